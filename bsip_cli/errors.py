@@ -1,0 +1,57 @@
+"""The errors a user may meet. Each carries its data and makes its own sentence."""
+
+from __future__ import annotations
+
+
+class BsipError(Exception):
+    """Base of all errors that are not bugs.
+
+    Parameters
+    ----------
+    found : what was found, as a clause without a full stop.
+    expected : what should have been there.
+    remedy : what the user can do about it.
+    file : the file (or participant, or option) the error is about.
+    """
+
+    exit_code = 1
+
+    def __init__(
+        self, found: str, *, expected: str = "", remedy: str = "", file: object = ""
+    ) -> None:
+        super().__init__(found, expected, remedy, str(file))
+        self.found = found
+        self.expected = expected
+        self.remedy = remedy
+        self.file = str(file)
+
+    def __str__(self) -> str:
+        where = f"{self.file}: " if self.file else ""
+        expected = f"; expected {self.expected}" if self.expected else ""
+        remedy = f". To mend it: {self.remedy}" if self.remedy else ""
+        return f"{where}{self.found}{expected}{remedy}."
+
+    def __reduce__(self):  # crosses process borders with its data
+        return _rebuild, (type(self), self.found, self.expected, self.remedy, self.file)
+
+
+def _rebuild(kind, found, expected, remedy, file):
+    return kind(found, expected=expected, remedy=remedy, file=file)
+
+
+class UsageError(BsipError):
+    """The command line or the configuration cannot be understood (exit code 2)."""
+
+    exit_code = 2
+
+
+class BadDataError(BsipError):
+    """A recording, table or artifact cannot be used (exit code 3)."""
+
+    exit_code = 3
+
+
+class NumericalError(BsipError):
+    """A computation did not converge or has no unique answer (exit code 4)."""
+
+    exit_code = 4

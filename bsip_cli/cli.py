@@ -1,0 +1,94 @@
+"""The command line: a few lines per command; heavy imports stay inside them."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import click
+
+from bsip_cli import __version__
+from bsip_cli.errors import BsipError
+from bsip_cli.pipeline import STAGES
+
+# One thread per process: results do not depend on the number of cores, and --jobs decides the load.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="bsip")
+def cli() -> None:
+    """Find a person's body segment inertial parameters from motion capture and force plates.
+
+    Exit codes: 0 done; 2 usage or configuration; 3 bad data (the rest is done); 4 numerical
+    failure; 1 a bug.
+    """
+
+
+def _stage_command(name: str, summary: str) -> click.Command:
+    @click.command(name, help=summary)
+    @click.argument("study", type=click.Path(path_type=Path))
+    @click.option("--out", required=True, type=click.Path(path_type=Path),
+                  help="Folder for all results.")
+    @click.option("--participant", "chosen", multiple=True, metavar="sub-01",
+                  help="Only this participant (may be repeated).")
+    @click.option("--config", "config_file", type=click.Path(path_type=Path),
+                  help="TOML file with options that differ from the study's.")
+    @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1),
+                  help="Participants at once.")
+    @click.option("--force", is_flag=True, help="Redo what is up to date.")
+    def command(study, out, chosen, config_file, jobs, force):
+        from bsip_cli.session import run_session
+
+        sys.exit(run_session(name, study, out, chosen, config_file, jobs=jobs, force=force))
+
+    return command
+
+
+for _stage in {stage.name: stage for stage in STAGES}.values():
+    cli.add_command(_stage_command(_stage.name, _stage.summary))
+cli.add_command(_stage_command("run", "All stages, from recordings to the report."))
+
+
+@cli.command()
+@click.argument("study", type=click.Path(path_type=Path))
+@click.option("--participants", default=6, show_default=True, type=click.IntRange(1, 500))
+@click.option("--seed", default=1, show_default=True, type=int)
+@click.option("--preset", default="sample", show_default=True,
+              type=click.Choice(["sample", "cohort"]),
+              help="sample: short trials at low rates; cohort: 120 s sequences at 100 Hz.")
+@click.option("--sequence-s", type=click.FloatRange(5, 1200),
+              help="Length of the identification sequence [s].")
+def simulate(study, participants, seed, preset, sequence_s):
+    """Make a study of simulated people whose inertial parameters are known."""
+    from bsip_cli.simulate.command import simulate_command
+
+    simulate_command(study, participants, seed, preset, sequence_s)
+
+
+@cli.command()
+def info() -> None:
+    """Versions of bsip and of the libraries its numbers depend on (for bug reports)."""
+    import platform
+
+    from bsip_cli.provenance import library_versions
+
+    click.echo(f"bsip {__version__}\npython {platform.python_version()}")
+    for name, version in library_versions().items():
+        click.echo(f"{name} {version}")
+
+
+def main() -> None:
+    """Entry point: turns errors into one sentence and a documented exit code."""
+    try:
+        cli(standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except click.Abort:
+        sys.exit(130)
+    except BsipError as error:
+        click.echo(f"bsip: {error}", err=True)
+        sys.exit(error.exit_code)

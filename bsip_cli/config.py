@@ -1,0 +1,158 @@
+"""The options: defaults, the study's own, the command line's; checked together, all faults at once."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from bsip_cli.errors import UsageError
+
+
+def shipped(*parts: str) -> Path:
+    """Path of a file that ships in ``configs/``, in a checkout as in an installed wheel."""
+    package = Path(__file__).parent
+    installed = package / "configs"
+    return (installed if installed.is_dir() else package.parent / "configs").joinpath(*parts)
+
+
+class Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Roles(Section):
+    static: tuple[str, ...]
+    sequence: tuple[str, ...]
+
+
+class Ingest(Section):
+    max_gap_s: float = Field(ge=0)
+    mass_tolerance_percent: float = Field(gt=0)
+    zero_unloaded_plates: bool
+    plates: tuple[int, ...]
+
+
+class Scale(Section):
+    joint_centre_sd_m: float = Field(gt=0)
+    length_sd: float = Field(gt=0)
+    marker_sd_m: float = Field(gt=0)
+    hinge_sd_rad: float = Field(gt=0)
+    symmetry_sd: float = Field(gt=0)
+    frames: int = Field(ge=1)
+    iterations: int = Field(ge=0)
+
+
+class Ik(Section):
+    marker_sd_m: float = Field(gt=0)
+    robust_limit_m: float = Field(gt=0)
+    posture_sd_rad: float = Field(gt=0)
+    iterations: int = Field(ge=1)
+    undetermined_sd_rad: float = Field(gt=0)
+
+
+class Smoothing(Section):
+    method: Literal["spline", "butterworth"]
+    butterworth_cutoff_hz: float = Field(gt=0)
+    pace_window_s: float = Field(gt=0)
+
+
+class Regress(Section):
+    table: Literal["dumas2007", "deleva1996"]
+
+
+class Identify(Section):
+    estimators: tuple[Literal["base", "hansen2017"], ...] = Field(min_length=1)
+    cutoff_hz: float = Field(gt=0)
+    hold_out_fraction: float = Field(ge=0, lt=1)
+    block_s: float = Field(gt=0)
+    sigma_percent_limit: float = Field(gt=0)
+
+
+class Reconstruct(Section):
+    cutoff_hz: float = Field(gt=0)
+    cop_min_force_N: float = Field(gt=0)
+
+
+class Stats(Section):
+    alpha: float = Field(gt=0, lt=1)
+    equivalence_percent: float = Field(gt=0)
+
+
+class Config(Section):
+    """All options of a run; sections are named after the stages that read them."""
+
+    marker_set: str
+    skeleton: str
+    roles: Roles
+    ingest: Ingest
+    scale: Scale
+    ik: Ik
+    smoothing: Smoothing
+    regress: Regress
+    identify: Identify
+    reconstruct: Reconstruct
+    stats: Stats
+
+    def options(self, names: Iterable[str]) -> dict:
+        """The named options as plain values, as they enter an artifact's provenance."""
+        everything = self.model_dump(mode="json")
+        return {name: everything[name] for name in names}
+
+
+def load_config(files: Iterable[Path]) -> Config:
+    """Defaults, then each existing file in turn.
+
+    Raises
+    ------
+    UsageError
+        A file is not TOML, or holds unknown options or values out of range: all named at once.
+    """
+    merged = _read_toml(shipped("default.toml"))
+    sources = []
+    for file in files:
+        if file.exists():
+            merged = _merge(merged, _read_toml(file))
+            sources.append(str(file))
+    try:
+        return Config.model_validate(merged)
+    except ValidationError as error:
+        raise UsageError(
+            "; ".join(_fault(e, merged) for e in error.errors()),
+            file=", ".join(sources),
+            remedy="configs/default.toml lists every option with its unit",
+        ) from None
+
+
+def _read_toml(file: Path) -> dict:
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(
+            f"not valid TOML ({error})", file=file, remedy="correct that line"
+        ) from None
+    except OSError as error:
+        raise UsageError(f"cannot be read ({error.strerror})", file=file) from None
+
+
+def _merge(base: Mapping, over: Mapping) -> dict:
+    merged = dict(base)
+    for key, value in over.items():
+        both = isinstance(value, dict) and isinstance(merged.get(key), dict)
+        merged[key] = _merge(merged[key], value) if both else value
+    return merged
+
+
+def _fault(error: Mapping, values: Mapping) -> str:
+    path = [str(part) for part in error["loc"]]
+    name = ".".join(path)
+    if error["type"] != "extra_forbidden":
+        return f"{name} = {error['input']!r}: {error['msg']}"
+    model: type[BaseModel] = Config
+    for part in path[:-1]:
+        model = model.model_fields[part].annotation  # type: ignore[assignment]
+    near = difflib.get_close_matches(path[-1], model.model_fields, n=1, cutoff=0.4)
+    return f"unknown option {name}" + (f" (did you mean {near[0]}?)" if near else "")

@@ -1,0 +1,126 @@
+"""The stages in the order of the data: what each reads, what it writes, which options it sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bsip_cli.artifacts import Level
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage at one level.
+
+    ``reads`` and ``writes`` are kinds of artifacts. A trial stage that reads a participant's
+    artifact gets its own participant's; a participant stage that reads a trial's gets those of
+    all trials; a cohort stage reads everybody's. ``options`` are names of configuration entries:
+    only they enter the provenance. ``module`` holds a function ``run(unit)``.
+    """
+
+    name: str
+    level: Level
+    summary: str
+    reads: tuple[str, ...]
+    writes: tuple[str, ...]
+    options: tuple[str, ...] = ()
+    module: str = ""
+
+    @property
+    def label(self) -> str:
+        return f"{self.name} ({self.level})"
+
+
+STAGES = (
+    Stage(
+        "ingest", "trial",
+        "Read recordings: markers and ground wrench in SI units, gaps filled, contacts found.",
+        reads=(),
+        writes=("markers", "wrench", "plates", "contacts", "quality"),
+        options=("marker_set", "ingest"),
+        module="bsip_cli.stages.ingest",
+    ),
+    Stage(
+        "scale", "participant",
+        "Build the person's skeleton: lengths, joint centres, markers on their segments.",
+        reads=("markers", "wrench"),
+        writes=("skeleton", "marker-positions", "person"),
+        options=("skeleton", "scale", "ik"),
+        module="bsip_cli.stages.scale",
+    ),
+    Stage(
+        "ik", "trial",
+        "Joint coordinates, velocities and accelerations from the markers.",
+        reads=("markers", "skeleton", "marker-positions"),
+        writes=("kinematics", "marker-residuals"),
+        options=("skeleton", "ik", "smoothing"),
+        module="bsip_cli.stages.ik",
+    ),
+    Stage(
+        "regress", "participant",
+        "Inertial parameters from an anthropometric table (RM).",
+        reads=("skeleton", "person"),
+        writes=("regression",),
+        options=("skeleton", "regress"),
+        module="bsip_cli.stages.regress",
+    ),
+    Stage(
+        "identify", "participant",
+        "Inertial parameters that explain the measured ground forces (OM).",
+        reads=("kinematics", "wrench", "skeleton", "person", "regression"),
+        writes=("bsip", "base-parameters", "excitation", "identification", "used-blocks"),
+        options=("skeleton", "roles", "identify"),
+        module="bsip_cli.stages.identify",
+    ),
+    Stage(
+        "reconstruct", "trial",
+        "Ground wrench and centre of pressure from the motion, beside the measured ones.",
+        reads=("kinematics", "wrench", "plates", "skeleton", "person", "bsip", "used-blocks"),
+        writes=("reconstruction", "fit", "correlation-difference", "posturography"),
+        options=("skeleton", "reconstruct"),
+        module="bsip_cli.stages.reconstruct",
+    ),
+    Stage(
+        "stats", "cohort",
+        "Tests and summaries over all participants.",
+        reads=("bsip", "fit", "posturography", "correlation-difference"),
+        writes=("values", "comparisons"),
+        options=("roles", "stats"),
+        module="bsip_cli.stages.stats",
+    ),
+    Stage(
+        "tables", "cohort",
+        "The papers' tables as CSV, Markdown and LaTeX.",
+        reads=("values", "comparisons"),
+        writes=("tables-files",),
+        options=("stats",),
+        module="bsip_cli.stages.tables",
+    ),
+    Stage(
+        "report", "participant",
+        "An HTML report per participant and one for the cohort.",
+        reads=("quality", "contacts", "skeleton", "marker-positions", "person", "kinematics",
+               "marker-residuals", "bsip", "base-parameters", "excitation", "identification",
+               "reconstruction", "fit", "posturography"),
+        writes=("report-files",),
+        options=("skeleton",),
+        module="bsip_cli.stages.report",
+    ),
+    Stage(
+        "report", "cohort",
+        "An HTML report per participant and one for the cohort.",
+        reads=("values", "comparisons", "person", "identification", "tables-files"),
+        writes=("group-report-files",),
+        options=("stats",),
+        module="bsip_cli.stages.group_report",
+    ),
+)
+
+
+def stages_named(name: str) -> tuple[Stage, ...]:
+    """The stages behind one command, in order; ``run`` is all of them."""
+    return STAGES if name == "run" else tuple(s for s in STAGES if s.name == name)
+
+
+def producer(kind: str) -> Stage:
+    """The stage that writes a kind of artifact."""
+    return next(stage for stage in STAGES if kind in stage.writes)

@@ -1,0 +1,43 @@
+"""What made an artifact: inputs by hash, options, versions. No clock: the same work, the same bytes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+
+from bsip_cli import __version__
+
+_LIBRARIES = ("ezc3d", "numpy", "scipy", "pin", "pyarrow", "statsmodels")
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file's bytes."""
+    status = path.stat()
+    return _file_hash(str(path), status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=4096)
+def _file_hash(path: str, _modified: int, _size: int) -> str:
+    with Path(path).open("rb") as handle:
+        return hashlib.file_digest(handle, "sha256").hexdigest()
+
+
+@lru_cache(maxsize=1)
+def library_versions() -> dict[str, str]:
+    """Versions of the libraries that numbers depend on."""
+    return {name: version(name) for name in _LIBRARIES}
+
+
+def describe(stage: str, inputs: Mapping[str, Path], options: Mapping) -> dict:
+    """The provenance of what ``stage`` makes from ``inputs`` (name: file) with ``options``."""
+    return {
+        "stage": stage,
+        "bsip_version": __version__,
+        "libraries": library_versions(),
+        "inputs": {name: file_hash(path) for name, path in sorted(inputs.items())},
+        "options": json.loads(json.dumps(options, sort_keys=True)),
+    }

@@ -1,0 +1,64 @@
+"""What a reader hands on: a recording in SI units and one Z-up world frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+LEVELS = ("info", "corrected", "warning", "excluded")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the quality table: what was met in the data and what was done.
+
+    ``found``, ``expected`` and ``action`` are short clauses with numbers and units.
+    """
+
+    check: str
+    subject: str
+    found: str
+    expected: str
+    action: str
+    level: str  # one of LEVELS
+
+
+@dataclass(frozen=True)
+class Plate:
+    """One force plate's wrench on the body, world frame, at the analog rate."""
+
+    name: str
+    force_N: np.ndarray  # (n_analog, 3); standing: z > 0
+    moment_Nm: np.ndarray  # (n_analog, 3), about the world origin
+    corners_m: np.ndarray | None  # (4, 3); None where the file does not say (MOT)
+    usable: np.ndarray  # (n_analog,) bool; False for NaN, clipped or stuck samples
+
+    def wrench(self) -> np.ndarray:
+        """Force and moment side by side, (n_analog, 6)."""
+        return np.hstack([self.force_N, self.moment_Nm])
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Markers and plates of one trial; analog sample 0 and frame 0 are simultaneous."""
+
+    path: Path
+    marker_rate_hz: float
+    labels: tuple[str, ...]
+    markers_m: np.ndarray  # (n_frames, n_markers, 3), NaN = missing
+    analog_rate_hz: float
+    plates: tuple[Plate, ...]
+    findings: tuple[Finding, ...]
+    rotation_world_lab: np.ndarray  # (3, 3), applied to turn the lab frame Z-up
+    forces_note: str  # "" or why there are no usable forces
+    time0_s: float
+
+    @property
+    def n_frames(self) -> int:
+        return len(self.markers_m)
+
+    def time_s(self) -> np.ndarray:
+        """Marker times, (n_frames,)."""
+        return self.time0_s + np.arange(self.n_frames) / self.marker_rate_hz

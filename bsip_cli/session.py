@@ -1,0 +1,81 @@
+"""One call of a stage command: load the study, run, tell the user, decide the exit code."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+
+import click
+from tqdm import tqdm
+
+from bsip_cli.config import Config, load_config
+from bsip_cli.errors import UsageError
+from bsip_cli.pipeline import stages_named
+from bsip_cli.runner import Outcome, refusal_sentence, run_stages
+from bsip_cli.study import Participant, Study, load_study
+
+_SEVERITY = (0, 3, 4, 2, 1)  # of several exit codes the gravest counts
+
+
+def run_session(
+    command: str, root: Path, out: Path, chosen: tuple[str, ...], config_file: Path | None,
+    *, jobs: int, force: bool,
+) -> int:
+    """Run a command's stages on a study and return the exit code."""
+    config = _config(root, config_file)
+    study, refusals = load_study(root, config.roles.model_dump())
+    participants = _choose(study, chosen)
+    stages = stages_named(command)
+    if chosen and command == "run":
+        stages = tuple(stage for stage in stages if stage.level != "cohort")
+    outcomes = list(refusal_sentence(refusals))
+    for outcome in outcomes:
+        _tell(outcome)
+    running = run_stages(stages, study, out, config, participants, force=force, jobs=jobs)
+    total = sum(
+        1 if s.level == "cohort"
+        else sum(len(p.trials) if s.level == "trial" else 1 for p in participants)
+        for s in stages
+    )
+    with tqdm(total=total, desc=command, unit="unit", disable=None) as progress:
+        for outcome in running:
+            outcomes.append(outcome)
+            progress.update()
+            _tell(outcome)
+    _summary(command, outcomes, out)
+    return _exit_code(outcomes)
+
+
+def _config(root: Path, config_file: Path | None) -> Config:
+    if config_file is not None and not config_file.is_file():
+        raise UsageError("there is no such file", file=config_file, remedy="check --config")
+    return load_config([root / "study.toml", *([config_file] if config_file else [])])
+
+
+def _choose(study: Study, chosen: tuple[str, ...]) -> tuple[Participant, ...]:
+    known = {participant.id: participant for participant in study.participants}
+    unknown = [name for name in chosen if name not in known]
+    if unknown:
+        raise UsageError(
+            f"no participant {', '.join(unknown)}", file=study.root / "participants.tsv",
+            expected=f"one of {', '.join(known) or 'none, every line was refused'}",
+        )
+    return tuple(known[name] for name in dict.fromkeys(chosen)) if chosen else study.participants
+
+
+def _tell(outcome: Outcome) -> None:
+    for sentence in outcome.sentences:
+        tqdm.write(f"{outcome.stage}: {sentence}", file=click.get_text_stream("stderr"))
+
+
+def _summary(command: str, outcomes: Iterable[Outcome], out: Path) -> None:
+    states = Counter(outcome.state for outcome in outcomes)
+    words = {"done": "done", "fresh": "up to date", "refused": "refused",
+             "waiting": "without input", "bug": "failed by a bug"}
+    said = ", ".join(f"{states[state]} {word}" for state, word in words.items() if states[state])
+    click.echo(f"bsip {command}: {said or 'nothing to do'}; results in {out}", err=True)
+
+
+def _exit_code(outcomes: Iterable[Outcome]) -> int:
+    return max((outcome.exit_code for outcome in outcomes), key=_SEVERITY.index, default=0)

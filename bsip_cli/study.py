@@ -1,0 +1,184 @@
+"""A study on disk: participants, trials, their roles, and where artifacts lie."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from bsip_cli.errors import BadDataError, UsageError
+
+Role = Literal["static", "sequence", "validation"]
+
+_PARTICIPANT = re.compile(r"sub-[A-Za-z0-9]+")
+_TRIAL = re.compile(r"(?P<participant>sub-[A-Za-z0-9]+)_task-(?P<task>[A-Za-z0-9]+)(_run-(?P<run>[0-9]+))?")
+_RECORDINGS = (".c3d", ".trc")
+_NAME_RULE = "names like sub-01_task-sequence_run-1.c3d (letters and digits only)"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One recording: ``stem`` names all its artifacts."""
+
+    participant_id: str
+    task: str
+    stem: str
+    path: Path
+    role: Role
+
+
+@dataclass(frozen=True)
+class Participant:
+    """One row of participants.tsv; mass and height are None where the table says n/a."""
+
+    id: str
+    sex: Literal["M", "F"]
+    mass_kg: float | None
+    height_m: float | None
+    trials: tuple[Trial, ...]
+
+
+@dataclass(frozen=True)
+class Study:
+    root: Path
+    participants: tuple[Participant, ...]
+
+
+def load_study(root: Path, roles: dict[str, tuple[str, ...]]) -> tuple[Study, list[BadDataError]]:
+    """Read participants.tsv and list the recordings.
+
+    Parameters
+    ----------
+    root : the study's folder.
+    roles : task names of the roles ``static`` and ``sequence``.
+
+    Returns
+    -------
+    The study, and what had to be refused: a participant whose row or folder cannot be used does
+    not stop the others.
+
+    Raises
+    ------
+    UsageError
+        There is no study at ``root``.
+    BadDataError
+        participants.tsv cannot be read or lacks a column.
+    """
+    if not root.is_dir():
+        raise UsageError(
+            "there is no such folder", file=root, remedy="name the folder with participants.tsv"
+        )
+    participants, refusals = [], []
+    for row in _participant_rows(root / "participants.tsv"):
+        try:
+            participants.append(_participant(root, row, roles))
+        except BadDataError as refusal:
+            refusals.append(refusal)
+    return Study(root, tuple(participants)), refusals
+
+
+def _participant_rows(file: Path) -> list[dict[str, str]]:
+    required = ("participant_id", "sex", "mass_kg")
+    try:
+        with file.open(encoding="utf-8-sig", newline="") as handle:
+            rows = list(csv.DictReader(handle, delimiter="\t"))
+            header = rows[0].keys() if rows else ()
+    except OSError as error:
+        raise BadDataError(
+            f"cannot be read ({error.strerror})", file=file,
+            expected="a tab-separated table with participant_id, sex, mass_kg, height_m",
+            remedy="write one, a line per participant",
+        ) from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise BadDataError(
+            f"is not a text table ({error})", file=file, expected="tab-separated UTF-8 text",
+            remedy="save it again as tab-separated text",
+        ) from None
+    missing = [name for name in required if name not in header]
+    if missing:
+        raise BadDataError(
+            f"has no column {', '.join(missing)}" if rows else "names no participant", file=file,
+            expected="participant_id, sex, mass_kg, height_m, separated by tabs",
+            remedy="add it",
+        )
+    return rows
+
+
+def _participant(root: Path, row: dict[str, str], roles: dict[str, tuple[str, ...]]) -> Participant:
+    file = root / "participants.tsv"
+    name = (row["participant_id"] or "").strip()
+    if not _PARTICIPANT.fullmatch(name):
+        raise BadDataError(
+            f"participant_id {name!r}", file=file, expected="sub- and letters or digits",
+            remedy="rename the participant and the folder",
+        )
+    sex = (row["sex"] or "").strip().upper()
+    if sex not in ("M", "F"):
+        raise BadDataError(
+            f"sex {row['sex']!r} of {name}", file=file, expected="M or F",
+            remedy="the tables know these two; choose the nearer one",
+        )
+    folder = root / name
+    if not folder.is_dir():
+        raise BadDataError(
+            f"there is no folder {name}", file=root, expected="one folder per participant",
+            remedy="add it, or take the line out of participants.tsv",
+        )
+    return Participant(
+        id=name,
+        sex=sex,  # type: ignore[arg-type]
+        mass_kg=_number(row, "mass_kg", name, file, 10.0, 400.0),
+        height_m=_number(row, "height_m", name, file, 0.5, 2.6),
+        trials=_trials(folder, name, roles),
+    )
+
+
+def _number(
+    row: dict[str, str], column: str, name: str, file: Path, low: float, high: float
+) -> float | None:
+    text = (row.get(column) or "n/a").strip()
+    if text.lower() in ("n/a", ""):
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not low <= value <= high:
+        raise BadDataError(
+            f"{column} {text!r} of {name}", file=file,
+            expected=f"a number between {low:g} and {high:g}, or n/a", remedy="correct it",
+        )
+    return value
+
+
+def _trials(
+    folder: Path, participant: str, roles: dict[str, tuple[str, ...]]
+) -> tuple[Trial, ...]:
+    trials = []
+    for path in sorted(folder.iterdir()):
+        if path.suffix.lower() not in _RECORDINGS or not path.is_file():
+            continue
+        match = _TRIAL.fullmatch(path.stem)
+        if match is None or match["participant"] != participant:
+            raise BadDataError(f"file name {path.name}", file=folder, expected=_NAME_RULE,
+                               remedy="rename it")
+        trials.append(Trial(participant, match["task"], path.stem, path, _role(match["task"], roles)))
+    stems = [trial.stem for trial in trials]
+    double = {stem for stem in stems if stems.count(stem) > 1}
+    if double:
+        raise BadDataError(
+            f"two recordings called {', '.join(sorted(double))}", file=folder,
+            expected="one .c3d or one .trc of each name", remedy="remove one or give it a run number",
+        )
+    if not trials:
+        raise BadDataError("no recordings", file=folder, expected=_NAME_RULE, remedy="add them")
+    return tuple(trials)
+
+
+def _role(task: str, roles: dict[str, tuple[str, ...]]) -> Role:
+    for role in ("static", "sequence"):
+        if task in roles[role]:
+            return role  # type: ignore[return-value]
+    return "validation"

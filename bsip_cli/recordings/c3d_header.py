@@ -10,8 +10,10 @@ from bsip_cli.errors import BadDataError
 
 _BLOCK = 512
 _C3D_KEY = 0x50
-_MIPS = 86
+_DEC, _MIPS = 85, 86
 _FULL = 0xFFFF  # frame number that does not fit the header's word
+_MANY_TIMES = 20
+_PARAMETER_BYTES = 64 * _BLOCK
 
 
 @dataclass(frozen=True)
@@ -47,16 +49,17 @@ def check_header(path: Path) -> Header:
                 file=path,
             )
         stream.seek((block[0] - 1) * _BLOCK if block[0] else 0)
-        parameters = stream.read(4)
-    if len(parameters) == 4 and parameters[3] == _MIPS:
+        parameters = stream.read(_PARAMETER_BYTES)
+    processor = parameters[3] if len(parameters) > 3 else 0
+    if processor == _MIPS:
         raise BadDataError(
             "numbers in MIPS (SGI) format",
             expected="PC or DEC format",
             remedy="convert the file to PC format",
             file=path,
         )
-    header = _parse(block)
-    _refuse_truncated(path, header, size)
+    header = _parse(block, processor == _DEC)
+    _refuse_truncated(path, header, _point_frames(parameters), size)
     return header
 
 
@@ -70,24 +73,40 @@ def _file_size(path: Path) -> int:
     return size
 
 
-def _parse(block: bytes) -> Header:
+def _parse(block: bytes, is_dec: bool) -> Header:
     n_points, n_analog, first, last = struct.unpack_from("<4H", block, 2)
-    # the exponent's sign bit sits in the high byte in DEC and PC floats alike
-    scale_is_negative = bool(block[13] & 0x80) or bool(block[15] & 0x80)
+    sign_byte = block[13] if is_dec else block[15]  # DEC floats have their words swapped
     (data_start,) = struct.unpack_from("<H", block, 16)
-    return Header(n_points, n_analog, first, last, data_start, scale_is_negative)
+    is_float = bool(sign_byte & 0x80)  # a negative point scale means floating-point data
+    return Header(n_points, n_analog, first, last, data_start, is_float)
 
 
-def _refuse_truncated(path: Path, header: Header, size: int) -> None:
+def _point_frames(parameters: bytes) -> int | None:
+    """POINT:FRAMES, which ezc3d believes more than the header's frame numbers."""
+    at = parameters.find(b"FRAMES")
+    value_at = at + len(b"FRAMES") + 4  # after the offset to the next (2), type and rank
+    if at < 1 or parameters[at - 1] != len(b"FRAMES") or value_at + 2 > len(parameters):
+        return None
+    is_one_integer = parameters[value_at - 2] == 2 and parameters[value_at - 1] == 0
+    return struct.unpack_from("<H", parameters, value_at)[0] if is_one_integer else None
+
+
+def _refuse_truncated(path: Path, header: Header, point_frames: int | None, size: int) -> None:
     """The data the header promises must be in the file (a last partial block is forgiven)."""
-    if header.last_frame == _FULL or header.n_frames <= 0 or header.data_start_block < 2:
+    if header.n_frames <= 0 or header.data_start_block < 2:
         return
     available = size - (header.data_start_block - 1) * _BLOCK
-    promised = header.n_frames * header.bytes_per_frame
+    n_frames = header.n_frames
+    is_too_much = n_frames * header.bytes_per_frame > available
+    if is_too_much and point_frames not in (None, 0, _FULL):
+        n_frames = min(n_frames, point_frames)
+    promised = n_frames * header.bytes_per_frame
+    if header.last_frame == _FULL and promised < _MANY_TIMES * max(available, 1):
+        return  # the true count is elsewhere
     if promised > available + _BLOCK:
         raise BadDataError(
             f"the header promises {promised} bytes of data ({header.n_points} points, "
-            f"{header.n_frames} frames) and the file holds {max(available, 0)}",
+            f"{n_frames} frames) and the file holds {max(available, 0)}",
             expected="a complete file",
             remedy="copy or export the trial again",
             file=path,

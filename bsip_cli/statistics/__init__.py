@@ -1,0 +1,1 @@
+"""Fit measures, sway measures and statistical tests: arrays in, frozen dataclasses out."""

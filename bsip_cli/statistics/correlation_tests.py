@@ -53,7 +53,7 @@ def williams_t(r_mc1: float, r_mc2: float, r_c1c2: float, n: float) -> Dependent
     ----------
     r_mc1, r_mc2 : correlation of the measured with each computed signal.
     r_c1c2 : correlation of the two computed signals.
-    n : independent samples.
+    n : independent samples; of two effective numbers the smaller.
     """
     difference = r_mc1 - r_mc2
     determinant = 1.0 - r_mc1**2 - r_mc2**2 - r_c1c2**2 + 2.0 * r_mc1 * r_mc2 * r_c1c2

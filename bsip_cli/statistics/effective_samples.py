@@ -58,7 +58,7 @@ def effective_samples_of_pair(
     """Independent pairs that would give the correlation of x and y the same variance.
 
     n / (1 + 2 sum_k (N_k / n) rho_x,k rho_y,k), after Bartlett 1935 (Some aspects of the
-    time-correlation problem, J. R. Stat. Soc. 98; Pyper and Peterman 1998, eq. 1): exact for
+    time-correlation problem, J. R. Stat. Soc. 98; Pyper and Peterman 1998): exact for
     series that are independent of each other, an approximation otherwise. The sum ends at the
     first lag of five integrated correlation times (Sokal 1997, section 3): unlike the sign rule
     for one series, this is not fooled by two oscillations that cross zero a frame apart.

@@ -8,7 +8,7 @@ from math import atan2, hypot, nan, pi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bsip_cli.statistics.effective_samples import effective_samples_of_pair
+from bsip_cli.statistics.effective_samples import MINIMUM_SAMPLES, effective_samples_of_pair
 from bsip_cli.statistics.samples import is_constant
 from bsip_cli.statistics.stretches import Stretches, finite_stretches, joined
 
@@ -44,9 +44,10 @@ def fit_measures(
     """RMSE, Pearson's r and the Sprague-Geers metric of two signals over the given stretches.
 
     With theta_ab the mean of a b: M = sqrt(theta_cc / theta_mm) - 1, P = arccos(theta_mc /
-    sqrt(theta_mm theta_cc)) / pi, C = sqrt(M^2 + P^2) (Schwer 2007, Validation metrics for
-    response histories, Engineering with Computers 23, eqs 1 to 5). They are not centred: for a
-    signal with a large mean, such as the vertical force, P stays small whatever the phase.
+    sqrt(theta_mm theta_cc)) / pi, C = sqrt(M^2 + P^2) (Sprague and Geers, as in Schwer 2007,
+    Validation metrics for response histories, Engineering with Computers 23). They are not
+    centred: for a signal with a large mean, such as the vertical force, P stays small whatever
+    the phase.
 
     Parameters
     ----------
@@ -68,6 +69,8 @@ def fit_measures(
     percent = 100.0 * rmse / body_weight_N if body_weight_N else nan
     r, why_no_r = _pearson(m, c)
     magnitude, phase, why_no_metric = _magnitude_and_phase(m, c)
+    few = f"Under {MINIMUM_SAMPLES} samples there is no effective number."
+    why_no_number = few if len(m) < MINIMUM_SAMPLES else ""
     return FitMeasures(
         rmse=rmse,
         rmse_percent_bw=percent,
@@ -77,7 +80,7 @@ def fit_measures(
         schwer_c=hypot(magnitude, phase),
         n=len(m),
         n_effective=effective_samples_of_pair(measured, computed, parts),
-        reason=" ".join(filter(None, [why_no_r, why_no_metric])),
+        reason=" ".join(filter(None, [why_no_r, why_no_metric, why_no_number])),
     )
 
 

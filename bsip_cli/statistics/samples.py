@@ -40,8 +40,10 @@ def is_constant(values: NDArray[np.float64], *, beside: float = 0.0) -> bool:
 
 
 def standard_deviation(values: NDArray[np.float64]) -> float:
-    """Sample standard deviation (n - 1), nan below two values."""
-    return float(np.std(values, ddof=1)) if len(values) > 1 else float("nan")
+    """Sample standard deviation (n - 1): nan below two values, 0 if they differ by rounding."""
+    if len(values) < 2:
+        return float("nan")
+    return 0.0 if is_constant(values) else float(np.std(values, ddof=1))
 
 
 def mean_of(values: NDArray[np.float64]) -> float:

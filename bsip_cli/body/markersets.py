@@ -1,0 +1,142 @@
+"""Marker sets: which label sits on which segment, and which bony landmark it is."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+from bsip_cli.body.names import SEGMENTS
+from bsip_cli.config import shipped
+from bsip_cli.errors import BadDataError, UsageError
+
+_SIDED = {
+    "forehead", "occiput", "temple", "acromion", "asis", "psis", "elbow_lateral", "elbow_medial",
+    "styloid_radial", "styloid_ulnar", "metacarpal_2", "metacarpal_3", "metacarpal_5",
+    "knee_lateral", "knee_medial", "malleolus_lateral", "malleolus_medial", "calcaneus",
+    "metatarsal_1", "metatarsal_2", "metatarsal_5",
+}
+LANDMARKS = frozenset(
+    {"vertex", "sellion", "forehead", "occiput", "c7", "t10", "suprasternale", "xiphoid", "sacrum"}
+    | {f"{name}_{side}" for name in _SIDED for side in "lr"}
+)
+
+
+@dataclass(frozen=True)
+class Marker:
+    """One marker: its label, its segment, the landmark it marks (or empty), its weight."""
+
+    label: str
+    segment: str
+    landmark: str
+    weight: float
+    optional: bool
+    aliases: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class MarkerSet:
+    name: str
+    description: str
+    markers: tuple[Marker, ...]
+
+    def wanted(self) -> dict[str, tuple[str, ...]]:
+        """Label and its aliases, for matching a file's labels."""
+        return {marker.label: marker.aliases for marker in self.markers}
+
+
+def load_marker_set(name: str) -> MarkerSet:
+    """Read a marker set: the name of a shipped one, or a path to a TOML file.
+
+    Raises
+    ------
+    UsageError
+        There is no such file, or it names unknown segments or landmarks: all faults at once.
+    """
+    file = Path(name) if name.endswith(".toml") else shipped("markersets", f"{name}.toml")
+    try:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError:
+        known = ", ".join(["auto", *shipped_names()])
+        raise UsageError(
+            "there is no such marker set", file=name, expected=f"{known}, or a path to a .toml"
+        ) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"not valid TOML ({error})", file=file) from None
+    faults = _faults(data)
+    if faults:
+        raise UsageError("; ".join(faults), file=file, remedy="configs/markersets has examples")
+    weights = data.get("weights", {})
+    aliases = data.get("aliases", {})
+    optional = data.get("optional", {}).get("markers", [])
+    markers = tuple(
+        Marker(label, segment, landmark, float(weights.get(label, 1.0)), label in optional,
+               tuple(aliases.get(label, ())))
+        for segment, members in data["segments"].items()
+        for label, landmark in members.items()
+    )
+    return MarkerSet(file.stem, str(data.get("description", file.stem)), markers)
+
+
+def shipped_names() -> tuple[str, ...]:
+    """Names of the marker sets that ship with bsip."""
+    return tuple(sorted(path.stem for path in shipped("markersets").glob("*.toml")))
+
+
+def guess_marker_set(labels: Collection[str]) -> MarkerSet:
+    """The shipped set of which most markers are there; labels may carry a ``Subject:`` prefix.
+
+    Raises
+    ------
+    BadDataError
+        No set has half of its markers among the labels.
+    """
+    plain = {label.rsplit(":", 1)[-1].strip().upper() for label in labels}
+
+    def share(marker_set: MarkerSet) -> float:
+        hits = [
+            bool(plain & {name.upper() for name in (marker.label, *marker.aliases)})
+            for marker in marker_set.markers if not marker.optional
+        ]
+        return sum(hits) / len(hits)
+
+    best = max((load_marker_set(name) for name in shipped_names()), key=share)
+    if share(best) < 0.5:
+        raise BadDataError(
+            f"no known marker set fits: {best.name} comes nearest with {share(best):.0%} of its "
+            f"markers; labels are {', '.join(sorted(labels)[:12])} ...",
+            expected="one of " + ", ".join(shipped_names()),
+            remedy="write a marker set (see configs/markersets) and name it in study.toml: "
+            'marker_set = "my_set.toml"',
+        )
+    return best
+
+
+def _faults(data: dict) -> list[str]:
+    segments = data.get("segments")
+    if not isinstance(segments, dict) or not segments:
+        return ["no [segments]: expected lines like head = { RTEM = \"temple_r\" }"]
+    faults = []
+    labels: list[str] = []
+    for segment, members in segments.items():
+        if segment not in SEGMENTS:
+            faults.append(f"unknown segment {segment}{_near(segment, SEGMENTS)}")
+        if not isinstance(members, dict):
+            faults.append(f"{segment}: expected {{ LABEL = \"landmark\", ... }}")
+            continue
+        for label, landmark in members.items():
+            labels.append(label)
+            if landmark and landmark not in LANDMARKS:
+                faults.append(f"{label}: unknown landmark {landmark}{_near(landmark, LANDMARKS)}")
+    faults += [f"{label} stands twice" for label in sorted(set(labels)) if labels.count(label) > 1]
+    named = {*data.get("weights", {}), *data.get("aliases", {}),
+             *data.get("optional", {}).get("markers", [])}
+    faults += [f"{label} has options but no segment" for label in sorted(named - set(labels))]
+    return faults
+
+
+def _near(name: str, known: Collection[str]) -> str:
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
+    return f" (did you mean {near[0]}?)" if near else ""

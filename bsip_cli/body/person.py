@@ -1,0 +1,68 @@
+"""A person's scaled skeleton: where the joints are and where the markers sit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.body.skeleton import Skeleton
+
+
+@dataclass(frozen=True)
+class Person:
+    """Geometry of one person; arrays run over the skeleton's segments or over the markers.
+
+    All segment axes are parallel in the neutral pose but for the hinges' tilts. A hinge turns
+    about ``Rx(parent_tilt) z`` in the parent and about ``Rx(child_tilt) z`` in the segment.
+
+    Attributes
+    ----------
+    joint_in_parent_m : (n, 3) joint centre in the parent's segment frame (zeros for the base).
+    parent_tilt_rad, child_tilt_rad : (n,) tilt of hinges about X; zero for other joints.
+    origin_in_joint_m : (n, 3) from the joint centre to the segment's origin, segment axes; only
+        the upper torso has one (its joint is the waist, its origin the neck).
+    lengths_m : (n,) lengths that scale the anthropometric table.
+    markers : names; ``marker_segments`` (m,) indices; ``marker_positions_m`` (m, 3) in the
+        segment frame; ``marker_weights`` (m,).
+    held : (n,) joints that no marker informs.
+    """
+
+    skeleton: Skeleton
+    joint_in_parent_m: np.ndarray
+    parent_tilt_rad: np.ndarray
+    child_tilt_rad: np.ndarray
+    origin_in_joint_m: np.ndarray
+    lengths_m: np.ndarray
+    markers: tuple[str, ...]
+    marker_segments: np.ndarray
+    marker_positions_m: np.ndarray
+    marker_weights: np.ndarray
+    held: np.ndarray
+
+    def joint_positions_m(self) -> np.ndarray:
+        """(n, 3) joint centres as seen from the parent's *joint*, parent axes."""
+        parents = np.array(self.skeleton.parents)
+        shift = np.where(parents[:, None] >= 0, self.origin_in_joint_m[parents], 0.0)
+        return self.joint_in_parent_m + shift
+
+    def joint_rotations(self) -> np.ndarray:
+        """(n, 3, 3) rotation of the segment in its parent at angle zero."""
+        return rotations_x(self.parent_tilt_rad - self.child_tilt_rad)
+
+    def hinge_axes(self) -> np.ndarray:
+        """(n, 3) unit axis of each joint in its own segment (used for hinges)."""
+        tilt = self.child_tilt_rad
+        return np.stack([np.zeros_like(tilt), -np.sin(tilt), np.cos(tilt)], axis=1)
+
+    def markers_in_joint_m(self) -> np.ndarray:
+        """(m, 3) marker positions from the joint centre of their segment, segment axes."""
+        return self.marker_positions_m + self.origin_in_joint_m[self.marker_segments]
+
+
+def rotations_x(angles_rad: np.ndarray) -> np.ndarray:
+    """(n, 3, 3) rotations about X."""
+    c, s = np.cos(angles_rad), np.sin(angles_rad)
+    one, zero = np.ones_like(c), np.zeros_like(c)
+    rows = [[one, zero, zero], [zero, c, -s], [zero, s, c]]
+    return np.moveaxis(np.array(rows), -1, 0)

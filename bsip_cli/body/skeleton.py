@@ -1,0 +1,126 @@
+"""The tree of segments and joints as data: names, parents, joint types, table rows."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+from bsip_cli.config import shipped
+from bsip_cli.errors import UsageError
+
+JointType = Literal["free", "spherical", "revolute"]
+
+_Q_PARTS = {
+    "free": ("tx", "ty", "tz", "qx", "qy", "qz", "qw"),
+    "spherical": ("qx", "qy", "qz", "qw"),
+    "revolute": ("angle",),
+}
+_V_PARTS = {"free": ("tx", "ty", "tz", "rx", "ry", "rz"), "spherical": ("rx", "ry", "rz"),
+            "revolute": ("angle",)}
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """A tree of segments in depth-first order; all tuples run over the segments.
+
+    Attributes
+    ----------
+    parents : index of the parent segment, -1 for the floating base, which comes first.
+    joints : name of the joint to the parent.
+    table_rows : row of the anthropometric table that gives the segment's inertia.
+    """
+
+    name: str
+    segments: tuple[str, ...]
+    parents: tuple[int, ...]
+    joints: tuple[str, ...]
+    joint_types: tuple[JointType, ...]
+    table_rows: tuple[str, ...]
+
+    def index(self, segment: str) -> int:
+        return self.segments.index(segment)
+
+    def side(self, segment: str) -> str:
+        """``l``, ``r`` or an empty string."""
+        return segment[-1] if segment.endswith(("_l", "_r")) else ""
+
+    @cached_property
+    def q_names(self) -> tuple[str, ...]:
+        """Names of the configuration's entries, in Pinocchio's order."""
+        return self._names(_Q_PARTS)
+
+    @cached_property
+    def v_names(self) -> tuple[str, ...]:
+        """Names of the velocity's entries, in Pinocchio's order."""
+        return self._names(_V_PARTS)
+
+    @cached_property
+    def q_starts(self) -> tuple[int, ...]:
+        """Where each joint's entries begin in q."""
+        return _starts(len(_Q_PARTS[kind]) for kind in self.joint_types)
+
+    @cached_property
+    def v_starts(self) -> tuple[int, ...]:
+        """Where each joint's entries begin in v."""
+        return _starts(len(_V_PARTS[kind]) for kind in self.joint_types)
+
+    def _names(self, parts: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
+        return tuple(
+            f"{joint}_{part}"
+            for joint, kind in zip(self.joints, self.joint_types, strict=True)
+            for part in parts[kind]
+        )
+
+
+def _starts(sizes) -> tuple[int, ...]:
+    starts, total = [], 0
+    for size in sizes:
+        starts.append(total)
+        total += size
+    return tuple(starts)
+
+
+def load_skeleton(name: str) -> Skeleton:
+    """Read a skeleton file: the name of a shipped one, or a path.
+
+    Raises
+    ------
+    UsageError
+        There is no such file, or its tree is not one: the first fault is named.
+    """
+    file = Path(name) if name.endswith(".toml") else shipped("skeletons", f"{name}.toml")
+    try:
+        rows = tomllib.loads(file.read_text(encoding="utf-8"))["segments"]
+        names = tuple(row["name"] for row in rows)
+        parents = tuple(names.index(row["parent"]) if row["parent"] else -1 for row in rows)
+        skeleton = Skeleton(
+            file.stem, names, parents,
+            tuple(row["joint"] for row in rows),
+            tuple(row["type"] for row in rows),
+            tuple(row["table"] for row in rows),
+        )
+    except OSError:
+        known = ", ".join(sorted(path.stem for path in shipped("skeletons").glob("*.toml")))
+        raise UsageError("there is no such skeleton", file=name, expected=known) from None
+    except (KeyError, ValueError, tomllib.TOMLDecodeError) as error:
+        raise UsageError(
+            f"not a skeleton ({error})", file=file,
+            expected="[[segments]] with name, parent, joint, type and table",
+        ) from None
+    _check(skeleton, file)
+    return skeleton
+
+
+def _check(skeleton: Skeleton, file: Path) -> None:
+    base_first = skeleton.parents[0] == -1 and skeleton.joint_types[0] == "free"
+    ordered = all(0 <= parent < i for i, parent in enumerate(skeleton.parents) if i)
+    known = set(skeleton.joint_types[1:]) <= {"spherical", "revolute"}
+    if not (base_first and ordered and known):
+        raise UsageError(
+            "the segments are not a tree with one free base", file=file,
+            expected="the free base first, every parent before its children, and joints of type "
+            "spherical or revolute",
+        )

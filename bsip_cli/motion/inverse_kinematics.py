@@ -1,0 +1,173 @@
+"""Poses of the whole tree that fit the markers best, frame by frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.body.person import Person
+from bsip_cli.errors import BadDataError
+from bsip_cli.motion import kernel
+
+_KINDS = {"free": kernel.FREE, "spherical": kernel.SPHERICAL, "revolute": kernel.REVOLUTE}
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Least-squares poses of N frames.
+
+    Attributes
+    ----------
+    q : (N, nq) configurations in Pinocchio's order (quaternions x, y, z, w).
+    residual_m : (N, m) distance of each marker from its model, NaN where missing.
+    coordinate_sd : (N, nv) standard deviation of each coordinate [m or rad], given those nearer
+        to the base.
+    converged : (N,) the optimum was reached within the allowed steps.
+    """
+
+    q: np.ndarray
+    residual_m: np.ndarray
+    coordinate_sd: np.ndarray
+    converged: np.ndarray
+
+    def frame_rms_m(self) -> np.ndarray:
+        """(N,) root-mean-square residual of the markers that are there."""
+        present = np.isfinite(self.residual_m)
+        squares = np.where(present, self.residual_m, 0.0) ** 2
+        return np.sqrt(squares.sum(axis=1) / np.maximum(present.sum(axis=1), 1))
+
+    def rms_m(self) -> float:
+        """Root-mean-square residual over everything."""
+        return float(np.sqrt(np.nanmean(self.residual_m**2)))
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A person as flat arrays, as the compiled kernel reads them."""
+
+    kinds: np.ndarray
+    parents: np.ndarray
+    q_starts: np.ndarray
+    v_starts: np.ndarray
+    v_segments: np.ndarray
+    v_parents: np.ndarray
+    positions: np.ndarray
+    rotations: np.ndarray
+    axes: np.ndarray
+    nq: int
+    nv: int
+
+    def forward(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Orientation (N, n, 3, 3) and joint centre (N, n, 3) [m] of every segment, world."""
+        R = np.empty((len(q), len(self.kinds), 3, 3))
+        p = np.empty((len(q), len(self.kinds), 3))
+        kernel.forward_frames(
+            np.ascontiguousarray(q), self.kinds, self.parents, self.q_starts, self.positions,
+            self.rotations, self.axes, R, p,
+        )
+        return R, p
+
+
+def tree_of(person: Person) -> Tree:
+    """Flatten a person's skeleton for the kernel."""
+    skeleton = person.skeleton
+    v_segments, v_parents, last = [], [], []
+    for i, kind in enumerate(skeleton.joint_types):
+        before = last[skeleton.parents[i]] if i else -1
+        for _ in range({"free": 6, "spherical": 3, "revolute": 1}[kind]):
+            v_segments.append(i)
+            v_parents.append(before)
+            before = len(v_segments) - 1
+        last.append(before)
+    return Tree(
+        kinds=np.array([_KINDS[kind] for kind in skeleton.joint_types]),
+        parents=np.array(skeleton.parents),
+        q_starts=np.array(skeleton.q_starts),
+        v_starts=np.array(skeleton.v_starts),
+        v_segments=np.array(v_segments),
+        v_parents=np.array(v_parents),
+        positions=person.joint_positions_m(),
+        rotations=person.joint_rotations(),
+        axes=person.hinge_axes(),
+        nq=len(skeleton.q_names),
+        nv=len(skeleton.v_names),
+    )
+
+
+def neutral(person: Person) -> np.ndarray:
+    """(nq,) all angles zero, the base at the world's origin."""
+    q = np.zeros(len(person.skeleton.q_names))
+    for start, kind in zip(person.skeleton.q_starts, person.skeleton.joint_types, strict=True):
+        if kind != "revolute":
+            q[start + (6 if kind == "free" else 3)] = 1.0
+    return q
+
+
+def solve_poses(
+    person: Person, markers_m: np.ndarray, q_first: np.ndarray, *, marker_sd_m: float,
+    robust_limit_m: float, posture_sd_rad: float, iterations: int,
+) -> Poses:
+    """Weighted least squares on all markers, robust beyond a limit, each frame from the last.
+
+    Parameters
+    ----------
+    markers_m : (N, m, 3) world positions in the order of ``person.markers``, NaN where missing.
+    q_first : (nq,) where the first frame starts.
+    marker_sd_m, robust_limit_m, posture_sd_rad, iterations : as in configs/default.toml, [ik].
+
+    Raises
+    ------
+    BadDataError
+        There is no frame, or no marker in any frame.
+    """
+    if markers_m.shape[0] == 0 or not np.isfinite(markers_m).any():
+        raise BadDataError("no marker is visible in any frame", expected="tracked markers")
+    tree = tree_of(person)
+    count, markers = markers_m.shape[:2]
+    q, residual = np.empty((count, tree.nq)), np.empty((count, markers))
+    sd, steps = np.empty((count, tree.nv)), np.empty(count, dtype=np.int64)
+    kernel.solve_frames(
+        np.ascontiguousarray(markers_m, dtype=float), q_first, person.marker_segments,
+        person.markers_in_joint_m(), person.marker_weights / marker_sd_m**2, robust_limit_m,
+        posture_sd_rad**-2, iterations, tree.kinds, tree.parents, tree.q_starts, tree.v_starts,
+        tree.v_segments, tree.v_parents, tree.positions, tree.rotations, tree.axes,
+        q, residual, sd, steps,
+    )
+    return Poses(q, residual, sd, steps >= 0)
+
+
+def place_base(person: Person, markers_m: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Move ``q``'s base so that the model's markers lie on one frame's markers (m, 3), rigidly.
+
+    The fit takes the markers of the base segment where three are visible, else all of them.
+    """
+    tree = tree_of(person)
+    R, p = tree.forward(q[None])
+    model = p[0, person.marker_segments] + np.einsum(
+        "mij,mj->mi", R[0, person.marker_segments], person.markers_in_joint_m()
+    )
+    seen = np.isfinite(markers_m).all(axis=1)
+    chosen = seen & (person.marker_segments == 0)
+    if chosen.sum() < 3:
+        chosen = seen
+    turn, shift = _rigid_fit(model[chosen], markers_m[chosen])
+    placed = q.copy()
+    placed[:3] = turn @ q[:3] + shift
+    placed[3:7] = _quaternion_of(turn @ R[0, 0])
+    return placed
+
+
+def _rigid_fit(points: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation and shift that bring points to targets (Kabsch)."""
+    a, b = points.mean(axis=0), targets.mean(axis=0)
+    u, _, vt = np.linalg.svd((points - a).T @ (targets - b))
+    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T))])
+    turn = vt.T @ flip @ u.T
+    return turn, b - turn @ a
+
+
+def _quaternion_of(rotation: np.ndarray) -> np.ndarray:
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(rotation).as_quat()

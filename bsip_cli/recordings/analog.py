@@ -1,0 +1,95 @@
+"""Which analog samples can be believed: not NaN, not clipped, not stuck."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_RAILS = (2047, 2048, 32767, 32768)  # counts of 12- and 16-bit converters
+_FLAT_S = 0.02  # a true peak is not flat for longer
+_STUCK_S = 0.5
+_LOAD_CHANGE = 0.2  # of the largest load
+
+
+@dataclass(frozen=True)
+class SampleCheck:
+    """One mask per fault, (n,) bool, True = faulty."""
+
+    not_a_number: np.ndarray
+    clipped: np.ndarray
+    stuck: np.ndarray
+    silent_channels: tuple[int, ...]  # identically zero although the plate is loaded
+
+    def usable(self) -> np.ndarray:
+        return ~(self.not_a_number | self.clipped | self.stuck)
+
+
+def check_samples(
+    channels: np.ndarray, counts: np.ndarray, load: np.ndarray, rate_hz: float
+) -> SampleCheck:
+    """Judge one plate's channels (n, k); ``counts`` (n, k) are the converter's integers.
+
+    ``load`` (n,) is the plate's vertical force, used to see a channel that does not answer.
+    """
+    nan = ~np.isfinite(channels).all(axis=1)
+    clipped = np.zeros(len(channels), bool)
+    stuck = np.zeros(len(channels), bool)
+    silent = []
+    for i in range(channels.shape[1]):
+        clipped |= _at_rail(counts[:, i]) | _flat_top(channels[:, i], rate_hz)
+        stuck_here = _stuck(channels[:, i], load, rate_hz)
+        if stuck_here.any() and not np.nan_to_num(channels[:, i]).any():
+            silent.append(i)
+        else:
+            stuck |= stuck_here
+    return SampleCheck(nan, clipped, stuck & ~clipped, tuple(silent))
+
+
+def runs(mask: np.ndarray) -> np.ndarray:
+    """Start and stop (exclusive) of each stretch of True, (n_runs, 2)."""
+    edges = np.diff(np.concatenate([[0], np.asarray(mask, np.int8), [0]]))
+    return np.column_stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)])
+
+
+def long_runs(mask: np.ndarray, least: int) -> np.ndarray:
+    """The mask with stretches of True shorter than ``least`` samples taken out, (n,) bool."""
+    kept = np.zeros(len(mask), bool)
+    for start, stop in runs(mask):
+        if stop - start >= least:
+            kept[start:stop] = True
+    return kept
+
+
+def _at_rail(counts: np.ndarray) -> np.ndarray:
+    whole = np.rint(np.nan_to_num(counts))
+    is_count = np.abs(np.nan_to_num(counts) - whole) < 0.01
+    return long_runs(is_count & np.isin(np.abs(whole), _RAILS), 2)
+
+
+def _flat_top(signal: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Long runs of exactly the extreme value, far from where the signal usually is."""
+    known = signal[np.isfinite(signal)]
+    flat = np.zeros(len(signal), bool)
+    if not len(known):
+        return flat
+    largest = np.abs(known).max()
+    for extreme in (known.min(), known.max()):
+        far = abs(extreme - np.median(known)) > 0.1 * largest
+        if abs(extreme) >= 0.6 * largest and far:
+            flat |= long_runs(signal == extreme, max(4, round(_FLAT_S * rate_hz)))
+    return flat
+
+
+def _stuck(signal: np.ndarray, load: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Stretches of a constant channel during which the plate's load changes."""
+    same = np.concatenate([[False], np.diff(signal) == 0])
+    stuck = np.zeros(len(signal), bool)
+    scale = np.nanmax(np.abs(load), initial=0.0)
+    for start, stop in runs(same):
+        part = load[start:stop]
+        if stop - start < _STUCK_S * rate_hz or not np.isfinite(part).any():
+            continue
+        if np.nanmax(part) - np.nanmin(part) > max(_LOAD_CHANGE * scale, 50.0):
+            stuck[start - 1 : stop] = True
+    return stuck

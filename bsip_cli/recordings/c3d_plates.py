@@ -1,0 +1,190 @@
+"""The FORCE_PLATFORM and ANALOG groups of a C3D file, one plate at a time, in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.plates import N_CHANNELS, PlateDescription, corners_are_plausible
+from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
+
+
+@dataclass(frozen=True)
+class PlateChannels:
+    """One plate's description and its channels."""
+
+    plate: PlateDescription
+    channels: np.ndarray  # (n, 6 or 8): N and N m (type 1: m), sensor's origin, plate frame
+    counts: np.ndarray  # (n, 6 or 8): the same as converter counts, to see the rails
+    baseline: slice | None  # analog samples of FORCE_PLATFORM:ZERO
+
+
+class _BadPlate(Exception):
+    """Why one plate cannot be used; turned into a Finding."""
+
+
+def read_plates(
+    parameters: Mapping, analog: np.ndarray, samples_per_frame: int, length_unit_m: float
+) -> tuple[list[PlateChannels], list[Finding]]:
+    """All plates that the file describes and that its channels can fill.
+
+    ``analog`` (n_channels, n), scaled as the file says; ``length_unit_m`` is the size of
+    the unit of points, corners and origins.
+    """
+    group = parameters.get("FORCE_PLATFORM", {})
+    plates, findings = [], []
+    for index in range(_n_plates(group)):
+        try:
+            plates.append(_read_plate(parameters, analog, samples_per_frame, length_unit_m, index))
+        except _BadPlate as reason:
+            findings.append(
+                Finding("plate", str(index + 1), str(reason), "", "left the plate out", "excluded")
+            )
+    return plates, findings
+
+
+def plate_surfaces(parameters: Mapping, length_unit_m: float) -> list[np.ndarray]:
+    """Corners (4, 3) of every plausible plate, lab frame, even of those without channels."""
+    group = parameters.get("FORCE_PLATFORM", {})
+    surfaces = []
+    for index in range(_n_plates(group)):
+        try:
+            surfaces.append(_slab(group, "CORNERS", index, (3, 4)).T * length_unit_m)
+        except _BadPlate:
+            break
+    return [corners for corners in surfaces if corners_are_plausible(corners)]
+
+
+def value(group: Mapping, name: str) -> list | np.ndarray:
+    """A parameter's value, an empty list where it is missing."""
+    return group[name]["value"] if name in group else []
+
+
+def _n_plates(group: Mapping) -> int:
+    used = np.ravel(value(group, "USED"))
+    claimed = int(used[0]) if len(used) else 0
+    return min(max(claimed, 0), 64)
+
+
+def _read_plate(
+    parameters: Mapping,
+    analog: np.ndarray,
+    samples_per_frame: int,
+    length_unit_m: float,
+    index: int,
+) -> PlateChannels:
+    group = parameters["FORCE_PLATFORM"]
+    kind = _kind(group, index)
+    corners = _slab(group, "CORNERS", index, (3, 4)).T * length_unit_m
+    if not corners_are_plausible(corners):
+        raise _BadPlate(f"corners that are no plate: {_sides(corners)}")
+    origin = _slab(group, "ORIGIN", index, (3,)) * length_unit_m
+    rows = _channel_rows(group, kind, index, len(analog))
+    raw = analog[rows].T
+    return PlateChannels(
+        plate=PlateDescription(str(index + 1), kind, corners, origin),
+        channels=_in_si(parameters, kind, index, raw, rows, length_unit_m),
+        counts=raw / _scales(parameters.get("ANALOG", {}), len(analog))[rows],
+        baseline=_baseline(group, samples_per_frame, analog.shape[1]),
+    )
+
+
+def _kind(group: Mapping, index: int) -> int:
+    kinds = np.ravel(value(group, "TYPE"))
+    if index >= len(kinds):
+        raise _BadPlate("no FORCE_PLATFORM:TYPE")
+    if int(kinds[index]) not in N_CHANNELS:
+        raise _BadPlate(f"force platform type {int(kinds[index])}, types 1 to 4 can be read")
+    return int(kinds[index])
+
+
+def _slab(group: Mapping, name: str, index: int, shape: tuple[int, ...]) -> np.ndarray:
+    """The part of an array parameter that belongs to one plate (the last axis counts plates)."""
+    flat = np.ravel(np.asarray(value(group, name), float), order="F")
+    size = int(np.prod(shape))
+    if len(flat) < size * (index + 1):
+        raise _BadPlate(f"FORCE_PLATFORM:{name} has no entry for it")
+    return flat[size * index : size * (index + 1)].reshape(shape, order="F")
+
+
+def _channel_rows(group: Mapping, kind: int, index: int, n_analog: int) -> np.ndarray:
+    table = np.atleast_1d(np.asarray(value(group, "CHANNEL"), float))
+    table = table[:, None] if table.ndim == 1 else table
+    wanted = N_CHANNELS[kind]
+    if table.shape[0] < wanted or table.shape[1] <= index:
+        raise _BadPlate(
+            f"{table.shape[0]} channels listed for it, a type {kind} plate has {wanted}"
+        )
+    rows = table[:wanted, index].astype(int) - 1
+    if rows.min() < 0 or rows.max() >= n_analog:
+        raise _BadPlate(
+            f"it claims analog channel {rows.max() + 1 if rows.max() >= n_analog else 0}, "
+            f"the file holds {n_analog}"
+        )
+    return rows
+
+
+def _in_si(
+    parameters: Mapping,
+    kind: int,
+    index: int,
+    raw: np.ndarray,
+    rows: np.ndarray,
+    length_unit_m: float,
+) -> np.ndarray:
+    """Channels in N, N m and m; a unit that is no mechanical one (V) means N and N x length."""
+    if kind == 4 and (matrix := _cal_matrix(parameters["FORCE_PLATFORM"], index)) is not None:
+        return raw @ matrix.T * np.repeat([1.0, length_unit_m], 3)
+    units = _units(parameters.get("ANALOG", {}), rows)
+    return raw * np.array(
+        [_size(unit, kind, i, length_unit_m) for i, unit in enumerate(units)]
+    )
+
+
+def _size(unit: str, kind: int, position: int, length_unit_m: float) -> float:
+    """Size in SI of the channel at one position of a plate of this type."""
+    if kind == 3 or position < 3:
+        return force_in_N(unit) or 1.0
+    if kind == 1 and position < 5:
+        return length_in_m(unit) or length_unit_m
+    return moment_in_Nm(unit) or length_unit_m
+
+
+def _units(group: Mapping, rows: np.ndarray) -> list[str]:
+    units = list(value(group, "UNITS"))
+    return [units[row] if row < len(units) else "" for row in rows]
+
+
+def _cal_matrix(group: Mapping, index: int) -> np.ndarray | None:
+    """The plate's 6 x 6 matrix to N and N x length; None if there is none or only zeros."""
+    matrix = np.asarray(value(group, "CAL_MATRIX"), float)
+    if matrix.ndim != 3 or matrix.shape[:2] != (6, 6) or matrix.shape[2] <= index:
+        return None
+    return matrix[:, :, index] if matrix[:, :, index].any() else None
+
+
+def _scales(group: Mapping, n_channels: int) -> np.ndarray:
+    """Size of one converter count per channel, (n_channels,)."""
+    general = np.ravel(value(group, "GEN_SCALE"))
+    scales = np.ones(n_channels)
+    given = np.ravel(value(group, "SCALE"))[:n_channels]
+    scales[: len(given)] = given
+    scales = scales * (float(general[0]) if len(general) else 1.0)
+    return np.where(scales == 0, 1.0, scales)
+
+
+def _baseline(group: Mapping, samples_per_frame: int, n_samples: int) -> slice | None:
+    """FORCE_PLATFORM:ZERO counts frames from 1; (1, 0) and (0, x) mean none."""
+    zero = np.ravel(value(group, "ZERO"))
+    if len(zero) < 2 or zero[0] < 1 or zero[1] <= zero[0]:
+        return None
+    start, stop = int(zero[0] - 1) * samples_per_frame, int(zero[1]) * samples_per_frame
+    return slice(start, stop) if stop <= n_samples else None
+
+
+def _sides(corners_m: np.ndarray) -> str:
+    sides = np.linalg.norm(np.roll(corners_m, -1, axis=0) - corners_m, axis=1)
+    return "sides of " + ", ".join(f"{side:.3g}" for side in sides) + " m"

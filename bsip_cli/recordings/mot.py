@@ -1,0 +1,108 @@
+"""MOT files: ground forces as OpenSim writes them, in several namings."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bsip_cli.errors import BadDataError
+from bsip_cli.recordings.trc import read_lines
+
+_COLUMN = re.compile(
+    r"^(?P<before>.*?)(?P<what>force|torque|moment|grf|grm|cop)(?P<between>.*?)"
+    r"(?P<kind>[vpmtf]?)_?(?P<axis>[xyz])$"
+)
+_KINDS = {"v": "force", "f": "force", "p": "point", "m": "torque", "t": "torque"}
+_BARE = {
+    "force": "force",
+    "grf": "force",
+    "torque": "torque",
+    "moment": "torque",
+    "grm": "torque",
+    "cop": "point",
+}
+
+
+@dataclass(frozen=True)
+class GroundForce:
+    """One force: as written, lab frame."""
+
+    name: str
+    force_N: np.ndarray  # (n, 3)
+    point: np.ndarray  # (n, 3), in the file's length unit
+    torque_Nm: np.ndarray  # (n, 3), free torque at the point
+
+
+@dataclass(frozen=True)
+class Mot:
+    time_s: np.ndarray  # (n,)
+    forces: tuple[GroundForce, ...]
+
+
+def read_mot(path: Path) -> Mot:
+    """Read the ground forces of a MOT (or STO) file."""
+    lines = read_lines(path)
+    end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
+    body = [line for line in lines[end + 1 :] if line.strip()] if end is not None else []
+    if len(body) < 2:
+        raise BadDataError("no table after 'endheader'", expected="a MOT file", file=path)
+    names = body[0].split()
+    table = _table(body[1:], len(names), path)
+    if names[0].lower() != "time":
+        raise BadDataError(f"first column '{names[0]}'", expected="time", file=path)
+    return Mot(table[:, 0], _forces(names, table, path))
+
+
+def _table(lines: list[str], n_columns: int, path: Path) -> np.ndarray:
+    try:
+        table = np.array([[float(cell) for cell in line.split()] for line in lines])
+    except ValueError as error:
+        raise BadDataError(f"its table cannot be read: {error}", file=path) from error
+    if table.ndim != 2 or table.shape[1] != n_columns:
+        raise BadDataError("rows of unequal length", expected=f"{n_columns} cells", file=path)
+    return table
+
+
+def _forces(names: list[str], table: np.ndarray, path: Path) -> tuple[GroundForce, ...]:
+    columns: dict[str, dict[tuple[str, str], int]] = {}
+    for i, name in enumerate(names):
+        if (meaning := _meaning(name)) is not None:
+            identity, kind, axis = meaning
+            columns.setdefault(identity, {}).setdefault((kind, axis), i)
+    forces = []
+    for found in columns.values():
+        if all(("force", axis) in found for axis in "xyz"):
+            parts = {k: _vector(found, k, table) for k in ("force", "point", "torque")}
+            forces.append(
+                GroundForce(
+                    str(len(forces) + 1), parts["force"], parts["point"], parts["torque"]
+                )
+            )
+    if not forces:
+        raise BadDataError(
+            "no ground force among the columns " + ", ".join(names[:8]),
+            expected="columns like ground_force_1_vx",
+            file=path,
+        )
+    return tuple(forces)
+
+
+def _meaning(name: str) -> tuple[str, str, str] | None:
+    """A column's plate, kind and axis: '1_ground_force_px' is ('1', 'point', 'x')."""
+    match = _COLUMN.match(name.lower())
+    if match is None:
+        return None
+    kind = _KINDS.get(match["kind"]) or _BARE[match["what"]]
+    identity = re.sub(r"ground|reaction|[_\s]", "", match["before"] + match["between"])
+    return identity, kind, match["axis"]
+
+
+def _vector(found: dict[tuple[str, str], int], kind: str, table: np.ndarray) -> np.ndarray:
+    """Three columns of the table, zero where the file has none, (n, 3)."""
+    zero = np.zeros(len(table))
+    return np.column_stack(
+        [table[:, found[kind, axis]] if (kind, axis) in found else zero for axis in "xyz"]
+    )

@@ -1,0 +1,25 @@
+"""The one door to recordings: a path in, a recording out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bsip_cli.errors import BadDataError
+from bsip_cli.recordings.model import Recording
+
+
+def read_recording(path: Path) -> Recording:
+    """Read a ``.c3d``, or a ``.trc`` with the ``.mot`` (or ``_grf.mot``) of the same stem."""
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix == ".c3d":
+        from bsip_cli.recordings.c3d import read_c3d
+
+        return read_c3d(path)
+    if suffix == ".trc":
+        from bsip_cli.recordings.trc_mot import read_trc_mot
+
+        return read_trc_mot(path)
+    raise BadDataError(
+        f"a recording of type '{suffix}'", expected="a .c3d or a .trc file", file=path
+    )

@@ -1,0 +1,180 @@
+"""A TRC with its MOT: markers and ground forces in the convention of OpenSim (Y up)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from bsip_cli.errors import BadDataError
+from bsip_cli.recordings import world
+from bsip_cli.recordings.assemble import why_no_forces
+from bsip_cli.recordings.model import Finding, Plate, Recording
+from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
+from bsip_cli.recordings.plate_checks import LOADED_N
+from bsip_cli.recordings.timebase import even_grid, onto_grid
+from bsip_cli.recordings.trc import Trc, read_trc
+
+_LARGEST_ROOM = 20.0  # a point of force further away is in mm
+
+
+@dataclass(frozen=True)
+class _Action:
+    """All forces of a MOT, lab frame, sign and unit settled, at the MOT's times."""
+
+    names: tuple[str, ...]
+    force_N: np.ndarray  # (n_forces, n, 3), on the body
+    moment_Nm: np.ndarray  # (n_forces, n, 3), about the lab's origin
+    findings: tuple[Finding, ...]
+
+
+def read_trc_mot(path: Path) -> Recording:
+    """Markers from the TRC; plates from STEM.mot or STEM_grf.mot if one lies beside it."""
+    trc = read_trc(path)
+    time_s, rate_hz, positions, findings = _even_markers(trc, path)
+    mot_path = companion_mot(path)
+    mot = read_mot(mot_path) if mot_path else None
+    up = _up(trc, mot)
+    rotation = world.rotation_to_z_up(up)
+    analog_rate_hz, plates, note, found = _plates(mot, up, rotation, time_s, rate_hz)
+    turned = world.finding_about(up)
+    return Recording(
+        path=path,
+        marker_rate_hz=rate_hz,
+        labels=trc.labels,
+        markers_m=positions @ rotation.T,
+        analog_rate_hz=analog_rate_hz,
+        plates=() if note else plates,
+        findings=(*findings, *([turned] if turned else []), *found),
+        rotation_world_lab=rotation,
+        forces_note=note,
+        time0_s=float(time_s[0]),
+    )
+
+
+def companion_mot(path: Path) -> Path | None:
+    """The MOT that belongs to a TRC, or None."""
+    stem = path.with_suffix("")
+    candidates = [stem.with_suffix(".mot"), stem.with_name(stem.name + "_grf.mot")]
+    return next((candidate for candidate in candidates if candidate.is_file()), None)
+
+
+def _even_markers(
+    trc: Trc, path: Path
+) -> tuple[np.ndarray, float, np.ndarray, tuple[Finding, ...]]:
+    """Times (n,), rate, positions (n, n_markers, 3) on an even grid, and what was done."""
+    if len(trc.time_s) < 2:
+        raise BadDataError(
+            f"{len(trc.time_s)} frame", expected="at least 2 frames with times", file=path
+        )
+    grid = even_grid(trc.time_s, trc.rate_hz)
+    if grid is None:
+        raise BadDataError("times that do not increase", expected="increasing times", file=path)
+    return grid.time_s, grid.rate_hz, onto_grid(grid, trc.time_s, trc.positions_m), grid.findings
+
+
+def _up(trc: Trc, mot: Mot | None) -> world.Up:
+    """From the direction of the forces, the markers telling its sign; else labels; else Y."""
+    surface = None
+    if mot is not None and (loaded := _largest_loads(mot)) is not None:
+        force, point = loaded
+        scale = _point_scale(mot)
+        surface = world.up_from_surface(
+            np.abs(force).mean(axis=0)[None], point * scale, trc.positions_m
+        )
+    return (
+        surface
+        or world.up_from_labels(trc.labels, trc.positions_m)
+        or world.Up(1, 1, "the convention of TRC files")
+    )
+
+
+def _largest_loads(mot: Mot) -> tuple[np.ndarray, np.ndarray] | None:
+    force = np.concatenate([f.force_N for f in mot.forces])
+    point = np.concatenate([f.point for f in mot.forces])
+    loaded = np.linalg.norm(np.nan_to_num(force), axis=1) > LOADED_N
+    return (force[loaded], point[loaded]) if loaded.any() else None
+
+
+def _point_scale(mot: Mot) -> float:
+    """Metres per length unit of the points of force."""
+    loaded = _largest_loads(mot)
+    far = loaded is not None and np.median(np.abs(loaded[1]).max(axis=1)) > _LARGEST_ROOM
+    return 1e-3 if far else 1.0
+
+
+def _plates(
+    mot: Mot | None,
+    up: world.Up,
+    rotation: np.ndarray,
+    time_s: np.ndarray,
+    marker_rate_hz: float,
+) -> tuple[float, tuple[Plate, ...], str, tuple[Finding, ...]]:
+    """Analog rate, plates, the reason for none, findings."""
+    if mot is None:
+        return marker_rate_hz, (), "no .mot file of the same name beside the .trc", ()
+    grid = even_grid(mot.time_s, float("nan"))
+    if grid is None:
+        return marker_rate_hz, (), "the times of the .mot do not increase", ()
+    action = _action(mot, up)
+    n = round((time_s[-1] - time_s[0]) * grid.rate_hz) + 1
+    analog = replace(grid, time_s=time_s[0] + np.arange(n) / grid.rate_hz)
+    plates = tuple(
+        _plate(name, onto_grid(analog, mot.time_s, np.hstack([force, moment])), rotation)
+        for name, force, moment in zip(
+            action.names, action.force_N, action.moment_Nm, strict=True
+        )
+    )
+    findings = [*grid.findings, *action.findings, *_coverage(plates)]
+    return grid.rate_hz, plates, why_no_forces(plates), tuple(findings)
+
+
+def _action(mot: Mot, up: world.Up) -> _Action:
+    scale = _point_scale(mot)
+    force = np.array([f.force_N for f in mot.forces])
+    moment = np.array([_moment_about_origin(f, scale) for f in mot.forces])
+    lift = force @ up.vector()
+    findings = []
+    if scale != 1.0:
+        findings.append(_finding("unit", "points of force beyond 20 m", "m", "read them in mm"))
+    if np.nansum(lift) < 0:
+        force, moment = -force, -moment
+        median = np.nanmedian(lift[np.abs(lift) > LOADED_N / 5])
+        found = f"median vertical force {median:.0f} N: the action on the ground"
+        findings.append(
+            _finding("plate_sign", found, "the force on the body", "reversed forces and torques")
+        )
+    return _Action(tuple(f.name for f in mot.forces), force, moment, tuple(findings))
+
+
+def _moment_about_origin(force: GroundForce, scale_m: float) -> np.ndarray:
+    """p x F + T, (n, 3)."""
+    return np.cross(force.point * scale_m, force.force_N) + force.torque_Nm
+
+
+def _finding(check: str, found: str, expected: str, action: str) -> Finding:
+    return Finding(check, "", found, expected, action, "corrected")
+
+
+def _plate(name: str, wrench: np.ndarray, rotation: np.ndarray) -> Plate:
+    """A plate of unknown outline from its wrench (n, 6), lab frame."""
+    usable = np.isfinite(wrench).all(axis=1)
+    return Plate(name, wrench[:, :3] @ rotation.T, wrench[:, 3:] @ rotation.T, None, usable)
+
+
+def _coverage(plates: tuple[Plate, ...]) -> list[Finding]:
+    missing = int((~plates[0].usable).sum()) if plates else 0
+    if not missing:
+        return []
+    n = len(plates[0].usable)
+    return [
+        Finding(
+            check="analog_nan",
+            subject="",
+            found=f"no force for {missing} of {n} samples of the markers' time",
+            expected="forces as long as the markers",
+            action="marked them unusable",
+            level="warning",
+        )
+    ]

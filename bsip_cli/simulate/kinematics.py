@@ -1,0 +1,139 @@
+"""From the plan and the pelvis' pose to the pose of every body; legs by inverse kinematics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.simulate.people import SIDE_SIGN, SIDES, Person
+from bsip_cli.simulate.plan import Plan
+from bsip_cli.simulate.rotations import (
+    about_axis,
+    about_x,
+    about_y,
+    about_z,
+    euler_zxy,
+    frame_of,
+    rotate,
+    transpose,
+)
+
+LONGEST_REACH = 0.9985  # of thigh plus shank, so that the knee never locks
+DOWN = np.array([0.0, -1.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Poses of all bodies in one world frame.
+
+    rotation : (T, 3, 3) by body. origin_m : (T, 3) by body.
+    excess_reach_m : (T,) how far the feet were out of the legs' reach (0 = reachable).
+    """
+
+    rotation: dict[str, np.ndarray]
+    origin_m: dict[str, np.ndarray]
+    excess_reach_m: np.ndarray
+
+    def point(self, body: str, position_m: np.ndarray) -> np.ndarray:
+        """(T, 3) world path of a point (3,) of a body."""
+        return self.origin_m[body] + rotate(self.rotation[body], position_m)
+
+    def part(self, samples: slice) -> Poses:
+        """The same poses at some of the samples."""
+        return Poses(
+            {name: R[samples] for name, R in self.rotation.items()},
+            {name: p[samples] for name, p in self.origin_m.items()},
+            self.excess_reach_m[samples],
+        )
+
+
+def poses_of(
+    person: Person, plan: Plan, pelvis_m: np.ndarray, pelvis_rotation: np.ndarray
+) -> Poses:
+    """All bodies' poses for the pelvis' path (T, 3) and rotation (T, 3, 3)."""
+    rotation = {"lower_torso": pelvis_rotation}
+    origin = {"lower_torso": pelvis_m}
+    _trunk(person, plan, rotation, origin)
+    for side in SIDES:
+        _arm(person, plan, side, rotation, origin)
+    excess = np.maximum(
+        _leg(person, plan, "l", rotation, origin), _leg(person, plan, "r", rotation, origin)
+    )
+    return Poses(rotation, origin, excess)
+
+
+def _trunk(
+    person: Person, plan: Plan, rotation: dict[str, np.ndarray], origin: dict[str, np.ndarray]
+) -> None:
+    waist, bend = plan.angles_rad["waist"], person.trunk_bend
+    abdomen = rotation["lower_torso"] @ euler_zxy((1.0 - bend) * waist)
+    thorax = abdomen @ euler_zxy(bend * waist) if bend else abdomen
+    rotation["abdomen"], rotation["thorax"] = abdomen, thorax
+    origin["abdomen"] = origin["lower_torso"]
+    upper_joint = origin["abdomen"] + rotate(abdomen, person.joints_m["tjc"])
+    origin["thorax"] = upper_joint + rotate(thorax, person.joints_m["cjc"])
+    rotation["head"] = thorax @ euler_zxy(plan.angles_rad["neck"])
+    origin["head"] = origin["thorax"]
+
+
+def _arm(
+    person: Person,
+    plan: Plan,
+    side: str,
+    rotation: dict[str, np.ndarray],
+    origin: dict[str, np.ndarray],
+) -> None:
+    sign, angles, joints = SIDE_SIGN[side], plan.angles_rad, person.joints_m
+    upper, lower, hand = (f"{name}_{side}" for name in ("upper_arm", "forearm", "hand"))
+    mirror = np.array([1.0, -sign, sign])
+    origin[upper] = origin["thorax"] + rotate(rotation["thorax"], joints[f"shoulder_{side}"])
+    rotation[upper] = rotation["thorax"] @ euler_zxy(mirror * angles[f"shoulder_{side}"])
+    origin[lower] = origin[upper] + rotate(rotation[upper], joints[f"elbow_{side}"])
+    elbow = about_axis(person.hinges[f"elbow_{side}"], angles[f"elbow_{side}"])
+    rotation[lower] = rotation[upper] @ elbow
+    origin[hand] = origin[lower] + rotate(rotation[lower], joints[f"wrist_{side}"])
+    flexion, deviation, pronation = angles[f"wrist_{side}"].T
+    wrist = about_y(sign * pronation) @ about_z(flexion) @ about_x(-sign * deviation)
+    rotation[hand] = rotation[lower] @ wrist
+
+
+def _leg(
+    person: Person,
+    plan: Plan,
+    side: str,
+    rotation: dict[str, np.ndarray],
+    origin: dict[str, np.ndarray],
+) -> np.ndarray:
+    """Thigh and shank between the hip and the planned ankle; returns the excess reach.
+
+    The knee angle follows from the distance (law of cosines, exact for a tilted hinge);
+    the free turn about the line from hip to ankle brings the hinge between the lateral
+    axes of the pelvis and of the foot.
+    """
+    foot_path = plan.feet[side]
+    thigh, shank, foot = (f"{name}_{side}" for name in ("thigh", "shank", "foot"))
+    hip = origin["lower_torso"] + rotate(rotation["lower_torso"], person.joints_m[f"hip_{side}"])
+    line = foot_path.position_m - hip
+    distance = np.linalg.norm(line, axis=1)
+    upper, lower = person.lengths_m[thigh], person.lengths_m[shank]
+    longest = LONGEST_REACH * (upper + lower)
+    reach = np.minimum(distance, longest)
+
+    hinge = person.hinges[f"knee_{side}"]
+    along = float(hinge @ DOWN)
+    cosine = (reach**2 - upper**2 - lower**2) / (2.0 * upper * lower)
+    cosine = (cosine - along**2) / (1.0 - along**2)
+    flexion = np.arccos(np.clip(cosine, -1.0, 1.0))
+    bend = about_axis(hinge, -flexion)
+    ankle_in_thigh = upper * DOWN + lower * rotate(bend, DOWN)
+
+    lateral = rotation["lower_torso"][:, :, 2] + foot_path.rotation[:, :, 2]
+    in_thigh = frame_of(ankle_in_thigh, np.broadcast_to(hinge, ankle_in_thigh.shape))
+    rotation[thigh] = frame_of(line, lateral) @ transpose(in_thigh)
+    rotation[shank] = rotation[thigh] @ bend
+    rotation[foot] = foot_path.rotation
+    origin[thigh] = hip
+    origin[shank] = hip + rotate(rotation[thigh], upper * DOWN)
+    origin[foot] = foot_path.position_m
+    return np.maximum(distance - longest, 0.0)

@@ -1,0 +1,117 @@
+"""What a simulated study may vary. Every richness can be turned off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+ALL_TASKS = (
+    "static",
+    "sequence",
+    "throwing",
+    "basketball",
+    "squat",
+    "steps",
+    "walking",
+    "running",
+)
+
+
+@dataclass(frozen=True)
+class Richness:
+    """How much the simulated world differs from the model that is fitted to it.
+
+    soft_tissue : scale of the markers' motion against the bone (0 = rigid).
+    marker_noise_m : white noise, standard deviation per axis.
+    marker_drift_m : slow correlated noise, standard deviation per axis.
+    gaps : whether markers get lost for 5 to 40 frames.
+    force_noise_n, moment_noise_nm : white noise of the analog channels.
+    quantised : whether the analog channels are rounded to a 16-bit step.
+    hinge_tilt : scale of the tilt of elbow and knee axes against their segment's Z.
+    joint_centre_offset : scale of the true joint centres' distance from the regressions.
+    placement_error_m : marker placement, standard deviation per axis.
+    inertia_variation : scale of the person's distance from the mean person.
+    trunk_bend : share of the waist rotation that happens at T12/L1 (0 = stiff trunk).
+    """
+
+    soft_tissue: float = 1.0
+    marker_noise_m: float = 0.0003
+    marker_drift_m: float = 0.0001
+    gaps: bool = True
+    force_noise_n: float = 1.0
+    moment_noise_nm: float = 0.3
+    quantised: bool = True
+    hinge_tilt: float = 1.0
+    joint_centre_offset: float = 1.0
+    placement_error_m: float = 0.005
+    inertia_variation: float = 1.0
+    trunk_bend: float = 0.0
+
+    @staticmethod
+    def none() -> Richness:
+        """No noise, no gaps, rigid markers, hinges along Z, joint centres as predicted."""
+        return Richness(
+            soft_tissue=0.0,
+            marker_noise_m=0.0,
+            marker_drift_m=0.0,
+            gaps=False,
+            force_noise_n=0.0,
+            moment_noise_nm=0.0,
+            quantised=False,
+            hinge_tilt=0.0,
+            joint_centre_offset=0.0,
+            placement_error_m=0.0,
+        )
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Sampling rates [Hz]; the analog rate is a multiple of the marker rate.
+
+    Both must divide the simulation's 1000 Hz.
+    """
+
+    marker_hz: int = 100
+    analog_hz: int = 1000
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """Where the plates and the person are in the lab (Z up).
+
+    plate_size_m : along and across the walking direction.
+    plate_centre_m : of the first plate, X and Y in the lab.
+    facing_deg : heading of the walking direction from lab X, counter-clockwise.
+    plates : 1, or 2: a second plate lies ahead of the first and stays unloaded
+        unless a foot treads on it.
+    plate_depth_m : depth of the transducers' origin under the surface.
+    """
+
+    plate_size_m: tuple[float, float] = (0.6, 1.2)
+    plate_centre_m: tuple[float, float] = (0.70, 0.40)
+    facing_deg: float = 90.0
+    plates: int = 1
+    plate_depth_m: float = 0.048
+
+
+@dataclass(frozen=True)
+class StudyOptions:
+    """A whole simulated study.
+
+    durations_s : of the tasks whose length can be chosen.
+    rates : by task name; "default" serves the others.
+    ball_mass_kg : range from which the thrown ball's mass is drawn.
+    sexes : one letter per participant, or empty to draw them alternately.
+    """
+
+    participants: int = 6
+    seed: int = 1
+    tasks: tuple[str, ...] = ALL_TASKS
+    durations_s: dict[str, float] = field(default_factory=dict)
+    rates: dict[str, Rates] = field(default_factory=lambda: {"default": Rates()})
+    richness: Richness = field(default_factory=Richness)
+    laboratory: Laboratory = field(default_factory=Laboratory)
+    ball_mass_kg: tuple[float, float] = (0.15, 0.40)
+    sexes: str = ""
+
+    def rates_of(self, task: str) -> Rates:
+        return self.rates.get(task, self.rates.get("default", Rates()))

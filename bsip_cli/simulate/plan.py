@@ -1,0 +1,108 @@
+"""What a movement prescribes: joint angles, feet, support. Walkway frame: X ahead, Y up, Z right.
+
+The plan leaves the pelvis' horizontal path (and in flight its whole pose) to `balance`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+STEP_S = 0.001
+
+
+@dataclass(frozen=True)
+class Foot:
+    """One foot over time.
+
+    position_m : (T, 3) ankle joint centre.
+    rotation : (T, 3, 3) foot frame in the walkway frame.
+    share : (T,) part of the ground force that this foot carries (0 when it is in the air).
+    cop_m : (T, 2) centre of pressure under this foot, X and Z.
+    on_plate : (T,) whether its contact (if any) is on the plate.
+    """
+
+    position_m: np.ndarray
+    rotation: np.ndarray
+    share: np.ndarray
+    cop_m: np.ndarray
+    on_plate: np.ndarray
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball in a hand; a point mass.
+
+    position_m : (3,) in the hand's frame.
+    hold : (T,) 1 while held, falling smoothly to 0 at the release.
+    release_s : when half the ball's load has left the hand, on the recording's clock.
+    """
+
+    body: str
+    mass_kg: float
+    position_m: np.ndarray
+    hold: np.ndarray
+    release_s: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A movement before balance. All arrays share one time axis.
+
+    angles_rad : waist, neck (T, 3): flexion about Z, about X, about Y;
+        shoulder_* (T, 3): flexion, abduction, internal rotation; elbow_* (T,): flexion;
+        wrist_* (T, 3): flexion, radial deviation, pronation.
+    pelvis_angles_rad : (T, 3) about Z, X, Y in the walkway frame; (nominal in flight).
+    pelvis_m : (T, 3) nominal path of the lumbar joint centre.
+    feet : by side, "l" and "r".
+    com_height_m : (T,) prescribed height of the centre of mass, or None: then the
+        pelvis keeps its nominal height.
+    flights : (first, last) sample of each phase without contact.
+    speed_m_s : mean forward speed.
+    sway_share : part of the unbalanced motion's COP excursion that is left standing.
+    keep : the part of the samples that is recorded.
+    plate_centre_m : X and Z of the first plate's centre, walkway frame.
+    """
+
+    step_s: float
+    angles_rad: dict[str, np.ndarray]
+    pelvis_angles_rad: np.ndarray
+    pelvis_m: np.ndarray
+    feet: dict[str, Foot]
+    keep: slice
+    com_height_m: np.ndarray | None = None
+    flights: tuple[tuple[int, int], ...] = ()
+    speed_m_s: float = 0.0
+    sway_share: float = 0.0
+    ball: Ball | None = None
+    plate_centre_m: tuple[float, float] = (0.0, 0.0)
+    notes: dict[str, object] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.pelvis_m)
+
+    def cop_m(self) -> np.ndarray:
+        """(T, 2) planned centre of pressure of both feet together."""
+        left, right = self.feet["l"], self.feet["r"]
+        return left.share[:, None] * left.cop_m + right.share[:, None] * right.cop_m
+
+    def thinned(self, factor: int) -> Plan:
+        """Every `factor`-th sample."""
+        s = slice(None, None, factor)
+        ball = replace(self.ball, hold=self.ball.hold[s]) if self.ball else None
+        return replace(
+            self,
+            step_s=self.step_s * factor,
+            angles_rad={name: a[s] for name, a in self.angles_rad.items()},
+            pelvis_angles_rad=self.pelvis_angles_rad[s],
+            pelvis_m=self.pelvis_m[s],
+            feet={side: _thinned_foot(foot, s) for side, foot in self.feet.items()},
+            com_height_m=None if self.com_height_m is None else self.com_height_m[s],
+            ball=ball,
+        )
+
+
+def _thinned_foot(foot: Foot, s: slice) -> Foot:
+    return Foot(foot.position_m[s], foot.rotation[s], foot.share[s], foot.cop_m[s],
+                foot.on_plate[s])

@@ -1,0 +1,93 @@
+"""Ground wrench by the rate of momentum of all bodies (Newton and Euler for the whole).
+
+F = dp/dt - m g and M = dL/dt - sum r x m g about the walkway's origin, with momenta by
+numerical differentiation of positions and rotations. No equations of motion of a tree.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.simulate.calculus import derivative
+from bsip_cli.simulate.inertia import Inertia
+from bsip_cli.simulate.kinematics import Poses
+from bsip_cli.simulate.plan import Ball
+from bsip_cli.simulate.rotations import rotate, transpose, unskew
+
+GRAVITY = np.array([0.0, -9.81, 0.0])
+
+
+@dataclass(frozen=True)
+class Momentum:
+    """Whole-body momentum in an inertial frame.
+
+    com_m : (T, 3). linear : (T, 3) [kg m/s]. angular : (T, 3) about the origin [kg m2/s].
+    locked : (T, 3, 3) inertia of the body as if stiff, about the centre of mass.
+    """
+
+    mass_kg: float
+    com_m: np.ndarray
+    linear: np.ndarray
+    angular: np.ndarray
+    locked: np.ndarray
+
+    def spin(self) -> np.ndarray:
+        """(T, 3) angular momentum about the centre of mass."""
+        return self.angular - np.cross(self.com_m, self.linear)
+
+
+def momentum_of(inertias: dict[str, Inertia], poses: Poses, step_s: float) -> Momentum:
+    """Sum over bodies of their momenta."""
+    mass = sum(part.mass_kg for part in inertias.values())
+    first, linear, angular = 0.0, 0.0, 0.0
+    about_origin = 0.0
+    for body, part in inertias.items():
+        R = poses.rotation[body]
+        r = poses.point(body, part.com_m)
+        v = derivative(r, step_s)
+        turning = unskew(derivative(R, step_s) @ transpose(R))
+        tensor = R @ part.tensor_kgm2 @ transpose(R)
+        first = first + part.mass_kg * r
+        linear = linear + part.mass_kg * v
+        angular = angular + part.mass_kg * np.cross(r, v) + rotate(tensor, turning)
+        about_origin = about_origin + tensor + part.mass_kg * _parallel(r)
+    com = first / mass
+    return Momentum(mass, com, linear, angular, about_origin - mass * _parallel(com))
+
+
+def _parallel(r: np.ndarray) -> np.ndarray:
+    """(T, 3, 3) r.r 1 - r r^T."""
+    square = np.sum(r * r, axis=-1)[:, None, None] * np.eye(3)
+    return square - r[:, :, None] * r[:, None, :]
+
+
+def ball_load(ball: Ball | None, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Force (T, 3) that moves the ball, and its moment (T, 3) about the origin."""
+    zero = np.zeros_like(poses.origin_m["lower_torso"])
+    if ball is None:
+        return zero, zero
+    r = poses.point(ball.body, ball.position_m)
+    acceleration = derivative(derivative(r, step_s), step_s)
+    force = ball.hold[:, None] * ball.mass_kg * (acceleration - GRAVITY)
+    return force, np.cross(r, force)
+
+
+def ground_wrench(
+    inertias: dict[str, Inertia], poses: Poses, step_s: float, ball: Ball | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Force (T, 3) [N] on the body and moment (T, 3) [N m] about the walkway's origin."""
+    momentum = momentum_of(inertias, poses, step_s)
+    weight = momentum.mass_kg * GRAVITY
+    ball_force, ball_moment = ball_load(ball, poses, step_s)
+    force = derivative(momentum.linear, step_s) - weight + ball_force
+    gravity_moment = np.cross(momentum.com_m, weight)
+    moment = derivative(momentum.angular, step_s) - gravity_moment + ball_moment
+    return force, moment
+
+
+def centre_of_pressure(force: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """(T, 2) X and Z on the ground where the horizontal moments vanish (NaN if unloaded)."""
+    vertical = np.where(np.abs(force[:, 1]) > 1e-6, force[:, 1], np.nan)
+    return np.stack([moment[:, 2] / vertical, -moment[:, 0] / vertical], axis=1)

@@ -1,0 +1,62 @@
+import numpy as np
+import pytest
+
+from bsip_cli.statistics.normality import lilliefors_test
+from bsip_cli.statistics.p_values import adjusted_p_values
+
+
+def test_statistic_is_the_largest_gap_to_the_fitted_normal():
+    from scipy.stats import kstest
+
+    x = np.random.default_rng(0).normal(3.0, 2.0, size=30)
+    test = lilliefors_test(x)
+    assert test.statistic == pytest.approx(kstest(x, "norm", (x.mean(), x.std(ddof=1))).statistic)
+    assert test.normal is True
+
+
+def test_level_and_power():
+    rng = np.random.default_rng(1)
+    rejected = [not lilliefors_test(rng.normal(size=12)).normal for _ in range(1000)]
+    assert np.mean(rejected) == pytest.approx(0.05, abs=0.02)
+    assert lilliefors_test(rng.exponential(size=100)).normal is False
+
+
+def test_critical_value_of_the_printed_table():
+    """Lilliefors 1967, table 1 (n = 20, 5 %): 0.190; later simulations: 0.192."""
+    rng = np.random.default_rng(2)
+    tests = [lilliefors_test(rng.normal(size=20)) for _ in range(2000)]
+    border = min(t.statistic for t in tests if t.p_value < 0.05)
+    assert border == pytest.approx(0.191, abs=0.003)
+
+
+def test_nan_is_dropped():
+    x = np.random.default_rng(3).normal(size=12)
+    assert lilliefors_test([*x, np.nan]) == lilliefors_test(x)
+
+
+@pytest.mark.parametrize(
+    ("x", "n", "words"),
+    [([], 0, "needs 4"), ([1, 2, 3, np.nan], 3, "there are 3"), ([0.1] * 12, 12, "equal")],
+)
+def test_not_possible(x, n, words):
+    test = lilliefors_test(x)
+    assert (test.n, test.normal) == (n, None)
+    assert np.isnan([test.statistic, test.p_value]).all()
+    assert words in test.reason
+
+
+def test_holm_and_bonferroni():
+    """R: p.adjust(c(0.01, 0.04, 0.03, 0.005), "holm")."""
+    p = [0.01, 0.04, 0.03, 0.005]
+    assert adjusted_p_values(p) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert adjusted_p_values(p, "bonferroni") == pytest.approx([0.04, 0.16, 0.12, 0.02])
+
+
+def test_impossible_tests_do_not_count():
+    adjusted = adjusted_p_values([0.01, np.nan, 0.04])
+    assert adjusted[::2] == pytest.approx([0.02, 0.04])
+    assert np.isnan(adjusted[1])
+    assert adjusted_p_values([]) == ()
+    assert np.isnan(adjusted_p_values([np.nan])).all()
+    with pytest.raises(ValueError, match="outside"):
+        adjusted_p_values([1.2])

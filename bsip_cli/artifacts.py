@@ -104,14 +104,23 @@ _COMPARISON = (
     _text("table", "table of the papers it belongs to"),
     _text("variable", "what is compared"),
     _text("task", "movement, or all"),
+    _text("role", "of the task: sequence (identified OM) or validation; empty if none"),
     _text("unit", "unit of the means"),
-    _text("test", "name of the test"),
+    _text("test", "name of the test; description: means without a test"),
     _text("origin", "published: as in the papers; added: what a reviewer asks for"),
     _text("method_a", "first method"),
-    _text("method_b", "second method"),
-    Column("n", "int", "1", "participants"),
+    _text("method_b", "second method; empty if the row concerns more or fewer than two"),
+    Column("n", "int", "1", "participants with all methods"),
     *_floats("mean_a sd_a mean_b sd_b difference ci_low ci_high", "as unit", "of the comparison"),
-    *_floats("statistic df1 df2 p_value effect_size lilliefors_p", "1", "of the test"),
+    Column("bound", "float", "as unit", "half-width of the range that counts as equivalent"),
+    *_floats("statistic df1 df2 p_value", "1", "of the test; correlations: medians"),
+    Column("p_holm", "float", "1", "Holm's correction over the same test's rows of the table"),
+    Column("effect_size", "float", "1", "of the test"),
+    _text("effect_size_name", "which effect size"),
+    Column("epsilon", "float", "1", "Greenhouse and Geisser's, already in df1, df2, p_value"),
+    Column("lilliefors_p", "float", "1", "normality of the differences; F tests: smallest of all"),
+    *_floats("count_a count_b", "1",
+             "participants in whom the first, the second method is (significantly) better"),
     _text("reason", "why the test is not possible, or what to mind"),
 )
 
@@ -280,11 +289,26 @@ SCHEMAS = {
         )),
         Schema("values", "cohort", 1, "one row per participant, trial, method and variable", (
             _text("participant", "participant_id"), _text("trial", "stem of the trial or empty"),
-            _text("task", "movement"), _text("table", "table of the papers"),
+            _text("task", "movement, or all"),
+            _text("role", "of the trial: sequence (identified OM) or validation; empty if none"),
+            _text("data", "held_out or identification: what the trial was to OM; else empty"),
+            _text("table", "table of the papers"),
             _text("variable", "what was computed"), _METHOD,
             Column("value", "float", "as unit", "the value"), _text("unit", "unit of the value"),
         )),
         Schema("comparisons", "cohort", 1, "tests between the methods", _COMPARISON),
+        Schema("tables-files", "cohort", 1, "the written tables, one row per file", (
+            _text("file", "path below the output folder"),
+            _text("sha256", "of the file's bytes"),
+        )),
+        Schema("report-files", "participant", 1, "the written report, one row per file", (
+            _text("file", "path below the output folder"),
+            _text("sha256", "of the file's bytes"),
+        )),
+        Schema("group-report-files", "cohort", 1, "the cohort's report, one row per file", (
+            _text("file", "path below the output folder"),
+            _text("sha256", "of the file's bytes"),
+        )),
     )
 }
 

@@ -43,6 +43,7 @@ class Scale(Section):
     hinge_sd_rad: float = Field(gt=0)
     symmetry_sd: float = Field(gt=0)
     frames: int = Field(ge=1)
+    independent_frames: float = Field(gt=0)
     iterations: int = Field(ge=0)
 
 
@@ -61,7 +62,13 @@ class Smoothing(Section):
 
 
 class Regress(Section):
-    table: Literal["dumas2007", "deleva1996"]
+    table: Literal["dumas2007"]
+
+
+class Prior(Section):
+    mass_sd_percent: float = Field(gt=0)
+    com_sd_percent: float = Field(gt=0)
+    inertia_sd_percent: float = Field(gt=0)
 
 
 class Identify(Section):
@@ -93,6 +100,7 @@ class Config(Section):
     ik: Ik
     smoothing: Smoothing
     regress: Regress
+    prior: Prior
     identify: Identify
     reconstruct: Reconstruct
     stats: Stats

@@ -1,0 +1,100 @@
+"""Inertial parameters by regression (RM) from an anthropometric table."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from bsip_cli.body.inertia import Inertia, nearest_physical_tensor
+from bsip_cli.body.person import Person
+
+_MEAN_STATURE_M = {"M": 1.77, "F": 1.61}
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """One segment of a table: fractions of the body's mass and of the segment's length.
+
+    ``gyration`` (3, 3) holds signed squares of the radii: the tensor is m L^2 times it.
+    """
+
+    mass_fraction: float
+    com: np.ndarray
+    gyration: np.ndarray
+    mean_length_m: float
+
+
+@dataclass(frozen=True)
+class Regression:
+    """RM of one person, per segment of the skeleton in its segment frame, and what was mended."""
+
+    inertias: tuple[Inertia, ...]
+    notes: tuple[str, ...]
+
+
+@cache
+def load_table(name: str) -> dict[tuple[str, str], TableRow]:
+    """Rows of a shipped table by sex (M, F) and segment, for the right side of the body."""
+    file = Path(__file__).parent / "tables" / f"{name}.csv"
+    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line[0] != "#"]
+    return {(row["sex"], row["segment"]): _row(row) for row in csv.DictReader(lines)}
+
+
+def _row(row: dict[str, str]) -> TableRow:
+    gyration = np.empty((3, 3))
+    for i, a in enumerate("xyz"):
+        for j, b in enumerate("xyz"):
+            gyration[i, j] = _signed_square(row[f"r{min(a, b)}{max(a, b)}_pct"])
+    com = np.array([float(row[f"com_{axis}_pct"]) for axis in "xyz"]) / 100
+    return TableRow(
+        float(row["mass_percent"]) / 100, com, gyration, float(row["mean_length_mm"]) / 1000
+    )
+
+
+def _signed_square(percent: str) -> float:
+    imaginary = percent.endswith("i")
+    radius = float(percent.rstrip("i")) / 100
+    return -(radius**2) if imaginary else radius**2
+
+
+def regress(person: Person, sex: str, mass_kg: float, table: str = "dumas2007") -> Regression:
+    """Mass, centre of mass and tensor of every segment from sex, mass and segment lengths.
+
+    Dumas 2007 with the head of its corrigendum: ``com = L c``, ``I_ij = m (r_ij L)^2`` (Hansen
+    2017, equations 2 and 3). The masses are normalised to the person's mass; the left side is
+    the right side mirrored in Z; a tensor that no body can have becomes the nearest one that can.
+    """
+    rows = load_table(table)
+    skeleton = person.skeleton
+    chosen = [rows[sex, name] for name in skeleton.table_rows]
+    total = sum(row.mass_fraction for row in chosen)
+    inertias, notes = [], []
+    for segment, row, length in zip(skeleton.segments, chosen, person.lengths_m, strict=True):
+        mirror = np.array([1.0, 1.0, -1.0 if skeleton.side(segment) == "l" else 1.0])
+        mass = mass_kg * row.mass_fraction / total
+        tensor = mass * length**2 * row.gyration * np.outer(mirror, mirror)
+        body = Inertia(mass, length * row.com * mirror, tensor)
+        note = ""
+        if not body.is_physical():
+            body = Inertia(mass, body.com_m, nearest_physical_tensor(tensor))
+            note = "the table's tensor breaks the triangle inequality: nearest possible one taken"
+        inertias.append(body)
+        notes.append(note)
+    return Regression(tuple(inertias), tuple(notes))
+
+
+def mean_length_m(sex: str, row: str, height_m: float | None) -> float:
+    """Length of a segment from the table's means, scaled to the stature where it is known."""
+    mean = load_table("dumas2007")[sex, row].mean_length_m
+    return mean * (height_m / _MEAN_STATURE_M[sex] if height_m else 1.0)
+
+
+def stature_m(sex: str, lengths_m: dict[str, float]) -> float:
+    """Stature from segment lengths by table row, by the proportions of the table's sample."""
+    table = load_table("dumas2007")
+    mean = sum(table[sex, name].mean_length_m for name in lengths_m)
+    return _MEAN_STATURE_M[sex] * sum(lengths_m.values()) / mean

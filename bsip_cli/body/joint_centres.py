@@ -1,0 +1,182 @@
+"""Joint centres from bony landmarks in one standing pose (Reed 1999, as Dumas 2007 uses them).
+
+Positions are world coordinates [m]; ``landmarks`` maps the names of
+:data:`bsip_cli.body.markersets.LANDMARKS` to (3,) positions. The pelvis fractions are those in
+the ISB pelvis frame (Dumas and Wojtusch 2018), since the pubis is not marked; the shoulder is the
+2007 edition's, whose angle is measured from the line C7 to suprasternale.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.errors import BadDataError
+
+# Fractions of the distance between the ASIS, from their middle; X anterior, Y up, Z right.
+_LJC = {"M": (-0.335, -0.032, 0.0), "F": (-0.340, 0.049, 0.0)}
+_HJC = {"M": (-0.095, -0.370, 0.361), "F": (-0.139, -0.336, 0.372)}
+# Fraction of the thorax width (C7 to suprasternale) and angle above that line [degrees].
+_CJC = {"M": (0.55, 8.0), "F": (0.53, 14.0)}
+_SJC = (0.42, -67.0)
+# Half breadths for joints with a lateral marker only, as fractions of the stature.
+_HALF_BREADTH = {"elbow": 0.022, "knee": 0.031, "malleolus": 0.022}
+# Used where a marker set has no suprasternale: the sample's thorax width over stature, and the
+# slope of the line C7 to suprasternale below the horizontal [degrees].
+_THORAX_WIDTH, _THORAX_SLOPE = 0.077, -25.0
+
+
+@dataclass(frozen=True)
+class JointCentres:
+    """World positions [m] by name (``hip_l`` ...) and the directions the frames are built on.
+
+    ``pelvis_axes`` (3, 3) has X, Y, Z as columns; ``hinges`` maps ``elbow_l`` ... to unit vectors
+    that point to the person's right; ``ends`` maps ``hand_l``, ``foot_l`` ... to segment ends;
+    ``notes`` says what had to be estimated.
+    """
+
+    positions: Mapping[str, np.ndarray]
+    pelvis_axes: np.ndarray
+    hinges: Mapping[str, np.ndarray]
+    ends: Mapping[str, np.ndarray]
+    notes: tuple[str, ...]
+
+
+def joint_centres(
+    landmarks: Mapping[str, np.ndarray], sex: str, stature_m: float
+) -> JointCentres:
+    """Joint centres of the whole body.
+
+    Raises
+    ------
+    BadDataError
+        Landmarks without which there is no skeleton are missing: all are named.
+    """
+    _require(landmarks)
+    notes: list[str] = []
+    axes, middle, width = _pelvis(landmarks)
+    centres = {
+        "waist": middle + width * (axes @ _LJC[sex]),
+        "hip_r": middle + width * (axes @ _HJC[sex]),
+        "hip_l": middle + width * (axes @ (_HJC[sex] * np.array([1.0, 1.0, -1.0]))),
+    }
+    width, line, right = _thorax(landmarks, axes, centres["waist"], stature_m, notes)
+    part, angle = _CJC[sex]
+    centres["neck"] = landmarks["c7"] + part * width * _turned(line, right, angle)
+    down = _SJC[0] * width * _turned(line, right, _SJC[1])
+    hinges, ends = {}, {}
+    for side in "lr":
+        outward = right if side == "r" else -right
+        centres[f"shoulder_{side}"] = landmarks[f"acromion_{side}"] + down
+        _arm(landmarks, centres, hinges, ends, side, outward, stature_m, notes)
+        outward = axes[:, 2] if side == "r" else -axes[:, 2]
+        _leg(landmarks, centres, hinges, ends, side, outward, stature_m, notes)
+    return JointCentres(centres, axes, hinges, ends, tuple(notes))
+
+
+_REQUIRED = ("asis_l", "asis_r", "c7", *(
+    f"{name}_{side}"
+    for name in ("acromion", "elbow_lateral", "styloid_radial", "styloid_ulnar", "knee_lateral",
+                 "malleolus_lateral", "calcaneus")
+    for side in "lr"
+))
+
+
+def _require(landmarks: Mapping[str, np.ndarray]) -> None:
+    missing = [name for name in _REQUIRED if name not in landmarks]
+    missing += [f"a metatarsal of foot_{s}" for s in "lr" if _mean(landmarks, _toes(s)) is None]
+    if _mean(landmarks, ("psis_l", "psis_r", "sacrum")) is None:
+        missing.append("psis_l and psis_r, or sacrum")
+    if missing:
+        raise BadDataError(
+            f"no marker for {', '.join(missing)}",
+            expected="at least one frame of the calibrating trial in which they are visible",
+            remedy="name the markers that serve in a marker set, or calibrate with another trial",
+        )
+
+
+def _pelvis(landmarks: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, float]:
+    right, left = landmarks["asis_r"], landmarks["asis_l"]
+    middle = 0.5 * (right + left)
+    back = _mean(landmarks, ("psis_l", "psis_r"))
+    back = landmarks["sacrum"] if back is None else back
+    z = unit(right - left)
+    y = unit(np.cross(z, middle - back))
+    return np.stack([np.cross(y, z), y, z], axis=1), middle, float(np.linalg.norm(right - left))
+
+
+def _thorax(landmarks, pelvis, waist, stature_m, notes):
+    c7 = landmarks["c7"]
+    if "suprasternale" in landmarks:
+        line = landmarks["suprasternale"] - c7
+        right = unit(np.cross(line, c7 - waist))
+        return float(np.linalg.norm(line)), unit(line), right
+    notes.append("no suprasternale: thorax width and neck estimated from the stature")
+    right = unit(landmarks["acromion_r"] - landmarks["acromion_l"])
+    forward = unit(np.cross(c7 - waist, right))
+    return _THORAX_WIDTH * stature_m, _turned(forward, right, _THORAX_SLOPE), right
+
+
+def _arm(landmarks, centres, hinges, ends, side, outward, stature_m, notes):
+    shoulder, lateral = centres[f"shoulder_{side}"], landmarks[f"elbow_lateral_{side}"]
+    wrist = 0.5 * (landmarks[f"styloid_radial_{side}"] + landmarks[f"styloid_ulnar_{side}"])
+    long_axis = unit(shoulder - lateral)
+    medial = landmarks.get(f"elbow_medial_{side}")
+    if medial is not None:
+        elbow, across = 0.5 * (lateral + medial), lateral - medial
+    else:
+        notes.append(f"elbow_{side} has a lateral marker only: centre from the mean breadth")
+        across = _across_bent_elbow(long_axis, lateral - wrist, outward)
+        elbow = lateral - _HALF_BREADTH["elbow"] * stature_m * unit(across)
+    centres[f"elbow_{side}"], centres[f"wrist_{side}"] = elbow, wrist
+    hinges[f"elbow_{side}"] = unit(across if side == "r" else -across)
+    hand = _mean(landmarks, tuple(f"metacarpal_{k}_{side}" for k in (2, 3, 5)))
+    if hand is not None:
+        ends[f"hand_{side}"] = hand
+
+
+def _across_bent_elbow(long_axis, forearm, outward):
+    """Lateral direction: normal of the arm's plane where the elbow is bent, else the body's."""
+    normal = np.cross(unit(forearm), long_axis)
+    across = outward - (outward @ long_axis) * long_axis
+    if np.linalg.norm(normal) < 0.35:  # less than about 20 degrees
+        return unit(across)
+    return unit(normal) * np.sign(normal @ across)
+
+
+def _leg(landmarks, centres, hinges, ends, side, outward, stature_m, notes):
+    for joint, name in (("knee", "knee"), ("ankle", "malleolus")):
+        lateral = landmarks[f"{name}_lateral_{side}"]
+        medial = landmarks.get(f"{name}_medial_{side}")
+        if medial is not None:
+            centres[f"{joint}_{side}"], across = 0.5 * (lateral + medial), lateral - medial
+        else:
+            notes.append(f"{joint}_{side} has a lateral marker only: centre from the mean breadth")
+            across = outward
+            half = _HALF_BREADTH[name] * stature_m
+            centres[f"{joint}_{side}"] = lateral - half * unit(across)
+        hinges[f"{joint}_{side}"] = unit(across if side == "r" else -across)
+    ends[f"foot_{side}"] = _mean(landmarks, _toes(side))
+
+
+def _toes(side: str) -> tuple[str, ...]:
+    return tuple(f"metatarsal_{k}_{side}" for k in (1, 2, 5))
+
+
+def _mean(landmarks: Mapping[str, np.ndarray], names: tuple[str, ...]) -> np.ndarray | None:
+    known = [landmarks[name] for name in names if name in landmarks]
+    return np.mean(known, axis=0) if known else None
+
+
+def _turned(direction: np.ndarray, right: np.ndarray, degrees: float) -> np.ndarray:
+    """A forward direction raised by an angle in the sagittal plane whose normal is ``right``."""
+    forward = unit(direction - (direction @ right) * right)
+    angle = np.deg2rad(degrees)
+    return np.cos(angle) * forward + np.sin(angle) * np.cross(right, forward)
+
+
+def unit(vector: np.ndarray) -> np.ndarray:
+    """The vector scaled to length one."""
+    return vector / np.linalg.norm(vector)

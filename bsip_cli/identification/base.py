@@ -1,0 +1,56 @@
+"""Estimator ``base``: base parameters by weighted least squares (Hansen 2017, equation 7).
+
+Only combinations are estimated; as segment parameters the leading ones carry all and the
+regrouped ones are zero, which no body has: they serve to predict the wrench, not to be read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.identification.estimator import Estimate, Problem
+
+# The table enters with this part of its weight, so that a combination the motion never excited
+# gets a large standard deviation instead of stopping the rest.
+_TRACE_OF_PRIOR = 1e-8
+
+
+@dataclass(frozen=True)
+class BaseParameters:
+    """values (rank,), covariance (rank, rank) and the regression's values (rank,)."""
+
+    values: np.ndarray
+    covariance: np.ndarray
+    rm_values: np.ndarray
+
+    def sigma_percent(self) -> np.ndarray:
+        """(rank,) 100 sd / |value|."""
+        return 100 * np.sqrt(np.diag(self.covariance)) / np.maximum(np.abs(self.values), 1e-300)
+
+
+def base_parameters(problem: Problem) -> BaseParameters:
+    """Weighted least squares in the basis; the covariance counts independent samples only."""
+    basis, prior = problem.basis, problem.prior
+    information, right = problem.equations.weighted(problem.noise.weights())
+    keep = np.ix_(basis.independent, basis.independent)
+    mapped = basis.combine @ prior.root
+    prior_precision = _TRACE_OF_PRIOR * np.linalg.inv(mapped @ mapped.T)
+    rm_values = basis.combine @ prior.phi
+    scale = np.sqrt(np.diag(mapped @ mapped.T))
+    matrix = (information[keep] + prior_precision) * np.outer(scale, scale)
+    vector = (right[basis.independent] + prior_precision @ rm_values) * scale
+    inverse = np.linalg.inv(matrix)
+    values = scale * np.linalg.solve(matrix, vector)
+    return BaseParameters(values, inverse * np.outer(scale, scale), rm_values)
+
+
+def estimate(problem: Problem) -> Estimate:
+    """Base parameters laid into the full vector: zeros where a parameter was regrouped."""
+    fit = base_parameters(problem)
+    size = problem.basis.combine.shape[1]
+    phi, covariance = np.zeros(size), np.zeros((size, size))
+    phi[problem.basis.independent] = fit.values
+    covariance[np.ix_(problem.basis.independent, problem.basis.independent)] = fit.covariance
+    return Estimate(phi, covariance, "combinations only: single segments are not to be read")

@@ -1,0 +1,118 @@
+"""The identification's normal equations, accumulated in blocks over trials."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from scipy import sparse
+
+from bsip_cli.dynamics.lowpass import lowpass_operator
+from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
+
+_ROWS = 200  # outputs per block: some 30 MB of regressor
+_OVERSAMPLING = 2.5  # samples kept per period of the cut-off
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Motion and measured wrench of one trial.
+
+    q (N, nq), v and a (N, nv); wrench (N, 6) about the world's origin [N, N m]; use (N,) frames
+    that may enter; rate [Hz].
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    wrench: np.ndarray
+    use: np.ndarray
+    rate_hz: float
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """Sums over samples of the wrench equation, one set per component c of the wrench.
+
+    information (6, P, P) = sum Y_c^T Y_c, right (6, P) = sum Y_c^T F_c, squares (6,) = sum F_c^2;
+    ``samples`` per component, ``duration_s`` of motion behind them.
+    """
+
+    information: np.ndarray
+    right: np.ndarray
+    squares: np.ndarray
+    samples: int
+    duration_s: float
+
+    def weighted(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Information (P, P) and right side (P,) with a weight (6,) per component."""
+        return (
+            np.einsum("c,cij->ij", weights, self.information),
+            np.einsum("c,ci->i", weights, self.right),
+        )
+
+    def residual_rms(self, phi: np.ndarray) -> np.ndarray:
+        """(6,) root-mean-square residual [N, N m] of a parameter vector (P,)."""
+        fitted = np.einsum("i,cij,j->c", phi, self.information, phi)
+        squares = self.squares - 2 * self.right @ phi + fitted
+        return np.sqrt(np.maximum(squares, 0.0) / self.samples)
+
+
+def accumulate(
+    model: pin.Model, recordings: list[Recording], cutoff_hz: float, reference_m: np.ndarray
+) -> NormalEquations:
+    """Both sides of the equations through the same low-pass, decimated, and summed.
+
+    Memory does not grow with the length of the trials.
+    """
+    size = 10 * (model.njoints - 1)
+    information, right = np.zeros((6, size, size)), np.zeros((6, size))
+    squares, samples, duration = np.zeros(6), 0, 0.0
+    for recording in recordings:
+        for regressor, measured in _filtered_blocks(model, recording, cutoff_hz, reference_m):
+            for c in range(6):
+                rows = regressor[:, c]
+                information[c] += rows.T @ rows
+                right[c] += rows.T @ measured[:, c]
+            squares += (measured**2).sum(axis=0)
+            samples += len(measured)
+        duration += recording.use.sum() / recording.rate_hz
+    return NormalEquations(information, right, squares, samples, duration)
+
+
+def residual_series(
+    model: pin.Model, recordings: list[Recording], cutoff_hz: float, reference_m: np.ndarray,
+    phi: np.ndarray,
+) -> list[np.ndarray]:
+    """Per stretch of motion, the filtered residual (n, 6) of a parameter vector."""
+    series = []
+    for recording in recordings:
+        blocks = [
+            measured - regressor @ phi
+            for regressor, measured in _filtered_blocks(model, recording, cutoff_hz, reference_m)
+        ]
+        if blocks:
+            series.append(np.concatenate(blocks))
+    return series
+
+
+def _filtered_blocks(
+    model: pin.Model, recording: Recording, cutoff_hz: float, reference_m: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    stride = max(1, int(recording.rate_hz / (_OVERSAMPLING * cutoff_hz)))
+    operator, _ = lowpass_operator(recording.use, recording.rate_hz, cutoff_hz, stride)
+    measured = operator @ np.where(
+        recording.use[:, None], move_moments(recording.wrench, reference_m), 0.0
+    )
+    data = model.createData()
+    for start in range(0, operator.shape[0], _ROWS):
+        rows: sparse.csr_array = operator[start : start + _ROWS]
+        first, last = int(rows.indices.min()), int(rows.indices.max()) + 1
+        part = slice(first, last)
+        regressor = wrench_regressor(
+            model, data, recording.q[part], recording.v[part], recording.a[part], reference_m
+        )
+        filtered = rows[:, part] @ regressor.reshape(last - first, -1)
+        yield filtered.reshape(rows.shape[0], 6, -1), measured[start : start + _ROWS]

@@ -1,0 +1,77 @@
+"""Estimator ``hansen2017``: what the data show by least squares, the rest nearest to RM.
+
+Hansen 2017 solves the base parameters by least squares and takes the segment parameters nearest
+to the regression among those that have these base parameters, with masses > 0. Nearness is
+measured in standard deviations of people about the table, and a combination that the data know
+worse than the table stays at the table: the paper's motions are rich enough for all, a clinic's
+trial is not. With everything excited this is the paper's method.
+"""
+
+from __future__ import annotations
+
+import clarabel
+import numpy as np
+from scipy import sparse
+
+from bsip_cli.errors import NumericalError
+from bsip_cli.identification.estimator import Estimate, Problem
+
+_SMALLEST_MASS = 0.05  # of the table's
+
+
+def estimate(problem: Problem) -> Estimate:
+    """Least squares in the directions that the data know better than the table.
+
+    In coordinates z with phi = phi_RM + S z, where z is N(0, 1) among people, the data give each
+    eigendirection of their information a variance; those below 1 are taken from the data.
+
+    Raises
+    ------
+    NumericalError
+        No parameters with positive masses satisfy the data.
+    """
+    prior = problem.prior
+    information, right = problem.equations.weighted(problem.noise.weights())
+    scaled = prior.root.T @ information @ prior.root
+    gradient = prior.root.T @ (right - information @ prior.phi)
+    strength, directions = np.linalg.eigh(scaled)
+    known = strength > 1.0
+    shown = directions[:, known]
+    target = (shown.T @ gradient) / strength[known]
+    z = shown @ target
+    note = f"{int(known.sum())} of {problem.basis.rank} combinations decided by the data"
+    if np.any(_masses(problem, z) < 0):
+        z = _with_positive_masses(problem, shown, target)
+        note += "; masses kept positive"
+    variance = np.where(known, 1.0 / np.where(known, strength, 1.0), 1.0)
+    spread = prior.root @ directions
+    return Estimate(prior.phi + prior.root @ z, (spread * variance) @ spread.T, note)
+
+
+def _masses(problem: Problem, z: np.ndarray) -> np.ndarray:
+    return (problem.prior.phi + problem.prior.root @ z)[::10]
+
+
+def _with_positive_masses(problem: Problem, shown: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Smallest z with ``shown^T z = target`` and every mass above a part of the table's."""
+    prior = problem.prior
+    size = len(prior.phi)
+    masses = prior.root[::10]
+    slack = prior.phi[::10] * (1 - _SMALLEST_MASS)
+    matrix = sparse.csc_matrix(np.vstack([shown.T, -masses]))
+    cones = [clarabel.ZeroConeT(shown.shape[1]), clarabel.NonnegativeConeT(len(masses))]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    solution = clarabel.DefaultSolver(
+        sparse.csc_matrix(np.eye(size)), np.zeros(size), matrix,
+        np.concatenate([target, slack]), cones, settings,
+    ).solve()
+    if solution.status not in (
+        clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved
+    ):
+        raise NumericalError(
+            f"no inertial parameters with positive masses fit the data ({solution.status})",
+            expected="a motion and forces that belong together",
+            remedy="look at the residuals of the identification trial",
+        )
+    return np.array(solution.x)

@@ -1,0 +1,69 @@
+"""What is known of a person before the data: the table's values and how far people stray."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.body.inertia import Inertia, readable_jacobian
+from bsip_cli.body.person import Person
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Standard deviations of people about the table, as in configs/default.toml, [prior]."""
+
+    mass_sd_percent: float
+    com_sd_percent: float
+    inertia_sd_percent: float
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Mean and covariance of the inertial parameters before the data.
+
+    Attributes
+    ----------
+    inertias : per segment, in the segment frame.
+    origin_in_joint_m : (n, 3) segment origin seen from the joint; parallel frames.
+    phi : (10 n,) mean, about the joint centres (Pinocchio's order).
+    root : (10 n, 10 n) block-diagonal S with covariance S S^T.
+    readable_sd : (n, 10) the same spread for mass, centre of mass and tensor.
+    """
+
+    inertias: tuple[Inertia, ...]
+    origin_in_joint_m: np.ndarray
+    phi: np.ndarray
+    root: np.ndarray
+    readable_sd: np.ndarray
+
+
+def prior_of(inertias: tuple[Inertia, ...], person: Person, spread: Spread) -> Prior:
+    """Build the prior; the parameters of a segment spread independently of each other."""
+    origins = person.origin_in_joint_m
+    n = len(inertias)
+    phi, root = np.empty(10 * n), np.zeros((10 * n, 10 * n))
+    readable_sd = np.empty((n, 10))
+    for i, inertia in enumerate(inertias):
+        block = slice(10 * i, 10 * i + 10)
+        about_joint = inertia.moved(-origins[i])
+        phi[block] = about_joint.phi()
+        readable_sd[i] = _readable_sd(inertia, person.lengths_m[i], spread)
+        root[block, block] = np.linalg.solve(
+            readable_jacobian(phi[block]), np.diag(readable_sd[i])
+        )
+    return Prior(inertias, origins, phi, root, readable_sd)
+
+
+def _readable_sd(inertia: Inertia, length_m: float, spread: Spread) -> np.ndarray:
+    """(10,) in the order of :meth:`Inertia.readable`."""
+    moments = np.diag(inertia.tensor_kgm2)
+    products = np.sqrt([moments[0] * moments[1], moments[0] * moments[2], moments[1] * moments[2]])
+    part = spread.inertia_sd_percent / 100
+    return np.array([
+        spread.mass_sd_percent / 100 * inertia.mass_kg,
+        *[spread.com_sd_percent / 100 * length_m] * 3,
+        *(part * moments),
+        *(0.5 * part * products),
+    ])

@@ -1,0 +1,317 @@
+"""Refine a first skeleton: lengths, joint centres, hinges and marker places that fit many frames.
+
+Bundle adjustment with priors: poses and geometry together minimise the marker residuals; the
+poses are eliminated frame by frame (variable projection), the geometry takes Gauss-Newton steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bsip_cli.body.person import Person
+from bsip_cli.motion.inverse_kinematics import Poses, Tree, solve_poses, tree_of
+
+
+@dataclass(frozen=True)
+class ScalingOptions:
+    """Standard deviations of the priors and limits, as in configs/default.toml, [scale]."""
+
+    joint_centre_sd_m: float
+    length_sd: float
+    marker_sd_m: float
+    hinge_sd_rad: float
+    symmetry_sd: float
+    independent_frames: float
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """The refined person, its poses, the residual before, and standard deviations.
+
+    ``length_sd_m`` (n,) is NaN for segments whose length is not a parameter of the fit.
+    """
+
+    person: Person
+    poses: Poses
+    rms_before_m: float
+    length_sd_m: np.ndarray
+    rounds: int
+
+
+@dataclass(frozen=True)
+class _Parameter:
+    """One number of the geometry: how it moves markers, and its prior.
+
+    kind: length, joint, parent_tilt, child_tilt, shift or marker. ``index`` is the segment (for
+    joints and tilts the child segment, for markers the marker); ``axis`` 0 to 2 where it has one.
+    """
+
+    kind: str
+    index: int
+    axis: int
+    sd: float
+
+
+def refine(
+    person: Person, markers_m: np.ndarray, q: np.ndarray, options: ScalingOptions, ik: dict
+) -> Refinement:
+    """Fit the person's geometry to N frames chosen from all trials.
+
+    Parameters
+    ----------
+    markers_m : (N, m, 3) world positions, NaN where missing.
+    q : (N, nq) poses to start from.
+    ik : keyword options of :func:`solve_poses`.
+    """
+    parameters = tuple(_parameters(person, options))
+    precision = _prior_precision(person, parameters, options)
+    x = np.zeros(len(parameters))
+    fitted, poses = person, _poses(person, markers_m, q, ik)
+    before, cost = poses.rms_m(), _total_cost(poses, fitted, x, precision, options, ik)
+    rounds, damping = 0, 1e-6
+    information, gradient = _reduced_equations(fitted, markers_m, poses, parameters, options, ik)
+    for rounds in range(1, options.iterations + 1):
+        hessian = information + precision
+        step = np.linalg.solve(
+            hessian + damping * np.diag(np.diag(hessian)), gradient - precision @ x
+        )
+        trial = _with(person, parameters, x + step)
+        trial_poses = _poses(trial, markers_m, poses.q, ik)
+        trial_cost = _total_cost(trial_poses, trial, x + step, precision, options, ik)
+        if trial_cost > cost:
+            damping = max(100 * damping, 1e-3)
+            continue
+        finished = cost - trial_cost < 1e-4 * cost
+        x, fitted, poses, cost, damping = x + step, trial, trial_poses, trial_cost, 1e-6
+        information, gradient = _reduced_equations(
+            fitted, markers_m, poses, parameters, options, ik
+        )
+        if finished:
+            break
+    covariance = np.linalg.inv(information + precision)
+    spread = np.full(len(person.skeleton.segments), np.nan)
+    for k, parameter in enumerate(parameters):
+        if parameter.kind == "length":
+            spread[parameter.index] = np.sqrt(covariance[k, k])
+    return Refinement(fitted, poses, before, spread, rounds)
+
+
+def varied_frames(orientations: np.ndarray, count: int) -> np.ndarray:
+    """Indices of ``count`` frames that differ most from each other, the first frame among them.
+
+    orientations : (N, n, 3, 3) segment orientations; seen from the base, so that walking about
+    does not count as variety.
+    """
+    base = orientations[:, :1]
+    features = np.einsum("fbij,fnik->fnjk", base, orientations).reshape(len(orientations), -1)
+    chosen = [0]
+    distance = np.linalg.norm(features - features[0], axis=1)
+    while len(chosen) < min(count, len(features)):
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(features - features[chosen[-1]], axis=1))
+    return np.array(sorted(chosen))
+
+
+def _poses(person: Person, markers_m: np.ndarray, q: np.ndarray, ik: dict) -> Poses:
+    """Each frame from its own start: the chosen frames are not neighbours."""
+    parts = [solve_poses(person, markers_m[f : f + 1], q[f], **ik) for f in range(len(q))]
+    return Poses(*(
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("q", "residual_m", "coordinate_sd", "converged")
+    ))
+
+
+def _frame_weight(frames: int, options: ScalingOptions) -> float:
+    return min(1.0, options.independent_frames / frames)
+
+
+def _marker_weights(poses: Poses, person: Person, options: ScalingOptions, ik: dict) -> np.ndarray:
+    """(N, m) weights [1/m2] with Huber's reduction; zero where missing."""
+    limit = ik["robust_limit_m"]
+    distance = np.where(np.isfinite(poses.residual_m), poses.residual_m, np.inf)
+    huber = np.minimum(1.0, limit / np.maximum(distance, 1e-12))
+    base = person.marker_weights / ik["marker_sd_m"] ** 2
+    return huber * base * _frame_weight(len(poses.q), options)
+
+
+def _total_cost(poses, person, x, precision, options, ik) -> float:
+    limit, d = ik["robust_limit_m"], np.nan_to_num(poses.residual_m)
+    loss = np.where(d <= limit, 0.5 * d**2, limit * (d - 0.5 * limit))
+    weights = person.marker_weights / ik["marker_sd_m"] ** 2 * _frame_weight(len(d), options)
+    return float((loss * weights).sum() + 0.5 * x @ precision @ x)
+
+
+# --- the parameters ---------------------------------------------------------------------------
+
+
+def _children(person: Person, segment: int) -> list[int]:
+    return [i for i, parent in enumerate(person.skeleton.parents) if parent == segment]
+
+
+def _parameters(person: Person, options: ScalingOptions) -> Iterator[_Parameter]:
+    skeleton = person.skeleton
+    for i in range(len(skeleton.segments)):
+        children = _children(person, i)
+        has_origin = np.any(person.origin_in_joint_m[i])
+        if has_origin or (len(children) == 1 and i > 0):
+            yield _Parameter("length", i, 1, options.length_sd * person.lengths_m[i])
+        if len(children) > 1:
+            for child in _placed_joints(person, i):
+                for axis in range(3):
+                    yield _Parameter("joint", child, axis, options.joint_centre_sd_m)
+        if skeleton.joint_types[i] == "revolute":
+            yield _Parameter("parent_tilt", i, 0, options.hinge_sd_rad)
+            yield _Parameter("child_tilt", i, 0, options.hinge_sd_rad)
+        if np.any(person.marker_segments == i):
+            for axis in range(3):
+                yield _Parameter("shift", i, axis, options.joint_centre_sd_m)
+    for m in range(len(person.markers)):
+        for axis in range(3):
+            yield _Parameter("marker", m, axis, options.marker_sd_m)
+
+
+def _placed_joints(person: Person, segment: int) -> list[int]:
+    """Children whose joint lies away from the segment's origin (hips, shoulders)."""
+    return [c for c in _children(person, segment) if np.any(person.joint_in_parent_m[c])]
+
+
+def _prior_precision(
+    person: Person, parameters: tuple[_Parameter, ...], options: ScalingOptions
+) -> np.ndarray:
+    """(P, P) precision of the priors; left and right lengths pull each other."""
+    precision = np.diag([parameter.sd**-2 for parameter in parameters])
+    lengths = {p.index: k for k, p in enumerate(parameters) if p.kind == "length"}
+    segments = person.skeleton.segments
+    for index, left in lengths.items():
+        name = segments[index]
+        if name.endswith("_l") and f"{name[:-1]}r" in segments:
+            right = lengths[segments.index(f"{name[:-1]}r")]
+            tie = (options.symmetry_sd * person.lengths_m[index]) ** -2
+            precision[np.ix_([left, right], [left, right])] += tie * np.array([[1, -1], [-1, 1]])
+    return precision
+
+
+def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> Person:
+    """The person with the parameters' changes ``x`` added to the first guess."""
+    joints, origins = person.joint_in_parent_m.copy(), person.origin_in_joint_m.copy()
+    tilts = {"parent_tilt": person.parent_tilt_rad.copy(), "child_tilt": person.child_tilt_rad.copy()}
+    places, lengths = person.marker_positions_m.copy(), person.lengths_m.copy()
+    for parameter, value in zip(parameters, x, strict=True):
+        i, axis = parameter.index, parameter.axis
+        if parameter.kind == "length":
+            lengths[i] += value
+            if np.any(person.origin_in_joint_m[i]):
+                origins[i, 1] += value
+            else:
+                joints[_children(person, i)[0], 1] -= value
+        elif parameter.kind == "joint":
+            joints[i, axis] += value
+        elif parameter.kind in tilts:
+            tilts[parameter.kind][i] += value
+        elif parameter.kind == "shift":
+            places[person.marker_segments == i, axis] += value
+            for child in _shifted_joints(person, i):
+                joints[child, axis] += value
+        else:
+            places[i, axis] += value
+    base = 0
+    hips = joints[_placed_joints(person, base)]
+    if len(hips):
+        lengths[base] = float(np.hypot(*hips.mean(axis=0)[:2]))
+    return replace(
+        person, joint_in_parent_m=joints, origin_in_joint_m=origins, lengths_m=lengths,
+        parent_tilt_rad=tilts["parent_tilt"], child_tilt_rad=tilts["child_tilt"],
+        marker_positions_m=places,
+    )
+
+
+def _shifted_joints(person: Person, segment: int) -> list[int]:
+    """Joints that move with a segment's bones when its origin is found elsewhere."""
+    return _placed_joints(person, segment) if len(_children(person, segment)) > 1 else []
+
+
+# --- the equations ----------------------------------------------------------------------------
+
+
+def _reduced_equations(
+    person: Person, markers_m: np.ndarray, poses: Poses, parameters: tuple[_Parameter, ...],
+    options: ScalingOptions, ik: dict,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Information (P, P) and gradient (P,) of the geometry with all poses eliminated."""
+    tree = tree_of(person)
+    R, p = tree.forward(poses.q)
+    segments = person.marker_segments
+    model = p[:, segments] + np.einsum("fmij,mj->fmi", R[:, segments], person.markers_in_joint_m())
+    root = np.sqrt(_marker_weights(poses, person, options, ik))[..., None]
+    residual = np.where(root > 0, (markers_m - model) * root, 0.0)
+    below = _subtrees(person)
+    by_pose = _pose_columns(person, tree, R, p, model, below) * root[..., None]
+    by_parameter = np.stack(
+        [_column(parameter, person, R, p, model, below) for parameter in parameters], axis=-1
+    ) * root[..., None]
+    frames = len(R)
+    Jq = by_pose.reshape(frames, -1, tree.nv)
+    Jp = by_parameter.reshape(frames, -1, len(parameters))
+    r = residual.reshape(frames, -1)
+    A = np.einsum("fki,fkj->fij", Jq, Jq, optimize=True)
+    A += np.eye(tree.nv) * max(ik["posture_sd_rad"] ** -2, 1e-9)
+    B = np.matmul(Jq.transpose(0, 2, 1), Jp)
+    C = np.linalg.solve(A, B)
+    flat = Jp.reshape(-1, Jp.shape[2])
+    information = flat.T @ flat - np.einsum("fip,fiq->pq", B, C, optimize=True)
+    pose_gradient = np.einsum("fki,fk->fi", Jq, r)
+    gradient = flat.T @ r.ravel() - np.einsum("fip,fi->p", C, pose_gradient)
+    return information, gradient
+
+
+def _subtrees(person: Person) -> np.ndarray:
+    """(n, m) True where marker m hangs on segment n or beyond it."""
+    parents = person.skeleton.parents
+    on = np.zeros((len(parents), len(person.markers)), dtype=bool)
+    on[person.marker_segments, np.arange(len(person.markers))] = True
+    for i in range(len(parents) - 1, 0, -1):
+        on[parents[i]] |= on[i]
+    return on
+
+
+def _pose_columns(person, tree: Tree, R, p, model, below) -> np.ndarray:
+    """(N, m, 3, nv) velocity of each marker for each unit velocity."""
+    columns = np.zeros((*model.shape, tree.nv))
+    for i, kind in enumerate(person.skeleton.joint_types):
+        at, mine = tree.v_starts[i], below[i]
+        if kind == "free":
+            columns[:, mine, :, at : at + 3] = R[:, None, i]
+            at += 3
+        arm = model[:, mine] - p[:, None, i]
+        axes = R[:, i] if kind != "revolute" else (R[:, i] @ tree.axes[i])[..., None]
+        for k in range(axes.shape[2]):
+            columns[:, mine, :, at + k] = np.cross(axes[:, None, :, k], arm)
+    return columns
+
+
+def _column(parameter: _Parameter, person: Person, R, p, model, below) -> np.ndarray:
+    """(N, m, 3) motion of the model's markers for a unit change of one parameter."""
+    column = np.zeros_like(model)
+    i, axis, parents = parameter.index, parameter.axis, person.skeleton.parents
+    if parameter.kind == "length":
+        if np.any(person.origin_in_joint_m[i]):
+            column[:, below[i]] = R[:, None, i, :, 1]
+        else:
+            column[:, below[_children(person, i)[0]]] = -R[:, None, i, :, 1]
+    elif parameter.kind == "joint":
+        column[:, below[i]] = R[:, None, parents[i], :, axis]
+    elif parameter.kind in ("parent_tilt", "child_tilt"):
+        turning = R[:, parents[i], :, 0] if parameter.kind == "parent_tilt" else -R[:, i, :, 0]
+        column[:, below[i]] = np.cross(turning[:, None], model[:, below[i]] - p[:, None, i])
+    elif parameter.kind == "shift":
+        own = person.marker_segments == i
+        for child in _shifted_joints(person, i):
+            own = own | below[child]
+        column[:, own] = R[:, None, i, :, axis]
+    else:
+        column[:, i] = R[:, person.marker_segments[i], :, axis]
+    return column

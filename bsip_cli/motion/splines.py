@@ -1,0 +1,193 @@
+"""Penalised splines whose stiffness follows the local pace of the motion.
+
+The signal is a quintic B-spline; the fourth differences of its coefficients get the prior
+variance ``tau^2(t)``, the samples the noise variance ``sigma^2`` (P-splines: Eilers and Marx
+1996). Both come from the data: sigma from high differences in the quiet part of the signal, tau
+by evidence maximisation (MacKay 1992) over a window that moves along. Derivatives are those of
+the spline.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+from scipy import sparse
+from scipy.interpolate import BSpline
+from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.ndimage import uniform_filter1d
+
+_DEGREE = 5
+_KNOT_RATE_HZ = 100.0  # at most; human motion ends far below
+_FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+_NOISE_ORDER = 6
+_ROUNDS = 20
+# sigma^2 / tau^2: where the evidence begins, and its limits (a cut-off of 20 Hz and of 0.3 Hz).
+_FIRST_STIFFNESS, _STIFFNESS_RANGE = 1e1, (1e-2, 1e12)
+
+
+@dataclass(frozen=True)
+class SmoothSignal:
+    """A smoothed signal and its derivatives at the samples, each (N, channels).
+
+    ``second_sd`` is the standard deviation of the second derivative.
+    """
+
+    value: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    second_sd: np.ndarray
+
+
+def smooth(
+    samples: np.ndarray, rate_hz: float, window_s: float, noise_sd: np.ndarray | None = None
+) -> SmoothSignal:
+    """Smooth each channel on its own.
+
+    Parameters
+    ----------
+    samples : (N, channels); NaN where missing, which the spline bridges.
+    window_s : time over which the pace of the motion is judged.
+    noise_sd : (channels,) noise of the samples, estimated from them where not given.
+
+    Raises
+    ------
+    ValueError
+        There are fewer than 12 samples, or a channel has none.
+    """
+    count, channels = samples.shape
+    if count < 2 * _NOISE_ORDER or not np.isfinite(samples).any(axis=0).all():
+        raise ValueError("too few samples for a spline")
+    sigma = noise_level(samples) if noise_sd is None else noise_sd
+    basis = _Basis(count, max(1, round(rate_hz / _KNOT_RATE_HZ)), rate_hz)
+    window = max(9, round(window_s * rate_hz / basis.samples_per_knot))
+    parts = [_smooth_channel(samples[:, k], sigma[k], window, basis) for k in range(channels)]
+    c = np.stack([part[0] for part in parts], axis=1)
+    sd = np.stack([part[1] for part in parts], axis=1)
+    return SmoothSignal(basis.values @ c, basis.slopes @ c, basis.curves @ c, sd)
+
+
+def noise_level(samples: np.ndarray) -> np.ndarray:
+    """(channels,) standard deviation of white noise on a smooth signal, from sixth differences.
+
+    The lower third of the differences counts: bursts of motion stand above it.
+    """
+    differences = np.abs(np.diff(samples, _NOISE_ORDER, axis=0))
+    gain = np.sqrt(924.0)  # root of the sum of squared binomials: 12 over 6
+    third = np.nanquantile(differences, 1 / 3, axis=0) / 0.4307  # of a normal's absolute value
+    scale = np.nanmax(np.abs(samples), axis=0)
+    return np.maximum(third / gain, 1e-9 * np.maximum(scale, 1.0))
+
+
+class _Basis:
+    """Values of the B-splines and their derivatives at N uniform samples, as sparse matrices."""
+
+    def __init__(self, count: int, samples_per_knot: int, rate_hz: float) -> None:
+        self.samples_per_knot = samples_per_knot
+        self.x = np.arange(count) / samples_per_knot  # in knots
+        self.intervals = max(int(np.ceil(self.x[-1])), 1)
+        self.per_s = rate_hz / samples_per_knot
+        self.size = self.intervals + _DEGREE
+
+    def _derivative(self, order: int) -> sparse.csr_array:
+        """Basis of degree 5 - order on the same knots, times the differences of that order."""
+        degree = _DEGREE - order
+        knots = np.arange(-degree, self.intervals + degree + 1, dtype=float)
+        basis = sparse.csr_array(BSpline.design_matrix(self.x, knots, degree))
+        signs = {0: [1.0], 1: [-1.0, 1.0], 2: [1.0, -2.0, 1.0]}[order]
+        size = self.size - order
+        differences = sparse.diags_array(
+            [np.full(size, s) for s in signs], offsets=range(order + 1), shape=(size, self.size)
+        )
+        return sparse.csr_array(basis @ differences) * self.per_s**order
+
+    @cached_property
+    def values(self) -> sparse.csr_array:
+        return self._derivative(0)
+
+    @cached_property
+    def slopes(self) -> sparse.csr_array:
+        return self._derivative(1)
+
+    @cached_property
+    def curves(self) -> sparse.csr_array:
+        return self._derivative(2)
+
+    @cached_property
+    def knot_of_sample(self) -> np.ndarray:
+        """(N,) fourth difference that is centred on each sample."""
+        return np.clip(np.round(self.x).astype(int), 0, self.size - 5)
+
+
+def _smooth_channel(
+    y: np.ndarray, sigma: float, window: int, basis: _Basis
+) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients and standard deviation (N,) of the second derivative."""
+    weights = np.isfinite(y).astype(float)
+    offset = np.nanmean(y)
+    data = np.where(weights > 0, y - offset, 0.0)
+    right = basis.values.T @ data
+    normal = _lower_band(basis.values.T @ (basis.values * weights[:, None]))
+    stiffness = np.full(basis.size - 4, _FIRST_STIFFNESS)
+    for _ in range(_ROUNDS):
+        c, inverse = _fit(normal, stiffness, right)
+        leverage = weights * _variances(basis.values, inverse)
+        known = np.bincount(basis.knot_of_sample, leverage, minlength=len(stiffness))
+        rough = np.convolve(c, _FOURTH, mode="valid") ** 2
+        new = sigma**2 * _mean(known, window) / np.maximum(_mean(rough, window), 1e-300)
+        new = np.exp(_mean(np.log(np.clip(new, *_STIFFNESS_RANGE)), max(3, window // 4)))
+        settled = np.max(np.abs(np.log(new / stiffness))) < 0.1
+        stiffness = new
+        if settled:
+            break
+    c, inverse = _fit(normal, stiffness, right)
+    return c + offset, sigma * np.sqrt(_variances(basis.curves, inverse))
+
+
+def _mean(x: np.ndarray, window: int) -> np.ndarray:
+    return uniform_filter1d(x, window, mode="nearest")
+
+
+def _lower_band(matrix: sparse.csr_array) -> np.ndarray:
+    """(6, n) lower band of a symmetric matrix."""
+    band = np.zeros((_DEGREE + 1, matrix.shape[0]))
+    for k in range(_DEGREE + 1):
+        band[k, : matrix.shape[0] - k] = matrix.diagonal(-k)
+    return band
+
+
+def _fit(normal: np.ndarray, stiffness: np.ndarray, right: np.ndarray):
+    """Coefficients and the band of the posterior covariance over sigma^2."""
+    matrix = normal.copy()
+    for a in range(5):
+        for b in range(a, 5):
+            matrix[b - a, a : a + len(stiffness)] += _FOURTH[a] * _FOURTH[b] * stiffness
+    matrix[0] += 1e-13 * matrix[0].max()
+    factor = cholesky_banded(matrix, lower=True)
+    return cho_solve_banded((factor, True), right), _inverse_band(factor)
+
+
+@njit(cache=True)
+def _inverse_band(factor):
+    """The band of (L L^T)^-1 for a lower banded factor L (Takahashi's recursion)."""
+    width, n = factor.shape
+    z = np.zeros((width, n))
+    for i in range(n - 1, -1, -1):
+        last = min(width - 1, n - 1 - i)
+        for b in range(last, -1, -1):
+            total = 1.0 / factor[0, i] if b == 0 else 0.0
+            for k in range(1, last + 1):
+                total -= factor[k, i] * z[abs(k - b), i + min(k, b)]
+            z[b, i] = total / factor[0, i]
+    return z
+
+
+def _variances(rows: sparse.csr_array, inverse: np.ndarray) -> np.ndarray:
+    """(N,) variance over sigma^2 of each row applied to the coefficients."""
+    n = inverse.shape[1]
+    diagonals = [inverse[k, : n - k] for k in range(len(inverse))]
+    offsets = [*range(len(inverse)), *range(-1, -len(inverse), -1)]
+    covariance = sparse.diags_array([*diagonals, *diagonals[1:]], offsets=offsets, shape=(n, n))
+    return np.maximum(np.asarray((rows @ covariance).multiply(rows).sum(axis=1)).ravel(), 0.0)

@@ -1,0 +1,58 @@
+"""Between artifacts' tables and the arrays of science: person, markers, wrench."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.body.person import Person
+from bsip_cli.body.skeleton import Skeleton
+
+WRENCH = ["fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm"]
+
+
+def markers_from(frame: pd.DataFrame) -> tuple[np.ndarray, tuple[str, ...], np.ndarray]:
+    """Times (N,), labels and positions (N, m, 3) [m] of a ``markers`` table."""
+    first = frame["time_s"].iloc[0]
+    labels = tuple(frame.loc[frame["time_s"] == first, "marker"])
+    positions = frame[["x_m", "y_m", "z_m"]].to_numpy().reshape(-1, len(labels), 3)
+    return frame["time_s"].to_numpy()[:: len(labels)], labels, positions
+
+
+def ordered_markers(
+    labels: tuple[str, ...], positions: np.ndarray, wanted: tuple[str, ...]
+) -> np.ndarray:
+    """(N, len(wanted), 3) positions in another order of markers; NaN for those not there."""
+    ordered = np.full((len(positions), len(wanted), 3), np.nan)
+    for k, name in enumerate(wanted):
+        if name in labels:
+            ordered[:, k] = positions[:, labels.index(name)]
+    return ordered
+
+
+def person_from(skeleton_rows: pd.DataFrame, marker_rows: pd.DataFrame, skeleton: Skeleton) -> Person:
+    """The person as ``scale`` wrote it."""
+    rows = skeleton_rows.set_index("segment").loc[list(skeleton.segments)]
+    return Person(
+        skeleton,
+        rows[["joint_x_m", "joint_y_m", "joint_z_m"]].to_numpy(),
+        rows["parent_tilt_rad"].to_numpy(),
+        rows["child_tilt_rad"].to_numpy(),
+        rows[["origin_x_m", "origin_y_m", "origin_z_m"]].to_numpy(),
+        rows["length_m"].to_numpy(),
+        tuple(marker_rows["marker"]),
+        np.array([skeleton.index(name) for name in marker_rows["segment"]]),
+        marker_rows[["x_m", "y_m", "z_m"]].to_numpy(),
+        marker_rows["weight"].to_numpy(),
+        rows["held"].to_numpy(),
+    )
+
+
+def coordinates_from(
+    frame: pd.DataFrame, skeleton: Skeleton
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """q (N, nq), v (N, nv) and a (N, nv) of a ``kinematics`` table."""
+    q = frame[[f"q_{name}" for name in skeleton.q_names]].to_numpy()
+    v = frame[[f"v_{name}" for name in skeleton.v_names]].to_numpy()
+    a = frame[[f"a_{name}" for name in skeleton.v_names]].to_numpy()
+    return q, v, a

@@ -1,0 +1,210 @@
+"""identify: inertial parameters that explain the measured ground forces (OM)."""
+
+from __future__ import annotations
+
+import importlib
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.artifacts import bsip_names, share_name
+from bsip_cli.body.inertia import from_readable
+from bsip_cli.body.person import Person
+from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.dynamics.base_parameters import expressions, find_basis
+from bsip_cli.dynamics.lowpass import stretches
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.errors import BadDataError
+from bsip_cli.identification.base import base_parameters
+from bsip_cli.identification.equations import Recording, accumulate, residual_series
+from bsip_cli.identification.estimator import Estimate, Problem
+from bsip_cli.identification.excitation import excitation
+from bsip_cli.identification.noise import Noise, noise_of
+from bsip_cli.identification.prior import Prior, Spread, prior_of
+from bsip_cli.identification.uncertainty import readable
+from bsip_cli.stages.frames import WRENCH, coordinates_from, person_from
+from bsip_cli.study import Trial
+from bsip_cli.unit import Unit
+
+# Where the iteration of the weights begins: force plates and skin make errors of this size.
+_FIRST_NOISE = np.array([10.0, 10.0, 10.0, 5.0, 5.0, 5.0])
+_WEIGHT_ROUNDS = 3
+_SHORTEST_S = 1.0
+
+
+def run(unit: Unit) -> None:
+    """Read motion, wrench, person and RM; write bsip and what belongs to it."""
+    skeleton = load_skeleton(unit.config.skeleton)
+    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    regression = unit.read("regression")
+    prior = _prior(unit, regression, person)
+    trials = _identification_trials(unit)
+    recordings, blocks = _recordings(unit, skeleton, trials)
+    problem, reference = _problem(unit, person, prior, recordings)
+    estimates = {
+        name: importlib.import_module(f"bsip_cli.identification.{name}").estimate(problem)
+        for name in unit.config.identify.estimators
+    }
+    methods = _methods(unit)
+    tables = [regression.drop(columns="note")]
+    for name, estimate in estimates.items():
+        unit.warn(f"{unit.name}: {methods[name]} ({name}): {estimate.note}")
+        tables.append(_bsip_table(skeleton, methods[name], estimate, prior))
+    unit.write("bsip", pd.concat(tables, ignore_index=True), facts={
+        "reference_m": reference.tolist(), "noise_rms": problem.noise.rms.tolist(),
+    })
+    unit.write("base-parameters", _base_table(skeleton, problem))
+    unit.write("excitation", _excitation_table(skeleton, problem))
+    unit.write("identification", _summary(unit, problem, estimates, methods, trials))
+    unit.write("used-blocks", blocks)
+
+
+def _prior(unit: Unit, regression: pd.DataFrame, person: Person) -> Prior:
+    rows = regression[list(bsip_names())].to_numpy()
+    spread = Spread(**unit.config.prior.model_dump())
+    return prior_of(tuple(from_readable(row) for row in rows), person, spread)
+
+
+def _methods(unit: Unit) -> dict[str, str]:
+    """The first estimator is OM, the others go by their names."""
+    names = unit.config.identify.estimators
+    return {name: "OM" if k == 0 else name for k, name in enumerate(names)}
+
+
+# --- which data -------------------------------------------------------------------------------
+
+
+def _usable(unit: Unit, trial: Trial) -> np.ndarray:
+    kinematics = unit.read("kinematics", trial)
+    return kinematics["determined"].to_numpy() & unit.read("wrench", trial)["valid"].to_numpy()
+
+
+def _identification_trials(unit: Unit) -> list[Trial]:
+    """The trials with the role; without one, the trial with most valid frames."""
+    ready = unit.trials("kinematics", "wrench")
+    named = [trial for trial in ready if trial.role == "sequence"]
+    if named:
+        return named
+    counts = {trial.stem: int(_usable(unit, trial).sum()) for trial in ready}
+    moving = [t for t in ready if t.role != "static" and counts[t.stem] > 0] or list(ready)
+    if not moving or max(counts.values()) == 0:
+        raise BadDataError(
+            "no trial in which every contact is on a plate", file=unit.name,
+            expected="a stretch of motion with all ground contacts measured",
+            remedy="record one; the table's values (RM) stand in the regression artifact",
+        )
+    chosen = max(moving, key=lambda trial: counts[trial.stem])
+    unit.warn(f"{unit.name}: no trial of an identification task; {chosen.stem} identifies")
+    if len(ready) == 1 and unit.config.identify.hold_out_fraction == 0:
+        unit.warn(
+            f"{unit.name}: no other trial validates, so the fit is judged on the data it was made "
+            "from; identify.hold_out_fraction would keep blocks out"
+        )
+    return [chosen]
+
+
+def _recordings(
+    unit: Unit, skeleton: Skeleton, trials: list[Trial]
+) -> tuple[list[Recording], pd.DataFrame]:
+    recordings, blocks = [], []
+    for trial in trials:
+        kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
+        times = kinematics["time_s"].to_numpy()
+        rate = 1.0 / float(np.median(np.diff(times)))
+        use = _usable(unit, trial) & ~_held_out(unit, times)
+        for start, stop in stretches(use):
+            blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})
+        measured = np.nan_to_num(wrench[WRENCH].to_numpy())
+        recordings.append(Recording(*coordinates_from(kinematics, skeleton), measured, use, rate))
+    duration = sum(r.use.sum() / r.rate_hz for r in recordings)
+    if duration < _SHORTEST_S:
+        raise BadDataError(
+            f"{duration:.2f} s with every contact on a plate in "
+            f"{', '.join(t.stem for t in trials)}", file=unit.name,
+            expected=f"at least {_SHORTEST_S:g} s", remedy="record a longer trial on the plates",
+        )
+    return recordings, pd.DataFrame(blocks, columns=["trial", "start_s", "end_s"])
+
+
+def _held_out(unit: Unit, times: np.ndarray) -> np.ndarray:
+    """(N,) frames of the blocks that are kept out, spread evenly over the trial."""
+    options = unit.config.identify
+    block = ((times - times[0]) // options.block_s).astype(int)
+    share = options.hold_out_fraction
+    return np.floor((block + 1) * share + 1e-9) > np.floor(block * share + 1e-9)
+
+
+# --- the estimate -----------------------------------------------------------------------------
+
+
+def _problem(
+    unit: Unit, person: Person, prior: Prior, recordings: list[Recording]
+) -> tuple[Problem, np.ndarray]:
+    """Equations about the middle of the motion, weighted by what the fit leaves."""
+    model = pinocchio_model(person)
+    basis = find_basis(model)
+    reference = np.mean(
+        [np.append(r.q[r.use, :2].mean(axis=0), 0.0) for r in recordings if r.use.any()], axis=0
+    )
+    cutoff = unit.config.identify.cutoff_hz
+    equations = accumulate(model, recordings, cutoff, reference)
+    noise = Noise(_FIRST_NOISE, np.full(6, float(equations.samples)), equations.samples)
+    estimator = importlib.import_module("bsip_cli.identification.hansen2017")
+    for _ in range(_WEIGHT_ROUNDS):
+        fitted = estimator.estimate(Problem(equations, noise, prior, basis))
+        noise = noise_of(residual_series(model, recordings, cutoff, reference, fitted.phi))
+    return Problem(equations, noise, prior, basis), reference
+
+
+def _bsip_table(
+    skeleton: Skeleton, method: str, estimate: Estimate, prior: Prior
+) -> pd.DataFrame:
+    result = readable(estimate, prior)
+    names = bsip_names()
+    table = {"method": [method] * len(skeleton.segments), "segment": list(skeleton.segments)}
+    table |= {name: result.values[:, k] for k, name in enumerate(names)}
+    table |= {f"{name}_sd": result.sd[:, k] for k, name in enumerate(names)}
+    table |= {share_name(name): result.share[:, k] for k, name in enumerate(names)}
+    return pd.DataFrame(table)
+
+
+def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
+    fit = base_parameters(problem)
+    named = expressions(problem.basis, skeleton.segments)
+    return pd.DataFrame({
+        "name": [row[0] for row in named], "expression": [row[1] for row in named],
+        "value": fit.values, "unit": [row[2] for row in named],
+        "sd": np.sqrt(np.diag(fit.covariance)), "sigma_percent": fit.sigma_percent(),
+        "rm_value": fit.rm_values,
+    })
+
+
+def _excitation_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
+    found = excitation(problem)
+    rows = [("condition_number", "", found.condition_number)]
+    rows += [("singular_value", str(k + 1), v) for k, v in enumerate(found.singular_values)]
+    rows += [
+        ("segment", name, share)
+        for name, share in zip(skeleton.segments, found.segment_share, strict=True)
+    ]
+    return pd.DataFrame(rows, columns=["quantity", "name", "value"])
+
+
+def _summary(
+    unit: Unit, problem: Problem, estimates: dict[str, Estimate], methods: dict[str, str],
+    trials: list[Trial],
+) -> pd.DataFrame:
+    names = [f"rms_{name}" for name in WRENCH]
+    condition = excitation(problem).condition_number
+    rows = []
+    for name, estimate in estimates.items():
+        rows.append({
+            "estimator": name, "method": methods[name],
+            "trials": ", ".join(trial.stem for trial in trials),
+            "samples": problem.equations.samples, "duration_s": problem.equations.duration_s,
+            "effective_samples": float(problem.noise.effective.sum()),
+            "rank": problem.basis.rank, "condition_number": condition,
+            **dict(zip(names, estimate.residual_rms(problem), strict=True)),
+            "note": estimate.note,
+        })
+    return pd.DataFrame(rows)

@@ -1,0 +1,76 @@
+"""ik: joint coordinates, velocities and accelerations from the markers of one trial."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.body.person import Person
+from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.motion.inverse_kinematics import Poses, neutral, place_base, solve_poses
+from bsip_cli.motion.smoothing import Motion, smooth_motion
+from bsip_cli.stages.frames import markers_from, ordered_markers, person_from
+from bsip_cli.unit import Unit
+
+
+def run(unit: Unit) -> None:
+    """Read markers and the person; write kinematics and marker-residuals."""
+    skeleton = load_skeleton(unit.config.skeleton)
+    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    times, labels, positions = markers_from(unit.read("markers"))
+    markers = ordered_markers(labels, positions, person.markers)
+    options = unit.config.ik
+    poses = solve_poses(
+        person, markers, start_pose(person, markers), marker_sd_m=options.marker_sd_m,
+        robust_limit_m=options.robust_limit_m, posture_sd_rad=options.posture_sd_rad,
+        iterations=options.iterations,
+    )
+    determined, angle_sd = _determined(unit, person, poses)
+    rate = 1.0 / float(np.median(np.diff(times)))
+    motion = smooth_motion(
+        skeleton, poses.q, determined, rate, **unit.config.smoothing.model_dump()
+    )
+    unit.write("kinematics", _kinematics(times, determined, angle_sd, poses, motion, skeleton))
+    unit.write("marker-residuals", pd.DataFrame({
+        "time_s": np.repeat(times, len(person.markers)),
+        "marker": np.tile(np.array(person.markers, dtype=object), len(times)),
+        "residual_m": poses.residual_m.ravel(),
+    }))
+
+
+def start_pose(person: Person, markers: np.ndarray) -> np.ndarray:
+    """(nq,) neutral pose, laid on the first frame that shows the most markers."""
+    seen = np.isfinite(markers).all(axis=2).sum(axis=1)
+    return place_base(person, markers[int(np.argmax(seen))], neutral(person))
+
+
+def _determined(unit: Unit, person: Person, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
+    """Frames in which the markers decide every angle that they decide in most frames."""
+    limit = unit.config.ik.undetermined_sd_rad
+    sd = poses.coordinate_sd[:, 3:]  # all but the base's position
+    ever = np.median(sd, axis=0) < limit
+    names = np.array(person.skeleton.v_names[3:])
+    if not ever.all():
+        unit.warn(
+            f"{unit.name}: no markers decide {', '.join(names[~ever])}; held near the neutral pose"
+        )
+    angle_sd = sd[:, ever].max(axis=1)
+    determined = (angle_sd < limit) & poses.converged & np.isfinite(poses.residual_m).any(axis=1)
+    if not determined.all():
+        unit.warn(f"{unit.name}: {int((~determined).sum())} frames without a pose")
+    return determined, angle_sd
+
+
+def _kinematics(times, determined, angle_sd, poses: Poses, motion: Motion, skeleton):
+    tables = [
+        pd.DataFrame({
+            "time_s": times, "determined": determined, "marker_rms_m": poses.frame_rms_m(),
+            "angle_sd_rad": angle_sd,
+        })
+    ]
+    for prefix, values, names in (
+        ("q", motion.q, skeleton.q_names), ("v", motion.v, skeleton.v_names),
+        ("a", motion.a, skeleton.v_names), ("sd", motion.a_sd, skeleton.v_names),
+    ):
+        tables.append(pd.DataFrame(values, columns=[f"{prefix}_{name}" for name in names]))
+    return pd.concat(tables, axis=1)

@@ -1,0 +1,221 @@
+"""scale: the person's skeleton from a static trial, refined over frames of all trials."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.body.markersets import MarkerSet, load_marker_set
+from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.errors import BadDataError
+from bsip_cli.motion.calibration import Calibration, calibrate
+from bsip_cli.motion.inverse_kinematics import neutral, place_base, solve_poses, tree_of
+from bsip_cli.motion.scaling import Refinement, ScalingOptions, refine, varied_frames
+from bsip_cli.stages.frames import WRENCH, markers_from, ordered_markers
+from bsip_cli.study import Trial
+from bsip_cli.unit import Unit
+
+_GRAVITY_M_S2 = 9.80665
+_QUIET_S = 1.0
+_FRAMES_PER_TRIAL = 400
+
+
+@dataclass(frozen=True)
+class _Recorded:
+    """Markers of one trial: times (N,), labels, positions (N, m, 3)."""
+
+    trial: Trial
+    times: np.ndarray
+    labels: tuple[str, ...]
+    positions: np.ndarray
+
+
+def run(unit: Unit) -> None:
+    """Read all trials' markers; write skeleton, marker-positions and person."""
+    skeleton = load_skeleton(unit.config.skeleton)
+    recorded = [
+        _Recorded(trial, *markers_from(unit.read("markers", trial)))
+        for trial in unit.trials("markers", "wrench")
+    ]
+    still = _calibrating_trial(unit, recorded)
+    quiet = _quietest(still)
+    marker_set = load_marker_set(unit.facts("markers", still.trial)["marker_set"])
+    assert unit.participant is not None
+    calibration = calibrate(
+        skeleton, marker_set, _mean_positions(still, quiet), unit.participant.sex,
+        unit.participant.height_m,
+    )
+    for note in calibration.notes:
+        unit.warn(f"{unit.name}: {note}")
+    fit = _refine(unit, calibration, recorded, still, quiet)
+    plate_mass = _plate_mass(unit, still, quiet)
+    mass, source = _mass(unit, plate_mass)
+    _warn_missing(unit, skeleton, marker_set, fit)
+    unit.write("skeleton", _skeleton_table(skeleton, calibration, fit))
+    unit.write("marker-positions", _marker_table(skeleton, calibration, fit))
+    unit.write("person", pd.DataFrame([{
+        "sex": unit.participant.sex, "mass_kg": mass, "mass_source": source,
+        "plate_mass_kg": plate_mass, "height_m": calibration.stature_m,
+        "anterior_x": calibration.anterior[0], "anterior_y": calibration.anterior[1],
+        "calibration_trial": still.trial.stem, "marker_rms_m": fit.poses.rms_m(),
+    }]), facts={"marker_set": marker_set.name, "rms_before_m": fit.rms_before_m})
+
+
+# --- which frames -----------------------------------------------------------------------------
+
+
+def _calibrating_trial(unit: Unit, recorded: list[_Recorded]) -> _Recorded:
+    if not recorded:
+        raise BadDataError("no trial with markers", file=unit.name, expected="at least one",
+                           remedy="see what ingest refused")
+    for one in recorded:
+        if one.trial.role == "static":
+            return one
+    quietest = min(recorded, key=lambda one: _unrest(one)[0])
+    unit.warn(
+        f"{unit.name}: no static trial; the quietest second of {quietest.trial.stem} calibrates"
+    )
+    return quietest
+
+
+def _quietest(one: _Recorded) -> slice:
+    """The quietest second of a trial."""
+    return _unrest(one)[1]
+
+
+def _unrest(one: _Recorded) -> tuple[float, slice]:
+    """Mean marker speed [m/s] in the quietest second, and that second."""
+    step = float(np.median(np.diff(one.times))) if len(one.times) > 1 else 1.0
+    width = min(max(2, round(_QUIET_S / step)), len(one.times))
+    if width < 3:
+        return np.inf, slice(0, len(one.times))
+    speed = np.linalg.norm(np.diff(one.positions, axis=0), axis=2) / step
+    seen = np.isfinite(speed)
+    mean = np.where(seen, speed, 0.0).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
+    mean[~seen.any(axis=1)] = np.inf
+    windows = np.convolve(mean, np.ones(width - 1) / (width - 1), mode="valid")
+    start = int(np.argmin(windows))
+    return float(windows[start]), slice(start, start + width)
+
+
+def _mean_positions(one: _Recorded, frames: slice) -> dict[str, np.ndarray]:
+    """Label to mean position over the frames in which the marker is visible."""
+    positions = one.positions[frames]
+    return {
+        label: positions[np.isfinite(positions[:, k, 0]), k].mean(axis=0)
+        for k, label in enumerate(one.labels) if np.isfinite(positions[:, k, 0]).any()
+    }
+
+
+# --- the fit ----------------------------------------------------------------------------------
+
+
+def _refine(
+    unit: Unit, calibration: Calibration, recorded: list[_Recorded], still: _Recorded, quiet: slice
+) -> Refinement:
+    options, person = unit.config.scale, calibration.person
+    ik = unit.config.ik.model_dump(exclude={"undetermined_sd_rad"})
+    middle = (quiet.start + quiet.stop) // 2
+    markers = [ordered_markers(still.labels, still.positions[middle : middle + 1], person.markers)]
+    poses = [solve_poses(person, markers[0], calibration.q, **ik).q]
+    for one in recorded:
+        stride = max(1, len(one.times) // _FRAMES_PER_TRIAL)
+        seen = ordered_markers(one.labels, one.positions[::stride], person.markers)
+        enough = np.isfinite(seen[..., 0]).mean(axis=1) > 0.8
+        if enough.any():
+            seen = seen[enough]
+            start = place_base(person, seen[0], neutral(person))
+            markers.append(seen)
+            poses.append(solve_poses(person, seen, start, **ik).q)
+    all_markers, all_poses = np.concatenate(markers), np.concatenate(poses)
+    orientations, _ = tree_of(person).forward(all_poses)
+    chosen = varied_frames(orientations, options.frames)
+    return refine(
+        person, all_markers[chosen], all_poses[chosen],
+        ScalingOptions(**options.model_dump(exclude={"frames"})), ik,
+    )
+
+
+# --- mass -------------------------------------------------------------------------------------
+
+
+def _plate_mass(unit: Unit, still: _Recorded, quiet: slice) -> float:
+    """Mass [kg] that the plates read in quiet standing, NaN where they do not tell."""
+    wrench = unit.read("wrench", still.trial)
+    valid = wrench["valid"].to_numpy().copy()
+    inside = np.zeros(len(valid), dtype=bool)
+    inside[quiet] = True
+    force = wrench[WRENCH[2]].to_numpy()[valid & inside]
+    return float(force.mean() / _GRAVITY_M_S2) if len(force) else float("nan")
+
+
+def _mass(unit: Unit, plate_mass: float) -> tuple[float, str]:
+    assert unit.participant is not None
+    stated = unit.participant.mass_kg
+    if stated is None:
+        if not plate_mass > 10:
+            raise BadDataError(
+                "mass_kg is n/a and the plates do not tell it", file=unit.name,
+                expected="a stated mass, or a quiet stretch with all contacts on plates",
+                remedy="put the mass into participants.tsv",
+            )
+        unit.warn(f"{unit.name}: mass {plate_mass:.2f} kg taken from the plates")
+        return plate_mass, "plates"
+    difference = 100 * (plate_mass - stated) / stated
+    limit = unit.config.ingest.mass_tolerance_percent
+    if abs(difference) > limit:
+        unit.warn(
+            f"{unit.name}: the plates read {plate_mass:.2f} kg in quiet standing, stated are "
+            f"{stated:.2f} kg ({difference:+.1f} %, tolerance {limit:g} %)"
+        )
+    return stated, "participants.tsv"
+
+
+# --- what is written --------------------------------------------------------------------------
+
+
+def _warn_missing(unit: Unit, skeleton: Skeleton, marker_set: MarkerSet, fit: Refinement) -> None:
+    for segment, held in zip(skeleton.segments, fit.person.held, strict=True):
+        if held:
+            known = [m.label for m in marker_set.markers if m.segment == segment]
+            serve = f"; {', '.join(known)} would do" if known else ""
+            unit.warn(f"{unit.name}: no markers on {segment}, its joint is held{serve}")
+
+
+def _skeleton_table(
+    skeleton: Skeleton, calibration: Calibration, fit: Refinement
+) -> pd.DataFrame:
+    first, person = calibration.person, fit.person
+    parents = [skeleton.segments[i] if i >= 0 else "" for i in skeleton.parents]
+    moved = person.joint_positions_m() - first.joint_positions_m()
+    table = {
+        "segment": list(skeleton.segments), "parent": parents, "joint": list(skeleton.joints),
+        "joint_type": list(skeleton.joint_types),
+    }
+    for name, values in (("joint", person.joint_in_parent_m), ("origin", person.origin_in_joint_m)):
+        table |= {f"{name}_{axis}_m": values[:, k] for k, axis in enumerate("xyz")}
+    table |= {
+        "parent_tilt_rad": person.parent_tilt_rad, "child_tilt_rad": person.child_tilt_rad,
+        "length_m": person.lengths_m, "first_guess_m": first.lengths_m,
+        "length_sd_m": fit.length_sd_m, "joint_shift_m": np.linalg.norm(moved, axis=1),
+        "held": person.held,
+    }
+    return pd.DataFrame(table)
+
+
+def _marker_table(skeleton: Skeleton, calibration: Calibration, fit: Refinement) -> pd.DataFrame:
+    first, person = calibration.person, fit.person
+    moved = person.marker_positions_m - first.marker_positions_m
+    seen = np.isfinite(fit.poses.residual_m)
+    squares = np.where(seen, fit.poses.residual_m, 0.0) ** 2
+    rms = np.sqrt(squares.sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
+    positions = person.marker_positions_m
+    return pd.DataFrame({
+        "marker": list(person.markers),
+        "segment": [skeleton.segments[i] for i in person.marker_segments],
+        "x_m": positions[:, 0], "y_m": positions[:, 1], "z_m": positions[:, 2],
+        "weight": person.marker_weights, "shift_m": np.linalg.norm(moved, axis=1),
+        "residual_m": np.where(seen.any(axis=0), rms, np.nan),
+    })

@@ -53,6 +53,7 @@ class Ik(Section):
     posture_sd_rad: float = Field(gt=0)
     iterations: int = Field(ge=1)
     undetermined_sd_rad: float = Field(gt=0)
+    held_sd_rad: float = Field(gt=0)
 
 
 class Smoothing(Section):

@@ -106,7 +106,7 @@ def neutral(person: Person) -> np.ndarray:
 
 def solve_poses(
     person: Person, markers_m: np.ndarray, q_first: np.ndarray, *, marker_sd_m: float,
-    robust_limit_m: float, posture_sd_rad: float, iterations: int,
+    robust_limit_m: float, posture_sd_rad: float | np.ndarray, iterations: int,
 ) -> Poses:
     """Weighted least squares on all markers, robust beyond a limit, each frame from the last.
 
@@ -114,7 +114,8 @@ def solve_poses(
     ----------
     markers_m : (N, m, 3) world positions in the order of ``person.markers``, NaN where missing.
     q_first : (nq,) where the first frame starts.
-    marker_sd_m, robust_limit_m, posture_sd_rad, iterations : as in configs/default.toml, [ik].
+    marker_sd_m, robust_limit_m, posture_sd_rad, iterations : as in configs/default.toml, [ik];
+        ``posture_sd_rad`` may differ between coordinates (nv,).
 
     Raises
     ------
@@ -130,7 +131,7 @@ def solve_poses(
     kernel.solve_frames(
         np.ascontiguousarray(markers_m, dtype=float), q_first, person.marker_segments,
         person.markers_in_joint_m(), person.marker_weights / marker_sd_m**2, robust_limit_m,
-        posture_sd_rad**-2, iterations, tree.kinds, tree.parents, tree.q_starts, tree.v_starts,
+        np.broadcast_to(posture_sd_rad, tree.nv) ** -2.0, iterations, tree.kinds, tree.parents, tree.q_starts, tree.v_starts,
         tree.v_segments, tree.v_parents, tree.positions, tree.rotations, tree.axes,
         q, residual, sd, steps,
     )

@@ -110,7 +110,7 @@ def _residuals(R, p, marker_segments, marker_positions, measured, out):
 
 
 @njit(cache=True)
-def _cost(residuals, weights, limit, q, kinds, q_starts, prior):
+def _cost(residuals, weights, limit, q, kinds, q_starts, v_starts, prior):
     """Half the weighted squares, Huber beyond ``limit``, plus the posture prior."""
     total = 0.0
     for m in range(weights.size):
@@ -124,9 +124,10 @@ def _cost(residuals, weights, limit, q, kinds, q_starts, prior):
         at = q_starts[i]
         if kinds[i] == SPHERICAL:
             _rotation_vector(q[at : at + 4], turn)
-            total += 0.5 * prior * (turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+            for j in range(3):
+                total += 0.5 * prior[v_starts[i] + j] * turn[j] ** 2
         else:
-            total += 0.5 * prior * q[at] ** 2
+            total += 0.5 * prior[v_starts[i]] * q[at] ** 2
     return total
 
 
@@ -227,11 +228,11 @@ def _normal_equations(
         if kinds[i] == SPHERICAL:
             _rotation_vector(q[q_starts[i] : q_starts[i] + 4], turn)
             for j in range(3):
-                H[at + j, at + j] += prior
-                g[at + j] -= prior * turn[j]
+                H[at + j, at + j] += prior[at + j]
+                g[at + j] -= prior[at + j] * turn[j]
         else:
-            H[at, at] += prior
-            g[at] -= prior * q[q_starts[i]]
+            H[at, at] += prior[at]
+            g[at] -= prior[at] * q[q_starts[i]]
 
 
 @njit(cache=True)
@@ -303,7 +304,7 @@ def solve_frames(
     """Least-squares pose of every frame, each started from the last.
 
     markers (N, m, 3) [m], NaN where missing; weights (m,) [1/m2]; limit of Huber's loss [m];
-    prior [1/rad2] on the joint angles; q_first (nq,). Fills q_out (N, nq), residual_out (N, m)
+    prior (nv,) [1/rad2] that pulls the joint angles to zero; q_first (nq,). Fills q_out (N, nq), residual_out (N, m)
     [m], sd_out (N, nv) (standard deviation of each velocity's coordinate, given those nearer to
     the base) and steps_out (N,), which is -1 where the steps ran out.
     """
@@ -320,7 +321,7 @@ def solve_frames(
         damping = 0.0
         forward(q, kinds, parents, q_starts, positions, rotations, axes, R, p)
         _residuals(R, p, marker_segments, marker_positions, measured, residuals)
-        cost = _cost(residuals, weights, limit, q, kinds, q_starts, prior)
+        cost = _cost(residuals, weights, limit, q, kinds, q_starts, v_starts, prior)
         steps_out[frame] = -1
         for step in range(max_steps):
             _normal_equations(
@@ -335,7 +336,9 @@ def solve_frames(
                 _step(q, dv, kinds, q_starts, v_starts, R[0], trial)
                 forward(trial, kinds, parents, q_starts, positions, rotations, axes, R, p)
                 _residuals(R, p, marker_segments, marker_positions, measured, trial_residuals)
-                trial_cost = _cost(trial_residuals, weights, limit, trial, kinds, q_starts, prior)
+                trial_cost = _cost(
+                    trial_residuals, weights, limit, trial, kinds, q_starts, v_starts, prior
+                )
                 if trial_cost <= cost * (1 + 1e-14):
                     better = True
                     break

@@ -46,8 +46,9 @@ class Refinement:
 class _Parameter:
     """One number of the geometry: how it moves markers, and its prior.
 
-    kind: length, joint, parent_tilt, child_tilt, shift or marker. ``index`` is the segment (for
-    joints and tilts the child segment, for markers the marker); ``axis`` 0 to 2 where it has one.
+    kind: length, joint, origin, parent_tilt, child_tilt, shift or marker. ``index`` is the segment
+    (for joints and tilts the child segment, for markers the marker); ``axis`` 0 to 2 where it has
+    one.
     """
 
     kind: str
@@ -153,20 +154,23 @@ def _children(person: Person, segment: int) -> list[int]:
 
 
 def _parameters(person: Person, options: ScalingOptions) -> Iterator[_Parameter]:
+    """The base keeps its anatomical origin: where the trunk bends on it is a joint of its own."""
     skeleton = person.skeleton
     for i in range(len(skeleton.segments)):
         children = _children(person, i)
-        has_origin = np.any(person.origin_in_joint_m[i])
-        if has_origin or (len(children) == 1 and i > 0):
+        if len(children) == 1 and i > 0:
             yield _Parameter("length", i, 1, options.length_sd * person.lengths_m[i])
         if len(children) > 1:
-            for child in _placed_joints(person, i):
+            for child in _moving_joints(person, i):
                 for axis in range(3):
                     yield _Parameter("joint", child, axis, options.joint_centre_sd_m)
+        if np.any(person.origin_in_joint_m[i]):
+            for axis in range(3):
+                yield _Parameter("origin", i, axis, options.joint_centre_sd_m)
         if skeleton.joint_types[i] == "revolute":
             yield _Parameter("parent_tilt", i, 0, options.hinge_sd_rad)
             yield _Parameter("child_tilt", i, 0, options.hinge_sd_rad)
-        if np.any(person.marker_segments == i):
+        if i > 0 and np.any(person.marker_segments == i):
             for axis in range(3):
                 yield _Parameter("shift", i, axis, options.joint_centre_sd_m)
     for m in range(len(person.markers)):
@@ -174,9 +178,15 @@ def _parameters(person: Person, options: ScalingOptions) -> Iterator[_Parameter]
             yield _Parameter("marker", m, axis, options.marker_sd_m)
 
 
-def _placed_joints(person: Person, segment: int) -> list[int]:
-    """Children whose joint lies away from the segment's origin (hips, shoulders)."""
-    return [c for c in _children(person, segment) if np.any(person.joint_in_parent_m[c])]
+def _moving_joints(person: Person, segment: int) -> list[int]:
+    """Joints on a segment with several that are not its origin by definition.
+
+    Hips, shoulders and the waist are; the neck is where the upper torso begins.
+    """
+    joints = _children(person, segment)
+    if segment == 0:
+        return joints
+    return [c for c in joints if np.any(person.joint_in_parent_m[c])]
 
 
 def _prior_precision(
@@ -204,10 +214,9 @@ def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> 
         i, axis = parameter.index, parameter.axis
         if parameter.kind == "length":
             lengths[i] += value
-            if np.any(person.origin_in_joint_m[i]):
-                origins[i, 1] += value
-            else:
-                joints[_children(person, i)[0], 1] -= value
+            joints[_children(person, i)[0], 1] -= value
+        elif parameter.kind == "origin":
+            origins[i, axis] += value
         elif parameter.kind == "joint":
             joints[i, axis] += value
         elif parameter.kind in tilts:
@@ -218,10 +227,9 @@ def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> 
                 joints[child, axis] += value
         else:
             places[i, axis] += value
-    base = 0
-    hips = joints[_placed_joints(person, base)]
-    if len(hips):
-        lengths[base] = float(np.hypot(*hips.mean(axis=0)[:2]))
+    hips = [c for c in _children(person, 0) if np.any(person.joint_in_parent_m[c])]
+    if hips:  # the pelvis is as long as its origin is from the hips' middle
+        lengths[0] = float(np.hypot(*joints[hips].mean(axis=0)[:2]))
     return replace(
         person, joint_in_parent_m=joints, origin_in_joint_m=origins, lengths_m=lengths,
         parent_tilt_rad=tilts["parent_tilt"], child_tilt_rad=tilts["child_tilt"],
@@ -231,7 +239,7 @@ def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> 
 
 def _shifted_joints(person: Person, segment: int) -> list[int]:
     """Joints that move with a segment's bones when its origin is found elsewhere."""
-    return _placed_joints(person, segment) if len(_children(person, segment)) > 1 else []
+    return _moving_joints(person, segment) if len(_children(person, segment)) > 1 else []
 
 
 # --- the equations ----------------------------------------------------------------------------
@@ -289,7 +297,7 @@ def _pose_columns(person, tree: Tree, R, p, model, below) -> np.ndarray:
         arm = model[:, mine] - p[:, None, i]
         axes = R[:, i] if kind != "revolute" else (R[:, i] @ tree.axes[i])[..., None]
         for k in range(axes.shape[2]):
-            columns[:, mine, :, at + k] = np.cross(axes[:, None, :, k], arm)
+            columns[..., at + k][:, mine] = np.cross(axes[:, None, :, k], arm)
     return columns
 
 
@@ -298,10 +306,9 @@ def _column(parameter: _Parameter, person: Person, R, p, model, below) -> np.nda
     column = np.zeros_like(model)
     i, axis, parents = parameter.index, parameter.axis, person.skeleton.parents
     if parameter.kind == "length":
-        if np.any(person.origin_in_joint_m[i]):
-            column[:, below[i]] = R[:, None, i, :, 1]
-        else:
-            column[:, below[_children(person, i)[0]]] = -R[:, None, i, :, 1]
+        column[:, below[_children(person, i)[0]]] = -R[:, None, i, :, 1]
+    elif parameter.kind == "origin":
+        column[:, below[i]] = R[:, None, i, :, axis]
     elif parameter.kind == "joint":
         column[:, below[i]] = R[:, None, parents[i], :, axis]
     elif parameter.kind in ("parent_tilt", "child_tilt"):

@@ -2,7 +2,7 @@
 
 The signal is a quintic B-spline; the fourth differences of its coefficients get the prior
 variance ``tau^2(t)``, the samples the noise variance ``sigma^2`` (P-splines: Eilers and Marx
-1996). Both come from the data: sigma from high differences in the quiet part of the signal, tau
+1996). Both come from the data: sigma from the power above human movement, tau
 by evidence maximisation (MacKay 1992) over a window that moves along. Derivatives are those of
 the spline.
 """
@@ -18,12 +18,14 @@ from scipy import sparse
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.ndimage import uniform_filter1d
+from scipy.signal import spectrogram
 
 _DEGREE = 5
 _KNOT_RATE_HZ = 100.0  # at most; human motion ends far below
 _FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
-_NOISE_ORDER = 6
+_NOISE_ORDER, _NOISE_BAND_HZ, _NOISE_WINDOW_S = 3, (12.0, 20.0), 0.64
 _ROUNDS = 20
+_FEWEST = 12
 # sigma^2 / tau^2: where the evidence begins, and its limits (a cut-off of 20 Hz and of 0.3 Hz).
 _FIRST_STIFFNESS, _STIFFNESS_RANGE = 1e1, (1e-2, 1e12)
 
@@ -58,9 +60,9 @@ def smooth(
         There are fewer than 12 samples, or a channel has none.
     """
     count, channels = samples.shape
-    if count < 2 * _NOISE_ORDER or not np.isfinite(samples).any(axis=0).all():
+    if count < _FEWEST or not np.isfinite(samples).any(axis=0).all():
         raise ValueError("too few samples for a spline")
-    sigma = noise_level(samples) if noise_sd is None else noise_sd
+    sigma = noise_level(samples, rate_hz) if noise_sd is None else noise_sd
     basis = _Basis(count, max(1, round(rate_hz / _KNOT_RATE_HZ)), rate_hz)
     window = max(9, round(window_s * rate_hz / basis.samples_per_knot))
     parts = [_smooth_channel(samples[:, k], sigma[k], window, basis) for k in range(channels)]
@@ -69,16 +71,32 @@ def smooth(
     return SmoothSignal(basis.values @ c, basis.slopes @ c, basis.curves @ c, sd)
 
 
-def noise_level(samples: np.ndarray) -> np.ndarray:
-    """(channels,) standard deviation of white noise on a smooth signal, from sixth differences.
+def noise_level(samples: np.ndarray, rate_hz: float) -> np.ndarray:
+    """(channels,) standard deviation of the noise on a smooth signal, as if it were white.
 
-    The lower third of the differences counts: bursts of motion stand above it.
+    The power above human movement (12 to 20 Hz) in the quietest third of the trial: bursts stand
+    above that third, and a lab's own low-pass, which would hide the noise from the highest
+    frequencies, ends above that band.
     """
-    differences = np.abs(np.diff(samples, _NOISE_ORDER, axis=0))
-    gain = np.sqrt(924.0)  # root of the sum of squared binomials: 12 over 6
-    third = np.nanquantile(differences, 1 / 3, axis=0) / 0.4307  # of a normal's absolute value
-    scale = np.nanmax(np.abs(samples), axis=0)
-    return np.maximum(third / gain, 1e-9 * np.maximum(scale, 1.0))
+    nyquist = 0.5 * rate_hz
+    band = (min(_NOISE_BAND_HZ[0], 0.5 * nyquist), min(_NOISE_BAND_HZ[1], 0.9 * nyquist))
+    width = min(max(16, round(_NOISE_WINDOW_S * rate_hz)), len(samples) - _NOISE_ORDER)
+    bridged = np.stack([_bridged(channel) for channel in samples.T], axis=1)
+    # Differences first: slow motion, a thousand times the noise, must not leak into the band.
+    f, _, power = spectrogram(
+        np.diff(bridged, _NOISE_ORDER, axis=0), rate_hz, axis=0, nperseg=width, detrend="linear"
+    )
+    inside = (f >= band[0]) & (f <= band[1])
+    gain = (2 * np.sin(np.pi * f[inside] / rate_hz)) ** (2 * _NOISE_ORDER)
+    density = (power[inside] / gain[:, None, None]).mean(axis=0)
+    level = np.sqrt(np.quantile(density, 1 / 3, axis=1) * nyquist)
+    scale = np.abs(bridged).max(axis=0)
+    return np.maximum(level, 1e-9 * np.maximum(scale, 1.0))
+
+
+def _bridged(channel: np.ndarray) -> np.ndarray:
+    seen = np.isfinite(channel)
+    return np.interp(np.arange(len(channel)), np.flatnonzero(seen), channel[seen])
 
 
 class _Basis:

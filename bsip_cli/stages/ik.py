@@ -19,13 +19,8 @@ def run(unit: Unit) -> None:
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     times, labels, positions = markers_from(unit.read("markers"))
     markers = ordered_markers(labels, positions, person.markers)
-    options = unit.config.ik
-    poses = solve_poses(
-        person, markers, start_pose(person, markers), marker_sd_m=options.marker_sd_m,
-        robust_limit_m=options.robust_limit_m, posture_sd_rad=options.posture_sd_rad,
-        iterations=options.iterations,
-    )
-    determined, angle_sd = _determined(unit, person, poses)
+    poses, decided = _poses(unit, person, markers)
+    determined, angle_sd = _determined(unit, poses, decided)
     rate = 1.0 / float(np.median(np.diff(times)))
     motion = smooth_motion(
         skeleton, poses.q, determined, rate, **unit.config.smoothing.model_dump()
@@ -44,18 +39,27 @@ def start_pose(person: Person, markers: np.ndarray) -> np.ndarray:
     return place_base(person, markers[int(np.argmax(seen))], neutral(person))
 
 
-def _determined(unit: Unit, person: Person, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
+def _poses(unit: Unit, person: Person, markers: np.ndarray) -> tuple[Poses, np.ndarray]:
+    """Poses, and which coordinates (nv,) the markers decide; the others are held near neutral."""
+    options = unit.config.ik
+    fixed = options.model_dump(include={"marker_sd_m", "robust_limit_m", "iterations"})
+    start = start_pose(person, markers)
+    poses = solve_poses(person, markers, start, posture_sd_rad=options.posture_sd_rad, **fixed)
+    decided = np.median(poses.coordinate_sd, axis=0) < options.undetermined_sd_rad
+    decided[:3] = True  # the base's position is in metres
+    if not decided.all():
+        names = ", ".join(np.array(person.skeleton.v_names)[~decided])
+        unit.warn(f"{unit.name}: no markers decide {names}; held near the neutral pose")
+        sd = np.where(decided, options.posture_sd_rad, options.held_sd_rad)
+        poses = solve_poses(person, markers, start, posture_sd_rad=sd, **fixed)
+    return poses, decided
+
+
+def _determined(unit: Unit, poses: Poses, decided: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Frames in which the markers decide every angle that they decide in most frames."""
-    limit = unit.config.ik.undetermined_sd_rad
-    sd = poses.coordinate_sd[:, 3:]  # all but the base's position
-    ever = np.median(sd, axis=0) < limit
-    names = np.array(person.skeleton.v_names[3:])
-    if not ever.all():
-        unit.warn(
-            f"{unit.name}: no markers decide {', '.join(names[~ever])}; held near the neutral pose"
-        )
-    angle_sd = sd[:, ever].max(axis=1)
-    determined = (angle_sd < limit) & poses.converged & np.isfinite(poses.residual_m).any(axis=1)
+    angle_sd = poses.coordinate_sd[:, 3:][:, decided[3:]].max(axis=1)
+    seen = np.isfinite(poses.residual_m).any(axis=1)
+    determined = (angle_sd < unit.config.ik.undetermined_sd_rad) & poses.converged & seen
     if not determined.all():
         unit.warn(f"{unit.name}: {int((~determined).sum())} frames without a pose")
     return determined, angle_sd

@@ -116,7 +116,7 @@ def _refine(
     unit: Unit, calibration: Calibration, recorded: list[_Recorded], still: _Recorded, quiet: slice
 ) -> Refinement:
     options, person = unit.config.scale, calibration.person
-    ik = unit.config.ik.model_dump(exclude={"undetermined_sd_rad"})
+    ik = unit.config.ik.model_dump(exclude={"undetermined_sd_rad", "held_sd_rad"})
     middle = (quiet.start + quiet.stop) // 2
     markers = [ordered_markers(still.labels, still.positions[middle : middle + 1], person.markers)]
     poses = [solve_poses(person, markers[0], calibration.q, **ik).q]

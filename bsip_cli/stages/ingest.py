@@ -1,0 +1,199 @@
+"""ingest: a recording as markers and ground wrench in SI units, one world frame, with its faults."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.body.markersets import MarkerSet, guess_marker_set, load_marker_set
+from bsip_cli.errors import BadDataError
+from bsip_cli.recordings.contacts import ContactWindows, contact_windows, plate_loads
+from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps
+from bsip_cli.recordings.labels import match_labels
+from bsip_cli.recordings.model import Finding, Recording
+from bsip_cli.recordings.read import read_recording
+from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
+from bsip_cli.recordings.zero import plate_zero, subtract_zero
+from bsip_cli.stages.frames import WRENCH
+from bsip_cli.unit import Unit
+
+_GRAVITY_M_S2 = 9.80665
+_TRUNK = ("lower_torso", "upper_torso")
+
+
+def run(unit: Unit) -> None:
+    """Read one recording; write markers, wrench, plates, contacts and quality."""
+    assert unit.trial is not None
+    recording = _chosen_plates(unit, read_recording(unit.trial.path))
+    marker_set = _marker_set(unit, recording)
+    match = match_labels(recording.labels, marker_set.wanted())
+    names = [marker.label for marker in marker_set.markers if marker.label in match.index]
+    _require(unit, names)
+    findings = [*recording.findings, *match.findings]
+    if unit.config.ingest.zero_unloaded_plates:
+        recording, zeroed = _without_zero(recording)
+        findings += zeroed
+    filled = _fill(unit, recording, marker_set, names, match.index)
+    findings += _gap_findings(names, filled)
+    wrench = wrench_at_marker_rate(recording)
+    contacts = _contacts(unit, recording, marker_set, names, filled, wrench)
+    findings += contacts.reasons
+    if recording.forces_note:
+        unit.warn(f"{unit.name}: kinematics only: {recording.forces_note}")
+    for finding in findings:
+        if finding.level in ("warning", "excluded", "corrected"):
+            unit.warn(f"{unit.name}: {_sentence(finding)}")
+    times = recording.time_s()
+    facts = {
+        "marker_set": marker_set.name if unit.config.marker_set == "auto"
+        else unit.config.marker_set,
+        "marker_rate_hz": recording.marker_rate_hz, "analog_rate_hz": recording.analog_rate_hz,
+    }
+    unit.write("markers", _marker_table(times, names, filled), facts)
+    unit.write("wrench", _wrench_table(times, wrench, contacts), facts)
+    unit.write("plates", _plate_table(recording))
+    unit.write("contacts", _contact_table(times, contacts))
+    unit.write("quality", _quality_table(marker_set, findings))
+
+
+def _chosen_plates(unit: Unit, recording: Recording) -> Recording:
+    wanted = unit.config.ingest.plates
+    if not wanted:
+        return recording
+    chosen = tuple(plate for plate in recording.plates if plate.name in map(str, wanted))
+    return replace(recording, plates=chosen)
+
+
+def _without_zero(recording: Recording) -> tuple[Recording, list[Finding]]:
+    done = [
+        subtract_zero(plate, plate_zero(plate, recording.analog_rate_hz))
+        for plate in recording.plates
+    ]
+    return replace(recording, plates=tuple(plate for plate, _ in done)), [f for _, f in done]
+
+
+def _marker_set(unit: Unit, recording: Recording) -> MarkerSet:
+    if unit.config.marker_set != "auto":
+        return load_marker_set(unit.config.marker_set)
+    return guess_marker_set(recording.labels)
+
+
+def _require(unit: Unit, names: list[str]) -> None:
+    if not names:
+        raise BadDataError(
+            "none of the marker set's labels is in the file", file=unit.name,
+            expected="the labels of the marker set",
+            remedy="name the right marker set in study.toml",
+        )
+
+
+def _segment_of(marker_set: MarkerSet) -> dict[str, str]:
+    return {marker.label: marker.segment for marker in marker_set.markers}
+
+
+def _fill(unit, recording, marker_set, names, index) -> FilledMarkers:
+    positions = recording.markers_m[:, [index[name] for name in names]]
+    segment = _segment_of(marker_set)
+    groups: dict[str, list[int]] = {}
+    for k, name in enumerate(names):
+        groups.setdefault(segment[name], []).append(k)
+    return fill_gaps(
+        positions, recording.marker_rate_hz, list(groups.values()), unit.config.ingest.max_gap_s
+    )
+
+
+def _contacts(unit, recording, marker_set, names, filled, wrench: FrameWrench) -> ContactWindows:
+    segment = _segment_of(marker_set)
+
+    def of(*segments: str) -> np.ndarray:
+        return filled.markers_m[:, [k for k, n in enumerate(names) if segment[n] in segments]]
+
+    feet = {side: of(f"foot_{side}") for side in "lr" if of(f"foot_{side}").shape[1]}
+    return contact_windows(
+        feet, dict.fromkeys(feet), recording.marker_rate_hz, plate_loads(recording, wrench),
+        of(*_TRUNK), _mass_kg(unit, wrench),
+    )
+
+
+def _mass_kg(unit: Unit, wrench: FrameWrench) -> float:
+    """Stated mass; without one, what the plates carry in the middle of the trial."""
+    assert unit.participant is not None
+    if unit.participant.mass_kg is not None:
+        return unit.participant.mass_kg
+    vertical = wrench.total[:, 2]
+    loaded = vertical[vertical > 100.0]
+    return float(np.median(loaded) / _GRAVITY_M_S2) if len(loaded) else 70.0
+
+
+def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:
+    findings = []
+    missing = ~np.isfinite(filled.markers_m[..., 0])
+    for k, name in enumerate(names):
+        if filled.filled[:, k].any() or missing[:, k].any():
+            findings.append(Finding(
+                "marker_gaps", name,
+                f"{int(filled.filled[:, k].sum() + missing[:, k].sum())} of {len(missing)} frames "
+                "missing", "every frame",
+                f"{int(filled.filled[:, k].sum())} filled, {int(missing[:, k].sum())} left open",
+                "info",
+            ))
+    return findings
+
+
+def _sentence(finding: Finding) -> str:
+    subject = f" {finding.subject}" if finding.subject else ""
+    expected = f" (expected {finding.expected})" if finding.expected else ""
+    return f"{finding.check.replace('_', ' ')}{subject}: {finding.found}{expected}; {finding.action}"
+
+
+# --- tables -----------------------------------------------------------------------------------
+
+
+def _marker_table(times: np.ndarray, names: list[str], filled: FilledMarkers) -> pd.DataFrame:
+    positions = filled.markers_m.reshape(-1, 3)
+    return pd.DataFrame({
+        "time_s": np.repeat(times, len(names)),
+        "marker": np.tile(np.array(names, dtype=object), len(times)),
+        "x_m": positions[:, 0], "y_m": positions[:, 1], "z_m": positions[:, 2],
+        "filled": filled.filled.ravel(),
+    })
+
+
+def _wrench_table(times, wrench: FrameWrench, contacts: ContactWindows) -> pd.DataFrame:
+    total = wrench.total if len(wrench.names) else np.full((len(times), 6), np.nan)
+    table = pd.DataFrame(total, columns=WRENCH)
+    table.insert(0, "time_s", times)
+    table["valid"] = contacts.valid
+    for name, rows in zip(wrench.names, wrench.per_plate, strict=True):
+        for k, column in enumerate(WRENCH):
+            table[f"plate{name}_{column}"] = rows[:, k]
+    return table
+
+
+def _plate_table(recording: Recording) -> pd.DataFrame:
+    rows = [
+        (plate.name, k + 1, *corner)
+        for plate in recording.plates if plate.corners_m is not None
+        for k, corner in enumerate(plate.corners_m)
+    ]
+    table = pd.DataFrame(rows, columns=["plate", "corner", "x_m", "y_m", "z_m"])
+    return table.astype({"plate": object, "corner": int, "x_m": float, "y_m": float, "z_m": float})
+
+
+def _contact_table(times: np.ndarray, contacts: ContactWindows) -> pd.DataFrame:
+    table = {"time_s": times}
+    for side, name in (("l", "left"), ("r", "right")):
+        nothing = np.zeros(len(times), dtype=bool)
+        table[f"{name}_on_ground"] = contacts.on_ground.get(side, nothing)
+        table[f"{name}_on_plate"] = contacts.on_plate.get(side, nothing)
+    table["valid"] = contacts.valid
+    return pd.DataFrame(table)
+
+
+def _quality_table(marker_set: MarkerSet, findings: list[Finding]) -> pd.DataFrame:
+    known = Finding("marker_set", "", marker_set.name, "", marker_set.description, "info")
+    columns = ["check", "subject", "found", "expected", "action", "level"]
+    rows = [[getattr(finding, name) for name in columns] for finding in (known, *findings)]
+    return pd.DataFrame(rows, columns=columns)

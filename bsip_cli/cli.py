@@ -54,18 +54,19 @@ cli.add_command(_stage_command("run", "All stages, from recordings to the report
 
 @cli.command()
 @click.argument("study", type=click.Path(path_type=Path))
-@click.option("--participants", default=6, show_default=True, type=click.IntRange(1, 500))
-@click.option("--seed", default=1, show_default=True, type=int)
 @click.option("--preset", default="sample", show_default=True,
               type=click.Choice(["sample", "cohort"]),
-              help="sample: short trials at low rates; cohort: 120 s sequences at 100 Hz.")
+              help="sample: 6 people, short trials, low rates; cohort: 12 people, 120 s sequences "
+              "at 100 Hz.")
+@click.option("--participants", type=click.IntRange(1, 10000), help="How many people.")
+@click.option("--seed", type=int, help="Draws other people and movements.")
 @click.option("--sequence-s", type=click.FloatRange(5, 1200),
               help="Length of the identification sequence [s].")
-def simulate(study, participants, seed, preset, sequence_s):
+def simulate(study, preset, participants, seed, sequence_s):
     """Make a study of simulated people whose inertial parameters are known."""
     from bsip_cli.simulate.command import simulate_command
 
-    simulate_command(study, participants, seed, preset, sequence_s)
+    simulate_command(study, preset, participants, seed, sequence_s)
 
 
 @cli.command()

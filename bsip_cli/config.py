@@ -60,6 +60,7 @@ class Smoothing(Section):
     method: Literal["spline", "butterworth"]
     butterworth_cutoff_hz: float = Field(gt=0)
     pace_window_s: float = Field(gt=0)
+    edge_s: float = Field(ge=0)
 
 
 class Regress(Section):
@@ -82,7 +83,7 @@ class Identify(Section):
 
 class Reconstruct(Section):
     cutoff_hz: float = Field(gt=0)
-    cop_min_force_N: float = Field(gt=0)
+    cop_min_force_percent_bw: float = Field(gt=0, lt=100)
 
 
 class Stats(Section):

@@ -145,9 +145,7 @@ def place_base(person: Person, markers_m: np.ndarray, q: np.ndarray) -> np.ndarr
     """
     tree = tree_of(person)
     R, p = tree.forward(q[None])
-    model = p[0, person.marker_segments] + np.einsum(
-        "mij,mj->mi", R[0, person.marker_segments], person.markers_in_joint_m()
-    )
+    model = _markers(person, R[0], p[0])
     seen = np.isfinite(markers_m).all(axis=1)
     chosen = seen & (person.marker_segments == 0)
     if chosen.sum() < 3:
@@ -157,6 +155,12 @@ def place_base(person: Person, markers_m: np.ndarray, q: np.ndarray) -> np.ndarr
     placed[:3] = turn @ q[:3] + shift
     placed[3:7] = _quaternion_of(turn @ R[0, 0])
     return placed
+
+
+def _markers(person: Person, R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """(m, 3) world positions of the markers in one frame."""
+    segments = person.marker_segments
+    return p[segments] + np.einsum("mij,mj->mi", R[segments], person.markers_in_joint_m())
 
 
 def _rigid_fit(points: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

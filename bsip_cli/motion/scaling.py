@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bsip_cli.body.person import Person
-from bsip_cli.motion.inverse_kinematics import Poses, Tree, solve_poses, tree_of
+from bsip_cli.motion.inverse_kinematics import Poses, solve_poses, tree_of
+from bsip_cli.motion.jacobian import model_markers, pose_columns, subtrees
 
 
 @dataclass(frozen=True)
@@ -252,12 +253,11 @@ def _reduced_equations(
     """Information (P, P) and gradient (P,) of the geometry with all poses eliminated."""
     tree = tree_of(person)
     R, p = tree.forward(poses.q)
-    segments = person.marker_segments
-    model = p[:, segments] + np.einsum("fmij,mj->fmi", R[:, segments], person.markers_in_joint_m())
+    model = model_markers(person, R, p)
     root = np.sqrt(_marker_weights(poses, person, options, ik))[..., None]
     residual = np.where(root > 0, (markers_m - model) * root, 0.0)
-    below = _subtrees(person)
-    by_pose = _pose_columns(person, tree, R, p, model, below) * root[..., None]
+    below = subtrees(person)
+    by_pose = pose_columns(person, tree, R, p, model, below) * root[..., None]
     by_parameter = np.stack(
         [_column(parameter, person, R, p, model, below) for parameter in parameters], axis=-1
     ) * root[..., None]
@@ -274,31 +274,6 @@ def _reduced_equations(
     pose_gradient = np.einsum("fki,fk->fi", Jq, r)
     gradient = flat.T @ r.ravel() - np.einsum("fip,fi->p", C, pose_gradient)
     return information, gradient
-
-
-def _subtrees(person: Person) -> np.ndarray:
-    """(n, m) True where marker m hangs on segment n or beyond it."""
-    parents = person.skeleton.parents
-    on = np.zeros((len(parents), len(person.markers)), dtype=bool)
-    on[person.marker_segments, np.arange(len(person.markers))] = True
-    for i in range(len(parents) - 1, 0, -1):
-        on[parents[i]] |= on[i]
-    return on
-
-
-def _pose_columns(person, tree: Tree, R, p, model, below) -> np.ndarray:
-    """(N, m, 3, nv) velocity of each marker for each unit velocity."""
-    columns = np.zeros((*model.shape, tree.nv))
-    for i, kind in enumerate(person.skeleton.joint_types):
-        at, mine = tree.v_starts[i], below[i]
-        if kind == "free":
-            columns[:, mine, :, at : at + 3] = R[:, None, i]
-            at += 3
-        arm = model[:, mine] - p[:, None, i]
-        axes = R[:, i] if kind != "revolute" else (R[:, i] @ tree.axes[i])[..., None]
-        for k in range(axes.shape[2]):
-            columns[..., at + k][:, mine] = np.cross(axes[:, None, :, k], arm)
-    return columns
 
 
 def _column(parameter: _Parameter, person: Person, R, p, model, below) -> np.ndarray:

@@ -2,32 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.errors import BadDataError
-from bsip_cli.motion.splines import SmoothSignal, smooth
+from bsip_cli.motion.jacobian import coordinate_covariance
+from bsip_cli.motion.splines import SmoothSignal, noise_level, smooth
 
 # Winter: a dual-pass second-order filter has its -3 dB point lower by this factor.
 _DUAL_PASS = 0.802
+_NOISE_FRAMES = 12
+# An angle that errs by more per metre of marker error is held by the prior, not by markers.
+_LOOSE, _WEAK_PRIOR = 60.0, 200.0  # rad/m
 
 
 @dataclass(frozen=True)
 class Motion:
-    """q (N, nq), v (N, nv), a (N, nv) in Pinocchio's conventions, and the noise of a (N, nv)."""
+    """q (N, nq), v (N, nv), a (N, nv) in Pinocchio's conventions, and the noise of a (N, nv).
+
+    ``inner`` (N,) is False near the ends of the trial, where an acceleration rests on one side
+    only; ``marker_noise_m`` is the noise of the markers that the poses show.
+    """
 
     q: np.ndarray
     v: np.ndarray
     a: np.ndarray
     a_sd: np.ndarray
+    inner: np.ndarray
+    marker_noise_m: float
 
 
 def smooth_motion(
-    skeleton: Skeleton, q: np.ndarray, determined: np.ndarray, rate_hz: float, *, method: str,
-    butterworth_cutoff_hz: float, pace_window_s: float,
+    person: Person, q: np.ndarray, determined: np.ndarray, rate_hz: float, *, method: str,
+    butterworth_cutoff_hz: float, pace_window_s: float, edge_s: float,
 ) -> Motion:
     """Smooth poses and differentiate them twice.
 
@@ -37,7 +49,7 @@ def smooth_motion(
     Parameters
     ----------
     q : (N, nq) poses; those not ``determined`` (N,) are bridged.
-    method, butterworth_cutoff_hz, pace_window_s : as in configs/default.toml, [smoothing].
+    method, butterworth_cutoff_hz, pace_window_s, edge_s : as in configs/default.toml, [smoothing].
 
     Raises
     ------
@@ -49,12 +61,66 @@ def smooth_motion(
             f"{int(determined.sum())} frames with a pose", expected="at least 12 to differentiate",
             remedy="check the markers of this trial",
         )
+    skeleton = person.skeleton
     curves = np.where(determined[:, None], _continuous(skeleton, q), np.nan)
+    marker_noise, noise = _noise(person, curves, determined, rate_hz)
     if method == "spline":
-        smoothed = smooth(curves, rate_hz, pace_window_s)
+        smoothed = smooth(curves, rate_hz, pace_window_s, noise)
     else:
-        smoothed = _butterworth(curves, rate_hz, butterworth_cutoff_hz)
-    return _on_manifold(skeleton, smoothed)
+        smoothed = _butterworth(curves, rate_hz, butterworth_cutoff_hz, noise)
+    inner = np.zeros(len(q), dtype=bool)
+    edge = round(edge_s * rate_hz)
+    inner[edge : len(q) - edge] = True
+    return _on_manifold(skeleton, smoothed, inner, marker_noise)
+
+
+def _noise(
+    person: Person, curves: np.ndarray, determined: np.ndarray, rate_hz: float
+) -> tuple[float, np.ndarray]:
+    """Noise of the markers [m], and of each curve (nq,) if all of it comes from them.
+
+    One number for all: a joint that moves fast has power where noise is looked for, the median
+    over the joints has not.
+    """
+    skeleton = person.skeleton
+    frames = np.flatnonzero(determined)
+    some = curves[frames[np.linspace(0, len(frames) - 1, _NOISE_FRAMES).astype(int)]]
+    unit = coordinate_covariance(person, _normalised(skeleton, some), _WEAK_PRIOR).mean(axis=0)
+    seen = noise_level(curves, rate_hz)
+    blocks = list(_blocks(skeleton))
+    predicted = np.array([
+        np.sqrt(np.diag(unit)[turning].sum() / count) / scale
+        for _, turning, count, scale in blocks
+    ])
+    found = np.array([np.sqrt((seen[part] ** 2).mean()) for part, *_ in blocks])
+    known = predicted < _LOOSE
+    marker_noise = float(np.median(found[known] / predicted[known]))
+    noise = np.empty(len(seen))
+    for (part, *_), value in zip(blocks, predicted, strict=True):
+        noise[part] = marker_noise * min(value, _LOOSE)
+    return marker_noise, noise
+
+
+def _blocks(skeleton: Skeleton) -> Iterator[tuple[slice, slice, int, float]]:
+    """Curves and velocities of each joint part, over how many curves the error spreads, and by
+    what it shrinks (a rotation moves the four parts of a quaternion by half of its angle)."""
+    for at, av, kind in zip(
+        skeleton.q_starts, skeleton.v_starts, skeleton.joint_types, strict=True
+    ):
+        if kind == "free":
+            yield slice(at, at + 3), slice(av, av + 3), 3, 1.0
+            yield slice(at + 3, at + 7), slice(av + 3, av + 6), 4, 2.0
+        elif kind == "spherical":
+            yield slice(at, at + 4), slice(av, av + 3), 4, 2.0
+        else:
+            yield slice(at, at + 1), slice(av, av + 1), 1, 1.0
+
+
+def _normalised(skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
+    out = q.copy()
+    for at in _quaternions(skeleton):
+        out[:, at : at + 4] /= np.linalg.norm(out[:, at : at + 4], axis=1, keepdims=True)
+    return out
 
 
 def _continuous(skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
@@ -76,7 +142,9 @@ def _quaternions(skeleton: Skeleton) -> list[int]:
     ]
 
 
-def _butterworth(curves: np.ndarray, rate_hz: float, cutoff_hz: float) -> SmoothSignal:
+def _butterworth(
+    curves: np.ndarray, rate_hz: float, cutoff_hz: float, noise: np.ndarray
+) -> SmoothSignal:
     """Zero-phase second-order Butterworth and central differences (Winter 2009, chapter 3)."""
     times = np.arange(len(curves))
     bridged = np.empty_like(curves)
@@ -88,11 +156,14 @@ def _butterworth(curves: np.ndarray, rate_hz: float, cutoff_hz: float) -> Smooth
     value = sosfiltfilt(sections, bridged, axis=0, padlen=min(len(curves) - 1, int(rate_hz)))
     first = np.gradient(value, 1 / rate_hz, axis=0)
     second = np.gradient(first, 1 / rate_hz, axis=0)
-    noise = np.std(bridged - value, axis=0) * (2 * np.pi * cutoff_hz) ** 2 / np.sqrt(5)
-    return SmoothSignal(value, first, second, np.broadcast_to(noise, value.shape).copy())
+    # White noise below the cut-off, differentiated twice: the integral of omega^4 up to there.
+    sd = noise * np.sqrt(2 * cutoff_hz / rate_hz / 5) * (2 * np.pi * cutoff_hz) ** 2
+    return SmoothSignal(value, first, second, np.broadcast_to(sd, value.shape).copy())
 
 
-def _on_manifold(skeleton: Skeleton, s: SmoothSignal) -> Motion:
+def _on_manifold(
+    skeleton: Skeleton, s: SmoothSignal, inner: np.ndarray, marker_noise_m: float
+) -> Motion:
     frames = len(s.value)
     nv = len(skeleton.v_names)
     q = s.value.copy()
@@ -111,7 +182,7 @@ def _on_manifold(skeleton: Skeleton, s: SmoothSignal) -> Motion:
             v[:, av : av + 3], a[:, av : av + 3], sd[:, av : av + 3] = _linear(
                 s, slice(at, at + 3), unit, v[:, turning]
             )
-    return Motion(q, v, a, sd)
+    return Motion(q, v, a, sd, inner, marker_noise_m)
 
 
 def _angular(s: SmoothSignal, part: slice):

@@ -55,9 +55,9 @@ def runs(mask: np.ndarray) -> np.ndarray:
 def long_runs(mask: np.ndarray, least: int) -> np.ndarray:
     """The mask with stretches of True shorter than ``least`` samples taken out, (n,) bool."""
     kept = np.zeros(len(mask), bool)
-    for start, stop in runs(mask):
-        if stop - start >= least:
-            kept[start:stop] = True
+    stretches = runs(mask)
+    for start, stop in stretches[np.diff(stretches, axis=1)[:, 0] >= least]:
+        kept[start:stop] = True
     return kept
 
 
@@ -85,10 +85,10 @@ def _stuck(signal: np.ndarray, load: np.ndarray, rate_hz: float) -> np.ndarray:
     """Stretches of a constant channel during which the plate's load changes."""
     same = np.concatenate([[False], np.diff(signal) == 0])
     stuck = np.zeros(len(signal), bool)
-    scale = np.nanmax(np.abs(load), initial=0.0)
-    for start, stop in runs(same):
+    scale = np.max(np.abs(load[np.isfinite(load)]), initial=0.0)
+    for start, stop in runs(long_runs(same, round(_STUCK_S * rate_hz))):
         part = load[start:stop]
-        if stop - start < _STUCK_S * rate_hz or not np.isfinite(part).any():
+        if not np.isfinite(part).any():
             continue
         if np.nanmax(part) - np.nanmin(part) > max(_LOAD_CHANGE * scale, 50.0):
             stuck[start - 1 : stop] = True

@@ -13,7 +13,6 @@ _C3D_KEY = 0x50
 _DEC, _MIPS = 85, 86
 _FULL = 0xFFFF  # frame number that does not fit the header's word
 _MANY_TIMES = 20
-_PARAMETER_BYTES = 64 * _BLOCK
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ def check_header(path: Path) -> Header:
                 file=path,
             )
         stream.seek((block[0] - 1) * _BLOCK if block[0] else 0)
-        parameters = stream.read(_PARAMETER_BYTES)
+        parameters = stream.read(4)
     processor = parameters[3] if len(parameters) > 3 else 0
     if processor == _MIPS:
         raise BadDataError(
@@ -59,7 +58,7 @@ def check_header(path: Path) -> Header:
             file=path,
         )
     header = _parse(block, processor == _DEC)
-    _refuse_truncated(path, header, _point_frames(parameters), size)
+    _refuse_truncated(path, header, size)
     return header
 
 
@@ -81,32 +80,21 @@ def _parse(block: bytes, is_dec: bool) -> Header:
     return Header(n_points, n_analog, first, last, data_start, is_float)
 
 
-def _point_frames(parameters: bytes) -> int | None:
-    """POINT:FRAMES, which ezc3d believes more than the header's frame numbers."""
-    at = parameters.find(b"FRAMES")
-    value_at = at + len(b"FRAMES") + 4  # after the offset to the next (2), type and rank
-    if at < 1 or parameters[at - 1] != len(b"FRAMES") or value_at + 2 > len(parameters):
-        return None
-    is_one_integer = parameters[value_at - 2] == 2 and parameters[value_at - 1] == 0
-    return struct.unpack_from("<H", parameters, value_at)[0] if is_one_integer else None
+def _refuse_truncated(path: Path, header: Header, size: int) -> None:
+    """The data the header promises must be in the file (a last partial block is forgiven).
 
-
-def _refuse_truncated(path: Path, header: Header, point_frames: int | None, size: int) -> None:
-    """The data the header promises must be in the file (a last partial block is forgiven)."""
+    ezc3d reads what is there and says nothing; and a count that is absurd asks for memory.
+    """
     if header.n_frames <= 0 or header.data_start_block < 2:
         return
     available = size - (header.data_start_block - 1) * _BLOCK
-    n_frames = header.n_frames
-    is_too_much = n_frames * header.bytes_per_frame > available
-    if is_too_much and point_frames not in (None, 0, _FULL):
-        n_frames = min(n_frames, point_frames)
-    promised = n_frames * header.bytes_per_frame
+    promised = header.n_frames * header.bytes_per_frame
     if header.last_frame == _FULL and promised < _MANY_TIMES * max(available, 1):
         return  # the true count is elsewhere
     if promised > available + _BLOCK:
         raise BadDataError(
             f"the header promises {promised} bytes of data ({header.n_points} points, "
-            f"{n_frames} frames) and the file holds {max(available, 0)}",
+            f"{header.n_frames} frames) and the file holds {max(available, 0)}",
             expected="a complete file",
             remedy="copy or export the trial again",
             file=path,

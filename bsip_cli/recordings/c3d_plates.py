@@ -22,7 +22,7 @@ class PlateChannels:
     baseline: slice | None  # analog samples of FORCE_PLATFORM:ZERO
 
 
-class _BadPlate(Exception):
+class _UnusablePlateError(Exception):
     """Why one plate cannot be used; turned into a Finding."""
 
 
@@ -39,7 +39,8 @@ def read_plates(
     for index in range(_n_plates(group)):
         try:
             plates.append(_read_plate(parameters, analog, samples_per_frame, length_unit_m, index))
-        except _BadPlate as reason:
+            findings += _about_cop_polynomial(group, plates[-1].plate)
+        except _UnusablePlateError as reason:
             findings.append(
                 Finding("plate", str(index + 1), str(reason), "", "left the plate out", "excluded")
             )
@@ -53,7 +54,7 @@ def plate_surfaces(parameters: Mapping, length_unit_m: float) -> list[np.ndarray
     for index in range(_n_plates(group)):
         try:
             surfaces.append(_slab(group, "CORNERS", index, (3, 4)).T * length_unit_m)
-        except _BadPlate:
+        except _UnusablePlateError:
             break
     return [corners for corners in surfaces if corners_are_plausible(corners)]
 
@@ -80,8 +81,10 @@ def _read_plate(
     kind = _kind(group, index)
     corners = _slab(group, "CORNERS", index, (3, 4)).T * length_unit_m
     if not corners_are_plausible(corners):
-        raise _BadPlate(f"corners that are no plate: {_sides(corners)}")
+        raise _UnusablePlateError(f"corners that are no plate: {_sides(corners)}")
     origin = _slab(group, "ORIGIN", index, (3,)) * length_unit_m
+    if kind == 3 and not origin[:2].all():
+        raise _UnusablePlateError("a type 3 plate whose ORIGIN lacks the distances of the sensors")
     rows = _channel_rows(group, kind, index, len(analog))
     raw = analog[rows].T
     return PlateChannels(
@@ -92,12 +95,30 @@ def _read_plate(
     )
 
 
+def _about_cop_polynomial(group: Mapping, plate: PlateDescription) -> list[Finding]:
+    """Kistler's correction of the centre of pressure is known of, not applied."""
+    if plate.kind != 3 or not np.any(np.asarray(value(group, "FPCOPPOLY"), float)):
+        return []
+    return [
+        Finding(
+            check="plate_cop",
+            subject=plate.name,
+            found="FPCOPPOLY holds a correction of the centre of pressure",
+            expected="",
+            action="not applied: it moves the centre of pressure by up to about 1 cm near the rim",
+            level="info",
+        )
+    ]
+
+
 def _kind(group: Mapping, index: int) -> int:
     kinds = np.ravel(value(group, "TYPE"))
     if index >= len(kinds):
-        raise _BadPlate("no FORCE_PLATFORM:TYPE")
+        raise _UnusablePlateError("no FORCE_PLATFORM:TYPE")
     if int(kinds[index]) not in N_CHANNELS:
-        raise _BadPlate(f"force platform type {int(kinds[index])}, types 1 to 4 can be read")
+        raise _UnusablePlateError(
+            f"force platform type {int(kinds[index])}, types 1 to 4 can be read"
+        )
     return int(kinds[index])
 
 
@@ -106,7 +127,7 @@ def _slab(group: Mapping, name: str, index: int, shape: tuple[int, ...]) -> np.n
     flat = np.ravel(np.asarray(value(group, name), float), order="F")
     size = int(np.prod(shape))
     if len(flat) < size * (index + 1):
-        raise _BadPlate(f"FORCE_PLATFORM:{name} has no entry for it")
+        raise _UnusablePlateError(f"FORCE_PLATFORM:{name} has no entry for it")
     return flat[size * index : size * (index + 1)].reshape(shape, order="F")
 
 
@@ -115,12 +136,12 @@ def _channel_rows(group: Mapping, kind: int, index: int, n_analog: int) -> np.nd
     table = table[:, None] if table.ndim == 1 else table
     wanted = N_CHANNELS[kind]
     if table.shape[0] < wanted or table.shape[1] <= index:
-        raise _BadPlate(
+        raise _UnusablePlateError(
             f"{table.shape[0]} channels listed for it, a type {kind} plate has {wanted}"
         )
     rows = table[:wanted, index].astype(int) - 1
     if rows.min() < 0 or rows.max() >= n_analog:
-        raise _BadPlate(
+        raise _UnusablePlateError(
             f"it claims analog channel {rows.max() + 1 if rows.max() >= n_analog else 0}, "
             f"the file holds {n_analog}"
         )
@@ -139,9 +160,7 @@ def _in_si(
     if kind == 4 and (matrix := _cal_matrix(parameters["FORCE_PLATFORM"], index)) is not None:
         return raw @ matrix.T * np.repeat([1.0, length_unit_m], 3)
     units = _units(parameters.get("ANALOG", {}), rows)
-    return raw * np.array(
-        [_size(unit, kind, i, length_unit_m) for i, unit in enumerate(units)]
-    )
+    return raw * np.array([_size(unit, kind, i, length_unit_m) for i, unit in enumerate(units)])
 
 
 def _size(unit: str, kind: int, position: int, length_unit_m: float) -> float:

@@ -72,14 +72,12 @@ def _forces(names: list[str], table: np.ndarray, path: Path) -> tuple[GroundForc
         if (meaning := _meaning(name)) is not None:
             identity, kind, axis = meaning
             columns.setdefault(identity, {}).setdefault((kind, axis), i)
-    forces = []
+    forces: list[GroundForce] = []
     for found in columns.values():
         if all(("force", axis) in found for axis in "xyz"):
             parts = {k: _vector(found, k, table) for k in ("force", "point", "torque")}
             forces.append(
-                GroundForce(
-                    str(len(forces) + 1), parts["force"], parts["point"], parts["torque"]
-                )
+                GroundForce(str(len(forces) + 1), parts["force"], parts["point"], parts["torque"])
             )
     if not forces:
         raise BadDataError(

@@ -23,6 +23,7 @@ _PULL_N = -20.0
 _GOOD_SHARE = 0.9
 _BAD_SHARE = 0.5
 _HOPELESS_SHARE = 0.2
+_PULL_SHARE = 0.2  # of the push's impulse
 _PERCENT = 100.0
 
 
@@ -52,14 +53,17 @@ def check_wrench(
     good = samples.usable()
     wrench, found = _without_baseline(wrench, plate, down_sign, good, baseline)
     findings += found
-    if found := _absurd(wrench, plate, good):
-        return Checked(None, (*findings, found))
-    wrench, found = _settle_moments(wrench, plate, good)
+    if fault := _absurd(wrench, plate, good):
+        return Checked(None, (*findings, fault))
+    at_surface, found = _settle_moments(wrench, plate, good)
     findings += found
-    if wrench is None:
+    if at_surface is None:
         return Checked(None, tuple(findings))
-    wrench, found = _settle_sign(wrench, plate, down_sign, good)
-    return Checked(wrench, (*findings, *found))
+    at_surface, found = _settle_sign(at_surface, plate, down_sign, good)
+    findings += found
+    if fault := _pulls(at_surface, plate, down_sign, good):
+        return Checked(None, (*findings, fault))
+    return Checked(at_surface, tuple(findings))
 
 
 def _without_baseline(
@@ -144,6 +148,24 @@ def _cop_finding(plate: PlateDescription, share: float, action: str, level: str)
         expected=f"at least {_PERCENT * _GOOD_SHARE:.0f} %",
         action=action,
         level=level,
+    )
+
+
+def _pulls(
+    wrench: LocalWrench, plate: PlateDescription, down_sign: float, good: np.ndarray
+) -> Finding | None:
+    """A plate that pulls hard for long, whatever its sign, measures no person."""
+    lift = down_sign * wrench.force_N[good, 2]
+    pull, push = -lift[lift < -_LIGHTLY_LOADED_N].sum(), lift[lift > _LIGHTLY_LOADED_N].sum()
+    if pull <= _PULL_SHARE * push or lift.min() > -LOADED_N:
+        return None
+    return Finding(
+        check="plate_sign",
+        subject=plate.name,
+        found=f"pushes up to {lift.max():.0f} N and pulls up to {-lift.min():.0f} N",
+        expected="pushes only",
+        action="left the plate out",
+        level="excluded",
     )
 
 

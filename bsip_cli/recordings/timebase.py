@@ -10,7 +10,8 @@ from bsip_cli.recordings.model import Finding
 
 _JITTER = 0.05  # of the sample interval: below it the stamps count as even
 _JUMP = 2.5  # sample intervals: above it the recording is torn
-_SAME = 0.02  # of the sample interval: a stamp that lies on the grid
+_SAME = 0.02  # of the sample interval: stamps that all lie on the grid
+_EXACT = 1e-3  # of the sample interval: a stamp that lies on the grid among others that do not
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,8 @@ def onto_grid(grid: Grid, stamps_s: np.ndarray, values: np.ndarray) -> np.ndarra
     flat = values.reshape(len(values), -1)
     columns = [_interpolated(grid.time_s, stamps_s, column) for column in flat.T]
     result = np.column_stack(columns)
-    result[off <= _SAME] = flat[nearest[off <= _SAME]]
+    exact = off <= _EXACT
+    result[exact] = flat[nearest[exact]]
     return result.reshape(len(grid.time_s), *values.shape[1:])
 
 

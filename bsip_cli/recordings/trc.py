@@ -75,9 +75,7 @@ def _row(line: str, n_columns: int, path: Path) -> list[float]:
         cells = [cell.strip() for cell in line.rstrip("\r\n").split("\t")]
         cells += [""] * (n_columns - len(cells))
     if any(cells[n_columns:]):
-        raise BadDataError(
-            f"a row of {len(cells)} cells", expected=f"{n_columns} cells", file=path
-        )
+        raise BadDataError(f"a row of {len(cells)} cells", expected=f"{n_columns} cells", file=path)
     numbers = [_number(cell) for cell in cells[:n_columns]]
     if not np.isfinite(numbers[1]):
         raise BadDataError("a row without a time", expected="times in column 2", file=path)

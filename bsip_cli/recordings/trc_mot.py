@@ -122,9 +122,7 @@ def _plates(
     analog = replace(grid, time_s=time_s[0] + np.arange(n) / grid.rate_hz)
     plates = tuple(
         _plate(name, onto_grid(analog, mot.time_s, np.hstack([force, moment])), rotation)
-        for name, force, moment in zip(
-            action.names, action.force_N, action.moment_Nm, strict=True
-        )
+        for name, force, moment in zip(action.names, action.force_N, action.moment_Nm, strict=True)
     )
     findings = [*grid.findings, *action.findings, *_coverage(plates)]
     return grid.rate_hz, plates, why_no_forces(plates), tuple(findings)

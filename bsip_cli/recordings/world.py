@@ -13,6 +13,7 @@ from bsip_cli.recordings.model import Finding
 _LOW = re.compile(r"hee|toe|cal|ank|mall|mt\d|fcc|fm\d|mfh|sph|foot", re.IGNORECASE)
 _HIGH = re.compile(r"hd$|head|^c7$|cv7|sho|clav|acr|^[rl]ac$|ster|strn|saj|^ij$", re.IGNORECASE)
 _CLEARLY_ABOVE_M = 0.2
+_CLEAR_SHARE = 0.75  # of all marker positions on one side of the floor
 _AXES = "XYZ"
 
 
@@ -47,10 +48,10 @@ def up_from_surface(
     seen = markers_m[np.isfinite(markers_m).all(axis=-1)]
     if not len(seen):
         return None
-    above = float(np.median(seen[:, axis]) - np.median(points_on_floor_m[:, axis]))
-    if abs(above) < _CLEARLY_ABOVE_M:
+    above = float(np.mean(seen[:, axis] > np.median(points_on_floor_m[:, axis])))
+    if 1 - _CLEAR_SHARE < above < _CLEAR_SHARE:
         return None
-    return Up(axis, 1 if above > 0 else -1, "the markers lie above the force plates")
+    return Up(axis, 1 if above > 0.5 else -1, "the markers lie above the force plates")
 
 
 def up_from_labels(labels: Sequence[str], markers_m: np.ndarray) -> Up | None:

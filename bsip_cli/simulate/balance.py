@@ -8,8 +8,8 @@ fixed-point iteration on the pelvis' pose:
   value problem for the centre of mass (a cart-table with varying vertical force; in
   flight it reduces to uniform motion), solved for the whole trial at once;
 - vertically, the pelvis keeps its nominal height, or the centre of mass a prescribed one;
-- in flight, the pelvis turns so that the angular momentum is kept; septic polynomials
-  carry the correction into the stances beside it.
+- in flight, the pelvis turns so that the angular momentum is kept; the turning fades out
+  in the stances beside it.
 """
 
 from __future__ import annotations
@@ -22,28 +22,50 @@ from scipy.linalg import solve_banded
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from bsip_cli.errors import NumericalError
-from bsip_cli.simulate.calculus import bridge, derivative, integral
+from bsip_cli.simulate.calculus import HALF_WIDTH, bridge, derivative, integral
 from bsip_cli.simulate.kinematics import Poses, poses_of
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
 from bsip_cli.simulate.rotations import euler_zxy, from_rotation_vector
-from bsip_cli.simulate.wrench import GRAVITY, Momentum, ball_load, momentum_of
+from bsip_cli.simulate.wrench import GRAVITY, Momentum, ball_load, locked_inertia, momentum_of
 
 G = -GRAVITY[1]
+UP = np.array([0.0, 1.0, 0.0])
 SWAY_LIMIT_M = np.array([0.045, 0.020])  # ahead, aside
-ENDS_FIT = 24  # samples of a flight's end that give its derivatives
-LONGEST_BRIDGE_S = 0.35
-CLOSE_ENOUGH_M = 1e-9
-MOST_ROUNDS = 80
+LONGEST_BRIDGE_S = 0.30
+LOWERING_REACH_S = 0.45
+RECORDED_SURROUND_S = 0.3
+TURN_REACH_S = 0.16
+HASTE = 1.35  # over-relaxation of the turns: the feet do not follow the pelvis
+CLOSE_ENOUGH_M = 2e-7  # and rad
+MOST_ROUNDS = 60
 MOST_LOWERINGS = 12
 
 
 @dataclass(frozen=True)
 class State:
-    """The pelvis' path (T, 3) and rotation (T, 3, 3) in the walkway frame."""
+    """The pelvis' path (T, 3), and its turn (T, 3) against the plan as a rotation vector.
+
+    The turn is kept as its rate [rad/s].
+    """
 
     pelvis_m: np.ndarray
-    rotation: np.ndarray
+    turn_rate: np.ndarray
+
+    def rotation(self, plan: Plan) -> np.ndarray:
+        """(T, 3, 3) pelvis rotation in the walkway frame."""
+        planned = euler_zxy(plan.pelvis_angles_rad)
+        if not self.turn_rate.any():
+            return planned
+        return from_rotation_vector(integral(self.turn_rate, plan.step_s)) @ planned
+
+    def poses(self, person: Person, plan: Plan) -> Poses:
+        """All bodies' poses."""
+        return poses_of(person, plan, self.pelvis_m, self.rotation(plan))
+
+    def moved(self, by_m: np.ndarray) -> State:
+        """The pelvis shifted by (T, 3)."""
+        return State(self.pelvis_m + by_m, self.turn_rate)
 
 
 def balanced(person: Person, plan: Plan, thin: int = 1) -> Poses:
@@ -55,10 +77,11 @@ def balanced(person: Person, plan: Plan, thin: int = 1) -> Poses:
     state, height = _within_reach(person, coarse)
     if thin > 1:
         state = _refined(coarse, state, plan)
-    poses = poses_of(person, plan, state.pelvis_m, state.rotation)
-    if poses.excess_reach_m.max() > 0.0:
+    poses = state.poses(person, plan)
+    excess = _excess(plan, poses).max()
+    if excess > 0.0:
         raise NumericalError(
-            f"a foot is {1000 * poses.excess_reach_m.max():.1f} mm out of reach",
+            f"a foot is {1000 * excess:.1f} mm out of reach",
             expected=f"legs that reach after lowering the body by {1000 * height:.0f} mm",
             remedy="use another seed",
         )
@@ -68,55 +91,78 @@ def balanced(person: Person, plan: Plan, thin: int = 1) -> Poses:
 def _within_reach(person: Person, plan: Plan) -> tuple[State, float]:
     """Balance, lowering the body until the legs reach the planned feet."""
     lowered = np.zeros(len(plan))
-    for attempt in range(MOST_LOWERINGS):
-        state, poses = _balance(person, _lowered(plan, lowered), final=attempt > 0)
-        excess = poses.excess_reach_m
-        if excess.max() == 0.0 and attempt > 0:
+    state = State(plan.pelvis_m, np.zeros_like(plan.pelvis_m))
+    final = False
+    for _ in range(MOST_LOWERINGS):
+        state, poses = _balance(person, _lowered(plan, lowered), state, final)
+        excess = _excess(plan, poses)
+        if excess.max() == 0.0 and final:
             break
-        if excess.max() > 0.0:
-            lowered = lowered + _lowering(excess, plan)
+        final = final or excess.max() == 0.0
+        further = _lowering(excess, plan)
+        lowered = lowered + further
+        state = state.moved(-further[:, None] * UP)
     return state, float(lowered.max())
 
 
+def _excess(plan: Plan, poses: Poses) -> np.ndarray:
+    """(T,) how far the feet are out of reach, in and near what is recorded."""
+    around = round(RECORDED_SURROUND_S / plan.step_s)
+    near = np.zeros(len(plan))
+    near[max(plan.keep.start - around, 0) : plan.keep.stop + around] = 1.0
+    return near * poses.excess_reach_m
+
+
 def _lowering(excess_m: np.ndarray, plan: Plan) -> np.ndarray:
-    """How much lower to go: everywhere the same if the height is prescribed."""
-    needed = 1.25 * excess_m + np.where(excess_m > 0.0, 0.003, 0.0)
-    if plan.com_height_m is not None:
-        return np.full(len(plan), needed.max())
-    samples = max(int(0.5 / plan.step_s), 1)
-    wide = maximum_filter1d(needed, 2 * samples + 1, mode="nearest")
-    return gaussian_filter1d(wide, samples / 4.0, mode="nearest", truncate=6.0)
+    """How much lower to go (T,): smooth, and the same throughout each flight."""
+    needed = 1.06 * excess_m + np.where(excess_m > 0.0, 0.002, 0.0)
+    near = _near_flights(plan, LOWERING_REACH_S)
+    lower = _dilated(needed, LOWERING_REACH_S, plan.step_s)
+    return near * needed.max() + (1.0 - near) * lower
+
+
+def _near_flights(plan: Plan, reach_s: float) -> np.ndarray:
+    """(T,) smooth mask: 1 in flight, 0 more than twice reach_s away from any."""
+    mask = np.zeros(len(plan))
+    for first, last in plan.flights:
+        mask[first : last + 1] = 1.0
+    return _dilated(mask, reach_s, plan.step_s)
+
+
+def _dilated(values: np.ndarray, reach_s: float, step_s: float) -> np.ndarray:
+    """The largest value within reach, smoothed, at least as large as the value itself."""
+    samples = max(int(reach_s / step_s), 1)
+    wide = maximum_filter1d(values, 2 * samples + 1, mode="nearest")
+    return gaussian_filter1d(wide, samples / 4.0, mode="nearest", truncate=3.9)
 
 
 def _lowered(plan: Plan, by_m: np.ndarray) -> Plan:
-    drop = np.stack([np.zeros_like(by_m), by_m, np.zeros_like(by_m)], axis=1)
     height = None if plan.com_height_m is None else plan.com_height_m - by_m
-    return replace(plan, pelvis_m=plan.pelvis_m - drop, com_height_m=height)
+    return replace(plan, pelvis_m=plan.pelvis_m - by_m[:, None] * UP, com_height_m=height)
 
 
-def _balance(person: Person, plan: Plan, final: bool) -> tuple[State, Poses]:
-    """The fixed-point iteration; a rough one unless `final`."""
-    rotation = euler_zxy(plan.pelvis_angles_rad)
-    state = State(plan.pelvis_m.copy(), rotation)
+def _balance(
+    person: Person, plan: Plan, state: State, final: bool
+) -> tuple[State, Poses]:
+    """The fixed-point iteration; a rough one, without turns in flight, unless `final`."""
     cop = plan.cop_m()
     if plan.sway_share:
         state, cop = _with_sway(person, plan, state, cop)
-    tolerance = CLOSE_ENOUGH_M if final else 1e-4
-    if not plan.flights:
-        tolerance = max(tolerance, 1e-6)
+    tolerance = CLOSE_ENOUGH_M if plan.flights and final else 1e-6
     for _ in range(MOST_ROUNDS):
-        poses = poses_of(person, plan, state.pelvis_m, state.rotation)
+        poses = state.poses(person, plan)
         momentum = momentum_of(person.inertias, poses, plan.step_s)
         ball_force, ball_moment = ball_load(plan.ball, poses, plan.step_s)
-        turn = _flight_turns(plan, momentum, ball_force, ball_moment)
-        target = _com_target(plan, momentum, cop, ball_force, ball_moment)
-        miss = target - momentum.com_m
-        state = State(
-            state.pelvis_m + miss, from_rotation_vector(turn) @ state.rotation
-        )
-        if max(np.abs(miss).max(), np.abs(turn).max()) < tolerance:
+        miss = _com_target(plan, momentum, cop, ball_force, ball_moment) - momentum.com_m
+        rate = state.turn_rate
+        if final and plan.flights:
+            locked = locked_inertia(person.inertias, poses, momentum.com_m)
+            rate = _turn_rate(plan, rate, momentum, locked, ball_force, ball_moment)
+        change = plan.step_s * np.abs(rate - state.turn_rate).sum(axis=0).max()
+        state = State(state.pelvis_m + miss, rate)
+        if max(np.abs(miss).max(), change) < tolerance:
             break
-    return state, poses_of(person, plan, state.pelvis_m, state.rotation)
+    return state, state.poses(person, plan)
 
 
 def _with_sway(
@@ -124,11 +170,11 @@ def _with_sway(
 ) -> tuple[State, np.ndarray]:
     """Stand over the planned COP, and leave a part of the COP's natural excursion in it."""
     for _ in range(3):
-        poses = poses_of(person, plan, state.pelvis_m, state.rotation)
+        poses = state.poses(person, plan)
         momentum = momentum_of(person.inertias, poses, plan.step_s)
         miss = np.zeros_like(momentum.com_m)
         miss[:, [0, 2]] = cop - momentum.com_m[:, [0, 2]]
-        state = State(state.pelvis_m + miss, state.rotation)
+        state = state.moved(miss)
     turning = derivative(momentum.spin(), plan.step_s)
     weight = momentum.mass_kg * G
     excursion = np.stack([turning[:, 2], -turning[:, 0]], axis=1) / weight
@@ -179,79 +225,68 @@ def _cart_table(
 
 
 def _height_target(plan: Plan, momentum: Momentum, ball_force: np.ndarray) -> np.ndarray:
-    """(T,) height of the centre of mass; a held ball slows its rise in flight."""
+    """(T,) height of the centre of mass; a held ball slows its rise in flight.
+
+    The prescribed height holds from the release on; before it, the body rises a little
+    faster, which a septic bridge in the stance before the flight prepares.
+    """
     if plan.com_height_m is None:
         return momentum.com_m[:, 1]
+    height = plan.com_height_m.copy()
     if plan.ball is None:
-        return plan.com_height_m
-    correction = np.zeros((len(plan), 1))
+        return height
     for first, last in plan.flights:
-        inside = slice(first, last + 1)
-        sink = -ball_force[inside, 1] / momentum.mass_kg
+        sink = -ball_force[first : last + 1, 1] / momentum.mass_kg
         speed = integral(sink, plan.step_s)
-        correction[inside, 0] = integral(speed - speed.mean(), plan.step_s)
-    return plan.com_height_m + _carried_into_stance(correction, plan)[:, 0]
+        speed = speed - speed[-1]
+        rise = integral(speed, plan.step_s)
+        rise = rise - rise[-1]
+        height[first : last + 1] += rise
+        before = min(first, round(LONGEST_BRIDGE_S / plan.step_s))
+        jerk = (sink[HALF_WIDTH + 1] - sink[0]) / ((HALF_WIDTH + 1) * plan.step_s)
+        takeoff = np.array([[rise[0]], [speed[0]], [sink[0]], [jerk]])
+        times = np.arange(before) * plan.step_s
+        prepared = bridge(np.zeros((4, 1)), takeoff, before * plan.step_s, times)
+        height[first - before : first] += prepared[:, 0]
+    return height
 
 
-def _flight_turns(
-    plan: Plan, momentum: Momentum, ball_force: np.ndarray, ball_moment: np.ndarray
+def _turn_rate(
+    plan: Plan,
+    rate: np.ndarray,
+    momentum: Momentum,
+    locked: np.ndarray,
+    ball_force: np.ndarray,
+    ball_moment: np.ndarray,
 ) -> np.ndarray:
-    """(T, 3) rotation vectors by which the pelvis must turn to keep the angular momentum.
+    """(T, 3) the pelvis' turning rate that keeps the angular momentum in flight.
 
-    In each flight the constant momentum is chosen so that the turns at both its ends vanish.
+    What is needed to keep it is faded out in the stances beside a flight; in running the
+    stances are so short that it is kept throughout. The momentum that is kept is chosen,
+    for each group of flights, so that the pelvis comes back to its planned orientation.
     """
-    turns = np.zeros_like(momentum.com_m)
-    for first, last in plan.flights:
-        inside = slice(first, last + 1)
-        com = momentum.com_m[inside]
-        torque = np.cross(com, ball_force[inside]) - ball_moment[inside]
-        spin = momentum.spin()[inside] - integral(torque, plan.step_s)
-        mobility = np.linalg.inv(momentum.locked[inside])
-        mean_rate = np.einsum("tij,tj->i", mobility, spin)
-        kept = np.linalg.solve(mobility.sum(axis=0), mean_rate)
-        rate = np.einsum("tij,tj->ti", mobility, kept - spin)
-        turn = integral(rate, plan.step_s)
-        ramp = np.linspace(0.0, 1.0, len(turn))[:, None]
-        turns[inside] = turn - ramp * turn[-1]
-    return _carried_into_stance(turns, plan) if plan.flights else turns
-
-
-def _carried_into_stance(values: np.ndarray, plan: Plan) -> np.ndarray:
-    """Fill the samples outside flights with septic bridges between the flights' ends."""
-    result = values.copy()
-    zero = np.zeros((4, values.shape[1]))
-    knots: list[tuple[int, np.ndarray]] = [(0, zero)]
-    for first, last in plan.flights:
-        window = values[first : last + 1]
-        knots.append((first, _end_state(window, plan.step_s, at_start=True)))
-        knots.append((last, _end_state(window, plan.step_s, at_start=False)))
-    knots.append((len(values) - 1, zero))
-    for (a, start), (b, end) in zip(knots[0::2], knots[1::2], strict=True):
-        result[a : b + 1] = _bridge_or_rest(start, end, b - a + 1, plan.step_s)
+    weight = _near_flights(plan, TURN_REACH_S)
+    result = np.zeros_like(rate)
+    for group in _runs(weight > 0.0):
+        w = weight[group, None]
+        torque = np.cross(momentum.com_m[group], ball_force[group]) - ball_moment[group]
+        spin = momentum.spin()[group] - integral(torque, plan.step_s)
+        mobility = np.linalg.inv(locked[group])
+        lacking = w * (rate[group] - HASTE * _apply(mobility, spin))
+        gain = HASTE * np.einsum("t,tij->ij", weight[group], mobility)
+        kept = np.linalg.solve(gain, -lacking.sum(axis=0))
+        result[group] = lacking + HASTE * w * _apply(mobility, kept)
     return result
 
 
-def _bridge_or_rest(start: np.ndarray, end: np.ndarray, n: int, step_s: float) -> np.ndarray:
-    """One bridge over a short stance; over a long one, to zero and back."""
-    longest = int(LONGEST_BRIDGE_S / step_s)
-    zero = np.zeros_like(start)
-    if n - 1 <= 2 * longest:
-        return bridge(start, end, (n - 1) * step_s, np.arange(n) * step_s)
-    filled = np.zeros((n, start.shape[1]))
-    times = np.arange(longest + 1) * step_s
-    filled[: longest + 1] = bridge(start, zero, longest * step_s, times)
-    filled[n - 1 - longest :] = bridge(zero, end, longest * step_s, times)
-    return filled
+def _apply(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    return np.einsum("tij,j->ti" if vectors.ndim == 1 else "tij,tj->ti", matrices, vectors)
 
 
-def _end_state(window: np.ndarray, step_s: float, at_start: bool) -> np.ndarray:
-    """Value and three derivatives (4, D) at an end of a flight, from the flight's side only."""
-    n = min(ENDS_FIT, len(window))
-    part = window[:n] if at_start else window[-n:]
-    times = np.arange(n) * step_s if at_start else np.arange(1 - n, 1) * step_s
-    scale = times[np.abs(times).argmax()]
-    fit = np.polynomial.polynomial.polyfit(times / scale, part, 6)[:4]
-    return fit * np.array([1.0, 1.0, 2.0, 6.0])[:, None] / scale ** np.arange(4)[:, None]
+def _runs(mask: np.ndarray) -> list[slice]:
+    """The stretches of samples where the mask holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _refined(coarse: Plan, state: State, plan: Plan) -> State:
@@ -259,4 +294,4 @@ def _refined(coarse: Plan, state: State, plan: Plan) -> State:
     coarse_s = np.arange(len(coarse)) * coarse.step_s
     fine_s = np.arange(len(plan)) * plan.step_s
     path = make_interp_spline(coarse_s, state.pelvis_m, k=5)(fine_s)
-    return State(path, euler_zxy(plan.pelvis_angles_rad))
+    return State(path, np.zeros_like(path))

@@ -28,10 +28,13 @@ def _ramp(t_s: np.ndarray, start_s: float, rise_s: float) -> np.ndarray:
     return inside + np.maximum(t_s - start_s - rise_s, 0.0)
 
 
-def glide(t_s: np.ndarray, start_s: float, end_s: float, ramp_s: float) -> np.ndarray:
-    """0 to 1 at constant speed, with smooth starting and stopping ramps."""
-    travelled = _ramp(t_s, start_s, ramp_s) - _ramp(t_s, end_s - ramp_s, ramp_s)
-    return travelled / (end_s - start_s - ramp_s)
+def glide(
+    t_s: np.ndarray, start_s: float, end_s: float, rise_s: float, fall_s: float | None = None
+) -> np.ndarray:
+    """0 to 1 at constant speed, with a smooth starting and a smooth stopping ramp."""
+    fall_s = rise_s if fall_s is None else fall_s
+    travelled = _ramp(t_s, start_s, rise_s) - _ramp(t_s, end_s - fall_s, fall_s)
+    return travelled / (end_s - start_s - 0.5 * (rise_s + fall_s))
 
 
 def soft_polyline(

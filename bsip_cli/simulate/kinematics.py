@@ -19,7 +19,6 @@ from bsip_cli.simulate.rotations import (
     transpose,
 )
 
-LONGEST_REACH = 0.9985  # of thigh plus shank, so that the knee never locks
 DOWN = np.array([0.0, -1.0, 0.0])
 
 
@@ -46,6 +45,12 @@ class Poses:
             {name: p[samples] for name, p in self.origin_m.items()},
             self.excess_reach_m[samples],
         )
+
+
+def centre_of_mass(person: Person, poses: Poses) -> np.ndarray:
+    """(T, 3) centre of mass of the whole body."""
+    parts = person.inertias.items()
+    return sum(part.mass_kg * poses.point(b, part.com_m) for b, part in parts) / person.mass_kg
 
 
 def poses_of(
@@ -117,7 +122,7 @@ def _leg(
     line = foot_path.position_m - hip
     distance = np.linalg.norm(line, axis=1)
     upper, lower = person.lengths_m[thigh], person.lengths_m[shank]
-    longest = LONGEST_REACH * (upper + lower)
+    longest = plan.longest_reach * (upper + lower)
     reach = np.minimum(distance, longest)
 
     hinge = person.hinges[f"knee_{side}"]

@@ -61,6 +61,7 @@ class Plan:
     flights : (first, last) sample of each phase without contact.
     speed_m_s : mean forward speed.
     sway_share : part of the unbalanced motion's COP excursion that is left standing.
+    longest_reach : of a leg, as part of thigh plus shank; keeps knees from locking.
     keep : the part of the samples that is recorded.
     plate_centre_m : X and Z of the first plate's centre, walkway frame.
     """
@@ -75,6 +76,7 @@ class Plan:
     flights: tuple[tuple[int, int], ...] = ()
     speed_m_s: float = 0.0
     sway_share: float = 0.0
+    longest_reach: float = 0.9985
     ball: Ball | None = None
     plate_centre_m: tuple[float, float] = (0.0, 0.0)
     notes: dict[str, object] = field(default_factory=dict)
@@ -100,6 +102,7 @@ class Plan:
             feet={side: _thinned_foot(foot, s) for side, foot in self.feet.items()},
             com_height_m=None if self.com_height_m is None else self.com_height_m[s],
             ball=ball,
+            keep=slice(self.keep.start // factor, -(-self.keep.stop // factor)),
         )
 
 

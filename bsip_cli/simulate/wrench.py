@@ -24,14 +24,12 @@ class Momentum:
     """Whole-body momentum in an inertial frame.
 
     com_m : (T, 3). linear : (T, 3) [kg m/s]. angular : (T, 3) about the origin [kg m2/s].
-    locked : (T, 3, 3) inertia of the body as if stiff, about the centre of mass.
     """
 
     mass_kg: float
     com_m: np.ndarray
     linear: np.ndarray
     angular: np.ndarray
-    locked: np.ndarray
 
     def spin(self) -> np.ndarray:
         """(T, 3) angular momentum about the centre of mass."""
@@ -41,20 +39,27 @@ class Momentum:
 def momentum_of(inertias: dict[str, Inertia], poses: Poses, step_s: float) -> Momentum:
     """Sum over bodies of their momenta."""
     mass = sum(part.mass_kg for part in inertias.values())
-    first, linear, angular = 0.0, 0.0, 0.0
-    about_origin = 0.0
+    samples = len(next(iter(poses.origin_m.values())))
+    first, linear, angular = (np.zeros((samples, 3)) for _ in range(3))
     for body, part in inertias.items():
         R = poses.rotation[body]
         r = poses.point(body, part.com_m)
-        v = derivative(r, step_s)
-        turning = unskew(derivative(R, step_s) @ transpose(R))
-        tensor = R @ part.tensor_kgm2 @ transpose(R)
-        first = first + part.mass_kg * r
-        linear = linear + part.mass_kg * v
-        angular = angular + part.mass_kg * np.cross(r, v) + rotate(tensor, turning)
-        about_origin = about_origin + tensor + part.mass_kg * _parallel(r)
-    com = first / mass
-    return Momentum(mass, com, linear, angular, about_origin - mass * _parallel(com))
+        p = part.mass_kg * derivative(r, step_s)
+        turning = unskew(transpose(R) @ derivative(R, step_s))  # body axes
+        first += part.mass_kg * r
+        linear += p
+        angular += np.cross(r, p) + rotate(R, turning @ part.tensor_kgm2)
+    return Momentum(mass, first / mass, linear, angular)
+
+
+def locked_inertia(inertias: dict[str, Inertia], poses: Poses, com_m: np.ndarray) -> np.ndarray:
+    """(T, 3, 3) inertia of the body as if it were stiff, about its centre of mass."""
+    total = np.zeros((len(com_m), 3, 3))
+    for body, part in inertias.items():
+        R = poses.rotation[body]
+        lever = poses.point(body, part.com_m) - com_m
+        total += R @ part.tensor_kgm2 @ transpose(R) + part.mass_kg * _parallel(lever)
+    return total
 
 
 def _parallel(r: np.ndarray) -> np.ndarray:

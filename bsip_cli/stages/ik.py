@@ -23,9 +23,13 @@ def run(unit: Unit) -> None:
     determined, angle_sd = _determined(unit, poses, decided)
     rate = 1.0 / float(np.median(np.diff(times)))
     motion = smooth_motion(
-        skeleton, poses.q, determined, rate, **unit.config.smoothing.model_dump()
+        person, poses.q, determined, rate, **unit.config.smoothing.model_dump()
     )
-    unit.write("kinematics", _kinematics(times, determined, angle_sd, poses, motion, skeleton))
+    determined &= motion.inner
+    unit.write(
+        "kinematics", _kinematics(times, determined, angle_sd, poses, motion, skeleton),
+        facts={"marker_noise_m": motion.marker_noise_m, "marker_rms_m": poses.rms_m()},
+    )
     unit.write("marker-residuals", pd.DataFrame({
         "time_s": np.repeat(times, len(person.markers)),
         "marker": np.tile(np.array(person.markers, dtype=object), len(times)),

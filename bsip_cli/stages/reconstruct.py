@@ -41,12 +41,13 @@ def run(unit: Unit) -> None:
         unit.warn(f"{unit.name}: no stretch in which every contact is on a plate; nothing to judge")
     height = _surface_height(unit)
     anterior = facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
+    weight = facts["mass_kg"] * GRAVITY_M_S2
+    min_force = unit.config.reconstruct.cop_min_force_percent_bw / 100 * weight
     signals = {
-        name: _signals(wrench, height, anterior, unit.config.reconstruct.cop_min_force_N)
+        name: _signals(wrench, height, anterior, min_force)
         for name, wrench in wrenches.items()
     }
     unit.write("reconstruction", _reconstruction(times, wrenches, signals, valid, used))
-    weight = facts["mass_kg"] * GRAVITY_M_S2
     unit.write("fit", _fit(signals, judged, weight, data))
     unit.write("correlation-difference", _correlations(signals, judged))
     unit.write("posturography", _sway(signals, judged, times))

@@ -1,0 +1,218 @@
+"""When everything that touches the person is measured by a plate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.recordings.analog import long_runs, runs
+from bsip_cli.recordings.force_balance import ContactLimits, force_mismatch
+from bsip_cli.recordings.model import Finding, Recording
+from bsip_cli.recordings.plates import cop_at_height
+from bsip_cli.recordings.resample import FrameWrench
+
+_SIDES = {"l": "left", "r": "right"}
+
+
+@dataclass(frozen=True)
+class PlateLoad:
+    """One plate at the marker rate."""
+
+    name: str
+    corners_m: np.ndarray | None  # (4, 3)
+    force_z_N: np.ndarray  # (n_frames,)
+    cop_m: np.ndarray  # (n_frames, 2), NaN without load
+    usable: np.ndarray  # (n_frames,) bool
+
+
+@dataclass(frozen=True)
+class ContactWindows:
+    valid: np.ndarray  # (n_frames,) bool: every contact is measured
+    on_ground: dict[str, np.ndarray]  # side -> (n_frames,) bool
+    on_plate: dict[str, np.ndarray]  # side -> (n_frames,) bool: touches, and is measured
+    reasons: tuple[Finding, ...]
+
+    def windows(self, rate_hz: float) -> list[tuple[float, float]]:
+        """Valid stretches [s from the first frame]."""
+        return [(a / rate_hz, b / rate_hz) for a, b in runs(self.valid)]
+
+
+def plate_loads(recording: Recording, wrench: FrameWrench) -> tuple[PlateLoad, ...]:
+    """The plates of a recording as `contact_windows` wants them."""
+    loads = []
+    for plate, rows, usable in zip(
+        recording.plates, wrench.per_plate, wrench.plate_usable, strict=True
+    ):
+        height = 0.0 if plate.corners_m is None else float(plate.corners_m[:, 2].mean())
+        cop = cop_at_height(rows[:, :3], rows[:, 3:], height)
+        cop[rows[:, 2] < ContactLimits.loaded_N] = np.nan
+        loads.append(PlateLoad(plate.name, plate.corners_m, rows[:, 2], cop, usable))
+    return tuple(loads)
+
+
+def contact_windows(
+    foot_markers_m: Mapping[str, np.ndarray],
+    foot_height0_m: Mapping[str, np.ndarray | None],
+    rate_hz: float,
+    plates: Sequence[PlateLoad],
+    trunk_markers_m: np.ndarray,
+    mass_kg: float,
+    limits: ContactLimits | None = None,
+) -> ContactWindows:
+    """Frames in which the plates measure all that touches the person.
+
+    ``foot_markers_m`` per side "l"/"r" (n_frames, k, 3); ``foot_height0_m`` per side the
+    standing height of each marker (k,), or None: then the 2nd percentile of its heights;
+    ``trunk_markers_m`` (n_frames, k, 3) stand for the centre of mass.
+    """
+    limits = limits or ContactLimits()
+    n_frames = len(trunk_markers_m)
+    if not plates:
+        nothing = np.zeros(n_frames, bool)
+        reason = _finding("", "no force plate", "no frame is compared")
+        return ContactWindows(nothing, {}, {}, (reason,))
+    usable = np.logical_and.reduce([plate.usable for plate in plates])
+    total = np.sum([plate.force_z_N for plate in plates], axis=0)
+    mismatch = force_mismatch(total, trunk_markers_m, mass_kg, rate_hz, limits)
+    on_ground, on_plate, reasons = {}, {}, []
+    valid = usable & ~mismatch
+    for side, markers in foot_markers_m.items():
+        foot = _Foot.of(markers, foot_height0_m.get(side), rate_hz)
+        on_ground[side], on_plate[side] = _touches(foot, plates, rate_hz, limits)
+        off = on_ground[side] & ~on_plate[side]
+        valid &= ~off & foot.seen
+        reasons += _foot_findings(side, off, ~foot.seen, rate_hz)
+    reasons += _force_findings(mismatch, usable, total, rate_hz)
+    valid = long_runs(valid, round(limits.least_window_s * rate_hz))
+    return ContactWindows(valid, on_ground, on_plate, tuple(reasons))
+
+
+@dataclass(frozen=True)
+class _Foot:
+    position_m: np.ndarray  # (n_frames, k, 2), horizontal
+    height_m: np.ndarray  # (n_frames, k), over each marker's standing height; inf = unseen
+    speed_m_s: np.ndarray  # (n_frames,), of the lowest marker
+    seen: np.ndarray  # (n_frames,) bool
+
+    @classmethod
+    def of(cls, markers_m: np.ndarray, height0_m: np.ndarray | None, rate_hz: float) -> _Foot:
+        known = np.isfinite(markers_m).all(axis=-1)
+        if height0_m is None:
+            height0_m = _low_percentile(markers_m[..., 2], known)
+        height = np.where(known, np.nan_to_num(markers_m[..., 2]) - height0_m, np.inf)
+        speed = np.linalg.norm(_central_difference(markers_m, rate_hz), axis=-1)
+        lowest = height.argmin(axis=1)
+        frames = np.arange(len(markers_m))
+        return cls(
+            position_m=markers_m[..., :2],
+            height_m=height,
+            speed_m_s=np.nan_to_num(speed[frames, lowest], nan=0.0),
+            seen=known.any(axis=1),
+        )
+
+
+def _low_percentile(height_m: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """2nd percentile of each marker's heights over time, zero if never seen, (k,)."""
+    columns = zip(height_m.T, known.T, strict=True)
+    return np.array([np.percentile(z[k], 2) if k.any() else 0.0 for z, k in columns])
+
+
+def _central_difference(markers_m: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Velocity over about 40 ms, (n_frames, k, 3)."""
+    reach = max(1, round(0.02 * rate_hz))
+    frames = np.arange(len(markers_m))
+    after = np.minimum(frames + reach, len(frames) - 1)
+    before = np.maximum(frames - reach, 0)
+    span = np.maximum(after - before, 1)[:, None, None]
+    return (markers_m[after] - markers_m[before]) / span * rate_hz
+
+
+def _touches(
+    foot: _Foot, plates: Sequence[PlateLoad], rate_hz: float, limits: ContactLimits
+) -> tuple[np.ndarray, np.ndarray]:
+    """Whether the foot touches, and whether a plate measures it, (n_frames,) bool each.
+
+    A foot on a moving belt is not slow: the load under it tells.
+    """
+    near_load = _near_load(foot, plates, limits)
+    low = foot.height_m.min(axis=1) < limits.touch_height_m
+    touching = low & ((foot.speed_m_s < limits.touch_speed_m_s) | near_load)
+    outlines = [plate.corners_m for plate in plates if plate.corners_m is not None]
+    inside = _inside_outlines(foot, outlines, limits) if outlines else False
+    without_outline = any(plate.corners_m is None for plate in plates)
+    measured = inside | near_load if without_outline else inside
+    off = long_runs(touching & ~measured, max(1, round(limits.blink_s * rate_hz)))
+    on_ground = (touching & measured) | off
+    return on_ground, on_ground & ~off
+
+
+def _near_load(foot: _Foot, plates: Sequence[PlateLoad], limits: ContactLimits) -> np.ndarray:
+    """A foot marker lies close to the centre of pressure of a loaded plate, (n_frames,)."""
+    near = np.zeros(len(foot.seen), bool)
+    for plate in plates:
+        gap = np.linalg.norm(foot.position_m - plate.cop_m[:, None], axis=-1)
+        is_close = (np.nan_to_num(gap, nan=np.inf) < limits.cop_distance_m).any(axis=1)
+        near |= (plate.force_z_N > limits.loaded_N) & is_close
+    return near
+
+
+def _inside_outlines(
+    foot: _Foot, outlines: Sequence[np.ndarray], limits: ContactLimits
+) -> np.ndarray:
+    """Every low marker of the foot lies on one plate or another, (n_frames,)."""
+    sole = foot.height_m < limits.sole_height_m
+    inside = np.zeros(sole.shape, bool)
+    for corners in outlines:
+        inside |= _inside(foot.position_m, corners[:, :2], limits.outline_tolerance_m)
+    return np.asarray((inside | ~sole).all(axis=1))
+
+
+def _inside(points_m: np.ndarray, corners_m: np.ndarray, tolerance_m: float) -> np.ndarray:
+    """Points (..., 2) in the rectangle of corners (4, 2) widened by the tolerance."""
+    x, y = corners_m[0] - corners_m[1], corners_m[0] - corners_m[3]
+    offset = points_m - corners_m.mean(axis=0)  # NaN is nowhere inside
+    inside = np.ones(points_m.shape[:-1], bool)
+    for side in (x, y):
+        length = np.linalg.norm(side)
+        along = offset[..., 0] * side[0] / length + offset[..., 1] * side[1] / length
+        inside &= np.abs(along) <= length / 2 + tolerance_m
+    return inside
+
+
+def _foot_findings(side: str, off: np.ndarray, unseen: np.ndarray, rate_hz: float) -> list[Finding]:
+    name = _SIDES.get(side, side) + " foot"
+    findings = []
+    if off.any():
+        findings.append(_finding(name, f"on the floor beside the plates: {_times(off, rate_hz)}"))
+    if unseen.any():
+        findings.append(_finding(name, f"no foot marker seen: {_times(unseen, rate_hz)}"))
+    return findings
+
+
+def _force_findings(
+    mismatch: np.ndarray, usable: np.ndarray, total_N: np.ndarray, rate_hz: float
+) -> list[Finding]:
+    findings = []
+    if mismatch.any():
+        found = (
+            f"the plates' {np.mean(total_N[mismatch]):.0f} N do not carry the motion: a contact "
+            f"they do not measure (seat, box, hands) {_times(mismatch, rate_hz)}"
+        )
+        findings.append(_finding("", found))
+    if not usable.all():
+        findings.append(_finding("", f"force samples unusable: {_times(~usable, rate_hz)}"))
+    return findings
+
+
+def _finding(subject: str, found: str, action: str = "left these frames out") -> Finding:
+    return Finding("contacts", subject, found, "every contact on a plate", action, "excluded")
+
+
+def _times(mask: np.ndarray, rate_hz: float, most: int = 6) -> str:
+    """The stretches of True in words."""
+    stretches = runs(mask)
+    words = [f"{a / rate_hz:.2f} to {b / rate_hz:.2f} s" for a, b in stretches[:most]]
+    more = f" and {len(stretches) - most} more" if len(stretches) > most else ""
+    return ", ".join(words) + more

@@ -1,0 +1,71 @@
+"""Does the plates' vertical force carry the motion of the trunk?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from bsip_cli.recordings.analog import long_runs
+
+GRAVITY = 9.80665
+
+
+@dataclass(frozen=True)
+class ContactLimits:
+    """The thresholds of the contact logic."""
+
+    touch_height_m: float = 0.035  # above a marker's own standing height
+    sole_height_m: float = 0.06  # markers this low belong to the footprint
+    touch_speed_m_s: float = 0.6
+    outline_tolerance_m: float = 0.03
+    loaded_N: float = 20.0
+    cop_distance_m: float = 0.35
+    mismatch_share: float = 0.35  # of body weight, and of the force's own departure from it
+    mismatch_s: float = 0.1
+    blink_s: float = 0.06  # shorter touches without load are no touch
+    least_window_s: float = 0.1
+    trunk_cutoff_hz: float = 6.0
+
+
+def force_mismatch(
+    total_force_z_N: np.ndarray,
+    trunk_markers_m: np.ndarray,
+    mass_kg: float,
+    rate_hz: float,
+    limits: ContactLimits,
+) -> np.ndarray:
+    """Frames in which the trunk's motion needs another vertical force than measured."""
+    height = _mean_height(trunk_markers_m)
+    if height is None:
+        return np.zeros(len(trunk_markers_m), bool)
+    acceleration = np.gradient(np.gradient(_low_pass(height, rate_hz, limits))) * rate_hz**2
+    needed = mass_kg * (GRAVITY + acceleration)
+    measured = _low_pass(total_force_z_N, rate_hz, limits)
+    weight = mass_kg * GRAVITY
+    allowed = limits.mismatch_share * (weight + np.abs(needed - weight))
+    different = np.abs(measured - needed) > allowed
+    return long_runs(different, max(2, round(limits.mismatch_s * rate_hz)))
+
+
+def _mean_height(trunk_markers_m: np.ndarray) -> np.ndarray | None:
+    """Mean height of the markers seen nearly always, gaps interpolated, (n_frames,)."""
+    height = trunk_markers_m[..., 2]
+    known = np.isfinite(height)
+    if not height.size or len(height) < 10:
+        return None
+    often = np.flatnonzero(known.mean(axis=0) > 0.9)
+    if not len(often):
+        return None
+    frames = np.arange(len(height))
+    filled = [np.interp(frames, frames[known[:, i]], height[known[:, i], i]) for i in often]
+    return np.mean(filled, axis=0)
+
+
+def _low_pass(signal: np.ndarray, rate_hz: float, limits: ContactLimits) -> np.ndarray:
+    """Zero phase, order 4."""
+    cutoff = min(limits.trunk_cutoff_hz, 0.45 * rate_hz)
+    sections = butter(2, cutoff, fs=rate_hz, output="sos")
+    pad = min(len(signal) - 1, round(rate_hz))
+    return sosfiltfilt(sections, np.asarray(signal), padlen=pad)

@@ -1,0 +1,82 @@
+"""What a plate reads without load."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from bsip_cli.recordings.analog import long_runs, runs
+from bsip_cli.recordings.model import Finding, Plate
+
+_WINDOW_S = 0.2
+
+
+@dataclass(frozen=True)
+class PlateZero:
+    """A plate's reading in its unloaded stretches."""
+
+    offset: np.ndarray  # (6,): N and N m about the world origin
+    spread: np.ndarray  # (6,): standard deviation of the single samples
+    n_samples: int  # 0: the plate was never seen unloaded, the offset is zero
+    stretches_s: tuple[tuple[float, float], ...]  # from the first sample
+
+    def is_known(self) -> bool:
+        return self.n_samples > 0
+
+
+def plate_zero(
+    plate: Plate,
+    rate_hz: float,
+    may_be_loaded: np.ndarray | None = None,
+    least_s: float = 0.4,
+    largest_N: float = 45.0,
+    quiet_N: float = 5.0,
+) -> PlateZero:
+    """Find unloaded stretches: long, low and quiet in the vertical force.
+
+    ``may_be_loaded`` (n_analog,) bool excludes samples at which a foot is on the plate;
+    ``largest_N`` bounds the offset, ``quiet_N`` its slow changes within 0.2 s.
+    """
+    unloaded = _unloaded(plate, rate_hz, largest_N, quiet_N)
+    if may_be_loaded is not None:
+        unloaded &= ~may_be_loaded
+    unloaded = long_runs(unloaded, max(2, round(least_s * rate_hz)))
+    if not unloaded.any():
+        return PlateZero(np.zeros(6), np.zeros(6), 0, ())
+    samples = plate.wrench()[unloaded]
+    return PlateZero(
+        offset=np.median(samples, axis=0),
+        spread=samples.std(axis=0),
+        n_samples=int(unloaded.sum()),
+        stretches_s=tuple((a / rate_hz, b / rate_hz) for a, b in runs(unloaded)),
+    )
+
+
+def subtract_zero(plate: Plate, zero: PlateZero) -> tuple[Plate, Finding]:
+    """The plate without its offset, and the line for the quality table."""
+    if not zero.is_known():
+        return plate, _finding(plate, "never unloaded", "left its zero as it is", "info")
+    seconds = sum(stop - start for start, stop in zero.stretches_s)
+    force = ", ".join(f"{value:.1f}" for value in zero.offset[:3])
+    found = f"({force}) N in {seconds:.1f} s without load"
+    corrected = replace(
+        plate,
+        force_N=plate.force_N - zero.offset[:3],
+        moment_Nm=plate.moment_Nm - zero.offset[3:],
+    )
+    level = "corrected" if np.abs(zero.offset[:3]).max() > 1.0 else "info"
+    return corrected, _finding(plate, found, "subtracted it", level)
+
+
+def _unloaded(plate: Plate, rate_hz: float, largest_N: float, quiet_N: float) -> np.ndarray:
+    width = max(1, round(_WINDOW_S * rate_hz))
+    force = np.where(plate.usable, plate.force_N[:, 2], 0.0)
+    mean = uniform_filter1d(force, width)
+    slow = uniform_filter1d(mean, width)
+    return plate.usable & (np.abs(mean) < largest_N) & (np.abs(mean - slow) < quiet_N)
+
+
+def _finding(plate: Plate, found: str, action: str, level: str) -> Finding:
+    return Finding("plate_zero", plate.name, found, "(0, 0, 0) N", action, level)

@@ -1,0 +1,24 @@
+"""The report of the cohort: its sections in order."""
+
+from __future__ import annotations
+
+from bsip_cli.report.blocks import Document
+from bsip_cli.report.cohort import gain, limits, people, published_tables, summary
+from bsip_cli.report.cohort.record import CohortRecord
+
+SECTIONS = (
+    summary.section,
+    people.section,
+    gain.section,
+    published_tables.section,
+    limits.section,
+)
+
+
+def cohort_document(record: CohortRecord) -> Document:
+    return Document(
+        title="Cohort: segment inertial parameters and ground forces",
+        subtitle="RM: parameters from an anthropometric table. OM: parameters identified from each "
+        "person's own movement and ground forces.",
+        sections=tuple(section(record) for section in SECTIONS),
+    )

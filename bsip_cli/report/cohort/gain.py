@@ -1,0 +1,57 @@
+"""Section 3: the gain of identification, participant by participant."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.report.blocks import Block, Heading, Paragraph, Picture, Section
+from bsip_cli.report.cohort.record import CohortRecord, ratio_of_means
+from bsip_cli.report.cohort.summary import chosen_gains
+from bsip_cli.report.figures.errors_per_task import ErrorsPerTask, errors_per_task
+from bsip_cli.report.figures.gain_dots import GainDots, gain_dots
+from bsip_cli.report.words import COMPONENTS, component_label
+
+_ERRORS = (("cop_error", "COP error [mm]", "errors_cop"),
+           ("grf_vertical", "vertical force error [% BW]", "errors_vertical_force"))
+_DATA = {"identification": "used to identify", "held_out": "held out"}
+
+
+def section(record: CohortRecord) -> Section:
+    blocks = [*_dots(record), Heading("Errors per movement")]
+    for variable, quantity, name in _ERRORS:
+        blocks += _per_task(record, variable, quantity, name)
+    return Section("gain", "How much identification gains", tuple(blocks))
+
+
+def _dots(record: CohortRecord) -> list[Block]:
+    gains, held_out = chosen_gains(record)
+    table = {c: np.array([ratio_of_means(own, c) for own in gains.values()]) for c in COMPONENTS}
+    table = {c: ratios for c, ratios in table.items() if np.isfinite(ratios).any()}
+    if not table:
+        return [Paragraph("There is no error of both methods to compare.", "warning")]
+    data = GainDots(tuple(component_label(c) for c in table), np.array(list(table.values())))
+    where = "held-out data" if held_out else "the data that identified the parameters"
+    caption = (f"Error of OM over error of RM, on {where}; a dot per participant (in the order of "
+               "the participants, from top to bottom), the bar their geometric mean. The scale is "
+               "one of ratios: half and double lie equally far from 1.")
+    return [Picture(gain_dots(data), caption, "Dots: error ratio OM to RM per component.", "gain")]
+
+
+def _per_task(record: CohortRecord, variable: str, quantity: str, name: str) -> list[Block]:
+    rows = record.errors(variable).dropna(subset=["RM", "OM"], how="all")
+    if rows.empty:
+        return [Paragraph(f"There is no {quantity} to show.", "note")]
+    keys = list(dict.fromkeys(zip(rows["task"], rows["data"], strict=True)))
+    people = sorted(rows["participant"].unique())
+    wide = rows.set_index(["task", "data", "participant"])
+    rm, om = (
+        np.array([[wide[method].get((*key, person), np.nan) for person in people] for key in keys])
+        for method in ("RM", "OM")
+    )
+    tasks, data = zip(*((task, _DATA.get(how, how)) for task, how in keys), strict=True)
+    caption = (f"{quantity} per movement and participant (mean over the runs); RM to the left, OM "
+               "to the right, thick lines are the means. The COP error is the length of the errors "
+               "in both directions." if variable == "cop_error" else
+               f"{quantity} per movement and participant, as above.")
+    figure = errors_per_task(ErrorsPerTask(tasks, data, rm, om, quantity))
+    return [Picture(figure, caption, f"Points: {quantity} of RM and OM per movement.", name)]

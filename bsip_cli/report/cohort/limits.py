@@ -1,0 +1,27 @@
+"""Section 5: what to mind, warnings, options and versions."""
+
+from __future__ import annotations
+
+from bsip_cli.report.blocks import Block, Bullets, Heading, Paragraph, Section
+from bsip_cli.report.cohort.record import CohortRecord
+from bsip_cli.report.origins import options_grids
+from bsip_cli.report.records import messages
+
+_MIND = (
+    "The masses of table 1 come from the identified combinations and a rule that splits them, "
+    "nearness to the regression. Read them with the data shares in each participant's report.",
+    "Tests compare participants, never frames: frames of a recording are not independent.",
+    "Errors on trials that identified the parameters favour OM. Only held-out data tell which "
+    "method predicts better.",
+)
+
+
+def section(record: CohortRecord) -> Section:
+    said = messages(record.origins)
+    warned: Block = (
+        Bullets(tuple(f"{stage}{f' ({unit})' if unit else ''}: {text}"
+                      for stage, unit, text in said), "warning")
+        if said else Paragraph("No stage had anything to warn of.")
+    )
+    return Section("limits", "Limits, warnings, options", (
+        Bullets(_MIND), Heading("Warnings"), warned, *options_grids(record.origins)))

@@ -1,0 +1,72 @@
+"""All that the cohort's report reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.report.gains import Gain
+from bsip_cli.report.records import Origin, Refusal
+from bsip_cli.report.table_model import Table
+from bsip_cli.report.words import COMPONENTS, trial_label
+
+_OF_TABLE = {"table4": "", "table5": "_rmse"}  # tables of errors, and the ending of their variables
+
+
+@dataclass(frozen=True)
+class Member:
+    """One participant of the study; ``facts`` and ``identification`` are None if not there."""
+
+    id: str
+    facts: pd.Series | None
+    identification: pd.DataFrame | None
+    has_report: bool
+    refusals: tuple[Refusal, ...]
+
+
+@dataclass(frozen=True)
+class CohortRecord:
+    """Attributes: ``missing`` sentences on who is in no table; ``table_files`` relative to OUT."""
+
+    members: tuple[Member, ...]
+    values: pd.DataFrame
+    tables: tuple[Table, ...]
+    table_files: tuple[str, ...]
+    missing: tuple[str, ...]
+    origins: tuple[Origin, ...]
+
+    def gains(self) -> dict[str, tuple[Gain, ...]]:
+        """Participant -> errors of RM and OM in each trial and component."""
+        return {name: _gains(rows) for name, rows in self.values.groupby("participant", sort=True)}
+
+    def errors(self, variable: str) -> pd.DataFrame:
+        """Rows of one error of table 4: participant, task, data, RM, OM; the mean over the runs."""
+        rows = self.values[self.values["table"] == "table4"]
+        rows = rows[rows["variable"] == variable]
+        wide = rows.pivot_table(index=["participant", "task", "data"], columns="method",
+                                values="value", aggfunc="mean")
+        return wide.reindex(columns=["RM", "OM"]).reset_index()
+
+
+def _gains(rows: pd.DataFrame) -> tuple[Gain, ...]:
+    kept = {(r.trial, r.table, r.variable, r.method): r for r in rows.itertuples()}
+    gains = []
+    for trial in dict.fromkeys(rows["trial"]):
+        for component in COMPONENTS:
+            for table, ending in _OF_TABLE.items():
+                rm = kept.get((trial, table, component + ending, "RM"))
+                om = kept.get((trial, table, component + ending, "OM"))
+                if rm is not None and om is not None:
+                    unit = om.unit.replace("% body weight", "% BW")
+                    gains.append(Gain(trial_label(trial), component, unit, float(rm.value),
+                                      float(om.value), om.data == "held_out"))
+    return tuple(gains)
+
+
+def ratio_of_means(gains: tuple[Gain, ...], component: str) -> float:
+    """Mean error of OM over mean error of RM, NaN where nothing is known."""
+    known = [g for g in gains if g.component == component and np.isfinite(g.rm + g.om)]
+    rm, om = sum(g.rm for g in known), sum(g.om for g in known)
+    return om / rm if rm > 0.0 and om > 0.0 else float("nan")

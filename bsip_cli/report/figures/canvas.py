@@ -1,0 +1,118 @@
+"""What all figures share: size, colours that differ in grey too, and files without a clock."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+WIDTH_MM = 170.0  # the text width of a page
+INK, SOFT, FAINT = "#1c1c1c", "#6e6e6e", "#d4d4d4"
+ORANGE, BLUE, GREEN, PURPLE = "#D55E00", "#0072B2", "#009E73", "#CC79A7"  # Okabe and Ito
+LONGEST_LABEL = 16
+MOST_POINTS = 1200  # of one curve: more than a page can show
+_MM = 1.0 / 25.4
+_RC = {
+    "svg.hashsalt": "bsip", "svg.fonttype": "path", "font.family": "DejaVu Sans", "font.size": 8,
+    "axes.unicode_minus": True, "path.simplify": True,
+}
+
+
+@dataclass(frozen=True)
+class Line:
+    """How a method is drawn."""
+
+    colour: str
+    style: str
+    width: float
+
+
+_LINES = {
+    "measured": Line("#7a7a7a", "-", 3.0),
+    "RM": Line(ORANGE, "--", 1.3),
+    "OM": Line(BLUE, "-", 1.1),
+}
+_OTHER_LINE = Line(PURPLE, "-.", 1.1)
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Matplotlib's own defaults and ours, whatever the user's matplotlibrc says."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_RC)
+        yield
+
+
+def line_of(method: str) -> Line:
+    return _LINES.get(method, _OTHER_LINE)
+
+
+def new_figure(height_mm: float, width_mm: float = WIDTH_MM) -> Figure:
+    """An empty figure of the page's width that lays itself out."""
+    figure = Figure(figsize=(width_mm * _MM, height_mm * _MM), layout="constrained")
+    figure.get_layout_engine().set(w_pad=0.04, h_pad=0.04)
+    return figure
+
+
+def tidy(axes: Axes, *, grid: str = "y") -> None:
+    """Only the lines that help: left and bottom, and a faint grid along one axis."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(SOFT)
+    axes.tick_params(labelsize=8, colors=INK, length=3)
+    axes.xaxis.label.set_size(8.5)
+    axes.yaxis.label.set_size(8.5)
+    if grid:
+        axes.grid(axis=grid, color=FAINT, linewidth=0.6)
+        axes.set_axisbelow(True)
+
+
+def legend_above(axes: Axes, columns: int = 4) -> None:
+    """A legend in one row over the axes, where no curve runs; each label once."""
+    handles, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    axes.legend(once.values(), once.keys(), loc="lower left", bbox_to_anchor=(0.0, 1.0),
+                ncols=columns, frameon=False, fontsize=8, borderaxespad=0.2, handlelength=2.4)
+
+
+def plain(text: str) -> str:
+    """A foreign label as it is: no mathematics, nothing unprintable, cut where it is too long."""
+    short = text if len(text) <= LONGEST_LABEL else f"{text[: LONGEST_LABEL - 1]}…"
+    return "".join(c if c.isprintable() else "?" for c in short).replace("$", r"\$")
+
+
+def thinned(length: int, most: int = MOST_POINTS) -> slice:
+    """Every k-th of ``length`` samples, so that at most ``most`` are left."""
+    return slice(None, None, max(1, -(-length // most)))
+
+
+def runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Half-open index pairs of the stretches where ``flags`` holds."""
+    steps = np.diff(np.concatenate([[0], np.asarray(flags, dtype=int), [0]]))
+    return list(zip(*(np.flatnonzero(steps == s).tolist() for s in (1, -1)), strict=True))
+
+
+def to_svg(figure: Figure) -> bytes:
+    """The figure as SVG; the same figure gives the same bytes."""
+    return _save(figure, "svg", metadata={"Date": None, "Creator": None})
+
+
+def to_png(figure: Figure) -> bytes:
+    """The figure as PNG of 200 dots per inch; the same figure gives the same bytes."""
+    return _save(figure, "png", metadata={"Software": None}, dpi=200)
+
+
+def _save(figure: Figure, form: str, **options) -> bytes:
+    buffer = io.BytesIO()
+    with house_style(), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph")  # a label in a script the font lacks
+        figure.savefig(buffer, format=form, **options)
+    figure.set_layout_engine("none")  # laid out once; the next file keeps it
+    return buffer.getvalue()

@@ -1,0 +1,66 @@
+"""Error of OM over error of RM, per component and participant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, NullLocator
+
+from bsip_cli.report.figures.canvas import (
+    BLUE,
+    FAINT,
+    INK,
+    ORANGE,
+    SOFT,
+    house_style,
+    new_figure,
+    tidy,
+)
+
+_TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
+_SPREAD = 0.28
+
+
+@dataclass(frozen=True)
+class GainDots:
+    """(c, p) over components and participants: RMSE of OM / RMSE of RM, NaN where not known."""
+
+    components: tuple[str, ...]
+    ratios: np.ndarray
+
+
+@house_style()
+def gain_dots(data: GainDots) -> Figure:
+    """A row per component, a dot per participant, a line at their geometric mean."""
+    rows, people = data.ratios.shape
+    figure = new_figure(20.0 + 8.0 * rows)
+    axes = figure.add_subplot()
+    offsets = np.linspace(-_SPREAD, _SPREAD, people) if people > 1 else np.zeros(1)
+    for row, ratios in enumerate(data.ratios):
+        axes.scatter(ratios, row + offsets, s=24, lw=0.5, edgecolor="white",
+                     color=[BLUE if r < 1.0 else ORANGE for r in ratios], zorder=2)
+        if np.isfinite(ratios).any():
+            mean = float(np.exp(np.nanmean(np.log(ratios))))
+            axes.plot([mean, mean], [row - 0.38, row + 0.38], color=INK, lw=1.6, zorder=3)
+    axes.axvline(1.0, color=SOFT, lw=1.0)
+    _log_axis(axes, data.ratios)
+    axes.set_yticks(range(rows), data.components)
+    axes.set_ylim(rows - 0.5, -0.5)
+    axes.set_xlabel("RMSE of OM / RMSE of RM (left of 1: OM follows better)")
+    tidy(axes, grid="x")
+    axes.hlines(np.arange(1, rows) - 0.5, 0, 1, transform=axes.get_yaxis_transform(), color=FAINT,
+                lw=0.6)
+    return figure
+
+
+def _log_axis(axes, ratios: np.ndarray) -> None:
+    low = min(0.5, float(np.nanmin(ratios))) / 1.15
+    high = max(2.0, float(np.nanmax(ratios))) * 1.15
+    axes.set_xscale("log")
+    axes.set_xlim(low, high)
+    ticks = [t for t in _TICKS if low <= t <= high]
+    axes.xaxis.set_major_locator(FixedLocator(ticks))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xticks(ticks, [f"{t:g}" for t in ticks])

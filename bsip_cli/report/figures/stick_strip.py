@@ -1,0 +1,119 @@
+"""A strip of stick figures with the measured ground force, from the side and from behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bsip_cli.report.figures.canvas import GREEN, INK, SOFT, WIDTH_MM, house_style, new_figure
+
+_MARGIN_M = 0.22
+_COLOURS = {"l": "#9a9a9a", "r": INK, "": INK}
+_WIDTHS = {"l": 2.2, "r": 1.3, "": 1.6}
+_TALLEST_MM = 40.0
+_LABEL_MM = 12.0
+
+
+@dataclass(frozen=True)
+class StickStrip:
+    """Poses at n instants; positions and forces in the person's axes (anterior, right, up).
+
+    Attributes
+    ----------
+    time_s : (n,).
+    bones_m : (n, b, 2, 3) end points of the bones.
+    sides : (b,) ``l``, ``r`` or empty.
+    head_m : (n, 3) centre of the head; head_radius_m : its radius.
+    force_m : (n, 3) where the ground force acts; forces : (n, 3), NaN where it is not measured.
+    ground_m : height of the ground.
+    body_weight : what an arrow of half a body height stands for.
+    """
+
+    time_s: np.ndarray
+    bones_m: np.ndarray
+    sides: tuple[str, ...]
+    head_m: np.ndarray
+    head_radius_m: float
+    force_m: np.ndarray
+    forces: np.ndarray
+    ground_m: float
+    body_weight: float
+
+    def arrow_m_per_newton(self) -> float:
+        """One body weight is as long as half the tallest pose."""
+        top = float(np.nanmax(self.head_m[:, 2])) + self.head_radius_m - self.ground_m
+        return 0.5 * top / self.body_weight
+
+    def arrow_tips_m(self) -> np.ndarray:
+        """(n, 3) tips of the force arrows."""
+        return self.force_m + self.forces * self.arrow_m_per_newton()
+
+
+@house_style()
+def stick_strip(data: StickStrip) -> Figure:
+    """Two rows of stick figures: from the right side, and from behind."""
+    slots = _slots(data)
+    width, height = slots[-1, 1], _height(data)
+    row_mm = min(_TALLEST_MM, height / width * (WIDTH_MM - _LABEL_MM))
+    figure = new_figure(2.0 * row_mm + 14.0, row_mm * width / height + _LABEL_MM)
+    rows = figure.subplots(2, 1)
+    for axes, axis, view in zip(rows, (0, 1), ("from the right", "from behind"), strict=True):
+        _draw_row(axes, data, slots, axis)
+        axes.set_ylabel(view, fontsize=8, color=SOFT)
+        axes.set_ylim(data.ground_m - 0.04 * height, data.ground_m + height)
+    for time, (left, right) in zip(data.time_s, slots, strict=True):
+        rows[1].text((left + right) / 2, data.ground_m - 0.07 * height, f"{time:.2f} s",
+                     ha="center", va="top", fontsize=8)
+    return figure
+
+
+def _height(data: StickStrip) -> float:
+    tops = [data.bones_m[..., 2].max(), data.head_m[:, 2].max() + data.head_radius_m]
+    tips = data.arrow_tips_m()[:, 2]
+    if np.isfinite(tips).any():
+        tops.append(np.nanmax(tips))
+    return float(max(tops)) - data.ground_m + 0.05
+
+
+def _half_width(data: StickStrip, k: int) -> float:
+    """How far pose ``k`` reaches from its pelvis to either side, in either view."""
+    tip = data.arrow_tips_m()[k]
+    points = [*data.bones_m[k].reshape(-1, 3), data.head_m[k] + data.head_radius_m]
+    points += [p for p in (tip, data.force_m[k]) if np.isfinite(tip).all()]
+    return float(np.abs(np.array(points)[:, :2] - data.bones_m[k, 0, 0, :2]).max())
+
+
+def _slots(data: StickStrip) -> np.ndarray:
+    """(n, 2) left and right edge of the room that each pose gets."""
+    halves = np.array([_half_width(data, k) for k in range(len(data.time_s))]) + _MARGIN_M / 2
+    edges = np.concatenate([[0.0], np.cumsum(2.0 * halves)])
+    return np.stack([edges[:-1], edges[1:]], axis=1)
+
+
+def _draw_row(axes: Axes, data: StickStrip, slots: np.ndarray, axis: int) -> None:
+    from matplotlib.patches import Circle
+
+    tips = data.arrow_tips_m()
+    for k, (left, right) in enumerate(slots):
+        shift = (left + right) / 2 - data.bones_m[k, 0, 0, axis]
+        for bone, side in zip(data.bones_m[k], data.sides, strict=True):
+            axes.plot(bone[:, axis] + shift, bone[:, 2], color=_COLOURS[side], lw=_WIDTHS[side],
+                      solid_capstyle="round", zorder=1 if side == "l" else 2)
+        centre = (data.head_m[k, axis] + shift, data.head_m[k, 2])
+        axes.add_patch(Circle(centre, data.head_radius_m, fill=False, ec=INK, lw=1.2))
+        if np.isfinite(tips[k]).all():
+            axes.annotate(
+                "", (tips[k, axis] + shift, tips[k, 2]),
+                (data.force_m[k, axis] + shift, data.force_m[k, 2]), zorder=3,
+                arrowprops={"arrowstyle": "-|>", "color": GREEN, "lw": 1.6, "shrinkA": 0,
+                            "shrinkB": 0, "mutation_scale": 8},
+            )
+    axes.axhline(data.ground_m, color=SOFT, lw=0.8, zorder=0)
+    axes.set_xlim(0.0, slots[-1, 1])
+    axes.set_aspect("equal")
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.spines[:].set_visible(False)

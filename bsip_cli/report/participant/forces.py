@@ -1,0 +1,247 @@
+"""Section 6: how well the forces follow from the motion with either set of parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.report.blocks import Block, Cell, Grid, Heading, Paragraph, Picture, Section
+from bsip_cli.report.figures.cop_path import CopPath, cop_path
+from bsip_cli.report.figures.methods_over_time import MethodsOverTime, methods_over_time
+from bsip_cli.report.gains import SAME_WITHIN, Gain, gains_of
+from bsip_cli.report.records import ParticipantRecord, TrialRecord, clock_of, flags_of, signals_of
+from bsip_cli.report.windows import hull_of, middle_of_longest
+from bsip_cli.report.words import (
+    COMPONENTS,
+    METHODS,
+    component_label,
+    method_label,
+    number,
+    percent,
+    signed,
+)
+
+_WINDOW_S = 10.0
+_ROOM_S = 0.2
+_THROWS = ("basketball", "throw")
+_MM = 1000.0
+_DATA = {"held_out": "held-out data: the identification had not seen them",
+         "identification": "data that were used for identification, which favours OM"}
+_MEASURES = (("rmse", "RMSE", 2), ("rmse_percent_bw", "RMSE [% BW]", 2), ("pearson_r", "r", 3),
+             ("schwer_m", "M", 3), ("schwer_p", "P", 3), ("schwer_c", "C", 3))
+_SWAY = (("rms_ap_mm", "RMS AP [mm]"), ("rms_ml_mm", "RMS ML [mm]"),
+         ("mean_velocity_mm_s", "mean speed [mm/s]"), ("sway_length_mm", "path length [mm]"),
+         ("ellipse_area_mm2", "95 % ellipse [mm²]"), ("duration_s", "duration [s]"))
+
+
+def section(record: ParticipantRecord) -> Section:
+    return Section("forces", "How well the forces follow", (
+        Paragraph("The ground force and its centre of pressure (COP) are computed from the motion "
+                  "alone, once with the table's parameters (RM) and once with the identified ones "
+                  "(OM), and compared with the plates."),
+        *_cop_over_time(record), *_vertical_force(record),
+        Heading("Errors in every trial and component"), *_overview(record), *_fit_grids(record),
+        Heading("Sway measures of the centre of pressure"), *_posturography(record),
+    ))
+
+
+# --- Hansen 2017, Fig. 3 ------------------------------------------------------------------------
+
+
+def _cop_over_time(record: ParticipantRecord) -> list[Block]:
+    trial = _cop_trial(record)
+    if trial is None:
+        return [Paragraph("No trial has a centre of pressure that could be compared, so it is not "
+                          "shown.", "warning")]
+    frame = trial.reconstruction
+    assert frame is not None
+    clock, shown = clock_of(frame), _with_cop(frame)
+    window = middle_of_longest(clock, shown, _WINDOW_S)
+    ap, ml = (_cop_mm(frame, name, shown, window) for name in ("ap", "ml"))
+    zero = {"ap": float(np.nanmean(ap["measured"])), "ml": float(np.nanmean(ml["measured"]))}
+    when = f"{trial.label}, {clock[window][0]:.1f} to {clock[window][-1]:.1f} s"
+    data = _data_of(flags_of(frame, "used")[window])
+    blocks: list[Block] = [Heading(f"Centre of pressure: {when}")]
+    for key, values, name, towards in (("ml", ml, "medio-lateral", "right"),
+                                       ("ap", ap, "anterior-posterior", "forward")):
+        signals = {method: v - zero[key] for method, v in values.items()}
+        figure = methods_over_time(MethodsOverTime(
+            clock[window], signals, f"COP {key.upper()} [mm] (+ {towards})"))
+        caption = (f"COP, {name}, about the measured mean. {_rmse_words(signals, 'mm')} These are "
+                   f"{data}.")
+        blocks.append(Picture(figure, caption, f"Curves: COP {name} over time.", f"fig3_cop_{key}"))
+    paths = {m: np.stack([ml[m] - zero["ml"], ap[m] - zero["ap"]], axis=1) for m in ap}
+    blocks.append(Picture(cop_path(CopPath(paths)), "The path of the centre of pressure on the "
+                          "plate over the same time, seen from above, about the measured mean.",
+                          "Curves: path of the COP from above.", "cop_path"))
+    return blocks
+
+
+def _cop_trial(record: ParticipantRecord) -> TrialRecord | None:
+    """The identification trial, else the one with the longest comparable COP."""
+    able = [t for t in record.trials if t.reconstruction is not None and t.role != "static"
+            and len(clock_of(t.reconstruction)) and _longest_s(t.reconstruction) > 0.0]
+    used = [t for t in able if t in record.identification_trials()]
+    return max(used or able, key=lambda t: _longest_s(t.reconstruction), default=None)
+
+
+def _with_cop(frame: pd.DataFrame) -> np.ndarray:
+    """Frames in which all contacts are measured and there is a measured COP."""
+    ap, ml = (signals_of(frame, f"cop_{name}_m")["measured"] for name in ("ap", "ml"))
+    return flags_of(frame, "valid") & np.isfinite(ap) & np.isfinite(ml)
+
+
+def _longest_s(frame: pd.DataFrame) -> float:
+    clock = clock_of(frame)
+    window = middle_of_longest(clock, _with_cop(frame), np.inf)
+    return float(clock[window][-1] - clock[window][0]) if window.stop > window.start else 0.0
+
+
+def _cop_mm(
+    frame: pd.DataFrame, name: str, shown: np.ndarray, window: slice
+) -> dict[str, np.ndarray]:
+    signals = signals_of(frame, f"cop_{name}_m")
+    return {m: _MM * np.where(shown, values, np.nan)[window] for m, values in signals.items()}
+
+
+def _vertical_force(record: ParticipantRecord) -> list[Block]:
+    trial = _throw(record)
+    if trial is None:
+        return [Paragraph("There is no validating trial with comparable forces, so the vertical "
+                          "ground force of a throw is not shown.", "note")]
+    frame = trial.reconstruction
+    assert frame is not None
+    clock, valid = clock_of(frame), flags_of(frame, "valid")
+    window = hull_of(valid, int(_ROOM_S / np.median(np.diff(clock))))
+    scale = 100.0 / record.body_weight()
+    signals = {m: np.where(valid | (m == "measured"), scale * v, np.nan)[window]
+               for m, v in signals_of(frame, "fz_N").items()}
+    figure = methods_over_time(
+        MethodsOverTime(clock[window], signals, "vertical force [% BW]"))
+    compared = {m: np.where(valid[window], v, np.nan) for m, v in signals.items()}
+    caption = (f"Vertical ground force in {trial.label}, in percent of body weight. "
+               f"{_rmse_words(compared, '% BW')} These are "
+               f"{_data_of(flags_of(frame, 'used'))}.")
+    return [Heading(f"Vertical ground force: {trial.label}"),
+            Picture(figure, caption, "Curves: vertical force over time.", "fig3_vertical_force")]
+
+
+def _throw(record: ParticipantRecord) -> TrialRecord | None:
+    """A validating trial with forces: a basketball throw, another throw, else the longest."""
+    used = record.identification_trials()
+    able = [t for t in record.trials if t.reconstruction is not None and t.role == "validation"
+            and t not in used and flags_of(t.reconstruction, "valid").sum() > 1]
+    for word in _THROWS:
+        for trial in able:
+            if word in trial.task.lower():
+                return trial
+    return max(able, key=lambda t: flags_of(t.reconstruction, "valid").sum(), default=None)
+
+
+def _rmse_words(signals: dict[str, np.ndarray], unit: str) -> str:
+    """``RMSE in what is shown: RM 3.2 mm, OM 1.1 mm.``"""
+    parts = []
+    for method in list(signals)[1:]:
+        difference = signals[method] - signals["measured"]
+        if np.isfinite(difference).any():
+            rmse = float(np.sqrt(np.nanmean(difference**2)))
+            parts.append(f"{method} {number(rmse, 2)} {unit}")
+    return f"RMSE in what is shown: {', '.join(parts)}." if parts else "No method was simulated."
+
+
+def _data_of(used: np.ndarray) -> str:
+    return _DATA["identification" if used.any() else "held_out"]
+
+
+# --- fit measures -------------------------------------------------------------------------------
+
+
+def _overview(record: ParticipantRecord) -> list[Block]:
+    fitted = [trial for trial in record.trials if trial.fit is not None]
+    rows = [_overview_row(trial, gains_of(trial.label, trial.fit)) for trial in fitted]
+    rows = [row for row in rows if row]
+    if not rows:
+        return [Paragraph("No trial could be compared with both methods.", "warning")]
+    head = ("trial", "data", *(component_label(c) for c in COMPONENTS))
+    return [
+        Paragraph("Change of the error (RMSE) when OM replaces RM, in percent: below zero OM "
+                  f"follows better (✓). Changes within {percent(SAME_WITHIN)} % count as equal."),
+        Grid(head, tuple(rows), "Change of RMSE from RM to OM [%]", words=2),
+    ]
+
+
+def _overview_row(trial: TrialRecord, gains: Sequence[Gain]) -> tuple[str | Cell, ...]:
+    if not gains:
+        return ()
+    by_name = {gain.component: gain for gain in gains}
+    marks = {"OM": "better", "RM": "warning", "": ""}
+    cells = [
+        Cell(signed(100.0 * by_name[c].change()), marks[by_name[c].better()]) if c in by_name
+        else Cell("–")
+        for c in COMPONENTS
+    ]
+    return (trial.label, "held out" if gains[0].held_out else "identification", *cells)
+
+
+def _fit_grids(record: ParticipantRecord) -> list[Block]:
+    blocks: list[Block] = []
+    for trial in record.trials:
+        if trial.fit is None or trial.fit.empty:
+            blocks.append(Paragraph(f"{trial.label}: the forces were not compared.", "note"))
+        else:
+            blocks.append(_fit_grid(trial, trial.fit))
+    blocks.append(Paragraph(
+        "r: Pearson's correlation. M, P and C: magnitude, phase and combined error after Sprague "
+        "and Geers (0 is perfect). Independent: how many independent samples the correlated frames "
+        "are worth. Moments are about the world origin.", "note"))
+    return blocks
+
+
+def _fit_grid(trial: TrialRecord, fit: pd.DataFrame) -> Grid:
+    methods = sorted(fit["method"].unique(), key=lambda m: (m not in METHODS, m != "RM", m))
+    rows = {(row["method"], row["component"]): row for _, row in fit.iterrows()}
+    lines = []
+    for component in (*COMPONENTS, *sorted(set(fit["component"]) - set(COMPONENTS))):
+        own = [rows.get((method, component)) for method in methods]
+        known = [row for row in own if row is not None]
+        if not known:
+            continue
+        cells = [cell for measure in _MEASURES for cell in _measure_cells(own, *measure[::2])]
+        lines.append((component_label(component), str(known[0]["unit"]), *cells,
+                      number(known[0]["n"], 0), number(known[-1]["n_effective"], 0)))
+    data = _DATA.get(str(fit["data"].iloc[-1]), str(fit["data"].iloc[-1]))
+    head = ("component", "unit", *methods * len(_MEASURES), "samples", "independent")
+    groups = (("", 2), *((title, len(methods)) for _, title, _ in _MEASURES), ("", 2))
+    return Grid(head, tuple(lines), f"{trial.label}: {data}", groups=groups, words=2)
+
+
+def _measure_cells(rows: Sequence[pd.Series | None], column: str, digits: int) -> list[Cell]:
+    """One cell per method; the best by more than the tolerance is marked."""
+    values = [float(row[column]) if row is not None else np.nan for row in rows]
+    badness: Callable[[float], float] = (lambda v: 1.0 - v) if column == "pearson_r" else abs
+    bad = np.array([badness(value) for value in values])
+    marks = [""] * len(values)
+    if np.isfinite(bad).sum() > 1:
+        best = int(np.nanargmin(bad))
+        second = np.nanmin(np.delete(bad, best))
+        if bad[best] < second * (1.0 - SAME_WITHIN):
+            marks[best] = "better"
+    return [Cell(number(v, digits), mark) for v, mark in zip(values, marks, strict=True)]
+
+
+# --- posturography ------------------------------------------------------------------------------
+
+
+def _posturography(record: ParticipantRecord) -> list[Block]:
+    rows = [
+        (trial.label, method_label(row["method"]), *(number(row[column], 1) for column, _ in _SWAY))
+        for trial in record.trials if trial.posturography is not None
+        for _, row in trial.posturography.iterrows()
+    ]
+    if not rows:
+        return [Paragraph("No trial has a centre of pressure to measure sway by.", "note")]
+    return [Grid(("trial", "from", *(title for _, title in _SWAY)), tuple(rows),
+                 "About the mean of each trial; a good simulation repeats the measured values",
+                 words=2)]

@@ -1,0 +1,84 @@
+"""Section 3: the motion as the model sees it, and how far its markers lie from the real ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.report.blocks import Block, Heading, Paragraph, Picture, Section
+from bsip_cli.report.figures.marker_residuals import MarkerResiduals, marker_residuals
+from bsip_cli.report.figures.residual_over_time import ResidualOverTime, residual_over_time
+from bsip_cli.report.figures.stick_strip import stick_strip
+from bsip_cli.report.records import ParticipantRecord, TrialRecord
+from bsip_cli.report.sticks import strip_of
+from bsip_cli.report.words import listing, number
+
+_INSTANTS = {"static": 2}
+_USUAL_INSTANTS = 8
+_WORST = 3
+_MM = 1000.0
+
+
+def section(record: ParticipantRecord) -> Section:
+    blocks: list[Block] = [
+        Paragraph("Grey limbs are left, black limbs right. The green arrow is the measured ground "
+                  "force at its centre of pressure, where all contacts are on plates; one body "
+                  "weight is half as long as the person is tall."),
+    ]
+    for trial in record.trials:
+        blocks += [Heading(trial.label), *_strip(record, trial), *_over_time(trial)]
+    return Section("motion", "The motion", (*blocks, Heading("Markers"), *_markers(record)))
+
+
+def _strip(record: ParticipantRecord, trial: TrialRecord) -> list[Block]:
+    if trial.kinematics is None:
+        return [Paragraph(f"The pose was not computed in {trial.label}.", "note")]
+    anterior = record.facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
+    strip = strip_of(record.body, trial.kinematics, trial.reconstruction, anterior,
+                     record.body_weight(), _INSTANTS.get(trial.role, _USUAL_INSTANTS))
+    if strip is None:
+        return [Paragraph(f"No frame of {trial.label} is determined by its markers.", "warning")]
+    forces = int(np.isfinite(strip.forces).all(axis=1).sum())
+    caption = (f"{trial.label}: the pose at {len(strip.time_s)} instants, the force at {forces} of "
+               "them.")
+    return [Picture(stick_strip(strip), caption, f"Stick figures of {trial.label}.",
+                    f"sticks_{trial.stem.split('_', 1)[-1]}")]
+
+
+def _over_time(trial: TrialRecord) -> list[Block]:
+    frame = trial.kinematics
+    if frame is None or len(frame) < 2 or not frame["marker_rms_m"].notna().any():
+        return []
+    data = ResidualOverTime(
+        frame["time_s"].to_numpy(), _MM * frame["marker_rms_m"].to_numpy(), _worst(trial, frame))
+    rms = float(np.sqrt(np.nanmean(data.rms_mm**2)))
+    caption = f"{trial.label}: distance of the markers from the model, {number(rms, 1)} mm RMS."
+    return [Picture(residual_over_time(data), caption,
+                    f"Marker residual over time in {trial.label}.")]
+
+
+def _worst(trial: TrialRecord, frame: pd.DataFrame) -> np.ndarray:
+    """(n,) residual of each frame's worst marker [mm]."""
+    if trial.residuals is None:
+        return np.full(len(frame), np.nan)
+    worst = trial.residuals.groupby("time_s")["residual_m"].max()
+    return _MM * worst.reindex(frame["time_s"]).to_numpy()
+
+
+def _markers(record: ParticipantRecord) -> list[Block]:
+    frames = [trial.residuals for trial in record.trials if trial.residuals is not None]
+    rows = pd.concat(frames) if frames else pd.DataFrame({"marker": [], "residual_m": []})
+    squares = (rows["residual_m"].astype(float) ** 2).groupby(rows["marker"]).mean().dropna()
+    if squares.empty:
+        return [Paragraph("No marker residuals are known.", "warning")]
+    rms = _MM * np.sqrt(squares)
+    overall = _MM * float(np.sqrt((rows["residual_m"] ** 2).mean()))
+    data = MarkerResiduals(tuple(rms.index.astype(str)), rms.to_numpy(), overall)
+    worst = rms.sort_values(ascending=False).head(_WORST)
+    named = listing([f"{name} ({number(value, 1)} mm)" for name, value in worst.items()])
+    return [
+        Picture(marker_residuals(data), "RMS distance of each marker from its model, all trials.",
+                "Bars: RMS residual per marker.", "marker_residuals"),
+        Paragraph(f"The farthest from the model: {named}. A single marker far above the others has "
+                  "slipped, is swapped, or sits where the model does not expect it."),
+    ]

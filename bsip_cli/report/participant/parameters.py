@@ -1,0 +1,206 @@
+"""Section 5: the inertial parameters, and how much of each the data decided."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from bsip_cli.artifacts import share_name
+from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Heading, Paragraph, Picture, Section
+from bsip_cli.report.figures.com_differences import ComDifferences, com_differences
+from bsip_cli.report.figures.segment_masses import SegmentMasses, segment_masses
+from bsip_cli.report.records import ParticipantRecord
+from bsip_cli.report.words import (
+    count,
+    listing,
+    number,
+    percent,
+    segment_label,
+    signed,
+    significant,
+    with_spread,
+)
+
+DECIDED, FROM_TABLE = 0.8, 0.2
+_COM = ("com_x_m", "com_y_m", "com_z_m")
+_MOMENTS = ("ixx_kgm2", "iyy_kgm2", "izz_kgm2")
+_MM, _KG_CM2 = 1e3, 1e4
+_WORST, _LEAST = 10, 3
+
+
+def section(record: ParticipantRecord) -> Section:
+    rm, om = record.method("RM"), record.method("OM")
+    if om.empty or rm.empty:
+        gone = "OM" if om.empty else "RM"
+        blocks: list[Block] = [Paragraph(f"There are no parameters of {gone}, so nothing can be "
+                                         "compared.", "warning")]
+    else:
+        om = om.reindex(rm.index)
+        blocks = [
+            Paragraph(_in_words(om)), _masses_picture(rm, om), _masses_grid(rm, om),
+            Heading("Centres of mass"), _com_picture(rm, om), _com_grid(rm, om),
+            Heading("Moments of inertia"), _moments_grid(rm, om),
+        ]
+    return Section("parameters", "The inertial parameters", (
+        *blocks, Heading("How well the movement excited the parameters"), *_excitation(record),
+        *_base(record)))
+
+
+# --- masses, centres, moments -------------------------------------------------------------------
+
+
+def _in_words(om: pd.DataFrame) -> str:
+    shares = om["mass_data_share"]
+    decided = [segment_label(s) for s in om.index[shares > DECIDED]]
+    table = [segment_label(s) for s in om.index[shares < FROM_TABLE]]
+    between = int(((shares >= FROM_TABLE) & (shares <= DECIDED)).sum())
+    by_data, by_table = listing(decided, "no segment"), listing(table, "no segment")
+    text = (
+        f"The data decided (data share above {percent(DECIDED)} %) the mass of {by_data}. "
+        f"The table still decides (data share under {percent(FROM_TABLE)} %) that of {by_table}. "
+    )
+    if between:
+        text += f"{count(between, 'segment lies', 'segments lie')} between. "
+    unknown = int(shares.isna().sum())
+    if unknown:
+        text += f"For {count(unknown, 'segment')} the data share is not known. "
+    return text + ("The data share is the part of the table's variance that the data removed: at 0 "
+                   "% the number is the table's, at 100 % the table has no say.")
+
+
+def _labels(frame: pd.DataFrame) -> tuple[str, ...]:
+    return tuple(segment_label(name) for name in frame.index)
+
+
+def _masses_picture(rm: pd.DataFrame, om: pd.DataFrame) -> Picture:
+    data = SegmentMasses(_labels(rm), rm["mass_kg"].to_numpy(), om["mass_kg"].to_numpy(),
+                         om["mass_kg_sd"].to_numpy(), om["mass_data_share"].to_numpy())
+    return Picture(
+        segment_masses(data), "Segment masses by table and by identification, their difference "
+        "with its 95 % interval, and how much of the mass the data decided.",
+        "Points: segment masses of RM and OM; bars: data share.", "masses")
+
+
+def _masses_grid(rm: pd.DataFrame, om: pd.DataFrame) -> Grid:
+    rows = [
+        (segment_label(name), number(rm.at[name, "mass_kg"], 3),
+         with_spread(om.at[name, "mass_kg"], om.at[name, "mass_kg_sd"], 3),
+         signed(100.0 * (om.at[name, "mass_kg"] / rm.at[name, "mass_kg"] - 1.0)),
+         _share_cell(om.at[name, "mass_data_share"]))
+        for name in rm.index
+    ]
+    total = ("whole body", number(rm["mass_kg"].sum(), 3), number(om["mass_kg"].sum(), 3),
+             signed(100.0 * (om["mass_kg"].sum() / rm["mass_kg"].sum() - 1.0)), "")
+    return Grid(("segment", "RM [kg]", "OM [kg] ± sd", "change [%]", "data share [%]"),
+                (*rows, total), "Segment masses")
+
+
+def _share_cell(share: float) -> Cell:
+    return Cell(percent(share), "warning" if share < FROM_TABLE else "")
+
+
+def _com_picture(rm: pd.DataFrame, om: pd.DataFrame) -> Picture:
+    data = ComDifferences(
+        _labels(rm), _MM * (om[list(_COM)] - rm[list(_COM)]).to_numpy(),
+        _MM * om[[f"{name}_sd" for name in _COM]].to_numpy(),
+        om[[share_name(name) for name in _COM]].to_numpy())
+    return Picture(
+        com_differences(data), "How far identification moves each centre of mass from the table's, "
+        "with 95 % intervals. Full points: the data decided more than half; empty ones: the table.",
+        "Points: difference of the centres of mass per segment and axis.", "centres_of_mass")
+
+
+def _com_grid(rm: pd.DataFrame, om: pd.DataFrame) -> Grid:
+    return _three_axes(
+        rm, om, _COM, _MM, 1, "Centre of mass in the segment's frame, from its proximal joint [mm]",
+        ("X (forward)", "Y (up)", "Z (to the right)"))
+
+
+def _moments_grid(rm: pd.DataFrame, om: pd.DataFrame) -> Grid:
+    return _three_axes(
+        rm, om, _MOMENTS, _KG_CM2, 1,
+        "Moments of inertia about the segment's centre of mass, segment axes [kg cm²]",
+        ("about X", "about Y", "about Z"))
+
+
+def _three_axes(
+    rm: pd.DataFrame, om: pd.DataFrame, columns: Sequence[str], scale: float, digits: int,
+    caption: str, axes: Sequence[str],
+) -> Grid:
+    rows = []
+    for name in rm.index:
+        cells: list[str | Cell] = [segment_label(name)]
+        for column in columns:
+            value, sd = scale * om.at[name, column], scale * om.at[name, f"{column}_sd"]
+            cells += [number(scale * rm.at[name, column], digits), with_spread(value, sd, digits),
+                      _share_cell(om.at[name, share_name(column)])]
+        rows.append(tuple(cells))
+    head = ("segment", *("RM", "OM ± sd", "data [%]") * len(columns))
+    groups = (("", 1), *((axis, 3) for axis in axes))
+    return Grid(head, tuple(rows), caption, groups=groups)
+
+
+# --- excitation, base parameters ----------------------------------------------------------------
+
+
+def _excitation(record: ParticipantRecord) -> list[Block]:
+    table = record.excitation
+    condition = table.loc[table["quantity"] == "condition_number", "value"]
+    segments = table[table["quantity"] == "segment"].sort_values("value", kind="stable")
+    text = ""
+    if len(condition):
+        text += (f"The condition number of the identification is {significant(condition.iloc[0])}: "
+                 "the larger, the more some combinations of parameters hang on noise. ")
+    if len(segments):
+        least = [segment_label(name) for name in segments["name"].head(_LEAST)]
+        text += (f"The movement excited {listing(least)} least; a sequence that swings and turns "
+                 "them faster would tell more about them.")
+    blocks: list[Block] = [Paragraph(text or "The excitation was not computed.")]
+    if len(segments):
+        rows = tuple((segment_label(row["name"]), significant(row["value"]))
+                     for _, row in segments.iterrows())
+        blocks.append(Grid(("segment", "excitation [1]"), rows, "Excitation, the least first"))
+    return [*blocks, *_identification(record.identification)]
+
+
+def _identification(table: pd.DataFrame) -> list[Block]:
+    if table.empty:
+        return []
+    rows = tuple(
+        (row["estimator"], row["method"], number(row["duration_s"]), number(row["samples"], 0),
+         number(row["effective_samples"], 0), number(row["rank"], 0),
+         *(number(row[f"rms_{c}"], 2) for c in ("fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm")))
+        for _, row in table.iterrows()
+    )
+    head = ("estimator", "method", "time used [s]", "samples", "independent", "base parameters",
+            "Fx [N]", "Fy [N]", "Fz [N]", "Mx [N m]", "My [N m]", "Mz [N m]")
+    notes = tuple(f"{row['method']} ({row['estimator']}): {row['note']}"
+                  for _, row in table.iterrows() if row["note"])
+    grid = Grid(head, rows, "What the identification used, and its residual (RMS)", words=2,
+                groups=(("", 6), ("residual", 6)))
+    return [grid, Bullets(notes)] if notes else [grid]
+
+
+def _base(record: ParticipantRecord) -> list[Block]:
+    table = record.base_parameters
+    if table.empty:
+        return [Paragraph("No base parameters were written.", "note")]
+    limit = record.option("identify", "sigma_percent_limit", 5.0)
+    good = int((table["sigma_percent"] < limit).sum())
+    worst = table.sort_values("sigma_percent", ascending=False, kind="stable").head(_WORST)
+    rows = tuple(
+        (row["name"], row["expression"], row["unit"], significant(row["rm_value"]),
+         significant(row["value"]), significant(row["sd"], 2), significant(row["sigma_percent"]))
+        for _, row in worst.iterrows()
+    )
+    return [
+        Heading("Base parameters"),
+        Paragraph(f"The ground forces determine {len(table)} combinations of the parameters. "
+                  f"{good} of them are known to better than {limit:g} %; the worst are below."),
+        Grid(
+            ("leading parameter", "combination", "unit", "RM", "identified", "sd", "sigma [%]"),
+            rows, f"The {len(rows)} base parameters with the largest sd relative to their value",
+            words=3,
+        ),
+    ]

@@ -1,0 +1,203 @@
+"""Section 1: what came out, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Heading, Paragraph, Section
+from bsip_cli.report.gains import SAME_WITHIN, Gain, MeanGain, gains_of, mean_gains
+from bsip_cli.report.records import ParticipantRecord, TrialRecord, messages
+from bsip_cli.report.words import (
+    component_label,
+    count,
+    listing,
+    number,
+    percent,
+    signed,
+    trial_label,
+)
+
+_STRONGEST = 6
+_SEXES = {"M": "a man", "F": "a woman"}
+
+
+def section(record: ParticipantRecord) -> Section:
+    blocks: list[Block] = [
+        Paragraph(_who(record)), Paragraph(_trials(record)), Paragraph(_markers(record)),
+        Heading("Do the identified parameters follow the forces better than the table's?"),
+        *_gain(record),
+        Heading("What to mind first"), *_warnings(record),
+    ]
+    return Section("summary", "Summary", tuple(blocks))
+
+
+def all_gains(record: ParticipantRecord) -> tuple[Gain, ...]:
+    """The gains of all trials of movement, trial by trial; standing still tells no method apart."""
+    return tuple(
+        gain for trial in record.trials if trial.fit is not None and trial.role != "static"
+        for gain in gains_of(trial.label, trial.fit)
+    )
+
+
+def _who(record: ParticipantRecord) -> str:
+    facts = record.facts
+    mass, plates = float(facts["mass_kg"]), float(facts["plate_mass_kg"])
+    who = (f"{record.id} is {_SEXES.get(facts['sex'], 'a person')} of {number(mass, 2)} kg "
+           f"(from {facts['mass_source']}) and {number(facts['height_m'], 2)} m.")
+    if not np.isfinite(plates):
+        return f"{who} No quiet standing on the plates was found to check the mass against."
+    if facts["mass_source"] == "plates":
+        return f"{who} No mass was stated, so the plates' reading in quiet standing is used."
+    return (f"{who} In quiet standing the plates read {number(plates, 2)} kg "
+            f"({signed(100.0 * (plates / mass - 1.0), 1)} %).")
+
+
+def _trials(record: ParticipantRecord) -> str:
+    used = record.identification_trials()
+    held_out = [t for t in record.trials if _has_held_out(t)]
+    seconds = record.identification["duration_s"].max() if len(record.identification) else np.nan
+    calibration = trial_label(str(record.facts["calibration_trial"]))
+    sentences = [
+        f"The skeleton was calibrated on {calibration}.",
+        f"The parameters were identified from {listing([t.label for t in used])}"
+        + (f" ({number(seconds, 1)} s of it used)." if np.isfinite(seconds) else "."),
+        "They were tested on data that the identification had not seen in "
+        f"{listing([t.label for t in held_out], 'no trial')}.",
+    ]
+    return " ".join(sentences)
+
+
+def _has_held_out(trial: TrialRecord) -> bool:
+    fit = trial.fit if trial.role != "static" else None
+    return fit is not None and bool((fit["data"] == "held_out").any())
+
+
+def _markers(record: ParticipantRecord) -> str:
+    sentence = ("In the frames that refined the skeleton the markers lie "
+                f"{number(1000.0 * record.facts['marker_rms_m'], 1)} mm (RMS) from the model")
+    frames = [t.kinematics for t in record.trials if t.kinematics is not None]
+    squares = [float((k["marker_rms_m"] ** 2).mean()) for k in frames if len(k)]
+    squares = [s for s in squares if np.isfinite(s)]
+    if not squares:
+        return f"{sentence}."
+    return (f"{sentence}; over all trials {number(1000.0 * np.sqrt(np.mean(squares)), 1)} mm. "
+            "Skin markers of careful recordings usually stay below 10 mm.")
+
+
+# --- gain -----------------------------------------------------------------------------------
+
+
+def _gain(record: ParticipantRecord) -> list[Block]:
+    gains = all_gains(record)
+    held_out = [gain for gain in gains if gain.held_out]
+    if not gains:
+        return [Paragraph("No trial could be compared with both methods: this report cannot say.",
+                          "warning")]
+    chosen, blocks = held_out, []
+    if not held_out:
+        chosen = list(gains)
+        blocks.append(Paragraph(
+            "No data were held out: the numbers below are from the very data that identified the "
+            "parameters, and favour OM. They do not show that OM is better.", "warning"))
+    means = mean_gains(chosen)
+    blocks += [_verdict(means, bool(held_out)), _mean_grid(means, bool(held_out))]
+    worse = [gain for gain in chosen if gain.better() == "RM"]
+    if worse:
+        blocks += [Paragraph("OM does not follow better everywhere. The table (RM) is better in:"),
+                   Bullets(tuple(_worse(gain) for gain in worse), "warning")]
+    else:
+        blocks.append(Paragraph("In no trial and component is the table (RM) better by more than "
+                                f"{percent(SAME_WITHIN)} %."))
+    return blocks
+
+
+def _verdict(means: tuple[MeanGain, ...], held_out: bool) -> Paragraph:
+    by_name = {mean.component: mean for mean in means}
+    parts = []
+    for component in ("cop_ap", "cop_ml", "grf_vertical"):
+        if component in by_name:
+            mean = by_name[component]
+            parts.append(f"{component_label(component)}: {number(mean.rm, 2)} {mean.unit} with RM, "
+                         f"{number(mean.om, 2)} {mean.unit} with OM "
+                         f"({signed(100.0 * mean.change())} %)")
+    where = "On data it had not seen" if held_out else "On the data it was fitted to"
+    better = [m for m in means if m.change() < -SAME_WITHIN]
+    text = (f"{where}, OM has the smaller mean error in {len(better)} of "
+            f"{count(len(means), 'component')}.")
+    if parts:
+        text += f" Mean error (RMSE) — {'; '.join(parts)}."
+    return Paragraph(text, "good" if held_out and len(better) > len(means) / 2 else "warning")
+
+
+def _mean_grid(means: tuple[MeanGain, ...], held_out: bool) -> Grid:
+    rows = tuple(
+        (component_label(m.component), m.unit, Cell(number(m.rm, 2), _mark(m.rm, m.om)),
+         Cell(number(m.om, 2), _mark(m.om, m.rm)), signed(100.0 * m.change()),
+         str(m.om_better), str(m.rm_better), str(m.trials))
+        for m in means
+    )
+    data = "held-out data" if held_out else "identification data"
+    return Grid(
+        ("component", "unit", "RM", "OM", "change [%]", "OM better", "RM better", "all"),
+        rows, f"Mean RMSE over the trials, {data}; ✓ marks the smaller error",
+        groups=(("", 2), ("mean RMSE", 3), ("number of trials", 3)), words=2,
+    )
+
+
+def _mark(own: float, other: float) -> str:
+    return "better" if own < other * (1.0 - SAME_WITHIN) else ""
+
+
+def _worse(gain: Gain) -> str:
+    return (f"{gain.trial}, {component_label(gain.component)}: {number(gain.rm, 2)} {gain.unit} "
+            f"with RM, {number(gain.om, 2)} {gain.unit} with OM "
+            f"({signed(100.0 * gain.change())} %)")
+
+
+# --- warnings -------------------------------------------------------------------------------
+
+
+def _warnings(record: ParticipantRecord) -> list[Block]:
+    strongest = [*_refusals(record), *_undecided(record), *_quality(record, "excluded"),
+                 *_messages(record), *_quality(record, "warning")]
+    strongest = list(dict.fromkeys(strongest))
+    if not strongest:
+        return [Paragraph("Nothing was refused, excluded or warned of.")]
+    blocks: list[Block] = [Bullets(tuple(strongest[:_STRONGEST]), "warning")]
+    if len(strongest) > _STRONGEST:
+        more = count(len(strongest) - _STRONGEST, "more warning")
+        blocks.append(Paragraph(f"{more} in sections 2 and 7.", "note"))
+    return blocks
+
+
+def _refusals(record: ParticipantRecord) -> list[str]:
+    return [f"{refusal.unit or record.id}, {refusal.stage} refused: {refusal.sentence}"
+            for refusal in record.refusals]
+
+
+def _undecided(record: ParticipantRecord) -> list[str]:
+    om = record.method("OM")
+    if om.empty:
+        return ["There are no identified parameters (OM): every statement rests on the table."]
+    shares = om["mass_data_share"]
+    weighted = float((shares * om["mass_kg"]).sum() / om["mass_kg"].sum())
+    if shares.isna().all() or weighted > 0.5:
+        return []
+    return [f"Weighted by mass, the data decided only {percent(weighted)} % of the segment masses; "
+            "the rest comes from the table (section 5)."]
+
+
+def _quality(record: ParticipantRecord, level: str) -> list[str]:
+    """One sentence per finding, with all trials it was found in."""
+    found: dict[str, list[str]] = {}
+    for trial in record.trials:
+        rows = trial.quality[trial.quality["level"] == level] if trial.quality is not None else None
+        for _, row in rows.iterrows() if rows is not None else ():
+            sentence = f"{row['check']} {row['subject']}: {row['found']} ({row['action']})"
+            found.setdefault(sentence, []).append(trial.label)
+    return [f"{sentence}, in {listing(list(dict.fromkeys(trials)))}"
+            for sentence, trials in found.items()]
+
+
+def _messages(record: ParticipantRecord) -> list[str]:
+    return [text for _, _, text in messages(record.origins)]

@@ -1,0 +1,130 @@
+"""All that is known of one participant, as the reports read it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.body.person import Person
+from bsip_cli.report.words import trial_label
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where one artifact comes from: its unit (trial label, or empty), stage and provenance."""
+
+    unit: str
+    stage: str
+    bsip_version: str
+    libraries: dict[str, str]
+    options: dict
+    inputs: dict[str, str]
+    messages: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """What a stage would not do."""
+
+    unit: str
+    stage: str
+    sentence: str
+
+
+@dataclass(frozen=True)
+class TrialRecord:
+    """One trial; a table is None where a stage did not make it."""
+
+    stem: str
+    task: str
+    role: str
+    quality: pd.DataFrame | None
+    contacts: pd.DataFrame | None
+    kinematics: pd.DataFrame | None
+    residuals: pd.DataFrame | None
+    reconstruction: pd.DataFrame | None
+    fit: pd.DataFrame | None
+    posturography: pd.DataFrame | None
+
+    @property
+    def label(self) -> str:
+        return trial_label(self.stem)
+
+
+@dataclass(frozen=True)
+class ParticipantRecord:
+    """One participant; ``facts`` is the single row of the ``person`` artifact."""
+
+    id: str
+    facts: pd.Series
+    skeleton: pd.DataFrame
+    marker_positions: pd.DataFrame
+    bsip: pd.DataFrame
+    base_parameters: pd.DataFrame
+    excitation: pd.DataFrame
+    identification: pd.DataFrame
+    body: Person
+    trials: tuple[TrialRecord, ...]
+    refusals: tuple[Refusal, ...]
+    origins: tuple[Origin, ...]
+
+    def mass_kg(self) -> float:
+        return float(self.facts["mass_kg"])
+
+    def body_weight(self) -> float:
+        return self.mass_kg() * 9.80665
+
+    def method(self, method: str) -> pd.DataFrame:
+        """Rows of ``bsip`` of one method, in the skeleton's order of segments."""
+        rows = self.bsip[self.bsip["method"] == method].set_index("segment")
+        return rows.reindex([s for s in self.body.skeleton.segments if s in rows.index])
+
+    def identification_trials(self) -> tuple[TrialRecord, ...]:
+        """Trials whose samples identified the parameters."""
+        named = " ".join(self.identification["trials"].astype(str))
+        return tuple(trial for trial in self.trials if trial.stem in named)
+
+    def option(self, section: str, name: str, otherwise: float) -> float:
+        """An option that a stage was run with."""
+        for origin in self.origins:
+            if name in origin.options.get(section, {}):
+                return float(origin.options[section][name])
+        return otherwise
+
+
+def messages(origins: Iterable[Origin]) -> tuple[tuple[str, str, str], ...]:
+    """(stage, unit, message), each once, in the order of the origins."""
+    return tuple(dict.fromkeys(
+        (origin.stage, origin.unit, text) for origin in origins for text in origin.messages
+    ))
+
+
+def signals_of(reconstruction: pd.DataFrame, column: str) -> dict[str, np.ndarray]:
+    """Label of the method -> values over time; ``measured`` first, all on its clock."""
+    methods = sorted(reconstruction["method"].unique(), key=_rank)
+    clock = clock_of(reconstruction)
+    rows = {name: reconstruction[reconstruction["method"] == name] for name in methods}
+    return {
+        name: frame.drop_duplicates("time_s").set_index("time_s")[column].reindex(clock).to_numpy()
+        for name, frame in rows.items()
+    }
+
+
+def clock_of(reconstruction: pd.DataFrame) -> np.ndarray:
+    """Times [s] of the measured rows."""
+    times = reconstruction.loc[reconstruction["method"] == "measured", "time_s"]
+    return times.drop_duplicates().to_numpy()
+
+
+def flags_of(reconstruction: pd.DataFrame, column: str) -> np.ndarray:
+    """A flag of the measured rows over time."""
+    measured = reconstruction[reconstruction["method"] == "measured"]
+    return measured.drop_duplicates("time_s")[column].to_numpy(dtype=bool)
+
+
+def _rank(method: str) -> tuple[int, str]:
+    order = {"measured": 0, "RM": 1, "OM": 2}
+    return order.get(method, len(order)), method

@@ -1,0 +1,144 @@
+"""Poses of the model as lines to draw, with the measured ground force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.body.person import Person
+from bsip_cli.motion.inverse_kinematics import tree_of
+from bsip_cli.report.figures.stick_strip import StickStrip
+from bsip_cli.report.records import clock_of, flags_of, signals_of
+
+_FORCES = ("fx_N", "fy_N", "fz_N")
+_HEAD_RADIUS_M = 0.1
+_ON_GROUND_PERCENTILE = 2.0
+
+
+@dataclass(frozen=True)
+class _Skeleton:
+    """Bones as pairs of points, each a segment with a position (in joint axes of that segment)."""
+
+    starts: np.ndarray
+    start_m: np.ndarray
+    ends: np.ndarray
+    end_m: np.ndarray
+    sides: tuple[str, ...]
+
+
+def strip_of(
+    body: Person, kinematics: pd.DataFrame, reconstruction: pd.DataFrame | None,
+    anterior: np.ndarray, body_weight_N: float, instants: int,
+) -> StickStrip | None:
+    """The poses of a trial at evenly spread instants; None where no frame is determined.
+
+    Parameters
+    ----------
+    anterior : (2,) the person's forward direction in the world.
+    """
+    rows = _choose(kinematics, reconstruction, instants)
+    if rows.empty:
+        return None
+    q = rows[[f"q_{name}" for name in body.skeleton.q_names]].to_numpy()
+    R, p = tree_of(body).forward(q)
+    axes = _person_axes(anterior)
+    lines = _bones(body)
+    start = _points(R, p, lines.starts, lines.start_m) @ axes.T
+    end = _points(R, p, lines.ends, lines.end_m) @ axes.T
+    head = body.skeleton.index("head") if "head" in body.skeleton.segments else 0
+    centre = _centre_of_markers(body, head, np.array([0.0, 0.15, 0.0]))
+    low = np.minimum(start[..., 2], end[..., 2]).min(axis=1)
+    times = rows["time_s"].to_numpy()
+    ground = float(np.percentile(low, _ON_GROUND_PERCENTILE))
+    force, point = _forces(reconstruction, times, axes, ground)
+    return StickStrip(
+        time_s=times, bones_m=np.stack([start, end], axis=2), sides=lines.sides,
+        head_m=(p[:, head] + R[:, head] @ centre) @ axes.T, head_radius_m=_HEAD_RADIUS_M,
+        force_m=point, forces=force, ground_m=ground, body_weight=body_weight_N,
+    )
+
+
+def _choose(
+    kinematics: pd.DataFrame, reconstruction: pd.DataFrame | None, instants: int
+) -> pd.DataFrame:
+    """Rows at evenly spread determined frames, within the compared span if there is one."""
+    rows = kinematics[kinematics["determined"].astype(bool)]
+    if reconstruction is not None:
+        compared = clock_of(reconstruction)[flags_of(reconstruction, "valid")]
+        if len(compared):
+            inside = rows["time_s"].between(compared[0], compared[-1])
+            rows = rows[inside] if inside.any() else rows
+    return rows.iloc[np.unique(np.linspace(0, len(rows) - 1, instants).astype(int))] if len(
+        rows) else rows
+
+
+def _person_axes(anterior: np.ndarray) -> np.ndarray:
+    """(3, 3) rows: forward, to the right, up."""
+    x, y = anterior / np.linalg.norm(anterior)
+    return np.array([[x, y, 0.0], [y, -x, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _points(R: np.ndarray, p: np.ndarray, segments: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """(n, b, 3) world positions of points fixed to segments."""
+    return p[:, segments] + np.einsum("nbij,bj->nbi", R[:, segments], local)
+
+
+def _bones(body: Person) -> _Skeleton:
+    """From each joint to the next one; the last segments of a limb end at their markers."""
+    skeleton, joints = body.skeleton, body.joint_positions_m()
+    bones: list[tuple[int, np.ndarray, np.ndarray]] = []
+    for i, name in enumerate(skeleton.segments):
+        children = [k for k, parent in enumerate(skeleton.parents) if parent == i]
+        origin = body.origin_in_joint_m[i]
+        bones += [(i, np.zeros(3), origin)] if origin.any() else []
+        bones += [(i, origin, joints[k]) for k in children if not np.allclose(joints[k], origin)]
+        if not children and name != "head":
+            bones += [(i, np.zeros(3), tip) for tip in _tips(body, i)]
+    segments = np.array([i for i, _, _ in bones])
+    return _Skeleton(
+        segments, np.array([a for _, a, _ in bones]), segments, np.array([b for _, _, b in bones]),
+        tuple(_side(body, i, tip) for i, _, tip in bones),
+    )
+
+
+def _side(body: Person, segment: int, tip: np.ndarray) -> str:
+    side = body.skeleton.side(body.skeleton.segments[segment])
+    if side or abs(tip[2]) < 0.02:  # on the trunk, what leads sideways leads to a limb
+        return side
+    return "r" if tip[2] > 0.0 else "l"
+
+
+def _tips(body: Person, segment: int) -> list[np.ndarray]:
+    """Where a limb ends: its farthest marker, for a foot the hindmost too."""
+    own = body.markers_in_joint_m()[body.marker_segments == segment]
+    if len(own) == 0:
+        return [np.array([0.0, -body.lengths_m[segment], 0.0])]
+    tips = [own[np.argmax(np.linalg.norm(own, axis=1))]]
+    if body.skeleton.segments[segment].startswith("foot"):
+        tips = [own[np.argmax(own[:, 0])], own[np.argmin(own[:, 0])]]
+    return tips
+
+
+def _centre_of_markers(body: Person, segment: int, otherwise: np.ndarray) -> np.ndarray:
+    own = body.markers_in_joint_m()[body.marker_segments == segment]
+    return own.mean(axis=0) if len(own) else otherwise
+
+
+def _forces(
+    reconstruction: pd.DataFrame | None, times: np.ndarray, axes: np.ndarray, ground_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) measured force and its point in person axes; NaN where it is not whole."""
+    force, point = np.full((len(times), 3), np.nan), np.full((len(times), 3), np.nan)
+    if reconstruction is None or len(clock_of(reconstruction)) == 0:
+        return force, point
+    clock = clock_of(reconstruction)
+    nearest = np.clip(np.searchsorted(clock, times - 1e-9), 0, len(clock) - 1)
+    seen = (np.abs(clock[nearest] - times) < 0.02) & flags_of(reconstruction, "valid")[nearest]
+    columns = [signals_of(reconstruction, name)["measured"] for name in _FORCES]
+    world = np.stack([column[nearest] for column in columns], axis=1)
+    ap, ml = (signals_of(reconstruction, f"cop_{name}_m")["measured"] for name in ("ap", "ml"))
+    force[seen] = (world @ axes.T)[seen]
+    point[seen] = np.stack([ap[nearest], ml[nearest], np.full(len(times), ground_m)], axis=1)[seen]
+    return force, point

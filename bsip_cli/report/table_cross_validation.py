@@ -1,0 +1,70 @@
+"""Table 4: errors of the centre of pressure and of the vertical force, movement by movement."""
+
+from __future__ import annotations
+
+from bsip_cli.report import table_labels as labels
+from bsip_cli.report import table_notes as notes
+from bsip_cli.report import table_paired as paired
+from bsip_cli.report.table_model import Column, Row, Table
+from bsip_cli.report.table_results import Results
+from bsip_cli.statistics.cohort import Criteria
+from bsip_cli.statistics.cohort_values import Topic
+
+NAME = "table4_cross_validation"
+
+_QUANTITIES = {
+    "cop_error": "COP error",
+    "grf_vertical": "Vertical GRF",
+    "cop_ap": "COP error AP",
+    "cop_ml": "COP error ML",
+}
+"""Groups of rows; the first two as in print."""
+
+
+def build(results: Results, criteria: Criteria) -> Table:
+    order = list(_QUANTITIES)
+    topics = sorted(
+        results.topics, key=lambda t: (order.index(t.variable), t.role == "sequence", t.task)
+    )
+    tests = [results.find(topic, "paired_t") for topic in topics]
+    named = {topic: f"{_QUANTITIES[topic.variable]}, {topic.task}" for topic in topics}
+    return Table(
+        NAME,
+        "Table 4. Errors of the simulated centre of pressure (COP) and vertical ground force (GRF)"
+        f" by movement: mean (standard deviation) of {notes.participants(tests)}.",
+        (
+            Column(("quantity",)),
+            Column(("task",)),
+            Column(("role",)),
+            Column(("label",), "Movement", text=True),
+            paired.participants(),
+            *paired.means(),
+            *paired.t_test(criteria),
+            *paired.added_tests(),
+            *paired.smaller_error(),
+            Column(("reason",)),
+        ),
+        tuple(_row(results, topic, criteria) for topic in topics),
+        tuple(filter(None, (
+            notes.star_legend(criteria.alpha),
+            "COP error: root mean square of the distance in the plane, sqrt(AP² + ML²); several "
+            "runs of a movement are averaged for each participant first.",
+            "As published: means and standard deviations. Added: everything else (paired t test of "
+            "OM - RM, Cohen's d = (RM - OM) / pooled SD, Wilcoxon's test, d_z = mean / SD of the "
+            "differences, in how many participants OM or RM has the smaller error). The same count "
+            "for the six components stands in table 5.",
+            notes.normality_legend(criteria.alpha),
+            notes.holm_legend(tests, criteria.alpha),
+            *notes.not_possible(results, named),
+        ))),
+    )
+
+
+def _row(results: Results, topic: Topic, criteria: Criteria) -> Row:
+    values = {
+        "quantity": topic.variable, "task": topic.task, "role": topic.role,
+        "label": labels.task(topic), **paired.values(results, topic),
+    }
+    marks = {paired.P: notes.star(results.find(topic, "paired_t"), criteria.alpha)}
+    group = f"{_QUANTITIES[topic.variable]} [{labels.unit(topic.unit)}]"
+    return Row(values, topic.unit, group, marks)

@@ -1,0 +1,104 @@
+"""The papers' five tables, from the cohort's results to text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+
+from bsip_cli.errors import UsageError
+from bsip_cli.report import (
+    table_cop_rmse,
+    table_cross_validation,
+    table_notes,
+    table_posturography,
+    table_segment_mass,
+    table_six_components,
+)
+from bsip_cli.report.table_csv import to_csv
+from bsip_cli.report.table_latex import to_latex
+from bsip_cli.report.table_markdown import to_markdown
+from bsip_cli.report.table_model import Table
+from bsip_cli.report.table_results import Results
+from bsip_cli.statistics.cohort import Criteria
+from bsip_cli.statistics.cohort_comparison import Comparison
+from bsip_cli.statistics.cohort_values import Value
+
+BUILDERS: dict[str, Callable[[Results, Criteria], Table]] = {
+    "table1": table_segment_mass.build,
+    "table2": table_cop_rmse.build,
+    "table3": table_posturography.build,
+    "table4": table_cross_validation.build,
+    "table5": table_six_components.build,
+}
+NAMES = tuple(
+    module.NAME
+    for module in (table_segment_mass, table_cop_rmse, table_posturography, table_cross_validation,
+                   table_six_components)
+)
+RENDERERS: dict[str, Callable[[Table], str]] = {
+    "csv": to_csv, "md": to_markdown, "tex": to_latex,
+}
+
+
+def build_tables(
+    values: pd.DataFrame,
+    comparisons: pd.DataFrame,
+    criteria: Criteria,
+    missing: Sequence[Mapping] = (),
+) -> tuple[Table, ...]:
+    """The five tables as data.
+
+    Parameters
+    ----------
+    values, comparisons : the artifacts of ``stats``.
+    criteria : the options with which they were computed.
+    missing : who is not in which tables: ``sentence`` and ``tables`` (as in `BUILDERS`).
+    """
+    rows = [Comparison.from_row(row) for row in comparisons.to_dict("records")]
+    tidy = [Value(**row) for row in values.to_dict("records")]
+    tables = []
+    for tag, build in BUILDERS.items():
+        table = build(Results(row for row in rows if row.topic.table == tag), criteria)
+        absent = [str(gone["sentence"]) for gone in missing if tag in gone["tables"]]
+        more = (
+            *table_notes.identified_on(value for value in tidy if value.table == tag),
+            table_notes.missing(absent),
+        )
+        tables.append(replace(table, notes=(*table.notes, *filter(None, more))))
+    return tuple(tables)
+
+
+def render_markdown(
+    values: pd.DataFrame,
+    comparisons: pd.DataFrame,
+    criteria: Criteria,
+    missing: Sequence[Mapping] = (),
+) -> dict[str, str]:
+    """The five tables as Markdown, by the stem of their file; parameters as `build_tables`."""
+    tables = build_tables(values, comparisons, criteria, missing)
+    return {table.name: to_markdown(table) for table in tables}
+
+
+def folder(out: Path) -> Path:
+    """Where the written tables lie."""
+    return out / "group" / "tables"
+
+
+def show(out: Path) -> str:
+    """The written Markdown tables of an output folder, one after the other.
+
+    Raises
+    ------
+    UsageError
+        None has been written there.
+    """
+    paths = [folder(out) / f"{name}.md" for name in NAMES]
+    texts = [path.read_text(encoding="utf-8") for path in paths if path.exists()]
+    if not texts:
+        raise UsageError(
+            "there are no tables", file=folder(out), remedy="run `bsip tables` or `bsip run` first"
+        )
+    return "\n\n".join(texts)

@@ -1,0 +1,93 @@
+"""Numbers, names and lists as people read them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+MISSING = "–"
+METHODS = {"measured": "measured", "RM": "RM (table)", "OM": "OM (identified)"}
+COMPONENTS = {
+    "cop_ap": "COP, anterior-posterior",
+    "cop_ml": "COP, medio-lateral",
+    "grf_vertical": "vertical ground force",
+    "fx": "force, lab X",
+    "fy": "force, lab Y",
+    "fz": "force, lab Z (up)",
+    "mx": "moment, lab X",
+    "my": "moment, lab Y",
+    "mz": "moment, lab Z (up)",
+}
+ROLES = {
+    "static": "calibrates the skeleton",
+    "sequence": "identifies the parameters",
+    "validation": "validates",
+}
+_STEM = re.compile(r"sub-[A-Za-z0-9]+_task-(?P<task>[A-Za-z0-9]+)(_run-(?P<run>[0-9]+))?")
+
+
+def number(value: float | None, digits: int = 1) -> str:
+    """A number with fixed decimals and a true minus; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return MISSING
+    text = f"{value:.{digits}f}"
+    return text.lstrip("-") if float(text) == 0 else text.replace("-", "−")
+
+
+def significant(value: float | None, digits: int = 3) -> str:
+    """A number with so many significant digits, in powers of ten where it is large or small."""
+    if value is None or not math.isfinite(value):
+        return MISSING
+    return f"{value:.{digits}g}".replace("-", "−")
+
+
+def with_spread(value: float, sd: float, digits: int = 1) -> str:
+    """``value ± sd``; the value alone where no spread is known."""
+    spread = number(sd, digits)
+    return number(value, digits) if spread == MISSING else f"{number(value, digits)} ± {spread}"
+
+
+def percent(share: float | None, digits: int = 0) -> str:
+    """A share of 0..1 in percent."""
+    return MISSING if share is None else number(100.0 * share, digits)
+
+
+def signed(value: float, digits: int = 0) -> str:
+    """A number that always shows its sign."""
+    text = number(value, digits)
+    return f"+{text}" if text != MISSING and value > 0 and float(f"{value:.{digits}f}") else text
+
+
+def listing(items: Sequence[str], empty: str = "none") -> str:
+    """``a, b and c``."""
+    if not items:
+        return empty
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def count(n: int, singular: str, plural: str = "") -> str:
+    """``1 trial``, ``2 trials``."""
+    return f"{n} {singular if n == 1 else plural or singular + 's'}"
+
+
+def trial_label(stem: str) -> str:
+    """``sequence, run 1`` for sub-01_task-sequence_run-1."""
+    match = _STEM.fullmatch(stem)
+    if match is None:
+        return stem
+    return f"{match['task']}, run {match['run']}" if match["run"] else match["task"]
+
+
+def segment_label(segment: str) -> str:
+    """``left upper arm`` for upper_arm_l."""
+    side = {"_l": "left ", "_r": "right "}.get(segment[-2:], "")
+    return (side + (segment[:-2] if side else segment)).replace("_", " ")
+
+
+def component_label(component: str) -> str:
+    return COMPONENTS.get(component, component)
+
+
+def method_label(method: str) -> str:
+    return METHODS.get(method, method)

@@ -1,0 +1,109 @@
+"""Skin markers of a trial: soft-tissue motion, noise, gaps."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from bsip_cli.simulate.kinematics import Poses
+from bsip_cli.simulate.landmarks import Marker
+from bsip_cli.simulate.options import Richness
+from bsip_cli.simulate.people import Person
+from bsip_cli.simulate.rotations import rotate, transpose, unskew
+
+LAG_SMOOTHING_S = 0.02
+DRIFT_SMOOTHING_S = 0.3
+GAP_FRAMES = (5, 40)
+GAPS_PER_TRIAL = 2.0
+GAPS_PER_SECOND = 0.12
+LONGEST_GAP_SHARE = 0.15  # of a trial
+# The bones whose turning against a marker's bone moves the skin over it.
+NEIGHBOURS = {
+    "lower_torso": ("thigh_l", "thigh_r"),
+    "thorax": ("lower_torso", "head"),
+    "head": ("thorax", "thorax"),
+    "upper_arm": ("thorax", "forearm"),
+    "forearm": ("upper_arm", "hand"),
+    "hand": ("forearm", "forearm"),
+    "thigh": ("lower_torso", "shank"),
+    "shank": ("thigh", "foot"),
+    "foot": ("shank", "shank"),
+}
+
+
+def rigid_paths(person: Person, poses: Poses) -> dict[str, np.ndarray]:
+    """(T, 3) path of every marker if it were fixed to its bone."""
+    return {
+        label: poses.point(marker.body, marker.position_m)
+        for label, marker in person.markers.items()
+    }
+
+
+def marker_paths(
+    person: Person, poses: Poses, rate_hz: float, richness: Richness, rng: np.random.Generator
+) -> dict[str, np.ndarray]:
+    """(T, 3) measured path of every marker; NaN where it is lost. Poses at the marker rate."""
+    paths = rigid_paths(person, poses)
+    for label, path in paths.items():
+        marker = person.markers[label]
+        if richness.soft_tissue:
+            path = path + _skin_travel(label, marker, poses) + _lag(marker, path, rate_hz)
+        paths[label] = path + _noise(len(path), rate_hz, richness, rng)
+    return _with_gaps(paths, rate_hz, rng) if richness.gaps else paths
+
+
+def _skin_travel(label: str, marker: Marker, poses: Poses) -> np.ndarray:
+    """(T, 3) travel of a marker over its bone, a smooth function of the nearby joints."""
+    own = poses.rotation[marker.body]
+    turns = [
+        unskew(transpose(own) @ poses.rotation[body]) for body in _neighbours(label, marker.body)
+    ]
+    travel = np.concatenate(turns, axis=1) @ marker.skin_gain_m.T
+    return rotate(own, travel)
+
+
+def _neighbours(label: str, body: str) -> tuple[str, str]:
+    side = body[-2:] if body.endswith(("_l", "_r")) else ""
+    first, second = NEIGHBOURS[body.removesuffix(side)]
+    if label in ("RAC", "LAC", "RSCAP"):
+        second = f"upper_arm_{label[0].lower()}"
+    sided = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
+    return tuple(name + side if name in sided else name for name in (first, second))
+
+
+def _lag(marker: Marker, path: np.ndarray, rate_hz: float) -> np.ndarray:
+    """(T, 3) the soft tissue stays behind when the bone accelerates."""
+    if len(path) < 5:
+        return np.zeros_like(path)
+    acceleration = np.gradient(np.gradient(path, 1.0 / rate_hz, axis=0), 1.0 / rate_hz, axis=0)
+    smooth = gaussian_filter1d(acceleration, LAG_SMOOTHING_S * rate_hz, axis=0, mode="nearest")
+    return -marker.lag_s2 * smooth
+
+
+def _noise(
+    frames: int, rate_hz: float, richness: Richness, rng: np.random.Generator
+) -> np.ndarray:
+    white = richness.marker_noise_m * rng.standard_normal((frames, 3))
+    slow = gaussian_filter1d(
+        rng.standard_normal((frames, 3)), DRIFT_SMOOTHING_S * rate_hz, axis=0, mode="reflect"
+    )
+    # a Gaussian filter of width s leaves 1 / sqrt(2 s sqrt(pi)) of white noise's deviation
+    gain = np.sqrt(2.0 * DRIFT_SMOOTHING_S * rate_hz * np.sqrt(np.pi))
+    return white + richness.marker_drift_m * gain * slow
+
+
+def _with_gaps(
+    paths: dict[str, np.ndarray], rate_hz: float, rng: np.random.Generator
+) -> dict[str, np.ndarray]:
+    """Lose a few markers for a short while each."""
+    labels = sorted(paths)
+    frames = len(paths[labels[0]])
+    longest = min(GAP_FRAMES[1], int(LONGEST_GAP_SHARE * frames))
+    if longest <= GAP_FRAMES[0]:
+        return paths
+    count = rng.poisson(GAPS_PER_TRIAL + GAPS_PER_SECOND * frames / rate_hz)
+    for label in rng.choice(labels, size=min(count, len(labels)), replace=False):
+        length = int(rng.integers(GAP_FRAMES[0], longest + 1))
+        start = int(rng.integers(0, frames - length))
+        paths[label][start : start + length] = np.nan
+    return paths

@@ -1,0 +1,241 @@
+"""Write a trial as a motion-capture lab would: a C3D file with markers and force plates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bsip_cli.simulate.markers import marker_paths
+from bsip_cli.simulate.options import Laboratory, Rates, Richness
+from bsip_cli.simulate.people import SIDES, Person
+from bsip_cli.simulate.plan import STEP_S
+from bsip_cli.simulate.trial import Trial
+
+SIMULATION_HZ = round(1.0 / STEP_S)
+MM = 1000.0
+PLATE_GAP_M = 0.005
+CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+FULL_SCALE = np.array([2500.0, 2500.0, 5000.0, 1.5e6, 1.5e6, 0.8e6])  # N and N mm
+ADC_STEPS = 2**15
+
+
+@dataclass(frozen=True)
+class Pose:
+    """From the walkway frame to the lab (Z up): lab = rotation @ walkway + offset_m."""
+
+    rotation: np.ndarray
+    offset_m: np.ndarray
+
+    def points(self, points_m: np.ndarray) -> np.ndarray:
+        """(..., 3) points in the lab."""
+        return points_m @ self.rotation.T + self.offset_m
+
+    def vectors(self, vectors: np.ndarray) -> np.ndarray:
+        """(..., 3) directions in the lab."""
+        return vectors @ self.rotation.T
+
+    def wrench(self, force: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Force and moment (T, 3) in the lab, the moment about the lab's origin."""
+        turned = self.vectors(force)
+        return turned, self.vectors(moment) + np.cross(self.offset_m, turned)
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A force plate in the lab. axes : (3, 3) columns x ahead, y to the right, z down."""
+
+    axes: np.ndarray
+    centre_m: np.ndarray
+    size_m: tuple[float, float]
+    depth_m: float
+
+    def corners_m(self) -> np.ndarray:
+        """(4, 3) in the order of the C3D format: +x+y, -x+y, -x-y, +x-y."""
+        signs = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
+        half = 0.5 * np.array([*self.size_m, 0.0])
+        return self.centre_m + (signs * half) @ self.axes.T
+
+    def holds(self, point_m: np.ndarray) -> bool:
+        """Whether a lab point lies on the plate."""
+        local = self.axes.T @ (point_m - self.centre_m)
+        return bool(np.all(np.abs(local[:2]) <= 0.5 * np.array(self.size_m)))
+
+    def origin_m(self) -> np.ndarray:
+        """(3,) as in FORCE_PLATFORM:ORIGIN: from the transducers to the surface, z negative."""
+        return np.array([0.0, 0.0, -self.depth_m])
+
+    def channels(self, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
+        """(T, 6) N and N mm for a ground wrench on the body about the lab's origin."""
+        local_force = force @ self.axes
+        at_centre = (moment - np.cross(self.centre_m, force)) @ self.axes
+        at_transducers = at_centre + np.cross(self.origin_m(), local_force)
+        return np.hstack([local_force, MM * at_transducers])
+
+
+def walkway_pose(trial: Trial, laboratory: Laboratory, heading_error_rad: float) -> Pose:
+    """Where the walkway lies so that the plan's plate centre meets the lab's first plate."""
+    heading = np.deg2rad(laboratory.facing_deg) + heading_error_rad
+    rotation = _walkway_axes(heading)
+    ahead, aside = trial.plan.plate_centre_m
+    centre = np.array([*laboratory.plate_centre_m, 0.0])
+    return Pose(rotation, centre - rotation @ np.array([ahead, 0.0, aside]))
+
+
+def _walkway_axes(heading_rad: float) -> np.ndarray:
+    """(3, 3) lab directions of the walkway's ahead, up and right."""
+    c, s = np.cos(heading_rad), np.sin(heading_rad)
+    return np.array([[c, 0.0, s], [s, 0.0, -c], [0.0, 1.0, 0.0]])
+
+
+def plates_of(laboratory: Laboratory) -> list[Plate]:
+    """The lab's plates, one behind the other in the walking direction."""
+    ahead, up, right = _walkway_axes(np.deg2rad(laboratory.facing_deg)).T
+    axes = np.stack([ahead, right, -up], axis=1)
+    first = np.array([*laboratory.plate_centre_m, 0.0])
+    pitch = laboratory.plate_size_m[0] + PLATE_GAP_M
+    return [
+        Plate(axes, first + k * pitch * ahead, laboratory.plate_size_m, laboratory.plate_depth_m)
+        for k in range(laboratory.plates)
+    ]
+
+
+def plate_wrenches(
+    trial: Trial, plates: list[Plate], pose: Pose
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Lab wrench (T, 3), (T, 3) on each plate; contacts on the floor are on none."""
+    wrenches = [(np.zeros_like(trial.force_n), np.zeros_like(trial.force_n)) for _ in plates]
+    for contact in trial.contacts:
+        index = _plate_of(contact.on_plate, contact.cop_m, plates, pose)
+        if index is None:
+            continue
+        window = slice(
+            round(contact.start_s * SIMULATION_HZ), round(contact.end_s * SIMULATION_HZ) + 1
+        )
+        force, moment = pose.wrench(
+            trial.feet_force_n[contact.side][window], trial.feet_moment_nm[contact.side][window]
+        )
+        wrenches[index][0][window] += force
+        wrenches[index][1][window] += moment
+    return wrenches
+
+
+def _plate_of(
+    on_first: bool, cop_m: tuple[float, float], plates: list[Plate], pose: Pose
+) -> int | None:
+    if on_first:
+        return 0
+    place = pose.points(np.array([cop_m[0], 0.0, cop_m[1]]))
+    for index, plate in enumerate(plates[1:], start=1):
+        if plate.holds(place):
+            return index
+    return None
+
+
+def analog_channels(
+    wrench: tuple[np.ndarray, np.ndarray],
+    plate: Plate,
+    rate_hz: int,
+    richness: Richness,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """(N, 6) sampled, noisy and quantised channels of one plate."""
+    channels = plate.channels(*wrench)[:: SIMULATION_HZ // rate_hz]
+    noise = np.repeat([richness.force_noise_n, MM * richness.moment_noise_nm], 3)
+    channels = channels + noise * rng.standard_normal(channels.shape)
+    if not richness.quantised:
+        return channels
+    steps = FULL_SCALE / ADC_STEPS
+    return np.clip(np.round(channels / steps), -ADC_STEPS, ADC_STEPS - 1) * steps
+
+
+def write_trial(
+    path: Path,
+    trial: Trial,
+    person: Person,
+    rates: Rates,
+    laboratory: Laboratory,
+    richness: Richness,
+    rng: np.random.Generator,
+    heading_error_rad: float = 0.0,
+    subject: str = "sub-01",
+) -> Pose:
+    """Write one C3D file; returns where the walkway lies in the lab."""
+    pose = walkway_pose(trial, laboratory, heading_error_rad)
+    plates = plates_of(laboratory)
+    frames = len(trial.time_s) * rates.marker_hz // SIMULATION_HZ
+    sampled = trial.poses.part(slice(0, None, SIMULATION_HZ // rates.marker_hz))
+    paths = marker_paths(person, sampled, rates.marker_hz, richness, rng)
+    points = np.stack([pose.points(path[:frames]) for path in paths.values()], axis=1)
+    ratio = rates.analog_hz // rates.marker_hz
+    analogs = [
+        analog_channels(wrench, plate, rates.analog_hz, richness, rng)[: frames * ratio]
+        for wrench, plate in zip(plate_wrenches(trial, plates, pose), plates, strict=True)
+    ]
+    _write_c3d(path, list(paths), points, np.hstack(analogs), plates, rates, subject)
+    return pose
+
+
+def _write_c3d(
+    path: Path,
+    labels: list[str],
+    points_m: np.ndarray,
+    analogs: np.ndarray,
+    plates: list[Plate],
+    rates: Rates,
+    subject: str,
+) -> None:
+    """points_m : (frames, markers, 3), NaN where lost. analogs : (samples, channels)."""
+    import ezc3d
+
+    c3d = ezc3d.c3d()
+    names = [f"{name}{k + 1}" for k in range(len(plates)) for name in CHANNELS]
+    parameters = c3d["parameters"]
+    parameters["POINT"]["RATE"]["value"] = [float(rates.marker_hz)]
+    parameters["POINT"]["LABELS"]["value"] = labels
+    parameters["POINT"]["DESCRIPTIONS"]["value"] = labels
+    parameters["POINT"]["UNITS"]["value"] = ["mm"]
+    parameters["ANALOG"]["RATE"]["value"] = [float(rates.analog_hz)]
+    parameters["ANALOG"]["LABELS"]["value"] = names
+    parameters["ANALOG"]["DESCRIPTIONS"]["value"] = [f"Force plate {n[-1]}" for n in names]
+    parameters["ANALOG"]["UNITS"]["value"] = [u for _ in plates for u in ["N"] * 3 + ["Nmm"] * 3]
+    _add_plates(c3d, plates)
+    c3d.add_parameter("SUBJECTS", "NAMES", [subject])
+    c3d.add_parameter("SUBJECTS", "USES_PREFIXES", [0])
+    c3d.add_parameter("MANUFACTURER", "COMPANY", ["simulation"])
+    c3d.add_parameter("MANUFACTURER", "SOFTWARE", ["bsip simulate"])
+
+    lost = np.isnan(points_m).any(axis=2)
+    homogeneous = np.ones((4, len(labels), len(points_m)))
+    homogeneous[:3] = MM * points_m.transpose(2, 1, 0)
+    c3d["data"]["points"] = homogeneous
+    residuals = np.where(lost.T, -1.0, 0.0)[None]
+    c3d["data"]["meta_points"]["residuals"] = residuals
+    c3d["data"]["meta_points"]["camera_masks"] = np.zeros((7, *lost.T.shape), dtype=bool)
+    c3d["data"]["analogs"] = analogs.T[None]
+    c3d.write(str(path))
+
+
+def _add_plates(c3d: object, plates: list[Plate]) -> None:
+    """The FORCE_PLATFORM group; integers are set by hand because ezc3d writes floats."""
+    n = len(plates)
+    c3d.add_parameter("FORCE_PLATFORM", "UNITS", ["N"])
+    group = {
+        "USED": np.array([n]),
+        "TYPE": np.full(n, 2),
+        "ZERO": np.array([1, 0]),
+        "CHANNEL": np.arange(1, 6 * n + 1).reshape(n, 6).T,
+        "CORNERS": np.stack([MM * plate.corners_m().T for plate in plates], axis=-1),
+        "ORIGIN": np.stack([MM * plate.origin_m() for plate in plates], axis=-1),
+    }
+    parameters = c3d["parameters"]["FORCE_PLATFORM"]
+    for name, value in group.items():
+        if name not in parameters:
+            c3d.add_parameter("FORCE_PLATFORM", name, [0.0])
+        parameters[name]["value"] = value
+
+
+def feet_in_the_lab(trial: Trial, pose: Pose) -> dict[str, np.ndarray]:
+    """(T, 3) ankle paths in the lab, for checks."""
+    return {side: pose.points(trial.poses.origin_m[f"foot_{side}"]) for side in SIDES}

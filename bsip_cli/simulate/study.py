@@ -1,0 +1,132 @@
+"""Write a whole study folder with a known truth beside it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from bsip_cli.errors import UsageError
+from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
+from bsip_cli.simulate.options import ALL_TASKS, Rates, StudyOptions
+from bsip_cli.simulate.people import Person, draw_person
+from bsip_cli.simulate.recording import SIMULATION_HZ, write_trial
+from bsip_cli.simulate.trial import simulate_trial
+from bsip_cli.simulate.truth import ParticipantTruth, StudyTruth, person_record, trial_record
+
+MARKER_SET = "hansen2017"
+HEADING_SPREAD_RAD = np.deg2rad(2.0)
+SCALE_SPREAD_KG = 0.1
+# Which stream of random numbers serves what, so that no draw depends on another's count.
+PERSON, MOVEMENT, RECORDING, LABORATORY = range(4)
+
+
+def simulate_study(folder: Path, options: StudyOptions) -> StudyTruth:
+    """Write participants.tsv, study.toml, the recordings and truth/ into the folder."""
+    folder = Path(folder)
+    check_options(options)
+    (folder / "truth").mkdir(parents=True, exist_ok=True)
+    truths = [
+        simulate_participant(folder, options, number)
+        for number in range(1, options.participants + 1)
+    ]
+    _write_text(folder / "participants.tsv", _participants_table(options, truths))
+    _write_text(folder / "study.toml", f'marker_set = "{MARKER_SET}"\n')
+    return StudyTruth(tuple(truths))
+
+
+def check_options(options: StudyOptions) -> None:
+    """Refuse options that no study can have."""
+    unknown = [task for task in options.tasks if task not in MOVEMENTS]
+    if unknown:
+        raise UsageError(f"unknown tasks {unknown}", expected=", ".join(ALL_TASKS))
+    if options.participants < 1:
+        raise UsageError("no participants", expected="at least one")
+    for task in options.tasks:
+        _check_rates(options.rates_of(task))
+
+
+def _check_rates(rates: Rates) -> None:
+    whole = SIMULATION_HZ % rates.marker_hz == 0 and SIMULATION_HZ % rates.analog_hz == 0
+    if not whole or rates.analog_hz % rates.marker_hz:
+        raise UsageError(
+            f"marker rate {rates.marker_hz} Hz with analog rate {rates.analog_hz} Hz",
+            expected="divisors of 1000 Hz, the analog rate a multiple of the marker rate",
+        )
+
+
+def generator(options: StudyOptions, number: int, use: int, task: str = "") -> np.random.Generator:
+    """The random numbers of one participant, use and task."""
+    return np.random.default_rng(seed_of(options, number, use, task))
+
+
+def seed_of(options: StudyOptions, number: int, use: int, task: str = "") -> list[int]:
+    """The seed sequence behind `generator`."""
+    return [options.seed, number, use, ALL_TASKS.index(task) if task else len(ALL_TASKS)]
+
+
+def participant_person(options: StudyOptions, number: int) -> Person:
+    """The person behind a participant number (1, 2, ...)."""
+    sexes = options.sexes or "MF"
+    sex = sexes[(number - 1) % len(sexes)]
+    return draw_person(generator(options, number, PERSON), options.richness, sex)
+
+
+def simulate_participant(folder: Path, options: StudyOptions, number: int) -> ParticipantTruth:
+    """Write all recordings and the truth of one participant."""
+    name = f"sub-{number:02d}"
+    person = participant_person(options, number)
+    lab = generator(options, number, LABORATORY)
+    heading_error = HEADING_SPREAD_RAD * lab.standard_normal()
+    ball_mass = float(lab.uniform(*options.ball_mass_kg))
+    (folder / name).mkdir(parents=True, exist_ok=True)
+    trials = {}
+    for task in options.tasks:
+        stem = f"{name}_task-{task}" + ("" if task == "static" else "_run-1")
+        trial = simulate_trial(
+            person,
+            task,
+            generator(options, number, MOVEMENT, task),
+            options.durations_s.get(task, DEFAULT_DURATION_S[task]),
+            ball_mass,
+        )
+        pose = write_trial(
+            folder / name / f"{stem}.c3d",
+            trial,
+            person,
+            options.rates_of(task),
+            options.laboratory,
+            options.richness,
+            generator(options, number, RECORDING, task),
+            heading_error,
+            name,
+        )
+        trials[stem] = trial_record(trial, pose, seed_of(options, number, MOVEMENT, task))
+    truth = ParticipantTruth(name, person, trials)
+    record = {
+        "participant_id": name,
+        "options": asdict(options),
+        "person": person_record(person),
+        "trials": trials,
+    }
+    _write_text(folder / "truth" / f"{name}_truth.json", json.dumps(record, indent=1) + "\n")
+    return truth
+
+
+def _participants_table(options: StudyOptions, truths: list[ParticipantTruth]) -> str:
+    """As a lab would note it: mass from a scale, height from a wall."""
+    lines = ["participant_id\tsex\tmass_kg\theight_m"]
+    for number, truth in enumerate(truths, start=1):
+        scale = generator(options, number, LABORATORY, "static")
+        mass = truth.person.mass_kg + SCALE_SPREAD_KG * scale.standard_normal()
+        height = truth.person.stature_m
+        lines.append(f"{truth.participant}\t{truth.person.sex}\t{mass:.1f}\t{height:.2f}")
+    return "\n".join(lines) + "\n"
+
+
+def _write_text(path: Path, text: str) -> None:
+    partial = path.with_name(path.name + ".part")
+    partial.write_text(text, encoding="utf-8")
+    partial.replace(path)

@@ -1,0 +1,74 @@
+"""Report (cohort): one HTML page with the papers' tables and the gain per participant.
+
+Reads values, comparisons, person, identification, tables-files. Writes group-report-files.
+"""
+
+from __future__ import annotations
+
+from bsip_cli.artifacts import SCHEMAS
+from bsip_cli.report.cohort.document import cohort_document
+from bsip_cli.report.cohort.record import CohortRecord, Member
+from bsip_cli.report.page import render
+from bsip_cli.report.records import Origin
+from bsip_cli.report.tables import build_tables
+from bsip_cli.report.words import listing
+from bsip_cli.stages.report import files_frame, origin_of, refusals_of, write_figures, write_text
+from bsip_cli.statistics.cohort import Criteria
+from bsip_cli.study import Participant
+from bsip_cli.unit import Unit
+
+
+def run(unit: Unit) -> None:
+    document = cohort_document(record_of(unit))
+    folder = unit.out / "group"
+    files = [write_text(folder / "report.html", render(document)),
+             *write_figures(folder / "figures", document)]
+    unit.write("group-report-files", files_frame(unit.out, files))
+
+
+# --- reading ------------------------------------------------------------------------------------
+
+
+def record_of(unit: Unit) -> CohortRecord:
+    """Everything that is there of the whole study."""
+    values, comparisons = unit.read("values"), unit.read("comparisons")
+    missing = unit.facts("values").get("missing", [])
+    options = unit.config.stats
+    criteria = Criteria(options.alpha, options.equivalence_percent)
+    return CohortRecord(
+        members=tuple(_member(unit, participant) for participant in unit.study.participants),
+        values=values,
+        tables=build_tables(values, comparisons, criteria, missing),
+        table_files=tuple(unit.read("tables-files")["file"]),
+        missing=tuple(_missing_sentence(gone) for gone in missing),
+        origins=_origins(unit),
+    )
+
+
+def _missing_sentence(gone: dict) -> str:
+    numbers = [tag.removeprefix("table") for tag in gone["tables"]]
+    return f"{gone['sentence']}: not in table{'s' if len(numbers) > 1 else ''} {listing(numbers)}"
+
+
+def _member(unit: Unit, participant: Participant) -> Member:
+    tables = {
+        kind: unit.read(kind, participant=participant)
+        if unit.path(kind, participant=participant).exists() else None
+        for kind in ("person", "identification")
+    }
+    facts = tables["person"]
+    return Member(
+        participant.id, facts.iloc[0] if facts is not None else None, tables["identification"],
+        (unit.out / participant.id / "report.html").exists(), refusals_of(unit, participant),
+    )
+
+
+def _origins(unit: Unit) -> tuple[Origin, ...]:
+    origins = []
+    for kind in unit.stage.reads:
+        if SCHEMAS[kind].level == "cohort":
+            origins.append(origin_of(unit.path(kind), ""))
+        else:
+            paths = {p.id: unit.path(kind, participant=p) for p in unit.study.participants}
+            origins += [origin_of(path, name) for name, path in paths.items() if path.exists()]
+    return tuple(origins)

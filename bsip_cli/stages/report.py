@@ -1,0 +1,132 @@
+"""Report (participant): one HTML page with its figures, and the main figures as files.
+
+Reads quality, contacts, skeleton, marker-positions, person, kinematics, marker-residuals, bsip,
+base-parameters, excitation, identification, reconstruction, fit, posturography. Writes
+report-files.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from bsip_cli.artifacts import SCHEMAS, read_artifact, read_header, write_atomically
+from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.provenance import file_hash
+from bsip_cli.report.blocks import Document
+from bsip_cli.report.figures.canvas import to_png
+from bsip_cli.report.page import render
+from bsip_cli.report.participant.document import participant_document
+from bsip_cli.report.records import Origin, ParticipantRecord, Refusal, TrialRecord
+from bsip_cli.report.words import trial_label
+from bsip_cli.stages.frames import person_from
+from bsip_cli.study import Participant, Trial
+from bsip_cli.unit import Unit
+
+_TABLES = {  # field of a trial's record: kind of artifact
+    "quality": "quality", "contacts": "contacts", "kinematics": "kinematics",
+    "residuals": "marker-residuals", "reconstruction": "reconstruction", "fit": "fit",
+    "posturography": "posturography",
+}
+
+
+def run(unit: Unit) -> None:
+    assert unit.participant is not None
+    document = participant_document(record_of(unit))
+    folder = unit.out / unit.participant.id
+    files = [write_text(folder / "report.html", render(document)),
+             *write_figures(folder / "figures", document)]
+    unit.write("report-files", files_frame(unit.out, files))
+
+
+def write_text(path: Path, text: str) -> Path:
+    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    return path
+
+
+def write_figures(folder: Path, document: Document) -> list[Path]:
+    """The named figures of a document as SVG and PNG."""
+    files = []
+    for picture in document.pictures():
+        if picture.name:
+            files += [_write_bytes(folder / f"{picture.name}.svg", picture.svg),
+                      _write_bytes(folder / f"{picture.name}.png", to_png(picture.figure))]
+    return files
+
+
+def _write_bytes(path: Path, content: bytes) -> Path:
+    write_atomically(path, lambda temporary: temporary.write_bytes(content))
+    return path
+
+
+def files_frame(out: Path, files: list[Path]) -> pd.DataFrame:
+    """Rows of ``report-files`` and ``group-report-files``."""
+    rows = [{"file": file.relative_to(out).as_posix(), "sha256": file_hash(file)} for file in files]
+    return pd.DataFrame(rows, columns=["file", "sha256"])
+
+
+# --- reading ------------------------------------------------------------------------------------
+
+
+def record_of(unit: Unit) -> ParticipantRecord:
+    """Everything that is there of the unit's participant."""
+    assert unit.participant is not None
+    skeleton, markers = unit.read("skeleton"), unit.read("marker-positions")
+    usable = {kind: set(unit.trials(kind)) for kind in _TABLES.values()}
+    return ParticipantRecord(
+        id=unit.participant.id,
+        facts=unit.read("person").iloc[0],
+        skeleton=skeleton,
+        marker_positions=markers,
+        bsip=unit.read("bsip"),
+        base_parameters=unit.read("base-parameters"),
+        excitation=unit.read("excitation"),
+        identification=unit.read("identification"),
+        body=person_from(skeleton, markers, load_skeleton(unit.config.skeleton)),
+        trials=tuple(_trial_record(unit, trial, usable) for trial in unit.participant.trials),
+        refusals=refusals_of(unit, unit.participant),
+        origins=_origins(unit, usable),
+    )
+
+
+def _trial_record(unit: Unit, trial: Trial, usable: dict[str, set[Trial]]) -> TrialRecord:
+    tables = {
+        name: unit.read(kind, trial) if trial in usable[kind] else None
+        for name, kind in _TABLES.items()
+    }
+    return TrialRecord(trial.stem, trial.task, trial.role, **tables)
+
+
+def refusals_of(unit: Unit, participant: Participant) -> tuple[Refusal, ...]:
+    """What earlier stages refused of a participant and the trials."""
+    found = []
+    for path in sorted((unit.out / participant.id).glob("*_refusal-*.parquet")):
+        owner = path.name.split("_refusal-")[0]
+        label = "" if owner == participant.id else trial_label(owner)
+        found += [Refusal(label, row["stage"], row["sentence"])
+                  for _, row in read_artifact(path, "refusal").iterrows()
+                  if row["stage"] != unit.stage.name]
+    return tuple(found)
+
+
+def _origins(unit: Unit, usable: dict[str, set[Trial]]) -> tuple[Origin, ...]:
+    assert unit.participant is not None
+    origins = []
+    for kind in unit.stage.reads:
+        if SCHEMAS[kind].level == "participant":
+            origins.append(origin_of(unit.path(kind), ""))
+        else:
+            origins += [origin_of(unit.path(kind, trial), trial_label(trial.stem))
+                        for trial in unit.participant.trials if trial in usable[kind]]
+    return tuple(origins)
+
+
+def origin_of(path: Path, label: str) -> Origin:
+    """Provenance of one artifact."""
+    provenance = read_header(path)["provenance"]
+    made_by = provenance["made_by"]
+    return Origin(
+        label, made_by["stage"], made_by["bsip_version"], made_by["libraries"], made_by["options"],
+        made_by["inputs"], tuple(provenance["messages"]),
+    )

@@ -1,0 +1,153 @@
+"""Valid windows on constructed steps: on and off plates, chair, flight, belt, no outline."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.recordings.contacts import PlateLoad, contact_windows
+from bsip_cli.recordings.force_balance import GRAVITY
+
+RATE_HZ = 100.0
+N = 300
+MASS_KG = 70.0
+WEIGHT_N = MASS_KG * GRAVITY
+CORNERS = np.array([[0.0, 0.5, 0], [0.5, 0.5, 0], [0.5, 0, 0], [0, 0, 0.0]])
+HEIGHT0 = np.array([0.04, 0.03])
+
+
+def _foot(x: np.ndarray | float, lift: np.ndarray | float = 0.0) -> np.ndarray:
+    """Heel and toe at x, (n, 2, 3)."""
+    foot = np.zeros((N, 2, 3))
+    foot[..., 0] = np.broadcast_to(np.asarray(x, float), (N,))[:, None]
+    foot[..., 1] = [0.15, 0.35]
+    foot[..., 2] = HEIGHT0 + np.broadcast_to(np.asarray(lift, float), (N,))[:, None]
+    return foot
+
+
+def _trunk(height: np.ndarray | float = 1.0) -> np.ndarray:
+    trunk = np.zeros((N, 3, 3))
+    trunk[..., 2] = np.broadcast_to(np.asarray(height, float), (N,))[:, None]
+    return trunk
+
+
+def _plate(force_N: np.ndarray | float, corners=CORNERS, x: float = 0.25) -> PlateLoad:
+    force = np.broadcast_to(np.asarray(force_N, float), (N,)).copy()
+    cop = np.where(force[:, None] > 20, [[x, 0.25]], np.nan)
+    return PlateLoad("1", corners, force, cop, np.ones(N, bool))
+
+
+def _windows(left, right, plates, trunk=None, height0=HEIGHT0):
+    return contact_windows(
+        {"l": left, "r": right},
+        {"l": height0, "r": height0},
+        RATE_HZ,
+        plates,
+        _trunk() if trunk is None else trunk,
+        MASS_KG,
+    )
+
+
+def test_standing_on_the_plate_is_valid():
+    for height0 in (HEIGHT0, None):
+        result = _windows(_foot(0.1), _foot(0.4), [_plate(WEIGHT_N)], height0=height0)
+        assert result.valid.all() and not result.reasons
+        assert result.on_plate["l"].all() and result.on_ground["r"].all()
+    assert result.windows(RATE_HZ) == [(0.0, 3.0)]
+
+
+def test_a_foot_beside_the_plate_is_not():
+    lift = np.where(np.arange(N) < 100, 0.0, 0.2)  # right foot stands beside, then lifts
+    force = np.where(np.arange(N) < 100, 0.8 * WEIGHT_N, WEIGHT_N)
+    result = _windows(_foot(0.1), _foot(0.8, lift), [_plate(force)])
+    assert not result.valid[:95].any() and result.valid[105:].all()
+    assert any("right foot" in finding.subject for finding in result.reasons)
+    assert result.on_ground["r"][:95].all() and not result.on_plate["r"].any()
+
+
+def test_outline_has_a_tolerance():
+    assert _windows(_foot(0.1), _foot(0.52), [_plate(WEIGHT_N)]).valid.all()
+    assert not _windows(_foot(0.1), _foot(0.54), [_plate(WEIGHT_N)]).valid.any()
+
+
+def test_a_foot_across_two_plates_is_measured():
+    second = PlateLoad(
+        "2", CORNERS + np.array([0, 0.5, 0]), np.zeros(N), np.full((N, 2), np.nan), np.ones(N, bool)
+    )
+    across = _foot(0.1)
+    across[..., 1] = [0.45, 0.6]
+    assert _windows(across, _foot(0.4), [_plate(WEIGHT_N), second]).valid.all()
+    assert not _windows(across, _foot(0.4), [_plate(WEIGHT_N)]).valid.any()
+
+
+def test_a_chair_is_named():
+    seated = np.arange(N) < 120
+    force = np.where(seated, 0.2 * WEIGHT_N, WEIGHT_N)
+    result = _windows(_foot(0.1), _foot(0.4), [_plate(force)])
+    assert not result.valid[:115].any() and result.valid[135:].all()
+    assert any("seat" in finding.found for finding in result.reasons)
+
+
+def test_flight_is_valid():
+    t = np.arange(N) / RATE_HZ
+    flying = (t > 1.0) & (t < 1.4)
+    since = np.clip(t - 1.0, 0, 0.4)
+    height = 1.0 + 0.2 * GRAVITY * since - GRAVITY * since**2 / 2
+    force = np.where(flying, 0.0, WEIGHT_N)
+    push = (np.abs(t - 0.9) < 0.1) | (np.abs(t - 1.5) < 0.1)
+    height[push & (t < 1)] += 0.0
+    result = _windows(
+        _foot(0.1, np.where(flying, 0.2, 0)),
+        _foot(0.4, np.where(flying, 0.2, 0)),
+        [_plate(force + push * 0.98 * WEIGHT_N)],
+        _trunk(_pushed(t, force + push * 0.98 * WEIGHT_N)),
+    )
+    assert result.valid[105:135].all()
+    assert not result.on_ground["l"][105:135].any()
+
+
+def _pushed(t: np.ndarray, force_N: np.ndarray) -> np.ndarray:
+    """Height of a mass under this force."""
+    speed = np.cumsum(force_N / MASS_KG - GRAVITY) / RATE_HZ
+    return 1.0 + np.cumsum(speed) / RATE_HZ
+
+
+def test_a_box_before_a_landing_is_no_flight():
+    force = np.where(np.arange(N) < 120, 0.0, WEIGHT_N)
+    lift = np.where(np.arange(N) < 120, 0.3, 0.0)
+    result = _windows(_foot(0.1, lift), _foot(0.4, lift), [_plate(force)])
+    assert not result.valid[:110].any()
+
+
+def test_a_belt_moves_the_foot():
+    x = 0.05 + 0.4 * (np.arange(N) % 20) / 20  # 2 m/s
+    result = _windows(_foot(x), _foot(0.4, 0.2), [_plate(WEIGHT_N)])
+    assert result.on_plate["l"].mean() > 0.9
+
+
+def test_without_outline_the_load_must_be_near():
+    near = _windows(_foot(0.1), _foot(0.4), [_plate(WEIGHT_N, corners=None)])
+    assert near.valid.all()
+    far = _windows(_foot(0.1), _foot(1.4), [_plate(WEIGHT_N, corners=None)])
+    assert not far.valid.any()
+
+
+def test_unusable_samples_and_unseen_feet_are_left_out():
+    plate = _plate(WEIGHT_N)
+    plate.usable[50:60] = False
+    left = _foot(0.1)
+    left[100:120] = np.nan
+    result = _windows(left, _foot(0.4), [plate])
+    expected = np.ones(N, bool)
+    expected[50:60] = expected[100:120] = False
+    np.testing.assert_array_equal(result.valid, expected)
+    assert len(result.reasons) == 2
+
+
+def test_windows_shorter_than_a_tenth_of_a_second_are_dropped():
+    plate = _plate(WEIGHT_N)
+    plate.usable[50:60] = plate.usable[65:80] = False
+    assert not _windows(_foot(0.1), _foot(0.4), [plate]).valid[50:80].any()
+
+
+def test_no_plates_no_windows():
+    assert not _windows(_foot(0.1), _foot(0.4), []).valid.any()

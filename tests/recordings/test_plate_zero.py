@@ -1,0 +1,45 @@
+"""A plate's zero from its unloaded stretches."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.recordings.model import Plate
+from bsip_cli.recordings.zero import plate_zero, subtract_zero
+
+RATE_HZ = 1000.0
+OFFSET = np.array([3.0, -2.0, 12.0, 0.5, -0.4, 0.1])
+
+
+def _plate(load_N: np.ndarray) -> Plate:
+    noise = np.random.default_rng(2).normal(0, 1.0, (len(load_N), 6))
+    wrench = OFFSET + noise
+    wrench[:, 2] += load_N
+    return Plate("1", wrench[:, :3], wrench[:, 3:], None, np.ones(len(load_N), bool))
+
+
+def test_offset_is_found_and_subtracted():
+    load = np.zeros(4000)
+    load[1000:3000] = 700 * np.sin(np.linspace(0, np.pi, 2000))
+    plate = _plate(load)
+    zero = plate_zero(plate, RATE_HZ)
+    assert 1500 < zero.n_samples < 2100 and len(zero.stretches_s) == 2
+    np.testing.assert_allclose(zero.offset, OFFSET, atol=0.3)
+    corrected, finding = subtract_zero(plate, zero)
+    assert finding.level == "corrected"
+    assert abs(np.median(corrected.force_N[:900, 2])) < 0.3
+
+
+def test_a_plate_that_is_never_unloaded_keeps_its_zero():
+    plate = _plate(np.full(3000, 350.0))
+    zero = plate_zero(plate, RATE_HZ)
+    assert not zero.is_known()
+    same, finding = subtract_zero(plate, zero)
+    assert same is plate and finding.level == "info"
+
+
+def test_samples_with_a_foot_on_the_plate_do_not_count():
+    plate = _plate(np.zeros(3000))
+    foot = np.zeros(3000, bool)
+    foot[:2000] = True
+    assert plate_zero(plate, RATE_HZ, may_be_loaded=foot).n_samples == 1000

@@ -1,0 +1,240 @@
+"""A known wrench and known markers come back from C3D files of all kinds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from recording_writers import (
+    CORNERS_M,
+    ORIGIN_M,
+    Y_UP_FROM_Z_UP,
+    PlateSpec,
+    standing_markers,
+    standing_wrench,
+    write_c3d,
+)
+
+from bsip_cli.errors import BadDataError
+from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.plates import PlateDescription
+from bsip_cli.recordings.read import read_recording
+
+N = 60
+RATIO = 10
+
+
+def _spec(**options) -> PlateSpec:
+    force, moment = standing_wrench(N * RATIO)
+    return PlateSpec(force, moment, **options)
+
+
+def _write(path, spec, **options):
+    markers, labels = standing_markers(N)
+    return write_c3d(path, markers, labels, [spec], **options)
+
+
+def _check_wrench(recording: Recording, atol_N: float = 0.01) -> None:
+    force, moment = standing_wrench(N * RATIO)
+    assert len(recording.plates) == 1, recording.findings
+    np.testing.assert_allclose(recording.plates[0].force_N, force, atol=atol_N)
+    np.testing.assert_allclose(recording.plates[0].moment_Nm, moment, atol=atol_N)
+    assert recording.plates[0].usable.all()
+    assert recording.forces_note == ""
+
+
+def _levels(recording: Recording, check: str) -> list[str]:
+    return [f.level for f in recording.findings if f.check == check]
+
+
+def test_writer_winds_the_corners_as_the_format_wants():
+    plate = PlateDescription("1", 2, CORNERS_M, ORIGIN_M)
+    np.testing.assert_allclose(plate.rotation_lab_plate()[:, 2], [0, 0, -1])
+
+
+@pytest.mark.parametrize("kind", [1, 2, 3, 4])
+def test_known_wrench_comes_back(tmp_path, kind):
+    origin = np.array([0.12, 0.2, -0.05]) if kind == 3 else ORIGIN_M
+    recording = read_recording(_write(tmp_path / "a.c3d", _spec(kind=kind, origin_m=origin)))
+    _check_wrench(recording)
+    assert not recording.findings
+    assert recording.analog_rate_hz == 1000.0
+
+
+@pytest.mark.parametrize(
+    ("unit", "force_unit", "moment_unit"),
+    [
+        ("mm", "N", "Nmm"),
+        ("mm", "N", "Nm"),
+        ("m", "N", "Nm"),
+        ("m", "N", "N.mm"),
+        ("mete", "Newtons", "Newton-meters"),
+        ("mm", "nt", "ntmm"),
+        ("mm", "V", "V"),
+    ],
+)
+def test_units(tmp_path, unit, force_unit, moment_unit):
+    stated = "Nmm" if moment_unit == "V" else moment_unit
+    path = _write(tmp_path / "a.c3d", _spec(), unit=unit, force_unit=force_unit, moment_unit=stated)
+    recording = read_recording(path)
+    _check_wrench(recording)
+    markers, _ = standing_markers(N)
+    np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)
+    assert bool(_levels(recording, "unit")) == (unit == "mete")
+
+
+def test_moments_in_nmm_labelled_nm_are_seen(tmp_path):
+    spec = _spec()
+    path = _write(tmp_path / "a.c3d", _ScaledMoments(spec, 1000.0), moment_unit="Nm")
+    recording = read_recording(path)
+    _check_wrench(recording, atol_N=0.1)
+    assert _levels(recording, "plate_cop") == ["corrected"]
+
+
+class _ScaledMoments(PlateSpec):
+    """A plate that writes its moments too large."""
+
+    def __init__(self, spec: PlateSpec, factor: float) -> None:
+        super().__init__(**vars(spec))
+        self.factor = factor
+
+    def channels(self) -> np.ndarray:
+        return super().channels() * np.repeat([1.0, self.factor], 3)[:, None]
+
+
+@pytest.mark.parametrize("kind", [2, 3, 4])
+def test_flipped_sign_is_corrected_and_said(tmp_path, kind):
+    origin = np.array([0.12, 0.2, -0.05]) if kind == 3 else ORIGIN_M
+    spec = _spec(kind=kind, origin_m=origin, sign=-1.0)
+    recording = read_recording(_write(tmp_path / "a.c3d", spec))
+    _check_wrench(recording)
+    assert _levels(recording, "plate_sign") == ["corrected"]
+
+
+@pytest.mark.parametrize("kind", [2, 3])
+def test_origin_of_either_sign_gives_the_same_wrench(tmp_path, kind):
+    origin = np.array([0.12, 0.2, -0.05]) if kind == 3 else ORIGIN_M
+    stated = origin * [1, 1, -1] if kind == 3 else -origin
+    spec = _spec(kind=kind, origin_m=origin, stated_origin_m=stated)
+    _check_wrench(read_recording(_write(tmp_path / "a.c3d", spec)))
+
+
+def test_y_up_laboratory_is_turned(tmp_path):
+    markers, labels = standing_markers(N)
+    force, moment = standing_wrench(N * RATIO)
+    turn = Y_UP_FROM_Z_UP.T
+    spec = PlateSpec(force @ turn, moment @ turn, corners_m=CORNERS_M @ turn)
+    recording = read_recording(write_c3d(tmp_path / "a.c3d", markers @ turn, labels, [spec]))
+    assert _levels(recording, "up_axis") == ["corrected"]
+    rotation = recording.rotation_world_lab
+    np.testing.assert_allclose(rotation @ Y_UP_FROM_Z_UP, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)
+    _check_wrench(recording)
+
+
+def test_x_up_without_plates_from_the_labels(tmp_path):
+    markers, labels = standing_markers(N)
+    recording = read_recording(write_c3d(tmp_path / "a.c3d", markers[..., [2, 0, 1]], labels))
+    assert np.linalg.det(recording.rotation_world_lab) == pytest.approx(1.0)
+    np.testing.assert_allclose(recording.markers_m[..., 2], markers[..., 2], atol=1e-6)
+    assert recording.plates == () and "no usable force plates" in recording.forces_note
+
+
+def test_missing_points_are_nan(tmp_path):
+    markers, labels = standing_markers(N)
+    markers[10:20, 3] = np.nan
+    markers[30, 2] = 0.0
+    recording = read_recording(write_c3d(tmp_path / "a.c3d", markers, labels))
+    expected = np.zeros((N, len(labels)), bool)
+    expected[10:20, 3] = expected[30, 2] = True
+    np.testing.assert_array_equal(np.isnan(recording.markers_m).all(axis=-1), expected)
+
+
+def test_nan_at_the_end_of_the_analog_samples(tmp_path):
+    spec = _spec()
+    spec.force_N[-17:, 1] = np.nan
+    plate = read_recording(_write(tmp_path / "a.c3d", spec)).plates[0]
+    np.testing.assert_array_equal(
+        np.flatnonzero(~plate.usable), np.arange(N * RATIO - 17, N * RATIO)
+    )
+
+
+def test_clipped_and_stuck_samples(tmp_path):
+    force, moment = standing_wrench(N * RATIO)
+    force[:, 2] = np.minimum(force[:, 2] * np.linspace(0.2, 3.0, N * RATIO), 1500.0)
+    recording = read_recording(_write(tmp_path / "a.c3d", PlateSpec(force, moment)))
+    np.testing.assert_array_equal(recording.plates[0].usable, force[:, 2] < 1500.0)
+    assert _levels(recording, "analog_clipped") == ["warning"]
+
+
+def test_model_outputs_and_unlabelled_points_are_dropped(tmp_path):
+    markers, labels = standing_markers(N)
+    extra = [
+        "LHipAngles",
+        "LKneeMoment",
+        "*41",
+        "PELO",
+        "PELA",
+        "PELL",
+        "PELP",
+        "RGroundReactionForce",
+    ]
+    path = write_c3d(
+        tmp_path / "a.c3d",
+        np.concatenate([markers, 1.0 + np.zeros((N, len(extra), 3))], axis=1),
+        labels + extra,
+        point_parameters={"ANGLES": ["LHipAngles"]},
+    )
+    assert read_recording(path).labels == tuple(labels)
+
+
+def test_duplicate_labels_are_resolved_by_descriptions(tmp_path):
+    markers, labels = standing_markers(N)
+    labels[0] = labels[1] = "LFOO"
+    descriptions = ["heel", "toe", *["other"] * (len(labels) - 2)]
+    described = write_c3d(
+        tmp_path / "a.c3d", markers, labels, point_parameters={"DESCRIPTIONS": descriptions}
+    )
+    assert read_recording(described).labels[:2] == ("heel", "toe")
+    plain = write_c3d(tmp_path / "b.c3d", markers, labels)
+    assert _levels(read_recording(plain), "labels") == ["warning"]
+
+
+def test_plate_that_claims_missing_channels(tmp_path):
+    recording = read_recording(_write(tmp_path / "a.c3d", _spec(), channel_shift=3))
+    assert recording.plates == ()
+    assert recording.forces_note
+    assert _levels(recording, "plate") == ["excluded"]
+
+
+def test_nonsense_corners_drop_the_plate(tmp_path):
+    spec = _spec(corners_m=np.array([[0, 0, 0], [1e9, 0, 0], [1e9, 1, 0], [0, 1, 0.0]]))
+    recording = read_recording(_write(tmp_path / "a.c3d", spec))
+    assert recording.plates == () and _levels(recording, "plate") == ["excluded"]
+
+
+def test_plates_never_loaded(tmp_path):
+    force, moment = standing_wrench(N * RATIO)
+    recording = read_recording(_write(tmp_path / "a.c3d", PlateSpec(0.01 * force, 0.01 * moment)))
+    assert recording.plates == () and "never loaded" in recording.forces_note
+
+
+@pytest.mark.parametrize("content", [b"", b"no c3d at all", b"\x02P" + 510 * b"\xff"])
+def test_foreign_files_are_refused(tmp_path, content):
+    path = tmp_path / "a.c3d"
+    path.write_bytes(content)
+    with pytest.raises(BadDataError):
+        read_recording(path)
+
+
+def test_truncated_file_is_refused(tmp_path):
+    path = _write(tmp_path / "a.c3d", _spec())
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(BadDataError, match="promises"):
+        read_recording(path)
+
+
+def test_missing_file_is_refused(tmp_path):
+    with pytest.raises(BadDataError):
+        read_recording(tmp_path / "none.c3d")
+    with pytest.raises(BadDataError):
+        read_recording(tmp_path / "a.txt")

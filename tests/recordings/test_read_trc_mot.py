@@ -1,0 +1,179 @@
+"""TRC and MOT: units, axes, column names, signs, rates and time stamps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from recording_writers import (
+    Y_UP_FROM_Z_UP,
+    standing_markers,
+    standing_wrench,
+    write_mot,
+    write_trc,
+)
+
+from bsip_cli.errors import BadDataError
+from bsip_cli.recordings.read import read_recording
+
+N = 80
+TURN = Y_UP_FROM_Z_UP.T
+NAMINGS = {
+    "numbered": ("ground_force_1_v{}", "ground_force_1_p{}", "ground_force_1_m{}"),
+    "bare": ("ground_force_v{}", "ground_force_p{}", "ground_torque_{}"),
+    "in front": ("1_ground_force_v{}", "1_ground_force_p{}", "1_ground_torque_{}"),
+    "joined": ("ground_force1_v{}", "ground_force1_p{}", "ground_torque1_{}"),
+    "sided": ("R_ground_force_v{}", "R_ground_force_p{}", "R_ground_torque_{}"),
+    "moment": ("ground_force_r_v{}", "ground_force_r_p{}", "ground_moment_r_m{}"),
+}
+
+
+def _columns(force, moment, naming="numbered", point_scale=1.0, y_up=True):
+    """Force at the point of pressure with its free torque, written in the lab frame."""
+    point = np.column_stack(
+        [-moment[:, 1] / force[:, 2], moment[:, 0] / force[:, 2], 0 * force[:, 2]]
+    )
+    free = moment - np.cross(point, force)
+    turn = TURN if y_up else np.eye(3)
+    parts = (force @ turn, point @ turn * point_scale, free @ turn)
+    return {
+        name.format(axis): values[:, i]
+        for name, values in zip(NAMINGS[naming], parts, strict=True)
+        for i, axis in enumerate("xyz")
+    }
+
+
+def _trial(tmp_path, *, unit="mm", mot="a.mot", ratio=1, start_s=0.0, n=N, **mot_options):
+    markers, labels = standing_markers(n)
+    time_s = start_s + np.arange(n) / 100.0
+    write_trc(tmp_path / "a.trc", time_s, markers @ TURN, labels, unit=unit)
+    force, moment = standing_wrench(n * ratio)
+    if mot:
+        times = start_s + np.arange(n * ratio) / (100.0 * ratio)
+        write_mot(tmp_path / mot, times, _columns(force, moment, **mot_options))
+    return read_recording(tmp_path / "a.trc"), markers, force, moment
+
+
+@pytest.mark.parametrize("naming", NAMINGS)
+@pytest.mark.parametrize("mot", ["a.mot", "a_grf.mot"])
+def test_known_wrench_comes_back(tmp_path, naming, mot):
+    recording, markers, force, moment = _trial(tmp_path, mot=mot, naming=naming)
+    np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)
+    np.testing.assert_allclose(recording.plates[0].force_N, force, atol=1e-6)
+    np.testing.assert_allclose(recording.plates[0].moment_Nm, moment, atol=1e-6)
+    assert recording.plates[0].corners_m is None
+    assert recording.forces_note == ""
+    assert [f.check for f in recording.findings] == ["up_axis"]
+
+
+@pytest.mark.parametrize("unit", ["mm", "m"])
+def test_units_and_faster_forces(tmp_path, unit):
+    recording, markers, force, _ = _trial(tmp_path, unit=unit, ratio=10, start_s=1.5)
+    assert recording.analog_rate_hz == pytest.approx(1000.0)
+    assert recording.time0_s == pytest.approx(1.5)
+    np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)
+    n = len(recording.plates[0].force_N)
+    assert n == (N - 1) * 10 + 1
+    np.testing.assert_allclose(recording.plates[0].force_N, force[:n], atol=1e-6)
+
+
+def test_points_in_mm(tmp_path):
+    recording, _, _, moment = _trial(tmp_path, point_scale=1000.0)
+    np.testing.assert_allclose(recording.plates[0].moment_Nm, moment, atol=1e-5)
+    assert "unit" in [f.check for f in recording.findings]
+
+
+def test_action_on_the_ground_is_reversed(tmp_path):
+    markers, labels = standing_markers(N)
+    time_s = np.arange(N) / 100.0
+    write_trc(tmp_path / "a.trc", time_s, markers @ TURN, labels)
+    force, moment = standing_wrench(N)
+    columns = _columns(force, moment)
+    reversed_ = {name: x if "_p" in name else -x for name, x in columns.items()}
+    write_mot(tmp_path / "a.mot", time_s, reversed_)
+    recording = read_recording(tmp_path / "a.trc")
+    np.testing.assert_allclose(recording.plates[0].force_N, force, atol=1e-6)
+    np.testing.assert_allclose(recording.plates[0].moment_Nm, moment, atol=1e-6)
+    assert "plate_sign" in [f.check for f in recording.findings]
+
+
+def test_z_up_trc_is_left_alone(tmp_path):
+    markers, labels = standing_markers(N)
+    time_s = np.arange(N) / 100.0
+    write_trc(tmp_path / "a.trc", time_s, markers, labels)
+    force, moment = standing_wrench(N)
+    write_mot(tmp_path / "a.mot", time_s, _columns(force, moment, y_up=False))
+    recording = read_recording(tmp_path / "a.trc")
+    np.testing.assert_array_equal(recording.rotation_world_lab, np.eye(3))
+    np.testing.assert_allclose(recording.plates[0].force_N, force, atol=1e-6)
+
+
+def test_without_mot(tmp_path):
+    recording, *_ = _trial(tmp_path, mot="")
+    assert recording.plates == () and ".mot" in recording.forces_note
+
+
+def test_forces_shorter_than_the_markers(tmp_path):
+    markers, labels = standing_markers(N)
+    write_trc(tmp_path / "a.trc", np.arange(N) / 100.0, markers @ TURN, labels)
+    force, moment = standing_wrench(N - 20)
+    write_mot(tmp_path / "a.mot", 0.1 + np.arange(N - 20) / 100.0, _columns(force, moment))
+    plate = read_recording(tmp_path / "a.trc").plates[0]
+    np.testing.assert_array_equal(np.flatnonzero(plate.usable), np.arange(10, N - 10))
+    np.testing.assert_allclose(plate.force_N[plate.usable], force, atol=1e-6)
+
+
+def test_missing_cells_and_header_with_empty_column(tmp_path):
+    markers, labels = standing_markers(N)
+    markers[5:9, 2] = np.nan
+    path = write_trc(
+        tmp_path / "a.trc",
+        np.arange(N) / 100.0,
+        markers @ TURN,
+        labels,
+        heading="Frame#\tTimes\t\t",
+    )
+    recording = read_recording(path)
+    assert recording.labels == tuple(labels)
+    assert np.isnan(recording.markers_m[5:9, 2]).all()
+    assert np.isnan(recording.markers_m).sum() == 12
+
+
+def test_uneven_stamps_are_resampled(tmp_path):
+    markers, labels = standing_markers(N)
+    true_s = np.arange(N) / 100.0
+    stamps = true_s + 0.002 * np.random.default_rng(1).uniform(-1, 1, N)
+    markers[:, 7, 0] = 0.2 + 0.5 * stamps
+    path = write_trc(tmp_path / "a.trc", stamps, markers @ TURN, labels)
+    recording = read_recording(path)
+    assert [f.level for f in recording.findings if f.check == "time"] == ["corrected"]
+    np.testing.assert_allclose(
+        recording.markers_m[:, 7, 0], 0.2 + 0.5 * recording.time_s(), atol=1e-6
+    )
+
+
+def test_torn_stamps_keep_the_longest_stretch(tmp_path):
+    markers, labels = standing_markers(N)
+    stamps = np.arange(N) / 100.0
+    stamps[10:] += 8.5
+    recording = read_recording(write_trc(tmp_path / "a.trc", stamps, markers @ TURN, labels))
+    assert recording.n_frames == N - 10
+    assert recording.time0_s == pytest.approx(8.6)
+    assert [f.level for f in recording.findings if f.check == "time"] == ["warning"]
+    np.testing.assert_allclose(recording.markers_m, markers[10:], atol=1e-6)
+
+
+@pytest.mark.parametrize("text", ["", "nothing", "PathFileType\nFrame#\tTime\tA\n\n1\t0\tx\n"])
+def test_broken_trc_is_refused(tmp_path, text):
+    path = tmp_path / "a.trc"
+    path.write_text(text)
+    with pytest.raises(BadDataError):
+        read_recording(path)
+
+
+@pytest.mark.parametrize("text", ["", "endheader\n", "endheader\ntime\tx\n0\t1\n0.1\tq\n"])
+def test_broken_mot_is_refused(tmp_path, text):
+    markers, labels = standing_markers(N)
+    path = write_trc(tmp_path / "a.trc", np.arange(N) / 100.0, markers @ TURN, labels)
+    (tmp_path / "a.mot").write_text(text)
+    with pytest.raises(BadDataError):
+        read_recording(path)

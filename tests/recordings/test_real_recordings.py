@@ -1,0 +1,148 @@
+"""Real recordings: every one reads or is refused in words, and known weights come back."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import ezc3d
+import numpy as np
+import pytest
+
+from bsip_cli.errors import BadDataError
+from bsip_cli.recordings.cop_near_feet import median_distance_m
+from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.read import read_recording
+from bsip_cli.recordings.resample import wrench_at_marker_rate
+
+pytestmark = pytest.mark.real
+
+GRAVITY = 9.80665
+STATIC_KG = {
+    "biobuddy_ech/anat_pose_ECH.c3d": 66.0,
+    "opencap_subject4/static1.trc": 60.03,
+    "btk_pig/PiG_Calibration-FlatFoot-Full.c3d": 46.3,
+    "btk_pig/PiG_Calibration-FlatFoot-Hole.c3d": 64.0,
+    "return11_static/c3dfile1.c3d": 62.0,
+    "pycgm/Sample_Static.c3d": 79.65,
+    "btk_functional_ll/FunctionalStatic.c3d": 59.65,
+}
+REFUSED = {
+    "Empty.c3d",
+    "badParameterOffset.c3d",
+    "Eb015si.c3d",
+    "Dance.c3d",
+    "bad_parameter_section.c3d",
+    "BKINtechnologies.c3d",
+    "Optotrak.c3d",
+}
+SAME_AS_EZC3D = (
+    "biobuddy_ech/anat_pose_ECH.c3d",
+    "btk_pig/PiG_Motion-FlatFoot-Full.c3d",
+    "btk_functional_ll/FunctionalWalk.c3d",
+    "motionanalysis_helenhayes/Sample_Jump2.c3d",
+    "type3_running_kistler/Running_0002.c3d",
+    "edge_ezc3d/BTS.c3d",
+)
+
+
+@cache
+def _read(path: Path) -> Recording:
+    return read_recording(path)
+
+
+def _all(folder: Path) -> list[Path]:
+    return sorted(p for p in folder.glob("*/*") if p.suffix.lower() in (".c3d", ".trc"))
+
+
+def test_every_file_reads_or_is_refused_in_words(real_data):
+    refused = set()
+    for path in _all(real_data):
+        try:
+            recording = _read(path)
+        except BadDataError as error:
+            refused.add(path.name)
+            assert str(path) in str(error)
+            continue
+        _check_shapes(recording)
+    assert refused == REFUSED
+
+
+def _check_shapes(recording: Recording) -> None:
+    assert recording.markers_m.shape[1:] == (len(recording.labels), 3)
+    assert bool(recording.plates) == (recording.forces_note == "")
+    np.testing.assert_allclose(
+        recording.rotation_world_lab @ recording.rotation_world_lab.T, np.eye(3), atol=1e-12
+    )
+    assert np.linalg.det(recording.rotation_world_lab) == pytest.approx(1.0)
+    for plate in recording.plates:
+        assert plate.force_N.shape == plate.moment_Nm.shape == (len(plate.usable), 3)
+        assert np.isfinite(plate.wrench()[plate.usable]).all()
+
+
+@pytest.mark.parametrize("name", STATIC_KG)
+def test_standing_mass(real_data, name):
+    wrench = wrench_at_marker_rate(_read(real_data / name))
+    assert wrench.usable.mean() > 0.95
+    mass_kg = np.mean(wrench.total[wrench.usable, 2]) / GRAVITY
+    assert mass_kg == pytest.approx(STATIC_KG[name], abs=0.06)
+
+
+@pytest.mark.parametrize("name", SAME_AS_EZC3D)
+def test_same_wrench_as_ezc3d(real_data, name):
+    recording = _read(real_data / name)
+    platforms = ezc3d.c3d(str(real_data / name), extract_forceplat_data=True)["data"]["platform"]
+    rotation = recording.rotation_world_lab
+    for plate in recording.plates:
+        own = platforms[int(plate.name) - 1]
+        force = (rotation @ own["force"]).T
+        centre = rotation @ own["corners"].mean(axis=1) * 1e-3
+        moment = (rotation @ own["moment"]).T * 1e-3 + np.cross(centre, force)
+        good = plate.usable
+        np.testing.assert_allclose(plate.force_N[good], force[good], atol=1e-9)
+        np.testing.assert_allclose(plate.moment_Nm[good], moment[good], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "type3_qualisys_c3dorg26/Capture0002.c3d",
+        "type3_qualisys_c3dorg26/Walking_Hybrid_1_1.c3d",
+        "c3dorg_plate_types/TYPE-3.c3d",
+        "ezc3d_rehazenter_qualisys/Qualisys.c3d",
+        "sprinter_ja1/JA1Gait35.c3d",
+        "hamner_other/run200.trc",
+        "opencap_subject4/squats1.trc",
+    ],
+)
+def test_centre_of_pressure_lies_under_the_feet(real_data, name):
+    recording = _read(real_data / name)
+    distances = [median_distance_m(recording, plate) for plate in recording.plates]
+    assert np.nanmax(distances) < 0.11
+
+
+def test_flipped_plate_is_corrected(real_data):
+    recording = _read(real_data / "edge_nimble/JH_01.c3d")
+    assert [np.median(p.force_N[:, 2]) for p in recording.plates] == pytest.approx(
+        [713, 380], abs=1
+    )
+    flips = [f for f in recording.findings if f.check == "plate_sign"]
+    assert [(f.subject, f.level) for f in flips] == [("1", "corrected")]
+
+
+def test_clipped_samples_of_sample21_are_left_out(real_data):
+    recording = _read(real_data / "c3dorg_plate_types/sample21.c3d")
+    assert [p.usable.mean() for p in recording.plates] == pytest.approx([0.35, 0.35], abs=0.01)
+
+
+def test_duplicates_of_motion_analysis_get_their_names(real_data):
+    labels = _read(real_data / "motionanalysis_helenhayes/Sample_Jump2.c3d").labels
+    assert len(set(labels)) == len(labels) == 51
+
+
+def test_squat_moves_as_the_force_says(real_data):
+    recording = _read(real_data / "opencap_subject4/squats1.trc")
+    force = wrench_at_marker_rate(recording).total[:, 2]
+    height = np.convolve(recording.markers_m[..., 2].mean(axis=1), np.ones(15) / 15, "same")
+    acceleration = np.gradient(np.gradient(height)) * recording.marker_rate_hz**2
+    assert np.corrcoef(acceleration[50:-50], force[50:-50])[0, 1] > 0.9

@@ -46,11 +46,11 @@ class SmoothSignal:
 def smooth(
     samples: np.ndarray, rate_hz: float, window_s: float, noise_sd: np.ndarray | None = None
 ) -> SmoothSignal:
-    """Smooth each channel on its own.
+    """Smooth all channels by one stiffness that changes over time.
 
     Parameters
     ----------
-    samples : (N, channels); NaN where missing, which the spline bridges.
+    samples : (N, channels); rows with NaN are missing, and bridged.
     window_s : time over which the pace of the motion is judged.
     noise_sd : (channels,) noise of the samples, estimated from them where not given.
 
@@ -65,10 +65,13 @@ def smooth(
     sigma = noise_level(samples, rate_hz) if noise_sd is None else noise_sd
     basis = _Basis(count, max(1, round(rate_hz / _KNOT_RATE_HZ)), rate_hz)
     window = max(9, round(window_s * rate_hz / basis.samples_per_knot))
-    parts = [_smooth_channel(samples[:, k], sigma[k], window, basis) for k in range(channels)]
-    c = np.stack([part[0] for part in parts], axis=1)
-    sd = np.stack([part[1] for part in parts], axis=1)
-    return SmoothSignal(basis.values @ c, basis.slopes @ c, basis.curves @ c, sd)
+    seen = np.isfinite(samples).all(axis=1)
+    offset = samples[seen].mean(axis=0)
+    c, spread = _coefficients((samples - offset) / sigma, seen, window, basis)
+    c = c * sigma
+    return SmoothSignal(
+        basis.values @ c + offset, basis.slopes @ c, basis.curves @ c, np.outer(spread, sigma)
+    )
 
 
 def noise_level(samples: np.ndarray, rate_hz: float) -> np.ndarray:
@@ -139,29 +142,37 @@ class _Basis:
         return np.clip(np.round(self.x).astype(int), 0, self.size - 5)
 
 
-def _smooth_channel(
-    y: np.ndarray, sigma: float, window: int, basis: _Basis
+def _coefficients(
+    y: np.ndarray, seen: np.ndarray, window: int, basis: _Basis
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients and standard deviation (N,) of the second derivative."""
-    weights = np.isfinite(y).astype(float)
-    offset = np.nanmean(y)
-    data = np.where(weights > 0, y - offset, 0.0)
-    right = basis.values.T @ data
+    """Coefficients of all channels, and the standard deviation (N,) of the second derivative.
+
+    y (N, channels) in units of its noise. All channels share one stiffness: where each has its
+    own, the errors of pelvis and legs no longer cancel and a planted foot accelerates.
+    """
+    weights = seen.astype(float)
+    right = basis.values.T @ np.where(seen[:, None], y, 0.0)
     normal = _lower_band(basis.values.T @ (basis.values * weights[:, None]))
     stiffness = np.full(basis.size - 4, _FIRST_STIFFNESS)
     for _ in range(_ROUNDS):
         c, inverse = _fit(normal, stiffness, right)
         leverage = weights * _variances(basis.values, inverse)
         known = np.bincount(basis.knot_of_sample, leverage, minlength=len(stiffness))
-        rough = np.convolve(c, _FOURTH, mode="valid") ** 2
-        new = sigma**2 * _mean(known, window) / np.maximum(_mean(rough, window), 1e-300)
+        rough = _pace(c)
+        new = _mean(known, window) / np.maximum(_mean(rough, window), 1e-300)
         new = np.exp(_mean(np.log(np.clip(new, *_STIFFNESS_RANGE)), max(3, window // 4)))
         settled = np.max(np.abs(np.log(new / stiffness))) < 0.1
         stiffness = new
         if settled:
             break
     c, inverse = _fit(normal, stiffness, right)
-    return c + offset, sigma * np.sqrt(_variances(basis.curves, inverse))
+    return c, np.sqrt(_variances(basis.curves, inverse))
+
+
+def _pace(c: np.ndarray) -> np.ndarray:
+    """Mean square over the channels of the coefficients' fourth differences."""
+    n = len(c) - 4
+    return (sum(_FOURTH[k] * c[k : k + n] for k in range(5)) ** 2).mean(axis=1)
 
 
 def _mean(x: np.ndarray, window: int) -> np.ndarray:

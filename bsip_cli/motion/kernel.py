@@ -111,14 +111,16 @@ def _residuals(R, p, marker_segments, marker_positions, measured, out):
 
 @njit(cache=True)
 def _cost(residuals, weights, limit, q, kinds, q_starts, v_starts, prior):
-    """Half the weighted squares, Huber beyond ``limit``, plus the posture prior."""
+    """Half the weighted squares, growing like the logarithm beyond ``limit``, plus the prior."""
     total = 0.0
     for m in range(weights.size):
         d2 = residuals[m, 0] ** 2 + residuals[m, 1] ** 2 + residuals[m, 2] ** 2
         if np.isnan(d2):
             continue
         d = np.sqrt(d2)
-        total += weights[m] * (0.5 * d2 if d <= limit else limit * (d - 0.5 * limit))
+        total += weights[m] * (
+            0.5 * d2 if d <= limit else limit**2 * (0.5 + np.log(d / limit))
+        )
     turn = np.empty(3)
     for i in range(1, kinds.size):
         at = q_starts[i]
@@ -180,7 +182,7 @@ def _normal_equations(
         i = marker_segments[m]
         r = residuals[m]
         distance = np.sqrt(r[0] ** 2 + r[1] ** 2 + r[2] ** 2)
-        weight = weights[m] * (1.0 if distance <= limit else limit / distance)
+        weight = weights[m] * (1.0 if distance <= limit else (limit / distance) ** 2)
         for j in range(3):
             x[j] = measured[m, j] - r[j] - p[0, j]
         _cross(x, r, moment)
@@ -303,7 +305,7 @@ def solve_frames(
 ):
     """Least-squares pose of every frame, each started from the last.
 
-    markers (N, m, 3) [m], NaN where missing; weights (m,) [1/m2]; limit of Huber's loss [m];
+    markers (N, m, 3) [m], NaN where missing; weights (m,) [1/m2]; limit [m] beyond which a marker's pull fades;
     prior (nv,) [1/rad2] that pulls the joint angles to zero; q_first (nq,). Fills q_out (N, nq), residual_out (N, m)
     [m], sd_out (N, nv) (standard deviation of each velocity's coordinate, given those nearer to
     the base) and steps_out (N,), which is -1 where the steps ran out.

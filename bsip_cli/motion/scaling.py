@@ -132,17 +132,18 @@ def _frame_weight(frames: int, options: ScalingOptions) -> float:
 
 
 def _marker_weights(poses: Poses, person: Person, options: ScalingOptions, ik: dict) -> np.ndarray:
-    """(N, m) weights [1/m2] with Huber's reduction; zero where missing."""
+    """(N, m) weights [1/m2], less beyond the robust limit; zero where missing."""
     limit = ik["robust_limit_m"]
     distance = np.where(np.isfinite(poses.residual_m), poses.residual_m, np.inf)
-    huber = np.minimum(1.0, limit / np.maximum(distance, 1e-12))
+    trust = np.minimum(1.0, limit / np.maximum(distance, 1e-12)) ** 2
     base = person.marker_weights / ik["marker_sd_m"] ** 2
-    return huber * base * _frame_weight(len(poses.q), options)
+    return trust * base * _frame_weight(len(poses.q), options)
 
 
 def _total_cost(poses, person, x, precision, options, ik) -> float:
     limit, d = ik["robust_limit_m"], np.nan_to_num(poses.residual_m)
-    loss = np.where(d <= limit, 0.5 * d**2, limit * (d - 0.5 * limit))
+    far = np.maximum(d, limit)
+    loss = np.where(d <= limit, 0.5 * d**2, limit**2 * (0.5 + np.log(far / limit)))
     weights = person.marker_weights / ik["marker_sd_m"] ** 2 * _frame_weight(len(d), options)
     return float((loss * weights).sum() + 0.5 * x @ precision @ x)
 

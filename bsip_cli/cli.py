@@ -30,14 +30,25 @@ def cli() -> None:
 def _stage_command(name: str, summary: str) -> click.Command:
     @click.command(name, help=summary)
     @click.argument("study", type=click.Path(path_type=Path))
-    @click.option("--out", required=True, type=click.Path(path_type=Path),
-                  help="Folder for all results.")
-    @click.option("--participant", "chosen", multiple=True, metavar="sub-01",
-                  help="Only this participant (may be repeated).")
-    @click.option("--config", "config_file", type=click.Path(path_type=Path),
-                  help="TOML file with options that differ from the study's.")
-    @click.option("--jobs", default=1, show_default=True, type=click.IntRange(1),
-                  help="Participants at once.")
+    @click.option(
+        "--out", required=True, type=click.Path(path_type=Path), help="Folder for all results."
+    )
+    @click.option(
+        "--participant",
+        "chosen",
+        multiple=True,
+        metavar="sub-01",
+        help="Only this participant (may be repeated).",
+    )
+    @click.option(
+        "--config",
+        "config_file",
+        type=click.Path(path_type=Path),
+        help="TOML file with options that differ from the study's.",
+    )
+    @click.option(
+        "--jobs", default=1, show_default=True, type=click.IntRange(1), help="Participants at once."
+    )
     @click.option("--force", is_flag=True, help="Redo what is up to date.")
     def command(study, out, chosen, config_file, jobs, force):
         from bsip_cli.session import run_session
@@ -54,19 +65,37 @@ cli.add_command(_stage_command("run", "All stages, from recordings to the report
 
 @cli.command()
 @click.argument("study", type=click.Path(path_type=Path))
-@click.option("--preset", default="sample", show_default=True,
-              type=click.Choice(["sample", "cohort"]),
-              help="sample: 6 people, short trials, low rates; cohort: 12 people, 120 s sequences "
-              "at 100 Hz.")
+@click.option(
+    "--preset",
+    default="sample",
+    show_default=True,
+    type=click.Choice(["sample", "cohort"]),
+    help="sample: 6 people, short trials, low rates; cohort: 12 people, 120 s sequences at 100 Hz.",
+)
 @click.option("--participants", type=click.IntRange(1, 10000), help="How many people.")
 @click.option("--seed", type=int, help="Draws other people and movements.")
-@click.option("--sequence-s", type=click.FloatRange(5, 1200),
-              help="Length of the identification sequence [s].")
+@click.option(
+    "--sequence-s",
+    type=click.FloatRange(5, 1200),
+    help="Length of the identification sequence [s].",
+)
 def simulate(study, preset, participants, seed, sequence_s):
     """Make a study of simulated people whose inertial parameters are known."""
     from bsip_cli.simulate.command import simulate_command
 
     simulate_command(study, preset, participants, seed, sequence_s)
+
+
+@cli.command()
+@click.argument("out", type=click.Path(path_type=Path))
+def show(out):
+    """Print the tables of a finished run and where its reports lie."""
+    from bsip_cli.report.tables import show as tables_of
+
+    click.echo(tables_of(out))
+    for report in (out / "group" / "report.html", *sorted(out.glob("sub-*/report.html"))):
+        if report.exists():
+            click.echo(f"report: {report}")
 
 
 @cli.command()

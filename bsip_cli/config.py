@@ -1,4 +1,4 @@
-"""The options: defaults, the study's own, the command line's; checked together, all faults at once."""
+"""The options: defaults, then the study's, then the command line's; all faults named at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What made an artifact: inputs by hash, options, versions. No clock: the same work, the same bytes."""
+"""What made an artifact: inputs by hash, options, versions. No clock: same work, same bytes."""
 
 from __future__ import annotations
 

@@ -34,8 +34,14 @@ class Outcome:
 
 
 def run_stages(
-    stages: tuple[Stage, ...], study: Study, out: Path, config: Config,
-    participants: tuple[Participant, ...], *, force: bool, jobs: int,
+    stages: tuple[Stage, ...],
+    study: Study,
+    out: Path,
+    config: Config,
+    participants: tuple[Participant, ...],
+    *,
+    force: bool,
+    jobs: int,
 ) -> Iterator[Outcome]:
     """Run ``stages`` participant by participant, then those of the cohort; yield what became.
 
@@ -47,7 +53,8 @@ def run_stages(
             participant.id: pool.submit(
                 _run_participant, personal, study, out, config, participant, force
             )
-            for participant in participants if personal
+            for participant in participants
+            if personal
         }
         for name, future in running.items():
             bug = future.exception()
@@ -61,8 +68,12 @@ def run_stages(
 
 
 def _run_participant(
-    stages: Iterable[Stage], study: Study, out: Path, config: Config,
-    participant: Participant, force: bool,
+    stages: Iterable[Stage],
+    study: Study,
+    out: Path,
+    config: Config,
+    participant: Participant,
+    force: bool,
 ) -> list[Outcome]:
     outcomes = []
     for stage in stages:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
@@ -19,8 +20,14 @@ _SEVERITY = (0, 3, 4, 2, 1)  # of several exit codes the gravest counts
 
 
 def run_session(
-    command: str, root: Path, out: Path, chosen: tuple[str, ...], config_file: Path | None,
-    *, jobs: int, force: bool,
+    command: str,
+    root: Path,
+    out: Path,
+    chosen: tuple[str, ...],
+    config_file: Path | None,
+    *,
+    jobs: int,
+    force: bool,
 ) -> int:
     """Run a command's stages on a study and return the exit code."""
     config = _config(root, config_file)
@@ -34,7 +41,8 @@ def run_session(
         _tell(outcome)
     running = run_stages(stages, study, out, config, participants, force=force, jobs=jobs)
     total = sum(
-        1 if s.level == "cohort"
+        1
+        if s.level == "cohort"
         else sum(len(p.trials) if s.level == "trial" else 1 for p in participants)
         for s in stages
     )
@@ -58,7 +66,8 @@ def _choose(study: Study, chosen: tuple[str, ...]) -> tuple[Participant, ...]:
     unknown = [name for name in chosen if name not in known]
     if unknown:
         raise UsageError(
-            f"no participant {', '.join(unknown)}", file=study.root / "participants.tsv",
+            f"no participant {', '.join(unknown)}",
+            file=study.root / "participants.tsv",
             expected=f"one of {', '.join(known) or 'none, every line was refused'}",
         )
     return tuple(known[name] for name in dict.fromkeys(chosen)) if chosen else study.participants
@@ -66,13 +75,18 @@ def _choose(study: Study, chosen: tuple[str, ...]) -> tuple[Participant, ...]:
 
 def _tell(outcome: Outcome) -> None:
     for sentence in outcome.sentences:
-        tqdm.write(f"{outcome.stage}: {sentence}", file=click.get_text_stream("stderr"))
+        tqdm.write(f"{outcome.stage}: {sentence}", file=sys.stderr)
 
 
 def _summary(command: str, outcomes: Iterable[Outcome], out: Path) -> None:
-    states = Counter(outcome.state for outcome in outcomes)
-    words = {"done": "done", "fresh": "up to date", "refused": "refused",
-             "waiting": "without input", "bug": "failed by a bug"}
+    states: Counter[str] = Counter(outcome.state for outcome in outcomes)
+    words = {
+        "done": "done",
+        "fresh": "up to date",
+        "refused": "refused",
+        "waiting": "without input",
+        "bug": "failed by a bug",
+    }
     said = ", ".join(f"{states[state]} {word}" for state, word in words.items() if states[state])
     click.echo(f"bsip {command}: {said or 'nothing to do'}; results in {out}", err=True)
 

@@ -13,7 +13,9 @@ from bsip_cli.errors import BadDataError, UsageError
 Role = Literal["static", "sequence", "validation"]
 
 _PARTICIPANT = re.compile(r"sub-[A-Za-z0-9]+")
-_TRIAL = re.compile(r"(?P<participant>sub-[A-Za-z0-9]+)_task-(?P<task>[A-Za-z0-9]+)(_run-(?P<run>[0-9]+))?")
+_TRIAL = re.compile(
+    r"(?P<participant>sub-[A-Za-z0-9]+)_task-(?P<task>[A-Za-z0-9]+)(_run-(?P<run>[0-9]+))?"
+)
 _RECORDINGS = (".c3d", ".trc")
 _NAME_RULE = "names like sub-01_task-sequence_run-1.c3d (letters and digits only)"
 
@@ -73,9 +75,12 @@ def load_study(root: Path, roles: dict[str, tuple[str, ...]]) -> tuple[Study, li
     participants, refusals = [], []
     for row in _participant_rows(root / "participants.tsv"):
         try:
-            participants.append(_participant(root, row, roles))
+            participant, misnamed = _participant(root, row, roles)
         except BadDataError as refusal:
             refusals.append(refusal)
+            continue
+        participants.append(participant)
+        refusals += misnamed
     return Study(root, tuple(participants)), refusals
 
 
@@ -87,52 +92,66 @@ def _participant_rows(file: Path) -> list[dict[str, str]]:
             header = rows[0].keys() if rows else ()
     except OSError as error:
         raise BadDataError(
-            f"cannot be read ({error.strerror})", file=file,
+            f"cannot be read ({error.strerror})",
+            file=file,
             expected="a tab-separated table with participant_id, sex, mass_kg, height_m",
             remedy="write one, a line per participant",
         ) from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise BadDataError(
-            f"is not a text table ({error})", file=file, expected="tab-separated UTF-8 text",
+            f"is not a text table ({error})",
+            file=file,
+            expected="tab-separated UTF-8 text",
             remedy="save it again as tab-separated text",
         ) from None
     missing = [name for name in required if name not in header]
     if missing:
         raise BadDataError(
-            f"has no column {', '.join(missing)}" if rows else "names no participant", file=file,
+            f"has no column {', '.join(missing)}" if rows else "names no participant",
+            file=file,
             expected="participant_id, sex, mass_kg, height_m, separated by tabs",
             remedy="add it",
         )
     return rows
 
 
-def _participant(root: Path, row: dict[str, str], roles: dict[str, tuple[str, ...]]) -> Participant:
+def _participant(
+    root: Path, row: dict[str, str], roles: dict[str, tuple[str, ...]]
+) -> tuple[Participant, list[BadDataError]]:
     file = root / "participants.tsv"
     name = (row["participant_id"] or "").strip()
     if not _PARTICIPANT.fullmatch(name):
         raise BadDataError(
-            f"participant_id {name!r}", file=file, expected="sub- and letters or digits",
+            f"participant_id {name!r}",
+            file=file,
+            expected="sub- and letters or digits",
             remedy="rename the participant and the folder",
         )
     sex = (row["sex"] or "").strip().upper()
     if sex not in ("M", "F"):
         raise BadDataError(
-            f"sex {row['sex']!r} of {name}", file=file, expected="M or F",
+            f"sex {row['sex']!r} of {name}",
+            file=file,
+            expected="M or F",
             remedy="the tables know these two; choose the nearer one",
         )
     folder = root / name
     if not folder.is_dir():
         raise BadDataError(
-            f"there is no folder {name}", file=root, expected="one folder per participant",
+            f"there is no folder {name}",
+            file=root,
+            expected="one folder per participant",
             remedy="add it, or take the line out of participants.tsv",
         )
-    return Participant(
+    trials, misnamed = _trials(folder, name, roles)
+    participant = Participant(
         id=name,
         sex=sex,  # type: ignore[arg-type]
         mass_kg=_number(row, "mass_kg", name, file, 10.0, 400.0),
         height_m=_number(row, "height_m", name, file, 0.5, 2.6),
-        trials=_trials(folder, name, roles),
+        trials=trials,
     )
+    return participant, misnamed
 
 
 def _number(
@@ -147,34 +166,52 @@ def _number(
         value = float("nan")
     if not low <= value <= high:
         raise BadDataError(
-            f"{column} {text!r} of {name}", file=file,
-            expected=f"a number between {low:g} and {high:g}, or n/a", remedy="correct it",
+            f"{column} {text!r} of {name}",
+            file=file,
+            expected=f"a number between {low:g} and {high:g}, or n/a",
+            remedy="correct it",
         )
     return value
 
 
 def _trials(
     folder: Path, participant: str, roles: dict[str, tuple[str, ...]]
-) -> tuple[Trial, ...]:
-    trials = []
+) -> tuple[tuple[Trial, ...], list[BadDataError]]:
+    """The recordings of a folder, and refusals of those whose names say nothing."""
+    trials, misnamed = [], []
     for path in sorted(folder.iterdir()):
         if path.suffix.lower() not in _RECORDINGS or not path.is_file():
             continue
         match = _TRIAL.fullmatch(path.stem)
         if match is None or match["participant"] != participant:
-            raise BadDataError(f"file name {path.name}", file=folder, expected=_NAME_RULE,
-                               remedy="rename it")
-        trials.append(Trial(participant, match["task"], path.stem, path, _role(match["task"], roles)))
+            misnamed.append(
+                BadDataError(
+                    "its name does not say what it is",
+                    file=path,
+                    expected=_NAME_RULE,
+                    remedy="rename it",
+                )
+            )
+            continue
+        role = _role(match["task"], roles)
+        trials.append(Trial(participant, match["task"], path.stem, path, role))
     stems = [trial.stem for trial in trials]
     double = {stem for stem in stems if stems.count(stem) > 1}
     if double:
         raise BadDataError(
-            f"two recordings called {', '.join(sorted(double))}", file=folder,
-            expected="one .c3d or one .trc of each name", remedy="remove one or give it a run number",
+            f"two recordings called {', '.join(sorted(double))}",
+            file=folder,
+            expected="one .c3d or one .trc of each name",
+            remedy="remove one or give it a run number",
         )
     if not trials:
-        raise BadDataError("no recordings", file=folder, expected=_NAME_RULE, remedy="add them")
-    return tuple(trials)
+        raise BadDataError(
+            "no recordings",
+            file=folder,
+            expected=f"recordings with {_NAME_RULE}",
+            remedy="add them",
+        )
+    return tuple(trials), misnamed
 
 
 def _role(task: str, roles: dict[str, tuple[str, ...]]) -> Role:

@@ -65,7 +65,8 @@ class Unit:
         """The participant's trials for which all these kinds are there and not refused."""
         assert self.participant is not None
         return tuple(
-            trial for trial in self.participant.trials
+            trial
+            for trial in self.participant.trials
             if all(self._usable(kind, self.participant, trial) for kind in kinds)
         )
 
@@ -100,8 +101,11 @@ class Unit:
             elif self.trial is not None:
                 found.append(self.path(kind))
             else:
-                found += [self.path(kind, trial, participant) for trial in participant.trials
-                          if self._usable(kind, participant, trial)]
+                found += [
+                    self.path(kind, trial, participant)
+                    for trial in participant.trials
+                    if self._usable(kind, participant, trial)
+                ]
         return found
 
     def missing(self) -> list[str]:
@@ -124,7 +128,8 @@ class Unit:
         options = self.config.options(self.stage.options)
         if self.participant is not None:
             options["participant"] = {
-                "sex": self.participant.sex, "mass_kg": self.participant.mass_kg,
+                "sex": self.participant.sex,
+                "mass_kg": self.participant.mass_kg,
                 "height_m": self.participant.height_m,
             }
         return describe(self.stage.name, present, options)

@@ -42,7 +42,9 @@ class Inertia:
 
     def is_physical(self) -> bool:
         """Positive mass and a positive second moment along every axis."""
-        return self.mass_kg > 0 and bool(np.linalg.eigvalsh(second_moments(self.tensor_kgm2))[0] > 0)
+        return self.mass_kg > 0 and bool(
+            np.linalg.eigvalsh(second_moments(self.tensor_kgm2))[0] > 0
+        )
 
 
 def from_phi(phi: np.ndarray) -> Inertia:

@@ -44,9 +44,7 @@ class JointCentres:
     notes: tuple[str, ...]
 
 
-def joint_centres(
-    landmarks: Mapping[str, np.ndarray], sex: str, stature_m: float
-) -> JointCentres:
+def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: float) -> JointCentres:
     """Joint centres of the whole body.
 
     Raises
@@ -66,7 +64,8 @@ def joint_centres(
     part, angle = _CJC[sex]
     centres["neck"] = landmarks["c7"] + part * width * _turned(line, right, angle)
     down = _SJC[0] * width * _turned(line, right, _SJC[1])
-    hinges, ends = {}, {}
+    hinges: dict[str, np.ndarray] = {}
+    ends: dict[str, np.ndarray] = {}
     for side in "lr":
         outward = right if side == "r" else -right
         centres[f"shoulder_{side}"] = landmarks[f"acromion_{side}"] + down
@@ -76,12 +75,24 @@ def joint_centres(
     return JointCentres(centres, axes, hinges, ends, tuple(notes))
 
 
-_REQUIRED = ("asis_l", "asis_r", "c7", *(
-    f"{name}_{side}"
-    for name in ("acromion", "elbow_lateral", "styloid_radial", "styloid_ulnar", "knee_lateral",
-                 "malleolus_lateral", "calcaneus")
-    for side in "lr"
-))
+_REQUIRED = (
+    "asis_l",
+    "asis_r",
+    "c7",
+    *(
+        f"{name}_{side}"
+        for name in (
+            "acromion",
+            "elbow_lateral",
+            "styloid_radial",
+            "styloid_ulnar",
+            "knee_lateral",
+            "malleolus_lateral",
+            "calcaneus",
+        )
+        for side in "lr"
+    ),
+)
 
 
 def _require(landmarks: Mapping[str, np.ndarray]) -> None:

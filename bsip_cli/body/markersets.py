@@ -13,10 +13,27 @@ from bsip_cli.config import shipped
 from bsip_cli.errors import BadDataError, UsageError
 
 _SIDED = {
-    "forehead", "occiput", "temple", "acromion", "asis", "psis", "elbow_lateral", "elbow_medial",
-    "styloid_radial", "styloid_ulnar", "metacarpal_2", "metacarpal_3", "metacarpal_5",
-    "knee_lateral", "knee_medial", "malleolus_lateral", "malleolus_medial", "calcaneus",
-    "metatarsal_1", "metatarsal_2", "metatarsal_5",
+    "forehead",
+    "occiput",
+    "temple",
+    "acromion",
+    "asis",
+    "psis",
+    "elbow_lateral",
+    "elbow_medial",
+    "styloid_radial",
+    "styloid_ulnar",
+    "metacarpal_2",
+    "metacarpal_3",
+    "metacarpal_5",
+    "knee_lateral",
+    "knee_medial",
+    "malleolus_lateral",
+    "malleolus_medial",
+    "calcaneus",
+    "metatarsal_1",
+    "metatarsal_2",
+    "metatarsal_5",
 }
 LANDMARKS = frozenset(
     {"vertex", "sellion", "forehead", "occiput", "c7", "t10", "suprasternale", "xiphoid", "sacrum"}
@@ -72,8 +89,14 @@ def load_marker_set(name: str) -> MarkerSet:
     aliases = data.get("aliases", {})
     optional = data.get("optional", {}).get("markers", [])
     markers = tuple(
-        Marker(label, segment, landmark, float(weights.get(label, 1.0)), label in optional,
-               tuple(aliases.get(label, ())))
+        Marker(
+            label,
+            segment,
+            landmark,
+            float(weights.get(label, 1.0)),
+            label in optional,
+            tuple(aliases.get(label, ())),
+        )
         for segment, members in data["segments"].items()
         for label, landmark in members.items()
     )
@@ -98,7 +121,8 @@ def guess_marker_set(labels: Collection[str]) -> MarkerSet:
     def share(marker_set: MarkerSet) -> float:
         hits = [
             bool(plain & {name.upper() for name in (marker.label, *marker.aliases)})
-            for marker in marker_set.markers if not marker.optional
+            for marker in marker_set.markers
+            if not marker.optional
         ]
         return sum(hits) / len(hits)
 
@@ -117,22 +141,25 @@ def guess_marker_set(labels: Collection[str]) -> MarkerSet:
 def _faults(data: dict) -> list[str]:
     segments = data.get("segments")
     if not isinstance(segments, dict) or not segments:
-        return ["no [segments]: expected lines like head = { RTEM = \"temple_r\" }"]
+        return ['no [segments]: expected lines like head = { RTEM = "temple_r" }']
     faults = []
     labels: list[str] = []
     for segment, members in segments.items():
         if segment not in SEGMENTS:
             faults.append(f"unknown segment {segment}{_near(segment, SEGMENTS)}")
         if not isinstance(members, dict):
-            faults.append(f"{segment}: expected {{ LABEL = \"landmark\", ... }}")
+            faults.append(f'{segment}: expected {{ LABEL = "landmark", ... }}')
             continue
         for label, landmark in members.items():
             labels.append(label)
             if landmark and landmark not in LANDMARKS:
                 faults.append(f"{label}: unknown landmark {landmark}{_near(landmark, LANDMARKS)}")
     faults += [f"{label} stands twice" for label in sorted(set(labels)) if labels.count(label) > 1]
-    named = {*data.get("weights", {}), *data.get("aliases", {}),
-             *data.get("optional", {}).get("markers", [])}
+    named = {
+        *data.get("weights", {}),
+        *data.get("aliases", {}),
+        *data.get("optional", {}).get("markers", []),
+    }
     faults += [f"{label} has options but no segment" for label in sorted(named - set(labels))]
     return faults
 

@@ -18,8 +18,11 @@ _Q_PARTS = {
     "spherical": ("qx", "qy", "qz", "qw"),
     "revolute": ("angle",),
 }
-_V_PARTS = {"free": ("tx", "ty", "tz", "rx", "ry", "rz"), "spherical": ("rx", "ry", "rz"),
-            "revolute": ("angle",)}
+_V_PARTS = {
+    "free": ("tx", "ty", "tz", "rx", "ry", "rz"),
+    "spherical": ("rx", "ry", "rz"),
+    "revolute": ("angle",),
+}
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,9 @@ def load_skeleton(name: str) -> Skeleton:
         names = tuple(row["name"] for row in rows)
         parents = tuple(names.index(row["parent"]) if row["parent"] else -1 for row in rows)
         skeleton = Skeleton(
-            file.stem, names, parents,
+            file.stem,
+            names,
+            parents,
             tuple(row["joint"] for row in rows),
             tuple(row["type"] for row in rows),
             tuple(row["table"] for row in rows),
@@ -107,7 +112,8 @@ def load_skeleton(name: str) -> Skeleton:
         raise UsageError("there is no such skeleton", file=name, expected=known) from None
     except (KeyError, ValueError, tomllib.TOMLDecodeError) as error:
         raise UsageError(
-            f"not a skeleton ({error})", file=file,
+            f"not a skeleton ({error})",
+            file=file,
             expected="[[segments]] with name, parent, joint, type and table",
         ) from None
     _check(skeleton, file)
@@ -120,7 +126,8 @@ def _check(skeleton: Skeleton, file: Path) -> None:
     known = set(skeleton.joint_types[1:]) <= {"spherical", "revolute"}
     if not (base_first and ordered and known):
         raise UsageError(
-            "the segments are not a tree with one free base", file=file,
+            "the segments are not a tree with one free base",
+            file=file,
             expected="the free base first, every parent before its children, and joints of type "
             "spherical or revolute",
         )

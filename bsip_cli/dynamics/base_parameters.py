@@ -38,7 +38,7 @@ def find_basis(model: pin.Model) -> Basis:
     """Basis of a model's inertial parameters, from its geometry alone."""
     stacked = random_regressor(model, _STATES).reshape(-1, 10 * (model.njoints - 1))
     scale = np.linalg.norm(stacked, axis=0)
-    triangle = np.linalg.qr(stacked / scale, mode="r")
+    triangle = np.asarray(np.linalg.qr(stacked / scale, mode="r"))
     independent, dependent = _split(triangle)
     beta = np.linalg.lstsq(triangle[:, independent], triangle[:, dependent], rcond=None)[0]
     beta *= scale[dependent] / scale[independent][:, None]
@@ -52,10 +52,12 @@ def find_basis(model: pin.Model) -> Basis:
 def random_regressor(model: pin.Model, states: int) -> np.ndarray:
     """(states, 6, 10 n) regressor at random configurations, velocities and accelerations."""
     rng = np.random.default_rng(_SEED)
-    q = np.stack([
-        pin.integrate(model, pin.neutral(model), rng.uniform(-1.5, 1.5, model.nv))
-        for _ in range(states)
-    ])
+    q = np.stack(
+        [
+            pin.integrate(model, pin.neutral(model), rng.uniform(-1.5, 1.5, model.nv))
+            for _ in range(states)
+        ]
+    )
     v, a = rng.normal(0, 3, (states, model.nv)), rng.normal(0, 20, (states, model.nv))
     return wrench_regressor(model, model.createData(), q, v, a, np.zeros(3))
 
@@ -83,7 +85,8 @@ def expressions(basis: Basis, segments: tuple[str, ...]) -> list[tuple[str, str,
     for row, leader in zip(basis.combine, basis.independent, strict=True):
         terms = [
             _term(row[k], f"{PARAMETERS[k % 10]} {segments[k // 10]}")
-            for k in np.flatnonzero(row) if k != leader
+            for k in np.flatnonzero(row)
+            if k != leader
         ]
         name = f"{PARAMETERS[leader % 10]} {segments[leader // 10]}"
         named.append((name, " ".join([name, *terms]), UNITS[leader % 10]))

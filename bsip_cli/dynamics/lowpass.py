@@ -34,7 +34,8 @@ def lowpass_operator(
     """
     sigma = np.sqrt(np.log(2)) / (2 * np.pi * cutoff_hz) * rate_hz
     reach = int(np.ceil(_REACH * sigma))
-    rows, columns, weights, frames = [], [], [], []
+    rows, columns, weights = [], [], []
+    frames: list[int] = []
     for start, stop in stretches(valid):
         for frame in range(start + min(stride, stop - start) // 2, stop, stride):
             around = np.arange(max(start, frame - reach), min(stop, frame + reach + 1))

@@ -9,7 +9,11 @@ import pinocchio as pin
 
 
 def wrench_regressor(
-    model: pin.Model, data: pin.Data, q: np.ndarray, v: np.ndarray, a: np.ndarray,
+    model: pin.Model,
+    data: pin.Data,
+    q: np.ndarray,
+    v: np.ndarray,
+    a: np.ndarray,
     reference_m: np.ndarray,
 ) -> np.ndarray:
     """(N, 6, 10 n) regressor of the ground wrench in world axes about a reference point.
@@ -28,8 +32,13 @@ def wrench_regressor(
 
 
 def predicted_wrench(
-    model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray, phi: np.ndarray,
-    reference_m: np.ndarray, block: int = 500,
+    model: pin.Model,
+    q: np.ndarray,
+    v: np.ndarray,
+    a: np.ndarray,
+    phi: np.ndarray,
+    reference_m: np.ndarray,
+    block: int = 500,
 ) -> np.ndarray:
     """(N, 6, k) wrench of k parameter vectors phi (10 n, k); memory grows with ``block`` only."""
     wrench = np.empty((len(q), 6, phi.shape[1]))
@@ -39,7 +48,11 @@ def predicted_wrench(
 
 
 def regressor_blocks(
-    model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray, reference_m: np.ndarray,
+    model: pin.Model,
+    q: np.ndarray,
+    v: np.ndarray,
+    a: np.ndarray,
+    reference_m: np.ndarray,
     block: int,
 ) -> Iterator[tuple[slice, np.ndarray]]:
     """The regressor, ``block`` frames at a time."""

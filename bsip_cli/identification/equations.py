@@ -83,7 +83,10 @@ def accumulate(
 
 
 def residual_series(
-    model: pin.Model, recordings: list[Recording], cutoff_hz: float, reference_m: np.ndarray,
+    model: pin.Model,
+    recordings: list[Recording],
+    cutoff_hz: float,
+    reference_m: np.ndarray,
     phi: np.ndarray,
 ) -> list[np.ndarray]:
     """Per stretch of motion, the filtered residual (n, 6) of a parameter vector."""

@@ -63,12 +63,14 @@ def _with_positive_masses(problem: Problem, shown: np.ndarray, target: np.ndarra
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     solution = clarabel.DefaultSolver(
-        sparse.csc_matrix(np.eye(size)), np.zeros(size), matrix,
-        np.concatenate([target, slack]), cones, settings,
+        sparse.csc_matrix(np.eye(size)),
+        np.zeros(size),
+        matrix,
+        np.concatenate([target, slack]),
+        cones,
+        settings,
     ).solve()
-    if solution.status not in (
-        clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved
-    ):
+    if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
         raise NumericalError(
             f"no inertial parameters with positive masses fit the data ({solution.status})",
             expected="a motion and forces that belong together",

@@ -50,9 +50,7 @@ def prior_of(inertias: tuple[Inertia, ...], person: Person, spread: Spread) -> P
         about_joint = inertia.moved(-origins[i])
         phi[block] = about_joint.phi()
         readable_sd[i] = _readable_sd(inertia, person.lengths_m[i], spread)
-        root[block, block] = np.linalg.solve(
-            readable_jacobian(phi[block]), np.diag(readable_sd[i])
-        )
+        root[block, block] = np.linalg.solve(readable_jacobian(phi[block]), np.diag(readable_sd[i]))
     return Prior(inertias, origins, phi, root, readable_sd)
 
 
@@ -61,9 +59,11 @@ def _readable_sd(inertia: Inertia, length_m: float, spread: Spread) -> np.ndarra
     moments = np.diag(inertia.tensor_kgm2)
     products = np.sqrt([moments[0] * moments[1], moments[0] * moments[2], moments[1] * moments[2]])
     part = spread.inertia_sd_percent / 100
-    return np.array([
-        spread.mass_sd_percent / 100 * inertia.mass_kg,
-        *[spread.com_sd_percent / 100 * length_m] * 3,
-        *(part * moments),
-        *(0.5 * part * products),
-    ])
+    return np.array(
+        [
+            spread.mass_sd_percent / 100 * inertia.mass_kg,
+            *[spread.com_sd_percent / 100 * length_m] * 3,
+            *(part * moments),
+            *(0.5 * part * products),
+        ]
+    )

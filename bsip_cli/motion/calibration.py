@@ -30,7 +30,10 @@ class Calibration:
 
 
 def calibrate(
-    skeleton: Skeleton, marker_set: MarkerSet, positions: Mapping[str, np.ndarray], sex: str,
+    skeleton: Skeleton,
+    marker_set: MarkerSet,
+    positions: Mapping[str, np.ndarray],
+    sex: str,
     height_m: float | None,
 ) -> Calibration:
     """Build the skeleton from marker positions in one standing pose.
@@ -69,7 +72,9 @@ def _rough_stature(landmarks: Mapping[str, np.ndarray]) -> float:
     needed = [landmarks[name][2] for name in ("c7", "calcaneus_l") if name in landmarks]
     if len(needed) < 2:
         raise BadDataError("no marker for c7 or calcaneus_l", expected="both in the static trial")
-    return (needed[0] - needed[1]) / 0.84  # C7 stands at 0.85 of the stature, the heel marker at 0.01
+    return (
+        needed[0] - needed[1]
+    ) / 0.84  # C7 stands at 0.85 of the stature, the heel marker at 0.01
 
 
 def _lengths(centres: JointCentres) -> dict[str, float]:
@@ -125,7 +130,8 @@ def _head(landmarks: Mapping[str, np.ndarray], neck: np.ndarray, torso: np.ndarr
     """Axes of the head: to the right between paired markers, up to the vertex or vertically."""
     pairs = [
         landmarks[f"{name}_r"] - landmarks[f"{name}_l"]
-        for name in ("temple", "forehead", "occiput") if f"{name}_r" in landmarks
+        for name in ("temple", "forehead", "occiput")
+        if f"{name}_r" in landmarks
     ]
     right = np.mean(pairs, axis=0) if pairs else torso[:, 2]
     up = landmarks["vertex"] - neck if "vertex" in landmarks else np.array([0.0, 0.0, 1.0])
@@ -165,13 +171,20 @@ def _person(skeleton, marker_set, positions, centres, frames, sex, stature, land
             child_tilt[i] = _tilt(axes.T @ hinge)
     present = [m for m in marker_set.markers if m.label in positions]
     index = np.array([skeleton.index(m.segment) for m in present])
-    local = np.array([
-        frames[m.segment][1].T @ (positions[m.label] - frames[m.segment][0]) for m in present
-    ])
+    local = np.array(
+        [frames[m.segment][1].T @ (positions[m.label] - frames[m.segment][0]) for m in present]
+    )
     return Person(
-        skeleton, in_parent, parent_tilt, child_tilt, origin,
+        skeleton,
+        in_parent,
+        parent_tilt,
+        child_tilt,
+        origin,
         _table_lengths(skeleton, centres, frames, sex, stature, landmarks),
-        tuple(m.label for m in present), index, local, np.array([m.weight for m in present]),
+        tuple(m.label for m in present),
+        index,
+        local,
+        np.array([m.weight for m in present]),
         np.array([i not in index for i in range(n)]),
     )
 
@@ -184,27 +197,31 @@ def _tilt(axis: np.ndarray) -> float:
 def _table_lengths(skeleton, centres, frames, sex, stature, landmarks) -> np.ndarray:
     """(n,) lengths as the anthropometric table defines them."""
     p = centres.positions
-    lengths = []
+    lengths: list[float] = []
     for name, row in zip(skeleton.segments, skeleton.table_rows, strict=True):
         side = skeleton.side(name)
         ends = {
-            "torso": ("neck", "waist"), "arm": (f"shoulder_{side}", f"elbow_{side}"),
-            "forearm": (f"elbow_{side}", f"wrist_{side}"), "thigh": (f"hip_{side}", f"knee_{side}"),
+            "torso": ("neck", "waist"),
+            "arm": (f"shoulder_{side}", f"elbow_{side}"),
+            "forearm": (f"elbow_{side}", f"wrist_{side}"),
+            "thigh": (f"hip_{side}", f"knee_{side}"),
             "shank": (f"knee_{side}", f"ankle_{side}"),
         }
         if row in ends:
             a, b = ends[row]
-            lengths.append(np.linalg.norm(p[a] - p[b]))
+            lengths.append(float(np.linalg.norm(p[a] - p[b])))
         elif row == "pelvis":
             origin, axes = frames["lower_torso"]
             middle = axes.T @ (0.5 * (p["hip_l"] + p["hip_r"]) - origin)
-            lengths.append(np.hypot(middle[0], middle[1]))
+            lengths.append(float(np.hypot(middle[0], middle[1])))
         elif row == "foot":
-            lengths.append(np.linalg.norm(centres.ends[name] - landmarks[f"calcaneus_{side}"]))
+            lengths.append(
+                float(np.linalg.norm(centres.ends[name] - landmarks[f"calcaneus_{side}"]))
+            )
         elif row == "hand" and name in centres.ends:
-            lengths.append(np.linalg.norm(centres.ends[name] - p[f"wrist_{side}"]))
+            lengths.append(float(np.linalg.norm(centres.ends[name] - p[f"wrist_{side}"])))
         elif row == "head" and "vertex" in landmarks:
-            lengths.append(np.linalg.norm(landmarks["vertex"] - p["neck"]))
+            lengths.append(float(np.linalg.norm(landmarks["vertex"] - p["neck"])))
         else:
             lengths.append(mean_length_m(sex, row, stature))
     return np.array(lengths)

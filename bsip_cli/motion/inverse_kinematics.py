@@ -63,8 +63,15 @@ class Tree:
         R = np.empty((len(q), len(self.kinds), 3, 3))
         p = np.empty((len(q), len(self.kinds), 3))
         kernel.forward_frames(
-            np.ascontiguousarray(q), self.kinds, self.parents, self.q_starts, self.positions,
-            self.rotations, self.axes, R, p,
+            np.ascontiguousarray(q),
+            self.kinds,
+            self.parents,
+            self.q_starts,
+            self.positions,
+            self.rotations,
+            self.axes,
+            R,
+            p,
         )
         return R, p
 
@@ -72,7 +79,9 @@ class Tree:
 def tree_of(person: Person) -> Tree:
     """Flatten a person's skeleton for the kernel."""
     skeleton = person.skeleton
-    v_segments, v_parents, last = [], [], []
+    v_segments: list[int] = []
+    v_parents: list[int] = []
+    last: list[int] = []
     for i, kind in enumerate(skeleton.joint_types):
         before = last[skeleton.parents[i]] if i else -1
         for _ in range({"free": 6, "spherical": 3, "revolute": 1}[kind]):
@@ -105,8 +114,14 @@ def neutral(person: Person) -> np.ndarray:
 
 
 def solve_poses(
-    person: Person, markers_m: np.ndarray, q_first: np.ndarray, *, marker_sd_m: float,
-    robust_limit_m: float, posture_sd_rad: float | np.ndarray, iterations: int,
+    person: Person,
+    markers_m: np.ndarray,
+    q_first: np.ndarray,
+    *,
+    marker_sd_m: float,
+    robust_limit_m: float,
+    posture_sd_rad: float | np.ndarray,
+    iterations: int,
 ) -> Poses:
     """Weighted least squares on all markers, robust beyond a limit, each frame from the last.
 
@@ -129,11 +144,27 @@ def solve_poses(
     q, residual = np.empty((count, tree.nq)), np.empty((count, markers))
     sd, steps = np.empty((count, tree.nv)), np.empty(count, dtype=np.int64)
     kernel.solve_frames(
-        np.ascontiguousarray(markers_m, dtype=float), q_first, person.marker_segments,
-        person.markers_in_joint_m(), person.marker_weights / marker_sd_m**2, robust_limit_m,
-        np.broadcast_to(posture_sd_rad, tree.nv) ** -2.0, iterations, tree.kinds, tree.parents, tree.q_starts, tree.v_starts,
-        tree.v_segments, tree.v_parents, tree.positions, tree.rotations, tree.axes,
-        q, residual, sd, steps,
+        np.ascontiguousarray(markers_m, dtype=float),
+        q_first,
+        person.marker_segments,
+        person.markers_in_joint_m(),
+        person.marker_weights / marker_sd_m**2,
+        robust_limit_m,
+        np.broadcast_to(posture_sd_rad, tree.nv) ** -2.0,
+        iterations,
+        tree.kinds,
+        tree.parents,
+        tree.q_starts,
+        tree.v_starts,
+        tree.v_segments,
+        tree.v_parents,
+        tree.positions,
+        tree.rotations,
+        tree.axes,
+        q,
+        residual,
+        sd,
+        steps,
     )
     return Poses(q, residual, sd, steps >= 0)
 

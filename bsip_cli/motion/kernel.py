@@ -118,9 +118,7 @@ def _cost(residuals, weights, limit, q, kinds, q_starts, v_starts, prior):
         if np.isnan(d2):
             continue
         d = np.sqrt(d2)
-        total += weights[m] * (
-            0.5 * d2 if d <= limit else limit**2 * (0.5 + np.log(d / limit))
-        )
+        total += weights[m] * (0.5 * d2 if d <= limit else limit**2 * (0.5 + np.log(d / limit)))
     turn = np.empty(3)
     for i in range(1, kinds.size):
         at = q_starts[i]
@@ -164,8 +162,31 @@ def _columns(R, p, kinds, v_starts, axes, d, w):
 
 @njit(cache=True)
 def _normal_equations(
-    R, p, residuals, weights, limit, kinds, parents, q_starts, v_starts, v_segments, v_parents,
-    axes, marker_segments, measured, q, prior, H, g, W, s, S, f, t, d, w,
+    R,
+    p,
+    residuals,
+    weights,
+    limit,
+    kinds,
+    parents,
+    q_starts,
+    v_starts,
+    v_segments,
+    v_parents,
+    axes,
+    marker_segments,
+    measured,
+    q,
+    prior,
+    H,
+    g,
+    W,
+    s,
+    S,
+    f,
+    t,
+    d,
+    w,
 ):
     """H (nv, nv; only entries between a velocity and its ancestors) and descent direction g."""
     n, nv = kinds.size, v_segments.size
@@ -299,16 +320,34 @@ def _step(q, dv, kinds, q_starts, v_starts, R0, out):
 
 @njit(cache=True)
 def solve_frames(
-    markers, q_first, marker_segments, marker_positions, weights, limit, prior, max_steps,
-    kinds, parents, q_starts, v_starts, v_segments, v_parents, positions, rotations, axes,
-    q_out, residual_out, sd_out, steps_out,
+    markers,
+    q_first,
+    marker_segments,
+    marker_positions,
+    weights,
+    limit,
+    prior,
+    max_steps,
+    kinds,
+    parents,
+    q_starts,
+    v_starts,
+    v_segments,
+    v_parents,
+    positions,
+    rotations,
+    axes,
+    q_out,
+    residual_out,
+    sd_out,
+    steps_out,
 ):
     """Least-squares pose of every frame, each started from the last.
 
-    markers (N, m, 3) [m], NaN where missing; weights (m,) [1/m2]; limit [m] beyond which a marker's pull fades;
-    prior (nv,) [1/rad2] that pulls the joint angles to zero; q_first (nq,). Fills q_out (N, nq), residual_out (N, m)
-    [m], sd_out (N, nv) (standard deviation of each velocity's coordinate, given those nearer to
-    the base) and steps_out (N,), which is -1 where the steps ran out.
+    markers (N, m, 3) [m], NaN where missing; weights (m,) [1/m2]; limit [m] beyond which a
+    marker's pull fades; prior (nv,) [1/rad2] that pulls the joint angles to zero; q_first (nq,).
+    Fills q_out (N, nq), residual_out (N, m) [m], sd_out (N, nv) (standard deviation of each
+    coordinate, given those nearer to the base) and steps_out (N,), -1 where the steps ran out.
     """
     n, m, nv = kinds.size, weights.size, v_segments.size
     R, p = np.zeros((n, 3, 3)), np.zeros((n, 3))
@@ -327,8 +366,31 @@ def solve_frames(
         steps_out[frame] = -1
         for step in range(max_steps):
             _normal_equations(
-                R, p, residuals, weights, limit, kinds, parents, q_starts, v_starts, v_segments,
-                v_parents, axes, marker_segments, measured, q, prior, H, g, W, s, S, f, t, d, w,
+                R,
+                p,
+                residuals,
+                weights,
+                limit,
+                kinds,
+                parents,
+                q_starts,
+                v_starts,
+                v_segments,
+                v_parents,
+                axes,
+                marker_segments,
+                measured,
+                q,
+                prior,
+                H,
+                g,
+                W,
+                s,
+                S,
+                f,
+                t,
+                d,
+                w,
             )
             better = False
             while damping < 1e6:

@@ -40,7 +40,6 @@ class Refinement:
     poses: Poses
     rms_before_m: float
     length_sd_m: np.ndarray
-    rounds: int
 
 
 @dataclass(frozen=True)
@@ -74,9 +73,9 @@ def refine(
     x = np.zeros(len(parameters))
     fitted, poses = person, _poses(person, markers_m, q, ik)
     before, cost = poses.rms_m(), _total_cost(poses, fitted, x, precision, options, ik)
-    rounds, damping = 0, 1e-6
+    damping = 1e-6
     information, gradient = _reduced_equations(fitted, markers_m, poses, parameters, options, ik)
-    for rounds in range(1, options.iterations + 1):
+    for _ in range(options.iterations):
         hessian = information + precision
         step = np.linalg.solve(
             hessian + damping * np.diag(np.diag(hessian)), gradient - precision @ x
@@ -99,7 +98,7 @@ def refine(
     for k, parameter in enumerate(parameters):
         if parameter.kind == "length":
             spread[parameter.index] = np.sqrt(covariance[k, k])
-    return Refinement(fitted, poses, before, spread, rounds)
+    return Refinement(fitted, poses, before, spread)
 
 
 def varied_frames(orientations: np.ndarray, count: int) -> np.ndarray:
@@ -121,10 +120,12 @@ def varied_frames(orientations: np.ndarray, count: int) -> np.ndarray:
 def _poses(person: Person, markers_m: np.ndarray, q: np.ndarray, ik: dict) -> Poses:
     """Each frame from its own start: the chosen frames are not neighbours."""
     parts = [solve_poses(person, markers_m[f : f + 1], q[f], **ik) for f in range(len(q))]
-    return Poses(*(
-        np.concatenate([getattr(part, name) for part in parts])
-        for name in ("q", "residual_m", "coordinate_sd", "converged")
-    ))
+    return Poses(
+        *(
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("q", "residual_m", "coordinate_sd", "converged")
+        )
+    )
 
 
 def _frame_weight(frames: int, options: ScalingOptions) -> float:
@@ -210,7 +211,10 @@ def _prior_precision(
 def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> Person:
     """The person with the parameters' changes ``x`` added to the first guess."""
     joints, origins = person.joint_in_parent_m.copy(), person.origin_in_joint_m.copy()
-    tilts = {"parent_tilt": person.parent_tilt_rad.copy(), "child_tilt": person.child_tilt_rad.copy()}
+    tilts = {
+        "parent_tilt": person.parent_tilt_rad.copy(),
+        "child_tilt": person.child_tilt_rad.copy(),
+    }
     places, lengths = person.marker_positions_m.copy(), person.lengths_m.copy()
     for parameter, value in zip(parameters, x, strict=True):
         i, axis = parameter.index, parameter.axis
@@ -233,8 +237,12 @@ def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> 
     if hips:  # the pelvis is as long as its origin is from the hips' middle
         lengths[0] = float(np.hypot(*joints[hips].mean(axis=0)[:2]))
     return replace(
-        person, joint_in_parent_m=joints, origin_in_joint_m=origins, lengths_m=lengths,
-        parent_tilt_rad=tilts["parent_tilt"], child_tilt_rad=tilts["child_tilt"],
+        person,
+        joint_in_parent_m=joints,
+        origin_in_joint_m=origins,
+        lengths_m=lengths,
+        parent_tilt_rad=tilts["parent_tilt"],
+        child_tilt_rad=tilts["child_tilt"],
         marker_positions_m=places,
     )
 
@@ -248,8 +256,12 @@ def _shifted_joints(person: Person, segment: int) -> list[int]:
 
 
 def _reduced_equations(
-    person: Person, markers_m: np.ndarray, poses: Poses, parameters: tuple[_Parameter, ...],
-    options: ScalingOptions, ik: dict,
+    person: Person,
+    markers_m: np.ndarray,
+    poses: Poses,
+    parameters: tuple[_Parameter, ...],
+    options: ScalingOptions,
+    ik: dict,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Information (P, P) and gradient (P,) of the geometry with all poses eliminated."""
     tree = tree_of(person)
@@ -259,9 +271,12 @@ def _reduced_equations(
     residual = np.where(root > 0, (markers_m - model) * root, 0.0)
     below = subtrees(person)
     by_pose = pose_columns(person, tree, R, p, model, below) * root[..., None]
-    by_parameter = np.stack(
-        [_column(parameter, person, R, p, model, below) for parameter in parameters], axis=-1
-    ) * root[..., None]
+    by_parameter = (
+        np.stack(
+            [_column(parameter, person, R, p, model, below) for parameter in parameters], axis=-1
+        )
+        * root[..., None]
+    )
     frames = len(R)
     Jq = by_pose.reshape(frames, -1, tree.nv)
     Jp = by_parameter.reshape(frames, -1, len(parameters))

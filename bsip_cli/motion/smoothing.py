@@ -38,8 +38,15 @@ class Motion:
 
 
 def smooth_motion(
-    person: Person, q: np.ndarray, determined: np.ndarray, rate_hz: float, *, method: str,
-    butterworth_cutoff_hz: float, pace_window_s: float, edge_s: float,
+    person: Person,
+    q: np.ndarray,
+    determined: np.ndarray,
+    rate_hz: float,
+    *,
+    method: str,
+    butterworth_cutoff_hz: float,
+    pace_window_s: float,
+    edge_s: float,
 ) -> Motion:
     """Smooth poses and differentiate them twice.
 
@@ -58,7 +65,8 @@ def smooth_motion(
     """
     if determined.sum() < 12:
         raise BadDataError(
-            f"{int(determined.sum())} frames with a pose", expected="at least 12 to differentiate",
+            f"{int(determined.sum())} frames with a pose",
+            expected="at least 12 to differentiate",
             remedy="check the markers of this trial",
         )
     skeleton = person.skeleton
@@ -88,10 +96,12 @@ def _noise(
     unit = coordinate_covariance(person, _normalised(skeleton, some), _WEAK_PRIOR).mean(axis=0)
     seen = noise_level(curves, rate_hz)
     blocks = list(_blocks(skeleton))
-    predicted = np.array([
-        np.sqrt(np.diag(unit)[turning].sum() / count) / scale
-        for _, turning, count, scale in blocks
-    ])
+    predicted = np.array(
+        [
+            np.sqrt(np.diag(unit)[turning].sum() / count) / scale
+            for _, turning, count, scale in blocks
+        ]
+    )
     found = np.array([np.sqrt((seen[part] ** 2).mean()) for part, *_ in blocks])
     known = predicted < _LOOSE
     marker_noise = float(np.median(found[known] / predicted[known]))

@@ -59,7 +59,7 @@ def smooth(
     ValueError
         There are fewer than 12 samples, or a channel has none.
     """
-    count, channels = samples.shape
+    count = len(samples)
     if count < _FEWEST or not np.isfinite(samples).any(axis=0).all():
         raise ValueError("too few samples for a spline")
     sigma = noise_level(samples, rate_hz) if noise_sd is None else noise_sd

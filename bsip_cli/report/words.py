@@ -24,6 +24,7 @@ ROLES = {
     "sequence": "identifies the parameters",
     "validation": "validates",
 }
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _STEM = re.compile(r"sub-[A-Za-z0-9]+_task-(?P<task>[A-Za-z0-9]+)(_run-(?P<run>[0-9]+))?")
 
 
@@ -36,10 +37,15 @@ def number(value: float | None, digits: int = 1) -> str:
 
 
 def significant(value: float | None, digits: int = 3) -> str:
-    """A number with so many significant digits, in powers of ten where it is large or small."""
+    """A number with so many significant digits, in powers of ten where needed."""
     if value is None or not math.isfinite(value):
         return MISSING
-    return f"{value:.{digits}g}".replace("-", "−")
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    power = int(exponent)
+    if value != 0 and not -4 <= power < 7:
+        return f"{mantissa} × 10{str(power).translate(_SUPERSCRIPTS)}".replace("-", "−")
+    rounded, decimals = float(f"{mantissa}e{exponent}"), max(0, digits - 1 - power)
+    return f"{rounded:,.{decimals}f}".replace(",", "\N{THIN SPACE}").replace("-", "−")
 
 
 def with_spread(value: float, sd: float, digits: int = 1) -> str:
@@ -72,11 +78,11 @@ def count(n: int, singular: str, plural: str = "") -> str:
 
 
 def trial_label(stem: str) -> str:
-    """``sequence, run 1`` for sub-01_task-sequence_run-1."""
+    """``sequence (run 1)`` for sub-01_task-sequence_run-1."""
     match = _STEM.fullmatch(stem)
     if match is None:
         return stem
-    return f"{match['task']}, run {match['run']}" if match["run"] else match["task"]
+    return f"{match['task']} (run {match['run']})" if match["run"] else match["task"]
 
 
 def segment_label(segment: str) -> str:

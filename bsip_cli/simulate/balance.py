@@ -34,10 +34,11 @@ UP = np.array([0.0, 1.0, 0.0])
 SWAY_LIMIT_M = np.array([0.045, 0.020])  # ahead, aside
 LONGEST_BRIDGE_S = 0.30
 LOWERING_REACH_S = 0.45
-RECORDED_SURROUND_S = 0.3
 TURN_REACH_S = 0.16
 HASTE = 1.35  # over-relaxation of the turns: the feet do not follow the pelvis
 CLOSE_ENOUGH_M = 2e-7  # and rad
+STANDING_CLOSE_ENOUGH_M = 1e-6
+ROUGH_M = 1e-4
 MOST_ROUNDS = 60
 MOST_LOWERINGS = 12
 
@@ -78,7 +79,7 @@ def balanced(person: Person, plan: Plan, thin: int = 1) -> Poses:
     if thin > 1:
         state = _refined(coarse, state, plan)
     poses = state.poses(person, plan)
-    excess = _excess(plan, poses).max()
+    excess = poses.excess_reach_m.max()
     if excess > 0.0:
         raise NumericalError(
             f"a foot is {1000 * excess:.1f} mm out of reach",
@@ -95,7 +96,7 @@ def _within_reach(person: Person, plan: Plan) -> tuple[State, float]:
     final = False
     for _ in range(MOST_LOWERINGS):
         state, poses = _balance(person, _lowered(plan, lowered), state, final)
-        excess = _excess(plan, poses)
+        excess = poses.excess_reach_m
         if excess.max() == 0.0 and final:
             break
         final = final or excess.max() == 0.0
@@ -103,14 +104,6 @@ def _within_reach(person: Person, plan: Plan) -> tuple[State, float]:
         lowered = lowered + further
         state = state.moved(-further[:, None] * UP)
     return state, float(lowered.max())
-
-
-def _excess(plan: Plan, poses: Poses) -> np.ndarray:
-    """(T,) how far the feet are out of reach, in and near what is recorded."""
-    around = round(RECORDED_SURROUND_S / plan.step_s)
-    near = np.zeros(len(plan))
-    near[max(plan.keep.start - around, 0) : plan.keep.stop + around] = 1.0
-    return near * poses.excess_reach_m
 
 
 def _lowering(excess_m: np.ndarray, plan: Plan) -> np.ndarray:
@@ -148,19 +141,22 @@ def _balance(
     cop = plan.cop_m()
     if plan.sway_share:
         state, cop = _with_sway(person, plan, state, cop)
-    tolerance = CLOSE_ENOUGH_M if plan.flights and final else 1e-6
+    tolerance = ROUGH_M
+    if final:
+        tolerance = CLOSE_ENOUGH_M if plan.flights else STANDING_CLOSE_ENOUGH_M
     for _ in range(MOST_ROUNDS):
         poses = state.poses(person, plan)
         momentum = momentum_of(person.inertias, poses, plan.step_s)
         ball_force, ball_moment = ball_load(plan.ball, poses, plan.step_s)
-        miss = _com_target(plan, momentum, cop, ball_force, ball_moment) - momentum.com_m
-        rate = state.turn_rate
+        shift = _com_target(plan, momentum, cop, ball_force, ball_moment) - momentum.com_m
+        turn = np.zeros_like(shift)
         if final and plan.flights:
             locked = locked_inertia(person.inertias, poses, momentum.com_m)
-            rate = _turn_rate(plan, rate, momentum, locked, ball_force, ball_moment)
-        change = plan.step_s * np.abs(rate - state.turn_rate).sum(axis=0).max()
-        state = State(state.pelvis_m + miss, rate)
-        if max(np.abs(miss).max(), change) < tolerance:
+            rate = _turn_rate(plan, state.turn_rate, momentum, locked, ball_force, ball_moment)
+            turn = rate - state.turn_rate
+        state = State(state.pelvis_m + shift, state.turn_rate + turn)
+        turned = plan.step_s * np.abs(turn).sum(axis=0)
+        if max(np.abs(shift).max(), turned.max()) < tolerance:
             break
     return state, state.poses(person, plan)
 
@@ -193,35 +189,52 @@ def _com_target(
     height = _height_target(plan, momentum, ball_force)
     mass = momentum.mass_kg
     lift = mass * (derivative(derivative(height, plan.step_s), plan.step_s) + G)
-    for first, last in plan.flights:
-        lift[first : last + 1] = -ball_force[first : last + 1, 1]
-    total = lift + ball_force[:, 1]
     load = derivative(momentum.spin(), plan.step_s) + ball_moment
-    ahead = _cart_table(height, mass, lift, total * cop_m[:, 0] - load[:, 2], plan)
-    aside = _cart_table(height, mass, lift, total * cop_m[:, 1] + load[:, 0], plan, 0.0)
+    for first, last in plan.flights:  # only the ball acts, and the spin is kept
+        air = slice(first, last + 1)
+        lift[air] = -ball_force[air, 1]
+        load[air] = np.cross(momentum.com_m[air], ball_force[air])
+    total = lift + ball_force[:, 1]
+    table = _CartTable(mass * height, lift, plan.step_s)
+    ahead = _ahead(table, total * cop_m[:, 0] - load[:, 2], plan)
+    aside = table.solve(total * cop_m[:, 1] + load[:, 0], 0.0)
     return np.stack([ahead, height, aside], axis=1)
 
 
-def _cart_table(
-    height: np.ndarray,
-    mass: float,
-    lift: np.ndarray,
-    moment: np.ndarray,
-    plan: Plan,
-    speed: float | None = None,
-) -> np.ndarray:
-    """Solve lift c - mass height c'' = moment for c (T,), with c' = speed at both ends."""
-    n = len(height)
-    speed = plan.speed_m_s if speed is None else speed
-    stiffness = mass * height / plan.step_s**2
-    bands = np.zeros((3, n))
-    bands[0, 2:] = -stiffness[1:-1]
-    bands[1, 1:-1] = lift[1:-1] + 2.0 * stiffness[1:-1]
-    bands[2, :-2] = -stiffness[1:-1]
-    right = moment.copy()
-    bands[1, 0], bands[0, 1], right[0] = -1.0, 1.0, speed * plan.step_s
-    bands[1, -1], bands[2, -2], right[-1] = 1.0, -1.0, speed * plan.step_s
-    return solve_banded((1, 1), bands, right)
+@dataclass(frozen=True)
+class _CartTable:
+    """lift c - mass height c'' = moment, for the centre of mass c (T,) in one direction.
+
+    mass_height : (T,) [kg m]. lift : (T,) vertical force on the body [N].
+    """
+
+    mass_height: np.ndarray
+    lift: np.ndarray
+    step_s: float
+
+    def solve(self, moment: np.ndarray, speed: float) -> np.ndarray:
+        """c (T,) with c' = speed at both ends."""
+        n = len(moment)
+        stiffness = self.mass_height / self.step_s**2
+        bands = np.zeros((3, n))
+        bands[0, 2:] = -stiffness[1:-1]
+        bands[1, 1:-1] = self.lift[1:-1] + 2.0 * stiffness[1:-1]
+        bands[2, :-2] = -stiffness[1:-1]
+        right = moment.copy()
+        bands[1, 0], bands[0, 1], right[0] = -1.0, 1.0, speed * self.step_s
+        bands[1, -1], bands[2, -2], right[-1] = 1.0, -1.0, speed * self.step_s
+        return solve_banded((1, 1), bands, right)
+
+
+def _ahead(table: _CartTable, moment: np.ndarray, plan: Plan) -> np.ndarray:
+    """The forward path; a gait enters and leaves at the speed it has in its middle."""
+    speed = plan.speed_m_s
+    path = table.solve(moment, speed)
+    if speed:
+        middle = len(path) // 2
+        speed = (path[middle + 1] - path[middle - 1]) / (2.0 * plan.step_s)
+        path = table.solve(moment, speed)
+    return path
 
 
 def _height_target(plan: Plan, momentum: Momentum, ball_force: np.ndarray) -> np.ndarray:

@@ -70,7 +70,7 @@ def _parallel(r: np.ndarray) -> np.ndarray:
 
 def ball_load(ball: Ball | None, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Force (T, 3) that moves the ball, and its moment (T, 3) about the origin."""
-    zero = np.zeros_like(poses.origin_m["lower_torso"])
+    zero = np.zeros_like(next(iter(poses.origin_m.values())))
     if ball is None:
         return zero, zero
     r = poses.point(ball.body, ball.position_m)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from bsip_cli.artifacts import bsip_names, share_name
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 
@@ -30,7 +31,9 @@ def ordered_markers(
     return ordered
 
 
-def person_from(skeleton_rows: pd.DataFrame, marker_rows: pd.DataFrame, skeleton: Skeleton) -> Person:
+def person_from(
+    skeleton_rows: pd.DataFrame, marker_rows: pd.DataFrame, skeleton: Skeleton
+) -> Person:
     """The person as ``scale`` wrote it."""
     rows = skeleton_rows.set_index("segment").loc[list(skeleton.segments)]
     return Person(
@@ -56,3 +59,15 @@ def coordinates_from(
     v = frame[[f"v_{name}" for name in skeleton.v_names]].to_numpy()
     a = frame[[f"a_{name}" for name in skeleton.v_names]].to_numpy()
     return q, v, a
+
+
+def bsip_table(
+    method: str, segments: tuple[str, ...], values: np.ndarray, sd: np.ndarray, share: np.ndarray
+) -> pd.DataFrame:
+    """Rows of one method: values, standard deviations and data shares, each (n, 10)."""
+    names = bsip_names()
+    table = pd.DataFrame({"method": method, "segment": list(segments)})
+    table[list(names)] = values
+    table[[f"{name}_sd" for name in names]] = sd
+    table[[share_name(name) for name in names]] = share
+    return table

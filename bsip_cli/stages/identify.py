@@ -7,7 +7,7 @@ import importlib
 import numpy as np
 import pandas as pd
 
-from bsip_cli.artifacts import bsip_names, share_name
+from bsip_cli.artifacts import bsip_names
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
@@ -22,7 +22,7 @@ from bsip_cli.identification.excitation import excitation
 from bsip_cli.identification.noise import Noise, noise_of
 from bsip_cli.identification.prior import Prior, Spread, prior_of
 from bsip_cli.identification.uncertainty import readable
-from bsip_cli.stages.frames import WRENCH, coordinates_from, person_from
+from bsip_cli.stages.frames import WRENCH, bsip_table, coordinates_from, person_from
 from bsip_cli.study import Trial
 from bsip_cli.unit import Unit
 
@@ -41,18 +41,26 @@ def run(unit: Unit) -> None:
     trials = _identification_trials(unit)
     recordings, blocks = _recordings(unit, skeleton, trials)
     problem, reference = _problem(unit, person, prior, recordings)
-    estimates = {
-        name: importlib.import_module(f"bsip_cli.identification.{name}").estimate(problem)
+    estimates: dict[str, Estimate] = {
+        str(name): importlib.import_module(f"bsip_cli.identification.{name}").estimate(problem)
         for name in unit.config.identify.estimators
     }
     methods = _methods(unit)
     tables = [regression.drop(columns="note")]
     for name, estimate in estimates.items():
         unit.warn(f"{unit.name}: {methods[name]} ({name}): {estimate.note}")
-        tables.append(_bsip_table(skeleton, methods[name], estimate, prior))
-    unit.write("bsip", pd.concat(tables, ignore_index=True), facts={
-        "reference_m": reference.tolist(), "noise_rms": problem.noise.rms.tolist(),
-    })
+        result = readable(estimate, prior)
+        tables.append(
+            bsip_table(methods[name], skeleton.segments, result.values, result.sd, result.share)
+        )
+    unit.write(
+        "bsip",
+        pd.concat(tables, ignore_index=True),
+        facts={
+            "reference_m": reference.tolist(),
+            "noise_rms": problem.noise.rms.tolist(),
+        },
+    )
     unit.write("base-parameters", _base_table(skeleton, problem))
     unit.write("excitation", _excitation_table(skeleton, problem))
     unit.write("identification", _summary(unit, problem, estimates, methods, trials))
@@ -89,7 +97,8 @@ def _identification_trials(unit: Unit) -> list[Trial]:
     moving = [t for t in ready if t.role != "static" and counts[t.stem] > 0] or list(ready)
     if not moving or max(counts.values()) == 0:
         raise BadDataError(
-            "no trial in which every contact is on a plate", file=unit.name,
+            "no trial in which every contact is on a plate",
+            file=unit.name,
             expected="a stretch of motion with all ground contacts measured",
             remedy="record one; the table's values (RM) stand in the regression artifact",
         )
@@ -120,8 +129,10 @@ def _recordings(
     if duration < _SHORTEST_S:
         raise BadDataError(
             f"{duration:.2f} s with every contact on a plate in "
-            f"{', '.join(t.stem for t in trials)}", file=unit.name,
-            expected=f"at least {_SHORTEST_S:g} s", remedy="record a longer trial on the plates",
+            f"{', '.join(t.stem for t in trials)}",
+            file=unit.name,
+            expected=f"at least {_SHORTEST_S:g} s",
+            remedy="record a longer trial on the plates",
         )
     return recordings, pd.DataFrame(blocks, columns=["trial", "start_s", "end_s"])
 
@@ -156,27 +167,20 @@ def _problem(
     return Problem(equations, noise, prior, basis), reference
 
 
-def _bsip_table(
-    skeleton: Skeleton, method: str, estimate: Estimate, prior: Prior
-) -> pd.DataFrame:
-    result = readable(estimate, prior)
-    names = bsip_names()
-    table = {"method": [method] * len(skeleton.segments), "segment": list(skeleton.segments)}
-    table |= {name: result.values[:, k] for k, name in enumerate(names)}
-    table |= {f"{name}_sd": result.sd[:, k] for k, name in enumerate(names)}
-    table |= {share_name(name): result.share[:, k] for k, name in enumerate(names)}
-    return pd.DataFrame(table)
-
-
 def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
     fit = base_parameters(problem)
     named = expressions(problem.basis, skeleton.segments)
-    return pd.DataFrame({
-        "name": [row[0] for row in named], "expression": [row[1] for row in named],
-        "value": fit.values, "unit": [row[2] for row in named],
-        "sd": np.sqrt(np.diag(fit.covariance)), "sigma_percent": fit.sigma_percent(),
-        "rm_value": fit.rm_values,
-    })
+    return pd.DataFrame(
+        {
+            "name": [row[0] for row in named],
+            "expression": [row[1] for row in named],
+            "value": fit.values,
+            "unit": [row[2] for row in named],
+            "sd": np.sqrt(np.diag(fit.covariance)),
+            "sigma_percent": fit.sigma_percent(),
+            "rm_value": fit.rm_values,
+        }
+    )
 
 
 def _excitation_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
@@ -191,20 +195,28 @@ def _excitation_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
 
 
 def _summary(
-    unit: Unit, problem: Problem, estimates: dict[str, Estimate], methods: dict[str, str],
+    unit: Unit,
+    problem: Problem,
+    estimates: dict[str, Estimate],
+    methods: dict[str, str],
     trials: list[Trial],
 ) -> pd.DataFrame:
     names = [f"rms_{name}" for name in WRENCH]
     condition = excitation(problem).condition_number
     rows = []
     for name, estimate in estimates.items():
-        rows.append({
-            "estimator": name, "method": methods[name],
-            "trials": ", ".join(trial.stem for trial in trials),
-            "samples": problem.equations.samples, "duration_s": problem.equations.duration_s,
-            "effective_samples": float(problem.noise.effective.sum()),
-            "rank": problem.basis.rank, "condition_number": condition,
-            **dict(zip(names, estimate.residual_rms(problem), strict=True)),
-            "note": estimate.note,
-        })
+        rows.append(
+            {
+                "estimator": name,
+                "method": methods[name],
+                "trials": ", ".join(trial.stem for trial in trials),
+                "samples": problem.equations.samples,
+                "duration_s": problem.equations.duration_s,
+                "effective_samples": float(problem.noise.effective.sum()),
+                "rank": problem.basis.rank,
+                "condition_number": condition,
+                **dict(zip(names, estimate.residual_rms(problem), strict=True)),
+                "note": estimate.note,
+            }
+        )
     return pd.DataFrame(rows)

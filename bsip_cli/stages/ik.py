@@ -22,19 +22,23 @@ def run(unit: Unit) -> None:
     poses, decided = _poses(unit, person, markers)
     determined, angle_sd = _determined(unit, poses, decided)
     rate = 1.0 / float(np.median(np.diff(times)))
-    motion = smooth_motion(
-        person, poses.q, determined, rate, **unit.config.smoothing.model_dump()
-    )
+    motion = smooth_motion(person, poses.q, determined, rate, **unit.config.smoothing.model_dump())
     determined &= motion.inner
     unit.write(
-        "kinematics", _kinematics(times, determined, angle_sd, poses, motion, skeleton),
+        "kinematics",
+        _kinematics(times, determined, angle_sd, poses, motion, skeleton),
         facts={"marker_noise_m": motion.marker_noise_m, "marker_rms_m": poses.rms_m()},
     )
-    unit.write("marker-residuals", pd.DataFrame({
-        "time_s": np.repeat(times, len(person.markers)),
-        "marker": np.tile(np.array(person.markers, dtype=object), len(times)),
-        "residual_m": poses.residual_m.ravel(),
-    }))
+    unit.write(
+        "marker-residuals",
+        pd.DataFrame(
+            {
+                "time_s": np.repeat(times, len(person.markers)),
+                "marker": np.tile(np.array(person.markers, dtype=object), len(times)),
+                "residual_m": poses.residual_m.ravel(),
+            }
+        ),
+    )
 
 
 def start_pose(person: Person, markers: np.ndarray) -> np.ndarray:
@@ -71,14 +75,20 @@ def _determined(unit: Unit, poses: Poses, decided: np.ndarray) -> tuple[np.ndarr
 
 def _kinematics(times, determined, angle_sd, poses: Poses, motion: Motion, skeleton):
     tables = [
-        pd.DataFrame({
-            "time_s": times, "determined": determined, "marker_rms_m": poses.frame_rms_m(),
-            "angle_sd_rad": angle_sd,
-        })
+        pd.DataFrame(
+            {
+                "time_s": times,
+                "determined": determined,
+                "marker_rms_m": poses.frame_rms_m(),
+                "angle_sd_rad": angle_sd,
+            }
+        )
     ]
     for prefix, values, names in (
-        ("q", motion.q, skeleton.q_names), ("v", motion.v, skeleton.v_names),
-        ("a", motion.a, skeleton.v_names), ("sd", motion.a_sd, skeleton.v_names),
+        ("q", motion.q, skeleton.q_names),
+        ("v", motion.v, skeleton.v_names),
+        ("a", motion.a, skeleton.v_names),
+        ("sd", motion.a_sd, skeleton.v_names),
     ):
         tables.append(pd.DataFrame(values, columns=[f"{prefix}_{name}" for name in names]))
     return pd.concat(tables, axis=1)

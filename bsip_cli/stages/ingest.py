@@ -1,4 +1,4 @@
-"""ingest: a recording as markers and ground wrench in SI units, one world frame, with its faults."""
+"""ingest: a recording as markers and ground wrench in SI units and one world frame."""
 
 from __future__ import annotations
 
@@ -47,9 +47,11 @@ def run(unit: Unit) -> None:
             unit.warn(f"{unit.name}: {_sentence(finding)}")
     times = recording.time_s()
     facts = {
-        "marker_set": marker_set.name if unit.config.marker_set == "auto"
+        "marker_set": marker_set.name
+        if unit.config.marker_set == "auto"
         else unit.config.marker_set,
-        "marker_rate_hz": recording.marker_rate_hz, "analog_rate_hz": recording.analog_rate_hz,
+        "marker_rate_hz": recording.marker_rate_hz,
+        "analog_rate_hz": recording.analog_rate_hz,
     }
     unit.write("markers", _marker_table(times, names, filled), facts)
     unit.write("wrench", _wrench_table(times, wrench, contacts), facts)
@@ -83,7 +85,8 @@ def _marker_set(unit: Unit, recording: Recording) -> MarkerSet:
 def _require(unit: Unit, names: list[str]) -> None:
     if not names:
         raise BadDataError(
-            "none of the marker set's labels is in the file", file=unit.name,
+            "none of the marker set's labels is in the file",
+            file=unit.name,
             expected="the labels of the marker set",
             remedy="name the right marker set in study.toml",
         )
@@ -112,8 +115,12 @@ def _contacts(unit, recording, marker_set, names, filled, wrench: FrameWrench) -
 
     feet = {side: of(f"foot_{side}") for side in "lr" if of(f"foot_{side}").shape[1]}
     return contact_windows(
-        feet, dict.fromkeys(feet), recording.marker_rate_hz, plate_loads(recording, wrench),
-        of(*_TRUNK), _mass_kg(unit, wrench),
+        feet,
+        dict.fromkeys(feet),
+        recording.marker_rate_hz,
+        plate_loads(recording, wrench),
+        of(*_TRUNK),
+        _mass_kg(unit, wrench),
     )
 
 
@@ -129,23 +136,21 @@ def _mass_kg(unit: Unit, wrench: FrameWrench) -> float:
 
 def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:
     findings = []
-    missing = ~np.isfinite(filled.markers_m[..., 0])
+    is_open = ~np.isfinite(filled.markers_m[..., 0])
     for k, name in enumerate(names):
-        if filled.filled[:, k].any() or missing[:, k].any():
-            findings.append(Finding(
-                "marker_gaps", name,
-                f"{int(filled.filled[:, k].sum() + missing[:, k].sum())} of {len(missing)} frames "
-                "missing", "every frame",
-                f"{int(filled.filled[:, k].sum())} filled, {int(missing[:, k].sum())} left open",
-                "info",
-            ))
+        closed, left = int(filled.filled[:, k].sum()), int(is_open[:, k].sum())
+        if closed or left:
+            found = f"{closed + left} of {len(is_open)} frames missing"
+            action = f"{closed} filled, {left} left open"
+            findings.append(Finding("marker_gaps", name, found, "every frame", action, "info"))
     return findings
 
 
 def _sentence(finding: Finding) -> str:
     subject = f" {finding.subject}" if finding.subject else ""
     expected = f" (expected {finding.expected})" if finding.expected else ""
-    return f"{finding.check.replace('_', ' ')}{subject}: {finding.found}{expected}; {finding.action}"
+    check = finding.check.replace("_", " ")
+    return f"{check}{subject}: {finding.found}{expected}; {finding.action}"
 
 
 # --- tables -----------------------------------------------------------------------------------
@@ -153,12 +158,16 @@ def _sentence(finding: Finding) -> str:
 
 def _marker_table(times: np.ndarray, names: list[str], filled: FilledMarkers) -> pd.DataFrame:
     positions = filled.markers_m.reshape(-1, 3)
-    return pd.DataFrame({
-        "time_s": np.repeat(times, len(names)),
-        "marker": np.tile(np.array(names, dtype=object), len(times)),
-        "x_m": positions[:, 0], "y_m": positions[:, 1], "z_m": positions[:, 2],
-        "filled": filled.filled.ravel(),
-    })
+    return pd.DataFrame(
+        {
+            "time_s": np.repeat(times, len(names)),
+            "marker": np.tile(np.array(names, dtype=object), len(times)),
+            "x_m": positions[:, 0],
+            "y_m": positions[:, 1],
+            "z_m": positions[:, 2],
+            "filled": filled.filled.ravel(),
+        }
+    )
 
 
 def _wrench_table(times, wrench: FrameWrench, contacts: ContactWindows) -> pd.DataFrame:
@@ -175,7 +184,8 @@ def _wrench_table(times, wrench: FrameWrench, contacts: ContactWindows) -> pd.Da
 def _plate_table(recording: Recording) -> pd.DataFrame:
     rows = [
         (plate.name, k + 1, *corner)
-        for plate in recording.plates if plate.corners_m is not None
+        for plate in recording.plates
+        if plate.corners_m is not None
         for k, corner in enumerate(plate.corners_m)
     ]
     table = pd.DataFrame(rows, columns=["plate", "corner", "x_m", "y_m", "z_m"])

@@ -44,8 +44,7 @@ def run(unit: Unit) -> None:
     weight = facts["mass_kg"] * GRAVITY_M_S2
     min_force = unit.config.reconstruct.cop_min_force_percent_bw / 100 * weight
     signals = {
-        name: _signals(wrench, height, anterior, min_force)
-        for name, wrench in wrenches.items()
+        name: _signals(wrench, height, anterior, min_force) for name, wrench in wrenches.items()
     }
     unit.write("reconstruction", _reconstruction(times, wrenches, signals, valid, used))
     unit.write("fit", _fit(signals, judged, weight, data))
@@ -79,10 +78,14 @@ def _parameters(bsip: pd.DataFrame, person: Person) -> tuple[list[str], np.ndarr
     for method in methods:
         rows = bsip[bsip["method"] == method].set_index("segment")
         rows = rows.loc[list(person.skeleton.segments), list(bsip_names())].to_numpy()
-        columns.append(np.concatenate([
-            from_readable(row).moved(-origin).phi()
-            for row, origin in zip(rows, person.origin_in_joint_m, strict=True)
-        ]))
+        columns.append(
+            np.concatenate(
+                [
+                    from_readable(row).moved(-origin).phi()
+                    for row, origin in zip(rows, person.origin_in_joint_m, strict=True)
+                ]
+            )
+        )
     return methods, np.stack(columns, axis=1)
 
 
@@ -153,12 +156,22 @@ def _fit(signals, judged, body_weight_N, data) -> pd.DataFrame:
             fit = fit_measures(
                 signals["measured"][component] * scale, values * scale, stretches(judged), weight
             )
-            rows.append({
-                "method": method, "component": component, "rmse": fit.rmse, "unit": unit,
-                "rmse_percent_bw": fit.rmse_percent_bw, "pearson_r": fit.pearson_r,
-                "schwer_m": fit.schwer_m, "schwer_p": fit.schwer_p, "schwer_c": fit.schwer_c,
-                "n": fit.n, "n_effective": fit.n_effective, "data": data,
-            })
+            rows.append(
+                {
+                    "method": method,
+                    "component": component,
+                    "rmse": fit.rmse,
+                    "unit": unit,
+                    "rmse_percent_bw": fit.rmse_percent_bw,
+                    "pearson_r": fit.pearson_r,
+                    "schwer_m": fit.schwer_m,
+                    "schwer_p": fit.schwer_p,
+                    "schwer_c": fit.schwer_c,
+                    "n": fit.n,
+                    "n_effective": fit.n_effective,
+                    "data": data,
+                }
+            )
     return pd.DataFrame(rows)
 
 
@@ -175,14 +188,38 @@ def _correlations(signals, judged) -> pd.DataFrame:
             n = min(effective_samples_of_pair(x, y, spans), effective_samples_of_pair(x, z, spans))
             williams = williams_t(r_a, r_b, r_ab, n)
             fisher = fisher_z_difference(r_a, n, r_b, n)
-            rows.append({
-                "component": component, "method_a": a, "method_b": b, "r_a": r_a, "r_b": r_b,
-                "r_ab": r_ab, "n_effective": n, "williams_t": williams.t, "df": williams.df,
-                "williams_p": williams.p, "fisher_z": fisher.z, "fisher_p": fisher.p,
-                "reason": williams.reason,
-            })
-    columns = ["component", "method_a", "method_b", "r_a", "r_b", "r_ab", "n_effective",
-               "williams_t", "df", "williams_p", "fisher_z", "fisher_p", "reason"]
+            rows.append(
+                {
+                    "component": component,
+                    "method_a": a,
+                    "method_b": b,
+                    "r_a": r_a,
+                    "r_b": r_b,
+                    "r_ab": r_ab,
+                    "n_effective": n,
+                    "williams_t": williams.t,
+                    "df": williams.df,
+                    "williams_p": williams.p,
+                    "fisher_z": fisher.z,
+                    "fisher_p": fisher.p,
+                    "reason": williams.reason,
+                }
+            )
+    columns = [
+        "component",
+        "method_a",
+        "method_b",
+        "r_a",
+        "r_b",
+        "r_ab",
+        "n_effective",
+        "williams_t",
+        "df",
+        "williams_p",
+        "fisher_z",
+        "fisher_p",
+        "reason",
+    ]
     return pd.DataFrame(rows, columns=columns)
 
 
@@ -191,11 +228,17 @@ def _sway(signals, judged, times) -> pd.DataFrame:
     rows = []
     for method, values in signals.items():
         sway = posturography(values["cop_ap"], values["cop_ml"], rate, stretches(judged))
-        rows.append({
-            "method": method, "rms_ap_mm": sway.rms_ap_mm, "rms_ml_mm": sway.rms_ml_mm,
-            "rms_ap_origin_m": sway.rms_ap_origin_m, "rms_ml_origin_m": sway.rms_ml_origin_m,
-            "mean_velocity_mm_s": sway.mean_velocity_mm_s,
-            "sway_length_mm": sway.sway_length_mm, "ellipse_area_mm2": sway.ellipse_area_mm2,
-            "duration_s": sway.duration_s,
-        })
+        rows.append(
+            {
+                "method": method,
+                "rms_ap_mm": sway.rms_ap_mm,
+                "rms_ml_mm": sway.rms_ml_mm,
+                "rms_ap_origin_m": sway.rms_ap_origin_m,
+                "rms_ml_origin_m": sway.rms_ml_origin_m,
+                "mean_velocity_mm_s": sway.mean_velocity_mm_s,
+                "sway_length_mm": sway.sway_length_mm,
+                "ellipse_area_mm2": sway.ellipse_area_mm2,
+                "duration_s": sway.duration_s,
+            }
+        )
     return pd.DataFrame(rows)

@@ -19,7 +19,7 @@ from bsip_cli.report.figures.canvas import to_png
 from bsip_cli.report.page import render
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import Origin, ParticipantRecord, Refusal, TrialRecord
-from bsip_cli.report.words import trial_label
+from bsip_cli.report.words import ROLES, trial_label
 from bsip_cli.stages.frames import person_from
 from bsip_cli.study import Participant, Trial
 from bsip_cli.unit import Unit
@@ -84,10 +84,14 @@ def record_of(unit: Unit) -> ParticipantRecord:
         excitation=unit.read("excitation"),
         identification=unit.read("identification"),
         body=person_from(skeleton, markers, load_skeleton(unit.config.skeleton)),
-        trials=tuple(_trial_record(unit, trial, usable) for trial in unit.participant.trials),
+        trials=tuple(_trial_record(unit, trial, usable) for trial in _by_role(unit.participant)),
         refusals=refusals_of(unit, unit.participant),
         origins=_origins(unit, usable),
     )
+
+
+def _by_role(participant: Participant) -> list[Trial]:
+    return sorted(participant.trials, key=lambda trial: list(ROLES).index(trial.role))
 
 
 def _trial_record(unit: Unit, trial: Trial, usable: dict[str, set[Trial]]) -> TrialRecord:

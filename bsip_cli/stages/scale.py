@@ -44,7 +44,10 @@ def run(unit: Unit) -> None:
     marker_set = load_marker_set(unit.facts("markers", still.trial)["marker_set"])
     assert unit.participant is not None
     calibration = calibrate(
-        skeleton, marker_set, _mean_positions(still, quiet), unit.participant.sex,
+        skeleton,
+        marker_set,
+        _mean_positions(still, quiet),
+        unit.participant.sex,
         unit.participant.height_m,
     )
     for note in calibration.notes:
@@ -55,12 +58,25 @@ def run(unit: Unit) -> None:
     _warn_missing(unit, skeleton, marker_set, fit)
     unit.write("skeleton", _skeleton_table(skeleton, calibration, fit))
     unit.write("marker-positions", _marker_table(skeleton, calibration, fit))
-    unit.write("person", pd.DataFrame([{
-        "sex": unit.participant.sex, "mass_kg": mass, "mass_source": source,
-        "plate_mass_kg": plate_mass, "height_m": calibration.stature_m,
-        "anterior_x": calibration.anterior[0], "anterior_y": calibration.anterior[1],
-        "calibration_trial": still.trial.stem, "marker_rms_m": fit.poses.rms_m(),
-    }]), facts={"marker_set": marker_set.name, "rms_before_m": fit.rms_before_m})
+    unit.write(
+        "person",
+        pd.DataFrame(
+            [
+                {
+                    "sex": unit.participant.sex,
+                    "mass_kg": mass,
+                    "mass_source": source,
+                    "plate_mass_kg": plate_mass,
+                    "height_m": calibration.stature_m,
+                    "anterior_x": calibration.anterior[0],
+                    "anterior_y": calibration.anterior[1],
+                    "calibration_trial": still.trial.stem,
+                    "marker_rms_m": fit.poses.rms_m(),
+                }
+            ]
+        ),
+        facts={"marker_set": marker_set.name, "rms_before_m": fit.rms_before_m},
+    )
 
 
 # --- which frames -----------------------------------------------------------------------------
@@ -68,8 +84,12 @@ def run(unit: Unit) -> None:
 
 def _calibrating_trial(unit: Unit, recorded: list[_Recorded]) -> _Recorded:
     if not recorded:
-        raise BadDataError("no trial with markers", file=unit.name, expected="at least one",
-                           remedy="see what ingest refused")
+        raise BadDataError(
+            "no trial with markers",
+            file=unit.name,
+            expected="at least one",
+            remedy="see what ingest refused",
+        )
     for one in recorded:
         if one.trial.role == "static":
             return one
@@ -105,7 +125,8 @@ def _mean_positions(one: _Recorded, frames: slice) -> dict[str, np.ndarray]:
     positions = one.positions[frames]
     return {
         label: positions[np.isfinite(positions[:, k, 0]), k].mean(axis=0)
-        for k, label in enumerate(one.labels) if np.isfinite(positions[:, k, 0]).any()
+        for k, label in enumerate(one.labels)
+        if np.isfinite(positions[:, k, 0]).any()
     }
 
 
@@ -133,8 +154,11 @@ def _refine(
     orientations, _ = tree_of(person).forward(all_poses)
     chosen = varied_frames(orientations, options.frames)
     return refine(
-        person, all_markers[chosen], all_poses[chosen],
-        ScalingOptions(**options.model_dump(exclude={"frames"})), ik,
+        person,
+        all_markers[chosen],
+        all_poses[chosen],
+        ScalingOptions(**options.model_dump(exclude={"frames"})),
+        ik,
     )
 
 
@@ -157,7 +181,8 @@ def _mass(unit: Unit, plate_mass: float) -> tuple[float, str]:
     if stated is None:
         if not plate_mass > 10:
             raise BadDataError(
-                "mass_kg is n/a and the plates do not tell it", file=unit.name,
+                "mass_kg is n/a and the plates do not tell it",
+                file=unit.name,
                 expected="a stated mass, or a quiet stretch with all contacts on plates",
                 remedy="put the mass into participants.tsv",
             )
@@ -184,22 +209,25 @@ def _warn_missing(unit: Unit, skeleton: Skeleton, marker_set: MarkerSet, fit: Re
             unit.warn(f"{unit.name}: no markers on {segment}, its joint is held{serve}")
 
 
-def _skeleton_table(
-    skeleton: Skeleton, calibration: Calibration, fit: Refinement
-) -> pd.DataFrame:
+def _skeleton_table(skeleton: Skeleton, calibration: Calibration, fit: Refinement) -> pd.DataFrame:
     first, person = calibration.person, fit.person
     parents = [skeleton.segments[i] if i >= 0 else "" for i in skeleton.parents]
     moved = person.joint_positions_m() - first.joint_positions_m()
     table = {
-        "segment": list(skeleton.segments), "parent": parents, "joint": list(skeleton.joints),
+        "segment": list(skeleton.segments),
+        "parent": parents,
+        "joint": list(skeleton.joints),
         "joint_type": list(skeleton.joint_types),
     }
     for name, values in (("joint", person.joint_in_parent_m), ("origin", person.origin_in_joint_m)):
         table |= {f"{name}_{axis}_m": values[:, k] for k, axis in enumerate("xyz")}
     table |= {
-        "parent_tilt_rad": person.parent_tilt_rad, "child_tilt_rad": person.child_tilt_rad,
-        "length_m": person.lengths_m, "first_guess_m": first.lengths_m,
-        "length_sd_m": fit.length_sd_m, "joint_shift_m": np.linalg.norm(moved, axis=1),
+        "parent_tilt_rad": person.parent_tilt_rad,
+        "child_tilt_rad": person.child_tilt_rad,
+        "length_m": person.lengths_m,
+        "first_guess_m": first.lengths_m,
+        "length_sd_m": fit.length_sd_m,
+        "joint_shift_m": np.linalg.norm(moved, axis=1),
         "held": person.held,
     }
     return pd.DataFrame(table)
@@ -212,10 +240,15 @@ def _marker_table(skeleton: Skeleton, calibration: Calibration, fit: Refinement)
     squares = np.where(seen, fit.poses.residual_m, 0.0) ** 2
     rms = np.sqrt(squares.sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
     positions = person.marker_positions_m
-    return pd.DataFrame({
-        "marker": list(person.markers),
-        "segment": [skeleton.segments[i] for i in person.marker_segments],
-        "x_m": positions[:, 0], "y_m": positions[:, 1], "z_m": positions[:, 2],
-        "weight": person.marker_weights, "shift_m": np.linalg.norm(moved, axis=1),
-        "residual_m": np.where(seen.any(axis=0), rms, np.nan),
-    })
+    return pd.DataFrame(
+        {
+            "marker": list(person.markers),
+            "segment": [skeleton.segments[i] for i in person.marker_segments],
+            "x_m": positions[:, 0],
+            "y_m": positions[:, 1],
+            "z_m": positions[:, 2],
+            "weight": person.marker_weights,
+            "shift_m": np.linalg.norm(moved, axis=1),
+            "residual_m": np.where(seen.any(axis=0), rms, np.nan),
+        }
+    )

@@ -39,7 +39,7 @@ def methods_beside_each_other(
         statistic=groups.f, df1=groups.df_between, df2=groups.df_within, p_value=groups.p,
         effect_size=groups.eta_squared, effect_size_name="eta squared",
         lilliefors_p=_smallest(test.p_value for test in normality),
-        reason=joined(groups.reason, *(test.reason for test in normality)),
+        reason=groups.reason or joined(*(test.reason for test in normality)),
     )
     same = repeated_measures_anova(complete, alpha)
     added = Comparison(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from bsip_cli.statistics.cohort_comparison import Comparison, joined
+from bsip_cli.statistics.cohort_comparison import Comparison
 from bsip_cli.statistics.cohort_values import OM, RM, Topic
 from bsip_cli.statistics.normality import NormalityTest, lilliefors_test
 from bsip_cli.statistics.paired_tests import (
@@ -76,7 +76,7 @@ def _t_row(
         statistic=test.t, df1=test.df, p_value=test.p,
         effect_size=test.cohens_d_pooled, effect_size_name="Cohen's d (pooled SD, RM - OM)",
         lilliefors_p=normality.p_value,
-        reason=joined(test.reason, normality.reason),
+        reason=test.reason or normality.reason,
     )
 
 

@@ -59,10 +59,11 @@ def _gain(record: CohortRecord) -> list[Block]:
     if not held_out:
         blocks.append(Paragraph("Nobody has held-out data: these numbers are from the data that "
                                 "identified the parameters, and favour OM.", "warning"))
-    worse = [row[0] for row in rows if int(row[3]) > int(row[2])]
+    worse = [row[0] for row in rows if row[1].startswith("+") or int(row[3]) > int(row[2])]
     blocks.append(Paragraph(
-        f"RM leads in more participants than OM in: {listing(worse)}.", "warning") if worse else
-        Paragraph("OM leads in at least as many participants as RM in every component.", "good"))
+        "The table (RM) follows better on the whole, or in more participants, in: "
+        f"{listing(worse)}.", "warning") if worse else
+        Paragraph("OM follows better on the whole in every component.", "good"))
     blocks.append(Grid(
         ("component", "typical change [%]", "OM better", "RM better", "the same", "all"),
         tuple(rows), "Change of the mean error (RMSE) from RM to OM, "

@@ -10,6 +10,8 @@ from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.words import MISSING, ROLES, count, number, percent
 
 _MOST_FINDINGS = 80
+_GAPS = "marker_gaps"  # the checks of ingest that are told apart here
+_PLATES = "plate"
 _LEVELS = ("excluded", "warning", "corrected")
 _FLAGS = ("left_on_ground", "right_on_ground", "left_on_plate", "right_on_plate", "valid")
 
@@ -20,9 +22,9 @@ def section(record: ParticipantRecord) -> Section:
                   "plate (the compared share). A frame is determined if its markers fix the pose."),
         Grid(
             ("trial", "role", "duration [s]", "compared [%]", "determined [%]",
-             "marker samples missing [%]", "excluded", "warnings", "corrected"),
+             "with gaps", "samples left open [%]", "excluded", "warnings", "corrected"),
             tuple(_row(trial) for trial in record.trials), words=2,
-            groups=(("", 6), ("findings at ingest", 3)),
+            groups=(("", 5), ("markers", 2), ("findings at ingest", 3)),
         ),
         *_findings(record),
         Heading("Contacts with the ground"), *_timelines(record),
@@ -36,7 +38,8 @@ def _row(trial: TrialRecord) -> tuple[str | Cell, ...]:
     return (
         trial.label, ROLES.get(trial.role, trial.role), _duration(trial),
         percent(_share(trial, "contacts", "valid")),
-        percent(_share(trial, "kinematics", "determined")), _missing_markers(trial),
+        percent(_share(trial, "kinematics", "determined")), _markers_with_gaps(trial),
+        _samples_left_open(trial),
         Cell(str(excluded), "warning" if excluded else ""),
         Cell(str(warned), "warning" if warned else ""), str(corrected),
     )
@@ -54,7 +57,11 @@ def _share(trial: TrialRecord, table: str, flag: str) -> float | None:
     return float(frame[flag].mean()) if frame is not None and len(frame) else None
 
 
-def _missing_markers(trial: TrialRecord) -> str:
+def _markers_with_gaps(trial: TrialRecord) -> str:
+    return MISSING if trial.quality is None else str((trial.quality["check"] == _GAPS).sum())
+
+
+def _samples_left_open(trial: TrialRecord) -> str:
     if trial.residuals is None or len(trial.residuals) == 0:
         return MISSING
     return percent(float(trial.residuals["residual_m"].isna().mean()), 1)
@@ -62,11 +69,12 @@ def _missing_markers(trial: TrialRecord) -> str:
 
 def _findings(record: ParticipantRecord) -> list[Block]:
     rows = [
-        (trial.label, Cell(row["level"], "warning" if row["level"] != "corrected" else ""),
+        (trial.label, Cell(row["level"], "warning" if row["level"] in _LEVELS[:2] else ""),
          row["check"], row["subject"] or MISSING, row["found"], row["expected"] or MISSING,
          row["action"] or MISSING)
-        for level in _LEVELS for trial in record.trials if trial.quality is not None
+        for level in (*_LEVELS, "info") for trial in record.trials if trial.quality is not None
         for _, row in trial.quality[trial.quality["level"] == level].iterrows()
+        if level != "info" or row["check"].startswith(_PLATES)
     ]
     if not rows:
         return [Paragraph("Nothing had to be corrected or excluded in the recordings.")]

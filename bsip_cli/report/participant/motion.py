@@ -38,7 +38,7 @@ def _strip(record: ParticipantRecord, trial: TrialRecord) -> list[Block]:
                      record.body_weight(), _INSTANTS.get(trial.role, _USUAL_INSTANTS))
     if strip is None:
         return [Paragraph(f"No frame of {trial.label} is determined by its markers.", "warning")]
-    forces = int(np.isfinite(strip.forces).all(axis=1).sum())
+    forces = int(np.isfinite(strip.arrow_tips_m()).all(axis=1).sum())
     caption = (f"{trial.label}: the pose at {len(strip.time_s)} instants, the force at {forces} of "
                "them.")
     return [Picture(stick_strip(strip), caption, f"Stick figures of {trial.label}.",

@@ -104,7 +104,7 @@ def _gain(record: ParticipantRecord) -> list[Block]:
     worse = [gain for gain in chosen if gain.better() == "RM"]
     if worse:
         blocks += [Paragraph("OM does not follow better everywhere. The table (RM) is better in:"),
-                   Bullets(tuple(_worse(gain) for gain in worse), "warning")]
+                   Bullets(_worse(worse), "warning")]
     else:
         blocks.append(Paragraph("In no trial and component is the table (RM) better by more than "
                                 f"{percent(SAME_WITHIN)} %."))
@@ -121,12 +121,14 @@ def _verdict(means: tuple[MeanGain, ...], held_out: bool) -> Paragraph:
                          f"{number(mean.om, 2)} {mean.unit} with OM "
                          f"({signed(100.0 * mean.change())} %)")
     where = "On data it had not seen" if held_out else "On the data it was fitted to"
-    better = [m for m in means if m.change() < -SAME_WITHIN]
+    counted = [m for m in means if m.component != "grf_vertical"]  # the same force as fz
+    better = [m for m in counted if m.change() < -SAME_WITHIN]
+    worse = [component_label(m.component) for m in counted if m.change() > SAME_WITHIN]
     text = (f"{where}, OM has the smaller mean error in {len(better)} of "
-            f"{count(len(means), 'component')}.")
+            f"{count(len(counted), 'component')}, RM in {listing(worse)}.")
     if parts:
         text += f" Mean error (RMSE) — {'; '.join(parts)}."
-    return Paragraph(text, "good" if held_out and len(better) > len(means) / 2 else "warning")
+    return Paragraph(text, "good" if held_out and len(better) > len(counted) / 2 else "warning")
 
 
 def _mean_grid(means: tuple[MeanGain, ...], held_out: bool) -> Grid:
@@ -148,10 +150,14 @@ def _mark(own: float, other: float) -> str:
     return "better" if own < other * (1.0 - SAME_WITHIN) else ""
 
 
-def _worse(gain: Gain) -> str:
-    return (f"{gain.trial}, {component_label(gain.component)}: {number(gain.rm, 2)} {gain.unit} "
-            f"with RM, {number(gain.om, 2)} {gain.unit} with OM "
-            f"({signed(100.0 * gain.change())} %)")
+def _worse(gains: list[Gain]) -> tuple[str, ...]:
+    """One sentence per trial."""
+    by_trial: dict[str, list[str]] = {}
+    for gain in gains:
+        by_trial.setdefault(gain.trial, []).append(
+            f"{component_label(gain.component)} {number(gain.rm, 2)} → {number(gain.om, 2)} "
+            f"{gain.unit} ({signed(100.0 * gain.change())} %)")
+    return tuple(f"{trial}: {'; '.join(parts)}" for trial, parts in by_trial.items())
 
 
 # --- warnings -------------------------------------------------------------------------------
@@ -159,7 +165,7 @@ def _worse(gain: Gain) -> str:
 
 def _warnings(record: ParticipantRecord) -> list[Block]:
     strongest = [*_refusals(record), *_undecided(record), *_quality(record, "excluded"),
-                 *_messages(record), *_quality(record, "warning")]
+                 *_quality(record, "warning"), *_messages(record)]
     strongest = list(dict.fromkeys(strongest))
     if not strongest:
         return [Paragraph("Nothing was refused, excluded or warned of.")]
@@ -188,16 +194,23 @@ def _undecided(record: ParticipantRecord) -> list[str]:
 
 
 def _quality(record: ParticipantRecord, level: str) -> list[str]:
-    """One sentence per finding, with all trials it was found in."""
-    found: dict[str, list[str]] = {}
+    """One sentence per check and what was done, with all trials it concerns."""
+    found: dict[tuple[str, str], dict[str, set[str]]] = {}
     for trial in record.trials:
-        rows = trial.quality[trial.quality["level"] == level] if trial.quality is not None else None
-        for _, row in rows.iterrows() if rows is not None else ():
-            sentence = f"{row['check']} {row['subject']}: {row['found']} ({row['action']})"
-            found.setdefault(sentence, []).append(trial.label)
-    return [f"{sentence}, in {listing(list(dict.fromkeys(trials)))}"
-            for sentence, trials in found.items()]
+        if trial.quality is not None:
+            for _, row in trial.quality[trial.quality["level"] == level].iterrows():
+                trials = found.setdefault((row["check"], row["action"]), {})
+                what = f"{row['subject']} {row['found']}".strip()
+                trials.setdefault(trial.label, set()).add(what)
+    return [_finding(check, action, trials) for (check, action), trials in found.items()]
+
+
+def _finding(check: str, action: str, trials: dict[str, set[str]]) -> str:
+    told = set().union(*trials.values())
+    what = told.pop() if len(told) == 1 else f"{count(len(told), 'finding')}, see section 2"
+    return f"{check} in {listing(list(trials))}: {what}{f' ({action})' if action else ''}"
 
 
 def _messages(record: ParticipantRecord) -> list[str]:
-    return [text for _, _, text in messages(record.origins)]
+    """What later stages warned of; ingest's findings stand for themselves."""
+    return [text for stage, _, text in messages(record.origins) if stage != "ingest"]

@@ -1,0 +1,62 @@
+import hashlib
+import re
+from html import unescape
+
+import numpy as np
+import pytest
+
+from bsip_cli.report.cohort.document import cohort_document
+from bsip_cli.stages.group_report import record_of
+
+
+@pytest.fixture(scope="module")
+def page(reports) -> str:
+    return reports.html("group")
+
+
+def test_links_lead_to_what_is_there(reports, page):
+    links = [link for link in re.findall(r'(?:src|href)="([^"]*)"', page)
+             if not link.startswith(("#", "data:"))]
+    assert "../sub-01/report.html" in links
+    assert "../sub-02/report.html" not in links  # its report was not made
+    for link in links:
+        assert (reports.out / "group" / link).is_file(), link
+
+
+def test_who_is_missing_is_said(page):
+    assert "2 of 3 participants" in page
+    assert "sub-03 has no identified parameters: not in table 1" in page
+
+
+def test_all_five_tables_are_there(page):
+    for k in range(1, 6):
+        assert re.search(rf"<h3>Table {k}\. ", page)
+    assert "table4_cross_validation.csv" in page
+
+
+def test_gain_is_that_of_the_values(reports, page):
+    record = record_of(reports.unit("report"))
+    ratios = [np.mean([g.om / g.rm for g in gains if g.held_out and g.component == "cop_ap"])
+              for gains in record.gains().values()]
+    typical = 100 * (np.exp(np.mean(np.log(ratios))) - 1)
+    row = re.search(r"COP, anterior-posterior</td>\s*<td[^>]*>([^<]+)<", page)
+    assert unescape(row[1]) == f"{typical:.0f}".replace("-", "−")
+
+
+def test_empty_cohort_gives_sentences(reports):
+    record = record_of(reports.unit("report"))
+    bare = type(record)(record.members[2:], record.values.iloc[:0], (), (), (), ())
+    document = cohort_document(bare)
+    texts = [getattr(block, "text", "") for s in document.sections for block in s.blocks]
+    assert "No trial could be compared with both methods." in texts
+    assert "No tables were made." in texts
+    assert not list(document.pictures())
+
+
+def test_second_run_gives_the_same_bytes(reports):
+    before = reports.files("group-report-files")
+    reports.run("report")
+    assert reports.files("group-report-files").equals(before)
+    for _, row in before.iterrows():
+        content = (reports.out / row["file"]).read_bytes()
+        assert hashlib.sha256(content).hexdigest() == row["sha256"]

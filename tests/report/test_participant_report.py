@@ -1,0 +1,98 @@
+import hashlib
+import re
+from html import unescape
+from xml.etree import ElementTree
+
+import pytest
+from fake_study import EVIL, svgs
+
+from bsip_cli.report.words import number, with_spread
+
+TITLES = ("Summary", "What was measured", "The motion", "The skeleton",
+          "The inertial parameters", "How well the forces follow", "Limits, warnings, options")
+
+
+@pytest.fixture(scope="module")
+def page(reports) -> str:
+    return reports.html("sub-01")
+
+
+@pytest.fixture(scope="module")
+def text(page) -> str:
+    """What a reader sees, with plain spaces."""
+    bare = re.sub(r"<(style|figure).*?</\1>", " ", page, flags=re.S)
+    return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]+>", " ", bare)))
+
+
+def test_page_needs_nothing_from_outside(page):
+    links = re.findall(r'(?:src|href)\s*=\s*"([^"]*)"', page)
+    assert links
+    assert all(link.startswith(("#", "data:image/svg+xml;base64,")) for link in links)
+    assert "http" not in re.sub(r'src="data:[^"]*"', "", page).replace("http-equiv", "")
+    assert "<script" not in page
+
+
+def test_page_is_small_enough(page):
+    assert len(page) < 6_000_000
+
+
+def test_foreign_labels_are_escaped(page, text):
+    assert EVIL not in page
+    assert EVIL in text  # shown as it is, not run
+
+
+def test_all_sections_are_there_in_order(page):
+    found = re.findall(r"<h2>\d\. (.*?)</h2>", page)
+    assert tuple(found) == TITLES
+
+
+def test_figures_are_whole_pictures_with_words(page):
+    figures = svgs(page)
+    assert len(figures) == 16
+    for figure in figures:
+        assert ElementTree.fromstring(figure).tag.endswith("svg")
+    assert all(re.findall(r'<img src="[^"]+" alt="([^"]+)"', page))
+
+
+def test_numbers_are_those_of_the_artifacts(reports, text):
+    unit = reports.unit("report", reports.study.participants[0])
+    bsip = unit.read("bsip")
+    for _, row in bsip[bsip["method"] == "OM"].iterrows():
+        assert with_spread(row["mass_kg"], row["mass_kg_sd"], 3) in text
+        assert with_spread(1e3 * row["com_y_m"], 1e3 * row["com_y_m_sd"], 1) in text
+    basketball = reports.study.participants[0].trials[2]
+    fit = unit.read("fit", basketball)
+    for _, row in fit.iterrows():
+        assert number(row["rmse"], 2) in text
+        assert number(row["schwer_c"], 3) in text
+
+
+def test_summary_tells_where_the_table_is_better(text):
+    assert "OM has the smaller mean error in 7 of 8 components, RM in moment, lab Z (up)." in text
+    assert "basketball (run 1): moment, lab Z (up) 9.00 → 15.30 N m (+70 %)" in text
+    assert "In quiet standing the plates read 63.10 kg (+0.5 %)." in text
+
+
+def test_decided_and_undecided_segments_are_named(text):
+    assert "(data share above 80 %) the mass of left foot, right thigh, right shank" in text
+    assert "(data share under 20 %) that of lower torso, upper torso and head." in text
+
+
+def test_files_are_listed_with_their_hash(reports):
+    person = reports.study.participants[0]
+    files = reports.files("report-files", person)
+    assert "sub-01/figures/fig3_cop_ml.png" in set(files["file"])
+    assert "sub-01/figures/fig3_vertical_force.svg" in set(files["file"])
+    for _, row in files.iterrows():
+        content = (reports.out / row["file"]).read_bytes()
+        assert hashlib.sha256(content).hexdigest() == row["sha256"]
+    written = {p.relative_to(reports.out).as_posix()
+               for p in (reports.out / "sub-01").rglob("*") if p.suffix in (".html", ".svg", ".png")}
+    assert written == set(files["file"])
+
+
+def test_second_run_gives_the_same_bytes(reports):
+    person = reports.study.participants[0]
+    before = reports.files("report-files", person)
+    reports.run("report", person)
+    assert reports.files("report-files", person).equals(before)

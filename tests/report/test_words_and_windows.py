@@ -1,0 +1,96 @@
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bsip_cli.report.figures.canvas import plain, runs, thinned
+from bsip_cli.report.gains import gains_of, mean_gains
+from bsip_cli.report.page import _tied
+from bsip_cli.report.windows import hull_of, middle_of_longest
+from bsip_cli.report.words import (
+    component_label,
+    count,
+    listing,
+    number,
+    segment_label,
+    signed,
+    significant,
+    trial_label,
+)
+
+
+@pytest.mark.parametrize(("value", "text"), [
+    (1.25, "1.2"), (-0.04, "0.0"), (-3.0, "−3.0"), (math.nan, "–"), (None, "–"), (math.inf, "–"),
+])
+def test_number(value, text):
+    assert number(value) == text
+
+
+@pytest.mark.parametrize(("value", "text"), [
+    (812.0, "812"), (182345.0, "182\N{THIN SPACE}000"), (0.05, "0.0500"), (1.2e-5, "1.20 × 10⁻⁵"),
+    (-3.14159, "−3.14"), (1.5e9, "1.50 × 10⁹"), (99.96, "100"), (0.0, "0.00"), (math.nan, "–"),
+])
+def test_significant(value, text):
+    assert significant(value) == text
+
+
+def test_words():
+    assert [signed(v) for v in (3.2, -3.2, 0.2, math.nan)] == ["+3", "−3", "0", "–"]
+    assert listing(["a", "b", "c"]) == "a, b and c"
+    assert listing([]) == "none"
+    assert (count(1, "trial"), count(2, "trial")) == ("1 trial", "2 trials")
+    assert trial_label("sub-01_task-throwing_run-2") == "throwing (run 2)"
+    assert trial_label("sub-01_task-static") == "static"
+    assert trial_label("<odd>") == "<odd>"
+    assert segment_label("upper_arm_l") == "left upper arm"
+    assert component_label("unheard") == "unheard"
+
+
+def test_units_stay_with_their_numbers():
+    assert _tied("5 % of 3 mm in 2 N m") == "5 % of 3 mm in 2 N m".replace(" ", "\xa0").replace(
+        "\xa0of\xa0", " of ").replace("\xa0in\xa0", " in ")
+
+
+def test_labels_lose_mathematics_and_control_signs():
+    assert plain("$x_1$") == r"\$x_1\$"
+    assert plain("a\x00b\nc") == "a?b?c"
+    assert len(plain("x" * 99)) == 16
+
+
+def test_runs_and_thinning():
+    assert runs(np.array([True, True, False, True])) == [(0, 2), (3, 4)]
+    assert runs(np.zeros(3, dtype=bool)) == []
+    assert len(np.arange(100_000)[thinned(100_000)]) <= 1200
+
+
+def test_window_is_the_middle_of_the_longest_stretch():
+    time = np.arange(0.0, 30.0, 0.1)
+    flags = (time < 4.0) | (time > 8.95)
+    window = middle_of_longest(time, flags, 10.0)
+    assert time[window][0] == pytest.approx(14.4, abs=0.11)
+    assert np.ptp(time[window]) == pytest.approx(10.0, abs=0.11)
+    assert middle_of_longest(time, np.zeros(300, dtype=bool), 10.0) == slice(0, 0)
+    assert middle_of_longest(time, time < 4.0, 10.0) == slice(0, 40)
+
+
+def test_hull():
+    assert hull_of(np.array([0, 0, 1, 0, 1, 0, 0], dtype=bool), 1) == slice(1, 6)
+    assert hull_of(np.zeros(4, dtype=bool), 1) == slice(0, 0)
+
+
+def test_gains():
+    fit = pd.DataFrame([
+        {"method": method, "component": component, "rmse": rmse, "unit": "N",
+         "rmse_percent_bw": 0.1 * rmse, "data": "held_out"}
+        for method, component, rmse in (
+            ("RM", "fx", 10.0), ("OM", "fx", 6.0), ("RM", "fz", 10.0), ("OM", "fz", 10.05),
+            ("RM", "grf_vertical", 10.0), ("OM", "grf_vertical", 12.0), ("RM", "mz", 3.0))
+    ])
+    gains = {gain.component: gain for gain in gains_of("throw", fit)}
+    assert set(gains) == {"fx", "fz", "grf_vertical"}
+    assert (gains["fx"].better(), gains["fz"].better()) == ("OM", "")
+    assert gains["fx"].change() == pytest.approx(-0.4)
+    assert (gains["grf_vertical"].unit, gains["grf_vertical"].rm) == ("% BW", 1.0)
+    means = mean_gains([*gains.values(), *gains.values()])
+    assert [m.trials for m in means] == [2, 2, 2]

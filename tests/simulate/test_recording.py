@@ -1,0 +1,163 @@
+"""What is written to C3D is what was simulated."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import ezc3d
+import numpy as np
+import pytest
+
+from bsip_cli.errors import UsageError
+from bsip_cli.simulate.markers import marker_paths, rigid_paths
+from bsip_cli.simulate.options import Laboratory, Rates, Richness, StudyOptions
+from bsip_cli.simulate.presets import preset
+from bsip_cli.simulate.recording import FULL_SCALE, plate_wrenches, plates_of, write_trial
+from bsip_cli.simulate.study import simulate_study
+
+QUIET = replace(Richness.none(), quantised=True)
+
+
+def _written(tmp_path, trial, person, richness, laboratory=None, rates=None):
+    laboratory = laboratory or Laboratory()
+    path = tmp_path / "trial.c3d"
+    rng = np.random.default_rng(5)
+    rates = rates or Rates(100, 1000)
+    pose = write_trial(path, trial, person, rates, laboratory, richness, rng, 0.03)
+    return ezc3d.c3d(str(path), extract_forceplat_data=True), pose, plates_of(laboratory)
+
+
+@pytest.mark.parametrize("task", ["squat", "walking", "basketball"])
+def test_the_plate_reads_back_the_true_wrench(tmp_path, trial, person, task):
+    here = trial(task)
+    c3d, pose, plates = _written(tmp_path, here, person, QUIET)
+    force, moment = plate_wrenches(here, plates, pose)[0]
+    n = len(here.time_s)
+    read = c3d["data"]["platform"][0]
+    half_step = 0.5 * FULL_SCALE / 2**15 * (1.0 + 1e-5)
+    assert np.all(np.abs(read["force"].T - force[:n]) <= half_step[:3].max() + 1e-3)
+    at_centre = moment - np.cross(plates[0].centre_m, force)
+    slack = half_step[3:].max() / 1000.0 + 0.05 * half_step[:3].max() + 1e-3
+    assert np.abs(read["moment"].T / 1000.0 - at_centre).max() <= slack
+    loaded = force[:, 2] > 100.0
+    assert loaded.any()
+    cop = plates[0].centre_m[:2] + np.stack(
+        [-at_centre[loaded, 1], at_centre[loaded, 0]], axis=1
+    ) / force[loaded, 2:]
+    assert np.abs(read["center_of_pressure"][:2, loaded].T / 1000.0 - cop).max() < 1e-3
+
+
+def test_a_standing_person_presses_down_inside_the_corners(tmp_path, trial, person):
+    c3d, _, _ = _written(tmp_path, trial("static"), person, Richness())
+    read = c3d["data"]["platform"][0]
+    assert read["force"][2].mean() == pytest.approx(9.81 * person.mass_kg, rel=1e-3)
+    raw = c3d["data"]["analogs"][0]
+    assert raw[2].mean() < 0.0  # Vicon: z of the plate points down
+    corners = read["corners"][:2]
+    cop = read["center_of_pressure"][:2].mean(axis=1)
+    assert np.all(corners.min(axis=1) < cop)
+    assert np.all(cop < corners.max(axis=1))
+
+
+def test_integer_parameters_are_integers(tmp_path, trial, person):
+    c3d, _, _ = _written(tmp_path, trial("static"), person, Richness())
+    group = c3d["parameters"]["FORCE_PLATFORM"]
+    for name in ("USED", "TYPE", "CHANNEL", "ZERO"):
+        assert np.issubdtype(np.asarray(group[name]["value"]).dtype, np.integer), name
+    assert group["ORIGIN"]["value"][2, 0] < 0.0
+    assert group["CORNERS"]["value"].shape == (3, 4, 1)
+
+
+def test_without_noise_markers_are_rigid_on_their_bones(trial, person):
+    here = trial("squat")
+    poses = here.poses.part(slice(None, None, 10))
+    paths = marker_paths(person, poses, 100.0, Richness.none(), np.random.default_rng(0))
+    for label, path in rigid_paths(person, poses).items():
+        assert np.array_equal(paths[label], path)
+    for a, b in (("RKNEL", "RKNEM"), ("C7", "LAC"), ("RASIS", "LPSIS"), ("LCAL", "LMT2")):
+        distance = np.linalg.norm(paths[a] - paths[b], axis=1)
+        assert np.ptp(distance) < 1e-12
+
+
+def test_skin_moves_by_millimetres(trial, person):
+    here = trial("squat")
+    poses = here.poses.part(slice(None, None, 10))
+    skin = replace(Richness.none(), soft_tissue=1.0)
+    marked = {m: person.markers[m] for m in ("RKNEL", "RKNEM", "LKNEL", "LKNEM")}
+    paths = marker_paths(person, poses, 100.0, skin, np.random.default_rng(0))
+    bones = rigid_paths(person, poses)
+    travel = [np.ptp(paths[m] - bones[m], axis=0).max() for m in marked]
+    assert 0.003 < max(travel) < 0.04
+    heel = np.ptp(paths["RCAL"] - bones["RCAL"], axis=0).max()
+    assert heel < 0.006
+
+
+def test_lost_markers_are_invalid_points(tmp_path, trial, person):
+    c3d, _, _ = _written(tmp_path, trial("squat"), person, Richness())
+    points = c3d["data"]["points"][:3]
+    residuals = c3d["data"]["meta_points"]["residuals"][0]
+    lost = np.isnan(points).any(axis=0)
+    assert lost.any()
+    assert np.all(residuals[lost] < 0.0)
+    assert np.all(residuals[~lost] >= 0.0)
+
+
+def test_a_second_plate_takes_the_next_footfall(tmp_path, trial, person):
+    c3d, _, _ = _written(
+        tmp_path, trial("walking"), person, Richness(), Laboratory(plates=2), Rates(100, 500)
+    )
+    first, second = c3d["data"]["platform"]
+    assert first["force"][2].max() > 5.0 * person.mass_kg
+    assert second["force"][2].max() > 5.0 * person.mass_kg
+
+
+def test_same_seed_same_bytes(tmp_path):
+    options = StudyOptions(
+        participants=1, tasks=("static", "squat"), durations_s={"static": 0.5, "squat": 2.0}
+    )
+    for name in ("a", "b"):
+        simulate_study(tmp_path / name, options)
+    files = sorted(p.relative_to(tmp_path / "a") for p in (tmp_path / "a").rglob("*.*"))
+    assert len(files) == 5
+    for file in files:
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+
+
+def test_study_layout_and_truth(tmp_path):
+    options = StudyOptions(
+        participants=2, tasks=("static", "throwing"), durations_s={"static": 0.5, "throwing": 1.6}
+    )
+    truth = simulate_study(tmp_path, options)
+    table = (tmp_path / "participants.tsv").read_text().splitlines()
+    assert table[0] == "participant_id\tsex\tmass_kg\theight_m"
+    assert [row.split("\t")[1] for row in table[1:]] == ["M", "F"]
+    assert (tmp_path / "sub-02" / "sub-02_task-throwing_run-1.c3d").is_file()
+    record = json.loads((tmp_path / "truth" / "sub-02_truth.json").read_text())
+    masses = [s["mass_kg"] for s in record["person"]["segments"].values()]
+    assert sum(masses) == pytest.approx(truth.participants[1].person.mass_kg)
+    assert abs(float(table[2].split("\t")[2]) - sum(masses)) < 0.6
+    ball = record["trials"]["sub-02_task-throwing_run-1"]["ball"]
+    assert 0.15 <= ball["mass_kg"] <= 0.4
+    assert 0.0 < ball["release_s"] < 1.6
+
+
+def test_the_sample_fits_into_eleven_megabytes():
+    """From the format: 16 bytes per point and frame, 4 per analog sample, blocks of 512."""
+    options = preset("sample")
+    size = 0
+    for task in options.tasks:
+        rates, seconds = options.rates_of(task), options.durations_s[task]
+        per_frame = 38 * 16 + 6 * 4 * rates.analog_hz // rates.marker_hz
+        size += seconds * rates.marker_hz * per_frame + 4096
+    truth_file = 25_000
+    assert options.participants * (size + truth_file) < 11e6
+
+
+def test_impossible_options_are_refused(tmp_path):
+    with pytest.raises(UsageError, match="marker rate"):
+        simulate_study(tmp_path, StudyOptions(rates={"default": Rates(120, 1000)}))
+    with pytest.raises(UsageError, match="unknown tasks"):
+        simulate_study(tmp_path, StudyOptions(tasks=("dancing",)))
+    with pytest.raises(UsageError, match="preset"):
+        preset("large")

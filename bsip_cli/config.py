@@ -71,6 +71,7 @@ class Prior(Section):
     mass_sd_percent: float = Field(gt=0)
     com_sd_percent: float = Field(gt=0)
     inertia_sd_percent: float = Field(gt=0)
+    total_mass_sd_percent: float = Field(gt=0)
 
 
 class Identify(Section):

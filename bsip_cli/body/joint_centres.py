@@ -55,6 +55,7 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
     _require(landmarks)
     notes: list[str] = []
     axes, middle, width = _pelvis(landmarks)
+    _require_sides(landmarks, axes[:, 2])
     centres = {
         "waist": middle + width * (axes @ _LJC[sex]),
         "hip_r": middle + width * (axes @ _HJC[sex]),
@@ -105,6 +106,21 @@ def _require(landmarks: Mapping[str, np.ndarray]) -> None:
             f"no marker for {', '.join(missing)}",
             expected="at least one frame of the calibrating trial in which they are visible",
             remedy="name the markers that serve in a marker set, or calibrate with another trial",
+        )
+
+
+def _require_sides(landmarks: Mapping[str, np.ndarray], right: np.ndarray) -> None:
+    """Right-hand landmarks must lie to the right of left-hand ones, as the pelvis has it."""
+    swapped = [
+        name
+        for name in ("acromion", "knee_lateral", "malleolus_lateral", "calcaneus")
+        if (landmarks[f"{name}_r"] - landmarks[f"{name}_l"]) @ right < 0
+    ]
+    if swapped:
+        raise BadDataError(
+            f"left and right are exchanged for {', '.join(swapped)}",
+            expected="right markers on the pelvis' right side in the calibrating pose",
+            remedy="correct the labels of that trial, or calibrate with another",
         )
 
 

@@ -17,6 +17,7 @@ class Spread:
     mass_sd_percent: float
     com_sd_percent: float
     inertia_sd_percent: float
+    total_mass_sd_percent: float
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Prior:
     inertias : per segment, in the segment frame.
     origin_in_joint_m : (n, 3) segment origin seen from the joint; parallel frames.
     phi : (10 n,) mean, about the joint centres (Pinocchio's order).
-    root : (10 n, 10 n) block-diagonal S with covariance S S^T.
+    root : (10 n, 10 n) S with covariance S S^T.
     readable_sd : (n, 10) the same spread for mass, centre of mass and tensor.
     """
 
@@ -40,18 +41,29 @@ class Prior:
 
 
 def prior_of(inertias: tuple[Inertia, ...], person: Person, spread: Spread) -> Prior:
-    """Build the prior; the parameters of a segment spread independently of each other."""
+    """Build the prior: parameters spread independently, but the masses sum to the scale's."""
     origins = person.origin_in_joint_m
     n = len(inertias)
     phi, root = np.empty(10 * n), np.zeros((10 * n, 10 * n))
-    readable_sd = np.empty((n, 10))
     for i, inertia in enumerate(inertias):
         block = slice(10 * i, 10 * i + 10)
-        about_joint = inertia.moved(-origins[i])
-        phi[block] = about_joint.phi()
-        readable_sd[i] = _readable_sd(inertia, person.lengths_m[i], spread)
-        root[block, block] = np.linalg.solve(readable_jacobian(phi[block]), np.diag(readable_sd[i]))
+        phi[block] = inertia.moved(-origins[i]).phi()
+        spreads = np.diag(_readable_sd(inertia, person.lengths_m[i], spread))
+        root[block, block] = np.linalg.solve(readable_jacobian(phi[block]), spreads)
+    root = _with_total_mass(root, spread.total_mass_sd_percent / 100 * phi[::10].sum())
+    readable_sd = np.empty((n, 10))
+    for i in range(n):
+        block = slice(10 * i, 10 * i + 10)
+        readable_sd[i] = np.linalg.norm(readable_jacobian(phi[block]) @ root[block], axis=1)
     return Prior(inertias, origins, phi, root, readable_sd)
+
+
+def _with_total_mass(root: np.ndarray, sd_kg: float) -> np.ndarray:
+    """The root of the covariance once the sum of the masses is known to ``sd_kg``."""
+    total = root[::10].sum(axis=0)
+    variance = total @ total
+    shrink = 1.0 - sd_kg / np.sqrt(variance + sd_kg**2)
+    return root - shrink * np.outer(root @ total, total) / variance
 
 
 def _readable_sd(inertia: Inertia, length_m: float, spread: Spread) -> np.ndarray:

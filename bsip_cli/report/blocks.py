@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Mark = Literal["", "better", "warning", "group"]
 Tone = Literal["plain", "good", "warning", "note"]
 
 
@@ -38,7 +39,7 @@ class Cell:
     """One cell: its text, how it is set off, and where it leads (a relative link) if anywhere."""
 
     text: str
-    mark: Literal["", "better", "warning", "group"] = ""
+    mark: Mark = ""
     link: str = ""
 
 

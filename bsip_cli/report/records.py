@@ -84,7 +84,7 @@ class ParticipantRecord:
 
     def identification_trials(self) -> tuple[TrialRecord, ...]:
         """Trials whose samples identified the parameters."""
-        named = " ".join(self.identification["trials"].astype(str))
+        named = {stem for row in self.identification["trials"] for stem in str(row).split(", ")}
         return tuple(trial for trial in self.trials if trial.stem in named)
 
     def option(self, section: str, name: str, otherwise: float) -> float:

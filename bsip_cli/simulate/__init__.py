@@ -1,0 +1,10 @@
+"""Simulated studies with a known truth.
+
+The way of the data: `people` draws a person; a movement in `movements` sketches joint
+angles, feet and support (`sketch`, `plan`); `balance` finds the pelvis' path that makes it
+physically possible; `kinematics` poses all bodies; `wrench` gets the ground wrench from the
+rate of momentum; `trial` splits it between the feet; `markers` and `recording` measure it
+as a lab would; `study` writes the folder, with the truth beside it.
+
+Nothing here is shared with the fitted side but the names of the segments.
+"""

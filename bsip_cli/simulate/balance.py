@@ -39,6 +39,7 @@ HASTE = 1.35  # over-relaxation of the turns: the feet do not follow the pelvis
 CLOSE_ENOUGH_M = 2e-7  # and rad
 STANDING_CLOSE_ENOUGH_M = 1e-6
 ROUGH_M = 1e-4
+REFINING_SLACK = 0.0005  # reach kept back for what interpolation adds
 MOST_ROUNDS = 60
 MOST_LOWERINGS = 12
 
@@ -74,7 +75,9 @@ def balanced(person: Person, plan: Plan, thin: int = 1) -> Poses:
 
     thin : balance every `thin`-th sample only and interpolate (for long standing trials).
     """
-    coarse = plan.thinned(thin) if thin > 1 else plan
+    coarse = plan
+    if thin > 1:
+        coarse = replace(plan.thinned(thin), longest_reach=plan.longest_reach - REFINING_SLACK)
     state, height = _within_reach(person, coarse)
     if thin > 1:
         state = _refined(coarse, state, plan)
@@ -134,9 +137,7 @@ def _lowered(plan: Plan, by_m: np.ndarray) -> Plan:
     return replace(plan, pelvis_m=plan.pelvis_m - by_m[:, None] * UP, com_height_m=height)
 
 
-def _balance(
-    person: Person, plan: Plan, state: State, final: bool
-) -> tuple[State, Poses]:
+def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[State, Poses]:
     """The fixed-point iteration; a rough one, without turns in flight, unless `final`."""
     cop = plan.cop_m()
     if plan.sway_share:

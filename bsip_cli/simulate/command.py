@@ -13,7 +13,10 @@ from bsip_cli.simulate.study import simulate_study
 
 
 def simulate_command(
-    study: Path, preset_name: str, participants: int | None, seed: int | None,
+    study: Path,
+    preset_name: str,
+    participants: int | None,
+    seed: int | None,
     sequence_s: float | None,
 ) -> None:
     """Write a simulated study into a new or empty folder."""

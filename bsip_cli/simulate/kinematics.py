@@ -49,8 +49,10 @@ class Poses:
 
 def centre_of_mass(person: Person, poses: Poses) -> np.ndarray:
     """(T, 3) centre of mass of the whole body."""
-    parts = person.inertias.items()
-    return sum(part.mass_kg * poses.point(b, part.com_m) for b, part in parts) / person.mass_kg
+    first = np.zeros_like(poses.origin_m["lower_torso"])
+    for body, part in person.inertias.items():
+        first += part.mass_kg * poses.point(body, part.com_m)
+    return first / person.mass_kg
 
 
 def poses_of(

@@ -63,7 +63,8 @@ def place_markers(
     for side, sign in (("l", -1.0), ("r", 1.0)):
         places |= _arm(side, sign, lengths, joints, errors, hinges, widths)
         places |= _leg(side, sign, lengths, hinges, ankle_height)
-    sliding = {body: rng.standard_normal((3, 6)) for body in sorted({b for b, _ in places.values()})}
+    bodies = sorted({body for body, _ in places.values()})
+    sliding = {body: rng.standard_normal((3, 6)) for body in bodies}
     markers = {}
     for label, (body, position) in places.items():
         error = richness.placement_error_m * rng.standard_normal(3)

@@ -14,7 +14,7 @@ from bsip_cli.simulate.rotations import rotate, transpose, unskew
 LAG_SMOOTHING_S = 0.02
 DRIFT_SMOOTHING_S = 0.3
 GAP_FRAMES = (5, 40)
-GAPS_PER_TRIAL = 2.0
+GAPS_PER_TRIAL = 1.5  # beyond the first one
 GAPS_PER_SECOND = 0.12
 LONGEST_GAP_SHARE = 0.15  # of a trial
 # The bones whose turning against a marker's bone moves the skin over it.
@@ -68,7 +68,8 @@ def _neighbours(label: str, body: str) -> tuple[str, str]:
     if label in ("RAC", "LAC", "RSCAP"):
         second = f"upper_arm_{label[0].lower()}"
     sided = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
-    return tuple(name + side if name in sided else name for name in (first, second))
+    first, second = (name + side if name in sided else name for name in (first, second))
+    return first, second
 
 
 def _lag(marker: Marker, path: np.ndarray, rate_hz: float) -> np.ndarray:
@@ -80,9 +81,7 @@ def _lag(marker: Marker, path: np.ndarray, rate_hz: float) -> np.ndarray:
     return -marker.lag_s2 * smooth
 
 
-def _noise(
-    frames: int, rate_hz: float, richness: Richness, rng: np.random.Generator
-) -> np.ndarray:
+def _noise(frames: int, rate_hz: float, richness: Richness, rng: np.random.Generator) -> np.ndarray:
     white = richness.marker_noise_m * rng.standard_normal((frames, 3))
     slow = gaussian_filter1d(
         rng.standard_normal((frames, 3)), DRIFT_SMOOTHING_S * rate_hz, axis=0, mode="reflect"
@@ -101,7 +100,7 @@ def _with_gaps(
     longest = min(GAP_FRAMES[1], int(LONGEST_GAP_SHARE * frames))
     if longest <= GAP_FRAMES[0]:
         return paths
-    count = rng.poisson(GAPS_PER_TRIAL + GAPS_PER_SECOND * frames / rate_hz)
+    count = 1 + rng.poisson(GAPS_PER_TRIAL + GAPS_PER_SECOND * frames / rate_hz)
     for label in rng.choice(labels, size=min(count, len(labels)), replace=False):
         length = int(rng.integers(GAP_FRAMES[0], longest + 1))
         start = int(rng.integers(0, frames - length))

@@ -20,7 +20,6 @@ from bsip_cli.simulate.inertia import (
     Inertia,
     combined,
     nearest_physical,
-    tensor_of,
     varied_tensor,
 )
 from bsip_cli.simulate.landmarks import Marker, place_markers
@@ -127,9 +126,7 @@ def draw_person(rng: np.random.Generator, richness: Richness, sex: str = "") -> 
     ankle_height = 0.045 * stature
     joints, predicted = _draw_joints(rng, sex, lengths, widths, richness.joint_centre_offset)
     hinges = _draw_hinges(rng, richness.hinge_tilt)
-    inertias = _draw_inertias(
-        rng, sex, mass, lengths, body_mass_index, richness.inertia_variation
-    )
+    inertias = _draw_inertias(rng, sex, mass, lengths, body_mass_index, richness.inertia_variation)
     markers = place_markers(
         rng, sex, lengths, joints, predicted, hinges, widths, ankle_height, richness
     )
@@ -222,8 +219,9 @@ def _draw_inertias(
 ) -> dict[str, Inertia]:
     """True inertial parameters: the mean person's, varied, summing to the mass."""
     mean = mean_segments(sex)
-    common = {name: np.exp(scale * MASS_SPREAD.get(name, 0.11) * rng.standard_normal())
-              for name in mean}
+    common = {
+        name: np.exp(scale * MASS_SPREAD.get(name, 0.11) * rng.standard_normal()) for name in mean
+    }
     masses = {
         body: mean[kind].mass_percent
         * common[kind]
@@ -233,8 +231,13 @@ def _draw_inertias(
     total = sum(masses.values())
     return {
         body: _draw_inertia(
-            rng, body, mean[kind], mass * masses[body] / total,
-            _table_length(body, lengths, sex), body_mass_index, scale,
+            rng,
+            body,
+            mean[kind],
+            mass * masses[body] / total,
+            _table_length(body, lengths, sex),
+            body_mass_index,
+            scale,
         )
         for body, kind in _kinds().items()
     }
@@ -272,9 +275,3 @@ def _draw_inertia(
     tensor = np.outer(mirror, mirror) * mean.tensor * mass * length**2
     tensor = varied_tensor(tensor, rng, 0.12 * scale) if scale else tensor
     return Inertia(mass, com, tensor)
-
-
-def point_mass_like(mass_kg: float, radius_m: float, position_m: np.ndarray) -> Inertia:
-    """A homogeneous ball at a position in a body's frame."""
-    moments = mass_kg * radius_m**2 / 5.0 * np.eye(3)
-    return Inertia(mass_kg, np.asarray(position_m, dtype=float), tensor_of(moments))

@@ -107,5 +107,6 @@ class Plan:
 
 
 def _thinned_foot(foot: Foot, s: slice) -> Foot:
-    return Foot(foot.position_m[s], foot.rotation[s], foot.share[s], foot.cop_m[s],
-                foot.on_plate[s])
+    return Foot(
+        foot.position_m[s], foot.rotation[s], foot.share[s], foot.cop_m[s], foot.on_plate[s]
+    )

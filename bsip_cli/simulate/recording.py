@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import ezc3d
 import numpy as np
 
 from bsip_cli.simulate.markers import marker_paths
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
-from bsip_cli.simulate.people import SIDES, Person
+from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import STEP_S
 from bsip_cli.simulate.trial import Trial
 
@@ -133,20 +134,63 @@ def _plate_of(
     return None
 
 
-def analog_channels(
+@dataclass(frozen=True)
+class Measurement:
+    """What the lab's instruments deliver for one trial, before it is written.
+
+    points_m : (frames, markers, 3) in the lab, NaN where a marker is lost.
+    channels : (samples, 6 per plate) N and N mm in each plate's frame, not yet quantised.
+    pose : where the walkway lies in the lab (truth).
+    """
+
+    labels: list[str]
+    points_m: np.ndarray
+    channels: np.ndarray
+    plates: list[Plate]
+    rates: Rates
+    pose: Pose
+
+
+def measure_trial(
+    trial: Trial,
+    person: Person,
+    rates: Rates,
+    laboratory: Laboratory,
+    richness: Richness,
+    rng: np.random.Generator,
+    heading_error_rad: float = 0.0,
+) -> Measurement:
+    """Sample markers and plates of a trial, with soft tissue, noise and gaps."""
+    pose = walkway_pose(trial, laboratory, heading_error_rad)
+    plates = plates_of(laboratory)
+    frames = len(trial.time_s) * rates.marker_hz // SIMULATION_HZ
+    sampled = trial.poses.part(slice(0, None, SIMULATION_HZ // rates.marker_hz))
+    paths = marker_paths(person, sampled, rates.marker_hz, richness, rng)
+    points = np.stack([pose.points(path[:frames]) for path in paths.values()], axis=1)
+    samples = frames * rates.analog_hz // rates.marker_hz
+    channels = [
+        _noisy_channels(wrench, plate, rates.analog_hz, richness, rng)[:samples]
+        for wrench, plate in zip(plate_wrenches(trial, plates, pose), plates, strict=True)
+    ]
+    return Measurement(list(paths), points, np.hstack(channels), plates, rates, pose)
+
+
+def _noisy_channels(
     wrench: tuple[np.ndarray, np.ndarray],
     plate: Plate,
     rate_hz: int,
     richness: Richness,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """(N, 6) sampled, noisy and quantised channels of one plate."""
+    """(N, 6) channels of one plate at the analog rate, sampled directly."""
     channels = plate.channels(*wrench)[:: SIMULATION_HZ // rate_hz]
     noise = np.repeat([richness.force_noise_n, MM * richness.moment_noise_nm], 3)
-    channels = channels + noise * rng.standard_normal(channels.shape)
-    if not richness.quantised:
-        return channels
-    steps = FULL_SCALE / ADC_STEPS
+    return channels + noise * rng.standard_normal(channels.shape)
+
+
+def quantised(channels: np.ndarray) -> np.ndarray:
+    """Channels (N, 6 per plate) rounded to the steps of a 16-bit converter, and clipped."""
+    steps = np.tile(FULL_SCALE / ADC_STEPS, channels.shape[1] // 6)
     return np.clip(np.round(channels / steps), -ADC_STEPS, ADC_STEPS - 1) * steps
 
 
@@ -161,63 +205,52 @@ def write_trial(
     heading_error_rad: float = 0.0,
     subject: str = "sub-01",
 ) -> Pose:
-    """Write one C3D file; returns where the walkway lies in the lab."""
-    pose = walkway_pose(trial, laboratory, heading_error_rad)
-    plates = plates_of(laboratory)
-    frames = len(trial.time_s) * rates.marker_hz // SIMULATION_HZ
-    sampled = trial.poses.part(slice(0, None, SIMULATION_HZ // rates.marker_hz))
-    paths = marker_paths(person, sampled, rates.marker_hz, richness, rng)
-    points = np.stack([pose.points(path[:frames]) for path in paths.values()], axis=1)
-    ratio = rates.analog_hz // rates.marker_hz
-    analogs = [
-        analog_channels(wrench, plate, rates.analog_hz, richness, rng)[: frames * ratio]
-        for wrench, plate in zip(plate_wrenches(trial, plates, pose), plates, strict=True)
-    ]
-    _write_c3d(path, list(paths), points, np.hstack(analogs), plates, rates, subject)
-    return pose
+    """Measure a trial and write it; returns where the walkway lies in the lab."""
+    measurement = measure_trial(trial, person, rates, laboratory, richness, rng, heading_error_rad)
+    write_measurement(path, measurement, richness.quantised, subject)
+    return measurement.pose
 
 
-def _write_c3d(
-    path: Path,
-    labels: list[str],
-    points_m: np.ndarray,
-    analogs: np.ndarray,
-    plates: list[Plate],
-    rates: Rates,
-    subject: str,
+def write_measurement(
+    path: Path, measurement: Measurement, quantise: bool = True, subject: str = "sub-01"
 ) -> None:
-    """points_m : (frames, markers, 3), NaN where lost. analogs : (samples, channels)."""
-    import ezc3d
-
+    """Write one C3D file: points in mm, plates of type 2 in N and N mm."""
     c3d = ezc3d.c3d()
+    rates, plates, labels = measurement.rates, measurement.plates, measurement.labels
     names = [f"{name}{k + 1}" for k in range(len(plates)) for name in CHANNELS]
-    parameters = c3d["parameters"]
-    parameters["POINT"]["RATE"]["value"] = [float(rates.marker_hz)]
-    parameters["POINT"]["LABELS"]["value"] = labels
-    parameters["POINT"]["DESCRIPTIONS"]["value"] = labels
-    parameters["POINT"]["UNITS"]["value"] = ["mm"]
-    parameters["ANALOG"]["RATE"]["value"] = [float(rates.analog_hz)]
-    parameters["ANALOG"]["LABELS"]["value"] = names
-    parameters["ANALOG"]["DESCRIPTIONS"]["value"] = [f"Force plate {n[-1]}" for n in names]
-    parameters["ANALOG"]["UNITS"]["value"] = [u for _ in plates for u in ["N"] * 3 + ["Nmm"] * 3]
+    point, analog = c3d["parameters"]["POINT"], c3d["parameters"]["ANALOG"]
+    point["RATE"]["value"] = [float(rates.marker_hz)]
+    point["LABELS"]["value"] = labels
+    point["DESCRIPTIONS"]["value"] = labels
+    point["UNITS"]["value"] = ["mm"]
+    analog["RATE"]["value"] = [float(rates.analog_hz)]
+    analog["LABELS"]["value"] = names
+    analog["DESCRIPTIONS"]["value"] = [f"Force plate {name[-1]}" for name in names]
+    analog["UNITS"]["value"] = [unit for _ in plates for unit in ["N"] * 3 + ["Nmm"] * 3]
     _add_plates(c3d, plates)
     c3d.add_parameter("SUBJECTS", "NAMES", [subject])
     c3d.add_parameter("SUBJECTS", "USES_PREFIXES", [0])
+    c3d["parameters"]["SUBJECTS"]["USES_PREFIXES"]["value"] = np.array([0])
     c3d.add_parameter("MANUFACTURER", "COMPANY", ["simulation"])
     c3d.add_parameter("MANUFACTURER", "SOFTWARE", ["bsip simulate"])
-
-    lost = np.isnan(points_m).any(axis=2)
-    homogeneous = np.ones((4, len(labels), len(points_m)))
-    homogeneous[:3] = MM * points_m.transpose(2, 1, 0)
-    c3d["data"]["points"] = homogeneous
-    residuals = np.where(lost.T, -1.0, 0.0)[None]
-    c3d["data"]["meta_points"]["residuals"] = residuals
-    c3d["data"]["meta_points"]["camera_masks"] = np.zeros((7, *lost.T.shape), dtype=bool)
-    c3d["data"]["analogs"] = analogs.T[None]
+    _add_points(c3d, measurement.points_m)
+    channels = quantised(measurement.channels) if quantise else measurement.channels
+    c3d["data"]["analogs"] = channels.T[None]
     c3d.write(str(path))
 
 
-def _add_plates(c3d: object, plates: list[Plate]) -> None:
+def _add_points(c3d: ezc3d.c3d, points_m: np.ndarray) -> None:
+    """Points (frames, markers, 3); a lost one has NaN coordinates and residual -1."""
+    frames, markers, _ = points_m.shape
+    lost = np.isnan(points_m).any(axis=2).T
+    homogeneous = np.ones((4, markers, frames))
+    homogeneous[:3] = MM * points_m.transpose(2, 1, 0)
+    c3d["data"]["points"] = homogeneous
+    c3d["data"]["meta_points"]["residuals"] = np.where(lost, -1.0, 0.0)[None]
+    c3d["data"]["meta_points"]["camera_masks"] = np.zeros((7, markers, frames), dtype=bool)
+
+
+def _add_plates(c3d: ezc3d.c3d, plates: list[Plate]) -> None:
     """The FORCE_PLATFORM group; integers are set by hand because ezc3d writes floats."""
     n = len(plates)
     c3d.add_parameter("FORCE_PLATFORM", "UNITS", ["N"])
@@ -234,8 +267,3 @@ def _add_plates(c3d: object, plates: list[Plate]) -> None:
         if name not in parameters:
             c3d.add_parameter("FORCE_PLATFORM", name, [0.0])
         parameters[name]["value"] = value
-
-
-def feet_in_the_lab(trial: Trial, pose: Pose) -> dict[str, np.ndarray]:
-    """(T, 3) ankle paths in the lab, for checks."""
-    return {side: pose.points(trial.poses.origin_m[f"foot_{side}"]) for side in SIDES}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -60,7 +61,7 @@ class Sketch:
             self.angles[f"elbow_{side}"] = zero + np.deg2rad(16.0)
             self.angles[f"wrist_{side}"] = triple + np.deg2rad([3.0, 0.0, 70.0])
             self.feet[side] = self._standing_foot(side)
-        self.pelvis_m = triple + [0.035, self.standing_height_m(), 0.0]
+        self.pelvis_m = triple + np.array([0.035, self.standing_height_m(), 0.0])
 
     def _standing_foot(self, side: str) -> FootSketch:
         zero = np.zeros_like(self.t_s)
@@ -96,7 +97,7 @@ class Sketch:
             heights.append(person.ankle_height_m + reach - hip[1])
         return float(min(heights))
 
-    def plan(self, **options: object) -> Plan:
+    def plan(self, **options: Any) -> Plan:
         """Freeze the sketch; `options` are further fields of `Plan`."""
         start = round((self.recorded_s[0] - self.t_s[0]) / STEP_S)
         samples = round((self.recorded_s[1] - self.recorded_s[0]) / STEP_S)

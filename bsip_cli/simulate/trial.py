@@ -130,8 +130,11 @@ def _contacts(plan: Plan) -> tuple[Contact, ...]:
             cop = foot.cop_m[keep][a:b].mean(axis=0)
             contacts.append(
                 Contact(
-                    side, round(a * STEP_S, 3), round((b - 1) * STEP_S, 3),
-                    bool(foot.on_plate[keep][a:b].any()), (float(cop[0]), float(cop[1])),
+                    side,
+                    round(a * STEP_S, 3),
+                    round((b - 1) * STEP_S, 3),
+                    bool(foot.on_plate[keep][a:b].any()),
+                    (float(cop[0]), float(cop[1])),
                 )
             )
     return tuple(sorted(contacts, key=lambda contact: (contact.start_s, contact.side)))

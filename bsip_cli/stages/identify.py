@@ -29,7 +29,7 @@ from bsip_cli.unit import Unit
 # Where the iteration of the weights begins: force plates and skin make errors of this size.
 _FIRST_NOISE = np.array([10.0, 10.0, 10.0, 5.0, 5.0, 5.0])
 _WEIGHT_ROUNDS = 3
-_SHORTEST_S = 1.0
+_SHORTEST_S = 0.5
 
 
 def run(unit: Unit) -> None:

@@ -105,12 +105,14 @@ def _counted(topic, test, origin, results: Sequence[tuple[float, float]], reason
     better = sum(t > 0.0 and p < alpha for t, p in possible)
     worse = sum(t < 0.0 and p < alpha for t, p in possible)
     impossible = len(results) - len(possible)
-    count = f"in {impossible} of {len(results)} participants. " if impossible else ""
+    like = ", for instance" if len(reasons) > 1 else ""
+    concerned = f"in {impossible} of {len(results)} participants{like}"
     return Comparison(
         topic, test, origin, OM, RM, n=len(possible),
         statistic=float(np.median([t for t, _ in possible])) if possible else nan,
         p_value=float(np.median([p for _, p in possible])) if possible else nan,
         effect_size=(better + worse) / len(possible) if possible else nan,
         effect_size_name="share of participants whose correlations differ",
-        count_a=better, count_b=worse, reason=count + " ".join(reasons),
+        count_a=better, count_b=worse,
+        reason=f"{concerned}: {reasons[0]}" if reasons else "",
     )

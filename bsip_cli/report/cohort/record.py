@@ -39,7 +39,8 @@ class CohortRecord:
 
     def gains(self) -> dict[str, tuple[Gain, ...]]:
         """Participant -> errors of RM and OM in each trial and component."""
-        return {name: _gains(rows) for name, rows in self.values.groupby("participant", sort=True)}
+        people = self.values.groupby("participant", sort=True)
+        return {str(name): _gains(rows) for name, rows in people}
 
     def errors(self, variable: str) -> pd.DataFrame:
         """Rows of one error of table 4: participant, task, data, RM, OM; the mean over the runs."""
@@ -51,7 +52,8 @@ class CohortRecord:
 
 
 def _gains(rows: pd.DataFrame) -> tuple[Gain, ...]:
-    kept = {(r.trial, r.table, r.variable, r.method): r for r in rows.itertuples()}
+    kept = {(r["trial"], r["table"], r["variable"], r["method"]): r
+            for r in rows.to_dict("records")}
     gains = []
     for trial in dict.fromkeys(rows["trial"]):
         for component in COMPONENTS:
@@ -59,9 +61,9 @@ def _gains(rows: pd.DataFrame) -> tuple[Gain, ...]:
                 rm = kept.get((trial, table, component + ending, "RM"))
                 om = kept.get((trial, table, component + ending, "OM"))
                 if rm is not None and om is not None:
-                    unit = om.unit.replace("% body weight", "% BW")
-                    gains.append(Gain(trial_label(trial), component, unit, float(rm.value),
-                                      float(om.value), om.data == "held_out"))
+                    unit = om["unit"].replace("% body weight", "% BW")
+                    gains.append(Gain(trial_label(trial), component, unit, float(rm["value"]),
+                                      float(om["value"]), om["data"] == "held_out"))
     return tuple(gains)
 
 

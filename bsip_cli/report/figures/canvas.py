@@ -7,11 +7,13 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any, Literal
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 WIDTH_MM = 170.0  # the text width of a page
 INK, SOFT, FAINT = "#1c1c1c", "#6e6e6e", "#d4d4d4"
@@ -19,7 +21,7 @@ ORANGE, BLUE, GREEN, PURPLE = "#D55E00", "#0072B2", "#009E73", "#CC79A7"  # Okab
 LONGEST_LABEL = 16
 MOST_POINTS = 1200  # of one curve: more than a page can show
 _MM = 1.0 / 25.4
-_RC = {
+_RC: dict[Any, Any] = {
     "svg.hashsalt": "bsip", "svg.fonttype": "path", "font.family": "DejaVu Sans", "font.size": 8,
     "axes.unicode_minus": True, "path.simplify": True,
 }
@@ -57,18 +59,17 @@ def line_of(method: str) -> Line:
 
 def new_figure(height_mm: float, width_mm: float = WIDTH_MM) -> Figure:
     """An empty figure of the page's width that lays itself out."""
-    figure = Figure(figsize=(width_mm * _MM, height_mm * _MM), layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.04, h_pad=0.04)
-    return figure
+    layout = ConstrainedLayoutEngine(w_pad=0.04, h_pad=0.04)
+    return Figure(figsize=(width_mm * _MM, height_mm * _MM), layout=layout)
 
 
-def tidy(axes: Axes, *, grid: str = "y") -> None:
+def tidy(axes: Axes, *, grid: Literal["x", "y", "both", ""] = "y") -> None:
     """Only the lines that help: left and bottom, and a faint grid along one axis."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(SOFT)
     axes.tick_params(labelsize=8, colors=INK, length=3)
-    axes.xaxis.label.set_size(8.5)
-    axes.yaxis.label.set_size(8.5)
+    axes.xaxis.label.set_fontsize(8.5)
+    axes.yaxis.label.set_fontsize(8.5)
     if grid:
         axes.grid(axis=grid, color=FAINT, linewidth=0.6)
         axes.set_axisbelow(True)

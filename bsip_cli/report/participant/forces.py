@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
-from bsip_cli.report.blocks import Block, Cell, Grid, Heading, Paragraph, Picture, Section
+from bsip_cli.report.blocks import Block, Cell, Grid, Heading, Mark, Paragraph, Picture, Section
 from bsip_cli.report.figures.cop_path import CopPath, cop_path
 from bsip_cli.report.figures.methods_over_time import MethodsOverTime, methods_over_time
 from bsip_cli.report.gains import SAME_WITHIN, Gain, gains_of
@@ -81,10 +81,11 @@ def _cop_over_time(record: ParticipantRecord) -> list[Block]:
 
 def _cop_trial(record: ParticipantRecord) -> TrialRecord | None:
     """The identification trial, else the one with the longest comparable COP."""
-    able = [t for t in record.trials if t.reconstruction is not None and t.role != "static"
-            and len(clock_of(t.reconstruction)) and _longest_s(t.reconstruction) > 0.0]
-    used = [t for t in able if t in record.identification_trials()]
-    return max(used or able, key=lambda t: _longest_s(t.reconstruction), default=None)
+    able = {trial.stem: trial for trial in record.trials if trial.role != "static"}
+    length = {stem: _longest_s(trial.reconstruction) for stem, trial in able.items()}
+    used = [t.stem for t in record.identification_trials() if length.get(t.stem, 0.0) > 0.0]
+    best = max(used or length, key=length.__getitem__, default="")
+    return able[best] if length.get(best, 0.0) > 0.0 else None
 
 
 def _with_cop(frame: pd.DataFrame) -> np.ndarray:
@@ -93,7 +94,10 @@ def _with_cop(frame: pd.DataFrame) -> np.ndarray:
     return flags_of(frame, "valid") & np.isfinite(ap) & np.isfinite(ml)
 
 
-def _longest_s(frame: pd.DataFrame) -> float:
+def _longest_s(frame: pd.DataFrame | None) -> float:
+    """Length [s] of the longest stretch with a COP to compare."""
+    if frame is None or len(clock_of(frame)) == 0:
+        return 0.0
     clock = clock_of(frame)
     window = middle_of_longest(clock, _with_cop(frame), np.inf)
     return float(clock[window][-1] - clock[window][0]) if window.stop > window.start else 0.0
@@ -131,13 +135,19 @@ def _vertical_force(record: ParticipantRecord) -> list[Block]:
 def _throw(record: ParticipantRecord) -> TrialRecord | None:
     """A validating trial with forces: a basketball throw, another throw, else the longest."""
     used = record.identification_trials()
-    able = [t for t in record.trials if t.reconstruction is not None and t.role == "validation"
-            and t not in used and flags_of(t.reconstruction, "valid").sum() > 1]
+    frames = [(trial, _valid_frames(trial)) for trial in record.trials
+              if trial.role == "validation" and trial not in used]
+    able = [(trial, frames) for trial, frames in frames if frames > 1]
     for word in _THROWS:
-        for trial in able:
+        for trial, _ in able:
             if word in trial.task.lower():
                 return trial
-    return max(able, key=lambda t: flags_of(t.reconstruction, "valid").sum(), default=None)
+    return max(able, key=lambda pair: pair[1])[0] if able else None
+
+
+def _valid_frames(trial: TrialRecord) -> int:
+    frame = trial.reconstruction
+    return int(flags_of(frame, "valid").sum()) if frame is not None else 0
 
 
 def _rmse_words(signals: dict[str, np.ndarray], unit: str) -> str:
@@ -159,8 +169,8 @@ def _data_of(used: np.ndarray) -> str:
 
 
 def _overview(record: ParticipantRecord) -> list[Block]:
-    fitted = [trial for trial in record.trials if trial.fit is not None]
-    rows = [_overview_row(trial, gains_of(trial.label, trial.fit)) for trial in fitted]
+    fits = [(trial, trial.fit) for trial in record.trials if trial.fit is not None]
+    rows = [_overview_row(trial, gains_of(trial.label, fit)) for trial, fit in fits]
     rows = [row for row in rows if row]
     if not rows:
         return [Paragraph("No trial could be compared with both methods.", "warning")]
@@ -176,7 +186,7 @@ def _overview_row(trial: TrialRecord, gains: Sequence[Gain]) -> tuple[str | Cell
     if not gains:
         return ()
     by_name = {gain.component: gain for gain in gains}
-    marks = {"OM": "better", "RM": "warning", "": ""}
+    marks: dict[str, Mark] = {"OM": "better", "RM": "warning", "": ""}
     cells = [
         Cell(signed(100.0 * by_name[c].change()), marks[by_name[c].better()]) if c in by_name
         else Cell("–")
@@ -201,14 +211,15 @@ def _fit_grids(record: ParticipantRecord) -> list[Block]:
 
 def _fit_grid(trial: TrialRecord, fit: pd.DataFrame) -> Grid:
     methods = sorted(fit["method"].unique(), key=lambda m: (m not in METHODS, m != "RM", m))
-    rows = {(row["method"], row["component"]): row for _, row in fit.iterrows()}
-    lines = []
+    rows = {(row["method"], row["component"]): row for row in fit.to_dict("records")}
+    lines: list[tuple[str | Cell, ...]] = []
     for component in (*COMPONENTS, *sorted(set(fit["component"]) - set(COMPONENTS))):
         own = [rows.get((method, component)) for method in methods]
         known = [row for row in own if row is not None]
         if not known:
             continue
-        cells = [cell for measure in _MEASURES for cell in _measure_cells(own, *measure[::2])]
+        cells = [cell for column, _, digits in _MEASURES
+                 for cell in _measure_cells(own, column, digits)]
         lines.append((component_label(component), str(known[0]["unit"]), *cells,
                       number(known[0]["n"], 0), number(known[-1]["n_effective"], 0)))
     data = _DATA.get(str(fit["data"].iloc[-1]), str(fit["data"].iloc[-1]))
@@ -217,12 +228,12 @@ def _fit_grid(trial: TrialRecord, fit: pd.DataFrame) -> Grid:
     return Grid(head, tuple(lines), f"{trial.label}: {data}", groups=groups, words=2)
 
 
-def _measure_cells(rows: Sequence[pd.Series | None], column: str, digits: int) -> list[Cell]:
+def _measure_cells(rows: Sequence[Mapping | None], column: str, digits: int) -> list[Cell]:
     """One cell per method; the best by more than the tolerance is marked."""
     values = [float(row[column]) if row is not None else np.nan for row in rows]
     badness: Callable[[float], float] = (lambda v: 1.0 - v) if column == "pearson_r" else abs
     bad = np.array([badness(value) for value in values])
-    marks = [""] * len(values)
+    marks: list[Mark] = [""] * len(values)
     if np.isfinite(bad).sum() > 1:
         best = int(np.nanargmin(bad))
         second = np.nanmin(np.delete(bad, best))

@@ -33,8 +33,8 @@ def section(record: ParticipantRecord) -> Section:
 
 
 def _row(trial: TrialRecord) -> tuple[str | Cell, ...]:
-    levels = trial.quality["level"].value_counts() if trial.quality is not None else {}
-    excluded, warned, corrected = (int(levels.get(level, 0)) for level in _LEVELS)
+    levels = list(trial.quality["level"]) if trial.quality is not None else []
+    excluded, warned, corrected = (levels.count(level) for level in _LEVELS)
     return (
         trial.label, ROLES.get(trial.role, trial.role), _duration(trial),
         percent(_share(trial, "contacts", "valid")),

@@ -68,14 +68,14 @@ def _worst(trial: TrialRecord, frame: pd.DataFrame) -> np.ndarray:
 def _markers(record: ParticipantRecord) -> list[Block]:
     frames = [trial.residuals for trial in record.trials if trial.residuals is not None]
     rows = pd.concat(frames) if frames else pd.DataFrame({"marker": [], "residual_m": []})
-    squares = (rows["residual_m"].astype(float) ** 2).groupby(rows["marker"]).mean().dropna()
-    if squares.empty:
+    squares = rows["residual_m"].astype(float) ** 2
+    by_marker = squares.groupby(rows["marker"]).mean().dropna()
+    if by_marker.empty:
         return [Paragraph("No marker residuals are known.", "warning")]
-    rms = _MM * np.sqrt(squares)
-    overall = _MM * float(np.sqrt((rows["residual_m"] ** 2).mean()))
-    data = MarkerResiduals(tuple(rms.index.astype(str)), rms.to_numpy(), overall)
-    worst = rms.sort_values(ascending=False).head(_WORST)
-    named = listing([f"{name} ({number(value, 1)} mm)" for name, value in worst.items()])
+    data = MarkerResiduals(tuple(by_marker.index.astype(str)), _MM * np.sqrt(by_marker.to_numpy()),
+                           _MM * float(np.sqrt(squares.mean())))
+    worst = np.argsort(-data.rms_mm, kind="stable")[:_WORST]
+    named = listing([f"{data.markers[k]} ({number(data.rms_mm[k], 1)} mm)" for k in worst])
     return [
         Picture(marker_residuals(data), "RMS distance of each marker from its model, all trials.",
                 "Bars: RMS residual per marker.", "marker_residuals"),

@@ -83,15 +83,15 @@ def _masses_picture(rm: pd.DataFrame, om: pd.DataFrame) -> Picture:
 
 
 def _masses_grid(rm: pd.DataFrame, om: pd.DataFrame) -> Grid:
+    table, own = rm["mass_kg"].to_numpy(dtype=float), om["mass_kg"].to_numpy(dtype=float)
+    sd, share = om["mass_kg_sd"].to_numpy(dtype=float), om["mass_data_share"].to_numpy(dtype=float)
     rows = [
-        (segment_label(name), number(rm.at[name, "mass_kg"], 3),
-         with_spread(om.at[name, "mass_kg"], om.at[name, "mass_kg_sd"], 3),
-         signed(100.0 * (om.at[name, "mass_kg"] / rm.at[name, "mass_kg"] - 1.0)),
-         _share_cell(om.at[name, "mass_data_share"]))
-        for name in rm.index
+        (label, number(table[k], 3), with_spread(own[k], sd[k], 3),
+         signed(100.0 * (own[k] / table[k] - 1.0)), _share_cell(share[k]))
+        for k, label in enumerate(_labels(rm))
     ]
-    total = ("whole body", number(rm["mass_kg"].sum(), 3), number(om["mass_kg"].sum(), 3),
-             signed(100.0 * (om["mass_kg"].sum() / rm["mass_kg"].sum() - 1.0)), "")
+    total = ("whole body", number(table.sum(), 3), number(own.sum(), 3),
+             signed(100.0 * (own.sum() / table.sum() - 1.0)), "")
     return Grid(("segment", "RM [kg]", "OM [kg] ± sd", "change [%]", "data share [%]"),
                 (*rows, total), "Segment masses")
 
@@ -128,13 +128,18 @@ def _three_axes(
     rm: pd.DataFrame, om: pd.DataFrame, columns: Sequence[str], scale: float, digits: int,
     caption: str, axes: Sequence[str],
 ) -> Grid:
+    table, own, sd, share = (
+        frame[list(names)].to_numpy(dtype=float)
+        for frame, names in ((rm, columns), (om, columns), (om, [f"{c}_sd" for c in columns]),
+                             (om, [share_name(c) for c in columns]))
+    )
     rows = []
-    for name in rm.index:
-        cells: list[str | Cell] = [segment_label(name)]
-        for column in columns:
-            value, sd = scale * om.at[name, column], scale * om.at[name, f"{column}_sd"]
-            cells += [number(scale * rm.at[name, column], digits), with_spread(value, sd, digits),
-                      _share_cell(om.at[name, share_name(column)])]
+    for i, label in enumerate(_labels(rm)):
+        cells: list[str | Cell] = [label]
+        for k in range(len(columns)):
+            cells += [number(scale * table[i, k], digits),
+                      with_spread(scale * own[i, k], scale * sd[i, k], digits),
+                      _share_cell(share[i, k])]
         rows.append(tuple(cells))
     head = ("segment", *("RM", "OM ± sd", "data [%]") * len(columns))
     groups = (("", 1), *((axis, 3) for axis in axes))

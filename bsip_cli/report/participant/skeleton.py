@@ -20,7 +20,7 @@ def section(record: ParticipantRecord) -> Section:
         Grid(
             ("segment", "hangs on", "joint", "type", "length [mm]", "first guess [mm]",
              "change [%]", "joint moved by [mm]"),
-            tuple(_row(name, row) for name, row in rows.iterrows()),
+            tuple(_row(str(name), row) for name, row in rows.iterrows()),
             "Lengths are those that scale the anthropometric table, ± one standard deviation",
             words=4,
         ),
@@ -37,7 +37,7 @@ def _change(row: pd.Series) -> float:
 
 def _in_words(rows: pd.DataFrame) -> str:
     changes = rows.apply(_change, axis=1)
-    far = [f"{segment_label(s)} ({signed(c, 1)} %)" for s, c in changes.items()
+    far = [f"{segment_label(str(s))} ({signed(c, 1)} %)" for s, c in changes.items()
            if abs(c) > _FAR_PERCENT]
     text = (f"Refinement moved these lengths by more than {_FAR_PERCENT:.0f} % from their first "
             f"guess: {listing(far)}.")
@@ -61,8 +61,9 @@ def _row(name: str, row: pd.Series) -> tuple[str | Cell, ...]:
 
 
 def _symmetry(rows: pd.DataFrame) -> list[Block]:
-    pairs = [(name[:-2], rows.loc[name, "length_m"], rows.loc[f"{name[:-2]}_r", "length_m"])
-             for name in rows.index if name.endswith("_l") and f"{name[:-2]}_r" in rows.index]
+    lengths = dict(zip(rows.index, rows["length_m"].to_numpy(dtype=float), strict=True))
+    pairs = [(name[:-2], length, lengths[f"{name[:-2]}_r"]) for name, length in lengths.items()
+             if name.endswith("_l") and f"{name[:-2]}_r" in lengths]
     if not pairs:
         return [Paragraph("The skeleton has no pairs of segments.", "note")]
     grid = tuple(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Heading, Paragraph, Section
+from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Heading, Mark, Paragraph, Section
 from bsip_cli.report.gains import SAME_WITHIN, Gain, MeanGain, gains_of, mean_gains
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, messages
 from bsip_cli.report.words import (
@@ -93,13 +93,16 @@ def _gain(record: ParticipantRecord) -> list[Block]:
     if not gains:
         return [Paragraph("No trial could be compared with both methods: this report cannot say.",
                           "warning")]
-    chosen, blocks = held_out, []
+    chosen = held_out or list(gains)
+    means = mean_gains(chosen)
+    if not means:
+        return [Paragraph("No trial has a stretch in which the forces could be compared: this "
+                          "report cannot say.", "warning")]
+    blocks: list[Block] = []
     if not held_out:
-        chosen = list(gains)
         blocks.append(Paragraph(
             "No data were held out: the numbers below are from the very data that identified the "
             "parameters, and favour OM. They do not show that OM is better.", "warning"))
-    means = mean_gains(chosen)
     blocks += [_verdict(means, bool(held_out)), _mean_grid(means, bool(held_out))]
     worse = [gain for gain in chosen if gain.better() == "RM"]
     if worse:
@@ -146,7 +149,7 @@ def _mean_grid(means: tuple[MeanGain, ...], held_out: bool) -> Grid:
     )
 
 
-def _mark(own: float, other: float) -> str:
+def _mark(own: float, other: float) -> Mark:
     return "better" if own < other * (1.0 - SAME_WITHIN) else ""
 
 

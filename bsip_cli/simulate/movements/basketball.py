@@ -68,15 +68,15 @@ def _draw_jump(sketch: Sketch, rng: np.random.Generator, duration_s: float) -> J
     settle = 0.62
     start = max(0.12, 0.5 * (duration_s - dip - push - flight - caught - settle))
     times = np.round(start + np.cumsum([0.0, dip, push, flight, caught, settle]), 3)
-    return Jump(*times, takeoff_m=0.01, depth_m=depth, speed_m_s=0.5 * G * (times[3] - times[2]))
+    speed = 0.5 * G * (times[3] - times[2])
+    start, bottom, takeoff, landing, caught, end = times.tolist()
+    return Jump(start, bottom, takeoff, landing, caught, end, 0.01, depth, speed)
 
 
 def _standing_height(sketch: Sketch) -> float:
     """Height of the centre of mass in the first sample."""
     first = sketch.plan().thinned(len(sketch.t_s))
-    poses = poses_of(
-        sketch.person, first, first.pelvis_m, euler_zxy(first.pelvis_angles_rad)
-    )
+    poses = poses_of(sketch.person, first, first.pelvis_m, euler_zxy(first.pelvis_angles_rad))
     return float(centre_of_mass(sketch.person, poses)[0, 1])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -213,7 +214,7 @@ def _bouncing_height(sketch: Sketch, gait: Gait) -> np.ndarray:
 
 
 def _finished(
-    sketch: Sketch, gait: Gait, rng: np.random.Generator, person: Person, **options: object
+    sketch: Sketch, gait: Gait, rng: np.random.Generator, person: Person, **options: Any
 ) -> Plan:
     add_breath_of_motion(sketch, rng, np.deg2rad(0.5))
     middle = 0.25 * person.lengths_m[f"foot_{gait.first_side}"]

@@ -7,6 +7,7 @@ and order are drawn, so that people differ.
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from bsip_cli.simulate.sketch import Sketch, sketch_for
 Block = Callable[[Sketch, np.random.Generator, float, float], None]
 CYCLE_S = 27.0
 QUIET_S = 0.4
+DEEPEST_M_PER_S2 = 0.5  # depth of a squat per square of its half period
 
 
 def sequence(person: Person, rng: np.random.Generator, duration_s: float, _ball: float) -> Plan:
@@ -96,9 +98,10 @@ def _twist(sketch: Sketch, rng: np.random.Generator, start: float, end: float) -
 def _squats(sketch: Sketch, rng: np.random.Generator, start: float, end: float) -> None:
     count = max(1, round((end - start) / rng.uniform(1.15, 1.9)))
     times = np.linspace(start, end, count + 1)
-    for a, b in zip(times[:-1], times[1:], strict=True):
+    for a, b in pairwise(times):
         down = window(sketch.t_s, a, b, 0.5 * (b - a))
-        add_squat(sketch, down, rng.uniform(0.08, 0.16) * sketch.person.stature_m)
+        depth = rng.uniform(0.08, 0.16) * sketch.person.stature_m
+        add_squat(sketch, down, min(depth, DEEPEST_M_PER_S2 * (0.5 * (b - a)) ** 2))
 
 
 def _lift(side: str) -> Block:

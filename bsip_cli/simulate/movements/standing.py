@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from bsip_cli.simulate.curves import wander, window
@@ -30,8 +32,8 @@ def add_sway(sketch: Sketch, rng: np.random.Generator, scale: float = 1.0) -> No
 
 
 def add_breath_of_motion(sketch: Sketch, rng: np.random.Generator, size_rad: float) -> None:
-    """Tiny wandering of all joint angles of the upper body."""
-    for angle in sketch.angles.values():
+    """Tiny wandering of all joint angles of the upper body, and of the pelvis."""
+    for angle in [*sketch.angles.values(), sketch.pelvis_angles]:
         for column in np.atleast_2d(angle.T):
             column += wander(sketch.t_s, rng, size_rad, 0.15, 0.7)
 
@@ -52,7 +54,7 @@ def squat(person: Person, rng: np.random.Generator, duration_s: float, _ball: fl
     count = max(2, round(duration_s / 1.7))
     times = np.linspace(0.1, duration_s - 0.1, count + 1)
     down = np.zeros_like(sketch.t_s)
-    for start, end in zip(times[:-1], times[1:], strict=True):
+    for start, end in pairwise(times):
         depth = rng.uniform(0.6, 1.0)
         pause = rng.uniform(0.0, 0.15)
         down += depth * window(sketch.t_s, start + pause, end, 0.5 * (end - start - pause))

@@ -30,9 +30,9 @@ def steps(person: Person, rng: np.random.Generator, duration_s: float, _ball: fl
         sketch.angles[f"shoulder_{name}"][:, 0] += swing * np.deg2rad(15.0) * ahead
     add_breath_of_motion(sketch, rng, np.deg2rad(0.4))
     add_sway(sketch, rng, 0.3)
-    ahead, aside = plate_under(sketch, rng)
+    plate_ahead, plate_aside = plate_under(sketch, rng)
     return sketch.plan(
-        plate_centre_m=(ahead - EDGE_CLOSER_M, aside),
+        plate_centre_m=(plate_ahead - EDGE_CLOSER_M, plate_aside),
         sway_share=0.2,
         notes={"stepping_side": side},
     )
@@ -56,8 +56,9 @@ def _stepping_foot(sketch: Sketch, side: str, moments: np.ndarray, reach_m: floa
 def _load(sketch: Sketch, side: str, moments: np.ndarray, floor_share: float) -> None:
     """The stepping foot's part of the load: half, none, some on the floor, none, half."""
     t = sketch.t_s
-    share = 0.5 * (1.0 - step(t, moments[0], moments[1]) + step(t, moments[6], moments[7]))
-    share += floor_share * (step(t, moments[2], moments[3]) - step(t, moments[4], moments[5]))
+    on_plate = 1.0 - step(t, moments[0], moments[1]) + step(t, moments[6], moments[7])
+    on_floor = step(t, moments[2], moments[3]) - step(t, moments[4], moments[5])
+    share = 0.5 * on_plate + floor_share * on_floor
     other = "l" if side == "r" else "r"
     sketch.feet[side].share[:] = share
     sketch.feet[other].share[:] = 1.0 - share

@@ -16,12 +16,13 @@ from bsip_cli.simulate.plan import Plan
 from bsip_cli.simulate.sketch import Sketch, held_ball, sketch_for
 
 RIGHT_HANDED_SHARE = 0.9
+SOFTNESS_S = 0.032
 STAGGER_M = 0.11  # each foot from the middle
 # Degrees at: start, cocked, release, followed through, back (relative times below).
-SHOULDER_FLEXION = (0.0, 105.0, 70.0, 15.0, 0.0)
+SHOULDER_FLEXION = (0.0, 115.0, 45.0, 5.0, 0.0)
 SHOULDER_ABDUCTION = (0.0, 75.0, 78.0, 35.0, 0.0)
-ELBOW = (0.0, 85.0, 15.0, 10.0, 0.0)
-TURN = (0.0, -32.0, 12.0, 30.0, 0.0)
+ELBOW = (0.0, 95.0, 12.0, 10.0, 0.0)
+TURN = (0.0, -38.0, 16.0, 34.0, 0.0)
 LEAN = (0.0, 8.0, -14.0, -28.0, 0.0)
 
 
@@ -34,7 +35,7 @@ def throwing(
     other = "l" if side == "r" else "r"
     sketch.feet[side].ahead_m -= STAGGER_M
     sketch.feet[other].ahead_m += STAGGER_M
-    throw_s = rng.uniform(0.24, 0.32)
+    throw_s = rng.uniform(0.20, 0.26)
     release = 0.5 * duration_s
     frames = np.array([0.15, release - throw_s, release, release + 0.22, duration_s - 0.15])
     _throwing_arm(sketch, rng, side, frames)
@@ -58,12 +59,10 @@ def _curve(
     sketch: Sketch, rng: np.random.Generator, frames: np.ndarray, degrees: tuple[float, ...]
 ) -> np.ndarray:
     size = np.deg2rad(np.array(degrees)) * rng.uniform(0.85, 1.1)
-    return soft_polyline(sketch.t_s, frames, size, 0.045)
+    return soft_polyline(sketch.t_s, frames, size, SOFTNESS_S)
 
 
-def _throwing_arm(
-    sketch: Sketch, rng: np.random.Generator, side: str, frames: np.ndarray
-) -> None:
+def _throwing_arm(sketch: Sketch, rng: np.random.Generator, side: str, frames: np.ndarray) -> None:
     sketch.angles[f"shoulder_{side}"][:, 0] += _curve(sketch, rng, frames, SHOULDER_FLEXION)
     sketch.angles[f"shoulder_{side}"][:, 1] += _curve(sketch, rng, frames, SHOULDER_ABDUCTION)
     sketch.angles[f"elbow_{side}"] += _curve(sketch, rng, frames - 0.01, ELBOW)

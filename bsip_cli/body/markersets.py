@@ -152,16 +152,42 @@ def _faults(data: dict) -> list[str]:
             continue
         for label, landmark in members.items():
             labels.append(label)
-            if landmark and landmark not in LANDMARKS:
+            if not isinstance(landmark, str):
+                faults.append(f'{label}: expected the name of a landmark or ""')
+            elif landmark and landmark not in LANDMARKS:
                 faults.append(f"{label}: unknown landmark {landmark}{_near(landmark, LANDMARKS)}")
     faults += [f"{label} stands twice" for label in sorted(set(labels)) if labels.count(label) > 1]
-    named = {
-        *data.get("weights", {}),
-        *data.get("aliases", {}),
-        *data.get("optional", {}).get("markers", []),
-    }
-    faults += [f"{label} has options but no segment" for label in sorted(named - set(labels))]
-    return faults
+    return faults + _option_faults(data, labels)
+
+
+def _option_faults(data: dict, labels: list[str]) -> list[str]:
+    weights, aliases = data.get("weights", {}), data.get("aliases", {})
+    optional = data.get("optional", {})
+    tables = {"weights": weights, "aliases": aliases, "optional": optional}
+    faults = [f"{k}: expected a table" for k, v in tables.items() if not isinstance(v, dict)]
+    if faults:
+        return faults
+    faults += [
+        f"{label}: expected a weight above 0"
+        for label, weight in weights.items()
+        if not (isinstance(weight, int | float) and weight > 0)
+    ]
+    faults += [
+        f'{label}: expected aliases like ["NAME"]'
+        for label, names in aliases.items()
+        if not _are_words(names)
+    ]
+    markers = optional.get("markers", [])
+    if not _are_words(markers):
+        return [*faults, 'optional markers: expected a list like ["RTHI"]']
+    named = {*weights, *aliases, *markers}
+    return faults + [
+        f"{label} has options but no segment" for label in sorted(named - set(labels))
+    ]
+
+
+def _are_words(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(word, str) for word in value)
 
 
 def _near(name: str, known: Collection[str]) -> str:

@@ -110,7 +110,7 @@ def load_skeleton(name: str) -> Skeleton:
     except OSError:
         known = ", ".join(sorted(path.stem for path in shipped("skeletons").glob("*.toml")))
         raise UsageError("there is no such skeleton", file=name, expected=known) from None
-    except (KeyError, ValueError, tomllib.TOMLDecodeError) as error:
+    except (KeyError, TypeError, ValueError, tomllib.TOMLDecodeError) as error:
         raise UsageError(
             f"not a skeleton ({error})",
             file=file,
@@ -121,13 +121,14 @@ def load_skeleton(name: str) -> Skeleton:
 
 
 def _check(skeleton: Skeleton, file: Path) -> None:
-    base_first = skeleton.parents[0] == -1 and skeleton.joint_types[0] == "free"
+    base_first = skeleton.parents[:1] == (-1,) and skeleton.joint_types[0] == "free"
     ordered = all(0 <= parent < i for i, parent in enumerate(skeleton.parents) if i)
     known = set(skeleton.joint_types[1:]) <= {"spherical", "revolute"}
-    if not (base_first and ordered and known):
+    once = all(len(set(names)) == len(names) for names in (skeleton.segments, skeleton.joints))
+    if not (base_first and ordered and known and once):
         raise UsageError(
             "the segments are not a tree with one free base",
             file=file,
-            expected="the free base first, every parent before its children, and joints of type "
-            "spherical or revolute",
+            expected="the free base first, every parent before its children, joints of type "
+            "spherical or revolute, and every name once",
         )

@@ -14,7 +14,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from bsip_cli.errors import BadDataError
+from bsip_cli.errors import BadDataError, UsageError
 
 Level = Literal["trial", "participant", "cohort"]
 
@@ -520,16 +520,29 @@ def write_artifact(path: Path, kind: str, frame: pd.DataFrame, provenance: Mappi
 
 
 def write_atomically(path: Path, write) -> None:
-    """Call ``write`` with a temporary path beside ``path``, then rename it into place."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """Call ``write`` with a temporary path beside ``path``, then rename it into place.
+
+    Raises
+    ------
+    UsageError
+        The disk is full, or the place cannot be written to; what was there stays.
+    """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        write(temporary)
-        with temporary.open("rb") as handle:
-            os.fsync(handle.fileno())
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            write(temporary)
+            with temporary.open("rb") as handle:
+                os.fsync(handle.fileno())
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"cannot be written ({error.strerror or error})",
+            file=path,
+            remedy="make room there, or name another folder with --out",
+        ) from None
 
 
 def read_artifact(path: Path, kind: str) -> pd.DataFrame:
@@ -538,38 +551,53 @@ def read_artifact(path: Path, kind: str) -> pd.DataFrame:
     Raises
     ------
     BadDataError
-        The file is not an artifact of this kind, or of a version this bsip does not know.
+        The file is not an artifact of this kind, is damaged, or of a version this bsip does not
+        know.
     """
-    found = read_header(path)
-    schema = SCHEMAS[kind]
-    if found.get("kind") != kind or found.get("schema_version") != schema.version:
-        raise BadDataError(
-            f"holds {found.get('kind', 'an unknown table')} version {found.get('schema_version')}",
-            expected=f"{kind} version {schema.version}",
-            file=path,
-            remedy="run the stage that made it again with --force",
-        )
-    return pq.read_table(path).to_pandas()
+    read_header(path, kind)
+    try:
+        return pq.read_table(path).to_pandas()
+    except (OSError, pa.ArrowException) as error:
+        raise _not_an_artifact(path, error) from None
 
 
-def read_header(path: Path) -> dict[str, Any]:
+def read_header(path: Path, kind: str | None = None) -> dict[str, Any]:
     """Kind, schema version and provenance of an artifact, without its data.
 
     Raises
     ------
     BadDataError
-        The file is missing or is not an artifact.
+        The file is missing or is not an artifact; with ``kind``, it is of another kind or version.
     """
     try:
         metadata = pq.read_schema(path).metadata or {}
-        return json.loads(metadata[b"bsip"])
-    except (OSError, pa.ArrowInvalid, KeyError, json.JSONDecodeError) as error:
-        raise BadDataError(
-            f"is not an artifact of bsip ({type(error).__name__})",
-            file=path,
-            expected="a Parquet file that a stage wrote",
-            remedy="run the stage again with --force",
-        ) from None
+        found = json.loads(metadata[b"bsip"])
+    except (OSError, pa.ArrowException, KeyError, ValueError) as error:
+        raise _not_an_artifact(path, error) from None
+    if kind is not None:
+        _check_kind(found, SCHEMAS[kind], path)
+    return found
+
+
+def _check_kind(found: Mapping, schema: Schema, path: Path) -> None:
+    if (found.get("kind"), found.get("schema_version")) == (schema.kind, schema.version):
+        return
+    stage = found.get("provenance", {}).get("made_by", {}).get("stage", "STAGE")
+    raise BadDataError(
+        f"holds {found.get('kind', 'an unknown table')} version {found.get('schema_version')}",
+        expected=f"{schema.kind} version {schema.version}",
+        file=path,
+        remedy=f"run `bsip {stage}` again",
+    )
+
+
+def _not_an_artifact(path: Path, error: Exception) -> BadDataError:
+    return BadDataError(
+        f"is not an artifact of bsip ({type(error).__name__})",
+        file=path,
+        expected="a Parquet file that a stage wrote",
+        remedy="run the stage again with --force",
+    )
 
 
 def _to_arrow(schema: Schema, frame: pd.DataFrame, provenance: Mapping) -> pa.Table:

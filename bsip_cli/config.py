@@ -79,6 +79,7 @@ class Identify(Section):
     cutoff_hz: float = Field(gt=0)
     hold_out_fraction: float = Field(ge=0, lt=1)
     block_s: float = Field(gt=0)
+    trust_ratio: float = Field(ge=1)
     sigma_percent_limit: float = Field(gt=0)
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from bsip_cli.artifacts import Level
+if TYPE_CHECKING:  # artifacts needs pandas, and `bsip --help` must not wait for it
+    from bsip_cli.artifacts import Level
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ STAGES = (
         "Build the person's skeleton: lengths, joint centres, markers on their segments.",
         reads=("markers", "wrench"),
         writes=("skeleton", "marker-positions", "person"),
-        options=("skeleton", "scale", "ik"),
+        options=("skeleton", "roles", "ingest", "scale", "ik"),
         module="bsip_cli.stages.scale",
     ),
     Stage(
@@ -133,7 +135,7 @@ STAGES = (
             "posturography",
         ),
         writes=("report-files",),
-        options=("skeleton",),
+        options=("skeleton", "roles"),
         module="bsip_cli.stages.report",
     ),
     Stage(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib
 import multiprocessing
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -14,7 +15,7 @@ import pandas as pd
 
 from bsip_cli.artifacts import write_artifact
 from bsip_cli.config import Config
-from bsip_cli.errors import BadDataError, BsipError, NumericalError
+from bsip_cli.errors import BadDataError, BsipError, NumericalError, UsageError
 from bsip_cli.pipeline import Stage, producer
 from bsip_cli.study import Participant, Study
 from bsip_cli.unit import Unit
@@ -48,39 +49,59 @@ def run_stages(
     ``force`` redoes what is fresh; ``jobs`` participants run at once, each in its own process.
     """
     personal = tuple(stage for stage in stages if stage.level != "cohort")
-    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
-        running = {
-            participant.id: pool.submit(
-                _run_participant, personal, study, out, config, participant, force
-            )
-            for participant in participants
-            if personal
-        }
-        for name, future in running.items():
-            bug = future.exception()
-            if bug is not None:
-                yield _bug(name, bug)
-            else:
-                yield from future.result()
-    for stage in stages:
-        if stage.level == "cohort":
-            yield perform(Unit(stage, study, out, config), force)
+    if personal:
+        with _processes(jobs) as pool:
+            running = {
+                participant.id: pool.submit(_run, personal, study, out, config, force, participant)
+                for participant in participants
+            }
+            for name, future in running.items():
+                yield from _outcomes(future, name, personal)
+    shared = tuple(stage for stage in stages if stage.level == "cohort")
+    if shared:
+        with _processes(1) as pool:
+            for stage in shared:
+                future = pool.submit(_run, (stage,), study, out, config, force)
+                yield from _outcomes(future, "group", (stage,))
 
 
-def _run_participant(
+def _processes(jobs: int) -> ProcessPoolExecutor:
+    return ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"))
+
+
+def _outcomes(
+    future: Future[list[Outcome]], name: str, stages: tuple[Stage, ...]
+) -> Iterable[Outcome]:
+    """What a process made of ``stages``; its bug stops nobody else's work."""
+    error = future.exception()
+    return future.result() if error is None else [_bug(name, stages, error)]
+
+
+def _run(
     stages: Iterable[Stage],
     study: Study,
     out: Path,
     config: Config,
-    participant: Participant,
     force: bool,
+    participant: Participant | None = None,
 ) -> list[Outcome]:
+    """Stages of one participant, or of the cohort."""
+    if participant is not None:
+        _forget_gone_recordings(out / participant.id, participant)
     outcomes = []
     for stage in stages:
-        trials = participant.trials if stage.level == "trial" else (None,)
+        trials = participant.trials if participant and stage.level == "trial" else (None,)
         for trial in trials:
             outcomes.append(perform(Unit(stage, study, out, config, participant, trial), force))
     return outcomes
+
+
+def _forget_gone_recordings(folder: Path, participant: Participant) -> None:
+    """A recording that was refused and then taken out of the study counts no more."""
+    known = {participant.id, *(trial.stem for trial in participant.trials)}
+    for path in folder.glob("*_refusal-*.parquet"):
+        if path.name.split("_refusal-")[0] not in known:
+            path.unlink()
 
 
 def perform(unit: Unit, force: bool = False) -> Outcome:
@@ -98,7 +119,8 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
     try:
         importlib.import_module(stage.module).run(unit)
     except BsipError as error:
-        _write_refusal(unit, error)
+        if not isinstance(error, UsageError):  # nothing is wrong with the data
+            _write_refusal(unit, error)
         sentence = str(error) if unit.name in str(error) else f"{unit.name}: {error}"
         return Outcome(stage.name, unit.name, "refused", (sentence,), error.exit_code)
     unit.refusal_path().unlink(missing_ok=True)
@@ -117,9 +139,14 @@ def _write_refusal(unit: Unit, error: BsipError) -> None:
     write_artifact(unit.refusal_path(), "refusal", row, notes)
 
 
-def _bug(participant: str, error: BaseException) -> Outcome:
-    trace = getattr(error, "__cause__", None) or error
-    return Outcome("run", participant, "bug", (f"{participant}: a bug in bsip: {trace}",), 1)
+def _bug(name: str, stages: tuple[Stage, ...], error: BaseException) -> Outcome:
+    stage = stages[0].name if len({stage.name for stage in stages}) == 1 else "run"
+    if isinstance(error, BrokenProcessPool):
+        found = "the process was killed (out of memory?); run again, with fewer --jobs"
+    else:
+        trace = str(error.__cause__ or "").strip('"\n')
+        found = f"a bug in bsip: {type(error).__name__}: {error}\n{trace}".rstrip()
+    return Outcome(stage, name, "bug", (f"{name}: {found}",), 1)
 
 
 def refusal_sentence(refusals: list[BadDataError]) -> Iterator[Outcome]:

@@ -10,6 +10,8 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
+from bsip_cli.body.markersets import load_marker_set
+from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, load_config
 from bsip_cli.errors import UsageError
 from bsip_cli.pipeline import stages_named
@@ -33,6 +35,7 @@ def run_session(
     config = _config(root, config_file)
     study, refusals = load_study(root, config.roles.model_dump())
     participants = _choose(study, chosen)
+    _check_out(out)
     stages = stages_named(command)
     if chosen and command == "run":
         stages = tuple(stage for stage in stages if stage.level != "cohort")
@@ -58,7 +61,20 @@ def run_session(
 def _config(root: Path, config_file: Path | None) -> Config:
     if config_file is not None and not config_file.is_file():
         raise UsageError("there is no such file", file=config_file, remedy="check --config")
-    return load_config([root / "study.toml", *([config_file] if config_file else [])])
+    config = load_config([root / "study.toml", *([config_file] if config_file else [])])
+    if config.marker_set != "auto":
+        load_marker_set(config.marker_set)
+    load_skeleton(config.skeleton)
+    return config
+
+
+def _check_out(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"is no folder to write to ({error.strerror})", file=out, remedy="check --out"
+        ) from None
 
 
 def _choose(study: Study, chosen: tuple[str, ...]) -> tuple[Participant, ...]:

@@ -72,12 +72,16 @@ def load_study(root: Path, roles: dict[str, tuple[str, ...]]) -> tuple[Study, li
         raise UsageError(
             "there is no such folder", file=root, remedy="name the folder with participants.tsv"
         )
-    participants, refusals = [], []
+    participants: list[Participant] = []
+    refusals: list[BadDataError] = []
     for row in _participant_rows(root / "participants.tsv"):
         try:
             participant, misnamed = _participant(root, row, roles)
         except BadDataError as refusal:
             refusals.append(refusal)
+            continue
+        if any(participant.id == other.id for other in participants):
+            refusals.append(_twice(root, participant.id))
             continue
         participants.append(participant)
         refusals += misnamed
@@ -113,6 +117,15 @@ def _participant_rows(file: Path) -> list[dict[str, str]]:
             remedy="add it",
         )
     return rows
+
+
+def _twice(root: Path, name: str) -> BadDataError:
+    return BadDataError(
+        f"{name} stands twice",
+        file=root / "participants.tsv",
+        expected="a line per participant; the first one counts",
+        remedy="remove one",
+    )
 
 
 def _participant(

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import takewhile
 from pathlib import Path
 
 import pandas as pd
 
-from bsip_cli.artifacts import SCHEMAS, Level, read_artifact, read_header, write_artifact
+from bsip_cli.artifacts import SCHEMAS, read_artifact, read_header, write_artifact
 from bsip_cli.config import Config
 from bsip_cli.errors import BadDataError
-from bsip_cli.pipeline import Stage
-from bsip_cli.provenance import describe
+from bsip_cli.pipeline import STAGES, Stage, producer
+from bsip_cli.provenance import describe, file_hash
 from bsip_cli.study import Participant, Study, Trial
 
 
@@ -67,23 +69,34 @@ class Unit:
         return tuple(
             trial
             for trial in self.participant.trials
-            if all(self._usable(kind, self.participant, trial) for kind in kinds)
+            if all(self._stands(kind, self.participant, trial) for kind in kinds)
         )
 
-    def _usable(self, kind: str, participant: Participant, trial: Trial) -> bool:
+    def _stands(self, kind: str, participant: Participant | None, trial: Trial | None) -> bool:
+        """It is there, and no stage up to its own has refused the trial or participant since."""
         path = self.path(kind, trial, participant)
-        refusals = path.parent.glob(f"{trial.stem}_refusal-*.parquet")
-        return path.exists() and not any(refusals)
+        before = STAGES[: STAGES.index(producer(kind)) + 1]
+        return path.exists() and not self._refusals(path.parent, participant, trial, before)
+
+    def _refusals(
+        self,
+        folder: Path,
+        participant: Participant | None,
+        trial: Trial | None,
+        stages: Iterable[Stage],
+    ) -> list[Path]:
+        owners = [participant.id if participant else "group", *([trial.stem] if trial else [])]
+        names = (f"{owner}_refusal-{stage.name}.parquet" for owner in owners for stage in stages)
+        return [folder / name for name in dict.fromkeys(names) if (folder / name).exists()]
 
     # --- inputs, freshness ------------------------------------------------------------------
 
     def inputs(self) -> dict[str, Path]:
         """Name and path of every file the unit reads; those a refusal left out are not in it."""
-        files = {}
-        for kind in self.stage.reads:
-            for path in self._input_paths(kind, SCHEMAS[kind].level):
-                files[path.name] = path
-        if self.trial is not None and not self.stage.reads:
+        files = {path.name: path for kind in self.stage.reads for path in self._standing(kind)}
+        if self.trial is None:
+            files |= {path.name: path for path in self._refused_before()}
+        elif not self.stage.reads:
             files |= {path.name: path for path in _recording_files(self.trial.path)}
         for name in ("marker_set", "skeleton"):
             own = Path(getattr(self.config, name))
@@ -91,37 +104,43 @@ class Unit:
                 files[own.name] = own
         return files
 
-    def _input_paths(self, kind: str, level: Level) -> list[Path]:
+    def _owners(self, kind: str) -> list[tuple[Participant | None, Trial | None]]:
+        """Whose artifact of a kind the unit reads: its own, or that of everybody below it."""
+        level = SCHEMAS[kind].level
         if level == "cohort":
-            return [self.path(kind)]
-        found = []
-        for participant in self.participants():
-            if level == "participant":
-                found.append(self.path(kind, participant=participant))
-            elif self.trial is not None:
-                found.append(self.path(kind))
-            else:
-                found += [
-                    self.path(kind, trial, participant)
-                    for trial in participant.trials
-                    if self._usable(kind, participant, trial)
-                ]
-        return found
+            return [(None, None)]
+        if level == "trial" and self.trial is None:
+            return [(person, trial) for person in self.participants() for trial in person.trials]
+        return [(person, self.trial) for person in self.participants()]
+
+    def _standing(self, kind: str) -> list[Path]:
+        return [
+            self.path(kind, trial, person)
+            for person, trial in self._owners(kind)
+            if self._stands(kind, person, trial)
+        ]
+
+    def _refused_before(self) -> list[Path]:
+        """What earlier stages refused of the unit's participants: reports tell of it."""
+        before = tuple(takewhile(lambda stage: stage.label != self.stage.label, STAGES))
+        return [
+            path
+            for person in self.participants()
+            for trial in (None, *person.trials)
+            for path in self._refusals(self.out / person.id, person, trial, before)
+        ]
 
     def missing(self) -> list[str]:
-        """Kinds the unit cannot do without and that are not there."""
-        gone = []
-        for kind in self.stage.reads:
-            paths = self._input_paths(kind, SCHEMAS[kind].level)
-            there = [path for path in paths if path.exists()]
-            enough = bool(there) if self.participant is None else len(there) == len(paths) > 0
-            if not enough:
-                gone.append(kind)
-        if self.trial is not None and self.stage.reads:
-            refused = any(self.path("markers").parent.glob(f"{self.trial.stem}_refusal-ingest.*"))
-            if refused and "markers" not in gone:
-                gone.append("markers")
-        return gone
+        """Kinds the unit cannot do without and that are not there.
+
+        A cohort stage judges itself what refusals leave of the cohort.
+        """
+        return [kind for kind in self.stage.reads if not self._has(kind)]
+
+    def _has(self, kind: str) -> bool:
+        if self.participant is None and SCHEMAS[kind].level != "cohort":
+            return any(self.path(kind, trial, p).exists() for p, trial in self._owners(kind))
+        return bool(self._standing(kind))
 
     def provenance(self) -> dict:
         present = {name: path for name, path in self.inputs().items() if path.exists()}
@@ -136,14 +155,27 @@ class Unit:
 
     def is_fresh(self) -> bool:
         """Everything the unit writes is there and made from what it would read now."""
-        paths = [self.path(kind) for kind in self.stage.writes]
-        if not all(path.exists() for path in paths) or self.refusal_path().exists():
+        if self.refusal_path().exists():
             return False
         wanted = self.provenance()
+        return all(self._is_current(kind, wanted) for kind in self.stage.writes)
+
+    def _is_current(self, kind: str, made_by: dict) -> bool:
+        path = self.path(kind)
         try:
-            return all(read_header(path)["provenance"]["made_by"] == wanted for path in paths)
+            header = read_header(path, kind)
+            if header["provenance"]["made_by"] != made_by:
+                return False
+            listed = read_artifact(path, kind) if SCHEMAS[kind].column("sha256") else None
         except BadDataError:
             return False
+        if listed is None:
+            return True
+        files = zip(listed["file"], listed["sha256"], strict=True)
+        return all(
+            (self.out / name).is_file() and file_hash(self.out / name) == known
+            for name, known in files
+        )
 
     # --- reading and writing ----------------------------------------------------------------
 
@@ -154,7 +186,7 @@ class Unit:
 
     def facts(self, kind: str, trial: Trial | None = None) -> dict:
         """What the producing stage said of its result as a whole."""
-        return read_header(self.path(kind, trial))["provenance"]["facts"]
+        return read_header(self.path(kind, trial), kind)["provenance"]["facts"]
 
     def write(self, kind: str, frame: pd.DataFrame, facts: dict | None = None) -> None:
         made_by = self.provenance()
@@ -164,4 +196,4 @@ class Unit:
 
 def _recording_files(path: Path) -> list[Path]:
     companions = (path.with_suffix(".mot"), path.with_name(f"{path.stem}_grf.mot"))
-    return [path, *(file for file in companions if path.suffix == ".trc" and file.exists())]
+    return [path, *(file for file in companions if path.suffix.lower() == ".trc" and file.exists())]

@@ -39,6 +39,7 @@ LANDMARKS = frozenset(
     {"vertex", "sellion", "forehead", "occiput", "c7", "t10", "suprasternale", "xiphoid", "sacrum"}
     | {f"{name}_{side}" for name in _SIDED for side in "lr"}
 )
+_TABLES = {"description", "segments", "weights", "aliases", "optional"}
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,7 @@ def _faults(data: dict) -> list[str]:
     segments = data.get("segments")
     if not isinstance(segments, dict) or not segments:
         return ['no [segments]: expected lines like head = { RTEM = "temple_r" }']
-    faults = []
+    faults = [f"unknown table {key}{_near(key, _TABLES)}" for key in sorted(set(data) - _TABLES)]
     labels: list[str] = []
     for segment, members in segments.items():
         if segment not in SEGMENTS:
@@ -168,9 +169,9 @@ def _option_faults(data: dict, labels: list[str]) -> list[str]:
     if faults:
         return faults
     faults += [
-        f"{label}: expected a weight above 0"
+        f"{label}: expected a weight of 0 or more"
         for label, weight in weights.items()
-        if not (isinstance(weight, int | float) and weight > 0)
+        if not (isinstance(weight, int | float) and weight >= 0)
     ]
     faults += [
         f'{label}: expected aliases like ["NAME"]'
@@ -181,9 +182,7 @@ def _option_faults(data: dict, labels: list[str]) -> list[str]:
     if not _are_words(markers):
         return [*faults, 'optional markers: expected a list like ["RTHI"]']
     named = {*weights, *aliases, *markers}
-    return faults + [
-        f"{label} has options but no segment" for label in sorted(named - set(labels))
-    ]
+    return faults + [f"{label} has options but no segment" for label in sorted(named - set(labels))]
 
 
 def _are_words(value: object) -> bool:

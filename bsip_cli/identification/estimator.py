@@ -15,12 +15,16 @@ from bsip_cli.identification.prior import Prior
 
 @dataclass(frozen=True)
 class Problem:
-    """Everything an estimator may use."""
+    """Everything an estimator may use.
+
+    ``trust_ratio``: how many times better than the table the data must know a combination.
+    """
 
     equations: NormalEquations
     noise: Noise
     prior: Prior
     basis: Basis
+    trust_ratio: float
 
 
 @dataclass(frozen=True)

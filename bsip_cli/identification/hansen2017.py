@@ -2,9 +2,9 @@
 
 Hansen 2017 solves the base parameters by least squares and takes the segment parameters nearest
 to the regression among those that have these base parameters, with masses > 0. Nearness is
-measured in standard deviations of people about the table, and a combination that the data know
-worse than the table stays at the table: the paper's motions are rich enough for all, a clinic's
-trial is not. With everything excited this is the paper's method.
+measured in standard deviations of people about the table, and a combination that the data do not
+know clearly better than the table stays at the table: the paper's motions are rich enough for all,
+a clinic's trial is not. With everything excited this is the paper's method.
 """
 
 from __future__ import annotations
@@ -20,10 +20,11 @@ _SMALLEST_MASS = 0.05  # of the table's
 
 
 def estimate(problem: Problem) -> Estimate:
-    """Least squares in the directions that the data know better than the table.
+    """Least squares in the directions that the data know clearly better than the table.
 
     In coordinates z with phi = phi_RM + S z, where z is N(0, 1) among people, the data give each
-    eigendirection of their information a variance; those below 1 are taken from the data.
+    eigendirection of their information a variance; those whose standard deviation is below
+    1 / trust_ratio are taken from the data.
 
     Raises
     ------
@@ -35,7 +36,7 @@ def estimate(problem: Problem) -> Estimate:
     scaled = prior.root.T @ information @ prior.root
     gradient = prior.root.T @ (right - information @ prior.phi)
     strength, directions = np.linalg.eigh(scaled)
-    known = strength > 1.0
+    known = strength > problem.trust_ratio**2
     shown = directions[:, known]
     target = (shown.T @ gradient) / strength[known]
     z = shown @ target

@@ -157,14 +157,14 @@ def _problem(
     reference = np.mean(
         [np.append(r.q[r.use, :2].mean(axis=0), 0.0) for r in recordings if r.use.any()], axis=0
     )
-    cutoff = unit.config.identify.cutoff_hz
+    cutoff, trust = unit.config.identify.cutoff_hz, unit.config.identify.trust_ratio
     equations = accumulate(model, recordings, cutoff, reference)
     noise = Noise(_FIRST_NOISE, np.full(6, float(equations.samples)), equations.samples)
     estimator = importlib.import_module("bsip_cli.identification.hansen2017")
     for _ in range(_WEIGHT_ROUNDS):
-        fitted = estimator.estimate(Problem(equations, noise, prior, basis))
+        fitted = estimator.estimate(Problem(equations, noise, prior, basis, trust))
         noise = noise_of(residual_series(model, recordings, cutoff, reference, fitted.phi))
-    return Problem(equations, noise, prior, basis), reference
+    return Problem(equations, noise, prior, basis, trust), reference
 
 
 def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:

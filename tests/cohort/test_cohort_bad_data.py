@@ -149,7 +149,7 @@ def test_correlation_tests_that_are_not_possible(make_cohort):
     cohort.run()
     five = cohort.table("table5_six_components").set_index(["task", "component", "method"])
     assert five.loc[("walking", "fx", "OM"), "williams_n"] == 3
-    reason = "in 1 of 4 participants. The test needs 4 independent samples, there are 3."
+    reason = "in 1 of 4 participants: The test needs 4 independent samples, there are 3."
     assert reason in five.loc[("walking", "fx", "OM"), "reason"]
     assert reason in cohort.text("table5_six_components")
 

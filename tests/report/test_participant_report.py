@@ -86,8 +86,9 @@ def test_files_are_listed_with_their_hash(reports):
     for _, row in files.iterrows():
         content = (reports.out / row["file"]).read_bytes()
         assert hashlib.sha256(content).hexdigest() == row["sha256"]
-    written = {p.relative_to(reports.out).as_posix()
-               for p in (reports.out / "sub-01").rglob("*") if p.suffix in (".html", ".svg", ".png")}
+    kinds = (".html", ".svg", ".png")
+    written = {path.relative_to(reports.out).as_posix()
+               for path in (reports.out / "sub-01").rglob("*") if path.suffix in kinds}
     assert written == set(files["file"])
 
 

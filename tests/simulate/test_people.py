@@ -10,11 +10,11 @@ from bsip_cli.simulate.inertia import Inertia, combined, nearest_physical, secon
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import HIP_FROM_ASIS, LUMBAR_FROM_ASIS, draw_person, mean_segments
 
-MARKERS = (
-    "RTEM LTEM FHEAD C7 T10 XIPH IJ RSCAP RASIS LASIS RPSIS LPSIS RAC LAC RUA LUA RELB LELB "
-    "RFA LFA RWRR RWRU LWRR LWRU RHAND LHAND RKNEL RKNEM LKNEL LKNEM RMALL RMALM LMALL LMALM "
-    "RCAL LCAL RMT2 LMT2"
-).split()
+LABELS = """
+RTEM LTEM FHEAD C7 T10 XIPH IJ RSCAP RASIS LASIS RPSIS LPSIS RAC LAC RUA LUA RELB LELB
+RFA LFA RWRR RWRU LWRR LWRU RHAND LHAND RKNEL RKNEM LKNEL LKNEM RMALL RMALM LMALL LMALM
+RCAL LCAL RMT2 LMT2
+"""
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -26,7 +26,7 @@ def test_true_parameters_are_physical(seed):
     assert all(part.is_physical() for part in segments.values())
     total = sum(part.mass_kg for part in segments.values())
     assert total == pytest.approx(person.mass_kg, rel=1e-12)
-    assert set(person.markers) == set(MARKERS)
+    assert set(person.markers) == set(LABELS.split())
 
 
 def test_people_differ_from_the_mean_person_unless_told_not_to():

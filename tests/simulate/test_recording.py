@@ -14,7 +14,8 @@ from bsip_cli.simulate.markers import marker_paths, rigid_paths
 from bsip_cli.simulate.options import Laboratory, Rates, Richness, StudyOptions
 from bsip_cli.simulate.presets import preset
 from bsip_cli.simulate.recording import FULL_SCALE, plate_wrenches, plates_of, write_trial
-from bsip_cli.simulate.study import simulate_study
+from bsip_cli.simulate.study import participant_person, simulate_study
+from bsip_cli.simulate.trial import simulate_trial
 
 QUIET = replace(Richness.none(), quantised=True)
 
@@ -42,9 +43,10 @@ def test_the_plate_reads_back_the_true_wrench(tmp_path, trial, person, task):
     assert np.abs(read["moment"].T / 1000.0 - at_centre).max() <= slack
     loaded = force[:, 2] > 100.0
     assert loaded.any()
-    cop = plates[0].centre_m[:2] + np.stack(
-        [-at_centre[loaded, 1], at_centre[loaded, 0]], axis=1
-    ) / force[loaded, 2:]
+    cop = (
+        plates[0].centre_m[:2]
+        + np.stack([-at_centre[loaded, 1], at_centre[loaded, 0]], axis=1) / force[loaded, 2:]
+    )
     assert np.abs(read["center_of_pressure"][:2, loaded].T / 1000.0 - cop).max() < 1e-3
 
 
@@ -161,3 +163,26 @@ def test_impossible_options_are_refused(tmp_path):
         simulate_study(tmp_path, StudyOptions(tasks=("dancing",)))
     with pytest.raises(UsageError, match="preset"):
         preset("large")
+
+
+@pytest.mark.parametrize("task", ["steps", "walking", "running"])
+def test_unmeasured_feet_stand_beside_the_plate(trial, person, task):
+    here = trial(task)
+    centre, half = here.plan.plate_centre_m, 0.3
+    for side in "lr":
+        ankle = here.poses.origin_m[f"foot_{side}"][:, 0] - centre[0]
+        length = person.lengths_m[f"foot_{side}"]
+        loaded = here.feet_force_n[side][:, 1] > 1.0
+        off, on = loaded & ~here.on_plate[side], loaded & here.on_plate[side]
+        heel, toe = ankle - 0.27 * length, ankle + 0.73 * length
+        assert np.all((heel[off] > half) | (toe[off] < -half))
+        assert np.all((heel[on] > -half) & (toe[on] < half))
+    assert any(contact.on_plate for contact in here.contacts)
+
+
+def test_a_bending_trunk_turns_its_two_parts_apart():
+    options = StudyOptions(richness=Richness(trunk_bend=0.5))
+    person = participant_person(options, 1)
+    trial = simulate_trial(person, "throwing", np.random.default_rng(2), 1.6)
+    parts = [trial.poses.rotation[name] for name in ("abdomen", "thorax")]
+    assert np.abs(parts[0] - parts[1]).max() > 0.1

@@ -1,0 +1,123 @@
+"""Dependencies point one way; science knows no tables, no logging, no command line."""
+
+from __future__ import annotations
+
+from graphlib import TopologicalSorter
+
+import pytest
+from imports_of import modules, names_from, package
+
+SCIENCE = ("body", "dynamics", "motion", "recordings", "statistics", "identification")
+
+# What each part of the package may import of the others. A new part needs a line here.
+ALLOWED = {
+    "__init__": "",
+    "errors": "",
+    "config": "errors",
+    "study": "errors",
+    "artifacts": "errors",
+    "provenance": "__init__",
+    "pipeline": "artifacts",
+    "unit": "artifacts config errors pipeline provenance study",
+    "runner": "artifacts config errors pipeline study unit",
+    "session": "body config errors pipeline runner study",
+    "__main__": "cli",
+    "cli": "__init__ errors pipeline provenance report session simulate",
+    "reference": "artifacts cli config pipeline",
+    "body": "config errors",
+    "dynamics": "body errors",
+    "motion": "body dynamics errors",
+    "recordings": "body errors",
+    "statistics": "errors",
+    "identification": "body dynamics errors statistics",
+    "effects": "body dynamics errors",
+    "diagnosis": "body dynamics effects errors identification statistics",
+    "report": "artifacts body dynamics errors motion statistics",
+    "simulate": "body config errors",
+    "stages": "artifacts body diagnosis dynamics effects errors identification motion pipeline "
+    "provenance recordings report statistics study unit",
+}
+
+FOREIGN_TO_SCIENCE = {"pandas", "pyarrow", "click", "tqdm", "logging", "subprocess", "matplotlib"}
+
+# Single modules of a part that may be imported, where the part as a whole may not.
+ONLY = {
+    "simulate": {"body": {"body.names"}},
+    "cli": {"report": {"report.tables"}, "simulate": {"simulate.command"}},
+    "session": {"body": {"body.markersets", "body.skeleton"}},
+}
+
+
+def inner(module: str) -> set[str]:
+    """The bsip modules that a module imports, without ``bsip_cli.``."""
+    found = {name for name in modules()[module] if name.split(".")[0] == "bsip_cli"}
+    return {name.removeprefix("bsip_cli").removeprefix(".") or "__init__" for name in found}
+
+
+def foreign(module: str) -> set[str]:
+    return {name for name in modules()[module] if not name.startswith("bsip_cli")}
+
+
+def test_reads_the_package():
+    """The rules below would hold of nothing too."""
+    assert "body.names" in inner("simulate.people")
+    assert {"numpy", "pandas"} <= foreign("artifacts")
+    assert "shipped" in names_from("body.skeleton", "bsip_cli.config")
+    assert {package(name) for name in modules()} >= {*SCIENCE, "stages", "report", "simulate"}
+
+
+@pytest.mark.parametrize("module", sorted(modules()))
+def test_imports_only_what_its_part_may(module):
+    part = package(module)
+    assert part in ALLOWED, f"{part} is a new part: say in ALLOWED what it may import"
+    allowed = {part, *ALLOWED[part].split()}
+    assert {name for name in inner(module) if package(name) not in allowed} == set()
+
+
+def test_parts_form_no_circle():
+    """The rule itself has one direction."""
+    order = list(TopologicalSorter({k: v.split() for k, v in ALLOWED.items()}).static_order())
+    assert order.index("body") < order.index("dynamics") < order.index("stages")
+    assert order.index("unit") < order.index("runner") < order.index("session") < order.index("cli")
+
+
+def test_modules_form_no_circle():
+    graph = {name: inner(name) - {"__init__", name} for name in modules()}
+    assert len(list(TopologicalSorter(graph).static_order())) >= len(graph)
+
+
+@pytest.mark.parametrize("module", [name for name in sorted(modules()) if package(name) in SCIENCE])
+def test_science_takes_arrays(module):
+    """No tables, no printing; of the configuration only where shipped files lie."""
+    assert foreign(module) & FOREIGN_TO_SCIENCE == set()
+    assert names_from(module, "bsip_cli.config") <= {"shipped"}
+
+
+@pytest.mark.parametrize(
+    ("module", "part", "known"),
+    [
+        (module, part, known)
+        for module in sorted(modules())
+        for part, known in ONLY.get(package(module), {}).items()
+    ],
+)
+def test_imports_of_another_part_only_what_is_shared(module, part, known):
+    assert {name for name in inner(module) if package(name) == part} <= known
+
+
+def test_the_fitted_side_does_not_know_the_simulator():
+    """Who finds must not see the truth."""
+    users = {name for name in modules() if any(package(m) == "simulate" for m in inner(name))}
+    assert {package(name) for name in users} == {"cli", "simulate"}
+
+
+def test_stages_do_not_know_each_other():
+    """They meet in files; two reports share their writing of files."""
+    helpers = {"stages.frames", "stages.report"}
+    pairs = {
+        (name, other)
+        for name in modules()
+        for other in inner(name) - helpers
+        if package(name) == package(other) == "stages"
+    }
+    assert pairs == set()

@@ -1,0 +1,95 @@
+"""A stage reads, writes and looks up what the table of stages says: freshness rests on it."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+
+import pytest
+
+from bsip_cli.artifacts import SCHEMAS
+from bsip_cli.config import Config
+from bsip_cli.pipeline import STAGES, producer, stages_named
+
+LABELS = [stage.label for stage in STAGES]
+
+
+def tree_of(stage) -> ast.Module:
+    return ast.parse(inspect.getsource(importlib.import_module(stage.module)))
+
+
+def options_used(tree: ast.Module) -> set[str]:
+    """X of every ``….config.X``."""
+    return {
+        node.attr
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute)
+        and isinstance(node.value, ast.Attribute)
+        and node.value.attr == "config"
+    }
+
+
+def kinds(tree: ast.Module, *methods: str) -> set[str]:
+    """Literal kinds handed to these methods of a unit."""
+    return {
+        word.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and node.func.attr in methods
+        for word in node.args
+        if isinstance(word, ast.Constant) and isinstance(word.value, str)
+    }
+
+
+def knows_roles(tree: ast.Module) -> bool:
+    return any(isinstance(node, ast.Attribute) and node.attr == "role" for node in ast.walk(tree))
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=LABELS)
+def test_declares_every_option_it_looks_up(stage):
+    """An undeclared option would change results without a rerun."""
+    tree = tree_of(stage)
+    used = options_used(tree) | ({"roles"} if knows_roles(tree) else set())
+    assert used <= set(stage.options)
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=LABELS)
+def test_declares_every_kind_it_reads(stage):
+    assert kinds(tree_of(stage), "read", "facts", "trials") <= set(stage.reads)
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=LABELS)
+def test_writes_what_it_declares(stage):
+    assert kinds(tree_of(stage), "write") == set(stage.writes)
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=LABELS)
+def test_reads_only_what_an_earlier_stage_writes(stage):
+    before = STAGES[: STAGES.index(stage)]
+    assert {kind for kind in stage.reads if producer(kind) not in before} == set()
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=LABELS)
+def test_writes_at_its_own_level(stage):
+    assert {SCHEMAS[kind].level for kind in stage.writes} == {stage.level}
+    assert set(stage.options) <= set(Config.model_fields)
+
+
+def test_every_kind_has_one_writer():
+    written = [kind for stage in STAGES for kind in stage.writes]
+    assert sorted(written) == sorted(set(SCHEMAS) - {"refusal"})
+
+
+def test_a_command_runs_its_stages_in_order():
+    assert stages_named("run") == STAGES
+    assert [stage.level for stage in stages_named("report")] == ["participant", "cohort"]
+
+
+@pytest.mark.parametrize("kind", SCHEMAS)
+def test_every_number_has_a_unit_and_every_column_a_meaning(kind):
+    for column in SCHEMAS[kind].columns:
+        assert column.meaning, column.name
+        counts = column.type == "int"
+        assert column.unit or column.type in ("text", "bool") or counts, column.name

@@ -1,0 +1,95 @@
+import pytest
+
+from bsip_cli.body.names import SEGMENTS
+from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.errors import UsageError
+
+
+def row(name, parent, joint, kind, table="thigh"):
+    values = {"name": name, "parent": parent, "joint": joint, "type": kind, "table": table}
+    return "[[segments]]\n" + "".join(f'{key} = "{value}"\n' for key, value in values.items())
+
+
+ROOT = row("lower_torso", "", "root", "free", "pelvis")
+GOOD = ROOT + row("thigh_l", "lower_torso", "hip_l", "spherical")
+
+
+def written(tmp_path, text):
+    file = tmp_path / "tree.toml"
+    file.write_text(text, encoding="utf-8")
+    return str(file)
+
+
+def test_the_shipped_skeleton_has_the_segments_of_the_contract():
+    skeleton = load_skeleton("hansen2017")
+    assert set(skeleton.segments) == set(SEGMENTS)
+    assert len(skeleton.segments) == len(SEGMENTS) == 15
+
+
+def test_forty_velocities():
+    skeleton = load_skeleton("hansen2017")
+    assert len(skeleton.v_names) == len(set(skeleton.v_names)) == 40
+    assert len(skeleton.q_names) == len(set(skeleton.q_names)) == 51
+    revolute = {
+        j for j, k in zip(skeleton.joints, skeleton.joint_types, strict=True) if k[0] == "r"
+    }
+    assert revolute == {"elbow_l", "elbow_r", "knee_l", "knee_r"}
+
+
+def test_entries_stand_where_pinocchio_has_them():
+    from standing_person import standing
+
+    skeleton = load_skeleton("hansen2017")
+    model = pinocchio_model(standing().person)
+    assert list(model.names)[1:] == list(skeleton.joints)
+    assert [model.joints[i + 1].idx_q for i in range(15)] == list(skeleton.q_starts)
+    assert [model.joints[i + 1].idx_v for i in range(15)] == list(skeleton.v_starts)
+
+
+def test_sides():
+    skeleton = load_skeleton("hansen2017")
+    sides = [skeleton.side(name) for name in ("foot_l", "foot_r", "head", "lower_torso")]
+    assert sides == ["l", "r", "", ""]
+
+
+def test_a_small_tree_of_ones_own(tmp_path):
+    skeleton = load_skeleton(written(tmp_path, GOOD))
+    assert skeleton.name == "tree"
+    assert skeleton.parents == (-1, 0)
+    assert len(skeleton.v_names) == 9
+
+
+CHILD = row("shank_l", "thigh_l", "knee_l", "revolute")
+BAD = {
+    "no base": row("thigh_l", "thigh_l", "hip_l", "spherical"),
+    "base is no free joint": row("lower_torso", "", "root", "spherical"),
+    "two bases": ROOT + row("thigh_l", "", "hip_l", "free"),
+    "a free joint within": ROOT + row("thigh_l", "lower_torso", "hip_l", "free"),
+    "child before its parent": ROOT + CHILD + row("thigh_l", "lower_torso", "hip_l", "spherical"),
+    "its own parent": ROOT + row("thigh_l", "thigh_l", "hip_l", "spherical"),
+    "a parent that is not there": ROOT + row("thigh_l", "pelvis", "hip_l", "spherical"),
+    "an unknown joint type": ROOT + row("thigh_l", "lower_torso", "hip_l", "universal"),
+    "a missing entry": ROOT + '[[segments]]\nname = "thigh_l"\n',
+    "a segment twice": GOOD + row("thigh_l", "lower_torso", "hip_r", "spherical"),
+    "a joint twice": GOOD + row("thigh_r", "lower_torso", "hip_l", "spherical"),
+    "no segment": "segments = []\n",
+    "segments that are no rows": 'segments = ["head"]\n',
+    "a number for a table": "segments = 3\n",
+    "no table": 'name = "tree"\n',
+    "not TOML": "[[segments\n",
+}
+
+
+@pytest.mark.parametrize("text", BAD.values(), ids=BAD.keys())
+def test_bad_trees_are_refused(tmp_path, text):
+    file = written(tmp_path, text)
+    with pytest.raises(UsageError) as caught:
+        load_skeleton(file)
+    assert "tree.toml" in str(caught.value)
+    assert caught.value.expected
+
+
+def test_an_unknown_skeleton_names_the_known_ones():
+    with pytest.raises(UsageError, match="hansen2017"):
+        load_skeleton("hansen2018")

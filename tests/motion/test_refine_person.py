@@ -1,0 +1,166 @@
+"""Scaling brings a wrong geometry back when the markers are true and the poses vary."""
+
+import numpy as np
+import pytest
+from standing_person import joint_frames, markers_of, random_poses, standing
+
+from bsip_cli.motion.inverse_kinematics import solve_poses
+from bsip_cli.motion.scaling import (
+    ScalingOptions,
+    _parameters,
+    _with,
+    refine,
+    varied_frames,
+)
+
+LOOSE = ScalingOptions(
+    joint_centre_sd_m=0.1,
+    length_sd=0.5,
+    marker_sd_m=0.1,
+    hinge_sd_rad=0.5,
+    symmetry_sd=0.5,
+    independent_frames=1000,
+    iterations=25,
+)
+IK = {
+    "marker_sd_m": 0.002,
+    "robust_limit_m": 0.1,
+    "posture_sd_rad": 100.0,
+    "iterations": 50,
+}
+LIMBS = [f"{name}_{s}" for name in ("thigh", "shank", "upper_arm", "forearm") for s in "lr"]
+
+
+def perturbed(person, seed, options=LOOSE):
+    """Lengths off by 3 %, joint centres by 10 mm, hinges by 4 degrees, markers by 5 mm."""
+    rng = np.random.default_rng(seed)
+    size = {"length": 0.012, "parent_tilt": 0.07, "child_tilt": 0.07, "marker": 0.005}
+    parameters = tuple(_parameters(person, options))
+    return _with(
+        person, parameters, np.array([rng.normal(0, size.get(p.kind, 0.01)) for p in parameters])
+    )
+
+
+@pytest.fixture(scope="module")
+def refined():
+    truth = standing().person
+    q = random_poses(truth, 60, 0.45, seed=1)
+    markers = markers_of(truth, q)
+    first = perturbed(truth, seed=2)
+    start = np.concatenate(
+        [solve_poses(first, markers[k : k + 1], q[k], **IK).q for k in range(len(q))]
+    )
+    return truth, q, first, start, refine(first, markers, start, LOOSE, IK)
+
+
+def test_the_residual_falls_to_almost_nothing(refined):
+    *_, result = refined
+    assert result.rms_before_m > 0.004
+    assert result.poses.rms_m() < 2e-4
+
+
+def test_lengths_come_back(refined):
+    """To 2 mm only: a hinge's centre may slide along its axis, which no marker sees."""
+    truth, _, first, _, result = refined
+    at = [truth.skeleton.index(name) for name in LIMBS]
+    before = np.abs(first.lengths_m - truth.lengths_m)[at]
+    after = np.abs(result.person.lengths_m - truth.lengths_m)[at]
+    assert before.max() > 0.02
+    assert after.max() < 0.002
+    assert after.mean() < 0.1 * before.mean()
+
+
+def test_joint_centres_come_back_in_the_world(refined):
+    """All but the pelvis' origin (a definition); of hinges the distance from the true axis."""
+    truth, q, first, start, result = refined
+    R, true = joint_frames(truth, q)
+    hinge = [kind == "revolute" for kind in truth.skeleton.joint_types]
+    axes = R @ truth.hinge_axes()[:, :, None]
+
+    def errors(person, poses):
+        apart = joint_frames(person, poses)[1] - true
+        along = np.einsum("fni,fni->fn", apart, axes[..., 0])[..., None] * axes[..., 0]
+        apart -= np.where(np.array(hinge)[:, None], along, 0.0)
+        return np.linalg.norm(apart, axis=2).mean(axis=0)[1:]
+
+    assert errors(first, start).min() > 0.002
+    assert errors(first, start).mean() > 0.015
+    assert errors(result.person, result.poses.q).max() < 1e-4
+
+
+def test_hinges_come_back(refined):
+    """The angle between the knee's axis and the true one, in the world."""
+    truth, q, first, start, result = refined
+    at = truth.skeleton.index("shank_l")
+
+    def axes(person, poses):
+        return joint_frames(person, poses)[0][:, at] @ person.hinge_axes()[at]
+
+    true = axes(truth, q)
+    before = np.arccos(np.einsum("fi,fi->f", axes(first, start), true).clip(-1, 1))
+    after = np.arccos(np.einsum("fi,fi->f", axes(result.person, result.poses.q), true).clip(-1, 1))
+    assert after.max() < min(0.01, before.max())
+
+
+def test_a_true_geometry_stays():
+    truth = standing().person
+    q = random_poses(truth, 20, 0.4, seed=3)
+    result = refine(truth, markers_of(truth, q), q, LOOSE, IK)
+    np.testing.assert_allclose(result.person.lengths_m, truth.lengths_m, atol=1e-5)
+    np.testing.assert_allclose(
+        result.person.joint_in_parent_m, truth.joint_in_parent_m, atol=2e-5
+    )
+
+
+def test_left_and_right_are_tied_softly():
+    """A leg that hangs still says little of its own length: it goes with the other one."""
+    truth = standing().person
+    q = random_poses(truth, 30, 0.4, seed=4)
+    markers = markers_of(truth, q)
+    skeleton = truth.skeleton
+    for part in ("shank_l", "foot_l"):
+        markers[:, truth.marker_segments == skeleton.index(part)] = np.nan
+    parameters = tuple(_parameters(truth, LOOSE))
+    x = np.zeros(len(parameters))
+    for k, p in enumerate(parameters):
+        if p.kind == "length" and skeleton.segments[p.index].startswith("shank"):
+            x[k] = 0.03
+    first = _with(truth, parameters, x)
+    found = {}
+    for tie in (0.5e-2, 10.0):
+        options = ScalingOptions(**{**LOOSE.__dict__, "symmetry_sd": tie})
+        found[tie] = refine(first, markers, q, options, IK).person.lengths_m - truth.lengths_m
+    left, right = skeleton.index("shank_l"), skeleton.index("shank_r")
+    assert abs(found[10.0][right]) < 0.001
+    assert found[10.0][left] == pytest.approx(0.03, abs=1e-3)
+    assert abs(found[0.5e-2][left]) < 0.002
+
+
+def test_the_lengths_sd_tells_known_from_unknown():
+    truth = standing().person
+    q = random_poses(truth, 20, 0.4, seed=5)
+    markers = markers_of(truth, q)
+    skeleton = truth.skeleton
+    markers[:, truth.marker_segments == skeleton.index("foot_l")] = np.nan
+    markers[:, truth.marker_segments == skeleton.index("shank_l")] = np.nan
+    loose = ScalingOptions(**{**LOOSE.__dict__, "symmetry_sd": 10.0})
+    sd = refine(truth, markers, q, loose, IK).length_sd_m
+    prior = 0.5 * truth.lengths_m[skeleton.index("shank_l")]
+    assert sd[skeleton.index("shank_l")] == pytest.approx(prior, rel=0.01)
+    assert sd[skeleton.index("shank_r")] < 0.03 * prior
+    assert np.isnan(sd[skeleton.index("head")])
+
+
+def test_varied_frames_are_the_farthest_apart():
+    truth = standing().person
+    R = np.stack([np.eye(3)] * 15)[None].repeat(50, axis=0)
+    turned = np.linspace(0, 1, 50)  # the head turns ever farther
+    head = truth.skeleton.index("head")
+    c, s = np.cos(turned), np.sin(turned)
+    R[:, head, 0, 0], R[:, head, 0, 2], R[:, head, 2, 0], R[:, head, 2, 2] = c, s, -s, c
+    assert varied_frames(R, 3).tolist()[::2] == [0, 49]
+    assert varied_frames(R, 3)[1] in (24, 25)
+    assert varied_frames(R, 99).tolist() == list(range(50))
+    spin = np.linalg.qr(np.random.default_rng(0).normal(size=(50, 3, 3)))[0]
+    spin *= np.linalg.det(spin)[:, None, None]
+    assert varied_frames(spin[:, None] @ R, 3).tolist()[::2] == [0, 49]

@@ -1,0 +1,172 @@
+"""Velocities and accelerations on the manifold against a trajectory whose own are known."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from standing_person import Swing, standing
+
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.errors import BadDataError
+from bsip_cli.motion.smoothing import smooth_motion
+
+RATE_HZ = 100.0
+OPTIONS = {
+    "method": "spline",
+    "butterworth_cutoff_hz": 6.0,
+    "pace_window_s": 0.5,
+    "edge_s": 0.1,
+}
+
+
+@pytest.fixture(scope="module")
+def swing():
+    person = standing().person
+    model = pinocchio_model(person)
+    return person, model, Swing(model, standing().q, seed=1).sampled(6.0, RATE_HZ)
+
+
+def smoothed(person, q, **changes):
+    return smooth_motion(person, q, np.ones(len(q), dtype=bool), RATE_HZ, **(OPTIONS | changes))
+
+
+def relative(found, true):
+    inner = slice(30, -30)
+    return np.sqrt(((found - true)[inner] ** 2).mean() / (true[inner] ** 2).mean())
+
+
+def test_the_known_trajectory_knows_its_velocity(swing):
+    """The truth of these tests itself: neighbouring frames differ by v dt."""
+    _, model, (_, q, v, a) = swing
+    steps = np.stack([pin.difference(model, q[k - 1], q[k + 1]) for k in range(1, len(q) - 1)])
+    assert relative(steps * RATE_HZ / 2, v[1:-1]) < 2e-3
+    assert relative((v[2:] - v[:-2]) * RATE_HZ / 2, a[1:-1]) < 2e-3
+
+
+def test_velocities_and_accelerations(swing):
+    person, _, (_, q, v, a) = swing
+    motion = smoothed(person, q)
+    assert relative(motion.v, v) < 1e-3
+    assert relative(motion.a, a) < 1e-3
+    for part in (slice(0, 3), slice(3, 6), slice(6, 40)):  # base, its turning, the joints
+        assert relative(motion.v[:, part], v[:, part]) < 1e-3
+        assert relative(motion.a[:, part], a[:, part]) < 1e-3
+
+
+def test_quaternions_stay_units_and_their_signs_do_not_matter(swing):
+    person, _, (_, q, _, _) = swing
+    motion = smoothed(person, q)
+    flipped = q.copy()
+    flipped[::3, 3:7] *= -1
+    again = smoothed(person, flipped)
+    np.testing.assert_allclose(again.v, motion.v, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(motion.q[:, 3:7], axis=1), 1.0, atol=1e-12)
+
+
+def test_a_joint_that_spins_at_a_constant_rate():
+    """Three turns about an oblique axis: omega in body axes is constant, its derivative zero."""
+    person = standing().person
+    model = pinocchio_model(person)
+    omega = np.array([1.0, -3.0, 2.0])
+    v = np.zeros(model.nv)
+    at = model.joints[model.getJointId("shoulder_r")].idx_v
+    v[at : at + 3] = omega
+    times = np.arange(500) / RATE_HZ
+    motion = smoothed(person, np.stack([pin.integrate(model, standing().q, v * t) for t in times]))
+    spin = motion.v[30:-30, at : at + 3]
+    np.testing.assert_allclose(spin, np.broadcast_to(omega, spin.shape), atol=1e-5)
+    np.testing.assert_allclose(motion.a[30:-30, at : at + 3], 0.0, atol=1e-3)
+    rest = np.delete(motion.v[30:-30], np.s_[at : at + 3], axis=1)
+    np.testing.assert_allclose(rest, 0.0, atol=1e-6)
+
+
+def test_a_turning_base_that_moves_straight_has_pinocchios_spatial_acceleration():
+    """In body axes the velocity turns though the body does not accelerate: a = -omega x v."""
+    person = standing().person
+    model = pinocchio_model(person)
+    omega, speed = np.array([0.5, 1.5, -1.0]), np.array([0.8, -0.2, 0.1])
+    q = np.repeat(standing().q[None], 400, axis=0)
+    for k in range(400):
+        turn = pin.exp3(omega * k / RATE_HZ)
+        q[k, 3:7] = pin.Quaternion(pin.Quaternion(standing().q[3:7]).toRotationMatrix() @ turn).coeffs()
+        q[k, :3] += speed * k / RATE_HZ
+    motion = smoothed(person, q)
+    data = model.createData()
+    for k in (100, 200, 300):
+        pin.forwardKinematics(model, data, motion.q[k], motion.v[k], motion.a[k])
+        classical = pin.getClassicalAcceleration(model, data, 1, pin.LOCAL_WORLD_ALIGNED)
+        velocity = pin.getVelocity(model, data, 1, pin.LOCAL_WORLD_ALIGNED)
+        np.testing.assert_allclose(velocity.linear, speed, atol=1e-5)
+        np.testing.assert_allclose(classical.linear, 0.0, atol=1e-3)
+        np.testing.assert_allclose(motion.v[k, 3:6], omega, atol=1e-5)
+        assert np.linalg.norm(motion.a[k, :3]) > 0.5
+
+
+def noisy(person, q, sd_m, seed):
+    """Poses solved from shaken markers."""
+    from standing_person import markers_of
+
+    from bsip_cli.motion.inverse_kinematics import solve_poses
+
+    markers = markers_of(person, q)
+    markers = markers + np.random.default_rng(seed).normal(0, sd_m, markers.shape)
+    options = {"marker_sd_m": 0.005, "robust_limit_m": 0.025, "posture_sd_rad": 3.0}
+    return solve_poses(person, markers, q[0], iterations=50, **options).q
+
+
+def test_the_markers_noise_is_found_and_the_stated_sd_holds(swing):
+    person, _, (_, q, _, a) = swing
+    motion = smoothed(person, noisy(person, q, 0.0005, seed=2))
+    assert motion.marker_noise_m == pytest.approx(0.0005, rel=0.25)
+    inner = slice(30, -30)
+    error = np.sqrt(((motion.a - a)[inner] ** 2).mean(axis=0))
+    stated = np.sqrt((motion.a_sd[inner] ** 2).mean(axis=0))
+    ratio = stated / error
+    assert 0.5 < np.median(ratio) < 2
+    assert np.mean((ratio > 0.4) & (ratio < 2.5)) > 0.85
+
+
+def test_butterworth(swing):
+    person, _, (_, q, v, a) = swing
+    motion = smoothed(person, q, method="butterworth", butterworth_cutoff_hz=10.0)
+    assert relative(motion.v, v) < 0.02
+    assert relative(motion.a, a) < 0.05
+    slow = smoothed(person, q, method="butterworth", butterworth_cutoff_hz=1.0)
+    assert relative(slow.a, a) > 0.3  # the cut-off bites
+
+
+def test_butterworth_halves_power_at_its_cutoff():
+    person = standing().person
+    times = np.arange(1000) / RATE_HZ
+    q = np.repeat(standing().q[None], 1000, axis=0)
+    q[:, 0] += 0.1 * np.sin(2 * np.pi * 5.0 * times)
+    motion = smoothed(person, q, method="butterworth", butterworth_cutoff_hz=5.0)
+    gain = np.std(motion.q[200:-200, 0]) / np.std(q[200:-200, 0])
+    assert gain == pytest.approx(np.sqrt(0.5), rel=0.02)
+
+
+@pytest.mark.parametrize("method", ["spline", "butterworth"])
+def test_undetermined_frames_are_bridged(swing, method):
+    person, _, (_, q, v, _) = swing
+    determined = np.ones(len(q), dtype=bool)
+    determined[300:306] = False
+    wild = q.copy()
+    wild[300:306] = wild[0]
+    motion = smooth_motion(person, wild, determined, RATE_HZ, **(OPTIONS | {"method": method}))
+    assert np.isfinite(motion.a).all()
+    if method == "spline":
+        assert relative(motion.v[270:336], v[270:336]) < 0.02
+
+
+def test_inner_frames_keep_away_from_the_ends(swing):
+    person, _, (_, q, _, _) = swing
+    inner = smoothed(person, q, edge_s=0.25).inner
+    assert np.flatnonzero(inner)[[0, -1]].tolist() == [25, len(q) - 26]
+    assert smoothed(person, q, edge_s=0.0).inner.all()
+
+
+def test_too_few_frames(swing):
+    person, _, (_, q, _, _) = swing
+    determined = np.zeros(len(q), dtype=bool)
+    determined[:11] = True
+    with pytest.raises(BadDataError, match="11 frames"):
+        smooth_motion(person, q, determined, RATE_HZ, **OPTIONS)

@@ -1,0 +1,195 @@
+"""Solved poses against an independent optimiser, and against the poses that made the markers."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.optimize import least_squares
+from standing_person import away, joint_frames, markers_of, random_poses, standing, tilted_person
+
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.errors import BadDataError
+from bsip_cli.motion.inverse_kinematics import neutral, place_base, solve_poses
+
+SD, LIMIT, POSTURE = 0.005, 0.025, 3.0
+OPTIONS = {
+    "marker_sd_m": SD,
+    "robust_limit_m": LIMIT,
+    "posture_sd_rad": POSTURE,
+    "iterations": 60,
+}
+NO_PRIOR = OPTIONS | {"posture_sd_rad": 1e5}
+
+
+def residual_vector(person, model, measured, q, limit):
+    """Its squares are twice the cost: a marker's square grows like the logarithm far out."""
+    apart = (measured - markers_of(person, q[None])[0])[np.isfinite(measured).all(axis=1)]
+    weight = person.marker_weights[np.isfinite(measured).all(axis=1)] / SD**2
+    d = np.linalg.norm(apart, axis=1)
+    loss = np.where(d <= limit, d**2, limit**2 * (1 + 2 * np.log(np.maximum(d, limit) / limit)))
+    shrunk = apart * np.sqrt(weight * loss / d**2)[:, None]
+    turns = []
+    for joint in range(2, model.njoints):
+        at, size = model.joints[joint].idx_q, model.joints[joint].nq
+        part = q[at : at + size]
+        turns += [*pin.log3(pin.Quaternion(part).toRotationMatrix())] if size == 4 else [part[0]]
+    return np.concatenate([shrunk.ravel(), np.array(turns) / POSTURE])
+
+
+def optimum(person, model, measured, q, limit):
+    def residuals(x):
+        return residual_vector(person, model, measured, pin.integrate(model, q, x), limit)
+
+    return least_squares(residuals, np.zeros(model.nv), xtol=1e-14, ftol=1e-14, gtol=1e-12)
+
+
+def noisy_frames(person, q, sd, seed):
+    rng = np.random.default_rng(seed)
+    markers = markers_of(person, q)
+    return markers + rng.normal(0, sd, markers.shape)
+
+
+@pytest.mark.parametrize("case", ["all markers", "missing markers", "beyond the robust limit"])
+def test_the_solved_pose_is_scipys_optimum(case):
+    person = tilted_person()
+    model = pinocchio_model(person)
+    q = random_poses(person, 2, 0.4, seed=1)
+    limit = 0.006 if case == "beyond the robust limit" else LIMIT
+    markers = noisy_frames(person, q, 0.004, seed=2)
+    if case == "missing markers":
+        gone = np.random.default_rng(3).random(markers.shape[:2]) < 0.15
+        markers[gone] = np.nan
+    for k in range(2):
+        options = OPTIONS | {"robust_limit_m": limit}
+        mine = solve_poses(person, markers[k : k + 1], q[k], **options)
+        assert mine.converged[0]
+        cost = 0.5 * (residual_vector(person, model, markers[k], mine.q[0], limit) ** 2).sum()
+        theirs = optimum(person, model, markers[k], q[k], limit)
+        far = np.nanmax(mine.residual_m) > limit
+        assert far == (case == "beyond the robust limit")
+        assert cost == pytest.approx(theirs.cost, rel=1e-8)
+        seen = np.isfinite(markers[k]).all(axis=1)
+        assert np.array_equal(np.isfinite(mine.residual_m[0]), seen)
+
+
+def test_noise_free_poses_come_back():
+    person = tilted_person()
+    q = random_poses(person, 20, 0.3, seed=4)
+    markers = markers_of(person, q)
+    for k in range(len(q)):
+        start = place_base(person, markers[k], neutral(person))
+        found = solve_poses(person, markers[k : k + 1], start, **NO_PRIOR)
+        assert np.abs(away(person, q[k], found.q[0])).max() < 1e-7
+        assert found.residual_m.max() < 1e-7
+
+
+@pytest.mark.parametrize("degrees", [60.0, 120.0, 170.0])
+@pytest.mark.parametrize("axis", [0, 2])
+def test_raised_arms_are_found_from_the_neutral_pose(axis, degrees):
+    person = standing().person
+    model = pinocchio_model(person)
+    turn = np.zeros(model.nv)
+    for joint, sign in (("shoulder_l", -1.0), ("shoulder_r", 1.0)):
+        sideways = sign if axis == 0 else 1.0
+        turn[model.joints[model.getJointId(joint)].idx_v + axis] = sideways * np.deg2rad(degrees)
+    q = pin.integrate(model, neutral(person), turn)
+    markers = markers_of(person, q[None])
+    start = place_base(person, markers[0], neutral(person))
+    found = solve_poses(person, markers, start, **NO_PRIOR)
+    same = joint_frames(person, found.q)[0] - joint_frames(person, q[None])[0]
+    assert np.abs(same).max() < 1e-7
+
+
+def test_a_motion_is_followed_from_frame_to_frame_over_turns():
+    """A spin of two turns with a wheeling arm: no frame may jump to another optimum."""
+    person = standing().person
+    model = pinocchio_model(person)
+    t = np.linspace(0, 1, 120)
+    v = np.zeros(model.nv)
+    v[5] = 4 * np.pi  # about the body's Z
+    v[model.joints[model.getJointId("shoulder_l")].idx_v + 2] = 2 * np.pi
+    q = np.stack([pin.integrate(model, standing().q, v * s) for s in t])
+    found = solve_poses(person, markers_of(person, q), standing().q, **NO_PRIOR)
+    errors = [away(person, a, b) for a, b in zip(q, found.q, strict=True)]
+    assert np.abs(errors).max() < 1e-7
+
+
+@pytest.mark.parametrize("label", ["XIPH", "RASIS", "LKNEL", "RELB", "FHEAD"])
+def test_a_wild_marker_hardly_moves_the_pose(label):
+    """Its pull fades as 1 / distance: 0.025^2 / 0.3, some 2 mm, spread over the segment."""
+    person = standing().person
+    q = random_poses(person, 1, 0.2, seed=5)
+    markers = np.repeat(markers_of(person, q), 2, axis=0)
+    clean = solve_poses(person, markers, q[0], **OPTIONS).q[0]
+    markers[1, person.markers.index(label)] += [0.18, -0.2, 0.13]  # 0.3 m
+    bent = solve_poses(person, markers, q[0], **OPTIONS)
+    assert bent.residual_m[1, person.markers.index(label)] == pytest.approx(0.3, abs=0.01)
+    assert np.abs(away(person, clean, bent.q[1]))[:3].max() < 0.003
+    moved = np.linalg.norm(markers_of(person, bent.q[1:])[0] - markers[0], axis=1)
+    assert moved.max() < 0.006
+    least = solve_poses(person, markers, q[0], **(OPTIONS | {"robust_limit_m": 10.0})).q[1]
+    pulled = np.linalg.norm(markers_of(person, least[None])[0] - markers[0], axis=1)
+    assert pulled.max() > 10 * moved.max()  # plain least squares would have bent the body
+
+
+def test_the_posture_prior_holds_what_no_marker_decides():
+    person = standing().person
+    skeleton = person.skeleton
+    q = random_poses(person, 1, 0.3, seed=6)
+    markers = markers_of(person, q)
+    hand = person.marker_segments == skeleton.index("hand_r")
+    markers[:, hand] = np.nan
+    found = solve_poses(person, markers, q[0], **OPTIONS)
+    wrist = skeleton.q_starts[skeleton.index("hand_r")]
+    np.testing.assert_allclose(found.q[0, wrist : wrist + 3], 0.0, atol=1e-5)
+    sd = dict(zip(skeleton.v_names, found.coordinate_sd[0], strict=True))
+    assert sd["wrist_r_rx"] == pytest.approx(POSTURE, rel=1e-6)
+    assert sd["hip_r_rx"] < 0.1
+    left = skeleton.q_starts[skeleton.index("hand_l")]
+    np.testing.assert_allclose(
+        np.abs(found.q[0, left : left + 4]), np.abs(q[0, left : left + 4]), atol=1e-3
+    )
+
+
+def test_a_prior_of_its_own_for_each_coordinate():
+    person = standing().person
+    skeleton = person.skeleton
+    q = random_poses(person, 1, 0.3, seed=7)
+    q[0, skeleton.q_starts[skeleton.index("shank_l")]] = -0.4
+    sd = np.full(40, 1e5)
+    knee = skeleton.v_names.index("knee_l_angle")
+    sd[knee] = 1e-6
+    found = solve_poses(person, markers_of(person, q), q[0], **(OPTIONS | {"posture_sd_rad": sd}))
+    assert abs(found.q[0, skeleton.q_starts[skeleton.index("shank_l")]]) < 1e-6
+    assert found.rms_m() > 1e-4
+
+
+@pytest.mark.parametrize("visible", ["all", "without the pelvis"])
+def test_place_base_lays_the_body_on_its_markers(visible):
+    person = standing().person
+    q = random_poses(person, 1, 0.5, seed=8)[0]
+    markers = markers_of(person, q[None])[0]
+    if visible != "all":
+        markers[person.marker_segments == 0] = np.nan
+    elsewhere = q.copy()
+    elsewhere[:7] = neutral(person)[:7]
+    placed = place_base(person, markers, elsewhere)
+    assert np.abs(away(person, q, placed)).max() < 1e-10
+
+
+def test_rms_counts_only_markers_that_are_there():
+    person = standing().person
+    markers = noisy_frames(person, standing().q[None], 0.003, seed=9)
+    markers[0, :5] = np.nan
+    poses = solve_poses(person, markers, standing().q, **OPTIONS)
+    apart = (markers - markers_of(person, poses.q))[0, 5:]
+    expected = np.sqrt((apart**2).sum(axis=1).mean())
+    assert poses.frame_rms_m()[0] == pytest.approx(expected, rel=1e-10)
+    assert poses.rms_m() == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("frames", [0, 3])
+def test_no_marker_at_all_is_bad_data(frames):
+    person = standing().person
+    markers = np.full((frames, len(person.markers), 3), np.nan)
+    with pytest.raises(BadDataError, match="no marker"):
+        solve_poses(person, markers, standing().q, **OPTIONS)

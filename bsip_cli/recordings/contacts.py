@@ -78,13 +78,16 @@ def contact_windows(
     mismatch = force_mismatch(total, trunk_markers_m, mass_kg, rate_hz, limits)
     on_ground, on_plate, reasons = {}, {}, []
     valid = usable & ~mismatch
+    explained = np.zeros(n_frames, bool)
     for side, markers in foot_markers_m.items():
         foot = _Foot.of(markers, foot_height0_m.get(side), rate_hz)
         on_ground[side], on_plate[side] = _touches(foot, plates, rate_hz, limits)
         off = on_ground[side] & ~on_plate[side]
         valid &= ~off & foot.seen
+        explained |= off
         reasons += _foot_findings(side, off, ~foot.seen, rate_hz)
-    reasons += _force_findings(mismatch, usable, total, rate_hz)
+    unexplained = _runs_apart_from(mismatch, explained)
+    reasons += _force_findings(unexplained, usable, total, rate_hz)
     valid = long_runs(valid, round(limits.least_window_s * rate_hz))
     return ContactWindows(valid, on_ground, on_plate, tuple(reasons))
 
@@ -189,6 +192,14 @@ def _foot_findings(side: str, off: np.ndarray, unseen: np.ndarray, rate_hz: floa
     if unseen.any():
         findings.append(_finding(name, f"no foot marker seen: {_times(unseen, rate_hz)}"))
     return findings
+
+
+def _runs_apart_from(mask: np.ndarray, explained: np.ndarray) -> np.ndarray:
+    """The runs of ``mask`` of which less than half is explained."""
+    apart = np.zeros_like(mask)
+    for start, stop in runs(mask):
+        apart[start:stop] = explained[start:stop].mean() < 0.5
+    return apart
 
 
 def _force_findings(

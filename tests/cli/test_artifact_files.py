@@ -1,0 +1,163 @@
+"""Artifacts as files: whole or not there, described, and refused when they are something else."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from bsip_cli import artifacts
+from bsip_cli.artifacts import (
+    SCHEMAS,
+    read_artifact,
+    read_header,
+    write_artifact,
+    write_atomically,
+)
+from bsip_cli.errors import BadDataError, UsageError
+
+NOTES = {"made_by": {"stage": "identify"}, "messages": [], "facts": {}}
+BLOCKS = pd.DataFrame({"trial": ["a", "b"], "start_s": [0.0, 1.0], "end_s": [1.0, np.nan]})
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "sub-01" / "sub-01_used-blocks.parquet"
+
+
+@pytest.fixture
+def written(path):
+    write_artifact(path, "used-blocks", BLOCKS, NOTES)
+    return path
+
+
+# --- writing ------------------------------------------------------------------------------------
+
+
+def test_comes_back_as_written(written):
+    pd.testing.assert_frame_equal(read_artifact(written, "used-blocks"), BLOCKS, check_dtype=False)
+    header = {"kind": "used-blocks", "schema_version": 1, "provenance": NOTES}
+    assert read_header(written) == header
+
+
+def test_columns_carry_unit_frame_and_meaning(written):
+    field = pq.read_schema(written).field("start_s")
+    assert field.type == pa.float64()
+    assert field.metadata[b"unit"] == b"s"
+    assert field.metadata[b"meaning"] == b"stretch that was used"
+
+
+@pytest.mark.parametrize("before", [None, b"what was there"])
+def test_interrupted_write_leaves_nothing_half(path, before):
+    """Neither under the final name nor beside it; what was there stays."""
+    path.parent.mkdir()
+    if before is not None:
+        path.write_bytes(before)
+
+    def write(temporary):
+        assert temporary != path
+        temporary.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_atomically(path, write)
+    assert [file.read_bytes() for file in path.parent.iterdir()] == [before] * (before is not None)
+
+
+def test_full_disk_leaves_the_earlier_artifact(written, monkeypatch):
+    content = written.read_bytes()
+
+    def full(table, temporary, **_):
+        temporary.write_bytes(content[:100])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(artifacts.pq, "write_table", full)
+    with pytest.raises(UsageError) as caught:
+        write_artifact(written, "used-blocks", BLOCKS.iloc[:1], NOTES)
+    assert "cannot be written (No space left on device)" in str(caught.value)
+    assert [file.read_bytes() for file in written.parent.iterdir()] == [content]
+
+
+def test_place_that_cannot_be_written_to(tmp_path):
+    (tmp_path / "sub-01").write_text("a file where the folder should be")
+    with pytest.raises(UsageError, match="--out"):
+        write_artifact(tmp_path / "sub-01" / "x.parquet", "used-blocks", BLOCKS, NOTES)
+
+
+@pytest.mark.parametrize(
+    ("frame", "said"),
+    [
+        (BLOCKS.drop(columns="end_s"), r"missing columns \['end_s'\]"),
+        (BLOCKS.assign(colour="red"), r"unknown columns \['colour'\]"),
+    ],
+)
+def test_wrong_columns_are_a_bug_of_the_stage(path, frame, said):
+    with pytest.raises(ValueError, match=said):
+        write_artifact(path, "used-blocks", frame, NOTES)
+    assert not path.exists()
+
+
+def test_families_of_columns():
+    schema = SCHEMAS["kinematics"]
+    assert schema.column("q_waist_x").unit == "m, rad, 1"
+    assert schema.column("q_").name == "q_*"
+    assert schema.column("r_waist_x") is None
+
+
+# --- reading ------------------------------------------------------------------------------------
+
+
+def foreign(path):
+    pq.write_table(pa.table({"x": [1, 2]}), path)
+
+
+def truncated(path):
+    path.write_bytes(path.read_bytes()[:-30])
+
+
+def text(path):
+    path.write_text("trial,start_s,end_s\n")
+
+
+@pytest.mark.parametrize("damage", [foreign, truncated, text, lambda path: path.unlink()])
+def test_what_is_no_artifact_is_refused_by_name(written, damage):
+    damage(written)
+    with pytest.raises(BadDataError) as caught:
+        read_artifact(written, "used-blocks")
+    assert str(written) in str(caught.value)
+    assert "is not an artifact of bsip" in str(caught.value)
+
+
+def test_damage_in_the_middle_is_refused(written):
+    """The header stands at the end of the file, so it alone proves nothing."""
+    content = bytearray(written.read_bytes())
+    content[4:120] = bytes(116)
+    written.write_bytes(content)
+    assert read_header(written, "used-blocks")["kind"] == "used-blocks"
+    with pytest.raises(BadDataError, match="is not an artifact of bsip"):
+        read_artifact(written, "used-blocks")
+
+
+def with_header(path, **changes):
+    table = pq.read_table(path)
+    header = json.loads(table.schema.metadata[b"bsip"]) | changes
+    pq.write_table(table.replace_schema_metadata({"bsip": json.dumps(header)}), path)
+
+
+def test_unknown_version_names_the_command_to_rerun(written):
+    with_header(written, schema_version=99)
+    with pytest.raises(BadDataError) as caught:
+        read_artifact(written, "used-blocks")
+    assert str(caught.value) == (
+        f"{written}: holds used-blocks version 99; expected used-blocks version 1. "
+        "To mend it: run `bsip identify` again."
+    )
+
+
+def test_another_kind_under_this_name(written):
+    with pytest.raises(BadDataError, match="holds used-blocks version 1; expected bsip version 1"):
+        read_artifact(written, "bsip")

@@ -1,0 +1,95 @@
+"""A bug is told as one, with its trace, and stops only what it concerns."""
+
+from __future__ import annotations
+
+import pytest
+
+from bsip_cli import session
+from bsip_cli.config import load_config
+from bsip_cli.pipeline import Stage
+from bsip_cli.runner import run_stages
+from bsip_cli.study import load_study
+
+STAGES = {
+    "faulty": 'def run(unit):\n    if unit.name in ("sub-01", "group"):\n'
+    '        raise ValueError("boom")\n    unit.warn(f"{unit.name}: went well")\n',
+    "harmless": 'def run(unit):\n    unit.warn(f"{unit.name}: went well")\n',
+    "deadly": 'import os\ndef run(unit):\n    if unit.name == "sub-01":\n        os._exit(9)\n',
+    "numeric": "from bsip_cli.errors import NumericalError\ndef run(unit):\n"
+    '    if unit.name == "sub-01":\n        raise NumericalError("no optimum", file="sub-01")\n',
+}
+
+
+@pytest.fixture
+def stage(tmp_path, monkeypatch):
+    """A stage made of a module with this text; the processes that run it find it too."""
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def make(name: str, level: str) -> Stage:
+        (tmp_path / f"stage_{name}.py").write_text(STAGES[name])
+        return Stage(name, level, "", reads=(), writes=(), module=f"stage_{name}")
+
+    return make
+
+
+@pytest.fixture
+def outcomes(empty_study, tmp_path):
+    def of(*stages: Stage):
+        study, _ = load_study(empty_study, {"static": ("static",), "sequence": ()})
+        out = tmp_path / "out"
+        running = run_stages(
+            stages, study, out, load_config([]), study.participants, force=True, jobs=1
+        )
+        return [(o.stage, o.unit, o.state, o.exit_code, o.sentences) for o in running]
+
+    return of
+
+
+def test_bug_of_one_participant(stage, outcomes):
+    first, second = outcomes(stage("faulty", "participant"))
+    assert first[:4] == ("faulty", "sub-01", "bug", 1)
+    assert second == ("faulty", "sub-02", "done", 0, ("sub-02: went well",))
+    (sentence,) = first[4]
+    assert sentence.startswith("sub-01: a bug in bsip: ValueError: boom\nTraceback")
+    assert sentence.count("Traceback") == 1
+    assert "stage_faulty.py" in sentence
+
+
+def test_bug_of_a_cohort_stage_is_told_as_one_of_a_participant(stage, outcomes):
+    first, second = outcomes(stage("faulty", "cohort"), stage("harmless", "cohort"))
+    assert first[:4] == ("faulty", "group", "bug", 1)
+    assert first[4][0].startswith("group: a bug in bsip: ValueError: boom\nTraceback")
+    assert second == ("harmless", "group", "done", 0, ("group: went well",))
+
+
+def test_cohort_goes_on_after_a_participants_bug(stage, outcomes):
+    found = outcomes(stage("faulty", "participant"), stage("harmless", "cohort"))
+    assert [each[2] for each in found] == ["bug", "done", "done"]
+
+
+def test_killed_process_is_not_called_a_bug(stage, outcomes):
+    """As by a machine short of memory; the cohort still has its turn."""
+    found = outcomes(stage("deadly", "participant"), stage("harmless", "cohort"))
+    assert found[0][1:4] == ("sub-01", "bug", 1)
+    assert "killed" in found[0][4][0]
+    assert "a bug in bsip" not in found[0][4][0]
+    assert found[-1][:3] == ("harmless", "group", "done")
+
+
+def test_exit_code_and_words_of_a_session(stage, empty_study, tmp_path, monkeypatch, capsys):
+    stages = (stage("faulty", "participant"), stage("numeric", "participant"))
+    monkeypatch.setattr(session, "stages_named", lambda name: stages)
+    code = session.run_session("run", empty_study, tmp_path / "out", (), None, jobs=1, force=True)
+    told = capsys.readouterr()
+    assert code == 1
+    assert told.out == ""
+    assert told.err.count("Traceback") == 1
+    assert told.err.count("a bug in bsip: ValueError: boom") == 1
+    assert told.err.splitlines()[-1].startswith("bsip run: 2 done, 1 failed by a bug; ")
+
+
+def test_numerical_failure_is_code_4(stage, empty_study, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(session, "stages_named", lambda name: (stage("numeric", "participant"),))
+    code = session.run_session("run", empty_study, tmp_path / "out", (), None, jobs=1, force=True)
+    assert code == 4
+    assert "numeric: sub-01: no optimum." in capsys.readouterr().err

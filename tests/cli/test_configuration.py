@@ -1,0 +1,75 @@
+"""configs/default.toml is the manual: every option is there, explained and checked."""
+
+from __future__ import annotations
+
+import tomllib
+
+import pytest
+from pydantic import BaseModel
+
+from bsip_cli.config import Config, load_config, shipped
+from bsip_cli.errors import UsageError
+from bsip_cli.reference import field_of, option_texts
+
+OPTIONS = {f"{o.section}.{o.name}".lstrip("."): o for o in option_texts()}
+
+
+def flat(values: dict, prefix: str = "") -> dict:
+    found = {}
+    for name, value in values.items():
+        found |= flat(value, f"{name}.") if isinstance(value, dict) else {f"{prefix}{name}": value}
+    return found
+
+
+def fields(model: type[BaseModel], prefix: str = "") -> set[str]:
+    names = set()
+    for name, field in model.model_fields.items():
+        inner = field.annotation
+        is_section = isinstance(inner, type) and issubclass(inner, BaseModel)
+        names |= fields(inner, f"{name}.") if is_section else {f"{prefix}{name}"}
+    return names
+
+
+def test_every_option_is_in_the_file_and_checked():
+    defaults = flat(tomllib.loads(shipped("default.toml").read_text(encoding="utf-8")))
+    assert set(defaults) == fields(Config) == set(OPTIONS)
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+def test_every_option_is_explained_and_has_its_default_in_the_file_alone(name):
+    option = OPTIONS[name]
+    assert len(option.comment) > 15, "say what it is, its unit and why"
+    assert field_of(option.section, option.name).is_required()
+
+
+def test_later_files_override_single_options(tmp_path):
+    first, second = tmp_path / "study.toml", tmp_path / "own.toml"
+    first.write_text("[stats]\nalpha = 0.1\nequivalence_percent = 5.0\n")
+    second.write_text("[stats]\nalpha = 0.01\n")
+    config = load_config([first, tmp_path / "absent.toml", second])
+    assert config.stats.alpha == 0.01
+    assert config.stats.equivalence_percent == 5.0
+    assert config.ik == load_config([]).ik
+
+
+def test_options_for_provenance_are_only_those_asked_for():
+    config = load_config([])
+    assert config.options(("regress", "skeleton")) == {
+        "regress": {"table": "dumas2007"},
+        "skeleton": "hansen2017",
+    }
+
+
+@pytest.mark.parametrize("value", ["nan", "-0.1", "'wide'", "[0.1]"])
+def test_values_out_of_range(tmp_path, value):
+    file = tmp_path / "study.toml"
+    file.write_text(f"[ingest]\nmax_gap_s = {value}\n")
+    with pytest.raises(UsageError, match=r"ingest\.max_gap_s = "):
+        load_config([file])
+
+
+def test_file_that_is_not_text(tmp_path):
+    file = tmp_path / "study.toml"
+    file.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(UsageError, match="not valid TOML"):
+        load_config([file])

@@ -1,0 +1,178 @@
+"""What cannot be understood: code 2 and one sentence. What cannot be used: code 3, and go on."""
+
+from __future__ import annotations
+
+import pytest
+
+from bsip_cli.artifacts import read_artifact
+
+
+def assert_usage_error(answer, *said: str) -> None:
+    assert answer.code == 2
+    assert "Traceback" not in answer.err
+    assert answer.out == ""
+    for words in said:
+        assert words in answer.err
+
+
+def one_sentence(answer) -> str:
+    """The only line, of the form `bsip: ...`."""
+    (line,) = answer.err.splitlines()
+    assert line.startswith("bsip: ")
+    assert line.endswith(".")
+    return line
+
+
+# --- usage --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["run", ".", "--out", "o", "--bogus"], "No such option"),
+        (["injest", ".", "--out", "o"], "No such command 'injest'"),
+        (["run", "."], "Missing option '--out'"),
+        (["run", "--out", "o"], "Missing argument 'STUDY'"),
+        (["run", ".", "--out", "o", "--jobs", "0"], "0 is not in the range x>=1"),
+        (["run", ".", "--out", "o", "--jobs", "two"], "'two' is not a valid integer"),
+    ],
+)
+def test_command_line_that_cannot_be_understood(bsip, arguments, said):
+    answer = bsip(*arguments)
+    assert_usage_error(answer, said)
+    assert answer.err.splitlines()[-1].startswith("Error: ")
+
+
+def test_no_study_at_this_place(bsip, tmp_path):
+    answer = bsip("run", tmp_path / "nowhere", "--out", tmp_path / "out")
+    assert_usage_error(answer)
+    sentence = one_sentence(answer)
+    assert f"{tmp_path / 'nowhere'}: there is no such folder" in sentence
+    assert "To mend it: " in sentence
+    assert not (tmp_path / "out").exists()
+
+
+def test_unknown_participants_are_named_with_the_known_ones(bsip, empty_study, tmp_path):
+    chosen = ["--participant", "sub-07", "--participant", "sub-01", "--participant", "sub-9"]
+    answer = bsip("run", empty_study, "--out", tmp_path / "out", *chosen)
+    assert_usage_error(answer)
+    sentence = one_sentence(answer)
+    assert "no participant sub-07, sub-9; expected one of sub-01, sub-02" in sentence
+
+
+def test_out_that_is_a_file(bsip, empty_study, tmp_path):
+    (tmp_path / "out").write_text("mine")
+    answer = bsip("run", empty_study, "--out", tmp_path / "out")
+    assert_usage_error(answer)
+    assert f"{tmp_path / 'out'}: is no folder to write to" in one_sentence(answer)
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+def test_show_without_tables(bsip, tmp_path):
+    answer = bsip("show", tmp_path)
+    assert_usage_error(answer)
+    assert "run `bsip tables` or `bsip run` first" in one_sentence(answer)
+
+
+# --- configuration ------------------------------------------------------------------------------
+
+
+def test_all_faults_of_the_configuration_at_once(bsip, empty_study, tmp_path):
+    (empty_study / "study.toml").write_text(
+        'marker_sett = "auto"\n[ingest]\nmax_gap = 0.1\n[stats]\nalpha = 2.0\n'
+        '[smoothing]\nmethod = "kalman"\n'
+    )
+    answer = bsip("run", empty_study, "--out", tmp_path / "out")
+    assert_usage_error(answer)
+    sentence = one_sentence(answer)
+    assert str(empty_study / "study.toml") in sentence
+    assert "unknown option marker_sett (did you mean marker_set?)" in sentence
+    assert "unknown option ingest.max_gap (did you mean max_gap_s?)" in sentence
+    assert "stats.alpha = 2.0: Input should be less than 1" in sentence
+    assert "smoothing.method = 'kalman'" in sentence
+    assert "configs/default.toml" in sentence
+
+
+def test_faults_of_two_files_are_named_with_both(bsip, empty_study, tmp_path):
+    (empty_study / "study.toml").write_text("[ik]\niterations = 0\n")
+    own = tmp_path / "own.toml"
+    own.write_text("[stats]\nalpha = 0.0\n")
+    answer = bsip("run", empty_study, "--out", tmp_path / "out", "--config", own)
+    assert_usage_error(answer, "ik.iterations", "stats.alpha", str(own), "study.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("alpha = ", "not valid TOML"),
+        ('marker_set = "hansen2071"\n', "hansen2071: there is no such marker set; expected auto, "),
+        ('marker_set = "lost.toml"\n', "lost.toml: there is no such marker set"),
+        ('skeleton = "robot"\n', "robot: there is no such skeleton; expected hansen2017"),
+        ("stats = 3\n", "stats = 3: "),
+    ],
+)
+def test_configuration_that_cannot_be_used(bsip, empty_study, tmp_path, text, said):
+    """Said once, before any recording is read."""
+    (empty_study / "study.toml").write_text(text)
+    answer = bsip("run", empty_study, "--out", tmp_path / "out")
+    assert_usage_error(answer)
+    assert said in one_sentence(answer)
+
+
+def test_own_marker_set_with_faults(bsip, empty_study, tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text('[segments]\nhed = { TOP = "vertex" }\nhead = { TOP = "vertexx" }\n')
+    (empty_study / "study.toml").write_text(f'marker_set = "{own}"\n')
+    answer = bsip("run", empty_study, "--out", tmp_path / "out")
+    assert_usage_error(answer, "unknown segment hed (did you mean head?)", "TOP stands twice")
+
+
+def test_config_file_that_is_not_there(bsip, empty_study, tmp_path):
+    answer = bsip("run", empty_study, "--out", tmp_path / "out", "--config", tmp_path / "no.toml")
+    assert_usage_error(answer)
+    assert f"{tmp_path / 'no.toml'}: there is no such file" in one_sentence(answer)
+
+
+def test_stage_before_its_turn_names_the_one_to_run_first(bsip, empty_study, tmp_path):
+    answer = bsip("scale", empty_study, "--out", tmp_path / "out")
+    assert_usage_error(answer, "sub-01: scale has no markers, wrench to read; run `bsip ingest`")
+    assert "2 without input" in answer.summary
+
+
+# --- data ---------------------------------------------------------------------------------------
+
+
+def test_study_without_table_of_participants(bsip, tmp_path):
+    answer = bsip("run", tmp_path, "--out", tmp_path / "out")
+    assert answer.code == 3
+    assert "participants.tsv: cannot be read" in one_sentence(answer)
+
+
+@pytest.mark.parametrize("content", [b"not a recording", bytes(range(256)) * 8])
+def test_corrupt_recording_is_refused_in_one_sentence(bsip, empty_study, tmp_path, content):
+    recording = empty_study / "sub-02" / "sub-02_task-static.c3d"
+    recording.write_bytes(content)
+    out = tmp_path / "out"
+    answer = bsip("ingest", empty_study, "--out", out, "--participant", "sub-02")
+    assert answer.code == 3
+    sentence, summary = answer.err.splitlines()
+    assert sentence.startswith("ingest: ")
+    assert str(recording) in sentence
+    assert "; expected " in sentence
+    assert ". To mend it: " in sentence
+    assert summary == f"bsip ingest: 1 refused; results in {out}"
+    written = out / "sub-02" / "sub-02_task-static_refusal-ingest.parquet"
+    assert [path.name for path in (out / "sub-02").iterdir()] == [written.name]
+    row = read_artifact(written, "refusal").iloc[0]
+    assert (row["stage"], row["kind"]) == ("ingest", "bad data")
+    assert row["sentence"] in sentence
+
+
+def test_everybody_refused(bsip, empty_study, tmp_path):
+    """No stage after the refusal fails, and nothing pretends to be done."""
+    answer = bsip("run", empty_study, "--out", tmp_path / "out", "--jobs", 2)
+    assert answer.code == 3
+    assert "Traceback" not in answer.err
+    assert " done" not in answer.summary
+    assert "2 refused" in answer.summary
+    assert "sub-01: scale has no markers, wrench to read: refused before" in answer.err

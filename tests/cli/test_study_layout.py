@@ -1,0 +1,128 @@
+"""Participants and recordings as they lie in a study folder."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from bsip_cli.config import load_config
+from bsip_cli.errors import BadDataError
+from bsip_cli.pipeline import STAGES
+from bsip_cli.study import load_study
+from bsip_cli.unit import Unit
+
+ROLES = {"static": ("static",), "sequence": ("sequence", "dance")}
+HEADER = "participant_id\tsex\tmass_kg\theight_m\n"
+
+
+def write_table(root: Path, *lines: str) -> None:
+    (root / "participants.tsv").write_text(HEADER + "\n".join(lines) + "\n")
+
+
+def load(root: Path):
+    study, refusals = load_study(root, ROLES)
+    return study, [str(refusal) for refusal in refusals]
+
+
+def test_roles_by_task(empty_study):
+    folder = empty_study / "sub-01"
+    for task in ("dance_run-1", "throwing_run-2", "throwing_run-10"):
+        (folder / f"sub-01_task-{task}.c3d").write_bytes(b"")
+    (folder / "notes.txt").write_text("no recording")
+    study, refusals = load(empty_study)
+    assert refusals == []
+    found = {trial.stem.split("task-")[1]: trial.role for trial in study.participants[0].trials}
+    assert found == {
+        "static": "static",
+        "dance_run-1": "sequence",
+        "throwing_run-2": "validation",
+        "throwing_run-10": "validation",
+    }
+
+
+def test_facts_of_the_participants(empty_study):
+    first, second = load(empty_study)[0].participants
+    assert (first.sex, first.mass_kg, first.height_m) == ("M", 70.0, 1.8)
+    assert (second.sex, second.mass_kg, second.height_m) == ("F", 60.0, None)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("sub-02\tX\t60\t1.7", "sex 'X' of sub-02; expected M or F"),
+        ("sub-02\tF\t-60\t1.7", "mass_kg '-60' of sub-02"),
+        ("sub-02\tF\tsixty\t1.7", "mass_kg 'sixty' of sub-02"),
+        ("sub-02\tF\tnan\t1.7", "mass_kg 'nan' of sub-02"),
+        ("sub-02\tF\t60\t170", "height_m '170' of sub-02; expected a number between 0.5 and 2.6"),
+        ("sub-03\tF\t60\t1.7", "there is no folder sub-03"),
+        ("../sub-02\tF\t60\t1.7", "participant_id '../sub-02'"),
+        ("\tF\t60\t1.7", "participant_id ''"),
+        ("sub-02", "sex None of sub-02"),
+        ("sub-01\tM\t71\t1.81", "sub-01 stands twice"),
+    ],
+)
+def test_bad_line_is_refused_and_the_others_stay(empty_study, line, said):
+    write_table(empty_study, "sub-01\tM\t70\t1.80", line)
+    study, refusals = load(empty_study)
+    assert [(person.id, person.mass_kg) for person in study.participants] == [("sub-01", 70.0)]
+    assert len(refusals) == 1
+    assert said in refusals[0]
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "names no participant"),
+        (HEADER.encode(), "names no participant"),
+        (b"participant_id,sex,mass_kg\nsub-01,M,70\n", "has no column"),
+        (HEADER.encode("utf-16"), "is not a text table"),
+    ],
+)
+def test_table_that_cannot_be_read(empty_study, content, said):
+    (empty_study / "participants.tsv").write_bytes(content)
+    with pytest.raises(BadDataError, match=said):
+        load(empty_study)
+
+
+def test_recording_whose_name_says_nothing(empty_study):
+    """Refused by name; the participant's other recordings are used."""
+    odd = empty_study / "sub-01" / "Trial 01.c3d"
+    odd.write_bytes(b"")
+    study, refusals = load(empty_study)
+    assert [trial.task for trial in study.participants[0].trials] == ["static"]
+    assert len(refusals) == 1
+    assert refusals[0].startswith(f"{odd}: its name does not say what it is")
+
+
+def test_two_recordings_of_one_name(empty_study):
+    (empty_study / "sub-01" / "sub-01_task-static.trc").write_bytes(b"")
+    study, refusals = load(empty_study)
+    assert [person.id for person in study.participants] == ["sub-02"]
+    assert "two recordings called sub-01_task-static" in refusals[0]
+
+
+@pytest.mark.parametrize("ending", ["trc", "TRC"])
+def test_forces_beside_a_trc_belong_to_its_inputs(empty_study, ending):
+    """A changed .mot must count as a changed recording."""
+    folder = empty_study / "sub-01"
+    for name in (f"sub-01_task-walk.{ending}", "sub-01_task-walk.mot", "sub-01_task-static.mot"):
+        (folder / name).write_bytes(b"")
+    study, _ = load(empty_study)
+    participant = study.participants[0]
+    static, walk = sorted(participant.trials, key=lambda trial: trial.task)
+    names = [
+        sorted(Unit(STAGES[0], study, Path("out"), load_config([]), participant, t).inputs())
+        for t in (static, walk)
+    ]
+    assert names[0] == ["sub-01_task-static.c3d"]
+    assert names[1] == sorted(["sub-01_task-walk.mot", f"sub-01_task-walk.{ending}"])
+
+
+def test_trials_keep_one_order(empty_study):
+    """Whatever the file system says: results must not depend on it."""
+    for run in (3, 1, 2):
+        (empty_study / "sub-01" / f"sub-01_task-walk_run-{run}.c3d").write_bytes(b"")
+    stems = [trial.stem for trial in load(empty_study)[0].participants[0].trials]
+    assert all(a < b for a, b in pairwise(stems))

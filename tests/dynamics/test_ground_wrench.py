@@ -1,0 +1,192 @@
+"""The regressor against Pinocchio's inverse dynamics and against Newton's and Euler's laws."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from standing_person import Swing, standing, tilted_person
+
+from bsip_cli.body.anthropometry import regress
+from bsip_cli.dynamics.pinocchio_model import GRAVITY_M_S2, pinocchio_model
+from bsip_cli.dynamics.regressor import (
+    move_moments,
+    predicted_wrench,
+    regressor_blocks,
+    rotations_of,
+    skew,
+    wrench_regressor,
+)
+
+
+def random_inertias(count, seed):
+    """(count, 10) parameters of clouds of points."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for _ in range(count):
+        points = rng.normal(0, 0.2, (20, 3)) + rng.normal(0, 0.2, 3)
+        mass = rng.uniform(0.3, 15)
+        moments = mass * points.T @ points / 20
+        tensor = np.trace(moments) * np.eye(3) - moments
+        order = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]
+        rows.append([mass, *(mass * points.mean(axis=0)), *(tensor[ij] for ij in order)])
+    return np.array(rows)
+
+
+def with_inertias(model, phi):
+    """The model as Pinocchio computes with it: inertias in its joints."""
+    full = model.copy()
+    for i, row in enumerate(phi.reshape(-1, 10)):
+        full.inertias[i + 1] = pin.Inertia.FromDynamicParameters(row)
+    return full
+
+
+def states(model, count, seed):
+    rng = np.random.default_rng(seed)
+    q = np.stack(
+        [pin.integrate(model, pin.neutral(model), rng.normal(0, 1, model.nv)) for _ in range(count)]
+    )
+    return q, rng.normal(0, 2, (count, model.nv)), rng.normal(0, 10, (count, model.nv))
+
+
+def rnea_wrench(model, phi, q, v, a, reference):
+    """(N, 6) force and moment on the base by inverse dynamics, world axes, about a point."""
+    full = with_inertias(model, phi)
+    data = full.createData()
+    rows = []
+    for one in zip(q, v, a, strict=True):
+        force = pin.Force(pin.rnea(full, data, *one)[:6])
+        pin.forwardKinematics(full, data, one[0])
+        at_reference = pin.SE3(np.eye(3), -reference) * data.oMi[1]
+        rows.append(at_reference.act(force).vector)
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("reference", [(0.0, 0.0, 0.0), (1.3, -0.4, 0.2)])
+def test_regressor_equals_inverse_dynamics(reference):
+    model = pinocchio_model(tilted_person())
+    phi = random_inertias(15, seed=1).ravel()
+    q, v, a = states(model, 20, seed=2)
+    rows = wrench_regressor(model, model.createData(), q, v, a, np.array(reference))
+    expected = rnea_wrench(model, phi, q, v, a, np.array(reference))
+    np.testing.assert_allclose(rows @ phi, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+
+def test_the_wrench_is_weight_plus_the_rate_of_momentum():
+    """Momentum summed over the bodies from positions alone, differentiated by finite differences.
+
+    No velocity or acceleration of the trajectory enters the expected side.
+    """
+    person = standing().person
+    model = pinocchio_model(person)
+    bodies = [
+        body.moved(-origin)
+        for body, origin in zip(
+            regress(person, "M", 73.0).inertias, person.origin_in_joint_m, strict=True
+        )
+    ]
+    phi = np.concatenate([body.phi() for body in bodies])
+    swing = Swing(model, standing().q, seed=3, amplitude=0.5)
+    data = model.createData()
+    h = 1e-3
+
+    def places(t):
+        pin.forwardKinematics(model, data, swing.q(t))
+        joints = [data.oMi[i + 1] for i in range(15)]
+        return (
+            np.array([j.translation + j.rotation @ b.com_m for j, b in zip(joints, bodies)]),
+            np.array([j.rotation.copy() for j in joints]),
+        )
+
+    def momentum(t):
+        """Linear (3,) and angular (3,) momentum about the world's origin."""
+        seen = [places(t + k * h) for k in (-2, -1, 0, 1, 2)]
+        stencil = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / (12 * h)
+        velocity = np.einsum("k,kij->ij", stencil, np.array([s[0] for s in seen]))
+        turning = np.einsum("k,kijl->ijl", stencil, np.array([s[1] for s in seen]))
+        com, R = seen[2]
+        linear, angular = np.zeros(3), np.zeros(3)
+        for i, body in enumerate(bodies):
+            w = turning[i] @ R[i].T
+            omega = 0.5 * np.array([w[2, 1] - w[1, 2], w[0, 2] - w[2, 0], w[1, 0] - w[0, 1]])
+            linear += body.mass_kg * velocity[i]
+            angular += np.cross(com[i], body.mass_kg * velocity[i])
+            angular += R[i] @ body.tensor_kgm2 @ R[i].T @ omega
+        return linear, angular
+
+    for t in (0.7, 1.9, 3.1, 4.3):
+        step = 1e-2
+        rates = []
+        for part in (0, 1):
+            p = {k: momentum(t + k * step)[part] for k in (-3, -2, -1, 1, 2, 3)}
+            rates.append(
+                (45 * (p[1] - p[-1]) - 9 * (p[2] - p[-2]) + (p[3] - p[-3])) / (60 * step)
+            )
+        weight = np.array([0.0, 0.0, 73.0 * GRAVITY_M_S2])
+        masses = np.array([body.mass_kg for body in bodies])
+        com = (masses[:, None] * places(t)[0]).sum(axis=0) / masses.sum()
+        expected = np.concatenate([rates[0] + weight, rates[1] + np.cross(com, weight)])
+        q, v, a = (np.array([f(t)]) for f in (swing.q, swing.v, swing.a))
+        found = predicted_wrench(model, q, v, a, phi[:, None], np.zeros(3))[0, :, 0]
+        assert np.linalg.norm(rates[0]) > 20
+        np.testing.assert_allclose(found[:3], expected[:3], rtol=0, atol=1e-5 * 73 * GRAVITY_M_S2)
+        scale = np.linalg.norm(expected[3:])
+        np.testing.assert_allclose(found[3:], expected[3:], rtol=0, atol=1e-5 * scale)
+
+
+def test_a_person_at_rest_presses_down_below_the_centre_of_mass():
+    person = standing().person
+    model = pinocchio_model(person)
+    bodies = [
+        b.moved(-o)
+        for b, o in zip(regress(person, "F", 60.0).inertias, person.origin_in_joint_m, strict=True)
+    ]
+    phi = np.concatenate([body.phi() for body in bodies])
+    zero = np.zeros((1, model.nv))
+    wrench = predicted_wrench(model, standing().q[None], zero, zero, phi[:, None], np.zeros(3))
+    full = with_inertias(model, phi)
+    com = pin.centerOfMass(full, full.createData(), standing().q)
+    weight = 60.0 * GRAVITY_M_S2
+    expected = [0, 0, weight, com[1] * weight, -com[0] * weight, 0]
+    np.testing.assert_allclose(wrench[0, :, 0], expected, atol=1e-10)
+
+
+def test_blocks_change_nothing():
+    model = pinocchio_model(standing().person)
+    q, v, a = states(model, 13, seed=4)
+    phi = np.stack([random_inertias(15, seed=s).ravel() for s in (5, 6)], axis=1)
+    whole = predicted_wrench(model, q, v, a, phi, np.ones(3), block=100)
+    parts = predicted_wrench(model, q, v, a, phi, np.ones(3), block=5)
+    np.testing.assert_array_equal(whole, parts)
+    assert whole.shape == (13, 6, 2)
+    spans = [part for part, _ in regressor_blocks(model, q, v, a, np.zeros(3), 5)]
+    assert spans == [slice(0, 5), slice(5, 10), slice(10, 13)]
+
+
+def test_every_kilogram_weighs_g():
+    model = pinocchio_model(standing().person)
+    zero = np.zeros((1, model.nv))
+    rows = wrench_regressor(
+        model, model.createData(), standing().q[None], zero, zero, np.zeros(3)
+    )
+    np.testing.assert_allclose(rows[0, 2, ::10], GRAVITY_M_S2, rtol=1e-12)
+
+
+def test_moved_moments_are_those_of_the_regressor():
+    model = pinocchio_model(standing().person)
+    q, v, a = states(model, 6, seed=8)
+    phi = random_inertias(15, seed=9).reshape(-1, 1)
+    reference = np.array([0.4, -1.2, 0.3])
+    about_origin = predicted_wrench(model, q, v, a, phi, np.zeros(3))[..., 0]
+    about_point = predicted_wrench(model, q, v, a, phi, reference)[..., 0]
+    before = about_origin.copy()
+    np.testing.assert_allclose(move_moments(about_origin, reference), about_point, atol=1e-9)
+    np.testing.assert_array_equal(about_origin, before)
+
+
+def test_rotations_and_skew():
+    rng = np.random.default_rng(10)
+    quaternions = rng.normal(size=(5, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
+    theirs = [pin.Quaternion(one).toRotationMatrix() for one in quaternions]
+    np.testing.assert_allclose(rotations_of(quaternions), theirs, atol=1e-14)
+    a, b = rng.normal(size=(2, 5, 3))
+    np.testing.assert_allclose((skew(a) @ b[..., None])[..., 0], np.cross(a, b), atol=1e-14)

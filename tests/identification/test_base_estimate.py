@@ -1,0 +1,128 @@
+import numpy as np
+import pytest
+from scipy import stats
+from synthetic_identification import (
+    equations_of,
+    motion,
+    problem_of,
+    recording,
+    regressor,
+    world,
+)
+
+from bsip_cli.dynamics.regressor import predicted_wrench
+from bsip_cli.identification.base import base_parameters, estimate
+from bsip_cli.identification.equations import accumulate
+from bsip_cli.identification.estimator import Problem
+from bsip_cli.identification.noise import Noise
+
+NOISE = np.array([3.0, 3.0, 5.0, 1.5, 1.5, 1.0])  # N, N m
+
+
+def test_noise_free_parameters_come_back_to_eight_digits():
+    one = recording(30.0)
+    equations = accumulate(world().model, [one], 8.0, np.zeros(3))
+    noise = Noise(np.full(6, 1e-3), np.full(6, float(equations.samples)), equations.samples)
+    fit = base_parameters(Problem(equations, noise, world().prior, world().basis))
+    true = world().basis.combine @ world().phi_true
+    mapped = world().basis.combine @ world().prior.root
+    spread = np.sqrt(np.diag(mapped @ mapped.T))  # each in how far people stray
+    assert np.abs((fit.rm_values - true) / spread).max() > 0.5
+    np.testing.assert_allclose(fit.values / spread, true / spread, rtol=0, atol=1e-8)
+
+
+def test_prediction_of_another_motion():
+    rows = regressor()
+    phi = estimate(problem_of(rows, rows @ world().phi_true, 1e-3)).phi
+    q, v, a = motion(3.0, seed=9)
+    both = np.stack([phi, world().phi_true], axis=1)
+    wrench = predicted_wrench(world().model, q, v, a, both, np.zeros(3))
+    assert np.abs(wrench[..., 0] - wrench[..., 1]).max() < 1e-6 * np.abs(wrench).max()
+    assert np.count_nonzero(phi) == 128
+
+
+def test_equals_dense_weighted_least_squares():
+    """Where the data say much more than the trace of the table's weight."""
+    rows = regressor()
+    rng = np.random.default_rng(1)
+    measured = rows @ world().phi_true + rng.normal(0, NOISE, rows.shape[:2])
+    fit = base_parameters(problem_of(rows, measured, NOISE))
+    A = (rows[..., world().basis.independent] / NOISE[:, None]).reshape(-1, 128)
+    expected = np.linalg.lstsq(A, (measured / NOISE).ravel(), rcond=None)[0]
+    sd = np.sqrt(np.diag(np.linalg.inv(A.T @ A)))
+    np.testing.assert_allclose((fit.values - expected) / sd, 0.0, atol=1e-3)
+    np.testing.assert_allclose(np.sqrt(np.diag(fit.covariance)), sd, rtol=1e-3)
+    np.testing.assert_allclose(fit.sigma_percent(), 100 * sd / np.abs(expected), rtol=0.01)
+
+
+def covered(count, effective_share=1.0):
+    """Share of 95 % intervals that hold the truth, over 40 draws of white noise."""
+    rows = regressor()
+    true = world().basis.combine @ world().phi_true
+    clean = rows @ world().phi_true
+    rng = np.random.default_rng(2)
+    quantile = stats.norm.ppf(0.975)
+    hits = []
+    for _ in range(count):
+        measured = clean + rng.normal(0, NOISE, clean.shape)
+        problem = problem_of(rows, measured, NOISE)
+        noise = Noise(NOISE, effective_share * problem.noise.effective, problem.noise.samples)
+        fit = base_parameters(Problem(problem.equations, noise, problem.prior, problem.basis))
+        hits.append(np.abs(fit.values - true) < quantile * np.sqrt(np.diag(fit.covariance)))
+    return np.mean(hits)
+
+
+def test_intervals_cover_the_truth():
+    assert 0.93 < covered(40) < 0.97
+
+
+def test_intervals_that_count_samples_too_often_do_not():
+    """The same noise claimed to be worth three times its samples."""
+    assert covered(15, effective_share=3.0) < 0.85
+
+
+def test_intervals_cover_the_truth_through_the_whole_chain():
+    """White noise on the plates, the low-pass with its memory, noise from the residuals."""
+    from bsip_cli.dynamics.lowpass import lowpass_operator
+    from bsip_cli.identification.noise import noise_of
+
+    one = recording(30.0)
+    operator, _ = lowpass_operator(one.use, 100.0, 8.0, 5)
+    model = world().model
+    from bsip_cli.dynamics.regressor import wrench_regressor
+
+    Y = wrench_regressor(model, model.createData(), one.q, one.v, one.a, np.zeros(3))
+    rows = (operator @ Y.reshape(len(Y), -1)).reshape(-1, 6, 150)
+    true = world().basis.combine @ world().phi_true
+    rng = np.random.default_rng(3)
+    hits = []
+    for _ in range(40):
+        measured = operator @ (one.wrench + rng.normal(0, NOISE, one.wrench.shape))
+        noise = Noise(NOISE, np.full(6, float(len(rows))), len(rows))
+        equations = equations_of(rows, measured)
+        for _ in range(2):
+            problem = Problem(equations, noise, world().prior, world().basis)
+            residual = measured - rows @ estimate(problem).phi
+            noise = noise_of([residual])
+        fit = base_parameters(Problem(equations, noise, world().prior, world().basis))
+        hits.append(np.abs(fit.values - true) < 1.96 * np.sqrt(np.diag(fit.covariance)))
+    assert 0.90 < np.mean(hits) < 0.98
+
+
+def test_what_was_not_excited_stays_with_the_table_and_is_uncertain():
+    """A person who stands still shows weight and centre of mass only."""
+    q, v, a = motion(30.0)
+    rows = np.repeat(regressor()[:1] * 0, 50, axis=0)
+    from bsip_cli.dynamics.regressor import wrench_regressor
+
+    still = wrench_regressor(
+        world().model, world().model.createData(), q[:1], 0 * v[:1], 0 * a[:1], np.zeros(3)
+    )
+    rows = rows + still
+    fit = base_parameters(problem_of(rows, rows @ world().phi_true, 1.0))
+    true = world().basis.combine @ world().phi_true
+    assert fit.values[0] == pytest.approx(true[0], rel=1e-6)  # the mass of the whole body
+    sigma = fit.sigma_percent()
+    assert sigma[0] < 0.1
+    assert np.median(sigma) > 100
+    assert np.isfinite(fit.values).all()

@@ -12,7 +12,7 @@ sample: .venv/ready
 	$(BIN)/bsip show out/sample
 
 test: check
-	$(BIN)/pytest -n $(JOBS)
+	$(BIN)/pytest -n $(JOBS) --dist loadfile
 
 check: .venv/ready
 	$(BIN)/ruff check .

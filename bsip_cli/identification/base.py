@@ -34,16 +34,15 @@ def base_parameters(problem: Problem) -> BaseParameters:
     """Weighted least squares in the basis; the covariance counts independent samples only."""
     basis, prior = problem.basis, problem.prior
     information, right = problem.equations.weighted(problem.noise.weights())
-    keep = np.ix_(basis.independent, basis.independent)
-    mapped = basis.combine @ prior.root
-    prior_precision = _TRACE_OF_PRIOR * np.linalg.inv(mapped @ mapped.T)
     rm_values = basis.combine @ prior.phi
-    scale = np.sqrt(np.diag(mapped @ mapped.T))
-    matrix = (information[keep] + prior_precision) * np.outer(scale, scale)
-    vector = (right[basis.independent] + prior_precision @ rm_values) * scale
+    # Steps from RM, in units in which people scatter as N(0, 1) and across what no wrench shows:
+    # in the parameters' own units the normal equations are so ill-conditioned that digits are lost.
+    shown, triangle = np.linalg.qr((basis.combine @ prior.root).T)
+    spread, units = prior.root @ shown, triangle.T
+    matrix = spread.T @ information @ spread + _TRACE_OF_PRIOR * np.eye(basis.rank)
     inverse = np.linalg.inv(matrix)
-    values = scale * np.linalg.solve(matrix, vector)
-    return BaseParameters(values, inverse * np.outer(scale, scale), rm_values)
+    steps = np.linalg.solve(matrix, spread.T @ (right - information @ prior.phi))
+    return BaseParameters(rm_values + units @ steps, units @ inverse @ units.T, rm_values)
 
 
 def estimate(problem: Problem) -> Estimate:

@@ -44,35 +44,17 @@ class Poses:
 
 @dataclass(frozen=True)
 class Tree:
-    """A person as flat arrays, as the compiled kernel reads them."""
+    """A person's skeleton as the compiled kernel reads it, and the sizes of q and v."""
 
-    kinds: np.ndarray
-    parents: np.ndarray
-    q_starts: np.ndarray
-    v_starts: np.ndarray
-    v_segments: np.ndarray
-    v_parents: np.ndarray
-    positions: np.ndarray
-    rotations: np.ndarray
-    axes: np.ndarray
+    arrays: kernel.Tree
     nq: int
     nv: int
 
     def forward(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Orientation (N, n, 3, 3) and joint centre (N, n, 3) [m] of every segment, world."""
-        R = np.empty((len(q), len(self.kinds), 3, 3))
-        p = np.empty((len(q), len(self.kinds), 3))
-        kernel.forward_frames(
-            np.ascontiguousarray(q),
-            self.kinds,
-            self.parents,
-            self.q_starts,
-            self.positions,
-            self.rotations,
-            self.axes,
-            R,
-            p,
-        )
+        segments = len(self.arrays.kinds)
+        R, p = np.empty((len(q), segments, 3, 3)), np.empty((len(q), segments, 3))
+        kernel.forward_frames(np.ascontiguousarray(q), self.arrays, R, p)
         return R, p
 
 
@@ -89,7 +71,7 @@ def tree_of(person: Person) -> Tree:
             v_parents.append(before)
             before = len(v_segments) - 1
         last.append(before)
-    return Tree(
+    arrays = kernel.Tree(
         kinds=np.array([_KINDS[kind] for kind in skeleton.joint_types]),
         parents=np.array(skeleton.parents),
         q_starts=np.array(skeleton.q_starts),
@@ -99,9 +81,8 @@ def tree_of(person: Person) -> Tree:
         positions=person.joint_positions_m(),
         rotations=person.joint_rotations(),
         axes=person.hinge_axes(),
-        nq=len(skeleton.q_names),
-        nv=len(skeleton.v_names),
     )
+    return Tree(arrays, len(skeleton.q_names), len(skeleton.v_names))
 
 
 def neutral(person: Person) -> np.ndarray:
@@ -143,29 +124,15 @@ def solve_poses(
     count, markers = markers_m.shape[:2]
     q, residual = np.empty((count, tree.nq)), np.empty((count, markers))
     sd, steps = np.empty((count, tree.nv)), np.empty(count, dtype=np.int64)
-    kernel.solve_frames(
-        np.ascontiguousarray(markers_m, dtype=float),
-        q_first,
-        person.marker_segments,
-        person.markers_in_joint_m(),
-        person.marker_weights / marker_sd_m**2,
-        robust_limit_m,
-        np.broadcast_to(posture_sd_rad, tree.nv) ** -2.0,
-        iterations,
-        tree.kinds,
-        tree.parents,
-        tree.q_starts,
-        tree.v_starts,
-        tree.v_segments,
-        tree.v_parents,
-        tree.positions,
-        tree.rotations,
-        tree.axes,
-        q,
-        residual,
-        sd,
-        steps,
+    task = kernel.Task(
+        segments=np.asarray(person.marker_segments),
+        positions=person.markers_in_joint_m(),
+        weights=person.marker_weights / marker_sd_m**2,
+        limit=float(robust_limit_m),
+        prior=np.full(tree.nv, posture_sd_rad) ** -2.0,
     )
+    measured = np.ascontiguousarray(markers_m, dtype=float)
+    kernel.solve_frames(measured, q_first, tree.arrays, task, iterations, q, residual, sd, steps)
     return Poses(q, residual, sd, steps >= 0)
 
 

@@ -30,12 +30,12 @@ def pose_columns(
     """(N, m, 3, nv) velocity of each marker for each unit velocity."""
     columns = np.zeros((*model.shape, tree.nv))
     for i, kind in enumerate(person.skeleton.joint_types):
-        at, mine = tree.v_starts[i], below[i]
+        at, mine = tree.arrays.v_starts[i], below[i]
         if kind == "free":
             columns[:, mine, :, at : at + 3] = R[:, None, i]
             at += 3
         arm = model[:, mine] - p[:, None, i]
-        axes = R[:, i] if kind != "revolute" else (R[:, i] @ tree.axes[i])[..., None]
+        axes = R[:, i] if kind != "revolute" else (R[:, i] @ tree.arrays.axes[i])[..., None]
         for k in range(axes.shape[2]):
             columns[..., at + k][:, mine] = np.cross(axes[:, None, :, k], arm)
     return columns

@@ -7,10 +7,24 @@ without fill-in by the tree's own sparsity (Featherstone 2008, chapters 6.2 and 
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 import numpy as np
 from numba import njit
 
 FREE, SPHERICAL, REVOLUTE = 0, 1, 2
+
+# The skeleton: per segment its joint's kind, parent, first entry in q and v, place and turn in the
+# parent and hinge axis; per velocity its segment and the velocity before it on the way to the base.
+Tree = namedtuple(
+    "Tree", "kinds parents q_starts v_starts v_segments v_parents positions rotations axes"
+)
+# What is fitted: segment, place on it [m] and weight [1/m2] of each marker; the residual [m] beyond
+# which a marker's pull fades; and the precision (nv,) [1/rad2] that pulls angles to zero.
+Task = namedtuple("Task", "segments positions weights limit prior")
+# Sums over the markers on each segment and beyond: weight, weighted place, its second moments,
+# weighted residual and its moment; places count from the base's origin.
+Sums = namedtuple("Sums", "weight first second force moment")
 
 
 @njit(cache=True)
@@ -62,35 +76,41 @@ def _rotation_vector(q, out):
 
 
 @njit(cache=True)
-def forward(q, kinds, parents, q_starts, positions, rotations, axes, R, p):
+def _hinge_rotation(u, angle, out):
+    """Rotation by an angle about a unit axis (Rodrigues)."""
+    c, s = np.cos(angle), np.sin(angle)
+    for j in range(3):
+        for k in range(3):
+            out[j, k] = (1 - c) * u[j] * u[k]
+        out[j, j] += c
+    out[0, 1] -= s * u[2]
+    out[0, 2] += s * u[1]
+    out[1, 0] += s * u[2]
+    out[1, 2] -= s * u[0]
+    out[2, 0] -= s * u[1]
+    out[2, 1] += s * u[0]
+
+
+@njit(cache=True)
+def forward(q, tree, R, p):
     """Fill R (n, 3, 3) and p (n, 3): orientation of each segment and its joint centre, world."""
     local = np.empty((3, 3))
-    for i in range(kinds.size):
-        at = q_starts[i]
-        if kinds[i] == FREE:
+    for i in range(tree.kinds.size):
+        at = tree.q_starts[i]
+        if tree.kinds[i] == FREE:
             p[i] = q[at : at + 3]
             _rotation_of_quaternion(q[at + 3 : at + 7], R[i])
             continue
-        if kinds[i] == SPHERICAL:
+        if tree.kinds[i] == SPHERICAL:
             _rotation_of_quaternion(q[at : at + 4], local)
         else:
-            u, c, s = axes[i], np.cos(q[at]), np.sin(q[at])
-            for j in range(3):
-                for k in range(3):
-                    local[j, k] = (1 - c) * u[j] * u[k]
-                local[j, j] += c
-            local[0, 1] -= s * u[2]
-            local[0, 2] += s * u[1]
-            local[1, 0] += s * u[2]
-            local[1, 2] -= s * u[0]
-            local[2, 0] -= s * u[1]
-            local[2, 1] += s * u[0]
-        parent = parents[i]
-        Rp, R0 = R[parent], rotations[i]
+            _hinge_rotation(tree.axes[i], q[at], local)
+        parent = tree.parents[i]
+        Rp, R0 = R[parent], tree.rotations[i]
         for j in range(3):
             p[i, j] = p[parent, j]
             for k in range(3):
-                p[i, j] += Rp[j, k] * positions[i, k]
+                p[i, j] += Rp[j, k] * tree.positions[i, k]
                 total = 0.0
                 for a in range(3):
                     for b in range(3):
@@ -99,45 +119,54 @@ def forward(q, kinds, parents, q_starts, positions, rotations, axes, R, p):
 
 
 @njit(cache=True)
-def _residuals(R, p, marker_segments, marker_positions, measured, out):
+def _residuals(R, p, task, measured, out):
     """out (m, 3) = measured - model; rows of missing markers are NaN."""
-    for m in range(marker_segments.size):
-        s = marker_segments[m]
+    for m in range(task.segments.size):
+        s = task.segments[m]
         for j in range(3):
             out[m, j] = measured[m, j] - p[s, j]
             for k in range(3):
-                out[m, j] -= R[s, j, k] * marker_positions[m, k]
+                out[m, j] -= R[s, j, k] * task.positions[m, k]
 
 
 @njit(cache=True)
-def _cost(residuals, weights, limit, q, kinds, q_starts, v_starts, prior):
-    """Half the weighted squares, growing like the logarithm beyond ``limit``, plus the prior."""
-    total = 0.0
-    for m in range(weights.size):
+def _cost(residuals, q, tree, task):
+    """Half the weighted squares, growing like the logarithm beyond the limit, plus the prior."""
+    total, limit = 0.0, task.limit
+    for m in range(task.weights.size):
         d2 = residuals[m, 0] ** 2 + residuals[m, 1] ** 2 + residuals[m, 2] ** 2
         if np.isnan(d2):
             continue
         d = np.sqrt(d2)
-        total += weights[m] * (0.5 * d2 if d <= limit else limit**2 * (0.5 + np.log(d / limit)))
+        loss = 0.5 * d2 if d <= limit else limit**2 * (0.5 + np.log(d / limit))
+        total += task.weights[m] * loss
     turn = np.empty(3)
-    for i in range(1, kinds.size):
-        at = q_starts[i]
-        if kinds[i] == SPHERICAL:
+    for i in range(1, tree.kinds.size):
+        at, av = tree.q_starts[i], tree.v_starts[i]
+        if tree.kinds[i] == SPHERICAL:
             _rotation_vector(q[at : at + 4], turn)
             for j in range(3):
-                total += 0.5 * prior[v_starts[i] + j] * turn[j] ** 2
+                total += 0.5 * task.prior[av + j] * turn[j] ** 2
         else:
-            total += 0.5 * prior[v_starts[i]] * q[at] ** 2
+            total += 0.5 * task.prior[av] * q[at] ** 2
     return total
 
 
 @njit(cache=True)
-def _columns(R, p, kinds, v_starts, axes, d, w):
+def _evaluate(q, tree, task, measured, R, p, residuals):
+    """Pose the model, fill R, p and the residuals, and return the cost."""
+    forward(q, tree, R, p)
+    _residuals(R, p, task, measured, residuals)
+    return _cost(residuals, q, tree, task)
+
+
+@njit(cache=True)
+def _columns(R, p, tree, d, w):
     """Velocity d + w x r that each unit velocity gives a point r (from the base's origin)."""
     r = np.empty(3)
-    for i in range(kinds.size):
-        at = v_starts[i]
-        if kinds[i] == FREE:
+    for i in range(tree.kinds.size):
+        at = tree.v_starts[i]
+        if tree.kinds[i] == FREE:
             for k in range(3):
                 for j in range(3):
                     d[at + k, j] = R[i, j, k]
@@ -147,7 +176,7 @@ def _columns(R, p, kinds, v_starts, axes, d, w):
             continue
         for j in range(3):
             r[j] = p[i, j] - p[0, j]
-        if kinds[i] == SPHERICAL:
+        if tree.kinds[i] == SPHERICAL:
             for k in range(3):
                 for j in range(3):
                     w[at + k, j] = R[i, j, k]
@@ -156,106 +185,85 @@ def _columns(R, p, kinds, v_starts, axes, d, w):
             for j in range(3):
                 w[at, j] = 0.0
                 for k in range(3):
-                    w[at, j] += R[i, j, k] * axes[i, k]
+                    w[at, j] += R[i, j, k] * tree.axes[i, k]
             _cross(r, w[at], d[at])
 
 
 @njit(cache=True)
-def _normal_equations(
-    R,
-    p,
-    residuals,
-    weights,
-    limit,
-    kinds,
-    parents,
-    q_starts,
-    v_starts,
-    v_segments,
-    v_parents,
-    axes,
-    marker_segments,
-    measured,
-    q,
-    prior,
-    H,
-    g,
-    W,
-    s,
-    S,
-    f,
-    t,
-    d,
-    w,
-):
-    """H (nv, nv; only entries between a velocity and its ancestors) and descent direction g."""
-    n, nv = kinds.size, v_segments.size
-    W[:] = 0.0
-    s[:] = 0.0
-    S[:] = 0.0
-    f[:] = 0.0
-    t[:] = 0.0
-    x = np.empty(3)
-    moment = np.empty(3)
-    for m in range(weights.size):
+def _gather(residuals, measured, base, tree, task, sums):
+    """Sums over each segment's own markers, then over all that hang on it."""
+    sums.weight[:] = 0.0
+    sums.first[:] = 0.0
+    sums.second[:] = 0.0
+    sums.force[:] = 0.0
+    sums.moment[:] = 0.0
+    x, moment = np.empty(3), np.empty(3)
+    for m in range(task.weights.size):
         if np.isnan(residuals[m, 0]):
             continue
-        i = marker_segments[m]
-        r = residuals[m]
+        i, r = task.segments[m], residuals[m]
         distance = np.sqrt(r[0] ** 2 + r[1] ** 2 + r[2] ** 2)
-        weight = weights[m] * (1.0 if distance <= limit else (limit / distance) ** 2)
+        trust = 1.0 if distance <= task.limit else (task.limit / distance) ** 2
+        weight = task.weights[m] * trust
         for j in range(3):
-            x[j] = measured[m, j] - r[j] - p[0, j]
+            x[j] = measured[m, j] - r[j] - base[j]
         _cross(x, r, moment)
-        W[i] += weight
+        sums.weight[i] += weight
         for j in range(3):
-            s[i, j] += weight * x[j]
-            f[i, j] += weight * r[j]
-            t[i, j] += weight * moment[j]
+            sums.first[i, j] += weight * x[j]
+            sums.force[i, j] += weight * r[j]
+            sums.moment[i, j] += weight * moment[j]
             for k in range(3):
-                S[i, j, k] += weight * x[j] * x[k]
-    for i in range(n - 1, 0, -1):
-        a = parents[i]
-        W[a] += W[i]
+                sums.second[i, j, k] += weight * x[j] * x[k]
+    for i in range(tree.kinds.size - 1, 0, -1):
+        a = tree.parents[i]
+        sums.weight[a] += sums.weight[i]
+        sums.first[a] += sums.first[i]
+        sums.force[a] += sums.force[i]
+        sums.moment[a] += sums.moment[i]
+        sums.second[a] += sums.second[i]
+
+
+@njit(cache=True)
+def _assemble(d, w, sums, tree, H, g):
+    """H (nv, nv; only between a velocity and its ancestors) and descent direction g of markers."""
+    F, T = np.empty(3), np.empty(3)
+    for k in range(g.size):
+        i = tree.v_segments[k]
+        S, first = sums.second[i], sums.first[i]
+        trace = S[0, 0] + S[1, 1] + S[2, 2]
+        _cross(w[k], first, F)
+        _cross(first, d[k], T)
         for j in range(3):
-            s[a, j] += s[i, j]
-            f[a, j] += f[i, j]
-            t[a, j] += t[i, j]
-            for k in range(3):
-                S[a, j, k] += S[i, j, k]
-    _columns(R, p, kinds, v_starts, axes, d, w)
-    F = np.empty(3)
-    T = np.empty(3)
-    for k in range(nv):
-        i = v_segments[k]
-        trace = S[i, 0, 0] + S[i, 1, 1] + S[i, 2, 2]
-        _cross(w[k], s[i], F)
-        _cross(s[i], d[k], T)
-        for j in range(3):
-            F[j] += W[i] * d[k, j]
+            F[j] += sums.weight[i] * d[k, j]
             T[j] += trace * w[k, j]
             for b in range(3):
-                T[j] -= S[i, j, b] * w[k, b]
+                T[j] -= S[j, b] * w[k, b]
         g[k] = 0.0
         for j in range(3):
-            g[k] += d[k, j] * f[i, j] + w[k, j] * t[i, j]
+            g[k] += d[k, j] * sums.force[i, j] + w[k, j] * sums.moment[i, j]
         a = k
         while a >= 0:
             H[k, a] = 0.0
             for j in range(3):
                 H[k, a] += d[a, j] * F[j] + w[a, j] * T[j]
-            a = v_parents[a]
+            a = tree.v_parents[a]
+
+
+@njit(cache=True)
+def _add_prior(q, tree, task, H, g):
+    """Pull the joint angles to zero."""
     turn = np.empty(3)
-    for i in range(1, n):
-        at = v_starts[i]
-        if kinds[i] == SPHERICAL:
-            _rotation_vector(q[q_starts[i] : q_starts[i] + 4], turn)
+    for i in range(1, tree.kinds.size):
+        at, av = tree.q_starts[i], tree.v_starts[i]
+        if tree.kinds[i] == SPHERICAL:
+            _rotation_vector(q[at : at + 4], turn)
             for j in range(3):
-                H[at + j, at + j] += prior[at + j]
-                g[at + j] -= prior[at + j] * turn[j]
+                H[av + j, av + j] += task.prior[av + j]
+                g[av + j] -= task.prior[av + j] * turn[j]
         else:
-            H[at, at] += prior[at]
-            g[at] -= prior[at] * q[q_starts[i]]
+            H[av, av] += task.prior[av]
+            g[av] -= task.prior[av] * q[at]
 
 
 @njit(cache=True)
@@ -302,135 +310,92 @@ def _solve(L, v_parents, x):
 
 
 @njit(cache=True)
-def _step(q, dv, kinds, q_starts, v_starts, R0, out):
+def _step(q, dv, tree, R0, out):
     """out = q moved by dv (base: translation and rotation in its own axes)."""
     out[:] = q
-    for i in range(kinds.size):
-        at, av = q_starts[i], v_starts[i]
-        if kinds[i] == FREE:
+    for i in range(tree.kinds.size):
+        at, av = tree.q_starts[i], tree.v_starts[i]
+        if tree.kinds[i] == FREE:
             for j in range(3):
                 for k in range(3):
                     out[at + j] += R0[j, k] * dv[av + k]
             _turn_quaternion(out[at + 3 : at + 7], dv[av + 3 : av + 6])
-        elif kinds[i] == SPHERICAL:
+        elif tree.kinds[i] == SPHERICAL:
             _turn_quaternion(out[at : at + 4], dv[av : av + 3])
         else:
             out[at] += dv[av]
 
 
 @njit(cache=True)
-def solve_frames(
-    markers,
-    q_first,
-    marker_segments,
-    marker_positions,
-    weights,
-    limit,
-    prior,
-    max_steps,
-    kinds,
-    parents,
-    q_starts,
-    v_starts,
-    v_segments,
-    v_parents,
-    positions,
-    rotations,
-    axes,
-    q_out,
-    residual_out,
-    sd_out,
-    steps_out,
-):
+def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
+    """Move q to the least-squares pose of one frame; return the steps, or -1 if they ran out.
+
+    Fills the residuals (m, 3) at the pose and L, the factor of the Gauss-Newton matrix there.
+    """
+    n, nv = tree.kinds.size, tree.v_segments.size
+    R, p = np.zeros((n, 3, 3)), np.zeros((n, 3))
+    d, w = np.zeros((nv, 3)), np.zeros((nv, 3))
+    H, g, dv = np.zeros((nv, nv)), np.zeros(nv), np.zeros(nv)
+    sums = Sums(
+        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))
+    )
+    trial, trial_residuals = q.copy(), residuals.copy()
+    cost = _evaluate(q, tree, task, measured, R, p, residuals)
+    damping, taken = 0.0, -1
+    for step in range(max_steps):
+        _columns(R, p, tree, d, w)
+        _gather(residuals, measured, p[0], tree, task, sums)
+        _assemble(d, w, sums, tree, H, g)
+        _add_prior(q, tree, task, H, g)
+        base, trial_cost = R[0].copy(), np.inf
+        while damping < 1e6:
+            _factor(H, damping, tree.v_parents, L)
+            dv[:] = g
+            _solve(L, tree.v_parents, dv)
+            _step(q, dv, tree, base, trial)
+            trial_cost = _evaluate(trial, tree, task, measured, R, p, trial_residuals)
+            if trial_cost <= cost * (1 + 1e-14):
+                break
+            damping = max(10 * damping, 1e-4)
+        if trial_cost > cost * (1 + 1e-14):  # no step helps: q is the optimum
+            taken = step
+            break
+        gain = cost - trial_cost
+        q[:] = trial
+        residuals[:] = trial_residuals
+        cost = trial_cost
+        damping = 0.0 if damping < 1e-3 else 0.1 * damping
+        if gain <= 1e-9 * cost + 1e-14 or np.max(np.abs(dv)) < 1e-8:
+            taken = step + 1
+            break
+    _factor(H, 0.0, tree.v_parents, L)
+    return taken
+
+
+@njit(cache=True)
+def solve_frames(markers, q_first, tree, task, max_steps, q_out, residual_out, sd_out, steps_out):
     """Least-squares pose of every frame, each started from the last.
 
-    markers (N, m, 3) [m], NaN where missing; weights (m,) [1/m2]; limit [m] beyond which a
-    marker's pull fades; prior (nv,) [1/rad2] that pulls the joint angles to zero; q_first (nq,).
-    Fills q_out (N, nq), residual_out (N, m) [m], sd_out (N, nv) (standard deviation of each
-    coordinate, given those nearer to the base) and steps_out (N,), -1 where the steps ran out.
+    markers (N, m, 3) [m], NaN where missing; q_first (nq,). Fills q_out (N, nq), residual_out
+    (N, m) [m], sd_out (N, nv) (standard deviation of each coordinate, given those nearer to the
+    base) and steps_out (N,), -1 where the steps ran out.
     """
-    n, m, nv = kinds.size, weights.size, v_segments.size
-    R, p = np.zeros((n, 3, 3)), np.zeros((n, 3))
-    residuals, trial_residuals = np.empty((m, 3)), np.empty((m, 3))
-    H, L, g = np.zeros((nv, nv)), np.zeros((nv, nv)), np.zeros(nv)
-    W, s, S = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3, 3))
-    f, t = np.zeros((n, 3)), np.zeros((n, 3))
-    d, w = np.zeros((nv, 3)), np.zeros((nv, 3))
-    q, trial, dv = q_first.copy(), q_first.copy(), np.zeros(nv)
+    nv = tree.v_segments.size
+    residuals, L = np.empty((task.weights.size, 3)), np.zeros((nv, nv))
+    q = q_first.copy()
     for frame in range(markers.shape[0]):
-        measured = markers[frame]
-        damping = 0.0
-        forward(q, kinds, parents, q_starts, positions, rotations, axes, R, p)
-        _residuals(R, p, marker_segments, marker_positions, measured, residuals)
-        cost = _cost(residuals, weights, limit, q, kinds, q_starts, v_starts, prior)
-        steps_out[frame] = -1
-        for step in range(max_steps):
-            _normal_equations(
-                R,
-                p,
-                residuals,
-                weights,
-                limit,
-                kinds,
-                parents,
-                q_starts,
-                v_starts,
-                v_segments,
-                v_parents,
-                axes,
-                marker_segments,
-                measured,
-                q,
-                prior,
-                H,
-                g,
-                W,
-                s,
-                S,
-                f,
-                t,
-                d,
-                w,
-            )
-            better = False
-            while damping < 1e6:
-                _factor(H, damping, v_parents, L)
-                dv[:] = g
-                _solve(L, v_parents, dv)
-                _step(q, dv, kinds, q_starts, v_starts, R[0], trial)
-                forward(trial, kinds, parents, q_starts, positions, rotations, axes, R, p)
-                _residuals(R, p, marker_segments, marker_positions, measured, trial_residuals)
-                trial_cost = _cost(
-                    trial_residuals, weights, limit, trial, kinds, q_starts, v_starts, prior
-                )
-                if trial_cost <= cost * (1 + 1e-14):
-                    better = True
-                    break
-                damping = max(10 * damping, 1e-4)
-                forward(q, kinds, parents, q_starts, positions, rotations, axes, R, p)
-            if not better:
-                steps_out[frame] = step
-                break
-            gain = cost - trial_cost
-            q[:] = trial
-            residuals[:] = trial_residuals
-            cost = trial_cost
-            damping = 0.0 if damping < 1e-3 else 0.1 * damping
-            if gain <= 1e-9 * cost + 1e-14 or np.max(np.abs(dv)) < 1e-8:
-                steps_out[frame] = step + 1
-                break
-        _factor(H, 0.0, v_parents, L)
+        steps_out[frame] = _solve_frame(q, markers[frame], tree, task, max_steps, residuals, L)
         q_out[frame] = q
         for k in range(nv):
             sd_out[frame, k] = 1.0 / L[k, k]
-        for k in range(m):
-            residual_out[frame, k] = np.sqrt(
-                residuals[k, 0] ** 2 + residuals[k, 1] ** 2 + residuals[k, 2] ** 2
+        for m in range(task.weights.size):
+            residual_out[frame, m] = np.sqrt(
+                residuals[m, 0] ** 2 + residuals[m, 1] ** 2 + residuals[m, 2] ** 2
             )
 
 
 @njit(cache=True)
-def forward_frames(q, kinds, parents, q_starts, positions, rotations, axes, R, p):
+def forward_frames(q, tree, R, p):
     """Fill R (N, n, 3, 3) and p (N, n, 3) for q (N, nq)."""
     for frame in range(q.shape[0]):
-        forward(q[frame], kinds, parents, q_starts, positions, rotations, axes, R[frame], p[frame])
+        forward(q[frame], tree, R[frame], p[frame])

@@ -16,7 +16,7 @@ STAGES = {
     "harmless": 'def run(unit):\n    unit.warn(f"{unit.name}: went well")\n',
     "deadly": 'import os\ndef run(unit):\n    if unit.name == "sub-01":\n        os._exit(9)\n',
     "numeric": "from bsip_cli.errors import NumericalError\ndef run(unit):\n"
-    '    if unit.name == "sub-01":\n        raise NumericalError("no optimum", file="sub-01")\n',
+    '    raise NumericalError("no optimum", file=unit.name)\n',
 }
 
 
@@ -77,6 +77,7 @@ def test_killed_process_is_not_called_a_bug(stage, outcomes):
 
 
 def test_exit_code_and_words_of_a_session(stage, empty_study, tmp_path, monkeypatch, capsys):
+    """The bug is graver than the other's numerical failure."""
     stages = (stage("faulty", "participant"), stage("numeric", "participant"))
     monkeypatch.setattr(session, "stages_named", lambda name: stages)
     code = session.run_session("run", empty_study, tmp_path / "out", (), None, jobs=1, force=True)
@@ -85,7 +86,7 @@ def test_exit_code_and_words_of_a_session(stage, empty_study, tmp_path, monkeypa
     assert told.out == ""
     assert told.err.count("Traceback") == 1
     assert told.err.count("a bug in bsip: ValueError: boom") == 1
-    assert told.err.splitlines()[-1].startswith("bsip run: 2 done, 1 failed by a bug; ")
+    assert told.err.splitlines()[-1].startswith("bsip run: 1 done, 1 refused, 1 failed by a bug; ")
 
 
 def test_numerical_failure_is_code_4(stage, empty_study, tmp_path, monkeypatch, capsys):

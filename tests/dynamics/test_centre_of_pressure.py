@@ -6,7 +6,7 @@ from bsip_cli.dynamics.cop import anterior_and_right, centre_of_pressure
 
 def wrench_at(point, force, free_moment=0.0):
     """Force and moment about the world's origin of a force at a point and a moment about Z."""
-    moment = np.cross(point, force) + [0, 0, free_moment]
+    moment = np.cross(point, force) + np.array([0, 0, free_moment])
     return np.concatenate([force, moment])[None]
 
 

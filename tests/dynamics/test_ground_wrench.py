@@ -92,7 +92,9 @@ def test_the_wrench_is_weight_plus_the_rate_of_momentum():
         pin.forwardKinematics(model, data, swing.q(t))
         joints = [data.oMi[i + 1] for i in range(15)]
         return (
-            np.array([j.translation + j.rotation @ b.com_m for j, b in zip(joints, bodies)]),
+            np.array(
+                [j.translation + j.rotation @ b.com_m for j, b in zip(joints, bodies, strict=True)]
+            ),
             np.array([j.rotation.copy() for j in joints]),
         )
 
@@ -117,9 +119,7 @@ def test_the_wrench_is_weight_plus_the_rate_of_momentum():
         rates = []
         for part in (0, 1):
             p = {k: momentum(t + k * step)[part] for k in (-3, -2, -1, 1, 2, 3)}
-            rates.append(
-                (45 * (p[1] - p[-1]) - 9 * (p[2] - p[-2]) + (p[3] - p[-3])) / (60 * step)
-            )
+            rates.append((45 * (p[1] - p[-1]) - 9 * (p[2] - p[-2]) + (p[3] - p[-3])) / (60 * step))
         weight = np.array([0.0, 0.0, 73.0 * GRAVITY_M_S2])
         masses = np.array([body.mass_kg for body in bodies])
         com = (masses[:, None] * places(t)[0]).sum(axis=0) / masses.sum()
@@ -164,9 +164,7 @@ def test_blocks_change_nothing():
 def test_every_kilogram_weighs_g():
     model = pinocchio_model(standing().person)
     zero = np.zeros((1, model.nv))
-    rows = wrench_regressor(
-        model, model.createData(), standing().q[None], zero, zero, np.zeros(3)
-    )
+    rows = wrench_regressor(model, model.createData(), standing().q[None], zero, zero, np.zeros(3))
     np.testing.assert_allclose(rows[0, 2, ::10], GRAVITY_M_S2, rtol=1e-12)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -22,7 +22,12 @@ from bsip_cli.identification.prior import Prior, Spread, prior_of
 
 MASS_KG = 72.0
 RATE_HZ = 100.0
-SPREAD = Spread(mass_sd_percent=20.0, com_sd_percent=6.0, inertia_sd_percent=30.0)
+SPREAD = Spread(
+    mass_sd_percent=20.0,
+    com_sd_percent=6.0,
+    inertia_sd_percent=30.0,
+    total_mass_sd_percent=3.0,
+)
 
 
 @dataclass(frozen=True)
@@ -61,9 +66,7 @@ def _other_body(prior: Prior, person: Person) -> np.ndarray:
 @cache
 def motion(duration_s: float, seed: int = 1, amplitude: float = 0.8) -> tuple[np.ndarray, ...]:
     """q, v, a of a lively motion that excites everything."""
-    swing = Swing(
-        world().model, standing().q, seed, amplitude, frequencies_hz=(0.3, 0.8, 1.4, 2.1)
-    )
+    swing = Swing(world().model, standing().q, seed, amplitude, frequencies_hz=(0.3, 0.8, 1.4, 2.1))
     return swing.sampled(duration_s, RATE_HZ)[1:]
 
 
@@ -93,8 +96,21 @@ def equations_of(rows: np.ndarray, measured: np.ndarray) -> NormalEquations:
     )
 
 
+def remeasured(
+    equations: NormalEquations, rows: np.ndarray, measured: np.ndarray
+) -> NormalEquations:
+    """The same motion with another measured wrench (n, 6)."""
+    right = np.stack([rows[:, c].T @ measured[:, c] for c in range(6)])
+    return replace(equations, right=right, squares=(measured**2).sum(axis=0))
+
+
 def problem_of(
-    rows: np.ndarray, measured: np.ndarray, noise_rms: np.ndarray | float
+    rows: np.ndarray,
+    measured: np.ndarray,
+    noise_rms: np.ndarray | float,
+    trust_ratio: float = 1.0,
 ) -> Problem:
-    noise = Noise(np.broadcast_to(noise_rms, 6).astype(float), np.full(6, float(len(rows))), len(rows))
-    return Problem(equations_of(rows, measured), noise, world().prior, world().basis)
+    count = len(rows)
+    noise = Noise(np.broadcast_to(noise_rms, 6).astype(float), np.full(6, float(count)), count)
+    equations = equations_of(rows, measured)
+    return Problem(equations, noise, world().prior, world().basis, trust_ratio)

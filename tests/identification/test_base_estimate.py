@@ -7,14 +7,16 @@ from synthetic_identification import (
     problem_of,
     recording,
     regressor,
+    remeasured,
     world,
 )
 
-from bsip_cli.dynamics.regressor import predicted_wrench
+from bsip_cli.dynamics.lowpass import lowpass_operator
+from bsip_cli.dynamics.regressor import predicted_wrench, wrench_regressor
 from bsip_cli.identification.base import base_parameters, estimate
 from bsip_cli.identification.equations import accumulate
 from bsip_cli.identification.estimator import Problem
-from bsip_cli.identification.noise import Noise
+from bsip_cli.identification.noise import Noise, noise_of
 
 NOISE = np.array([3.0, 3.0, 5.0, 1.5, 1.5, 1.0])  # N, N m
 
@@ -23,7 +25,7 @@ def test_noise_free_parameters_come_back_to_eight_digits():
     one = recording(30.0)
     equations = accumulate(world().model, [one], 8.0, np.zeros(3))
     noise = Noise(np.full(6, 1e-3), np.full(6, float(equations.samples)), equations.samples)
-    fit = base_parameters(Problem(equations, noise, world().prior, world().basis))
+    fit = base_parameters(Problem(equations, noise, world().prior, world().basis, 1.0))
     true = world().basis.combine @ world().phi_true
     mapped = world().basis.combine @ world().prior.root
     spread = np.sqrt(np.diag(mapped @ mapped.T))  # each in how far people stray
@@ -63,11 +65,11 @@ def covered(count, effective_share=1.0):
     rng = np.random.default_rng(2)
     quantile = stats.norm.ppf(0.975)
     hits = []
+    equations = equations_of(rows, clean)
+    noise = Noise(NOISE, effective_share * np.full(6, float(len(rows))), len(rows))
     for _ in range(count):
-        measured = clean + rng.normal(0, NOISE, clean.shape)
-        problem = problem_of(rows, measured, NOISE)
-        noise = Noise(NOISE, effective_share * problem.noise.effective, problem.noise.samples)
-        fit = base_parameters(Problem(problem.equations, noise, problem.prior, problem.basis))
+        drawn = remeasured(equations, rows, clean + rng.normal(0, NOISE, clean.shape))
+        fit = base_parameters(Problem(drawn, noise, world().prior, world().basis, 1.0))
         hits.append(np.abs(fit.values - true) < quantile * np.sqrt(np.diag(fit.covariance)))
     return np.mean(hits)
 
@@ -83,28 +85,22 @@ def test_intervals_that_count_samples_too_often_do_not():
 
 def test_intervals_cover_the_truth_through_the_whole_chain():
     """White noise on the plates, the low-pass with its memory, noise from the residuals."""
-    from bsip_cli.dynamics.lowpass import lowpass_operator
-    from bsip_cli.identification.noise import noise_of
-
     one = recording(30.0)
     operator, _ = lowpass_operator(one.use, 100.0, 8.0, 5)
     model = world().model
-    from bsip_cli.dynamics.regressor import wrench_regressor
-
     Y = wrench_regressor(model, model.createData(), one.q, one.v, one.a, np.zeros(3))
     rows = (operator @ Y.reshape(len(Y), -1)).reshape(-1, 6, 150)
     true = world().basis.combine @ world().phi_true
     rng = np.random.default_rng(3)
+    motion_only = equations_of(rows, np.zeros(rows.shape[:2]))
     hits = []
-    for _ in range(40):
+    for _ in range(25):
         measured = operator @ (one.wrench + rng.normal(0, NOISE, one.wrench.shape))
         noise = Noise(NOISE, np.full(6, float(len(rows))), len(rows))
-        equations = equations_of(rows, measured)
-        for _ in range(2):
-            problem = Problem(equations, noise, world().prior, world().basis)
-            residual = measured - rows @ estimate(problem).phi
-            noise = noise_of([residual])
-        fit = base_parameters(Problem(equations, noise, world().prior, world().basis))
+        equations = remeasured(motion_only, rows, measured)
+        problem = Problem(equations, noise, world().prior, world().basis, 1.0)
+        noise = noise_of([measured - rows @ estimate(problem).phi])
+        fit = base_parameters(Problem(equations, noise, world().prior, world().basis, 1.0))
         hits.append(np.abs(fit.values - true) < 1.96 * np.sqrt(np.diag(fit.covariance)))
     assert 0.90 < np.mean(hits) < 0.98
 
@@ -112,13 +108,10 @@ def test_intervals_cover_the_truth_through_the_whole_chain():
 def test_what_was_not_excited_stays_with_the_table_and_is_uncertain():
     """A person who stands still shows weight and centre of mass only."""
     q, v, a = motion(30.0)
-    rows = np.repeat(regressor()[:1] * 0, 50, axis=0)
-    from bsip_cli.dynamics.regressor import wrench_regressor
-
     still = wrench_regressor(
         world().model, world().model.createData(), q[:1], 0 * v[:1], 0 * a[:1], np.zeros(3)
     )
-    rows = rows + still
+    rows = np.repeat(still, 50, axis=0)
     fit = base_parameters(problem_of(rows, rows @ world().phi_true, 1.0))
     true = world().basis.combine @ world().phi_true
     assert fit.values[0] == pytest.approx(true[0], rel=1e-6)  # the mass of the whole body

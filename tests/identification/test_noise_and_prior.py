@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from synthetic_identification import SPREAD, world
+from synthetic_identification import world
 
 from bsip_cli.body.inertia import PARAMETERS, from_phi
 from bsip_cli.identification.estimator import Estimate
@@ -53,32 +53,41 @@ def test_the_priors_mean_is_rm_about_the_joints():
     assert np.linalg.norm(prior.origin_in_joint_m[torso]) > 0.3  # the neck, from the waist
 
 
+def scatter(draws=4000):
+    """(draws, 15, 10) readable parameters of small draws phi = mean + S z, a thousandth of S."""
+    z = np.random.default_rng(5).normal(0, 1e-3, (draws, 150))
+    phi = (z @ world().prior.root.T + world().prior.phi).reshape(draws, 15, 10)
+    return np.array([[from_phi(segment).readable() for segment in one] for one in phi])
+
+
 def test_the_priors_spread_is_that_of_the_options():
-    """Small draws phi = mean + S z scatter as the options say, in what people read."""
     prior, person = world().prior, world().person
-    draws = np.random.default_rng(5).normal(0, 1e-3, (4000, 150)) @ prior.root.T + prior.phi
-    for name in ("head", "upper_torso", "thigh_l", "hand_r"):
-        i = person.skeleton.index(name)
-        read = np.array([from_phi(row).readable() for row in draws[:, 10 * i : 10 * i + 10]])
-        sd = read.std(axis=0) * 1e3
-        body, length = prior.inertias[i], person.lengths_m[i]
-        moments = np.diag(body.tensor_kgm2)
-        np.testing.assert_allclose(sd[0], 0.20 * body.mass_kg, rtol=0.05)
-        np.testing.assert_allclose(sd[1:4], 0.06 * length, rtol=0.05)
-        np.testing.assert_allclose(sd[4:7], 0.30 * moments, rtol=0.05)
-        xy = 0.5 * 0.30 * np.sqrt(moments[0] * moments[1])
-        np.testing.assert_allclose(sd[7], xy, rtol=0.05)
-        np.testing.assert_allclose(sd, prior.readable_sd[i], rtol=0.05)
-    assert SPREAD.mass_sd_percent == 20.0
+    sd = scatter().std(axis=0) * 1e3
+    masses = np.array([body.mass_kg for body in prior.inertias])
+    alone, scale = 0.20 * masses, 0.03 * masses.sum()
+    # Masses spread by 20 % each before their sum is known to 3 %: conditional variance.
+    known = alone**2 - alone**4 / ((alone**2).sum() + scale**2)
+    np.testing.assert_allclose(sd[:, 0], np.sqrt(known), rtol=0.05)
+    np.testing.assert_allclose(sd[:, 1:4], 0.06 * person.lengths_m[:, None] * np.ones(3), rtol=0.05)
+    moments = np.array([np.diag(body.tensor_kgm2) for body in prior.inertias])
+    np.testing.assert_allclose(sd[:, 4:7], 0.30 * moments, rtol=0.05)
+    products = np.sqrt(moments[:, [0, 0, 1]] * moments[:, [1, 2, 2]])
+    np.testing.assert_allclose(sd[:, 7:], 0.15 * products, rtol=0.05)
+    np.testing.assert_allclose(sd, prior.readable_sd, rtol=0.05)
 
 
-def test_segments_spread_independently():
-    covariance = world().prior.root @ world().prior.root.T
-    for i in range(15):
-        block = slice(10 * i, 10 * i + 10)
-        outside = covariance[block].copy()
-        outside[:, block] = 0.0
-        assert not outside.any()
+def test_only_masses_hang_together_and_their_sum_is_the_scales():
+    read = scatter()
+    alone = 0.20 * np.array([body.mass_kg for body in world().prior.inertias])
+    scale = 0.03 * sum(body.mass_kg for body in world().prior.inertias)
+    total = read[:, :, 0].sum(axis=1).std() * 1e3
+    assert total == pytest.approx((1 / (alone**2).sum() + 1 / scale**2) ** -0.5, rel=0.05)
+    correlation = np.corrcoef(read.reshape(len(read), -1).T)
+    others = np.delete(np.arange(150), np.s_[::10])
+    apart = correlation[others] - np.eye(150)[others]
+    assert np.abs(apart).max() < 5 / np.sqrt(len(read))
+    torso, thigh = (10 * world().person.skeleton.index(s) for s in ("upper_torso", "thigh_l"))
+    assert correlation[torso, thigh] < -0.2
 
 
 def test_no_data_no_share_and_all_data_all_share():

@@ -102,10 +102,10 @@ def test_a_trial_without_a_usable_frame_adds_nothing(recordings):
 
 
 def test_memory_does_not_grow_with_the_trial():
-    """Both trials are longer than a block (200 outputs, 10 s); one has four times the frames."""
+    """Both trials fill two blocks (200 outputs, 10 s each); one has four times the frames."""
     q, v, a = motion(14.0, 3)
     peaks = []
-    for times in (1, 4):
+    for times in (2, 8):
         frames = len(q) * times
         one = Recording(
             *(np.tile(x, (times, 1)) for x in (q, v, a)),

@@ -49,7 +49,7 @@ def test_parents_of_velocities_follow_the_tree(person):
         last = -1 if parent == 0 else model.joints[parent].idx_v + model.joints[parent].nv - 1
         start = model.joints[j].idx_v
         expected += [last, *range(start, start + model.joints[j].nv - 1)]
-    assert tree.v_parents.tolist() == expected
+    assert tree.arrays.v_parents.tolist() == expected
 
 
 def test_model_markers_equal_pinocchios_placements(person):

@@ -107,9 +107,7 @@ def test_a_true_geometry_stays():
     q = random_poses(truth, 20, 0.4, seed=3)
     result = refine(truth, markers_of(truth, q), q, LOOSE, IK)
     np.testing.assert_allclose(result.person.lengths_m, truth.lengths_m, atol=1e-5)
-    np.testing.assert_allclose(
-        result.person.joint_in_parent_m, truth.joint_in_parent_m, atol=2e-5
-    )
+    np.testing.assert_allclose(result.person.joint_in_parent_m, truth.joint_in_parent_m, atol=2e-5)
 
 
 def test_left_and_right_are_tied_softly():

@@ -1,5 +1,7 @@
 """Velocities and accelerations on the manifold against a trajectory whose own are known."""
 
+from itertools import pairwise
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -7,7 +9,8 @@ from standing_person import Swing, standing
 
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.errors import BadDataError
-from bsip_cli.motion.smoothing import smooth_motion
+from bsip_cli.motion.smoothing import _angular, smooth_motion
+from bsip_cli.motion.splines import SmoothSignal
 
 RATE_HZ = 100.0
 OPTIONS = {
@@ -87,7 +90,9 @@ def test_a_turning_base_that_moves_straight_has_pinocchios_spatial_acceleration(
     q = np.repeat(standing().q[None], 400, axis=0)
     for k in range(400):
         turn = pin.exp3(omega * k / RATE_HZ)
-        q[k, 3:7] = pin.Quaternion(pin.Quaternion(standing().q[3:7]).toRotationMatrix() @ turn).coeffs()
+        q[k, 3:7] = pin.Quaternion(
+            pin.Quaternion(standing().q[3:7]).toRotationMatrix() @ turn
+        ).coeffs()
         q[k, :3] += speed * k / RATE_HZ
     motion = smoothed(person, q)
     data = model.createData()
@@ -99,6 +104,29 @@ def test_a_turning_base_that_moves_straight_has_pinocchios_spatial_acceleration(
         np.testing.assert_allclose(classical.linear, 0.0, atol=1e-3)
         np.testing.assert_allclose(motion.v[k, 3:6], omega, atol=1e-5)
         assert np.linalg.norm(motion.a[k, :3]) > 0.5
+
+
+def test_a_curve_off_the_unit_sphere_turns_as_the_one_on_it():
+    """Smoothing shrinks quaternions, and not evenly: omega and its rate must not notice."""
+    omega, alpha = np.array([0.4, -1.1, 0.7]), np.array([0.9, 0.2, -0.5])
+    h = 1e-3
+    times = h * np.arange(-3, 4)
+
+    def curve(t):
+        """A turn about a fixed axis would hide an error across it: two turns, one after another."""
+        turn = pin.exp3(omega * t) @ pin.exp3(0.5 * alpha * t**2)
+        return (1.0 + 0.3 * np.sin(2 * t + 0.5)) * pin.Quaternion(turn).coeffs()
+
+    x = np.array([curve(t) for t in times])
+    first = (45 * (x[4] - x[2]) - 9 * (x[5] - x[1]) + x[6] - x[0]) / (60 * h)
+    second = (270 * (x[4] + x[2]) - 27 * (x[5] + x[1]) + 2 * (x[6] + x[0]) - 490 * x[3]) / (
+        180 * h**2
+    )
+    signal = SmoothSignal(*(part[None] for part in (x[3], first, second, np.zeros(4))))
+    unit, found_omega, found_alpha, _ = _angular(signal, slice(0, 4))
+    np.testing.assert_allclose(unit[0], [0, 0, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(found_omega[0], omega, atol=1e-8)
+    np.testing.assert_allclose(found_alpha[0], alpha, atol=1e-6)
 
 
 def noisy(person, q, sd_m, seed):
@@ -118,7 +146,7 @@ def test_the_markers_noise_is_found_and_the_stated_sd_holds(swing):
     motion = smoothed(person, noisy(person, q, 0.0005, seed=2))
     assert motion.marker_noise_m == pytest.approx(0.0005, rel=0.25)
     starts = [0, 3, *person.skeleton.v_starts[1:], 40]  # one noise for the axes of a joint
-    for start, stop in zip(starts[:-1], starts[1:], strict=True):
+    for start, stop in pairwise(starts):
         part = np.s_[30:-30, start:stop]
         error = np.sqrt(((motion.a - a)[part] ** 2).mean())
         stated = np.sqrt((motion.a_sd[part] ** 2).mean())

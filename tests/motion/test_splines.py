@@ -147,7 +147,9 @@ def test_channels_are_smoothed_by_one_linear_operator():
     times = np.arange(600) / 100
     a, b = np.sin(5 * times) + rng.normal(0, 1e-3, 600), np.cos(3 * times)
     found = smooth(np.stack([a, b, a + b], axis=1), 100.0, WINDOW_S, np.full(3, 1e-3))
-    np.testing.assert_allclose(found.second[:, 0] + found.second[:, 1], found.second[:, 2], atol=1e-8)
+    np.testing.assert_allclose(
+        found.second[:, 0] + found.second[:, 1], found.second[:, 2], atol=1e-8
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,173 @@
+"""What the benchmarks share: a person who moves, CPU-seconds, Markdown tables."""
+
+from __future__ import annotations
+
+import os
+
+# One thread, as the command line has it; before numpy is loaded.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+import re
+import statistics
+import subprocess
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from bsip_cli.body.markersets import load_marker_set
+from bsip_cli.body.person import Person
+from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.motion.calibration import calibrate
+from bsip_cli.motion.inverse_kinematics import neutral, tree_of
+from bsip_cli.motion.jacobian import model_markers
+from bsip_cli.recordings.read import read_recording
+
+ROOT = Path(__file__).parents[1]
+_STATIC = ROOT / "sample_data" / "sub-01" / "sub-01_task-static.c3d"
+_HEIGHT_M = 1.77
+_FREQUENCIES_HZ = np.array([0.3, 0.7, 1.1])
+_TILT_RAD = 0.08
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What a process and its children took."""
+
+    cpu_s: float
+    peak_mb: float
+    stdout: str
+
+
+# --- a person who moves -----------------------------------------------------------------------
+
+
+@cache
+def sample_person() -> Person:
+    """The first person of the sample study, from the static trial; all markers weigh the same.
+
+    The hinges lean a little, so that nothing is easier than in a refined skeleton.
+    """
+    recording = read_recording(_STATIC)
+    places = dict(zip(recording.labels, np.nanmean(recording.markers_m, axis=0), strict=True))
+    skeleton = load_skeleton("hansen2017")
+    person = calibrate(skeleton, load_marker_set("hansen2017"), places, "M", _HEIGHT_M).person
+    hinges = np.array([kind == "revolute" for kind in skeleton.joint_types])
+    lean = np.random.default_rng(1).normal(0, _TILT_RAD, (2, len(hinges)))
+    return replace(
+        person,
+        parent_tilt_rad=np.where(hinges, lean[0], 0.0),
+        child_tilt_rad=np.where(hinges, lean[1], 0.0),
+        marker_weights=np.ones(len(person.markers)),
+    )
+
+
+def standing(person: Person) -> np.ndarray:
+    """(nq,) upright, facing world X, elbows and knees a little bent."""
+    q = neutral(person)
+    q[2] = 1.0
+    q[3:7] = np.array([1.0, 0.0, 0.0, 1.0]) / np.sqrt(2)  # the segments' Y axes point up
+    for start, kind, joint in zip(
+        person.skeleton.q_starts, person.skeleton.joint_types, person.skeleton.joints, strict=True
+    ):
+        if kind == "revolute":
+            q[start] = 0.6 if joint.startswith("elbow") else -0.4
+    return q
+
+
+def movement(
+    person: Person, frames: int, rate_hz: float, seed: int = 1, amplitude_rad: float = 0.4
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sums of sines in all coordinates about standing: q (N, nq) and their rates (N, nv), twice.
+
+    The base translates by a third of the amplitude [m]. The rates are those of the coordinates on
+    the manifold: Pinocchio's v and a up to second order in the angles, which no benchmark needs.
+    """
+    model, rng = pinocchio_model(person), np.random.default_rng(seed)
+    shape = (len(_FREQUENCIES_HZ), model.nv)
+    omega = 2 * np.pi * _FREQUENCIES_HZ[:, None] * rng.uniform(0.8, 1.2, shape)
+    size = amplitude_rad / len(_FREQUENCIES_HZ) * rng.uniform(0.5, 1.5, shape)
+    size[:, :3] /= 3
+    phase = omega * (np.arange(frames) / rate_hz)[:, None, None] + rng.uniform(0, 2 * np.pi, shape)
+    x, v, a = (
+        (size * omega**order * np.sin(phase + order * np.pi / 2)).sum(axis=1) for order in range(3)
+    )
+    start = standing(person)
+    return np.stack([pin.integrate(model, start, one) for one in x]), v, a
+
+
+def noisy_markers(person: Person, q: np.ndarray, noise_m: float, seed: int = 2) -> np.ndarray:
+    """(N, m, 3) markers of the poses with white noise per axis."""
+    markers = model_markers(person, *tree_of(person).forward(q))
+    return markers + np.random.default_rng(seed).normal(0, noise_m, markers.shape)
+
+
+# --- measuring --------------------------------------------------------------------------------
+
+
+def cpu_seconds(work: Callable[[], object]) -> float:
+    """CPU-seconds of this process, all threads: another's load on the machine does not count."""
+    before = time.process_time()
+    work()
+    return time.process_time() - before
+
+
+def interleaved(contestants: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, float]:
+    """Median of what each contestant returns, run in turns A B A B."""
+    found: dict[str, list[float]] = {name: [] for name in contestants}
+    for _ in range(rounds):
+        for name, work in contestants.items():
+            found[name].append(work())
+    return {name: statistics.median(values) for name, values in found.items()}
+
+
+def run_child(
+    arguments: Sequence[str], environment: Mapping[str, str] | None = None, allowed: int = 0
+) -> Usage:
+    """Run a process; CPU-seconds of it and its children, and the peak memory of the largest.
+
+    Raises
+    ------
+    RuntimeError
+        Its exit code is above ``allowed``.
+    """
+    child = subprocess.Popen(
+        list(arguments),
+        env={**os.environ, **(environment or {})},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert child.stdout and child.stderr
+    out = child.stdout.read()
+    errors = child.stderr.read()
+    _, status, used = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    if not 0 <= child.returncode <= allowed:
+        raise RuntimeError(f"{' '.join(arguments)} ended with {child.returncode}\n{errors}")
+    return Usage(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, out)
+
+
+# --- showing ----------------------------------------------------------------------------------
+
+
+def markdown(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """A Markdown table."""
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
+
+
+def machine() -> str:
+    """Cores and GHz of this machine."""
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="ascii")
+        ghz = max(float(mhz) for mhz in re.findall(r"cpu MHz\s*: ([\d.]+)", text)) / 1000
+        return f"{os.cpu_count()} cores, {ghz:.1f} GHz"
+    except (OSError, ValueError):
+        return f"{os.cpu_count()} cores"

@@ -1,0 +1,256 @@
+"""Inverse kinematics against OpenSim's and Pinocchio's: the same optimum, and how fast.
+
+OpenSim is asked of another interpreter, which needs ``pip install opensim`` (not part of bsip):
+
+    python3 -m venv bench && bench/bin/pip install opensim
+    python benchmarks/inverse_kinematics.py --opensim-python bench/bin/python
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from common import (
+    cpu_seconds,
+    interleaved,
+    machine,
+    markdown,
+    movement,
+    noisy_markers,
+    run_child,
+    sample_person,
+    standing,
+)
+import numpy as np
+import opensim_model
+import pinocchio as pin
+import pinocchio_loop
+
+from bsip_cli.body.person import Person
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.motion.inverse_kinematics import Poses, solve_poses, tree_of
+from bsip_cli.motion.jacobian import model_markers
+from bsip_cli.motion.smoothing import smooth_motion
+
+NOISE_M = 0.005
+# No robust limit and hardly a prior: the same sum of squares as OpenSim's.
+SAME_PROBLEM = {
+    "marker_sd_m": 0.005,
+    "robust_limit_m": 10.0,
+    "posture_sd_rad": 1e5,
+    "iterations": 50,
+}
+AS_SHIPPED = SAME_PROBLEM | {"robust_limit_m": 0.025, "posture_sd_rad": 3.0}
+SMOOTHING = {
+    "method": "spline",
+    "butterworth_cutoff_hz": 6.0,
+    "pace_window_s": 0.5,
+    "edge_s": 0.1,
+}
+FEW = 10
+
+
+@dataclass(frozen=True)
+class OpenSimRun:
+    """(N,) marker RMS of each frame [m], CPU-seconds per frame, and the version."""
+
+    rms_m: np.ndarray
+    cpu_s_per_frame: float
+    version: str
+
+
+def run_opensim(
+    python: str,
+    person: Person,
+    markers_m: np.ndarray,
+    rate_hz: float,
+    accuracy: float,
+    joint_family: str = "ball",
+) -> OpenSimRun:
+    """OpenSim's InverseKinematicsTool on the same tree and markers."""
+    count = len(markers_m)
+    with tempfile.TemporaryDirectory() as folder:
+        model, markers = Path(folder, "person.osim"), Path(folder, "markers.trc")
+        model.write_text(opensim_model.model_xml(person, joint_family), encoding="utf-8")
+        markers.write_text(opensim_model.trc_text(person.markers, markers_m, rate_hz), "utf-8")
+        worker = str(Path(__file__).with_name("opensim_worker.py"))
+        sizes = [str(number) for number in (count, FEW, rate_hz, accuracy)]
+        used = run_child([python, worker, str(model), str(markers), *sizes])
+        errors = storage_column(Path(folder, "all_ik_marker_errors.sto"), "marker_error_RMS")
+    printed = json.loads(used.stdout.splitlines()[-1])
+    per_frame = (printed["all"] - printed["few"]) / (count - FEW)
+    return OpenSimRun(errors, per_frame, printed["version"])
+
+
+def storage_column(path: Path, name: str) -> np.ndarray:
+    """One column of an OpenSim storage file."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    start = next(k for k, line in enumerate(lines) if line.strip() == "endheader") + 1
+    at = lines[start].split().index(name)
+    return np.array([float(line.split()[at]) for line in lines[start + 1 :] if line.strip()])
+
+
+def optimum_rows(ours: np.ndarray, theirs: np.ndarray) -> list[list[str]]:
+    """Rows that compare the marker RMS (N,) [m] of two solvers."""
+    total = [np.sqrt((rms**2).mean()) for rms in (ours, theirs)]
+    ratio = ours / theirs - 1
+    return [
+        ["marker RMS, bsip [mm]", f"{1e3 * total[0]:.4f}"],
+        ["marker RMS, OpenSim [mm]", f"{1e3 * total[1]:.4f}"],
+        ["difference of the totals [%]", f"{100 * (total[0] / total[1] - 1):+.4f}"],
+        ["worst frame, bsip above OpenSim [%]", f"{100 * ratio.max():+.4f}"],
+        ["worst frame, OpenSim above bsip [%]", f"{-100 * ratio.min():+.4f}"],
+        ["frames in which OpenSim is better by 0.1 %", f"{int((ratio > 1e-3).sum())}"],
+    ]
+
+
+def forward_difference(person: Person, count: int) -> float:
+    """Largest difference [1 and m] of forward kinematics to Pinocchio's at random poses."""
+    model = pinocchio_model(person)
+    data, rng = model.createData(), np.random.default_rng(3)
+    spread = np.where(np.arange(model.nv) < 3, 0.7, 1.0)
+    start = standing(person)
+    q = np.stack(
+        [pin.integrate(model, start, rng.normal(0, 1, model.nv) * spread) for _ in range(count)]
+    )
+    R, p = tree_of(person).forward(q)
+    worst = 0.0
+    for k in range(count):
+        pin.forwardKinematics(model, data, q[k])
+        for i in range(model.njoints - 1):
+            placement = data.oMi[i + 1]
+            worst = max(
+                worst,
+                np.abs(placement.rotation - R[k, i]).max(),
+                np.abs(placement.translation - p[k, i]).max(),
+            )
+    return float(worst)
+
+
+def rms_of(person: Person, q: np.ndarray, markers_m: np.ndarray) -> np.ndarray:
+    """(N,) marker RMS [m] of given poses."""
+    apart = markers_m - model_markers(person, *tree_of(person).forward(q))
+    return np.sqrt((apart**2).sum(axis=2).mean(axis=1))
+
+
+def first_call() -> None:
+    """Print the CPU-seconds of the first solved pose in this process, and of the second."""
+    person = sample_person()
+    start = standing(person)
+    markers = noisy_markers(person, start[None], NOISE_M)
+    np.asarray(markers)
+    times = [
+        cpu_seconds(lambda: solve_poses(person, markers, start, **AS_SHIPPED)) for _ in range(2)
+    ]
+    print(json.dumps(times))
+
+
+def compile_rows() -> list[list[str]]:
+    """First call in a fresh process, with an empty cache and with a full one."""
+    rows = []
+    with tempfile.TemporaryDirectory() as cache:
+        for label in ("first solve, empty cache", "first solve, cached"):
+            used = run_child(
+                [sys.executable, __file__, "--first-call"], {"NUMBA_CACHE_DIR": cache}
+            )
+            first, second = json.loads(used.stdout.splitlines()[-1])
+            rows.append([label, f"{first - second:.2f}"])
+    return rows
+
+
+def long_trial_rows(person: Person, rounds: int) -> list[list[str]]:
+    """120 s at 250 Hz, as shipped: poses alone, and with smoothing."""
+    rate, count = 250.0, 30_000
+    q, _, _ = movement(person, count, rate)
+    markers = noisy_markers(person, q, NOISE_M)
+    last: list[Poses] = []
+
+    def poses() -> float:
+        last[:] = [solve_poses(person, markers, q[0], **AS_SHIPPED)]
+        return 0.0
+
+    def smoothing() -> None:
+        smooth_motion(person, last[0].q, np.ones(count, dtype=bool), rate, **SMOOTHING)
+
+    poses()
+    smoothing()  # compiled once
+    found = interleaved(
+        {"ik": lambda: cpu_seconds(poses), "smoothing": lambda: cpu_seconds(smoothing)}, rounds
+    )
+    return [
+        ["inverse kinematics", f"{found['ik']:.2f}", f"{count / found['ik']:,.0f}"],
+        ["smoothing", f"{found['smoothing']:.2f}", f"{count / found['smoothing']:,.0f}"],
+        ["both (target: at most 10)", f"{sum(found.values()):.2f}", ""],
+    ]
+
+
+def compare(options: argparse.Namespace) -> None:
+    person = sample_person()
+    rate = options.rate
+    q, _, _ = movement(person, options.frames, rate)
+    markers = noisy_markers(person, q, NOISE_M)
+    many = np.tile(markers, (max(1, 6000 // options.frames), 1, 1))
+    solve_poses(person, markers[:2], q[0], **SAME_PROBLEM)
+    ours = solve_poses(person, markers, q[0], **SAME_PROBLEM)
+    some = markers[: options.pinocchio_frames]
+    runs: list[OpenSimRun] = []
+    looped: list[np.ndarray] = []
+
+    def kernel() -> float:
+        return cpu_seconds(lambda: solve_poses(person, many, q[0], **SAME_PROBLEM)) / len(many)
+
+    def loop() -> float:
+        work = lambda: looped.append(pinocchio_loop.solve(person, some, q[0]))  # noqa: E731
+        return cpu_seconds(work) / len(some)
+
+    def opensim() -> float:
+        runs.append(run_opensim(options.opensim_python, person, markers, rate, options.accuracy))
+        return runs[-1].cpu_s_per_frame
+
+    contestants = {"bsip": kernel, "Pinocchio in a Python loop": loop}
+    if options.opensim_python:
+        contestants["OpenSim"] = opensim
+    seconds = interleaved(contestants, options.rounds)
+    print(f"\n{len(person.markers)} markers with {1e3 * NOISE_M:g} mm noise, {options.frames} frames")
+    if runs:
+        print(f"at {rate:g} Hz; OpenSim {runs[0].version}, accuracy {options.accuracy:g}\n")
+        print(markdown(["optimum", ""], optimum_rows(ours.frame_rms_m(), runs[0].rms_m)))
+    mine = rms_of(person, looped[0], some) / ours.frame_rms_m()[: len(some)] - 1
+    print(f"\nPinocchio's loop ends at bsip's optimum to {100 * np.abs(mine).max():.1g} %;")
+    print(f"forward kinematics equals Pinocchio's to {forward_difference(person, 200):.1g}.\n")
+    rows = [
+        [name, f"{1 / value:,.0f}", f"{value / seconds['bsip']:.0f}"]
+        for name, value in seconds.items()
+    ]
+    print(markdown(["solver", "frames per CPU-second", "CPU time over bsip's"], rows))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--opensim-python", help="interpreter that has opensim")
+    parser.add_argument("--frames", type=int, default=400)
+    parser.add_argument("--pinocchio-frames", type=int, default=200)
+    parser.add_argument("--rate", type=float, default=100.0, help="[Hz]")
+    parser.add_argument("--accuracy", type=float, default=1e-5, help="OpenSim's")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--first-call", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.first_call:
+        first_call()
+        return
+    print(f"machine: {machine()}; medians of {options.rounds} rounds")
+    if not options.opensim_python:
+        print(f"without OpenSim: see the first lines of {Path(__file__).name} for how to add it")
+    compare(options)
+    print("\n" + markdown(["compiling", "CPU-s"], compile_rows()))
+    header = ["120 s at 250 Hz, options as shipped", "CPU-s", "frames per CPU-second"]
+    print("\n" + markdown(header, long_trial_rows(sample_person(), options.rounds)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+"""One trial's markers beside the fitted model: what the search for bad markers reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.body.person import Person
+from bsip_cli.motion.inverse_kinematics import tree_of
+from bsip_cli.motion.jacobian import model_markers, pose_columns, subtrees
+
+_RESPONSE_FRAMES = 16
+_POSTURE_SD_RAD = 3.0
+
+
+@dataclass(frozen=True)
+class MarkerFit:
+    """Markers of N frames and the poses fitted to them.
+
+    Attributes
+    ----------
+    labels, segments : (m,) names of the markers and of the segments they sit on.
+    times_s : (N,).
+    measured_m, model_m : (N, m, 3) world; NaN where a marker is missing.
+    residual_m : (N, m, 3) measured less model, in the axes of the marker's segment.
+    trusted_m : (m,) what a marker's position is trusted to, as in the inverse kinematics.
+    pose : segment to (N, k) columns, the angles of its own joint and of those it carries.
+    response : (m, 3, m, 3) change of the residual of a marker (first) for each metre by which
+        another (third) moves on its segment: the pose follows the marker and bends the others.
+    """
+
+    labels: tuple[str, ...]
+    segments: tuple[str, ...]
+    times_s: np.ndarray
+    measured_m: np.ndarray
+    model_m: np.ndarray
+    residual_m: np.ndarray
+    trusted_m: np.ndarray
+    pose: dict[str, np.ndarray]
+    response: np.ndarray
+
+
+def marker_fit(
+    person: Person,
+    markers_m: np.ndarray,
+    q: np.ndarray,
+    times_s: np.ndarray,
+    *,
+    marker_sd_m: float,
+    robust_limit_m: float,
+) -> MarkerFit:
+    """Lay fitted poses q (N, nq) beside the markers (N, m, 3) in the order of the person's.
+
+    ``marker_sd_m`` and ``robust_limit_m`` are those of the inverse kinematics.
+    """
+    R, p = tree_of(person).forward(q)
+    model = model_markers(person, R, p)
+    turns = R[:, person.marker_segments]
+    residual = np.einsum("fmji,fmj->fmi", turns, markers_m - model)
+    names = person.skeleton.segments
+    return MarkerFit(
+        person.markers,
+        tuple(names[k] for k in person.marker_segments),
+        times_s,
+        markers_m,
+        model,
+        residual,
+        marker_sd_m / np.sqrt(np.maximum(person.marker_weights, 1e-6)),
+        {names[k]: _pose(person, q, int(k)) for k in np.unique(person.marker_segments)},
+        _response(person, residual, R, p, model, marker_sd_m, robust_limit_m),
+    )
+
+
+def _pose(person: Person, q: np.ndarray, segment: int) -> np.ndarray:
+    """(N, k) angles about a segment, which its skin may follow: vector parts of quaternions
+    (half the sine of the turn) and hinge angles."""
+    skeleton, columns = person.skeleton, []
+    for i, kind in enumerate(skeleton.joint_types):
+        if kind == "free" or (i != segment and skeleton.parents[i] != segment):
+            continue
+        at = skeleton.q_starts[i]
+        if kind == "revolute":
+            columns.append(q[:, at : at + 1])
+        else:
+            columns.append(q[:, at : at + 3] * np.where(q[:, at + 3 : at + 4] < 0, -1.0, 1.0))
+    return np.concatenate(columns, axis=1) if columns else np.empty((len(q), 0))
+
+
+def _response(
+    person: Person,
+    residual_m: np.ndarray,
+    R: np.ndarray,
+    p: np.ndarray,
+    model: np.ndarray,
+    marker_sd_m: float,
+    limit_m: float,
+) -> np.ndarray:
+    """(m, 3, m, 3) I - J (J' W J + prior)^-1 J' W in segment axes, mean over some frames.
+
+    W holds the weights that the robust loss leaves: a marker far off bends the pose little.
+    """
+    distance = np.linalg.norm(residual_m, axis=2)
+    frames = np.unique(np.linspace(0, len(R) - 1, _RESPONSE_FRAMES).astype(int))
+    tree, m = tree_of(person), len(person.markers)
+    columns = pose_columns(person, tree, R[frames], p[frames], model[frames], subtrees(person))
+    turns = R[frames][:, person.marker_segments]
+    columns = np.einsum("fmji,fmjv->fmiv", turns, columns).reshape(len(frames), 3 * m, tree.nv)
+    total, seen_total = np.zeros((3 * m, 3 * m)), np.zeros(m)
+    for columns_f, d in zip(columns, distance[frames], strict=True):
+        seen = np.isfinite(d)
+        pull = np.where(
+            seen, np.minimum(1.0, limit_m / np.maximum(np.where(seen, d, 1.0), 1e-9)), 0
+        )
+        weight = np.repeat(person.marker_weights / marker_sd_m**2 * pull**2, 3)
+        information = columns_f.T @ (weight[:, None] * columns_f)
+        information[range(6, tree.nv), range(6, tree.nv)] += _POSTURE_SD_RAD**-2
+        information[range(tree.nv), range(tree.nv)] += 1e-9 * np.trace(information) / tree.nv
+        gain = np.linalg.solve(information, (weight[:, None] * columns_f).T)
+        total += columns_f @ gain * np.repeat(seen, 3)[None]
+        seen_total += seen
+    mean = total / np.repeat(np.maximum(seen_total, 1), 3)[None]
+    return (np.eye(3 * m) - mean).reshape(m, 3, m, 3)

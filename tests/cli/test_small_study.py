@@ -1,0 +1,452 @@
+"""A whole run on a small simulated study: its files, their origin, and what runs again when.
+
+All tests that need the run stand in this file, so that they share it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from bsip_cli import __version__
+from bsip_cli.artifacts import SCHEMAS, read_artifact, read_header, write_artifact
+from bsip_cli.config import Config, load_config
+from bsip_cli.pipeline import STAGES, producer
+from bsip_cli.runner import Outcome, perform
+from bsip_cli.simulate.options import Rates, StudyOptions
+from bsip_cli.simulate.study import simulate_study
+from bsip_cli.study import load_study
+from bsip_cli.unit import Unit
+
+pytestmark = pytest.mark.slow
+
+OPTIONS = StudyOptions(
+    participants=2,
+    seed=3,
+    sexes="MF",
+    tasks=("static", "sequence", "squat"),
+    durations_s={"static": 1.0, "sequence": 10.0, "squat": 3.0},
+    rates={"default": Rates(marker_hz=50, analog_hz=250)},
+)
+TRIALS = ("task-sequence_run-1", "task-squat_run-1", "task-static")
+GOLDEN = Path(__file__).with_name("files_of_a_run.txt")
+UNITS = 2 * (3 * 3 + 4) + 3  # 3 stages per trial, 4 per participant, 3 of the cohort
+
+
+@dataclass(frozen=True)
+class Run:
+    """A study and what a run made of it."""
+
+    study: Path
+    out: Path
+
+    def files(self) -> dict[str, Path]:
+        found = sorted(path for path in self.out.rglob("*") if path.is_file())
+        return {path.relative_to(self.out).as_posix(): path for path in found}
+
+    def content(self) -> dict[str, bytes]:
+        return {name: path.read_bytes() for name, path in self.files().items()}
+
+    def times(self) -> dict[str, int]:
+        return {name: path.stat().st_mtime_ns for name, path in self.files().items()}
+
+    def rewritten(self, before: dict[str, int]) -> set[str]:
+        return {name for name, time in self.times().items() if before.get(name) != time}
+
+    def recording(self, stem: str) -> Path:
+        return self.study / stem.split("_")[0] / f"{stem}.c3d"
+
+    def path(self, kind: str, owner: str = "sub-01") -> Path:
+        return self.out / owner.split("_")[0] / f"{owner}_{kind}.parquet"
+
+    def perform(self, stage: str, config: Config | None = None) -> Outcome:
+        """A stage on the first participant, in this process."""
+        config = config or load_config([self.study / "study.toml"])
+        study, _ = load_study(self.study, config.roles.model_dump())
+        first = next(each for each in STAGES if each.name == stage)
+        return perform(Unit(first, study, self.out, config, study.participants[0]))
+
+
+def stages_of(names: set[str]) -> set[str]:
+    """Which stages wrote these artifacts."""
+    kinds = {Path(name).stem.split("_")[-1] for name in names if name.endswith(".parquet")}
+    return {producer(kind).label for kind in kinds}
+
+
+def owners_of(names: set[str], stage: str) -> set[str]:
+    """Trials, participants or group of a stage's artifacts among these names."""
+    kinds = [kind for each in STAGES if each.name == stage for kind in each.writes]
+    return {
+        Path(name).stem.removesuffix(f"_{kind}")
+        for name in names
+        for kind in kinds
+        if name.endswith(f"_{kind}.parquet")
+    }
+
+
+@pytest.fixture(scope="session")
+def first_run(tmp_path_factory, bsip):
+    """Made once; nobody changes it."""
+    folder = tmp_path_factory.mktemp("small")
+    simulate_study(folder / "study", OPTIONS)
+    run = Run(folder / "study", folder / "out")
+    answer = bsip("run", run.study, "--out", run.out, "--jobs", 2)
+    assert answer.code == 0, answer.err
+    assert answer.summary == f"bsip run: {UNITS} done; results in {run.out}"
+    return run
+
+
+@pytest.fixture
+def run(first_run, tmp_path) -> Run:
+    """A copy to change."""
+    shutil.copytree(first_run.study, tmp_path / "study")
+    shutil.copytree(first_run.out, tmp_path / "out")
+    return Run(tmp_path / "study", tmp_path / "out")
+
+
+# --- what a run leaves --------------------------------------------------------------------------
+
+
+def test_files_of_a_run(first_run):
+    """Exactly these: a new or a lost file is a change that others must hear of."""
+    golden = GOLDEN.read_text(encoding="utf-8").splitlines()
+    names = {name.replace("sub-XX", sub) for name in golden for sub in ("sub-01", "sub-02")}
+    assert set(first_run.files()) == names
+
+
+def test_two_runs_give_the_same_bytes(first_run, bsip, tmp_path):
+    """Another folder, one process instead of two."""
+    again = Run(first_run.study, tmp_path / "elsewhere")
+    assert bsip("run", again.study, "--out", again.out, "--jobs", 1).code == 0
+    first, second = first_run.content(), again.content()
+    assert set(first) == set(second)
+    assert [name for name in first if first[name] != second[name]] == []
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.label)
+def test_every_artifact_says_what_made_it(first_run, stage):
+    files = {path.name: path for path in first_run.files().values()}
+    files |= {path.name: path for path in first_run.study.rglob("*.c3d")}
+    facts = set() if stage.level == "cohort" else {"participant"}
+    for kind in stage.writes:
+        written = [path for name, path in files.items() if name.endswith(f"_{kind}.parquet")]
+        assert len(written) == {"trial": 6, "participant": 2, "cohort": 1}[stage.level]
+        for path in written:
+            header = read_header(path, kind)
+            made_by = header["provenance"]["made_by"]
+            assert made_by["stage"] == stage.name
+            assert made_by["bsip_version"] == __version__
+            assert {"numpy", "scipy", "pin", "ezc3d"} <= set(made_by["libraries"])
+            assert set(made_by["options"]) == set(stage.options) | facts
+            hashes = {name: sha256(files[name]) for name in made_by["inputs"]}
+            assert made_by["inputs"] == hashes
+            kinds = {Path(name).stem.split("_")[-1] for name in hashes}
+            recording = {path.name.removesuffix(f"_{kind}.parquet").split("_")[-1]}
+            assert kinds == (set(stage.reads) or recording)
+
+
+def sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_listed_files_are_there_with_their_hash(first_run):
+    for kind, owner in (("report-files", "sub-01"), ("tables-files", "group")):
+        listed = read_artifact(first_run.path(kind, owner), kind)
+        assert len(listed) > 5
+        for row in listed.itertuples():
+            assert sha256(first_run.out / row.file) == row.sha256
+
+
+def test_show_prints_the_tables(first_run, bsip):
+    answer = bsip("show", first_run.out)
+    assert answer.code == 0
+    assert str(first_run.out / "sub-02" / "report.html") in answer.out
+    assert answer.out.count("| ") > 20
+
+
+# --- what runs again ----------------------------------------------------------------------------
+
+
+def test_second_run_does_nothing(run, bsip):
+    content, times = run.content(), run.times()
+    answer = bsip("run", run.study, "--out", run.out, "--jobs", 2)
+    assert answer.code == 0
+    assert answer.err.splitlines() == [f"bsip run: {UNITS} up to date; results in {run.out}"]
+    assert answer.out == ""
+    assert run.times() == times
+    assert run.content() == content
+
+
+def test_touched_recording_is_the_same_recording(run, bsip):
+    times = run.times()
+    for path in run.study.rglob("*.c3d"):
+        os.utime(path)
+    answer = bsip("ingest", run.study, "--out", run.out)
+    assert answer.summary.startswith("bsip ingest: 6 up to date;")
+    assert run.times() == times
+
+
+def test_changed_recording_runs_again_with_what_reads_it(run, bsip):
+    with run.recording("sub-01_task-squat_run-1").open("ab") as handle:
+        handle.write(bytes(512))
+    times = run.times()
+    answer = bsip("run", run.study, "--out", run.out, "--jobs", 2)
+    assert answer.code == 0
+    rewritten = run.rewritten(times)
+    assert owners_of(rewritten, "ingest") == {"sub-01_task-squat_run-1"}
+    assert owners_of(rewritten, "scale") == {"sub-01"}
+    assert owners_of(rewritten, "ik") == {f"sub-01_{trial}" for trial in TRIALS}
+    assert owners_of(rewritten, "stats") == {"group"}
+    assert not any("sub-02" in name for name in rewritten)
+
+
+def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text("[reconstruct]\ncop_min_force_percent_bw = 31.0\n")
+    times = run.times()
+    chosen = ("--participant", "sub-01", "--config", own)
+    answer = bsip("run", run.study, "--out", run.out, *chosen)
+    assert answer.summary.startswith("bsip run: 4 done, 9 up to date;")
+    rewritten = run.rewritten(times)
+    assert stages_of(rewritten) == {"reconstruct (trial)", "report (participant)"}
+    assert all("sub-01" in name for name in rewritten)
+    made_by = read_header(run.path("fit", f"sub-01_{TRIALS[0]}"))["provenance"]["made_by"]
+    assert made_by["options"]["reconstruct"]["cop_min_force_percent_bw"] == 31.0
+
+
+def test_changed_option_of_the_cohort(run, bsip, tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text("[stats]\nalpha = 0.04\n")
+    times = run.times()
+    answer = bsip("run", run.study, "--out", run.out, "--config", own)
+    assert answer.summary.startswith(f"bsip run: 3 done, {UNITS - 3} up to date;")
+    group = {"stats (cohort)", "tables (cohort)", "report (cohort)"}
+    assert stages_of(run.rewritten(times)) == group
+
+
+def test_changed_role_rebuilds_the_skeleton(run):
+    """The calibrating trial is a matter of roles, not of scale's own options."""
+    config = load_config([run.study / "study.toml"])
+    assert run.perform("scale", config).state == "fresh"
+    roles = config.roles.model_copy(update={"static": ("squat",)})
+    assert run.perform("scale", config.model_copy(update={"roles": roles})).state == "done"
+    trial = read_artifact(run.path("person"), "person")["calibration_trial"][0]
+    assert trial == "sub-01_task-squat_run-1"
+
+
+def test_force_redoes_with_the_same_result(run, bsip):
+    content, times = run.content(), run.times()
+    answer = bsip("regress", run.study, "--out", run.out, "--force")
+    assert answer.summary.startswith("bsip regress: 2 done;")
+    assert owners_of(run.rewritten(times), "regress") == {"sub-01", "sub-02"}
+    assert stages_of(run.rewritten(times)) == {"regress (participant)"}
+    assert run.content() == content
+
+
+def delete(path: Path) -> None:
+    path.unlink()
+
+
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-40])
+
+
+def empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def make_foreign(path: Path) -> None:
+    pq.write_table(pa.table({"segment": ["head"]}), path)
+
+
+def make_other_kind(path: Path) -> None:
+    shutil.copy(path.with_name(path.name.replace("regression", "bsip")), path)
+
+
+def make_other_version(path: Path) -> None:
+    """As an earlier bsip might have left it: all but the version as it would be now."""
+    table = pq.read_table(path)
+    header = table.schema.metadata[b"bsip"]
+    old = header.replace(b'"schema_version": 1', b'"schema_version": 0')
+    assert old != header
+    pq.write_table(table.replace_schema_metadata({"bsip": old}), path)
+
+
+DAMAGES = [delete, truncate, empty, make_foreign, make_other_kind, make_other_version]
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_artifact_that_is_none_is_made_again(run, damage):
+    path = run.path("regression")
+    content = path.read_bytes()
+    assert run.perform("regress").state == "fresh"
+    damage(path)
+    assert run.perform("regress").state == "done"
+    assert path.read_bytes() == content
+    assert run.perform("identify").state == "fresh"  # same bytes, nothing to do for readers
+
+
+@pytest.mark.parametrize("damage", [truncate, make_foreign, make_other_version])
+def test_reader_of_what_is_no_artifact_refuses_it_by_name(run, damage):
+    path = run.path("regression")
+    damage(path)
+    outcome = run.perform("identify")
+    assert (outcome.state, outcome.exit_code) == ("refused", 3)
+    assert str(path) in outcome.sentences[0]
+    assert "To mend it: run " in outcome.sentences[0]
+    assert run.perform("regress").state == "done"
+    assert run.perform("identify").state == "done"
+    assert not run.path("refusal-identify").exists()
+
+
+@pytest.mark.parametrize("change", [delete, lambda path: path.write_text("edited")])
+def test_lost_or_edited_table_is_made_again(run, bsip, change):
+    table = run.out / "group" / "tables" / "table1_segment_mass.csv"
+    content = table.read_bytes()
+    change(table)
+    answer = bsip("tables", run.study, "--out", run.out)
+    assert answer.summary.startswith("bsip tables: 1 done;")
+    assert table.read_bytes() == content
+
+
+def test_lost_report_is_made_again(run):
+    report = run.out / "sub-01" / "report.html"
+    content = report.read_bytes()
+    assert run.perform("report").state == "fresh"
+    report.unlink()
+    assert run.perform("report").state == "done"
+    assert report.read_bytes() == content
+
+
+# --- bad data beside good -----------------------------------------------------------------------
+
+
+def test_corrupt_recording_and_its_return(run, bsip, first_run):
+    """The rest goes on without it; mended, everything is as if nothing had been."""
+    recording = run.recording("sub-01_task-squat_run-1")
+    whole, times = recording.read_bytes(), run.times()
+    recording.write_bytes(whole[:1000])
+    answer = bsip("run", run.study, "--out", run.out, "--jobs", 2)
+    assert answer.code == 3
+    assert "Traceback" not in answer.err
+    (sentence,) = [line for line in answer.err.splitlines() if str(recording) in line]
+    assert sentence.startswith(f"ingest: {recording}: ")
+    assert "; expected " in sentence
+    assert ". To mend it: " in sentence
+    assert " 1 refused, 2 without input;" in answer.summary
+    rewritten = run.rewritten(times)
+    assert not any(
+        "sub-02" in name or "squat" in name for name in rewritten if "refusal" not in name
+    )
+    assert owners_of(rewritten, "identify") == {"sub-01"}
+    assert "sub-01_task-squat_run-1" not in set(
+        read_artifact(run.path("values", "group"), "values")["trial"]
+    )
+
+    recording.write_bytes(whole)
+    assert bsip("run", run.study, "--out", run.out, "--jobs", 2).code == 0
+    now, before = run.content(), first_run.content()
+    assert [name for name in before if now.get(name) != before[name]] == []
+    assert set(now) == set(before)
+
+
+def test_refused_recording_that_is_taken_out(run, bsip):
+    recording = run.recording("sub-01_task-squat_run-1")
+    recording.write_bytes(b"")
+    assert bsip("ingest", run.study, "--out", run.out).code == 3
+    assert run.path("refusal-ingest", recording.stem).exists()
+    recording.unlink()
+    assert bsip("ingest", run.study, "--out", run.out).code == 0
+    assert not run.path("refusal-ingest", recording.stem).exists()
+
+
+def test_stale_artifact_of_a_refused_unit_is_not_read(run):
+    """The kinematics of an earlier run do not stand for what the last run refused."""
+    stem = f"sub-01_{TRIALS[1]}"
+    unit = unit_of(run, "reconstruct", stem)
+    assert perform(unit).state == "fresh"
+    shutil.copy(run.path("kinematics", stem), run.path("refusal-ik", stem))
+    assert perform(unit).state == "waiting"
+
+
+def test_refusal_of_a_later_stage_does_not_take_a_trial_away(run):
+    """Else what a run does would depend on the run before."""
+    stem = f"sub-01_{TRIALS[0]}"
+    shutil.copy(run.path("kinematics", stem), run.path("refusal-reconstruct", stem))
+    assert run.perform("identify").state == "fresh"
+
+
+def test_refusal_makes_the_cohort_look_again(run):
+    """What a participant had before the refusal is no result any more."""
+    study, _ = load_study(run.study, load_config([]).roles.model_dump())
+    config = load_config([run.study / "study.toml"])
+    stats = next(stage for stage in STAGES if stage.name == "stats")
+    assert Unit(stats, study, run.out, config).is_fresh()
+    shutil.copy(run.path("person"), run.path("refusal-scale", "sub-02"))
+    assert not Unit(stats, study, run.out, config).is_fresh()
+
+
+def test_report_follows_what_was_refused(run):
+    refusal = run.path("refusal-ingest", f"sub-01_{TRIALS[1]}")
+    notes = {"made_by": {}, "messages": [], "facts": {}}
+    for sentence in ("its header is torn", "its frames are lost"):
+        row = {"stage": "ingest", "kind": "bad data", "sentence": sentence}
+        write_artifact(refusal, "refusal", pd.DataFrame([row]), notes)
+        assert run.perform("report").state == "done"
+        assert sentence in (run.out / "sub-01" / "report.html").read_text(encoding="utf-8")
+        assert run.perform("report").state == "fresh"
+
+
+def unit_of(run: Run, stage: str, stem: str) -> Unit:
+    config = load_config([run.study / "study.toml"])
+    study, _ = load_study(run.study, config.roles.model_dump())
+    trial = next(trial for trial in study.participants[0].trials if trial.stem == stem)
+    first = next(each for each in STAGES if each.name == stage)
+    return Unit(first, study, run.out, config, study.participants[0], trial)
+
+
+def test_bad_line_of_the_table_does_not_stop_the_others(run, bsip, tmp_path):
+    table = run.study / "participants.tsv"
+    table.write_text(table.read_text().replace("sub-02\tF", "sub-02\tfemale"))
+    answer = bsip("ingest", run.study, "--out", tmp_path / "new", "--jobs", 2)
+    assert answer.code == 3
+    (sentence,) = [line for line in answer.err.splitlines() if line.startswith("study: ")]
+    assert f"{table}: sex 'female' of sub-02; expected M or F. To mend it: " in sentence
+    assert answer.summary.startswith("bsip ingest: 3 done, 1 refused;")
+    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["sub-01"]
+
+
+def test_place_that_cannot_be_written_is_no_refusal_of_the_data(run):
+    path = run.path("regression")
+    path.unlink()
+    path.mkdir()
+    outcome = run.perform("regress")
+    assert outcome.exit_code == 2
+    assert f"{path}: cannot be written" in outcome.sentences[0]
+    assert not run.path("refusal-regress").exists()
+    assert not [each for each in path.parent.iterdir() if each.name.endswith(".part")]
+
+
+def test_warnings_are_told_and_kept(run, bsip):
+    """A mass that the plates contradict: said on the terminal and in the artifact."""
+    table = run.study / "participants.tsv"
+    table.write_text(table.read_text().replace("\tM\t", "\tM\t1", 1))
+    answer = bsip("scale", run.study, "--out", run.out, "--participant", "sub-01")
+    assert answer.code == 0
+    (told,) = [line for line in answer.err.splitlines() if "the plates read" in line]
+    kept = read_header(run.path("person"))["provenance"]["messages"]
+    assert told.removeprefix("scale: ") in kept
+
+
+def test_every_schema_is_exercised(first_run):
+    """Nothing above would notice a kind that no run writes."""
+    kinds = {Path(name).stem.split("_")[-1] for name in first_run.files() if "parquet" in name}
+    assert kinds == set(SCHEMAS) - {"refusal"}

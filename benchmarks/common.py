@@ -128,9 +128,12 @@ def interleaved(contestants: Mapping[str, Callable[[], float]], rounds: int) -> 
 
 
 def run_child(
-    arguments: Sequence[str], environment: Mapping[str, str] | None = None, allowed: int = 0
+    arguments: Sequence[str],
+    environment: Mapping[str, str] | None = None,
+    folder: Path | None = None,
+    allowed: int = 0,
 ) -> Usage:
-    """Run a process; CPU-seconds of it and its children, and the peak memory of the largest.
+    """Run a process in a folder; CPU-seconds of it and its children, peak memory of the largest.
 
     Raises
     ------
@@ -140,6 +143,7 @@ def run_child(
     child = subprocess.Popen(
         list(arguments),
         env={**os.environ, **(environment or {})},
+        cwd=folder,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -13,9 +13,10 @@ import json
 import sys
 import tempfile
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from common import (
+from common import (  # first: one thread, before numpy is loaded
     cpu_seconds,
     interleaved,
     machine,
@@ -26,6 +27,8 @@ from common import (
     sample_person,
     standing,
 )
+
+# isort: split
 import numpy as np
 import opensim_model
 import pinocchio as pin
@@ -53,6 +56,14 @@ SMOOTHING = {
     "edge_s": 0.1,
 }
 FEW = 10
+OPTIMUM = (
+    "marker RMS, bsip [mm]",
+    "marker RMS, OpenSim [mm]",
+    "bsip over OpenSim, all frames [%]",
+    "bsip over OpenSim, OpenSim's best frame [%]",
+    "bsip over OpenSim, bsip's best frame [%]",
+    "frames in which OpenSim is better by 0.1 %",
+)
 
 
 @dataclass(frozen=True)
@@ -78,9 +89,9 @@ def run_opensim(
         model, markers = Path(folder, "person.osim"), Path(folder, "markers.trc")
         model.write_text(opensim_model.model_xml(person, joint_family), encoding="utf-8")
         markers.write_text(opensim_model.trc_text(person.markers, markers_m, rate_hz), "utf-8")
-        worker = str(Path(__file__).with_name("opensim_worker.py"))
+        worker = str(Path(__file__).resolve().with_name("opensim_worker.py"))
         sizes = [str(number) for number in (count, FEW, rate_hz, accuracy)]
-        used = run_child([python, worker, str(model), str(markers), *sizes])
+        used = run_child([python, worker, str(model), str(markers), *sizes], folder=Path(folder))
         errors = storage_column(Path(folder, "all_ik_marker_errors.sto"), "marker_error_RMS")
     printed = json.loads(used.stdout.splitlines()[-1])
     per_frame = (printed["all"] - printed["few"]) / (count - FEW)
@@ -95,17 +106,17 @@ def storage_column(path: Path, name: str) -> np.ndarray:
     return np.array([float(line.split()[at]) for line in lines[start + 1 :] if line.strip()])
 
 
-def optimum_rows(ours: np.ndarray, theirs: np.ndarray) -> list[list[str]]:
-    """Rows that compare the marker RMS (N,) [m] of two solvers."""
-    total = [np.sqrt((rms**2).mean()) for rms in (ours, theirs)]
+def optimum_column(ours: np.ndarray, theirs: np.ndarray) -> list[str]:
+    """How the marker RMS (N,) [m] of two solvers compare; the meanings are in ``OPTIMUM``."""
+    total = [float(np.sqrt((rms**2).mean())) for rms in (ours, theirs)]
     ratio = ours / theirs - 1
     return [
-        ["marker RMS, bsip [mm]", f"{1e3 * total[0]:.4f}"],
-        ["marker RMS, OpenSim [mm]", f"{1e3 * total[1]:.4f}"],
-        ["difference of the totals [%]", f"{100 * (total[0] / total[1] - 1):+.4f}"],
-        ["worst frame, bsip above OpenSim [%]", f"{100 * ratio.max():+.4f}"],
-        ["worst frame, OpenSim above bsip [%]", f"{-100 * ratio.min():+.4f}"],
-        ["frames in which OpenSim is better by 0.1 %", f"{int((ratio > 1e-3).sum())}"],
+        f"{1e3 * total[0]:.4f}",
+        f"{1e3 * total[1]:.4f}",
+        f"{100 * (total[0] / total[1] - 1):+.4f}",
+        f"{100 * ratio.max():+.4f}",
+        f"{100 * ratio.min():+.4f}",
+        f"{int((ratio > 1e-3).sum())} of {len(ours)}",
     ]
 
 
@@ -143,7 +154,6 @@ def first_call() -> None:
     person = sample_person()
     start = standing(person)
     markers = noisy_markers(person, start[None], NOISE_M)
-    np.asarray(markers)
     times = [
         cpu_seconds(lambda: solve_poses(person, markers, start, **AS_SHIPPED)) for _ in range(2)
     ]
@@ -190,39 +200,48 @@ def long_trial_rows(person: Person, rounds: int) -> list[list[str]]:
 
 
 def compare(options: argparse.Namespace) -> None:
-    person = sample_person()
-    rate = options.rate
+    """The same least squares by every solver: tables of the optimum and of the speed."""
+    person, rate = sample_person(), options.rate
     q, _, _ = movement(person, options.frames, rate)
     markers = noisy_markers(person, q, NOISE_M)
-    many = np.tile(markers, (max(1, 6000 // options.frames), 1, 1))
-    solve_poses(person, markers[:2], q[0], **SAME_PROBLEM)
-    ours = solve_poses(person, markers, q[0], **SAME_PROBLEM)
+    many = np.tile(markers, (max(1, 4000 // options.frames), 1, 1))
     some = markers[: options.pinocchio_frames]
-    runs: list[OpenSimRun] = []
+    ours = solve_poses(person, markers, q[0], **SAME_PROBLEM).frame_rms_m()
+    runs: dict[str, OpenSimRun] = {}
     looped: list[np.ndarray] = []
 
     def kernel() -> float:
         return cpu_seconds(lambda: solve_poses(person, many, q[0], **SAME_PROBLEM)) / len(many)
 
     def loop() -> float:
-        work = lambda: looped.append(pinocchio_loop.solve(person, some, q[0]))  # noqa: E731
+        def work() -> None:
+            looped[:] = [pinocchio_loop.solve(person, some, q[0])]
+
         return cpu_seconds(work) / len(some)
 
-    def opensim() -> float:
-        runs.append(run_opensim(options.opensim_python, person, markers, rate, options.accuracy))
-        return runs[-1].cpu_s_per_frame
+    def opensim(family: str) -> float:
+        python, accuracy = options.opensim_python, options.accuracy
+        runs[family] = run_opensim(python, person, markers, rate, accuracy, family)
+        return runs[family].cpu_s_per_frame
 
     contestants = {"bsip": kernel, "Pinocchio in a Python loop": loop}
     if options.opensim_python:
-        contestants["OpenSim"] = opensim
+        for family in opensim_model.JOINTS:
+            contestants[f"OpenSim, {family} joints"] = partial(opensim, family)
     seconds = interleaved(contestants, options.rounds)
-    print(f"\n{len(person.markers)} markers with {1e3 * NOISE_M:g} mm noise, {options.frames} frames")
+    print(
+        f"\n{len(person.markers)} markers with {1e3 * NOISE_M:g} mm noise, "
+        f"{options.frames} frames at {rate:g} Hz"
+    )
     if runs:
-        print(f"at {rate:g} Hz; OpenSim {runs[0].version}, accuracy {options.accuracy:g}\n")
-        print(markdown(["optimum", ""], optimum_rows(ours.frame_rms_m(), runs[0].rms_m)))
-    mine = rms_of(person, looped[0], some) / ours.frame_rms_m()[: len(some)] - 1
-    print(f"\nPinocchio's loop ends at bsip's optimum to {100 * np.abs(mine).max():.1g} %;")
-    print(f"forward kinematics equals Pinocchio's to {forward_difference(person, 200):.1g}.\n")
+        version = next(iter(runs.values())).version
+        print(f"OpenSim {version}, accuracy {options.accuracy:g}\n")
+        columns = [optimum_column(ours, run.rms_m) for run in runs.values()]
+        header = ["optimum", *(f"{family} joints" for family in runs)]
+        print(markdown(header, list(zip(OPTIMUM, *columns, strict=True))))
+    apart = np.abs(rms_of(person, looped[0], some) / ours[: len(some)] - 1).max()
+    print(f"\nPinocchio's loop ends at bsip's marker RMS to {100 * apart:.0e} %;")
+    print(f"forward kinematics equals Pinocchio's to {forward_difference(person, 200):.0e}.\n")
     rows = [
         [name, f"{1 / value:,.0f}", f"{value / seconds['bsip']:.0f}"]
         for name, value in seconds.items()

@@ -90,7 +90,7 @@ def simulate(study, preset, participants, seed, sequence_s):
 @click.argument("out", type=click.Path(path_type=Path))
 def show(out):
     """Print the tables of a finished run and where its reports lie."""
-    from bsip_cli.report.tables import show as tables_of
+    from bsip_cli.report.tables.build import show as tables_of
 
     click.echo(tables_of(out))
     for report in (out / "group" / "report.html", *sorted(out.glob("sub-*/report.html"))):

@@ -48,7 +48,7 @@ STAGES = (
         "Build the person's skeleton: lengths, joint centres, markers on their segments.",
         reads=("markers", "wrench"),
         writes=("skeleton", "marker-positions", "person"),
-        options=("skeleton", "roles", "ingest", "scale", "ik"),
+        options=("marker_set", "skeleton", "roles", "ingest", "scale", "ik"),
         module="bsip_cli.stages.scale",
     ),
     Stage(

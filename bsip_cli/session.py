@@ -62,10 +62,19 @@ def _config(root: Path, config_file: Path | None) -> Config:
     if config_file is not None and not config_file.is_file():
         raise UsageError("there is no such file", file=config_file, remedy="check --config")
     config = load_config([root / "study.toml", *([config_file] if config_file else [])])
+    config = config.model_copy(
+        update={name: _own_file(root, getattr(config, name)) for name in ("marker_set", "skeleton")}
+    )
     if config.marker_set != "auto":
         load_marker_set(config.marker_set)
     load_skeleton(config.skeleton)
     return config
+
+
+def _own_file(root: Path, name: str) -> str:
+    """A user's own TOML file lies in the study, or where the command was given."""
+    in_study = root / name
+    return str(in_study) if name.endswith(".toml") and in_study.is_file() else name
 
 
 def _check_out(out: Path) -> None:

@@ -145,6 +145,9 @@ class Unit:
     def provenance(self) -> dict:
         present = {name: path for name, path in self.inputs().items() if path.exists()}
         options = self.config.options(self.stage.options)
+        for name in ("marker_set", "skeleton"):
+            if str(options.get(name, "")).endswith(".toml"):  # its content counts, not its place
+                options[name] = Path(options[name]).name
         if self.participant is not None:
             options["participant"] = {
                 "sex": self.participant.sex,

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.person import Person
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion import kernel
 
+_STARTS, _START_SD_RAD, _LARGEST_MISFIT_M = 16, 0.8, 0.1
 _KINDS = {"free": kernel.FREE, "spherical": kernel.SPHERICAL, "revolute": kernel.REVOLUTE}
 
 
@@ -136,6 +138,57 @@ def solve_poses(
     return Poses(q, residual, sd, steps >= 0)
 
 
+def solve_trial(person: Person, markers_m: np.ndarray, **options) -> Poses:
+    """Poses of a whole trial (N, m, 3), from the frame that shows most markers to both ends.
+
+    ``options`` and errors as in :func:`solve_poses`.
+    """
+    seen = np.isfinite(markers_m).all(axis=2).sum(axis=1)
+    first = int(np.argmax(seen)) if len(seen) else 0
+    if not seen.any():
+        return solve_poses(person, markers_m, neutral(person), **options)
+    start = first_pose(person, markers_m[first], **options)
+    after = solve_poses(person, markers_m[first:], start, **options)
+    if first == 0:
+        return after
+    before = solve_poses(person, markers_m[first - 1 :: -1], after.q[0], **options)
+    return Poses(
+        *(
+            np.concatenate([getattr(before, name)[::-1], getattr(after, name)])
+            for name in ("q", "residual_m", "coordinate_sd", "converged")
+        )
+    )
+
+
+def first_pose(person: Person, markers_m: np.ndarray, **options) -> np.ndarray:
+    """(nq,) pose of one frame (m, 3) without a neighbour to start from.
+
+    The best of several starts: the neutral pose and random turns of all joints about it, since
+    raised arms seen from hanging ones may end in a wrong optimum. ``options`` as in
+    :func:`solve_poses`. Hinge angles come back within half a turn of zero.
+    """
+    rng = np.random.default_rng(_STARTS)
+    best, least = neutral(person), np.inf
+    for k in range(_STARTS):
+        start = (
+            neutral(person)
+            if k == 0
+            else _turned(person, rng.normal(0.0, _START_SD_RAD, len(person.skeleton.v_names)))
+        )
+        placed = place_base(person, markers_m, start)
+        poses = solve_poses(person, markers_m[None], placed, **options)
+        misfit = float(np.nansum(np.minimum(poses.residual_m, _LARGEST_MISFIT_M) ** 2))
+        if misfit < least:
+            best, least = poses.q[0], misfit
+    hinges = [
+        at
+        for at, kind in zip(person.skeleton.q_starts, person.skeleton.joint_types, strict=True)
+        if kind == "revolute"
+    ]
+    best[hinges] = (best[hinges] + np.pi) % (2 * np.pi) - np.pi
+    return best
+
+
 def place_base(person: Person, markers_m: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Move ``q``'s base so that the model's markers lie on one frame's markers (m, 3), rigidly.
 
@@ -151,8 +204,20 @@ def place_base(person: Person, markers_m: np.ndarray, q: np.ndarray) -> np.ndarr
     turn, shift = _rigid_fit(model[chosen], markers_m[chosen])
     placed = q.copy()
     placed[:3] = turn @ q[:3] + shift
-    placed[3:7] = _quaternion_of(turn @ R[0, 0])
+    placed[3:7] = Rotation.from_matrix(turn @ R[0, 0]).as_quat()
     return placed
+
+
+def _turned(person: Person, angles_rad: np.ndarray) -> np.ndarray:
+    """(nq,) neutral pose with every joint but the base's turned by some of the angles."""
+    q, skeleton = neutral(person), person.skeleton
+    for i, kind in enumerate(skeleton.joint_types):
+        at, av = skeleton.q_starts[i], skeleton.v_starts[i]
+        if kind == "spherical":
+            q[at : at + 4] = Rotation.from_rotvec(angles_rad[av : av + 3]).as_quat()
+        elif kind == "revolute":
+            q[at] = angles_rad[av]
+    return q
 
 
 def _markers(person: Person, R: np.ndarray, p: np.ndarray) -> np.ndarray:
@@ -168,9 +233,3 @@ def _rigid_fit(points: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.
     flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T))])
     turn = vt.T @ flip @ u.T
     return turn, b - turn @ a
-
-
-def _quaternion_of(rotation: np.ndarray) -> np.ndarray:
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(rotation).as_quat()

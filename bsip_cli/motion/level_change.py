@@ -22,7 +22,8 @@ class LevelChange:
     step : (d,) new level less old one, in the signal's unit.
     step_sd : standard deviation of the step, each direction.
     spread : standard deviation of what neither columns nor step explain, each direction.
-    z : gain in likelihood by the step as a number of standard deviations.
+    z : how unlikely the gain in likelihood is by chance at one place: the length of a normal
+        vector of d directions that is as unlikely (so it counts the samples, which F does).
     """
 
     at: int
@@ -91,8 +92,14 @@ def _best(
         rest[k] / own[k],
         float(np.sqrt(variance / own[k])),
         float(np.sqrt(variance / (1.0 - correlation**2))),
-        float(np.sqrt(gain[best] / variance)),
+        _as_normal(float(gain[best] / variance), d, freedom),
     )
+
+
+def _as_normal(gain: float, d: int, freedom: int) -> float:
+    from scipy.stats import chi2, f
+
+    return float(np.sqrt(chi2.isf(max(f.sf(gain / d, d, freedom), 1e-300), d)))
 
 
 def _correlation(y: np.ndarray, X: np.ndarray, at: int, step: np.ndarray) -> float:

@@ -12,6 +12,7 @@ from bsip_cli.motion.jacobian import model_markers, pose_columns, subtrees
 
 _RESPONSE_FRAMES = 16
 _POSTURE_SD_RAD = 3.0
+_USUAL_M = 0.03  # how far a displaced marker moves, before the data speak
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,7 @@ class MarkerFit:
     times_s : (N,).
     measured_m, model_m : (N, m, 3) world; NaN where a marker is missing.
     residual_m : (N, m, 3) measured less model, in the axes of the marker's segment.
+    place_m : (m, 3) where the markers sit in their segments.
     trusted_m : (m,) what a marker's position is trusted to, as in the inverse kinematics.
     pose : segment to (N, k) columns, the angles of its own joint and of those it carries.
     response : (m, 3, m, 3) change of the residual of a marker (first) for each metre by which
@@ -36,9 +38,18 @@ class MarkerFit:
     measured_m: np.ndarray
     model_m: np.ndarray
     residual_m: np.ndarray
+    place_m: np.ndarray
     trusted_m: np.ndarray
     pose: dict[str, np.ndarray]
     response: np.ndarray
+
+    def distance_m(self) -> np.ndarray:
+        """(N, m) distance of each marker from its model, NaN where missing."""
+        return np.linalg.norm(self.residual_m, axis=2)
+
+    def step_s(self) -> float:
+        """Time between two frames."""
+        return float(np.median(np.diff(self.times_s))) if len(self.times_s) > 1 else 1.0
 
 
 def marker_fit(
@@ -66,6 +77,7 @@ def marker_fit(
         markers_m,
         model,
         residual,
+        person.marker_positions_m,
         marker_sd_m / np.sqrt(np.maximum(person.marker_weights, 1e-6)),
         {names[k]: _pose(person, q, int(k)) for k in np.unique(person.marker_segments)},
         _response(person, residual, R, p, model, marker_sd_m, robust_limit_m),
@@ -121,3 +133,32 @@ def _response(
         seen_total += seen
     mean = total / np.repeat(np.maximum(seen_total, 1), 3)[None]
     return (np.eye(3 * m) - mean).reshape(m, 3, m, 3)
+
+
+def best_source(
+    response: np.ndarray, field: np.ndarray, sd: np.ndarray, candidates: list[int]
+) -> tuple[int, np.ndarray]:
+    """Which one marker's displacement explains a field of residuals best.
+
+    Parameters
+    ----------
+    response : as of :class:`MarkerFit`.
+    field : (m, 3) residuals or changes of them, NaN where unknown; ``sd`` (m,).
+    candidates : markers to choose from.
+
+    Returns
+    -------
+    The marker and its displacement (3,) [m] on the segment, drawn to zero where the pose would
+    follow it anyway.
+    """
+    known = np.flatnonzero(np.isfinite(sd) & np.isfinite(field[:, 0]))
+    weight = np.repeat(1.0 / sd[known], 3)
+    y = weight * field[known].ravel()
+    fits = []
+    for m in candidates:
+        A = weight[:, None] * response[known, :, m].reshape(-1, 3)
+        vector = np.linalg.solve(A.T @ A + np.eye(3) / _USUAL_M**2, A.T @ y)
+        left = float(((y - A @ vector) ** 2).sum() + (vector**2).sum() / _USUAL_M**2)
+        fits.append((left, m, vector))
+    _, m, vector = min(fits, key=lambda one: one[0])
+    return m, vector

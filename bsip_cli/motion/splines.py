@@ -19,6 +19,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import spectrogram
+from scipy.stats import chi2
 
 _DEGREE = 5
 _KNOT_RATE_HZ = 100.0  # at most; human motion ends far below
@@ -87,12 +88,21 @@ def noise_level(samples: np.ndarray, rate_hz: float) -> np.ndarray:
     bridged = np.stack([_bridged(channel) for channel in samples.T], axis=1)
     # Differences first: slow motion, a thousand times the noise, must not leak into the band.
     f, _, power = spectrogram(
-        np.diff(bridged, _NOISE_ORDER, axis=0), rate_hz, axis=0, nperseg=width, detrend="linear"
+        np.diff(bridged, _NOISE_ORDER, axis=0),
+        rate_hz,
+        axis=0,
+        nperseg=width,
+        window="hann",
+        detrend="linear",
     )
     inside = (f >= band[0]) & (f <= band[1])
     gain = (2 * np.sin(np.pi * f[inside] / rate_hz)) ** (2 * _NOISE_ORDER)
     density = (power[inside] / gain[:, None, None]).mean(axis=0)
-    level = np.sqrt(np.quantile(density, 1 / 3, axis=1) * nyquist)
+    # The lower third of such a mean lies below it; a Hann window ties neighbouring frequencies.
+    freedom = 2 * inside.sum() / 1.9
+    level = np.sqrt(
+        np.quantile(density, 1 / 3, axis=1) * freedom / chi2.ppf(1 / 3, freedom) * nyquist
+    )
     scale = np.abs(bridged).max(axis=0)
     return np.maximum(level, 1e-9 * np.maximum(scale, 1.0))
 

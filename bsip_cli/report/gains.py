@@ -61,8 +61,16 @@ def gains_of(trial: str, fit: pd.DataFrame) -> tuple[Gain, ...]:
         if rm is None or om is None:
             continue
         column, unit = _measure(component, om)
-        gains.append(Gain(trial, component, unit, float(rm[column]), float(om[column]),
-                          om["data"] == "held_out"))
+        gains.append(
+            Gain(
+                trial,
+                component,
+                unit,
+                float(rm[column]),
+                float(om[column]),
+                om["data"] == "held_out",
+            )
+        )
     return tuple(gains)
 
 
@@ -79,11 +87,15 @@ def mean_gains(gains: Iterable[Gain]) -> tuple[MeanGain, ...]:
     for component in COMPONENTS:
         of_it = [gain for gain in known if gain.component == component]
         if of_it:
-            means.append(MeanGain(
-                component, of_it[0].unit, len(of_it),
-                float(np.mean([gain.rm for gain in of_it])),
-                float(np.mean([gain.om for gain in of_it])),
-                sum(gain.better() == "OM" for gain in of_it),
-                sum(gain.better() == "RM" for gain in of_it),
-            ))
+            means.append(
+                MeanGain(
+                    component,
+                    of_it[0].unit,
+                    len(of_it),
+                    float(np.mean([gain.rm for gain in of_it])),
+                    float(np.mean([gain.om for gain in of_it])),
+                    sum(gain.better() == "OM" for gain in of_it),
+                    sum(gain.better() == "RM" for gain in of_it),
+                )
+            )
     return tuple(means)

@@ -20,13 +20,17 @@ def options_grids(origins: Sequence[Origin]) -> list[Block]:
         Grid(("software", "version"), _rows(_versions(origins)), words=2),
     ]
     recordings = {
-        name: digest[:_HASH_DIGITS] for origin in origins for name, digest in origin.inputs.items()
+        name: digest[:_HASH_DIGITS]
+        for origin in origins
+        for name, digest in origin.inputs.items()
         if not name.endswith(".parquet")
     }
     if recordings:
         rows = tuple(sorted(recordings.items()))
-        blocks += [Heading("Recordings and files read"),
-                   Grid(("file", "SHA-256 (start)"), rows, words=2)]
+        blocks += [
+            Heading("Recordings and files read"),
+            Grid(("file", "SHA-256 (start)"), rows, words=2),
+        ]
     return blocks
 
 

@@ -18,8 +18,11 @@ _TEMPLATES = Path(__file__).parent / "templates"
 def render(document: Document) -> str:
     """The page: figures as data, no scripts, nothing from the network; all texts escaped."""
     environment = Environment(
-        loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
+        loader=FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.filters["svg_source"] = _svg_source
     environment.filters["tied"] = _tied

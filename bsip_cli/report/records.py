@@ -97,9 +97,11 @@ class ParticipantRecord:
 
 def messages(origins: Iterable[Origin]) -> tuple[tuple[str, str, str], ...]:
     """(stage, unit, message), each once, in the order of the origins."""
-    return tuple(dict.fromkeys(
-        (origin.stage, origin.unit, text) for origin in origins for text in origin.messages
-    ))
+    return tuple(
+        dict.fromkeys(
+            (origin.stage, origin.unit, text) for origin in origins for text in origin.messages
+        )
+    )
 
 
 def signals_of(reconstruction: pd.DataFrame, column: str) -> dict[str, np.ndarray]:

@@ -29,8 +29,12 @@ class _Skeleton:
 
 
 def strip_of(
-    body: Person, kinematics: pd.DataFrame, reconstruction: pd.DataFrame | None,
-    anterior: np.ndarray, body_weight_N: float, instants: int,
+    body: Person,
+    kinematics: pd.DataFrame,
+    reconstruction: pd.DataFrame | None,
+    anterior: np.ndarray,
+    body_weight_N: float,
+    instants: int,
 ) -> StickStrip | None:
     """The poses of a trial at evenly spread instants; None where no frame is determined.
 
@@ -54,9 +58,15 @@ def strip_of(
     ground = float(np.percentile(low, _ON_GROUND_PERCENTILE))
     force, point = _forces(reconstruction, times, axes, ground)
     return StickStrip(
-        time_s=times, bones_m=np.stack([start, end], axis=2), sides=lines.sides,
-        head_m=(p[:, head] + R[:, head] @ centre) @ axes.T, head_radius_m=_HEAD_RADIUS_M,
-        force_m=point, forces=force, ground_m=ground, body_weight=body_weight_N,
+        time_s=times,
+        bones_m=np.stack([start, end], axis=2),
+        sides=lines.sides,
+        head_m=(p[:, head] + R[:, head] @ centre) @ axes.T,
+        head_radius_m=_HEAD_RADIUS_M,
+        force_m=point,
+        forces=force,
+        ground_m=ground,
+        body_weight=body_weight_N,
     )
 
 
@@ -70,8 +80,11 @@ def _choose(
         if len(compared):
             inside = rows["time_s"].between(compared[0], compared[-1])
             rows = rows[inside] if inside.any() else rows
-    return rows.iloc[np.unique(np.linspace(0, len(rows) - 1, instants).astype(int))] if len(
-        rows) else rows
+    return (
+        rows.iloc[np.unique(np.linspace(0, len(rows) - 1, instants).astype(int))]
+        if len(rows)
+        else rows
+    )
 
 
 def _person_axes(anterior: np.ndarray) -> np.ndarray:
@@ -98,7 +111,10 @@ def _bones(body: Person) -> _Skeleton:
             bones += [(i, np.zeros(3), tip) for tip in _tips(body, i)]
     segments = np.array([i for i, _, _ in bones])
     return _Skeleton(
-        segments, np.array([a for _, a, _ in bones]), segments, np.array([b for _, _, b in bones]),
+        segments,
+        np.array([a for _, a, _ in bones]),
+        segments,
+        np.array([b for _, _, b in bones]),
         tuple(_side(body, i, tip) for i, _, tip in bones),
     )
 

@@ -10,7 +10,7 @@ from bsip_cli.report.cohort.document import cohort_document
 from bsip_cli.report.cohort.record import CohortRecord, Member
 from bsip_cli.report.page import render
 from bsip_cli.report.records import Origin
-from bsip_cli.report.tables import build_tables
+from bsip_cli.report.tables.build import build_tables
 from bsip_cli.report.words import listing
 from bsip_cli.stages.report import files_frame, origin_of, refusals_of, write_figures, write_text
 from bsip_cli.statistics.cohort import Criteria
@@ -21,8 +21,10 @@ from bsip_cli.unit import Unit
 def run(unit: Unit) -> None:
     document = cohort_document(record_of(unit))
     folder = unit.out / "group"
-    files = [write_text(folder / "report.html", render(document)),
-             *write_figures(folder / "figures", document)]
+    files = [
+        write_text(folder / "report.html", render(document)),
+        *write_figures(folder / "figures", document),
+    ]
     unit.write("group-report-files", files_frame(unit.out, files))
 
 
@@ -53,13 +55,17 @@ def _missing_sentence(gone: dict) -> str:
 def _member(unit: Unit, participant: Participant) -> Member:
     tables = {
         kind: unit.read(kind, participant=participant)
-        if unit.path(kind, participant=participant).exists() else None
+        if unit.path(kind, participant=participant).exists()
+        else None
         for kind in ("person", "identification")
     }
     facts = tables["person"]
     return Member(
-        participant.id, facts.iloc[0] if facts is not None else None, tables["identification"],
-        (unit.out / participant.id / "report.html").exists(), refusals_of(unit, participant),
+        participant.id,
+        facts.iloc[0] if facts is not None else None,
+        tables["identification"],
+        (unit.out / participant.id / "report.html").exists(),
+        refusals_of(unit, participant),
     )
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.motion.inverse_kinematics import Poses, neutral, place_base, solve_poses
+from bsip_cli.motion.inverse_kinematics import Poses, solve_trial
 from bsip_cli.motion.smoothing import Motion, smooth_motion
 from bsip_cli.stages.frames import markers_from, ordered_markers, person_from
 from bsip_cli.unit import Unit
@@ -41,25 +41,18 @@ def run(unit: Unit) -> None:
     )
 
 
-def start_pose(person: Person, markers: np.ndarray) -> np.ndarray:
-    """(nq,) neutral pose, laid on the first frame that shows the most markers."""
-    seen = np.isfinite(markers).all(axis=2).sum(axis=1)
-    return place_base(person, markers[int(np.argmax(seen))], neutral(person))
-
-
 def _poses(unit: Unit, person: Person, markers: np.ndarray) -> tuple[Poses, np.ndarray]:
     """Poses, and which coordinates (nv,) the markers decide; the others are held near neutral."""
     options = unit.config.ik
     fixed = options.model_dump(include={"marker_sd_m", "robust_limit_m", "iterations"})
-    start = start_pose(person, markers)
-    poses = solve_poses(person, markers, start, posture_sd_rad=options.posture_sd_rad, **fixed)
+    poses = solve_trial(person, markers, posture_sd_rad=options.posture_sd_rad, **fixed)
     decided = np.median(poses.coordinate_sd, axis=0) < options.undetermined_sd_rad
     decided[:3] = True  # the base's position is in metres
     if not decided.all():
         names = ", ".join(np.array(person.skeleton.v_names)[~decided])
         unit.warn(f"{unit.name}: no markers decide {names}; held near the neutral pose")
         sd = np.where(decided, options.posture_sd_rad, options.held_sd_rad)
-        poses = solve_poses(person, markers, start, posture_sd_rad=sd, **fixed)
+        poses = solve_trial(person, markers, posture_sd_rad=sd, **fixed)
     return poses, decided
 
 

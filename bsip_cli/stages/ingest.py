@@ -47,9 +47,7 @@ def run(unit: Unit) -> None:
             unit.warn(f"{unit.name}: {_sentence(finding)}")
     times = recording.time_s()
     facts = {
-        "marker_set": marker_set.name
-        if unit.config.marker_set == "auto"
-        else unit.config.marker_set,
+        "marker_set": marker_set.name,
         "marker_rate_hz": recording.marker_rate_hz,
         "analog_rate_hz": recording.analog_rate_hz,
     }

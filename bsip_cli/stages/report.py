@@ -25,8 +25,12 @@ from bsip_cli.study import Participant, Trial
 from bsip_cli.unit import Unit
 
 _TABLES = {  # field of a trial's record: kind of artifact
-    "quality": "quality", "contacts": "contacts", "kinematics": "kinematics",
-    "residuals": "marker-residuals", "reconstruction": "reconstruction", "fit": "fit",
+    "quality": "quality",
+    "contacts": "contacts",
+    "kinematics": "kinematics",
+    "residuals": "marker-residuals",
+    "reconstruction": "reconstruction",
+    "fit": "fit",
     "posturography": "posturography",
 }
 
@@ -35,8 +39,10 @@ def run(unit: Unit) -> None:
     assert unit.participant is not None
     document = participant_document(record_of(unit))
     folder = unit.out / unit.participant.id
-    files = [write_text(folder / "report.html", render(document)),
-             *write_figures(folder / "figures", document)]
+    files = [
+        write_text(folder / "report.html", render(document)),
+        *write_figures(folder / "figures", document),
+    ]
     unit.write("report-files", files_frame(unit.out, files))
 
 
@@ -50,8 +56,10 @@ def write_figures(folder: Path, document: Document) -> list[Path]:
     files = []
     for picture in document.pictures():
         if picture.name:
-            files += [_write_bytes(folder / f"{picture.name}.svg", picture.svg),
-                      _write_bytes(folder / f"{picture.name}.png", to_png(picture.figure))]
+            files += [
+                _write_bytes(folder / f"{picture.name}.svg", picture.svg),
+                _write_bytes(folder / f"{picture.name}.png", to_png(picture.figure)),
+            ]
     return files
 
 
@@ -108,9 +116,11 @@ def refusals_of(unit: Unit, participant: Participant) -> tuple[Refusal, ...]:
     for path in sorted((unit.out / participant.id).glob("*_refusal-*.parquet")):
         owner = path.name.split("_refusal-")[0]
         label = "" if owner == participant.id else trial_label(owner)
-        found += [Refusal(label, row["stage"], row["sentence"])
-                  for _, row in read_artifact(path, "refusal").iterrows()
-                  if row["stage"] != unit.stage.name]
+        found += [
+            Refusal(label, row["stage"], row["sentence"])
+            for _, row in read_artifact(path, "refusal").iterrows()
+            if row["stage"] != unit.stage.name
+        ]
     return tuple(found)
 
 
@@ -121,8 +131,11 @@ def _origins(unit: Unit, usable: dict[str, set[Trial]]) -> tuple[Origin, ...]:
         if SCHEMAS[kind].level == "participant":
             origins.append(origin_of(unit.path(kind), ""))
         else:
-            origins += [origin_of(unit.path(kind, trial), trial_label(trial.stem))
-                        for trial in unit.participant.trials if trial in usable[kind]]
+            origins += [
+                origin_of(unit.path(kind, trial), trial_label(trial.stem))
+                for trial in unit.participant.trials
+                if trial in usable[kind]
+            ]
     return tuple(origins)
 
 
@@ -131,6 +144,11 @@ def origin_of(path: Path, label: str) -> Origin:
     provenance = read_header(path)["provenance"]
     made_by = provenance["made_by"]
     return Origin(
-        label, made_by["stage"], made_by["bsip_version"], made_by["libraries"], made_by["options"],
-        made_by["inputs"], tuple(provenance["messages"]),
+        label,
+        made_by["stage"],
+        made_by["bsip_version"],
+        made_by["libraries"],
+        made_by["options"],
+        made_by["inputs"],
+        tuple(provenance["messages"]),
     )

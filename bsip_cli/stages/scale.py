@@ -11,7 +11,7 @@ from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.calibration import Calibration, calibrate
-from bsip_cli.motion.inverse_kinematics import neutral, place_base, solve_poses, tree_of
+from bsip_cli.motion.inverse_kinematics import solve_poses, solve_trial, tree_of
 from bsip_cli.motion.scaling import Refinement, ScalingOptions, refine, varied_frames
 from bsip_cli.stages.frames import WRENCH, markers_from, ordered_markers
 from bsip_cli.study import Trial
@@ -41,7 +41,7 @@ def run(unit: Unit) -> None:
     ]
     still = _calibrating_trial(unit, recorded)
     quiet = _quietest(still)
-    marker_set = load_marker_set(unit.facts("markers", still.trial)["marker_set"])
+    marker_set = load_marker_set(_marker_set_name(unit, still.trial))
     assert unit.participant is not None
     calibration = calibrate(
         skeleton,
@@ -77,6 +77,12 @@ def run(unit: Unit) -> None:
         ),
         facts={"marker_set": marker_set.name, "rms_before_m": fit.rms_before_m},
     )
+
+
+def _marker_set_name(unit: Unit, trial: Trial) -> str:
+    """As configured; what ingest guessed where that was left to it."""
+    configured = unit.config.marker_set
+    return unit.facts("markers", trial)["marker_set"] if configured == "auto" else configured
 
 
 # --- which frames -----------------------------------------------------------------------------
@@ -147,9 +153,8 @@ def _refine(
         enough = np.isfinite(seen[..., 0]).mean(axis=1) > 0.8
         if enough.any():
             seen = seen[enough]
-            start = place_base(person, seen[0], neutral(person))
             markers.append(seen)
-            poses.append(solve_poses(person, seen, start, **ik).q)
+            poses.append(solve_trial(person, seen, **ik).q)
     all_markers, all_poses = np.concatenate(markers), np.concatenate(poses)
     orientations, _ = tree_of(person).forward(all_poses)
     chosen = varied_frames(orientations, options.frames)

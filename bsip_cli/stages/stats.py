@@ -49,8 +49,18 @@ class Recording:
 
     def value(self, table: str, variable: str, method: str, value: float, unit: str) -> Value:
         t = self.trial
-        return Value(t.participant_id, t.stem, t.task, self.role, self.data, table, variable,
-                     method, float(value), unit)
+        return Value(
+            t.participant_id,
+            t.stem,
+            t.task,
+            self.role,
+            self.data,
+            table,
+            variable,
+            method,
+            float(value),
+            unit,
+        )
 
 
 def run(unit: Unit) -> None:
@@ -64,7 +74,8 @@ def run(unit: Unit) -> None:
     values += [value for test in correlations for value in test.values()]
     if not values:
         raise BadDataError(
-            "no participant has results of RM and OM", file=unit.out,
+            "no participant has results of RM and OM",
+            file=unit.out,
             remedy="run `bsip identify` and `bsip reconstruct`, and read why they refused",
         )
     facts = {"missing": missing.found, "participants": len({v.participant for v in values})}
@@ -249,6 +260,13 @@ def _correlations(recording: Recording) -> Iterator[CorrelationRun]:
             continue
         om, rm = ("r_a", "r_b") if row["method_a"] == OM else ("r_b", "r_a")
         yield CorrelationRun(
-            trial.participant_id, trial.stem, trial.task, recording.role, row["component"],
-            row[om], row[rm], row["r_ab"], row["n_effective"],
+            trial.participant_id,
+            trial.stem,
+            trial.task,
+            recording.role,
+            row["component"],
+            row[om],
+            row[rm],
+            row["r_ab"],
+            row["n_effective"],
         )

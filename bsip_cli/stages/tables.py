@@ -11,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from bsip_cli.artifacts import write_atomically
-from bsip_cli.report.tables import RENDERERS, build_tables, folder
+from bsip_cli.report.tables.build import RENDERERS, build_tables, folder
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.unit import Unit
 

@@ -18,8 +18,15 @@ from bsip_cli.unit import Unit
 NOTES = {"made_by": {}, "messages": [], "facts": {}}
 FILES = ("static", "sequence", "walking", "throwing_run-1", "throwing_run-2")
 UNITS = {
-    "fx": "N", "fy": "N", "fz": "N", "grf_vertical": "N", "mx": "N m", "my": "N m", "mz": "N m",
-    "cop_ap": "mm", "cop_ml": "mm",
+    "fx": "N",
+    "fy": "N",
+    "fz": "N",
+    "grf_vertical": "N",
+    "mx": "N m",
+    "my": "N m",
+    "mz": "N m",
+    "cop_ap": "mm",
+    "cop_ml": "mm",
 }
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 
@@ -134,11 +141,18 @@ def trial_frames(rng, trial: Trial) -> dict[str, pd.DataFrame]:
     data = "identification" if trial.role == "sequence" else "held_out"
     fits = [
         {
-            "method": method, "component": component, "rmse": error, "unit": unit,
+            "method": method,
+            "component": component,
+            "rmse": error,
+            "unit": unit,
             "rmse_percent_bw": error / 7.0 if unit == "N" else np.nan,
-            "pearson_r": 1.0 - error / 500.0, "schwer_m": rng.normal(0, 0.01),
-            "schwer_p": error / 900.0, "schwer_c": error / 800.0, "n": 1000,
-            "n_effective": rng.uniform(60, 400), "data": data,
+            "pearson_r": 1.0 - error / 500.0,
+            "schwer_m": rng.normal(0, 0.01),
+            "schwer_p": error / 900.0,
+            "schwer_c": error / 800.0,
+            "n": 1000,
+            "n_effective": rng.uniform(60, 400),
+            "data": data,
         }
         for method, mean in size.items()
         for component, unit in UNITS.items()
@@ -149,9 +163,12 @@ def trial_frames(rng, trial: Trial) -> dict[str, pd.DataFrame]:
             "method": method,
             "rms_ap_mm": rng.normal(60 if method == "RM" else 50, 3),
             "rms_ml_mm": rng.normal(40, 3),
-            "rms_ap_origin_m": rng.normal(0.3, 0.01), "rms_ml_origin_m": rng.normal(1.0, 0.01),
-            "mean_velocity_mm_s": rng.normal(300, 30), "sway_length_mm": rng.normal(36000, 3000),
-            "ellipse_area_mm2": rng.normal(9e4, 9e3), "duration_s": 120.0,
+            "rms_ap_origin_m": rng.normal(0.3, 0.01),
+            "rms_ml_origin_m": rng.normal(1.0, 0.01),
+            "mean_velocity_mm_s": rng.normal(300, 30),
+            "sway_length_mm": rng.normal(36000, 3000),
+            "ellipse_area_mm2": rng.normal(9e4, 9e3),
+            "duration_s": 120.0,
         }
         for method in ("measured", *size)
     ]
@@ -169,7 +186,17 @@ def correlation(rng, component: str) -> dict:
     r_ab, n = 0.93, rng.uniform(60, 200)
     test, fisher = williams_t(r[a], r[b], r_ab, n), fisher_z_difference(r[a], n, r[b], n)
     return {
-        "component": component, "method_a": a, "method_b": b, "r_a": r[a], "r_b": r[b],
-        "r_ab": r_ab, "n_effective": n, "williams_t": test.t, "df": test.df,
-        "williams_p": test.p, "fisher_z": fisher.z, "fisher_p": fisher.p, "reason": test.reason,
+        "component": component,
+        "method_a": a,
+        "method_b": b,
+        "r_a": r[a],
+        "r_b": r[b],
+        "r_ab": r_ab,
+        "n_effective": n,
+        "williams_t": test.t,
+        "df": test.df,
+        "williams_p": test.p,
+        "fisher_z": fisher.z,
+        "fisher_p": fisher.p,
+        "reason": test.reason,
     }

@@ -6,13 +6,17 @@ import pytest
 
 from bsip_cli.artifacts import read_header, write_artifact
 from bsip_cli.errors import UsageError
-from bsip_cli.report.tables import NAMES, RENDERERS, show
+from bsip_cli.report.tables.build import NAMES, RENDERERS, show
 from bsip_cli.runner import perform
 from bsip_cli.stages import stats as stats_stage
 
 NOTES = {"made_by": {}, "messages": [], "facts": {}}
-P_COLUMNS = {"table1_segment_mass": "p", "table2_cop_rmse": "p", "table3_posturography": "p",
-             "table4_cross_validation": "p"}
+P_COLUMNS = {
+    "table1_segment_mass": "p",
+    "table2_cop_rmse": "p",
+    "table3_posturography": "p",
+    "table4_cross_validation": "p",
+}
 
 
 def refuse(cohort, participant: str, stage: str, stem: str = "") -> None:
@@ -143,9 +147,7 @@ def test_correlation_tests_that_are_not_possible(make_cohort):
     cohort = make_cohort(4)
     person = cohort.study.participants[0]
     trial = next(t for t in person.trials if t.task == "walking")
-    cohort.change(
-        "correlation-difference", person.id, trial, lambda f: f.assign(n_effective=3.0)
-    )
+    cohort.change("correlation-difference", person.id, trial, lambda f: f.assign(n_effective=3.0))
     cohort.run()
     five = cohort.table("table5_six_components").set_index(["task", "component", "method"])
     assert five.loc[("walking", "fx", "OM"), "williams_n"] == 3
@@ -165,7 +167,9 @@ def test_study_without_sequence(make_cohort):
     assert set(two["n"]) == {4}
     roles = four.loc[four["quantity"] == "cop_error", ["task", "role"]].to_records(index=False)
     assert {tuple(pair) for pair in roles} == {
-        ("walking", "validation"), ("throwing", "validation"), ("throwing", "sequence"),
+        ("walking", "validation"),
+        ("throwing", "validation"),
+        ("throwing", "sequence"),
     }
     assert "task: throwing" in cohort.text("table2_cop_rmse")
     assert "throwing (identified OM; in the paper: random, 120 s)" in cohort.text(
@@ -225,5 +229,3 @@ def test_level_of_the_interval_follows_alpha(make_cohort):
 def test_show_without_tables(tmp_path):
     with pytest.raises(UsageError, match="run `bsip tables`"):
         show(tmp_path)
-
-

@@ -13,9 +13,12 @@ ALPHA = 0.05
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 TASKS = ("sequence", "walking", "throwing")
 SWAY = {
-    "mean_velocity": ("mean_velocity_mm_s", "mm_s"), "sway_length": ("sway_length_mm", "mm"),
-    "ellipse_area": ("ellipse_area_mm2", "mm2"), "rms_ap": ("rms_ap_mm", "mm"),
-    "rms_ml": ("rms_ml_mm", "mm"), "rms_ap_origin": ("rms_ap_origin_m", "m"),
+    "mean_velocity": ("mean_velocity_mm_s", "mm_s"),
+    "sway_length": ("sway_length_mm", "mm"),
+    "ellipse_area": ("ellipse_area_mm2", "mm2"),
+    "rms_ap": ("rms_ap_mm", "mm"),
+    "rms_ml": ("rms_ml_mm", "mm"),
+    "rms_ap_origin": ("rms_ap_origin_m", "m"),
     "rms_ml_origin": ("rms_ml_origin_m", "m"),
 }
 
@@ -32,11 +35,16 @@ def check_pair(row, om, rm, unit: str) -> None:
     interval = test.confidence_interval(1 - ALPHA)
     pooled = np.sqrt((np.var(om, ddof=1) + np.var(rm, ddof=1)) / 2)
     expected = {
-        f"om_mean_{unit}": np.mean(om), f"om_sd_{unit}": np.std(om, ddof=1),
-        f"rm_mean_{unit}": np.mean(rm), f"rm_sd_{unit}": np.std(rm, ddof=1),
+        f"om_mean_{unit}": np.mean(om),
+        f"om_sd_{unit}": np.std(om, ddof=1),
+        f"rm_mean_{unit}": np.mean(rm),
+        f"rm_sd_{unit}": np.std(rm, ddof=1),
         f"difference_{unit}": np.mean(om) - np.mean(rm),
-        f"ci_low_{unit}": interval.low, f"ci_high_{unit}": interval.high,
-        "t": test.statistic, "df": len(om) - 1, "p": test.pvalue,
+        f"ci_low_{unit}": interval.low,
+        f"ci_high_{unit}": interval.high,
+        "t": test.statistic,
+        "df": len(om) - 1,
+        "p": test.pvalue,
         "cohens_d_pooled": (np.mean(rm) - np.mean(om)) / pooled,
         "d_z": np.mean(om - rm) / np.std(om - rm, ddof=1),
         "wilcoxon_w": stats.wilcoxon(om, rm).statistic,
@@ -159,7 +167,8 @@ def test_table_4(cohort):
         both = ap.assign(rmse=np.hypot(ap["rmse"].to_numpy(), ml["rmse"].to_numpy()))
         grf = of_task[of_task["component"] == "grf_vertical"]
         for quantity, frame, column, unit in (
-            ("cop_error", both, "rmse", "mm"), ("cop_ap", ap, "rmse", "mm"),
+            ("cop_error", both, "rmse", "mm"),
+            ("cop_ap", ap, "rmse", "mm"),
             ("cop_ml", ml, "rmse", "mm"),
             ("grf_vertical", grf, "rmse_percent_bw", "percent_bw"),
         ):
@@ -182,8 +191,10 @@ def test_table_5(cohort):
             chosen = fit[(fit["task"] == task) & (fit["component"] == component)]
             unit = "N" if component[0] == "f" else "Nm"
             columns = {
-                "rmse": ("rmse_mean_" + unit, "rmse_sd_" + unit), "pearson_r": ("r_mean", "r_sd"),
-                "schwer_m": ("m_mean", "m_sd"), "schwer_p": ("p_mean", "p_sd"),
+                "rmse": ("rmse_mean_" + unit, "rmse_sd_" + unit),
+                "pearson_r": ("r_mean", "r_sd"),
+                "schwer_m": ("m_mean", "m_sd"),
+                "schwer_p": ("p_mean", "p_sd"),
                 "schwer_c": ("c_mean", "c_sd"),
             }
             for column, (mean, sd) in columns.items():

@@ -7,15 +7,15 @@ from math import nan
 
 import pytest
 
-from bsip_cli.report.table_csv import to_csv
-from bsip_cli.report.table_labels import segment
-from bsip_cli.report.table_latex import escape as latex
-from bsip_cli.report.table_latex import to_latex
-from bsip_cli.report.table_markdown import escape as markdown
-from bsip_cli.report.table_markdown import to_markdown
-from bsip_cli.report.table_model import Column, Row, Table
-from bsip_cli.report.table_numbers import interval, mean_sd, number, p_value
-from bsip_cli.report.tables import NAMES, render_markdown, show
+from bsip_cli.report.tables.build import NAMES, render_markdown, show
+from bsip_cli.report.tables.csv import to_csv
+from bsip_cli.report.tables.labels import segment
+from bsip_cli.report.tables.latex import escape as latex
+from bsip_cli.report.tables.latex import to_latex
+from bsip_cli.report.tables.markdown import escape as markdown
+from bsip_cli.report.tables.markdown import to_markdown
+from bsip_cli.report.tables.model import Column, Row, Table
+from bsip_cli.report.tables.numbers import interval, mean_sd, number, p_value
 from bsip_cli.statistics.cohort import Criteria
 
 NASTY = r"50% of A&B_1 #2 {x} ~y ^z $5 \end{table} a|b <b>*bold*</b> `c`"
@@ -99,8 +99,15 @@ def test_markdown_escapes_what_has_a_meaning():
 
 @pytest.mark.parametrize(
     ("p", "printed"),
-    [(0.0181, ".018"), (0.0004, "<.001"), (0.0005, ".001"), (0.9999, "1.000"), (nan, "-"),
-     (0.0, "<.001"), (1.0, "1.000")],
+    [
+        (0.0181, ".018"),
+        (0.0004, "<.001"),
+        (0.0005, ".001"),
+        (0.9999, "1.000"),
+        (nan, "-"),
+        (0.0, "<.001"),
+        (1.0, "1.000"),
+    ],
 )
 def test_p_values(p, printed):
     assert p_value(p) == printed
@@ -131,7 +138,12 @@ def test_printed_table_1_is_the_csv_rounded(cohort):
     header, _, *rows = rows_of(cohort.text("table1_segment_mass"))
     table = cohort.table("table1_segment_mass")
     assert [row[0] for row in rows[:6]] == [
-        "lower torso", "upper torso", "head", "left upper arm", "left forearm", "left hand",
+        "lower torso",
+        "upper torso",
+        "head",
+        "left upper arm",
+        "left forearm",
+        "left hand",
     ]
     for cells, (_, numbers) in zip(rows, table.iterrows(), strict=True):
         printed = dict(zip(header, cells, strict=True))

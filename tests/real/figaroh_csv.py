@@ -56,8 +56,13 @@ def _write_mot(path: Path, times: np.ndarray, forces: np.ndarray) -> None:
         *(f"ground_torque_{axis}" for axis in "xyz"),
     ]
     lines = [
-        path.name, "version=1", f"nRows={len(times)}", f"nColumns={len(columns)}",
-        "inDegrees=yes", "endheader", "\t".join(columns),
+        path.name,
+        "version=1",
+        f"nRows={len(times)}",
+        f"nColumns={len(columns)}",
+        "inDegrees=yes",
+        "endheader",
+        "\t".join(columns),
     ]
     for time, row in zip(times, forces, strict=True):
         values = [*row[:3], *PLATE_ORIGIN_M, *row[3:]]

@@ -19,16 +19,43 @@ TASKS = {"static": "static", "sequence": "sequence", "basketball": "validation"}
 DURATIONS_S = {"static": 2.0, "sequence": 14.0, "basketball": 3.0}
 RATE_HZ = 50.0
 _JOINTS = {  # joint centre in the parent, right side; origin of the parent where it differs
-    "lower_torso": (0, 0, 0), "upper_torso": (0, 0.05, 0), "head": (0, 0.0, 0),
-    "upper_arm": (0, -0.05, 0.18), "forearm": (0, -0.29, 0), "hand": (0, -0.25, 0),
-    "thigh": (0.02, -0.1, 0.09), "shank": (0, -0.42, 0), "foot": (0, -0.41, 0),
+    "lower_torso": (0, 0, 0),
+    "upper_torso": (0, 0.05, 0),
+    "head": (0, 0.0, 0),
+    "upper_arm": (0, -0.05, 0.18),
+    "forearm": (0, -0.29, 0),
+    "hand": (0, -0.25, 0),
+    "thigh": (0.02, -0.1, 0.09),
+    "shank": (0, -0.42, 0),
+    "foot": (0, -0.41, 0),
 }
-_LENGTHS = {"lower_torso": 0.1, "upper_torso": 0.48, "head": 0.25, "upper_arm": 0.29,
-            "forearm": 0.25, "hand": 0.08, "thigh": 0.42, "shank": 0.41, "foot": 0.17}
-_SHARES = {"lower_torso": 0.142, "upper_torso": 0.333, "head": 0.067, "upper_arm": 0.024,
-           "forearm": 0.017, "hand": 0.006, "thigh": 0.123, "shank": 0.048, "foot": 0.011}
-_TIPS = {"foot": ((-0.05, -0.06, 0.0), (0.13, -0.06, 0.0)), "hand": ((0.0, -0.08, 0.0),),
-         "head": ((0.1, 0.15, 0.0), (0.0, 0.15, 0.07), (0.0, 0.15, -0.07))}
+_LENGTHS = {
+    "lower_torso": 0.1,
+    "upper_torso": 0.48,
+    "head": 0.25,
+    "upper_arm": 0.29,
+    "forearm": 0.25,
+    "hand": 0.08,
+    "thigh": 0.42,
+    "shank": 0.41,
+    "foot": 0.17,
+}
+_SHARES = {
+    "lower_torso": 0.142,
+    "upper_torso": 0.333,
+    "head": 0.067,
+    "upper_arm": 0.024,
+    "forearm": 0.017,
+    "hand": 0.006,
+    "thigh": 0.123,
+    "shank": 0.048,
+    "foot": 0.011,
+}
+_TIPS = {
+    "foot": ((-0.05, -0.06, 0.0), (0.13, -0.06, 0.0)),
+    "hand": ((0.0, -0.08, 0.0),),
+    "head": ((0.1, 0.15, 0.0), (0.0, 0.15, 0.07), (0.0, 0.15, -0.07)),
+}
 _KINDS = ["fx", "fy", "fz", "mx", "my", "mz"]
 
 
@@ -38,8 +65,13 @@ def part(segment: str) -> str:
 
 def participant(name: str = "sub-01") -> Participant:
     trials = tuple(
-        Trial(name, task, f"{name}_task-{task}" + ("_run-1" if task != "static" else ""),
-              Path(f"{name}_task-{task}.c3d"), role)
+        Trial(
+            name,
+            task,
+            f"{name}_task-{task}" + ("_run-1" if task != "static" else ""),
+            Path(f"{name}_task-{task}.c3d"),
+            role,
+        )
         for task, role in TASKS.items()
     )
     return Participant(name, "M", MASS_KG, 1.63, trials)
@@ -50,9 +82,13 @@ def study(*names: str) -> Study:
 
 
 def notes(stage: str, *messages: str, facts: dict | None = None) -> dict:
-    made_by = {"stage": stage, "bsip_version": "0", "libraries": {"numpy": "2.0"},
-               "inputs": {"sub-01_task-static.c3d": "ab" * 32},
-               "options": {"ik": {"iterations": 50}, "identify": {"sigma_percent_limit": 5.0}}}
+    made_by = {
+        "stage": stage,
+        "bsip_version": "0",
+        "libraries": {"numpy": "2.0"},
+        "inputs": {"sub-01_task-static.c3d": "ab" * 32},
+        "options": {"ik": {"iterations": 50}, "identify": {"sigma_percent_limit": 5.0}},
+    }
     return {"made_by": made_by, "messages": list(messages), "facts": facts or {}}
 
 
@@ -97,11 +133,21 @@ class Artifacts:
     # --- participant ------------------------------------------------------------------------
 
     def facts(self) -> pd.DataFrame:
-        return pd.DataFrame([{
-            "sex": "M", "mass_kg": MASS_KG, "mass_source": "participants.tsv",
-            "plate_mass_kg": 63.1, "height_m": 1.63, "anterior_x": 1.0, "anterior_y": 0.0,
-            "calibration_trial": self.person.trials[0].stem, "marker_rms_m": 0.0067,
-        }])
+        return pd.DataFrame(
+            [
+                {
+                    "sex": "M",
+                    "mass_kg": MASS_KG,
+                    "mass_source": "participants.tsv",
+                    "plate_mass_kg": 63.1,
+                    "height_m": 1.63,
+                    "anterior_x": 1.0,
+                    "anterior_y": 0.0,
+                    "calibration_trial": self.person.trials[0].stem,
+                    "marker_rms_m": 0.0067,
+                }
+            ]
+        )
 
     def skeleton_rows(self) -> pd.DataFrame:
         rows = []
@@ -111,15 +157,27 @@ class Artifacts:
             parent = self.skeleton.parents[i]
             origin = 0.48 if name == "upper_torso" else 0.0
             length = _LENGTHS[part(name)] * (1.01 if side < 0 else 1.0)
-            rows.append({
-                "segment": name, "parent": self.skeleton.segments[parent] if i else "",
-                "joint": self.skeleton.joints[i], "joint_type": self.skeleton.joint_types[i],
-                "joint_x_m": float(x), "joint_y_m": float(y), "joint_z_m": side * z,
-                "parent_tilt_rad": 0.0, "child_tilt_rad": 0.0,
-                "origin_x_m": 0.0, "origin_y_m": origin, "origin_z_m": 0.0,
-                "length_m": length, "first_guess_m": 0.97 * length, "length_sd_m": 0.004,
-                "joint_shift_m": 0.006, "held": False,
-            })
+            rows.append(
+                {
+                    "segment": name,
+                    "parent": self.skeleton.segments[parent] if i else "",
+                    "joint": self.skeleton.joints[i],
+                    "joint_type": self.skeleton.joint_types[i],
+                    "joint_x_m": float(x),
+                    "joint_y_m": float(y),
+                    "joint_z_m": side * z,
+                    "parent_tilt_rad": 0.0,
+                    "child_tilt_rad": 0.0,
+                    "origin_x_m": 0.0,
+                    "origin_y_m": origin,
+                    "origin_z_m": 0.0,
+                    "length_m": length,
+                    "first_guess_m": 0.97 * length,
+                    "length_sd_m": 0.004,
+                    "joint_shift_m": 0.006,
+                    "held": False,
+                }
+            )
         return pd.DataFrame(rows)
 
     def markers(self) -> pd.DataFrame:
@@ -127,11 +185,20 @@ class Artifacts:
         for name in self.skeleton.segments:
             tips = _TIPS.get(part(name), ((0.05, -0.1, 0.03),))
             for k, tip in enumerate(tips):
-                rows.append({
-                    "marker": EVIL if name == "forearm_r" else f"{name[:6].upper()}{name[-1]}{k}",
-                    "segment": name, "x_m": tip[0], "y_m": tip[1], "z_m": tip[2],
-                    "weight": 1.0, "shift_m": 0.004, "residual_m": 0.005,
-                })
+                rows.append(
+                    {
+                        "marker": EVIL
+                        if name == "forearm_r"
+                        else f"{name[:6].upper()}{name[-1]}{k}",
+                        "segment": name,
+                        "x_m": tip[0],
+                        "y_m": tip[1],
+                        "z_m": tip[2],
+                        "weight": 1.0,
+                        "shift_m": 0.004,
+                        "residual_m": 0.005,
+                    }
+                )
         return pd.DataFrame(rows)
 
     def bsip(self) -> pd.DataFrame:
@@ -140,22 +207,43 @@ class Artifacts:
             for k, name in enumerate(self.skeleton.segments):
                 row = {"method": method, "segment": name}
                 mass, length = MASS_KG * _SHARES[part(name)], _LENGTHS[part(name)]
-                values = [mass, 0.01, -0.45 * length, 0.0,
-                          *[mass * length**2 * f for f in (0.08, 0.02, 0.08)], 0.0, 0.0, 0.0]
+                values = [
+                    mass,
+                    0.01,
+                    -0.45 * length,
+                    0.0,
+                    *[mass * length**2 * f for f in (0.08, 0.02, 0.08)],
+                    0.0,
+                    0.0,
+                    0.0,
+                ]
                 if method == "OM":
-                    values = [v + s * abs(v) for v, s in
-                              zip(values, self.random.normal(0, 0.08, 10), strict=True)]
+                    values = [
+                        v + s * abs(v)
+                        for v, s in zip(values, self.random.normal(0, 0.08, 10), strict=True)
+                    ]
                 share = 0.0 if method == "RM" else min(1.0, 0.07 * (k + 0.5))
                 for column, value in zip(bsip_names(), values, strict=True):
-                    row |= {column: value, f"{column}_sd": 0.1 * abs(value) * (1 - 0.8 * share),
-                            share_name(column): share}
+                    row |= {
+                        column: value,
+                        f"{column}_sd": 0.1 * abs(value) * (1 - 0.8 * share),
+                        share_name(column): share,
+                    }
                 rows.append(row)
         return pd.DataFrame(rows)
 
     def identification(self) -> pd.DataFrame:
-        row = {"estimator": "hansen2017", "method": "OM", "trials": self.person.trials[1].stem,
-               "samples": 1400, "duration_s": 13.5, "effective_samples": 321.0, "rank": 128,
-               "condition_number": 812.0, "note": "masses kept positive"}
+        row = {
+            "estimator": "hansen2017",
+            "method": "OM",
+            "trials": self.person.trials[1].stem,
+            "samples": 1400,
+            "duration_s": 13.5,
+            "effective_samples": 321.0,
+            "rank": 128,
+            "condition_number": 812.0,
+            "note": "masses kept positive",
+        }
         row |= {f"rms_{c}_N": 4.5 for c in ("fx", "fy", "fz")}
         row |= {f"rms_{c}_Nm": 2.25 for c in ("mx", "my", "mz")}
         return pd.DataFrame([row])
@@ -172,10 +260,16 @@ class Artifacts:
     def contacts(self, trial: Trial) -> pd.DataFrame:
         t, valid = self.times(trial), self.valid(trial)
         lifted = (t > 1.0) & (t < 1.4)
-        return pd.DataFrame({
-            "time_s": t, "left_on_ground": ~lifted, "right_on_ground": np.ones(len(t), bool),
-            "left_on_plate": valid & ~lifted, "right_on_plate": valid, "valid": valid,
-        })
+        return pd.DataFrame(
+            {
+                "time_s": t,
+                "left_on_ground": ~lifted,
+                "right_on_ground": np.ones(len(t), bool),
+                "left_on_plate": valid & ~lifted,
+                "right_on_plate": valid,
+                "valid": valid,
+            }
+        )
 
     def kinematics(self, trial: Trial) -> pd.DataFrame:
         t = self.times(trial)
@@ -193,8 +287,12 @@ class Artifacts:
             self._turn(q, f"ankle_{side}", 2, squat)
             q[f"q_knee_{side}_angle"] = -2.0 * squat
             self._turn(q, f"shoulder_{side}", 2 if side == "r" else 0, sign * raise_)
-        table = {"time_s": t, "determined": np.ones(len(t), bool),
-                 "marker_rms_m": 0.006 + 0.001 * np.sin(t), "angle_sd_rad": np.full(len(t), 0.01)}
+        table = {
+            "time_s": t,
+            "determined": np.ones(len(t), bool),
+            "marker_rms_m": 0.006 + 0.001 * np.sin(t),
+            "angle_sd_rad": np.full(len(t), 0.01),
+        }
         return pd.concat([pd.DataFrame(table), q], axis=1)
 
     @staticmethod
@@ -207,25 +305,44 @@ class Artifacts:
         size = np.linspace(0.003, 0.012, len(names))
         values = size * (1 + 0.3 * self.random.normal(size=(len(t), len(names))))
         values[3, 4] = np.nan
-        return pd.DataFrame({"time_s": np.repeat(t, len(names)), "marker": list(names) * len(t),
-                             "residual_m": np.abs(values).ravel()})
+        return pd.DataFrame(
+            {
+                "time_s": np.repeat(t, len(names)),
+                "marker": list(names) * len(t),
+                "residual_m": np.abs(values).ravel(),
+            }
+        )
 
     def reconstruction(self, trial: Trial) -> pd.DataFrame:
         t, valid = self.times(trial), self.valid(trial)
         slow, fast = np.sin(2 * np.pi * t / 2.5), np.sin(2 * np.pi * t / 0.9)
         signals = {
-            "fx_N": 15 * fast, "fy_N": 8 * slow, "fz_N": MASS_KG * GRAVITY * (1 + 0.12 * slow),
-            "mx_Nm": 10 * slow, "my_Nm": 12 * fast, "mz_Nm": 2 * fast,
-            "cop_ap_m": 0.05 + 0.04 * slow + 0.01 * fast, "cop_ml_m": 0.02 * fast - 0.03 * slow,
+            "fx_N": 15 * fast,
+            "fy_N": 8 * slow,
+            "fz_N": MASS_KG * GRAVITY * (1 + 0.12 * slow),
+            "mx_Nm": 10 * slow,
+            "my_Nm": 12 * fast,
+            "mz_Nm": 2 * fast,
+            "cop_ap_m": 0.05 + 0.04 * slow + 0.01 * fast,
+            "cop_ml_m": 0.02 * fast - 0.03 * slow,
         }
         parts = []
         for method, size in (("measured", 0.0), ("RM", 1.0), ("OM", self.better)):
-            part_ = {name: v * (1 + 0.08 * size) + 0.02 * size * np.ptp(v) * fast
-                     for name, v in signals.items()}
-            parts.append(pd.DataFrame({
-                "time_s": t, "method": method, **part_, "valid": valid,
-                "used": valid & (trial.role == "sequence"),
-            }))
+            part_ = {
+                name: v * (1 + 0.08 * size) + 0.02 * size * np.ptp(v) * fast
+                for name, v in signals.items()
+            }
+            parts.append(
+                pd.DataFrame(
+                    {
+                        "time_s": t,
+                        "method": method,
+                        **part_,
+                        "valid": valid,
+                        "used": valid & (trial.role == "sequence"),
+                    }
+                )
+            )
         return pd.concat(parts, ignore_index=True)
 
     def fit(self, trial: Trial) -> pd.DataFrame:
@@ -235,35 +352,70 @@ class Artifacts:
                 worse = 1.7 if (method, c, trial.role) == ("OM", "mz", "validation") else size
                 unit = "mm" if c.startswith("cop") else "N m" if c.startswith("m") else "N"
                 force = c.startswith("f") or c == "grf_vertical"
-                rows.append({
-                    "method": method, "component": c, "rmse": (4.0 + k) * worse, "unit": unit,
-                    "rmse_percent_bw": 0.7 * (1 + k / 10) * worse if force else np.nan,
-                    "pearson_r": 1 - 0.03 * worse, "schwer_m": 0.05 * worse,
-                    "schwer_p": 0.04 * worse, "schwer_c": 0.064 * worse, "n": 500,
-                    "n_effective": 41.5,
-                    "data": "identification" if trial.role == "sequence" else "held_out",
-                })
+                rows.append(
+                    {
+                        "method": method,
+                        "component": c,
+                        "rmse": (4.0 + k) * worse,
+                        "unit": unit,
+                        "rmse_percent_bw": 0.7 * (1 + k / 10) * worse if force else np.nan,
+                        "pearson_r": 1 - 0.03 * worse,
+                        "schwer_m": 0.05 * worse,
+                        "schwer_p": 0.04 * worse,
+                        "schwer_c": 0.064 * worse,
+                        "n": 500,
+                        "n_effective": 41.5,
+                        "data": "identification" if trial.role == "sequence" else "held_out",
+                    }
+                )
         return pd.DataFrame(rows)
 
 
 def quality() -> pd.DataFrame:
-    return pd.DataFrame([
-        {"check": "plate sign", "subject": "plate 1", "found": "pushes up", "expected": "down",
-         "action": "sign turned", "level": "corrected"},
-        {"check": "label", "subject": EVIL, "found": "unknown", "expected": "", "action": "cut",
-         "level": "excluded"},
-        {"check": "rate", "subject": "", "found": "50 Hz", "expected": "", "action": "",
-         "level": "info"},
-    ])
+    return pd.DataFrame(
+        [
+            {
+                "check": "plate sign",
+                "subject": "plate 1",
+                "found": "pushes up",
+                "expected": "down",
+                "action": "sign turned",
+                "level": "corrected",
+            },
+            {
+                "check": "label",
+                "subject": EVIL,
+                "found": "unknown",
+                "expected": "",
+                "action": "cut",
+                "level": "excluded",
+            },
+            {
+                "check": "rate",
+                "subject": "",
+                "found": "50 Hz",
+                "expected": "",
+                "action": "",
+                "level": "info",
+            },
+        ]
+    )
 
 
 def base_parameters() -> pd.DataFrame:
-    return pd.DataFrame({
-        "name": [f"parameter {k}" for k in range(14)],
-        "expression": [f"mx(thigh_r) + {0.1 * k:.1f} m(shank_r) + m(foot_r)" for k in range(14)],
-        "value": np.linspace(0.1, 2.0, 14), "unit": ["kg m"] * 14, "sd": [0.01] * 14,
-        "sigma_percent": np.linspace(1.0, 77.0, 14), "rm_value": np.linspace(0.1, 1.8, 14),
-    })
+    return pd.DataFrame(
+        {
+            "name": [f"parameter {k}" for k in range(14)],
+            "expression": [
+                f"mx(thigh_r) + {0.1 * k:.1f} m(shank_r) + m(foot_r)" for k in range(14)
+            ],
+            "value": np.linspace(0.1, 2.0, 14),
+            "unit": ["kg m"] * 14,
+            "sd": [0.01] * 14,
+            "sigma_percent": np.linspace(1.0, 77.0, 14),
+            "rm_value": np.linspace(0.1, 1.8, 14),
+        }
+    )
 
 
 def excitation(skeleton: Skeleton) -> pd.DataFrame:
@@ -273,17 +425,29 @@ def excitation(skeleton: Skeleton) -> pd.DataFrame:
 
 
 def posturography() -> pd.DataFrame:
-    row = {"rms_ap_mm": 31.4, "rms_ml_mm": 15.9, "rms_ap_origin_m": 0.05, "rms_ml_origin_m": 0.01,
-           "mean_velocity_mm_s": 88.8, "sway_length_mm": 1234.5, "ellipse_area_mm2": 4321.0,
-           "duration_s": 13.1}
+    row = {
+        "rms_ap_mm": 31.4,
+        "rms_ml_mm": 15.9,
+        "rms_ap_origin_m": 0.05,
+        "rms_ml_origin_m": 0.01,
+        "mean_velocity_mm_s": 88.8,
+        "sway_length_mm": 1234.5,
+        "ellipse_area_mm2": 4321.0,
+        "duration_s": 13.1,
+    }
     return pd.DataFrame([{"method": m, **row} for m in ("measured", "RM", "OM")])
 
 
 def empty(kind: str) -> pd.DataFrame:
     """A table of the kind without rows."""
     kinds = {"float": float, "int": "int64", "bool": bool, "text": object}
-    return pd.DataFrame({c.name: pd.Series([], dtype=kinds[c.type])
-                         for c in SCHEMAS[kind].columns if not c.name.endswith("*")})
+    return pd.DataFrame(
+        {
+            c.name: pd.Series([], dtype=kinds[c.type])
+            for c in SCHEMAS[kind].columns
+            if not c.name.endswith("*")
+        }
+    )
 
 
 def svgs(html: str) -> list[bytes]:

@@ -15,8 +15,11 @@ def page(reports) -> str:
 
 
 def test_links_lead_to_what_is_there(reports, page):
-    links = [link for link in re.findall(r'(?:src|href)="([^"]*)"', page)
-             if not link.startswith(("#", "data:"))]
+    links = [
+        link
+        for link in re.findall(r'(?:src|href)="([^"]*)"', page)
+        if not link.startswith(("#", "data:"))
+    ]
     assert "../sub-01/report.html" in links
     assert "../sub-02/report.html" not in links  # its report was not made
     for link in links:
@@ -36,8 +39,10 @@ def test_all_five_tables_are_there(page):
 
 def test_gain_is_that_of_the_values(reports, page):
     record = record_of(reports.unit("report"))
-    ratios = [np.mean([g.om / g.rm for g in gains if g.held_out and g.component == "cop_ap"])
-              for gains in record.gains().values()]
+    ratios = [
+        np.mean([g.om / g.rm for g in gains if g.held_out and g.component == "cop_ap"])
+        for gains in record.gains().values()
+    ]
     typical = 100 * (np.exp(np.mean(np.log(ratios))) - 1)
     row = re.search(r"COP, anterior-posterior</td>\s*<td[^>]*>([^<]+)<", page)
     assert unescape(row[1]) == f"{typical:.0f}".replace("-", "−")

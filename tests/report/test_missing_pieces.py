@@ -45,8 +45,11 @@ def test_no_held_out_data(record):
 def test_no_identified_parameters(record):
     bsip = record.bsip[record.bsip["method"] == "RM"]
     trials = tuple(
-        replace(t, fit=t.fit[t.fit["method"] == "RM"],
-                reconstruction=t.reconstruction[t.reconstruction["method"] != "OM"])
+        replace(
+            t,
+            fit=t.fit[t.fit["method"] == "RM"],
+            reconstruction=t.reconstruction[t.reconstruction["method"] != "OM"],
+        )
         for t in record.trials
     )
     text = words_of(participant_document(replace(record, bsip=bsip, trials=trials)))
@@ -88,11 +91,19 @@ def test_nothing_on_the_plates(record):
 
 def test_empty_tables(record):
     changed = replace(
-        record, base_parameters=empty("base-parameters"), excitation=empty("excitation"),
-        identification=empty("identification"), marker_positions=empty("marker-positions"),
+        record,
+        base_parameters=empty("base-parameters"),
+        excitation=empty("excitation"),
+        identification=empty("identification"),
+        marker_positions=empty("marker-positions"),
     )
-    kinds = {"quality": "quality", "residuals": "marker-residuals", "fit": "fit",
-             "reconstruction": "reconstruction", "posturography": "posturography"}
+    kinds = {
+        "quality": "quality",
+        "residuals": "marker-residuals",
+        "fit": "fit",
+        "reconstruction": "reconstruction",
+        "posturography": "posturography",
+    }
     document = participant_document(with_trials(changed, **{k: empty(v) for k, v in kinds.items()}))
     text = words_of(document)
     assert "No base parameters were written." in text

@@ -8,8 +8,15 @@ from fake_study import EVIL, svgs
 
 from bsip_cli.report.words import number, with_spread
 
-TITLES = ("Summary", "What was measured", "The motion", "The skeleton",
-          "The inertial parameters", "How well the forces follow", "Limits, warnings, options")
+TITLES = (
+    "Summary",
+    "What was measured",
+    "The motion",
+    "The skeleton",
+    "The inertial parameters",
+    "How well the forces follow",
+    "Limits, warnings, options",
+)
 
 
 @pytest.fixture(scope="module")
@@ -87,8 +94,11 @@ def test_files_are_listed_with_their_hash(reports):
         content = (reports.out / row["file"]).read_bytes()
         assert hashlib.sha256(content).hexdigest() == row["sha256"]
     kinds = (".html", ".svg", ".png")
-    written = {path.relative_to(reports.out).as_posix()
-               for path in (reports.out / "sub-01").rglob("*") if path.suffix in kinds}
+    written = {
+        path.relative_to(reports.out).as_posix()
+        for path in (reports.out / "sub-01").rglob("*")
+        if path.suffix in kinds
+    }
     assert written == set(files["file"])
 
 

@@ -20,17 +20,35 @@ from bsip_cli.report.words import (
 )
 
 
-@pytest.mark.parametrize(("value", "text"), [
-    (1.25, "1.2"), (-0.04, "0.0"), (-3.0, "−3.0"), (math.nan, "–"), (None, "–"), (math.inf, "–"),
-])
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (1.25, "1.2"),
+        (-0.04, "0.0"),
+        (-3.0, "−3.0"),
+        (math.nan, "–"),
+        (None, "–"),
+        (math.inf, "–"),
+    ],
+)
 def test_number(value, text):
     assert number(value) == text
 
 
-@pytest.mark.parametrize(("value", "text"), [
-    (812.0, "812"), (182345.0, "182\N{THIN SPACE}000"), (0.05, "0.0500"), (1.2e-5, "1.20 × 10⁻⁵"),
-    (-3.14159, "−3.14"), (1.5e9, "1.50 × 10⁹"), (99.96, "100"), (0.0, "0.00"), (math.nan, "–"),
-])
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (812.0, "812"),
+        (182345.0, "182\N{THIN SPACE}000"),
+        (0.05, "0.0500"),
+        (1.2e-5, "1.20 × 10⁻⁵"),
+        (-3.14159, "−3.14"),
+        (1.5e9, "1.50 × 10⁹"),
+        (99.96, "100"),
+        (0.0, "0.00"),
+        (math.nan, "–"),
+    ],
+)
 def test_significant(value, text):
     assert significant(value) == text
 
@@ -49,7 +67,8 @@ def test_words():
 
 def test_units_stay_with_their_numbers():
     assert _tied("5 % of 3 mm in 2 N m") == "5 % of 3 mm in 2 N m".replace(" ", "\xa0").replace(
-        "\xa0of\xa0", " of ").replace("\xa0in\xa0", " in ")
+        "\xa0of\xa0", " of "
+    ).replace("\xa0in\xa0", " in ")
 
 
 def test_labels_lose_mathematics_and_control_signs():
@@ -80,13 +99,27 @@ def test_hull():
 
 
 def test_gains():
-    fit = pd.DataFrame([
-        {"method": method, "component": component, "rmse": rmse, "unit": "N",
-         "rmse_percent_bw": 0.1 * rmse, "data": "held_out"}
-        for method, component, rmse in (
-            ("RM", "fx", 10.0), ("OM", "fx", 6.0), ("RM", "fz", 10.0), ("OM", "fz", 10.05),
-            ("RM", "grf_vertical", 10.0), ("OM", "grf_vertical", 12.0), ("RM", "mz", 3.0))
-    ])
+    fit = pd.DataFrame(
+        [
+            {
+                "method": method,
+                "component": component,
+                "rmse": rmse,
+                "unit": "N",
+                "rmse_percent_bw": 0.1 * rmse,
+                "data": "held_out",
+            }
+            for method, component, rmse in (
+                ("RM", "fx", 10.0),
+                ("OM", "fx", 6.0),
+                ("RM", "fz", 10.0),
+                ("OM", "fz", 10.05),
+                ("RM", "grf_vertical", 10.0),
+                ("OM", "grf_vertical", 12.0),
+                ("RM", "mz", 3.0),
+            )
+        ]
+    )
     gains = {gain.component: gain for gain in gains_of("throw", fit)}
     assert set(gains) == {"fx", "fz", "grf_vertical"}
     assert (gains["fx"].better(), gains["fz"].better()) == ("OM", "")

@@ -11,8 +11,10 @@ from bsip_cli.report.figures.errors_per_task import ErrorsPerTask, errors_per_ta
 from bsip_cli.report.figures.gain_dots import GainDots, gain_dots
 from bsip_cli.report.words import COMPONENTS, component_label
 
-_ERRORS = (("cop_error", "COP error [mm]", "errors_cop"),
-           ("grf_vertical", "vertical force error [% BW]", "errors_vertical_force"))
+_ERRORS = (
+    ("cop_error", "COP error [mm]", "errors_cop"),
+    ("grf_vertical", "vertical force error [% BW]", "errors_vertical_force"),
+)
 _DATA = {"identification": "used to identify", "held_out": "held out"}
 
 
@@ -31,9 +33,11 @@ def _dots(record: CohortRecord) -> list[Block]:
         return [Paragraph("There is no error of both methods to compare.", "warning")]
     data = GainDots(tuple(component_label(c) for c in table), np.array(list(table.values())))
     where = "held-out data" if held_out else "the data that identified the parameters"
-    caption = (f"Error of OM over error of RM, on {where}; a dot per participant (in the order of "
-               "the participants, from top to bottom), the bar their geometric mean. The scale is "
-               "one of ratios: half and double lie equally far from 1.")
+    caption = (
+        f"Error of OM over error of RM, on {where}; a dot per participant (in the order of "
+        "the participants, from top to bottom), the bar their geometric mean. The scale is "
+        "one of ratios: half and double lie equally far from 1."
+    )
     return [Picture(gain_dots(data), caption, "Dots: error ratio OM to RM per component.", "gain")]
 
 
@@ -49,9 +53,12 @@ def _per_task(record: CohortRecord, variable: str, quantity: str, name: str) -> 
         for method in ("RM", "OM")
     )
     tasks, data = zip(*((task, _DATA.get(how, how)) for task, how in keys), strict=True)
-    caption = (f"{quantity} per movement and participant (mean over the runs); RM to the left, OM "
-               "to the right, thick lines are the means. The COP error is the length of the errors "
-               "in both directions." if variable == "cop_error" else
-               f"{quantity} per movement and participant, as above.")
+    caption = (
+        f"{quantity} per movement and participant (mean over the runs); RM to the left, OM "
+        "to the right, thick lines are the means. The COP error is the length of the errors "
+        "in both directions."
+        if variable == "cop_error"
+        else f"{quantity} per movement and participant, as above."
+    )
     figure = errors_per_task(ErrorsPerTask(tasks, data, rm, om, quantity))
     return [Picture(figure, caption, f"Points: {quantity} of RM and OM per movement.", name)]

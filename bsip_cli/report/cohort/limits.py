@@ -19,9 +19,15 @@ _MIND = (
 def section(record: CohortRecord) -> Section:
     said = messages(record.origins)
     warned: Block = (
-        Bullets(tuple(f"{stage}{f' ({unit})' if unit else ''}: {text}"
-                      for stage, unit, text in said), "warning")
-        if said else Paragraph("No stage had anything to warn of.")
+        Bullets(
+            tuple(f"{stage}{f' ({unit})' if unit else ''}: {text}" for stage, unit, text in said),
+            "warning",
+        )
+        if said
+        else Paragraph("No stage had anything to warn of.")
     )
-    return Section("limits", "Limits, warnings, options", (
-        Bullets(_MIND), Heading("Warnings"), warned, *options_grids(record.origins)))
+    return Section(
+        "limits",
+        "Limits, warnings, options",
+        (Bullets(_MIND), Heading("Warnings"), warned, *options_grids(record.origins)),
+    )

@@ -10,9 +10,18 @@ from bsip_cli.report.words import MISSING, number, signed, significant, trial_la
 
 
 def section(record: CohortRecord) -> Section:
-    head = ("participant", "calibrated on", "sex", "mass [kg]", "plates against it [%]",
-            "height [m]", "marker residual [mm]", "identified on [s]", "condition number",
-            "refusals")
+    head = (
+        "participant",
+        "calibrated on",
+        "sex",
+        "mass [kg]",
+        "plates against it [%]",
+        "height [m]",
+        "marker residual [mm]",
+        "identified on [s]",
+        "condition number",
+        "refusals",
+    )
     rows = tuple(_row(member) for member in record.members)
     return Section("people", "Participants", (Grid(head, rows, words=3),))
 
@@ -25,10 +34,16 @@ def _row(member: Member) -> tuple[str | Cell, ...]:
     facts = member.facts
     difference = 100.0 * (facts["plate_mass_kg"] / facts["mass_kg"] - 1.0)
     return (
-        name, trial_label(str(facts["calibration_trial"])), str(facts["sex"]),
-        number(facts["mass_kg"], 2), signed(difference, 1), number(facts["height_m"], 2),
-        number(1000.0 * facts["marker_rms_m"], 1), number(_first(member, "duration_s")),
-        significant(_first(member, "condition_number")), refusals,
+        name,
+        trial_label(str(facts["calibration_trial"])),
+        str(facts["sex"]),
+        number(facts["mass_kg"], 2),
+        signed(difference, 1),
+        number(facts["height_m"], 2),
+        number(1000.0 * facts["marker_rms_m"], 1),
+        number(_first(member, "duration_s")),
+        significant(_first(member, "condition_number")),
+        refusals,
     )
 
 

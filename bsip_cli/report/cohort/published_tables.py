@@ -6,7 +6,7 @@ from pathlib import PurePosixPath
 
 from bsip_cli.report.blocks import Block, Cell, Grid, Heading, Paragraph, Section
 from bsip_cli.report.cohort.record import CohortRecord
-from bsip_cli.report.table_model import Table
+from bsip_cli.report.tables.model import Table
 
 
 def section(record: CohortRecord) -> Section:
@@ -17,8 +17,9 @@ def section(record: CohortRecord) -> Section:
     if not record.tables:
         blocks.append(Paragraph("No tables were made.", "warning"))
     if record.table_files:
-        rows = tuple((Cell(PurePosixPath(file).name, link=f"../{file}"),)
-                     for file in record.table_files)
+        rows = tuple(
+            (Cell(PurePosixPath(file).name, link=f"../{file}"),) for file in record.table_files
+        )
         blocks += [Heading("The tables as files"), Grid(("file",), rows)]
     return Section("tables", "The papers' tables", tuple(blocks))
 

@@ -9,7 +9,7 @@ import pandas as pd
 
 from bsip_cli.report.gains import Gain
 from bsip_cli.report.records import Origin, Refusal
-from bsip_cli.report.table_model import Table
+from bsip_cli.report.tables.model import Table
 from bsip_cli.report.words import COMPONENTS, trial_label
 
 _OF_TABLE = {"table4": "", "table5": "_rmse"}  # tables of errors, and the ending of their variables
@@ -46,14 +46,16 @@ class CohortRecord:
         """Rows of one error of table 4: participant, task, data, RM, OM; the mean over the runs."""
         rows = self.values[self.values["table"] == "table4"]
         rows = rows[rows["variable"] == variable]
-        wide = rows.pivot_table(index=["participant", "task", "data"], columns="method",
-                                values="value", aggfunc="mean")
+        wide = rows.pivot_table(
+            index=["participant", "task", "data"], columns="method", values="value", aggfunc="mean"
+        )
         return wide.reindex(columns=["RM", "OM"]).reset_index()
 
 
 def _gains(rows: pd.DataFrame) -> tuple[Gain, ...]:
-    kept = {(r["trial"], r["table"], r["variable"], r["method"]): r
-            for r in rows.to_dict("records")}
+    kept = {
+        (r["trial"], r["table"], r["variable"], r["method"]): r for r in rows.to_dict("records")
+    }
     gains = []
     for trial in dict.fromkeys(rows["trial"]):
         for component in COMPONENTS:
@@ -62,8 +64,16 @@ def _gains(rows: pd.DataFrame) -> tuple[Gain, ...]:
                 om = kept.get((trial, table, component + ending, "OM"))
                 if rm is not None and om is not None:
                     unit = om["unit"].replace("% body weight", "% BW")
-                    gains.append(Gain(trial_label(trial), component, unit, float(rm["value"]),
-                                      float(om["value"]), om["data"] == "held_out"))
+                    gains.append(
+                        Gain(
+                            trial_label(trial),
+                            component,
+                            unit,
+                            float(rm["value"]),
+                            float(om["value"]),
+                            om["data"] == "held_out",
+                        )
+                    )
     return tuple(gains)
 
 

@@ -21,9 +21,12 @@ from bsip_cli.report.words import (
 def section(record: CohortRecord) -> Section:
     done = [m for m in record.members if m.facts is not None and m.identification is not None]
     blocks: list[Block] = [
-        Paragraph(f"{len(done)} of {count(len(record.members), 'participant')} of the study have "
-                  "identified parameters."),
-        *_missing(record), Heading("Do the identified parameters follow the forces better?"),
+        Paragraph(
+            f"{len(done)} of {count(len(record.members), 'participant')} of the study have "
+            "identified parameters."
+        ),
+        *_missing(record),
+        Heading("Do the identified parameters follow the forces better?"),
         *_gain(record),
     ]
     return Section("summary", "Summary", tuple(blocks))
@@ -32,14 +35,18 @@ def section(record: CohortRecord) -> Section:
 def _missing(record: CohortRecord) -> list[Block]:
     sentences = list(record.missing)
     for member in record.members:
-        sentences += [f"{', '.join(filter(None, (member.id, r.unit)))}, {r.stage} refused: "
-                      f"{r.sentence}" for r in member.refusals]
+        sentences += [
+            f"{', '.join(filter(None, (member.id, r.unit)))}, {r.stage} refused: {r.sentence}"
+            for r in member.refusals
+        ]
         if member.identification is None and not any(member.id in s for s in sentences):
             sentences.append(f"{member.id} has no identified parameters; no refusal says why.")
     if not sentences:
         return [Paragraph("Nobody is missing from the tables.")]
-    return [Paragraph("Who is missing, and why:"),
-            Bullets(tuple(dict.fromkeys(sentences)), "warning")]
+    return [
+        Paragraph("Who is missing, and why:"),
+        Bullets(tuple(dict.fromkeys(sentences)), "warning"),
+    ]
 
 
 def chosen_gains(record: CohortRecord) -> tuple[dict[str, tuple[Gain, ...]], bool]:
@@ -57,22 +64,39 @@ def _gain(record: CohortRecord) -> list[Block]:
         return [Paragraph("No trial could be compared with both methods.", "warning")]
     blocks: list[Block] = []
     if not held_out:
-        blocks.append(Paragraph("Nobody has held-out data: these numbers are from the data that "
-                                "identified the parameters, and favour OM.", "warning"))
+        blocks.append(
+            Paragraph(
+                "Nobody has held-out data: these numbers are from the data that "
+                "identified the parameters, and favour OM.",
+                "warning",
+            )
+        )
     worse = [row[0] for row in rows if row[1].startswith("+") or int(row[3]) > int(row[2])]
-    blocks.append(Paragraph(
-        "The table (RM) follows better on the whole, or in more participants, in: "
-        f"{listing(worse)}.", "warning") if worse else
-        Paragraph("OM follows better on the whole in every component.", "good"))
-    blocks.append(Grid(
-        ("component", "typical change [%]", "OM better", "RM better", "the same", "all"),
-        tuple(rows), "Change of the mean error (RMSE) from RM to OM, "
-        + ("held-out data" if held_out else "identification data"),
-        groups=(("", 2), ("number of participants", 4)),
-    ))
-    blocks.append(Paragraph(
-        "Typical: the geometric mean of the participants' error ratios. The same: within "
-        f"{percent(SAME_WITHIN)} %. Tests stand in the tables of section 4.", "note"))
+    blocks.append(
+        Paragraph(
+            "The table (RM) follows better on the whole, or in more participants, in: "
+            f"{listing(worse)}.",
+            "warning",
+        )
+        if worse
+        else Paragraph("OM follows better on the whole in every component.", "good")
+    )
+    blocks.append(
+        Grid(
+            ("component", "typical change [%]", "OM better", "RM better", "the same", "all"),
+            tuple(rows),
+            "Change of the mean error (RMSE) from RM to OM, "
+            + ("held-out data" if held_out else "identification data"),
+            groups=(("", 2), ("number of participants", 4)),
+        )
+    )
+    blocks.append(
+        Paragraph(
+            "Typical: the geometric mean of the participants' error ratios. The same: within "
+            f"{percent(SAME_WITHIN)} %. Tests stand in the tables of section 4.",
+            "note",
+        )
+    )
     return blocks
 
 
@@ -83,5 +107,11 @@ def _row(component: str, gains: dict[str, tuple[Gain, ...]]) -> tuple[str, ...]:
         return ()
     better, worse = int((ratios < 1 - SAME_WITHIN).sum()), int((ratios > 1 + SAME_WITHIN).sum())
     typical = 100.0 * (float(np.exp(np.log(ratios).mean())) - 1.0)
-    return (component_label(component), signed(typical), str(better), str(worse),
-            str(len(ratios) - better - worse), number(len(ratios), 0))
+    return (
+        component_label(component),
+        signed(typical),
+        str(better),
+        str(worse),
+        str(len(ratios) - better - worse),
+        number(len(ratios), 0),
+    )

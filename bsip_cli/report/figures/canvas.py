@@ -22,8 +22,12 @@ LONGEST_LABEL = 16
 MOST_POINTS = 1200  # of one curve: more than a page can show
 _MM = 1.0 / 25.4
 _RC: dict[Any, Any] = {
-    "svg.hashsalt": "bsip", "svg.fonttype": "path", "font.family": "DejaVu Sans", "font.size": 8,
-    "axes.unicode_minus": True, "path.simplify": True,
+    "svg.hashsalt": "bsip",
+    "svg.fonttype": "path",
+    "font.family": "DejaVu Sans",
+    "font.size": 8,
+    "axes.unicode_minus": True,
+    "path.simplify": True,
 }
 
 
@@ -79,8 +83,17 @@ def legend_above(axes: Axes, columns: int = 4) -> None:
     """A legend in one row over the axes, where no curve runs; each label once."""
     handles, labels = axes.get_legend_handles_labels()
     once = dict(zip(labels, handles, strict=True))
-    axes.legend(once.values(), once.keys(), loc="lower left", bbox_to_anchor=(0.0, 1.0),
-                ncols=columns, frameon=False, fontsize=8, borderaxespad=0.2, handlelength=2.4)
+    axes.legend(
+        once.values(),
+        once.keys(),
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=columns,
+        frameon=False,
+        fontsize=8,
+        borderaxespad=0.2,
+        handlelength=2.4,
+    )
 
 
 def plain(text: str) -> str:

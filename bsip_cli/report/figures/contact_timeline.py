@@ -37,12 +37,23 @@ def contact_timeline(data: ContactTimeline) -> Figure:
     """Three bars over time: left foot, right foot, compared."""
     figure = new_figure(34)
     axes = figure.add_subplot()
-    feet = ((2, data.left_on_ground, data.left_on_plate),
-            (1, data.right_on_ground, data.right_on_plate))
+    feet = (
+        (2, data.left_on_ground, data.left_on_plate),
+        (1, data.right_on_ground, data.right_on_plate),
+    )
     for row, on_ground, on_plate in feet:
         _bars(axes, data.time_s, on_ground & on_plate, row, "on a plate", color=BLUE)
-        _bars(axes, data.time_s, on_ground & ~on_plate, row, "on the ground beside the plates",
-              facecolor="white", edgecolor=ORANGE, hatch="////", linewidth=0.8)
+        _bars(
+            axes,
+            data.time_s,
+            on_ground & ~on_plate,
+            row,
+            "on the ground beside the plates",
+            facecolor="white",
+            edgecolor=ORANGE,
+            hatch="////",
+            linewidth=0.8,
+        )
     _bars(axes, data.time_s, data.valid, 0, "forces compared", color=GREEN)
     axes.set_yticks([2, 1, 0], ["left foot", "right foot", "compared"])
     axes.set_ylim(-0.5, 2.5)

@@ -33,8 +33,14 @@ def cop_path(data: CopPath) -> Figure:
     for method, path in data.paths_mm.items():
         line = line_of(method)
         keep = thinned(len(path))
-        axes.plot(path[keep, 0], path[keep, 1], color=line.colour, ls=line.style, lw=line.width,
-                  label=method)
+        axes.plot(
+            path[keep, 0],
+            path[keep, 1],
+            color=line.colour,
+            ls=line.style,
+            lw=line.width,
+            label=method,
+        )
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("to the right [mm]")
     axes.set_ylabel("forward [mm]")

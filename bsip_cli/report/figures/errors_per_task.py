@@ -45,8 +45,16 @@ def errors_per_task(data: ErrorsPerTask) -> Figure:
             (left, data.rm[task], ORANGE, "s", "RM (table)"),
             (right, data.om[task], BLUE, "o", "OM (identified)"),
         ):
-            axes.scatter(np.full(len(values), x), values, s=14, marker=marker, color=colour,
-                         lw=0, zorder=2, label=label if task == 0 else None)
+            axes.scatter(
+                np.full(len(values), x),
+                values,
+                s=14,
+                marker=marker,
+                color=colour,
+                lw=0,
+                zorder=2,
+                label=label if task == 0 else None,
+            )
             if np.isfinite(values).any():
                 axes.hlines(np.nanmean(values), x - 0.12, x + 0.12, color=colour, lw=2.0)
     names = [f"{plain(task)}\n({how})" for task, how in zip(data.tasks, data.data, strict=True)]

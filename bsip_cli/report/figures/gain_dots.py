@@ -39,8 +39,15 @@ def gain_dots(data: GainDots) -> Figure:
     axes = figure.add_subplot()
     offsets = np.linspace(-_SPREAD, _SPREAD, people) if people > 1 else np.zeros(1)
     for row, ratios in enumerate(data.ratios):
-        axes.scatter(ratios, row + offsets, s=24, lw=0.5, edgecolor="white",
-                     color=[BLUE if r < 1.0 else ORANGE for r in ratios], zorder=2)
+        axes.scatter(
+            ratios,
+            row + offsets,
+            s=24,
+            lw=0.5,
+            edgecolor="white",
+            color=[BLUE if r < 1.0 else ORANGE for r in ratios],
+            zorder=2,
+        )
         if np.isfinite(ratios).any():
             mean = float(np.exp(np.nanmean(np.log(ratios))))
             axes.plot([mean, mean], [row - 0.38, row + 0.38], color=INK, lw=1.6, zorder=3)
@@ -50,8 +57,9 @@ def gain_dots(data: GainDots) -> Figure:
     axes.set_ylim(rows - 0.5, -0.5)
     axes.set_xlabel("RMSE of OM / RMSE of RM (left of 1: OM follows better)")
     tidy(axes, grid="x")
-    axes.hlines(np.arange(1, rows) - 0.5, 0, 1, transform=axes.get_yaxis_transform(), color=FAINT,
-                lw=0.6)
+    axes.hlines(
+        np.arange(1, rows) - 0.5, 0, 1, transform=axes.get_yaxis_transform(), color=FAINT, lw=0.6
+    )
     return figure
 
 

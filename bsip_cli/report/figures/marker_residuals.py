@@ -28,8 +28,15 @@ def marker_residuals(data: MarkerResiduals) -> Figure:
     axes = figure.add_subplot()
     axes.bar(places, data.rms_mm[order], width=0.72, color=BLUE)
     axes.axhline(data.overall_mm, color=INK, lw=1.0, ls="--")
-    axes.annotate(f"all markers {data.overall_mm:.1f} mm", (len(order) - 0.5, data.overall_mm),
-                  xytext=(0, 3), textcoords="offset points", ha="right", va="bottom", fontsize=8)
+    axes.annotate(
+        f"all markers {data.overall_mm:.1f} mm",
+        (len(order) - 0.5, data.overall_mm),
+        xytext=(0, 3),
+        textcoords="offset points",
+        ha="right",
+        va="bottom",
+        fontsize=8,
+    )
     axes.set_xticks(places, [plain(data.markers[k]) for k in order], rotation=90)
     axes.set_xlim(-0.7, len(order) - 0.3)
     axes.set_ylabel("RMS residual [mm]")

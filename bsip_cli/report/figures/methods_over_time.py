@@ -42,8 +42,14 @@ def methods_over_time(data: MethodsOverTime) -> Figure:
     axes = figure.add_subplot()
     for method, values in data.signals.items():
         line = line_of(method)
-        axes.plot(data.time_s[keep], values[keep], color=line.colour, ls=line.style,
-                  lw=line.width, label=method)
+        axes.plot(
+            data.time_s[keep],
+            values[keep],
+            color=line.colour,
+            ls=line.style,
+            lw=line.width,
+            label=method,
+        )
     axes.set_xlim(data.time_s[0], data.time_s[-1])
     axes.set_xlabel("time [s]")
     axes.set_ylabel(data.quantity)

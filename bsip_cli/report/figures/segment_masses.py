@@ -54,8 +54,9 @@ def segment_masses(data: SegmentMasses) -> Figure:
 
 def _draw_masses(axes: Axes, data: SegmentMasses, rows: np.ndarray) -> None:
     positive = np.where(data.om_kg > 0.0, data.om_kg, np.nan)
-    axes.scatter(data.rm_kg, rows, marker="s", s=26, facecolor="white", edgecolor=ORANGE, lw=1.4,
-                 label="RM")
+    axes.scatter(
+        data.rm_kg, rows, marker="s", s=26, facecolor="white", edgecolor=ORANGE, lw=1.4, label="RM"
+    )
     axes.scatter(positive, rows, marker="o", s=16, color=BLUE, label="OM", zorder=3)
     axes.set_xscale("log")
     both = np.concatenate([data.rm_kg, positive])
@@ -73,8 +74,17 @@ def _draw_masses(axes: Axes, data: SegmentMasses, rows: np.ndarray) -> None:
 def _draw_differences(axes: Axes, data: SegmentMasses, rows: np.ndarray) -> None:
     spread = np.nan_to_num(_NORMAL_95 * data.om_sd_kg)
     axes.axvline(0.0, color=ORANGE, lw=1.2, ls="--")
-    axes.errorbar(data.om_kg - data.rm_kg, rows, xerr=spread, fmt="o", ms=4, color=BLUE,
-                  ecolor=SOFT, elinewidth=1.1, capsize=2)
+    axes.errorbar(
+        data.om_kg - data.rm_kg,
+        rows,
+        xerr=spread,
+        fmt="o",
+        ms=4,
+        color=BLUE,
+        ecolor=SOFT,
+        elinewidth=1.1,
+        capsize=2,
+    )
     axes.set_xlabel("OM − RM [kg]")
     axes.set_title("difference, 95 % interval", fontsize=8.5)
     tidy(axes, grid="both")

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 
 from bsip_cli.report.figures.canvas import GREEN, INK, SOFT, WIDTH_MM, house_style, new_figure
 
@@ -65,8 +67,14 @@ def stick_strip(data: StickStrip) -> Figure:
         axes.set_ylabel(view, fontsize=8, color=SOFT)
         axes.set_ylim(data.ground_m - 0.04 * height, data.ground_m + height)
     for time, (left, right) in zip(data.time_s, slots, strict=True):
-        rows[1].text((left + right) / 2, data.ground_m - 0.07 * height, f"{time:.2f} s",
-                     ha="center", va="top", fontsize=8)
+        rows[1].text(
+            (left + right) / 2,
+            data.ground_m - 0.07 * height,
+            f"{time:.2f} s",
+            ha="center",
+            va="top",
+            fontsize=8,
+        )
     return figure
 
 
@@ -94,26 +102,47 @@ def _slots(data: StickStrip) -> np.ndarray:
 
 
 def _draw_row(axes: Axes, data: StickStrip, slots: np.ndarray, axis: int) -> None:
-    from matplotlib.patches import Circle
-
-    tips = data.arrow_tips_m()
-    for k, (left, right) in enumerate(slots):
-        shift = (left + right) / 2 - data.bones_m[k, 0, 0, axis]
-        for bone, side in zip(data.bones_m[k], data.sides, strict=True):
-            axes.plot(bone[:, axis] + shift, bone[:, 2], color=_COLOURS[side], lw=_WIDTHS[side],
-                      solid_capstyle="round", zorder=1 if side == "l" else 2)
-        centre = (data.head_m[k, axis] + shift, data.head_m[k, 2])
-        axes.add_patch(Circle(centre, data.head_radius_m, fill=False, ec=INK, lw=1.2))
-        if np.isfinite(tips[k]).all():
-            axes.annotate(
-                "", (tips[k, axis] + shift, tips[k, 2]),
-                (data.force_m[k, axis] + shift, data.force_m[k, 2]), zorder=3,
-                arrowprops={"arrowstyle": "-|>", "color": GREEN, "lw": 1.6, "shrinkA": 0,
-                            "shrinkB": 0, "mutation_scale": 8},
+    shifts = slots.mean(axis=1) - data.bones_m[:, 0, 0, axis]
+    bones = data.bones_m[..., [axis, 2]] + np.stack([shifts, 0.0 * shifts], axis=1)[:, None, None]
+    for side in ("l", "", "r"):  # the left side lies behind
+        own = bones[:, [s == side for s in data.sides]].reshape(-1, 2, 2)
+        axes.add_collection(
+            LineCollection(own, colors=_COLOURS[side], linewidths=_WIDTHS[side], capstyle="round")
+        )
+    for centre, shift in zip(data.head_m, shifts, strict=True):
+        axes.add_patch(
+            Circle(
+                (centre[axis] + shift, centre[2]), data.head_radius_m, fill=False, ec=INK, lw=1.2
             )
+        )
+    _draw_forces(axes, data, shifts, axis)
     axes.axhline(data.ground_m, color=SOFT, lw=0.8, zorder=0)
     axes.set_xlim(0.0, slots[-1, 1])
     axes.set_aspect("equal")
     axes.set_xticks([])
     axes.set_yticks([])
     axes.spines[:].set_visible(False)
+
+
+def _draw_forces(axes: Axes, data: StickStrip, shifts: np.ndarray, axis: int) -> None:
+    tips = data.arrow_tips_m()
+    seen = np.isfinite(tips).all(axis=1)
+    if seen.any():
+        foot, arrow = data.force_m[seen], (tips - data.force_m)[seen]
+        axes.quiver(
+            foot[:, axis] + shifts[seen],
+            foot[:, 2],
+            arrow[:, axis],
+            arrow[:, 2],
+            color=GREEN,
+            angles="xy",
+            scale_units="xy",
+            scale=1.0,
+            units="inches",
+            width=0.022,
+            headwidth=4.5,
+            headlength=5.5,
+            headaxislength=5.5,
+            minlength=0.0,
+            zorder=3,
+        )

@@ -27,24 +27,47 @@ _WINDOW_S = 10.0
 _ROOM_S = 0.2
 _THROWS = ("basketball", "throw")
 _MM = 1000.0
-_DATA = {"held_out": "held-out data: the identification had not seen them",
-         "identification": "data that were used for identification, which favours OM"}
-_MEASURES = (("rmse", "RMSE", 2), ("rmse_percent_bw", "RMSE [% BW]", 2), ("pearson_r", "r", 3),
-             ("schwer_m", "M", 3), ("schwer_p", "P", 3), ("schwer_c", "C", 3))
-_SWAY = (("rms_ap_mm", "RMS AP [mm]"), ("rms_ml_mm", "RMS ML [mm]"),
-         ("mean_velocity_mm_s", "mean speed [mm/s]"), ("sway_length_mm", "path length [mm]"),
-         ("ellipse_area_mm2", "95 % ellipse [mm²]"), ("duration_s", "duration [s]"))
+_DATA = {
+    "held_out": "held-out data: the identification had not seen them",
+    "identification": "data that were used for identification, which favours OM",
+}
+_MEASURES = (
+    ("rmse", "RMSE", 2),
+    ("rmse_percent_bw", "RMSE [% BW]", 2),
+    ("pearson_r", "r", 3),
+    ("schwer_m", "M", 3),
+    ("schwer_p", "P", 3),
+    ("schwer_c", "C", 3),
+)
+_SWAY = (
+    ("rms_ap_mm", "RMS AP [mm]"),
+    ("rms_ml_mm", "RMS ML [mm]"),
+    ("mean_velocity_mm_s", "mean speed [mm/s]"),
+    ("sway_length_mm", "path length [mm]"),
+    ("ellipse_area_mm2", "95 % ellipse [mm²]"),
+    ("duration_s", "duration [s]"),
+)
 
 
 def section(record: ParticipantRecord) -> Section:
-    return Section("forces", "How well the forces follow", (
-        Paragraph("The ground force and its centre of pressure (COP) are computed from the motion "
-                  "alone, once with the table's parameters (RM) and once with the identified ones "
-                  "(OM), and compared with the plates."),
-        *_cop_over_time(record), *_vertical_force(record),
-        Heading("Errors in every trial and component"), *_overview(record), *_fit_grids(record),
-        Heading("Sway measures of the centre of pressure"), *_posturography(record),
-    ))
+    return Section(
+        "forces",
+        "How well the forces follow",
+        (
+            Paragraph(
+                "The ground force and its centre of pressure (COP) are computed from the motion "
+                "alone, once with the table's parameters (RM) and once with the identified ones "
+                "(OM), and compared with the plates."
+            ),
+            *_cop_over_time(record),
+            *_vertical_force(record),
+            Heading("Errors in every trial and component"),
+            *_overview(record),
+            *_fit_grids(record),
+            Heading("Sway measures of the centre of pressure"),
+            *_posturography(record),
+        ),
+    )
 
 
 # --- Hansen 2017, Fig. 3 ------------------------------------------------------------------------
@@ -53,8 +76,12 @@ def section(record: ParticipantRecord) -> Section:
 def _cop_over_time(record: ParticipantRecord) -> list[Block]:
     trial = _cop_trial(record)
     if trial is None:
-        return [Paragraph("No trial has a centre of pressure that could be compared, so it is not "
-                          "shown.", "warning")]
+        return [
+            Paragraph(
+                "No trial has a centre of pressure that could be compared, so it is not shown.",
+                "warning",
+            )
+        ]
     frame = trial.reconstruction
     assert frame is not None
     clock, shown = clock_of(frame), _with_cop(frame)
@@ -64,18 +91,28 @@ def _cop_over_time(record: ParticipantRecord) -> list[Block]:
     when = f"{trial.label}, {clock[window][0]:.1f} to {clock[window][-1]:.1f} s"
     data = _data_of(flags_of(frame, "used")[window])
     blocks: list[Block] = [Heading(f"Centre of pressure: {when}")]
-    for key, values, name, towards in (("ml", ml, "medio-lateral", "right"),
-                                       ("ap", ap, "anterior-posterior", "forward")):
+    for key, values, name, towards in (
+        ("ml", ml, "medio-lateral", "right"),
+        ("ap", ap, "anterior-posterior", "forward"),
+    ):
         signals = {method: v - zero[key] for method, v in values.items()}
-        figure = methods_over_time(MethodsOverTime(
-            clock[window], signals, f"COP {key.upper()} [mm] (+ {towards})"))
-        caption = (f"COP, {name}, about the measured mean. {_rmse_words(signals, 'mm')} These are "
-                   f"{data}.")
+        figure = methods_over_time(
+            MethodsOverTime(clock[window], signals, f"COP {key.upper()} [mm] (+ {towards})")
+        )
+        caption = (
+            f"COP, {name}, about the measured mean. {_rmse_words(signals, 'mm')} These are {data}."
+        )
         blocks.append(Picture(figure, caption, f"Curves: COP {name} over time.", f"fig3_cop_{key}"))
     paths = {m: np.stack([ml[m] - zero["ml"], ap[m] - zero["ap"]], axis=1) for m in ap}
-    blocks.append(Picture(cop_path(CopPath(paths)), "The path of the centre of pressure on the "
-                          "plate over the same time, seen from above, about the measured mean.",
-                          "Curves: path of the COP from above.", "cop_path"))
+    blocks.append(
+        Picture(
+            cop_path(CopPath(paths)),
+            "The path of the centre of pressure on the "
+            "plate over the same time, seen from above, about the measured mean.",
+            "Curves: path of the COP from above.",
+            "cop_path",
+        )
+    )
     return blocks
 
 
@@ -113,30 +150,43 @@ def _cop_mm(
 def _vertical_force(record: ParticipantRecord) -> list[Block]:
     trial = _throw(record)
     if trial is None:
-        return [Paragraph("There is no validating trial with comparable forces, so the vertical "
-                          "ground force of a throw is not shown.", "note")]
+        return [
+            Paragraph(
+                "There is no validating trial with comparable forces, so the vertical "
+                "ground force of a throw is not shown.",
+                "note",
+            )
+        ]
     frame = trial.reconstruction
     assert frame is not None
     clock, valid = clock_of(frame), flags_of(frame, "valid")
     window = hull_of(valid, int(_ROOM_S / np.median(np.diff(clock))))
     scale = 100.0 / record.body_weight()
-    signals = {m: np.where(valid | (m == "measured"), scale * v, np.nan)[window]
-               for m, v in signals_of(frame, "fz_N").items()}
-    figure = methods_over_time(
-        MethodsOverTime(clock[window], signals, "vertical force [% BW]"))
+    signals = {
+        m: np.where(valid | (m == "measured"), scale * v, np.nan)[window]
+        for m, v in signals_of(frame, "fz_N").items()
+    }
+    figure = methods_over_time(MethodsOverTime(clock[window], signals, "vertical force [% BW]"))
     compared = {m: np.where(valid[window], v, np.nan) for m, v in signals.items()}
-    caption = (f"Vertical ground force in {trial.label}, in percent of body weight. "
-               f"{_rmse_words(compared, '% BW')} These are "
-               f"{_data_of(flags_of(frame, 'used'))}.")
-    return [Heading(f"Vertical ground force: {trial.label}"),
-            Picture(figure, caption, "Curves: vertical force over time.", "fig3_vertical_force")]
+    caption = (
+        f"Vertical ground force in {trial.label}, in percent of body weight. "
+        f"{_rmse_words(compared, '% BW')} These are "
+        f"{_data_of(flags_of(frame, 'used'))}."
+    )
+    return [
+        Heading(f"Vertical ground force: {trial.label}"),
+        Picture(figure, caption, "Curves: vertical force over time.", "fig3_vertical_force"),
+    ]
 
 
 def _throw(record: ParticipantRecord) -> TrialRecord | None:
     """A validating trial with forces: a basketball throw, another throw, else the longest."""
     used = record.identification_trials()
-    frames = [(trial, _valid_frames(trial)) for trial in record.trials
-              if trial.role == "validation" and trial not in used]
+    frames = [
+        (trial, _valid_frames(trial))
+        for trial in record.trials
+        if trial.role == "validation" and trial not in used
+    ]
     able = [(trial, frames) for trial, frames in frames if frames > 1]
     for word in _THROWS:
         for trial, _ in able:
@@ -176,8 +226,10 @@ def _overview(record: ParticipantRecord) -> list[Block]:
         return [Paragraph("No trial could be compared with both methods.", "warning")]
     head = ("trial", "data", *(component_label(c) for c in COMPONENTS))
     return [
-        Paragraph("Change of the error (RMSE) when OM replaces RM, in percent: below zero OM "
-                  f"follows better (✓). Changes within {percent(SAME_WITHIN)} % count as equal."),
+        Paragraph(
+            "Change of the error (RMSE) when OM replaces RM, in percent: below zero OM "
+            f"follows better (✓). Changes within {percent(SAME_WITHIN)} % count as equal."
+        ),
         Grid(head, tuple(rows), "Change of RMSE from RM to OM [%]", words=2),
     ]
 
@@ -188,7 +240,8 @@ def _overview_row(trial: TrialRecord, gains: Sequence[Gain]) -> tuple[str | Cell
     by_name = {gain.component: gain for gain in gains}
     marks: dict[str, Mark] = {"OM": "better", "RM": "warning", "": ""}
     cells = [
-        Cell(signed(100.0 * by_name[c].change()), marks[by_name[c].better()]) if c in by_name
+        Cell(signed(100.0 * by_name[c].change()), marks[by_name[c].better()])
+        if c in by_name
         else Cell("–")
         for c in COMPONENTS
     ]
@@ -202,10 +255,14 @@ def _fit_grids(record: ParticipantRecord) -> list[Block]:
             blocks.append(Paragraph(f"{trial.label}: the forces were not compared.", "note"))
         else:
             blocks.append(_fit_grid(trial, trial.fit))
-    blocks.append(Paragraph(
-        "r: Pearson's correlation. M, P and C: magnitude, phase and combined error after Sprague "
-        "and Geers (0 is perfect). Independent: how many independent samples the correlated frames "
-        "are worth. Moments are about the world origin.", "note"))
+    blocks.append(
+        Paragraph(
+            "r: Pearson's correlation. M, P and C: magnitude, phase and combined error after Sprague "
+            "and Geers (0 is perfect). Independent: how many independent samples the correlated frames "
+            "are worth. Moments are about the world origin.",
+            "note",
+        )
+    )
     return blocks
 
 
@@ -218,10 +275,18 @@ def _fit_grid(trial: TrialRecord, fit: pd.DataFrame) -> Grid:
         known = [row for row in own if row is not None]
         if not known:
             continue
-        cells = [cell for column, _, digits in _MEASURES
-                 for cell in _measure_cells(own, column, digits)]
-        lines.append((component_label(component), str(known[0]["unit"]), *cells,
-                      number(known[0]["n"], 0), number(known[-1]["n_effective"], 0)))
+        cells = [
+            cell for column, _, digits in _MEASURES for cell in _measure_cells(own, column, digits)
+        ]
+        lines.append(
+            (
+                component_label(component),
+                str(known[0]["unit"]),
+                *cells,
+                number(known[0]["n"], 0),
+                number(known[-1]["n_effective"], 0),
+            )
+        )
     data = _DATA.get(str(fit["data"].iloc[-1]), str(fit["data"].iloc[-1]))
     head = ("component", "unit", *methods * len(_MEASURES), "samples", "independent")
     groups = (("", 2), *((title, len(methods)) for _, title, _ in _MEASURES), ("", 2))
@@ -248,11 +313,17 @@ def _measure_cells(rows: Sequence[Mapping | None], column: str, digits: int) -> 
 def _posturography(record: ParticipantRecord) -> list[Block]:
     rows = [
         (trial.label, method_label(row["method"]), *(number(row[column], 1) for column, _ in _SWAY))
-        for trial in record.trials if trial.posturography is not None
+        for trial in record.trials
+        if trial.posturography is not None
         for _, row in trial.posturography.iterrows()
     ]
     if not rows:
         return [Paragraph("No trial has a centre of pressure to measure sway by.", "note")]
-    return [Grid(("trial", "from", *(title for _, title in _SWAY)), tuple(rows),
-                 "About the mean of each trial; a good simulation repeats the measured values",
-                 words=2)]
+    return [
+        Grid(
+            ("trial", "from", *(title for _, title in _SWAY)),
+            tuple(rows),
+            "About the mean of each trial; a good simulation repeats the measured values",
+            words=2,
+        )
+    ]

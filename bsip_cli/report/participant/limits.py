@@ -25,8 +25,12 @@ CANNOT_KNOW = (
 
 def section(record: ParticipantRecord) -> Section:
     blocks: list[Block] = [
-        Bullets(CANNOT_KNOW), Heading("Refused"), *_refused(record),
-        Heading("Warnings"), *_warned(record), *options_grids(record.origins),
+        Bullets(CANNOT_KNOW),
+        Heading("Refused"),
+        *_refused(record),
+        Heading("Warnings"),
+        *_warned(record),
+        *options_grids(record.origins),
     ]
     return Section("limits", "Limits, warnings, options", tuple(blocks))
 
@@ -42,5 +46,9 @@ def _warned(record: ParticipantRecord) -> list[Block]:
     said = messages(record.origins)
     if not said:
         return [Paragraph("No stage had anything to warn of.")]
-    return [Bullets(tuple(f"{stage}{f' ({unit})' if unit else ''}: {text}"
-                          for stage, unit, text in said), "warning")]
+    return [
+        Bullets(
+            tuple(f"{stage}{f' ({unit})' if unit else ''}: {text}" for stage, unit, text in said),
+            "warning",
+        )
+    ]

@@ -18,16 +18,30 @@ _FLAGS = ("left_on_ground", "right_on_ground", "left_on_plate", "right_on_plate"
 
 def section(record: ParticipantRecord) -> Section:
     blocks: list[Block] = [
-        Paragraph("Forces are compared only while every foot that touches the ground stands on a "
-                  "plate (the compared share). A frame is determined if its markers fix the pose."),
+        Paragraph(
+            "Forces are compared only while every foot that touches the ground stands on a "
+            "plate (the compared share). A frame is determined if its markers fix the pose."
+        ),
         Grid(
-            ("trial", "role", "duration [s]", "compared [%]", "determined [%]",
-             "with gaps", "samples left open [%]", "excluded", "warnings", "corrected"),
-            tuple(_row(trial) for trial in record.trials), words=2,
+            (
+                "trial",
+                "role",
+                "duration [s]",
+                "compared [%]",
+                "determined [%]",
+                "with gaps",
+                "samples left open [%]",
+                "excluded",
+                "warnings",
+                "corrected",
+            ),
+            tuple(_row(trial) for trial in record.trials),
+            words=2,
             groups=(("", 5), ("markers", 2), ("findings at ingest", 3)),
         ),
         *_findings(record),
-        Heading("Contacts with the ground"), *_timelines(record),
+        Heading("Contacts with the ground"),
+        *_timelines(record),
     ]
     return Section("measured", "What was measured", tuple(blocks))
 
@@ -36,12 +50,16 @@ def _row(trial: TrialRecord) -> tuple[str | Cell, ...]:
     levels = list(trial.quality["level"]) if trial.quality is not None else []
     excluded, warned, corrected = (levels.count(level) for level in _LEVELS)
     return (
-        trial.label, ROLES.get(trial.role, trial.role), _duration(trial),
+        trial.label,
+        ROLES.get(trial.role, trial.role),
+        _duration(trial),
         percent(_share(trial, "contacts", "valid")),
-        percent(_share(trial, "kinematics", "determined")), _markers_with_gaps(trial),
+        percent(_share(trial, "kinematics", "determined")),
+        _markers_with_gaps(trial),
         _samples_left_open(trial),
         Cell(str(excluded), "warning" if excluded else ""),
-        Cell(str(warned), "warning" if warned else ""), str(corrected),
+        Cell(str(warned), "warning" if warned else ""),
+        str(corrected),
     )
 
 
@@ -69,10 +87,18 @@ def _samples_left_open(trial: TrialRecord) -> str:
 
 def _findings(record: ParticipantRecord) -> list[Block]:
     rows = [
-        (trial.label, Cell(row["level"], "warning" if row["level"] in _LEVELS[:2] else ""),
-         row["check"], row["subject"] or MISSING, row["found"], row["expected"] or MISSING,
-         row["action"] or MISSING)
-        for level in (*_LEVELS, "info") for trial in record.trials if trial.quality is not None
+        (
+            trial.label,
+            Cell(row["level"], "warning" if row["level"] in _LEVELS[:2] else ""),
+            row["check"],
+            row["subject"] or MISSING,
+            row["found"],
+            row["expected"] or MISSING,
+            row["action"] or MISSING,
+        )
+        for level in (*_LEVELS, "info")
+        for trial in record.trials
+        if trial.quality is not None
         for _, row in trial.quality[trial.quality["level"] == level].iterrows()
         if level != "info" or row["check"].startswith(_PLATES)
     ]
@@ -81,8 +107,12 @@ def _findings(record: ParticipantRecord) -> list[Block]:
     head = ("trial", "level", "check", "subject", "found", "expected", "done")
     blocks: list[Block] = [Grid(head, tuple(rows[:_MOST_FINDINGS]), "Findings at ingest", words=7)]
     if len(rows) > _MOST_FINDINGS:
-        blocks.append(Paragraph(
-            f"{count(len(rows) - _MOST_FINDINGS, 'more finding')} in the quality tables.", "note"))
+        blocks.append(
+            Paragraph(
+                f"{count(len(rows) - _MOST_FINDINGS, 'more finding')} in the quality tables.",
+                "note",
+            )
+        )
     return blocks
 
 
@@ -97,13 +127,21 @@ def _timelines(record: ParticipantRecord) -> list[Block]:
         if not any(flags[name].any() for name in _FLAGS):
             blocks.append(Paragraph(f"{trial.label}: no foot touches the ground.", "note"))
             continue
-        blocks.append(Picture(contact_timeline(data), f"{trial.label}: {_in_words(data)}",
-                              f"Bars over time: contacts of both feet in {trial.label}."))
+        blocks.append(
+            Picture(
+                contact_timeline(data),
+                f"{trial.label}: {_in_words(data)}",
+                f"Bars over time: contacts of both feet in {trial.label}.",
+            )
+        )
     return blocks
 
 
 def _in_words(data: ContactTimeline) -> str:
     beside = (data.left_on_ground & ~data.left_on_plate) | (
-        data.right_on_ground & ~data.right_on_plate)
-    return (f"forces compared over {percent(float(np.mean(data.valid)))} % of the time; in "
-            f"{percent(float(np.mean(beside)))} % a foot stands beside the plates.")
+        data.right_on_ground & ~data.right_on_plate
+    )
+    return (
+        f"forces compared over {percent(float(np.mean(data.valid)))} % of the time; in "
+        f"{percent(float(np.mean(beside)))} % a foot stands beside the plates."
+    )

@@ -21,9 +21,11 @@ _MM = 1000.0
 
 def section(record: ParticipantRecord) -> Section:
     blocks: list[Block] = [
-        Paragraph("Grey limbs are left, black limbs right. The green arrow is the measured ground "
-                  "force at its centre of pressure, where all contacts are on plates; one body "
-                  "weight is half as long as the person is tall."),
+        Paragraph(
+            "Grey limbs are left, black limbs right. The green arrow is the measured ground "
+            "force at its centre of pressure, where all contacts are on plates; one body "
+            "weight is half as long as the person is tall."
+        ),
     ]
     for trial in record.trials:
         blocks += [Heading(trial.label), *_strip(record, trial), *_over_time(trial)]
@@ -34,15 +36,28 @@ def _strip(record: ParticipantRecord, trial: TrialRecord) -> list[Block]:
     if trial.kinematics is None:
         return [Paragraph(f"The pose was not computed in {trial.label}.", "note")]
     anterior = record.facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
-    strip = strip_of(record.body, trial.kinematics, trial.reconstruction, anterior,
-                     record.body_weight(), _INSTANTS.get(trial.role, _USUAL_INSTANTS))
+    strip = strip_of(
+        record.body,
+        trial.kinematics,
+        trial.reconstruction,
+        anterior,
+        record.body_weight(),
+        _INSTANTS.get(trial.role, _USUAL_INSTANTS),
+    )
     if strip is None:
         return [Paragraph(f"No frame of {trial.label} is determined by its markers.", "warning")]
     forces = int(np.isfinite(strip.arrow_tips_m()).all(axis=1).sum())
-    caption = (f"{trial.label}: the pose at {len(strip.time_s)} instants, the force at {forces} of "
-               "them.")
-    return [Picture(stick_strip(strip), caption, f"Stick figures of {trial.label}.",
-                    f"sticks_{trial.stem.split('_', 1)[-1]}")]
+    caption = (
+        f"{trial.label}: the pose at {len(strip.time_s)} instants, the force at {forces} of them."
+    )
+    return [
+        Picture(
+            stick_strip(strip),
+            caption,
+            f"Stick figures of {trial.label}.",
+            f"sticks_{trial.stem.split('_', 1)[-1]}",
+        )
+    ]
 
 
 def _over_time(trial: TrialRecord) -> list[Block]:
@@ -50,11 +65,13 @@ def _over_time(trial: TrialRecord) -> list[Block]:
     if frame is None or len(frame) < 2 or not frame["marker_rms_m"].notna().any():
         return []
     data = ResidualOverTime(
-        frame["time_s"].to_numpy(), _MM * frame["marker_rms_m"].to_numpy(), _worst(trial, frame))
+        frame["time_s"].to_numpy(), _MM * frame["marker_rms_m"].to_numpy(), _worst(trial, frame)
+    )
     rms = float(np.sqrt(np.nanmean(data.rms_mm**2)))
     caption = f"{trial.label}: distance of the markers from the model, {number(rms, 1)} mm RMS."
-    return [Picture(residual_over_time(data), caption,
-                    f"Marker residual over time in {trial.label}.")]
+    return [
+        Picture(residual_over_time(data), caption, f"Marker residual over time in {trial.label}.")
+    ]
 
 
 def _worst(trial: TrialRecord, frame: pd.DataFrame) -> np.ndarray:
@@ -72,13 +89,22 @@ def _markers(record: ParticipantRecord) -> list[Block]:
     by_marker = squares.groupby(rows["marker"]).mean().dropna()
     if by_marker.empty:
         return [Paragraph("No marker residuals are known.", "warning")]
-    data = MarkerResiduals(tuple(by_marker.index.astype(str)), _MM * np.sqrt(by_marker.to_numpy()),
-                           _MM * float(np.sqrt(squares.mean())))
+    data = MarkerResiduals(
+        tuple(by_marker.index.astype(str)),
+        _MM * np.sqrt(by_marker.to_numpy()),
+        _MM * float(np.sqrt(squares.mean())),
+    )
     worst = np.argsort(-data.rms_mm, kind="stable")[:_WORST]
     named = listing([f"{data.markers[k]} ({number(data.rms_mm[k], 1)} mm)" for k in worst])
     return [
-        Picture(marker_residuals(data), "RMS distance of each marker from its model, all trials.",
-                "Bars: RMS residual per marker.", "marker_residuals"),
-        Paragraph(f"The farthest from the model: {named}. A single marker far above the others has "
-                  "slipped, is swapped, or sits where the model does not expect it."),
+        Picture(
+            marker_residuals(data),
+            "RMS distance of each marker from its model, all trials.",
+            "Bars: RMS residual per marker.",
+            "marker_residuals",
+        ),
+        Paragraph(
+            f"The farthest from the model: {named}. A single marker far above the others has "
+            "slipped, is swapped, or sits where the model does not expect it."
+        ),
     ]

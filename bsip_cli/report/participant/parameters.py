@@ -33,18 +33,31 @@ def section(record: ParticipantRecord) -> Section:
     rm, om = record.method("RM"), record.method("OM")
     if om.empty or rm.empty:
         gone = "OM" if om.empty else "RM"
-        blocks: list[Block] = [Paragraph(f"There are no parameters of {gone}, so nothing can be "
-                                         "compared.", "warning")]
+        blocks: list[Block] = [
+            Paragraph(f"There are no parameters of {gone}, so nothing can be compared.", "warning")
+        ]
     else:
         om = om.reindex(rm.index)
         blocks = [
-            Paragraph(_in_words(om)), _masses_picture(rm, om), _masses_grid(rm, om),
-            Heading("Centres of mass"), _com_picture(rm, om), _com_grid(rm, om),
-            Heading("Moments of inertia"), _moments_grid(rm, om),
+            Paragraph(_in_words(om)),
+            _masses_picture(rm, om),
+            _masses_grid(rm, om),
+            Heading("Centres of mass"),
+            _com_picture(rm, om),
+            _com_grid(rm, om),
+            Heading("Moments of inertia"),
+            _moments_grid(rm, om),
         ]
-    return Section("parameters", "The inertial parameters", (
-        *blocks, Heading("How well the movement excited the parameters"), *_excitation(record),
-        *_base(record)))
+    return Section(
+        "parameters",
+        "The inertial parameters",
+        (
+            *blocks,
+            Heading("How well the movement excited the parameters"),
+            *_excitation(record),
+            *_base(record),
+        ),
+    )
 
 
 # --- masses, centres, moments -------------------------------------------------------------------
@@ -65,8 +78,10 @@ def _in_words(om: pd.DataFrame) -> str:
     unknown = int(shares.isna().sum())
     if unknown:
         text += f"For {count(unknown, 'segment')} the data share is not known. "
-    return text + ("The data share is the part of the table's variance that the data removed: at 0 "
-                   "% the number is the table's, at 100 % the table has no say.")
+    return text + (
+        "The data share is the part of the table's variance that the data removed: at 0 "
+        "% the number is the table's, at 100 % the table has no say."
+    )
 
 
 def _labels(frame: pd.DataFrame) -> tuple[str, ...]:
@@ -74,26 +89,47 @@ def _labels(frame: pd.DataFrame) -> tuple[str, ...]:
 
 
 def _masses_picture(rm: pd.DataFrame, om: pd.DataFrame) -> Picture:
-    data = SegmentMasses(_labels(rm), rm["mass_kg"].to_numpy(), om["mass_kg"].to_numpy(),
-                         om["mass_kg_sd"].to_numpy(), om["mass_data_share"].to_numpy())
+    data = SegmentMasses(
+        _labels(rm),
+        rm["mass_kg"].to_numpy(),
+        om["mass_kg"].to_numpy(),
+        om["mass_kg_sd"].to_numpy(),
+        om["mass_data_share"].to_numpy(),
+    )
     return Picture(
-        segment_masses(data), "Segment masses by table and by identification, their difference "
+        segment_masses(data),
+        "Segment masses by table and by identification, their difference "
         "with its 95 % interval, and how much of the mass the data decided.",
-        "Points: segment masses of RM and OM; bars: data share.", "masses")
+        "Points: segment masses of RM and OM; bars: data share.",
+        "masses",
+    )
 
 
 def _masses_grid(rm: pd.DataFrame, om: pd.DataFrame) -> Grid:
     table, own = rm["mass_kg"].to_numpy(dtype=float), om["mass_kg"].to_numpy(dtype=float)
     sd, share = om["mass_kg_sd"].to_numpy(dtype=float), om["mass_data_share"].to_numpy(dtype=float)
     rows = [
-        (label, number(table[k], 3), with_spread(own[k], sd[k], 3),
-         signed(100.0 * (own[k] / table[k] - 1.0)), _share_cell(share[k]))
+        (
+            label,
+            number(table[k], 3),
+            with_spread(own[k], sd[k], 3),
+            signed(100.0 * (own[k] / table[k] - 1.0)),
+            _share_cell(share[k]),
+        )
         for k, label in enumerate(_labels(rm))
     ]
-    total = ("whole body", number(table.sum(), 3), number(own.sum(), 3),
-             signed(100.0 * (own.sum() / table.sum() - 1.0)), "")
-    return Grid(("segment", "RM [kg]", "OM [kg] ± sd", "change [%]", "data share [%]"),
-                (*rows, total), "Segment masses")
+    total = (
+        "whole body",
+        number(table.sum(), 3),
+        number(own.sum(), 3),
+        signed(100.0 * (own.sum() / table.sum() - 1.0)),
+        "",
+    )
+    return Grid(
+        ("segment", "RM [kg]", "OM [kg] ± sd", "change [%]", "data share [%]"),
+        (*rows, total),
+        "Segment masses",
+    )
 
 
 def _share_cell(share: float) -> Cell:
@@ -102,44 +138,71 @@ def _share_cell(share: float) -> Cell:
 
 def _com_picture(rm: pd.DataFrame, om: pd.DataFrame) -> Picture:
     data = ComDifferences(
-        _labels(rm), _MM * (om[list(_COM)] - rm[list(_COM)]).to_numpy(),
+        _labels(rm),
+        _MM * (om[list(_COM)] - rm[list(_COM)]).to_numpy(),
         _MM * om[[f"{name}_sd" for name in _COM]].to_numpy(),
-        om[[share_name(name) for name in _COM]].to_numpy())
+        om[[share_name(name) for name in _COM]].to_numpy(),
+    )
     return Picture(
-        com_differences(data), "How far identification moves each centre of mass from the table's, "
+        com_differences(data),
+        "How far identification moves each centre of mass from the table's, "
         "with 95 % intervals. Full points: the data decided more than half; empty ones: the table.",
-        "Points: difference of the centres of mass per segment and axis.", "centres_of_mass")
+        "Points: difference of the centres of mass per segment and axis.",
+        "centres_of_mass",
+    )
 
 
 def _com_grid(rm: pd.DataFrame, om: pd.DataFrame) -> Grid:
     return _three_axes(
-        rm, om, _COM, _MM, 1, "Centre of mass in the segment's frame, from its proximal joint [mm]",
-        ("X (forward)", "Y (up)", "Z (to the right)"))
+        rm,
+        om,
+        _COM,
+        _MM,
+        1,
+        "Centre of mass in the segment's frame, from its proximal joint [mm]",
+        ("X (forward)", "Y (up)", "Z (to the right)"),
+    )
 
 
 def _moments_grid(rm: pd.DataFrame, om: pd.DataFrame) -> Grid:
     return _three_axes(
-        rm, om, _MOMENTS, _KG_CM2, 1,
+        rm,
+        om,
+        _MOMENTS,
+        _KG_CM2,
+        1,
         "Moments of inertia about the segment's centre of mass, segment axes [kg cm²]",
-        ("about X", "about Y", "about Z"))
+        ("about X", "about Y", "about Z"),
+    )
 
 
 def _three_axes(
-    rm: pd.DataFrame, om: pd.DataFrame, columns: Sequence[str], scale: float, digits: int,
-    caption: str, axes: Sequence[str],
+    rm: pd.DataFrame,
+    om: pd.DataFrame,
+    columns: Sequence[str],
+    scale: float,
+    digits: int,
+    caption: str,
+    axes: Sequence[str],
 ) -> Grid:
     table, own, sd, share = (
         frame[list(names)].to_numpy(dtype=float)
-        for frame, names in ((rm, columns), (om, columns), (om, [f"{c}_sd" for c in columns]),
-                             (om, [share_name(c) for c in columns]))
+        for frame, names in (
+            (rm, columns),
+            (om, columns),
+            (om, [f"{c}_sd" for c in columns]),
+            (om, [share_name(c) for c in columns]),
+        )
     )
     rows = []
     for i, label in enumerate(_labels(rm)):
         cells: list[str | Cell] = [label]
         for k in range(len(columns)):
-            cells += [number(scale * table[i, k], digits),
-                      with_spread(scale * own[i, k], scale * sd[i, k], digits),
-                      _share_cell(share[i, k])]
+            cells += [
+                number(scale * table[i, k], digits),
+                with_spread(scale * own[i, k], scale * sd[i, k], digits),
+                _share_cell(share[i, k]),
+            ]
         rows.append(tuple(cells))
     head = ("segment", *("RM", "OM ± sd", "data [%]") * len(columns))
     groups = (("", 1), *((axis, 3) for axis in axes))
@@ -155,16 +218,22 @@ def _excitation(record: ParticipantRecord) -> list[Block]:
     segments = table[table["quantity"] == "segment"].sort_values("value", kind="stable")
     text = ""
     if len(condition):
-        text += (f"The condition number of the identification is {significant(condition.iloc[0])}: "
-                 "the larger, the more some combinations of parameters hang on noise. ")
+        text += (
+            f"The condition number of the identification is {significant(condition.iloc[0])}: "
+            "the larger, the more some combinations of parameters hang on noise. "
+        )
     if len(segments):
         least = [segment_label(name) for name in segments["name"].head(_LEAST)]
-        text += (f"The movement excited {listing(least)} least; a sequence that swings and turns "
-                 "them faster would tell more about them.")
+        text += (
+            f"The movement excited {listing(least)} least; a sequence that swings and turns "
+            "them faster would tell more about them."
+        )
     blocks: list[Block] = [Paragraph(text or "The excitation was not computed.")]
     if len(segments):
-        rows = tuple((segment_label(row["name"]), significant(row["value"]))
-                     for _, row in segments.iterrows())
+        rows = tuple(
+            (segment_label(row["name"]), significant(row["value"]))
+            for _, row in segments.iterrows()
+        )
         blocks.append(Grid(("segment", "excitation [1]"), rows, "Excitation, the least first"))
     return [*blocks, *_identification(record.identification)]
 
@@ -173,17 +242,46 @@ def _identification(table: pd.DataFrame) -> list[Block]:
     if table.empty:
         return []
     rows = tuple(
-        (row["estimator"], row["method"], number(row["duration_s"]), number(row["samples"], 0),
-         number(row["effective_samples"], 0), number(row["rank"], 0),
-         *(number(row[f"rms_{c}"], 2) for c in ("fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm")))
+        (
+            row["estimator"],
+            row["method"],
+            number(row["duration_s"]),
+            number(row["samples"], 0),
+            number(row["effective_samples"], 0),
+            number(row["rank"], 0),
+            *(
+                number(row[f"rms_{c}"], 2)
+                for c in ("fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm")
+            ),
+        )
         for _, row in table.iterrows()
     )
-    head = ("estimator", "method", "time used [s]", "samples", "independent", "base parameters",
-            "Fx [N]", "Fy [N]", "Fz [N]", "Mx [N m]", "My [N m]", "Mz [N m]")
-    notes = tuple(f"{row['method']} ({row['estimator']}): {row['note']}"
-                  for _, row in table.iterrows() if row["note"])
-    grid = Grid(head, rows, "What the identification used, and its residual (RMS)", words=2,
-                groups=(("", 6), ("residual", 6)))
+    head = (
+        "estimator",
+        "method",
+        "time used [s]",
+        "samples",
+        "independent",
+        "base parameters",
+        "Fx [N]",
+        "Fy [N]",
+        "Fz [N]",
+        "Mx [N m]",
+        "My [N m]",
+        "Mz [N m]",
+    )
+    notes = tuple(
+        f"{row['method']} ({row['estimator']}): {row['note']}"
+        for _, row in table.iterrows()
+        if row["note"]
+    )
+    grid = Grid(
+        head,
+        rows,
+        "What the identification used, and its residual (RMS)",
+        words=2,
+        groups=(("", 6), ("residual", 6)),
+    )
     return [grid, Bullets(notes)] if notes else [grid]
 
 
@@ -195,17 +293,27 @@ def _base(record: ParticipantRecord) -> list[Block]:
     good = int((table["sigma_percent"] < limit).sum())
     worst = table.sort_values("sigma_percent", ascending=False, kind="stable").head(_WORST)
     rows = tuple(
-        (row["name"], row["expression"], row["unit"], significant(row["rm_value"]),
-         significant(row["value"]), significant(row["sd"], 2), significant(row["sigma_percent"]))
+        (
+            row["name"],
+            row["expression"],
+            row["unit"],
+            significant(row["rm_value"]),
+            significant(row["value"]),
+            significant(row["sd"], 2),
+            significant(row["sigma_percent"]),
+        )
         for _, row in worst.iterrows()
     )
     return [
         Heading("Base parameters"),
-        Paragraph(f"The ground forces determine {len(table)} combinations of the parameters. "
-                  f"{good} of them are known to better than {limit:g} %; the worst are below."),
+        Paragraph(
+            f"The ground forces determine {len(table)} combinations of the parameters. "
+            f"{good} of them are known to better than {limit:g} %; the worst are below."
+        ),
         Grid(
             ("leading parameter", "combination", "unit", "RM", "identified", "sd", "sigma [%]"),
-            rows, f"The {len(rows)} base parameters with the largest sd relative to their value",
+            rows,
+            f"The {len(rows)} base parameters with the largest sd relative to their value",
             words=3,
         ),
     ]

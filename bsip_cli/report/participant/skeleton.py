@@ -18,14 +18,24 @@ def section(record: ParticipantRecord) -> Section:
     blocks: list[Block] = [
         Paragraph(_in_words(rows)),
         Grid(
-            ("segment", "hangs on", "joint", "type", "length [mm]", "first guess [mm]",
-             "change [%]", "joint moved by [mm]"),
+            (
+                "segment",
+                "hangs on",
+                "joint",
+                "type",
+                "length [mm]",
+                "first guess [mm]",
+                "change [%]",
+                "joint moved by [mm]",
+            ),
             tuple(_row(str(name), row) for name, row in rows.iterrows()),
             "Lengths are those that scale the anthropometric table, ± one standard deviation",
             words=4,
         ),
-        Heading("Left against right"), *_symmetry(rows),
-        Heading("Where the markers sit"), _markers(record),
+        Heading("Left against right"),
+        *_symmetry(rows),
+        Heading("Where the markers sit"),
+        _markers(record),
     ]
     return Section("skeleton", "The skeleton", tuple(blocks))
 
@@ -37,14 +47,21 @@ def _change(row: pd.Series) -> float:
 
 def _in_words(rows: pd.DataFrame) -> str:
     changes = rows.apply(_change, axis=1)
-    far = [f"{segment_label(str(s))} ({signed(c, 1)} %)" for s, c in changes.items()
-           if abs(c) > _FAR_PERCENT]
-    text = (f"Refinement moved these lengths by more than {_FAR_PERCENT:.0f} % from their first "
-            f"guess: {listing(far)}.")
+    far = [
+        f"{segment_label(str(s))} ({signed(c, 1)} %)"
+        for s, c in changes.items()
+        if abs(c) > _FAR_PERCENT
+    ]
+    text = (
+        f"Refinement moved these lengths by more than {_FAR_PERCENT:.0f} % from their first "
+        f"guess: {listing(far)}."
+    )
     held = [segment_label(s) for s in rows.index[rows["held"].astype(bool)]]
     if held:
-        text += (f" No markers inform {listing(held)}: their joints are held at the neutral pose, "
-                 "and their parameters cannot be identified.")
+        text += (
+            f" No markers inform {listing(held)}: their joints are held at the neutral pose, "
+            "and their parameters cannot be identified."
+        )
     return text
 
 
@@ -52,7 +69,10 @@ def _row(name: str, row: pd.Series) -> tuple[str | Cell, ...]:
     change = _change(row)
     kind = f"{row['joint_type']}, held" if row["held"] else row["joint_type"]
     return (
-        segment_label(name), segment_label(row["parent"] or "") or "–", row["joint"], kind,
+        segment_label(name),
+        segment_label(row["parent"] or "") or "–",
+        row["joint"],
+        kind,
         with_spread(_MM * row["length_m"], _MM * row["length_sd_m"]),
         number(_MM * row["first_guess_m"]),
         Cell(signed(change, 1), "warning" if abs(change) > _FAR_PERCENT else ""),
@@ -62,37 +82,60 @@ def _row(name: str, row: pd.Series) -> tuple[str | Cell, ...]:
 
 def _symmetry(rows: pd.DataFrame) -> list[Block]:
     lengths = dict(zip(rows.index, rows["length_m"].to_numpy(dtype=float), strict=True))
-    pairs = [(name[:-2], length, lengths[f"{name[:-2]}_r"]) for name, length in lengths.items()
-             if name.endswith("_l") and f"{name[:-2]}_r" in lengths]
+    pairs = [
+        (name[:-2], length, lengths[f"{name[:-2]}_r"])
+        for name, length in lengths.items()
+        if name.endswith("_l") and f"{name[:-2]}_r" in lengths
+    ]
     if not pairs:
         return [Paragraph("The skeleton has no pairs of segments.", "note")]
     grid = tuple(
-        (segment_label(name), number(_MM * left), number(_MM * right),
-         signed(_MM * (left - right), 1), signed(200.0 * (left - right) / (left + right), 1))
+        (
+            segment_label(name),
+            number(_MM * left),
+            number(_MM * right),
+            signed(_MM * (left - right), 1),
+            signed(200.0 * (left - right) / (left + right), 1),
+        )
         for name, left, right in pairs
     )
     name, left, right = max(pairs, key=lambda p: abs(p[1] - p[2]) / (p[1] + p[2]))
     longer = "left" if left > right else "right"
     share = 200.0 * abs(left - right) / (left + right)
-    sentence = (f"The largest difference is in the {segment_label(name)}: the {longer} one is "
-                f"longer by {number(share, 1)} %.") if share >= 0.05 else "Left and right agree."
+    sentence = (
+        (
+            f"The largest difference is in the {segment_label(name)}: the {longer} one is "
+            f"longer by {number(share, 1)} %."
+        )
+        if share >= 0.05
+        else "Left and right agree."
+    )
     return [
-        Paragraph(f"{sentence} Left and right were tied softly, so a difference that the markers "
-                  "do not show clearly is drawn towards zero."),
+        Paragraph(
+            f"{sentence} Left and right were tied softly, so a difference that the markers "
+            "do not show clearly is drawn towards zero."
+        ),
         Grid(("segment", "left [mm]", "right [mm]", "left − right [mm]", "left − right [%]"), grid),
     ]
 
 
 def _markers(record: ParticipantRecord) -> Grid:
     rows = tuple(
-        (row["marker"], segment_label(row["segment"]), number(row["weight"], 2),
-         *(number(_MM * row[axis]) for axis in ("x_m", "y_m", "z_m")),
-         number(_MM * row["shift_m"]), number(_MM * row["residual_m"]))
+        (
+            row["marker"],
+            segment_label(row["segment"]),
+            number(row["weight"], 2),
+            *(number(_MM * row[axis]) for axis in ("x_m", "y_m", "z_m")),
+            number(_MM * row["shift_m"]),
+            number(_MM * row["residual_m"]),
+        )
         for _, row in record.marker_positions.iterrows()
     )
     return Grid(
-        ("marker", "segment", "weight", "X", "Y", "Z", "moved by [mm]", "residual [mm]"), rows,
+        ("marker", "segment", "weight", "X", "Y", "Z", "moved by [mm]", "residual [mm]"),
+        rows,
         "Position in the segment (X forward, Y up, Z to the right), how far refinement moved it "
         "from the calibration trial, RMS residual over the refining frames",
-        groups=(("", 3), ("position [mm]", 3), ("", 2)), words=2,
+        groups=(("", 3), ("position [mm]", 3), ("", 2)),
+        words=2,
     )

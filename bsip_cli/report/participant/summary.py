@@ -23,10 +23,13 @@ _SEXES = {"M": "a man", "F": "a woman"}
 
 def section(record: ParticipantRecord) -> Section:
     blocks: list[Block] = [
-        Paragraph(_who(record)), Paragraph(_trials(record)), Paragraph(_markers(record)),
+        Paragraph(_who(record)),
+        Paragraph(_trials(record)),
+        Paragraph(_markers(record)),
         Heading("Do the identified parameters follow the forces better than the table's?"),
         *_gain(record),
-        Heading("What to mind first"), *_warnings(record),
+        Heading("What to mind first"),
+        *_warnings(record),
     ]
     return Section("summary", "Summary", tuple(blocks))
 
@@ -34,7 +37,9 @@ def section(record: ParticipantRecord) -> Section:
 def all_gains(record: ParticipantRecord) -> tuple[Gain, ...]:
     """The gains of all trials of movement, trial by trial; standing still tells no method apart."""
     return tuple(
-        gain for trial in record.trials if trial.fit is not None and trial.role != "static"
+        gain
+        for trial in record.trials
+        if trial.fit is not None and trial.role != "static"
         for gain in gains_of(trial.label, trial.fit)
     )
 
@@ -42,14 +47,18 @@ def all_gains(record: ParticipantRecord) -> tuple[Gain, ...]:
 def _who(record: ParticipantRecord) -> str:
     facts = record.facts
     mass, plates = float(facts["mass_kg"]), float(facts["plate_mass_kg"])
-    who = (f"{record.id} is {_SEXES.get(facts['sex'], 'a person')} of {number(mass, 2)} kg "
-           f"(from {facts['mass_source']}) and {number(facts['height_m'], 2)} m.")
+    who = (
+        f"{record.id} is {_SEXES.get(facts['sex'], 'a person')} of {number(mass, 2)} kg "
+        f"(from {facts['mass_source']}) and {number(facts['height_m'], 2)} m."
+    )
     if not np.isfinite(plates):
         return f"{who} No quiet standing on the plates was found to check the mass against."
     if facts["mass_source"] == "plates":
         return f"{who} No mass was stated, so the plates' reading in quiet standing is used."
-    return (f"{who} In quiet standing the plates read {number(plates, 2)} kg "
-            f"({signed(100.0 * (plates / mass - 1.0), 1)} %).")
+    return (
+        f"{who} In quiet standing the plates read {number(plates, 2)} kg "
+        f"({signed(100.0 * (plates / mass - 1.0), 1)} %)."
+    )
 
 
 def _trials(record: ParticipantRecord) -> str:
@@ -73,15 +82,19 @@ def _has_held_out(trial: TrialRecord) -> bool:
 
 
 def _markers(record: ParticipantRecord) -> str:
-    sentence = ("In the frames that refined the skeleton the markers lie "
-                f"{number(1000.0 * record.facts['marker_rms_m'], 1)} mm (RMS) from the model")
+    sentence = (
+        "In the frames that refined the skeleton the markers lie "
+        f"{number(1000.0 * record.facts['marker_rms_m'], 1)} mm (RMS) from the model"
+    )
     frames = [t.kinematics for t in record.trials if t.kinematics is not None]
     squares = [float((k["marker_rms_m"] ** 2).mean()) for k in frames if len(k)]
     squares = [s for s in squares if np.isfinite(s)]
     if not squares:
         return f"{sentence}."
-    return (f"{sentence}; over all trials {number(1000.0 * np.sqrt(np.mean(squares)), 1)} mm. "
-            "Skin markers of careful recordings usually stay below 10 mm.")
+    return (
+        f"{sentence}; over all trials {number(1000.0 * np.sqrt(np.mean(squares)), 1)} mm. "
+        "Skin markers of careful recordings usually stay below 10 mm."
+    )
 
 
 # --- gain -----------------------------------------------------------------------------------
@@ -91,26 +104,44 @@ def _gain(record: ParticipantRecord) -> list[Block]:
     gains = all_gains(record)
     held_out = [gain for gain in gains if gain.held_out]
     if not gains:
-        return [Paragraph("No trial could be compared with both methods: this report cannot say.",
-                          "warning")]
+        return [
+            Paragraph(
+                "No trial could be compared with both methods: this report cannot say.", "warning"
+            )
+        ]
     chosen = held_out or list(gains)
     means = mean_gains(chosen)
     if not means:
-        return [Paragraph("No trial has a stretch in which the forces could be compared: this "
-                          "report cannot say.", "warning")]
+        return [
+            Paragraph(
+                "No trial has a stretch in which the forces could be compared: this "
+                "report cannot say.",
+                "warning",
+            )
+        ]
     blocks: list[Block] = []
     if not held_out:
-        blocks.append(Paragraph(
-            "No data were held out: the numbers below are from the very data that identified the "
-            "parameters, and favour OM. They do not show that OM is better.", "warning"))
+        blocks.append(
+            Paragraph(
+                "No data were held out: the numbers below are from the very data that identified the "
+                "parameters, and favour OM. They do not show that OM is better.",
+                "warning",
+            )
+        )
     blocks += [_verdict(means, bool(held_out)), _mean_grid(means, bool(held_out))]
     worse = [gain for gain in chosen if gain.better() == "RM"]
     if worse:
-        blocks += [Paragraph("OM does not follow better everywhere. The table (RM) is better in:"),
-                   Bullets(_worse(worse), "warning")]
+        blocks += [
+            Paragraph("OM does not follow better everywhere. The table (RM) is better in:"),
+            Bullets(_worse(worse), "warning"),
+        ]
     else:
-        blocks.append(Paragraph("In no trial and component is the table (RM) better by more than "
-                                f"{percent(SAME_WITHIN)} %."))
+        blocks.append(
+            Paragraph(
+                "In no trial and component is the table (RM) better by more than "
+                f"{percent(SAME_WITHIN)} %."
+            )
+        )
     return blocks
 
 
@@ -120,15 +151,19 @@ def _verdict(means: tuple[MeanGain, ...], held_out: bool) -> Paragraph:
     for component in ("cop_ap", "cop_ml", "grf_vertical"):
         if component in by_name:
             mean = by_name[component]
-            parts.append(f"{component_label(component)}: {number(mean.rm, 2)} {mean.unit} with RM, "
-                         f"{number(mean.om, 2)} {mean.unit} with OM "
-                         f"({signed(100.0 * mean.change())} %)")
+            parts.append(
+                f"{component_label(component)}: {number(mean.rm, 2)} {mean.unit} with RM, "
+                f"{number(mean.om, 2)} {mean.unit} with OM "
+                f"({signed(100.0 * mean.change())} %)"
+            )
     where = "On data it had not seen" if held_out else "On the data it was fitted to"
     counted = [m for m in means if m.component != "grf_vertical"]  # the same force as fz
     better = [m for m in counted if m.change() < -SAME_WITHIN]
     worse = [component_label(m.component) for m in counted if m.change() > SAME_WITHIN]
-    text = (f"{where}, OM has the smaller mean error in {len(better)} of "
-            f"{count(len(counted), 'component')}, RM in {listing(worse)}.")
+    text = (
+        f"{where}, OM has the smaller mean error in {len(better)} of "
+        f"{count(len(counted), 'component')}, RM in {listing(worse)}."
+    )
     if parts:
         text += f" Mean error (RMSE) — {'; '.join(parts)}."
     return Paragraph(text, "good" if held_out and len(better) > len(counted) / 2 else "warning")
@@ -136,16 +171,25 @@ def _verdict(means: tuple[MeanGain, ...], held_out: bool) -> Paragraph:
 
 def _mean_grid(means: tuple[MeanGain, ...], held_out: bool) -> Grid:
     rows = tuple(
-        (component_label(m.component), m.unit, Cell(number(m.rm, 2), _mark(m.rm, m.om)),
-         Cell(number(m.om, 2), _mark(m.om, m.rm)), signed(100.0 * m.change()),
-         str(m.om_better), str(m.rm_better), str(m.trials))
+        (
+            component_label(m.component),
+            m.unit,
+            Cell(number(m.rm, 2), _mark(m.rm, m.om)),
+            Cell(number(m.om, 2), _mark(m.om, m.rm)),
+            signed(100.0 * m.change()),
+            str(m.om_better),
+            str(m.rm_better),
+            str(m.trials),
+        )
         for m in means
     )
     data = "held-out data" if held_out else "identification data"
     return Grid(
         ("component", "unit", "RM", "OM", "change [%]", "OM better", "RM better", "all"),
-        rows, f"Mean RMSE over the trials, {data}; ✓ marks the smaller error",
-        groups=(("", 2), ("mean RMSE", 3), ("number of trials", 3)), words=2,
+        rows,
+        f"Mean RMSE over the trials, {data}; ✓ marks the smaller error",
+        groups=(("", 2), ("mean RMSE", 3), ("number of trials", 3)),
+        words=2,
     )
 
 
@@ -159,7 +203,8 @@ def _worse(gains: list[Gain]) -> tuple[str, ...]:
     for gain in gains:
         by_trial.setdefault(gain.trial, []).append(
             f"{component_label(gain.component)} {number(gain.rm, 2)} → {number(gain.om, 2)} "
-            f"{gain.unit} ({signed(100.0 * gain.change())} %)")
+            f"{gain.unit} ({signed(100.0 * gain.change())} %)"
+        )
     return tuple(f"{trial}: {'; '.join(parts)}" for trial, parts in by_trial.items())
 
 
@@ -167,8 +212,13 @@ def _worse(gains: list[Gain]) -> tuple[str, ...]:
 
 
 def _warnings(record: ParticipantRecord) -> list[Block]:
-    strongest = [*_refusals(record), *_undecided(record), *_quality(record, "excluded"),
-                 *_quality(record, "warning"), *_messages(record)]
+    strongest = [
+        *_refusals(record),
+        *_undecided(record),
+        *_quality(record, "excluded"),
+        *_quality(record, "warning"),
+        *_messages(record),
+    ]
     strongest = list(dict.fromkeys(strongest))
     if not strongest:
         return [Paragraph("Nothing was refused, excluded or warned of.")]
@@ -180,8 +230,10 @@ def _warnings(record: ParticipantRecord) -> list[Block]:
 
 
 def _refusals(record: ParticipantRecord) -> list[str]:
-    return [f"{refusal.unit or record.id}, {refusal.stage} refused: {refusal.sentence}"
-            for refusal in record.refusals]
+    return [
+        f"{refusal.unit or record.id}, {refusal.stage} refused: {refusal.sentence}"
+        for refusal in record.refusals
+    ]
 
 
 def _undecided(record: ParticipantRecord) -> list[str]:
@@ -192,8 +244,10 @@ def _undecided(record: ParticipantRecord) -> list[str]:
     weighted = float((shares * om["mass_kg"]).sum() / om["mass_kg"].sum())
     if shares.isna().all() or weighted > 0.5:
         return []
-    return [f"Weighted by mass, the data decided only {percent(weighted)} % of the segment masses; "
-            "the rest comes from the table (section 5)."]
+    return [
+        f"Weighted by mass, the data decided only {percent(weighted)} % of the segment masses; "
+        "the rest comes from the table (section 5)."
+    ]
 
 
 def _quality(record: ParticipantRecord, level: str) -> list[str]:

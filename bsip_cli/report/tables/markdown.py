@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from bsip_cli.report.table_model import Table
+from bsip_cli.report.tables.model import Table
 
 
 def to_markdown(table: Table) -> str:
@@ -33,7 +33,8 @@ def escape(text: str) -> str:
 
 def _lines(table: Table) -> list[Sequence[str]]:
     """The rows' cells, a line with the group's name before its first row."""
-    width, group, lines = len(table.printed_columns()), "", []
+    width, group = len(table.printed_columns()), ""
+    lines: list[Sequence[str]] = []
     for row in table.rows:
         if row.group != group:
             group = row.group

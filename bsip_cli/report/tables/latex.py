@@ -5,14 +5,27 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from bsip_cli.report.table_model import Table
+from bsip_cli.report.tables.model import Table
 
 _SIGNS = {
     "\\": r"\textbackslash{}",
-    "{": r"\{", "}": r"\}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
-    "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
-    "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}",
-    "²": r"\textsuperscript{2}", "–": "--", "×": r"$\times$", "−": "$-$", "\n": " ",
+    "{": r"\{",
+    "}": r"\}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    "²": r"\textsuperscript{2}",
+    "–": "--",
+    "×": r"$\times$",
+    "−": "$-$",
+    "\n": " ",
 }
 
 

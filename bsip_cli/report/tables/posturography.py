@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from itertools import combinations
 
-from bsip_cli.report import table_labels as labels
-from bsip_cli.report import table_notes as notes
-from bsip_cli.report.table_model import Cell, Column, Row, Table
-from bsip_cli.report.table_numbers import mean_sd, number, p_value
-from bsip_cli.report.table_results import Results
+from bsip_cli.report.tables import labels, notes
+from bsip_cli.report.tables.model import Cell, Column, Row, Table
+from bsip_cli.report.tables.numbers import mean_sd, number, p_value
+from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_comparison import Comparison
 from bsip_cli.statistics.cohort_values import MEASURED, OM, RM, Topic
@@ -16,14 +15,21 @@ from bsip_cli.statistics.cohort_values import MEASURED, OM, RM, Topic
 NAME = "table3_posturography"
 
 _NAMES = {
-    "mean_velocity": "MV", "sway_length": "SL", "ellipse_area": "SA",
-    "rms_ap": "RMS AP", "rms_ml": "RMS ML",
-    "rms_ap_origin": "RMS AP", "rms_ml_origin": "RMS ML",
+    "mean_velocity": "MV",
+    "sway_length": "SL",
+    "ellipse_area": "SA",
+    "rms_ap": "RMS AP",
+    "rms_ml": "RMS ML",
+    "rms_ap_origin": "RMS AP",
+    "rms_ml_origin": "RMS ML",
 }
 _SHORT = {MEASURED: "fp", OM: "om", RM: "rm"}
 _PAIRS = tuple(combinations((MEASURED, OM, RM), 2))
-_MARKS = {(MEASURED, OM): ("OM M(SD)", "#"), (MEASURED, RM): ("RM M(SD)", "*"),
-          (OM, RM): ("RM M(SD)", "+")}
+_MARKS = {
+    (MEASURED, OM): ("OM M(SD)", "#"),
+    (MEASURED, RM): ("RM M(SD)", "*"),
+    (OM, RM): ("RM M(SD)", "+"),
+}
 """Where the sign of a post hoc difference stands, and which it is, after the print."""
 
 ALL = " / ".join((MEASURED, OM, RM))
@@ -41,16 +47,21 @@ def build(results: Results, criteria: Criteria) -> Table:
         f"{notes.participants(tests)}.",
         _columns(),
         tuple(_row(results, topic, alpha) for topic in results.topics),
-        tuple(filter(None, (
-            f"Bonferroni post hoc p < {alpha:g}: * between FP and RM; + between OM and RM; # "
-            "between FP and OM. MV mean velocity, SL sway length, SA area of the 95 % prediction "
-            "ellipse, RMS about the mean.",
-            "As published: one-way ANOVA (F, p), as if FP, OM and RM were three groups of people, "
-            "with its post hoc tests. Added: ANOVA for repeated measures, because they are the "
-            "same people, with Greenhouse and Geisser's correction (epsilon); its post hoc tests "
-            "are in the CSV.",
-            *notes.not_possible(results, named),
-        ))),
+        tuple(
+            filter(
+                None,
+                (
+                    f"Bonferroni post hoc p < {alpha:g}: * between FP and RM; + between OM and RM; # "
+                    "between FP and OM. MV mean velocity, SL sway length, SA area of the 95 % prediction "
+                    "ellipse, RMS about the mean.",
+                    "As published: one-way ANOVA (F, p), as if FP, OM and RM were three groups of people, "
+                    "with its post hoc tests. Added: ANOVA for repeated measures, because they are the "
+                    "same people, with Greenhouse and Geisser's correction (epsilon); its post hoc tests "
+                    "are in the CSV.",
+                    *notes.not_possible(results, named),
+                ),
+            )
+        ),
     )
 
 
@@ -61,13 +72,15 @@ def label(topic: Topic) -> str:
 
 def _columns() -> tuple[Column, ...]:
     methods = [
-        Column((f"{short}_mean", f"{short}_sd"), f"{short.upper()} M(SD)", mean_sd(2),
-               in_row_unit=True)
+        Column(
+            (f"{short}_mean", f"{short}_sd"), f"{short.upper()} M(SD)", mean_sd(2), in_row_unit=True
+        )
         for short in _SHORT.values()
     ]
     post_hoc = [
         Column((f"{kind}_{_SHORT[a]}_{_SHORT[b]}",))
-        for kind in ("bonferroni_p", "repeated_bonferroni_p") for a, b in _PAIRS
+        for kind in ("bonferroni_p", "repeated_bonferroni_p")
+        for a, b in _PAIRS
     ]
     return (
         Column(("variable",)),
@@ -95,11 +108,19 @@ def _row(results: Results, topic: Topic, alpha: float) -> Row:
     one_way = results.find(topic, "one_way_anova", ALL, "")
     repeated = results.find(topic, "repeated_measures_anova", ALL, "")
     values: dict[str, Cell] = {
-        "variable": topic.variable, "label": label(topic), "n": one_way.n,
-        "f": one_way.statistic, "df1": one_way.df1, "df2": one_way.df2, "p": one_way.p_value,
-        "eta_squared": one_way.effect_size, "lilliefors_p_smallest": one_way.lilliefors_p,
-        "repeated_f": repeated.statistic, "repeated_df1": repeated.df1,
-        "repeated_df2": repeated.df2, "repeated_p": repeated.p_value,
+        "variable": topic.variable,
+        "label": label(topic),
+        "n": one_way.n,
+        "f": one_way.statistic,
+        "df1": one_way.df1,
+        "df2": one_way.df2,
+        "p": one_way.p_value,
+        "eta_squared": one_way.effect_size,
+        "lilliefors_p_smallest": one_way.lilliefors_p,
+        "repeated_f": repeated.statistic,
+        "repeated_df1": repeated.df1,
+        "repeated_df2": repeated.df2,
+        "repeated_p": repeated.p_value,
         "repeated_epsilon": repeated.epsilon,
         "repeated_partial_eta_squared": repeated.effect_size,
         "reason": results.reasons(topic),
@@ -119,5 +140,9 @@ def _row(results: Results, topic: Topic, alpha: float) -> Row:
 
 def _means(pair: Comparison) -> dict[str, Cell]:
     a, b = _SHORT[pair.method_a], _SHORT[pair.method_b]
-    return {f"{a}_mean": pair.mean_a, f"{a}_sd": pair.sd_a,
-            f"{b}_mean": pair.mean_b, f"{b}_sd": pair.sd_b}
+    return {
+        f"{a}_mean": pair.mean_a,
+        f"{a}_sd": pair.sd_a,
+        f"{b}_mean": pair.mean_b,
+        f"{b}_sd": pair.sd_b,
+    }

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from bsip_cli.report import table_labels as labels
-from bsip_cli.report import table_notes as notes
-from bsip_cli.report import table_paired as paired
-from bsip_cli.report.table_model import Column, Row, Table
-from bsip_cli.report.table_numbers import number, p_value
-from bsip_cli.report.table_results import Results
+from bsip_cli.report.tables import labels, notes, paired
+from bsip_cli.report.tables.model import Column, Row, Table
+from bsip_cli.report.tables.numbers import number, p_value
+from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import DATA_SHARE, Criteria
 from bsip_cli.statistics.cohort_values import OM, Topic
 
@@ -25,21 +23,26 @@ def build(results: Results, criteria: Criteria) -> Table:
         f"regression (RM): mean (standard deviation) of {notes.participants(tests)}.",
         _columns(criteria),
         tuple(_row(results, topic, criteria) for topic in segments),
-        tuple(filter(None, (
-            notes.star_legend(criteria.alpha),
-            "As published: paired t test of OM - RM with its confidence interval; Cohen's d = (RM "
-            "- OM) / pooled SD; Lilliefors' test of the differences. Added: Wilcoxon's signed-rank "
-            "test; d_z = mean / SD of the differences; equivalence by two one-sided t tests, "
-            f"where p < {criteria.alpha:g} says that OM and RM differ by less than "
-            f"{criteria.equivalence_percent:g} % of RM's mean; data share.",
-            "Data share: the part of the prior's variance of OM's mass that the data removed, from "
-            "0 (the mass is the regression's) to 1 (the data alone decide), mean over participants."
-            " Masses behind spherical joints are not decided by the data alone: the ground forces "
-            "hold them only in combinations, and nearness to the regression splits these.",
-            notes.normality_legend(criteria.alpha),
-            notes.holm_legend(tests, criteria.alpha),
-            *notes.not_possible(results, named),
-        ))),
+        tuple(
+            filter(
+                None,
+                (
+                    notes.star_legend(criteria.alpha),
+                    "As published: paired t test of OM - RM with its confidence interval; Cohen's d = (RM "
+                    "- OM) / pooled SD; Lilliefors' test of the differences. Added: Wilcoxon's signed-rank "
+                    "test; d_z = mean / SD of the differences; equivalence by two one-sided t tests, "
+                    f"where p < {criteria.alpha:g} says that OM and RM differ by less than "
+                    f"{criteria.equivalence_percent:g} % of RM's mean; data share.",
+                    "Data share: the part of the prior's variance of OM's mass that the data removed, from "
+                    "0 (the mass is the regression's) to 1 (the data alone decide), mean over participants."
+                    " Masses behind spherical joints are not decided by the data alone: the ground forces "
+                    "hold them only in combinations, and nearness to the regression splits these.",
+                    notes.normality_legend(criteria.alpha),
+                    notes.holm_legend(tests, criteria.alpha),
+                    *notes.not_possible(results, named),
+                ),
+            )
+        ),
     )
 
 

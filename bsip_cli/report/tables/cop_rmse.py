@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from bsip_cli.report import table_notes as notes
-from bsip_cli.report import table_paired as paired
-from bsip_cli.report.table_model import Column, Row, Table
-from bsip_cli.report.table_results import Results
+from bsip_cli.report.tables import notes, paired
+from bsip_cli.report.tables.model import Column, Row, Table
+from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_values import Topic
 
@@ -33,15 +32,20 @@ def build(results: Results, criteria: Criteria) -> Table:
             Column(("reason",)),
         ),
         tuple(_row(results, topic, criteria) for topic in results.topics),
-        tuple(filter(None, (
-            notes.star_legend(criteria.alpha),
-            "As published: paired t test of OM - RM with its confidence interval; Cohen's d = (RM "
-            "- OM) / pooled SD; Lilliefors' test of the differences. Added: Wilcoxon's signed-rank "
-            "test; d_z = mean / SD of the differences; in how many participants OM or RM has the "
-            "smaller error. AP and ML are the person's own axes.",
-            notes.normality_legend(criteria.alpha),
-            *notes.not_possible(results, named),
-        ))),
+        tuple(
+            filter(
+                None,
+                (
+                    notes.star_legend(criteria.alpha),
+                    "As published: paired t test of OM - RM with its confidence interval; Cohen's d = (RM "
+                    "- OM) / pooled SD; Lilliefors' test of the differences. Added: Wilcoxon's signed-rank "
+                    "test; d_z = mean / SD of the differences; in how many participants OM or RM has the "
+                    "smaller error. AP and ML are the person's own axes.",
+                    notes.normality_legend(criteria.alpha),
+                    *notes.not_possible(results, named),
+                ),
+            )
+        ),
     )
 
 

@@ -6,7 +6,7 @@ import csv
 import io
 from math import isnan
 
-from bsip_cli.report.table_model import Cell, Column, Row, Table
+from bsip_cli.report.tables.model import Cell, Column, Row, Table
 
 UNIT_SUFFIXES = {
     "kg": "kg",

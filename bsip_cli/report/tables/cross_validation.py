@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from bsip_cli.report import table_labels as labels
-from bsip_cli.report import table_notes as notes
-from bsip_cli.report import table_paired as paired
-from bsip_cli.report.table_model import Column, Row, Table
-from bsip_cli.report.table_results import Results
+from bsip_cli.report.tables import labels, notes, paired
+from bsip_cli.report.tables.model import Column, Row, Table
+from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_values import Topic
 
@@ -45,25 +43,33 @@ def build(results: Results, criteria: Criteria) -> Table:
             Column(("reason",)),
         ),
         tuple(_row(results, topic, criteria) for topic in topics),
-        tuple(filter(None, (
-            notes.star_legend(criteria.alpha),
-            "COP error: root mean square of the distance in the plane, sqrt(AP² + ML²); several "
-            "runs of a movement are averaged for each participant first.",
-            "As published: means and standard deviations. Added: everything else (paired t test of "
-            "OM - RM, Cohen's d = (RM - OM) / pooled SD, Wilcoxon's test, d_z = mean / SD of the "
-            "differences, in how many participants OM or RM has the smaller error). The same count "
-            "for the six components stands in table 5.",
-            notes.normality_legend(criteria.alpha),
-            notes.holm_legend(tests, criteria.alpha),
-            *notes.not_possible(results, named),
-        ))),
+        tuple(
+            filter(
+                None,
+                (
+                    notes.star_legend(criteria.alpha),
+                    "COP error: root mean square of the distance in the plane, sqrt(AP² + ML²); several "
+                    "runs of a movement are averaged for each participant first.",
+                    "As published: means and standard deviations. Added: everything else (paired t test of "
+                    "OM - RM, Cohen's d = (RM - OM) / pooled SD, Wilcoxon's test, d_z = mean / SD of the "
+                    "differences, in how many participants OM or RM has the smaller error). The same count "
+                    "for the six components stands in table 5.",
+                    notes.normality_legend(criteria.alpha),
+                    notes.holm_legend(tests, criteria.alpha),
+                    *notes.not_possible(results, named),
+                ),
+            )
+        ),
     )
 
 
 def _row(results: Results, topic: Topic, criteria: Criteria) -> Row:
     values = {
-        "quantity": topic.variable, "task": topic.task, "role": topic.role,
-        "label": labels.task(topic), **paired.values(results, topic),
+        "quantity": topic.variable,
+        "task": topic.task,
+        "role": topic.role,
+        "label": labels.task(topic),
+        **paired.values(results, topic),
     }
     marks = {paired.P: notes.star(results.find(topic, "paired_t"), criteria.alpha)}
     group = f"{_QUANTITIES[topic.variable]} [{labels.unit(topic.unit)}]"

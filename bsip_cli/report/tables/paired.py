@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from bsip_cli.report.table_model import Cell, Column
-from bsip_cli.report.table_numbers import count, counts_of, interval, mean_sd, number, p_value
-from bsip_cli.report.table_results import Results
+from bsip_cli.report.tables.model import Cell, Column
+from bsip_cli.report.tables.numbers import count, counts_of, interval, mean_sd, number, p_value
+from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_values import Topic
 
@@ -62,13 +62,26 @@ def values(results: Results, topic: Topic) -> dict[str, Cell]:
     ranks, sign = results.find(topic, "wilcoxon"), results.find(topic, "sign")
     return {
         "n": t.n,
-        "om_mean": t.mean_a, "om_sd": t.sd_a, "rm_mean": t.mean_b, "rm_sd": t.sd_b,
-        "difference": t.difference, "ci_low": t.ci_low, "ci_high": t.ci_high,
-        "t": t.statistic, "df": t.df1, "p": t.p_value, "p_holm": t.p_holm,
-        "cohens_d_pooled": t.effect_size, "lilliefors_p": t.lilliefors_p,
-        "wilcoxon_w": ranks.statistic, "wilcoxon_p": ranks.p_value,
-        "rank_biserial": ranks.effect_size, "d_z": effect.effect_size,
-        "om_smaller": sign.count_a, "rm_smaller": sign.count_b,
-        "om_smaller_share": sign.effect_size, "sign_test_p": sign.p_value,
+        "om_mean": t.mean_a,
+        "om_sd": t.sd_a,
+        "rm_mean": t.mean_b,
+        "rm_sd": t.sd_b,
+        "difference": t.difference,
+        "ci_low": t.ci_low,
+        "ci_high": t.ci_high,
+        "t": t.statistic,
+        "df": t.df1,
+        "p": t.p_value,
+        "p_holm": t.p_holm,
+        "cohens_d_pooled": t.effect_size,
+        "lilliefors_p": t.lilliefors_p,
+        "wilcoxon_w": ranks.statistic,
+        "wilcoxon_p": ranks.p_value,
+        "rank_biserial": ranks.effect_size,
+        "d_z": effect.effect_size,
+        "om_smaller": sign.count_a,
+        "rm_smaller": sign.count_b,
+        "om_smaller_share": sign.effect_size,
+        "sign_test_p": sign.p_value,
         "reason": results.reasons(topic),
     }

@@ -9,9 +9,21 @@ UNITS = {"mm2": "mm²", "% body weight": "% BW"}
 SEQUENCE_IN_PRINT = "in the paper: random, 120 s"
 
 SEGMENT_ORDER = (
-    "lower_torso", "upper_torso", "head",
-    "upper_arm_l", "forearm_l", "hand_l", "upper_arm_r", "forearm_r", "hand_r",
-    "thigh_l", "shank_l", "foot_l", "thigh_r", "shank_r", "foot_r",
+    "lower_torso",
+    "upper_torso",
+    "head",
+    "upper_arm_l",
+    "forearm_l",
+    "hand_l",
+    "upper_arm_r",
+    "forearm_r",
+    "hand_r",
+    "thigh_l",
+    "shank_l",
+    "foot_l",
+    "thigh_r",
+    "shank_r",
+    "foot_r",
 )
 """As in table 1 of Hansen 2017; other segments follow."""
 

@@ -6,8 +6,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from math import isnan
 
-from bsip_cli.report.table_numbers import p_value
-from bsip_cli.report.table_results import Results
+from bsip_cli.report.tables.numbers import p_value
+from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort_comparison import Comparison
 from bsip_cli.statistics.cohort_values import OM, Topic, Value
 
@@ -77,7 +77,7 @@ def missing(sentences: Sequence[str]) -> str:
 
 def identified_on(values: Iterable[Value]) -> tuple[str, ...]:
     """For each task what its data were to OM: those it was fitted to, or data it never saw."""
-    people: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+    people: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
     for value in values:
         if value.method == OM and value.data:
             people[value.task, value.role][value.data].add(value.participant)

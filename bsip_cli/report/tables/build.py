@@ -9,37 +9,38 @@ from pathlib import Path
 import pandas as pd
 
 from bsip_cli.errors import UsageError
-from bsip_cli.report import (
-    table_cop_rmse,
-    table_cross_validation,
-    table_notes,
-    table_posturography,
-    table_segment_mass,
-    table_six_components,
+from bsip_cli.report.tables import (
+    cop_rmse,
+    cross_validation,
+    notes,
+    posturography,
+    segment_mass,
+    six_components,
 )
-from bsip_cli.report.table_csv import to_csv
-from bsip_cli.report.table_latex import to_latex
-from bsip_cli.report.table_markdown import to_markdown
-from bsip_cli.report.table_model import Table
-from bsip_cli.report.table_results import Results
+from bsip_cli.report.tables.csv import to_csv
+from bsip_cli.report.tables.latex import to_latex
+from bsip_cli.report.tables.markdown import to_markdown
+from bsip_cli.report.tables.model import Table
+from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_comparison import Comparison
 from bsip_cli.statistics.cohort_values import Value
 
 BUILDERS: dict[str, Callable[[Results, Criteria], Table]] = {
-    "table1": table_segment_mass.build,
-    "table2": table_cop_rmse.build,
-    "table3": table_posturography.build,
-    "table4": table_cross_validation.build,
-    "table5": table_six_components.build,
+    "table1": segment_mass.build,
+    "table2": cop_rmse.build,
+    "table3": posturography.build,
+    "table4": cross_validation.build,
+    "table5": six_components.build,
 }
 NAMES = tuple(
     module.NAME
-    for module in (table_segment_mass, table_cop_rmse, table_posturography, table_cross_validation,
-                   table_six_components)
+    for module in (segment_mass, cop_rmse, posturography, cross_validation, six_components)
 )
 RENDERERS: dict[str, Callable[[Table], str]] = {
-    "csv": to_csv, "md": to_markdown, "tex": to_latex,
+    "csv": to_csv,
+    "md": to_markdown,
+    "tex": to_latex,
 }
 
 
@@ -58,14 +59,14 @@ def build_tables(
     missing : who is not in which tables: ``sentence`` and ``tables`` (as in `BUILDERS`).
     """
     rows = [Comparison.from_row(row) for row in comparisons.to_dict("records")]
-    tidy = [Value(**row) for row in values.to_dict("records")]
+    tidy = [Value(**{str(k): v for k, v in row.items()}) for row in values.to_dict("records")]
     tables = []
     for tag, build in BUILDERS.items():
         table = build(Results(row for row in rows if row.topic.table == tag), criteria)
         absent = [str(gone["sentence"]) for gone in missing if tag in gone["tables"]]
         more = (
-            *table_notes.identified_on(value for value in tidy if value.table == tag),
-            table_notes.missing(absent),
+            *notes.identified_on(value for value in tidy if value.table == tag),
+            notes.missing(absent),
         )
         tables.append(replace(table, notes=(*table.notes, *filter(None, more))))
     return tuple(tables)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from bsip_cli.report import table_labels as labels
-from bsip_cli.report import table_notes as notes
-from bsip_cli.report import table_paired as paired
-from bsip_cli.report.table_model import Cell, Column, Row, Table
-from bsip_cli.report.table_numbers import count, counts_of, mean_sd, number, p_value
-from bsip_cli.report.table_results import Results
+from bsip_cli.report.tables import labels, notes, paired
+from bsip_cli.report.tables.model import Cell, Column, Row, Table
+from bsip_cli.report.tables.numbers import count, counts_of, mean_sd, number, p_value
+from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_comparison import Comparison, joined
 from bsip_cli.statistics.cohort_values import OM, RM, Topic
@@ -27,7 +25,8 @@ def build(results: Results, criteria: Criteria) -> Table:
     tests = [results.find(topic, "paired_t") for topic in errors]
     named = {
         sibling: f"{_NAMES[_component(topic)]}, {topic.task}"
-        for topic in errors for sibling in (topic, _sibling(topic, "r"))
+        for topic in errors
+        for sibling in (topic, _sibling(topic, "r"))
     }
     return Table(
         NAME,
@@ -35,19 +34,24 @@ def build(results: Results, criteria: Criteria) -> Table:
         f"measured: mean (standard deviation) of {notes.participants(tests)}.",
         _columns(),
         tuple(_row(results, topic, method) for topic in errors for method in (OM, RM)),
-        tuple(filter(None, (
-            "RMSE in N for forces and N m for moments; r Pearson's correlation; M, P, C errors in "
-            "magnitude and phase and both (Schwer 2007), without unit, 0 for equal signals.",
-            "The test of r is made in each participant, with the effective number of independent "
-            "samples; t, z and p are medians over participants, positive where OM correlates "
-            f"better. '{_DIFFER}' counts those in whom r of OM, or of RM, is significantly higher "
-            f"(p < {criteria.alpha:g}) by Williams' t.",
-            "As published: RMSE, r, M, P, C, and Fisher's z, which takes the two correlations for "
-            "independent. Added: Williams' t, because they share the measured signal; in how many "
-            "participants OM or RM has the smaller RMSE (a paired t test of the RMSE is in the "
-            "CSV). Several runs of a movement are averaged for each participant first.",
-            *notes.not_possible(results, named),
-        ))),
+        tuple(
+            filter(
+                None,
+                (
+                    "RMSE in N for forces and N m for moments; r Pearson's correlation; M, P, C errors in "
+                    "magnitude and phase and both (Schwer 2007), without unit, 0 for equal signals.",
+                    "The test of r is made in each participant, with the effective number of independent "
+                    "samples; t, z and p are medians over participants, positive where OM correlates "
+                    f"better. '{_DIFFER}' counts those in whom r of OM, or of RM, is significantly higher "
+                    f"(p < {criteria.alpha:g}) by Williams' t.",
+                    "As published: RMSE, r, M, P, C, and Fisher's z, which takes the two correlations for "
+                    "independent. Added: Williams' t, because they share the measured signal; in how many "
+                    "participants OM or RM has the smaller RMSE (a paired t test of the RMSE is in the "
+                    "CSV). Several runs of a movement are averaged for each participant first.",
+                    *notes.not_possible(results, named),
+                ),
+            )
+        ),
     )
 
 
@@ -95,7 +99,10 @@ def _row(results: Results, topic: Topic, method: str) -> Row:
     name = _NAMES[_component(topic)]
     tests = _tests(results, topic)
     values: dict[str, Cell] = {
-        "task": topic.task, "role": topic.role, "component": _component(topic), "method": method,
+        "task": topic.task,
+        "role": topic.role,
+        "component": _component(topic),
+        "method": method,
         "label": f"{name} [{labels.unit(topic.unit)}]" if method == OM else "",
         "n": results.find(topic, "paired_t").n,
         **(tests if method == OM else dict.fromkeys(tests, "")),
@@ -116,13 +123,21 @@ def _tests(results: Results, topic: Topic) -> dict[str, Cell]:
     williams = results.find(_sibling(topic, "r"), "williams_t")
     fisher = results.find(_sibling(topic, "r"), "fisher_z")
     return {
-        "om_smaller": sign.count_a, "rm_smaller": sign.count_b, "n_paired": sign.n,
-        "om_smaller_share": sign.effect_size, "sign_test_p": sign.p_value,
-        "rmse_t": error.statistic, "rmse_t_p": error.p_value,
-        "williams_t_median": williams.statistic, "williams_p_median": williams.p_value,
-        "williams_om_better": williams.count_a, "williams_rm_better": williams.count_b,
+        "om_smaller": sign.count_a,
+        "rm_smaller": sign.count_b,
+        "n_paired": sign.n,
+        "om_smaller_share": sign.effect_size,
+        "sign_test_p": sign.p_value,
+        "rmse_t": error.statistic,
+        "rmse_t_p": error.p_value,
+        "williams_t_median": williams.statistic,
+        "williams_p_median": williams.p_value,
+        "williams_om_better": williams.count_a,
+        "williams_rm_better": williams.count_b,
         "williams_n": williams.n,
-        "fisher_z_median": fisher.statistic, "fisher_p_median": fisher.p_value,
-        "fisher_om_better": fisher.count_a, "fisher_rm_better": fisher.count_b,
+        "fisher_z_median": fisher.statistic,
+        "fisher_p_median": fisher.p_value,
+        "fisher_om_better": fisher.count_a,
+        "fisher_rm_better": fisher.count_b,
         "reason": joined(results.reasons(topic), results.reasons(_sibling(topic, "r"))),
     }

@@ -1,0 +1,77 @@
+"""What is said of a marker that is not where the model may expect it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from bsip_cli.motion.marker_fit import MarkerFit
+
+Kind = Literal["jump", "slip", "swap", "offset"]
+
+# Nothing is reported that stays within this many times what a marker is trusted to.
+BEYOND = 1.5
+
+
+@dataclass(frozen=True)
+class MarkerEvent:
+    """One marker that is not where the model may expect it.
+
+    Attributes
+    ----------
+    partner : the other marker of a swap, else empty.
+    start_s, end_s : a slip lasts until the trial's end, an offset fills the trial.
+    size_m : length of the jump, the slip or the offset on the segment; of a swap the distance
+        between the two places.
+    statistic : size over the spread it is judged against (jump, offset), unlikeliness as the
+        length of a normal vector (slip), residual as labelled over residual exchanged (swap).
+    """
+
+    kind: Kind
+    marker: str
+    partner: str
+    start_s: float
+    end_s: float
+    size_m: float
+    statistic: float
+    sentence: str
+
+
+def event(
+    fit: MarkerFit,
+    kind: Kind,
+    m: int,
+    frames: slice,
+    size_m: float,
+    statistic: float,
+    *,
+    partner: int | None = None,
+    note: str = "",
+) -> MarkerEvent:
+    """An event of marker number ``m`` over a stretch of frames."""
+    marker, segment = fit.labels[m], fit.segments[m]
+    other = "" if partner is None else fit.labels[partner]
+    start, end = float(fit.times_s[frames.start]), float(fit.times_s[frames.stop - 1])
+    whole = frames.start == 0 and frames.stop == len(fit.times_s)
+    when = "throughout the trial" if whole else f"from {start:.2f} to {end:.2f} s"
+    mm = f"{1000 * size_m:.0f} mm"
+    sentence = {
+        "jump": f"{marker} jumps {mm} away {when} and comes back",
+        "slip": f"{marker} slips {mm} on {segment} at {start:.2f} s and stays there",
+        "swap": f"{marker} and {other}, {mm} apart, bear each other's labels {when}",
+        "offset": f"{marker} sits {mm} from its calibrated place on {segment} {when}",
+    }[kind]
+    return MarkerEvent(kind, marker, other, start, end, size_m, statistic, sentence + note)
+
+
+def pieces(hit, joined=None, longest_break: int = 1) -> list[slice]:
+    """Stretches of hits (N,); ``joined`` frames and short breaks hold two of them together."""
+    found: list[slice] = []
+    for k in hit.nonzero()[0]:
+        stop = found[-1].stop if found else 0
+        near = k - stop < longest_break or (joined is not None and joined[stop:k].all())
+        if found and near:
+            found[-1] = slice(found[-1].start, int(k) + 1)
+        else:
+            found.append(slice(int(k), int(k) + 1))
+    return found

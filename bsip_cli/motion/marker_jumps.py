@@ -1,0 +1,102 @@
+"""Markers that leave their place for a moment: ghosts, flickers, badly filled gaps."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from bsip_cli.motion.marker_events import BEYOND, MarkerEvent, event, pieces
+from bsip_cli.motion.marker_fit import MarkerFit
+
+_WINDOW_S = 0.5  # of the running median: a jump lasts at most half of it
+_JUMP = 8.0  # spreads
+_LEAST_FRAMES = 5
+_DRAGGED = 0.25  # of the largest jump on the segment at the same time: the pose's, not its own
+# Median length of a three-dimensional normal vector of unit spread.
+_MEDIAN_LENGTH = 1.538
+
+
+def jumps(
+    fit: MarkerFit, residual: np.ndarray, noise_m: float, filled: np.ndarray | None
+) -> tuple[list[MarkerEvent], np.ndarray]:
+    """Events, and (N, m) frames in which a marker is astray.
+
+    A jump exceeds ``_JUMP`` spreads of the marker about its running median, of all markers in the
+    same frame (at an impact all shake), and of the noise; half of it comes or goes within two
+    frames, and the measured path shows it.
+    """
+    away = _away(residual, 2 * max(2, round(0.5 * _WINDOW_S / fit.step_s())) + 1)
+    distance = np.linalg.norm(away, axis=2)
+    astray = np.zeros(distance.shape, dtype=bool)
+    if not np.isfinite(distance).any():
+        return [], astray
+    own = _median(distance, 0)[None] / _MEDIAN_LENGTH
+    frame = _median(distance, 1)[:, None] / _MEDIAN_LENGTH
+    spread = np.maximum(np.maximum(own, frame), noise_m)
+    with np.errstate(invalid="ignore"):
+        beyond = distance > np.maximum(_JUMP * spread, BEYOND * fit.trusted_m)
+    longest = round(0.5 * _WINDOW_S / fit.step_s())
+    found = []
+    for m in range(len(fit.labels)):
+        for piece in pieces(beyond[:, m], ~np.isfinite(distance[:, m]), 2):
+            if piece.stop - piece.start <= longest and _is_own(fit, m, piece, distance[:, m]):
+                found.append((float(np.nanmax(distance[piece, m])), m, piece))
+    events = []
+    for size, m, piece in found:
+        astray[piece, m] = True
+        if any(
+            fit.segments[other] == fit.segments[m]
+            and size < _DRAGGED * larger
+            and near.start - 2 < piece.stop
+            and piece.start < near.stop + 2
+            for larger, other, near in found
+        ):
+            continue
+        gap = filled is not None and filled[piece, m].mean() > 0.5
+        note = ", where a gap was filled" if gap else ""
+        statistic = size / float(spread[piece, m].max())
+        events.append(event(fit, "jump", m, piece, size, statistic, note=note))
+    return events, astray
+
+
+def _away(residual: np.ndarray, width: int) -> np.ndarray:
+    """Residual less its running median over the visible frames, NaN where missing."""
+    away = np.full(residual.shape, np.nan)
+    for m in range(residual.shape[1]):
+        seen = np.flatnonzero(np.isfinite(residual[:, m, 0]))
+        if len(seen) >= _LEAST_FRAMES:
+            own = residual[seen, m]
+            size = (min(width, len(seen) | 1), 1)
+            away[seen, m] = own - median_filter(own, size=size, mode="nearest")
+    return away
+
+
+def _median(distance: np.ndarray, axis: int) -> np.ndarray:
+    seen = np.isfinite(distance).any(axis=axis)
+    out = np.zeros(len(seen))
+    kept = distance[:, seen] if axis == 0 else distance[seen]
+    out[seen] = np.nanmedian(kept, axis=axis)
+    return out
+
+
+def _is_own(fit: MarkerFit, m: int, piece: slice, distance: np.ndarray) -> bool:
+    """Half of the jump comes or goes within two frames, and the measured path shows it.
+
+    The path is compared with the straight line through the two frames before: a pose that another
+    marker bends leaves it smooth.
+    """
+    seen = np.flatnonzero(np.isfinite(fit.measured_m[:, m, 0]))
+    path, model = fit.measured_m[seen, m], fit.model_m[seen, m]
+    first, last = np.searchsorted(seen, [piece.start, piece.stop - 1])
+    half = 0.5 * float(np.nanmax(distance[piece]))
+    for edge, back in ((first, -1), (last, 1)):
+        before, earlier = edge + back, edge + 2 * back
+        if min(before, earlier) < 0 or max(before, earlier) >= len(seen):
+            continue
+        for k in {edge, min(max(edge - back, first), last)}:
+            step = (path[k] - model[k]) - (path[before] - model[before])
+            length = float(np.linalg.norm(step))
+            straight = path[before] + (path[before] - path[earlier]) * abs(k - before)
+            if length > half and (path[k] - straight) @ step > 0.5 * length**2:
+                return True
+    return False

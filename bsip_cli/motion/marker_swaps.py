@@ -1,0 +1,164 @@
+"""Markers that bear each other's labels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from bsip_cli.motion.marker_events import MarkerEvent, event, pieces
+from bsip_cli.motion.marker_fit import MarkerFit
+
+Refit = Callable[[np.ndarray, np.ndarray], MarkerFit]
+
+_FAR = 3.0  # own residual over the trusted distance and over the trial's median residual
+_NEARER = 0.5  # distance to the other's place over that to the own
+_BRIDGE_S = 0.1  # breaks within one swap
+_UNSEEN_S = 0.25  # a reversal is looked for over gaps up to this long
+_LIMBS = (("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot"))
+_LIMB_FRAMES = 24
+_LARGEST_M = 0.2  # a marker farther off says no more
+
+
+def swaps(fit: MarkerFit) -> tuple[list[MarkerEvent], np.ndarray]:
+    """Events of pairs, and (N, m) which marker's position each label should have.
+
+    Two signs, and either is enough. The model's: both markers are far from their own places and
+    at least twice as near to the other's. The path's: the line between the two reverses from one
+    frame to the next, which no segment does; it shows also where the pose follows the labels.
+    """
+    own = fit.distance_m()
+    usual = float(np.nanmedian(own)) if np.isfinite(own).any() else 0.0
+    far = _FAR * max(float(fit.trusted_m.min()), usual)
+    found = []
+    for a, b in _pairs(fit.segments):
+        pair = own[:, [a, b]]
+        across = np.linalg.norm(fit.measured_m[:, [a, b]] - fit.model_m[:, [b, a]], axis=2)
+        with np.errstate(invalid="ignore"):
+            hit = (pair > far).all(axis=1) & (across < _NEARER * pair).all(axis=1)
+        hit = _between_reversals(fit, a, b, hit, far)
+        if hit.any():
+            gain = float(np.nansum(np.linalg.norm(_line(fit, a, b)[hit], axis=1)))
+            found.append((gain, a, b, hit, across))
+    taken = np.zeros(own.shape, dtype=bool)
+    order = np.tile(np.arange(own.shape[1]), (len(own), 1))
+    events = []
+    for _, a, b, hit, across in sorted(found, key=lambda one: -one[0]):
+        unseen = ~np.isfinite(own[:, [a, b]]).all(axis=1)
+        hit = hit & ~taken[:, a] & ~taken[:, b]
+        for piece in pieces(hit, unseen, 1 + round(_BRIDGE_S / fit.step_s())):
+            taken[piece, a] = taken[piece, b] = True
+            order[piece, a], order[piece, b] = b, a
+            inside = np.arange(piece.start, piece.stop)[hit[piece]]
+            ratio = np.nanmedian(own[inside][:, [a, b]] / np.maximum(across[inside], 1e-4))
+            apart = float(np.nanmedian(np.linalg.norm(_line(fit, a, b)[inside], axis=1)))
+            events.append(event(fit, "swap", a, piece, apart, float(ratio), partner=b))
+    return events, order
+
+
+def exchanged(markers: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """Markers (N, m, 3) under the labels that ``swaps`` says (N, m)."""
+    return np.take_along_axis(markers, order[..., None], axis=1)
+
+
+def swapped_limbs(fit: MarkerFit, refit: Refit) -> tuple[list[MarkerEvent], np.ndarray]:
+    """Both arms or both legs exchanged throughout: events, and order as of :func:`swaps`.
+
+    All markers of one limb pull the other limb's model over, so single pairs need not show it.
+    The poses are fitted again to some frames with the limbs exchanged; if that at least halves
+    the limbs' residual, they are.
+    """
+    frames = np.unique(np.linspace(0, len(fit.times_s) - 1, _LIMB_FRAMES).astype(int))
+    order = np.tile(np.arange(len(fit.labels)), (len(fit.times_s), 1))
+    events: list[MarkerEvent] = []
+    for limb in _LIMBS:
+        pairs = _mirrored_pairs(fit, limb)
+        both = np.array(pairs, dtype=int).ravel()
+        before = _misfit_m(fit.distance_m()[frames][:, both])
+        if not before > _FAR * fit.trusted_m.min():
+            continue
+        trial = order.copy()
+        for a, b in pairs:
+            trial[:, [a, b]] = trial[:, [b, a]]
+        again = refit(exchanged(fit.measured_m, trial)[frames], fit.times_s[frames])
+        after = _misfit_m(again.distance_m()[:, both])
+        if after < _NEARER * before:
+            order = trial
+            whole = slice(0, len(fit.times_s))
+            for a, b in pairs:
+                apart = float(np.nanmedian(np.linalg.norm(_line(fit, a, b), axis=1)))
+                events.append(event(fit, "swap", a, whole, apart, before / after, partner=b))
+    return events, order
+
+
+def _misfit_m(distance: np.ndarray) -> float:
+    near = np.minimum(distance[np.isfinite(distance)], _LARGEST_M)
+    return float(np.sqrt(np.mean(near**2))) if len(near) else 0.0
+
+
+def _pairs(segments: tuple[str, ...]) -> Iterator[tuple[int, int]]:
+    for a, first in enumerate(segments):
+        for b in range(a + 1, len(segments)):
+            if segments[b] in (first, _mirrored(first)):
+                yield a, b
+
+
+def _mirrored(segment: str) -> str:
+    other = {"_l": "_r", "_r": "_l"}.get(segment[-2:])
+    return segment[:-2] + other if other else segment
+
+
+def _mirrored_pairs(fit: MarkerFit, limb: tuple[str, ...]) -> list[tuple[int, int]]:
+    """Markers of the right limb and those that lie mirrored on the left one."""
+    pairs, used = [], set()
+    for a, segment in enumerate(fit.segments):
+        if segment[:-2] not in limb or not segment.endswith("_r"):
+            continue
+        mirrored = fit.place_m[a] * [1.0, 1.0, -1.0]
+        others = [
+            (float(np.linalg.norm(fit.place_m[b] - mirrored)), b)
+            for b, other in enumerate(fit.segments)
+            if other == _mirrored(segment) and b not in used
+        ]
+        if others:
+            used.add(min(others)[1])
+            pairs.append((a, min(others)[1]))
+    return pairs
+
+
+def _line(fit: MarkerFit, a: int, b: int) -> np.ndarray:
+    return fit.measured_m[:, a] - fit.measured_m[:, b]
+
+
+def _between_reversals(
+    fit: MarkerFit, a: int, b: int, hit: np.ndarray, far: float
+) -> np.ndarray:
+    """The hits; where the line between two markers reverses, all frames between reversals."""
+    line = _line(fit, a, b)
+    seen = np.flatnonzero(np.isfinite(line[:, 0]))
+    if len(seen) < 4:
+        return hit
+    d, length = line[seen], np.linalg.norm(line[seen], axis=1)
+    change = np.linalg.norm(np.diff(d, axis=0), axis=1)
+    turned = np.linalg.norm(d[1:] + d[:-1], axis=1) < 0.5 * length[1:]
+    turned &= (length[1:] > far) & (np.diff(fit.times_s[seen]) < _UNSEEN_S)
+    calm = np.ones(len(turned), dtype=bool)  # the line moves little before it reverses
+    calm[1:] = (change[:-1] < 0.5 * length[1:-1]) | turned[:-1]
+    flips = np.flatnonzero(turned & calm) + 1
+    if not len(flips):
+        return hit
+    state = np.zeros(len(seen), dtype=int)
+    state[flips] = 1
+    state = np.cumsum(state) % 2
+    own = fit.distance_m()[seen][:, [a, b]].sum(axis=1)
+    shares = [float(hit[seen[state == k]].mean()) for k in (0, 1)]
+    means = [float(own[state == k].mean()) for k in (0, 1)]
+    if max(shares) > 0.1:
+        wrong = int(np.argmax(shares))
+    elif max(means) > 1.5 * min(means):
+        wrong = int(np.argmax(means))
+    else:
+        wrong = int((state == 1).mean() < 0.5)
+    between = np.zeros(len(hit), dtype=bool)
+    between[seen[state == wrong]] = True
+    return between

@@ -165,9 +165,7 @@ def compile_rows() -> list[list[str]]:
     rows = []
     with tempfile.TemporaryDirectory() as cache:
         for label in ("first solve, empty cache", "first solve, cached"):
-            used = run_child(
-                [sys.executable, __file__, "--first-call"], {"NUMBA_CACHE_DIR": cache}
-            )
+            used = run_child([sys.executable, __file__, "--first-call"], {"NUMBA_CACHE_DIR": cache})
             first, second = json.loads(used.stdout.splitlines()[-1])
             rows.append([label, f"{first - second:.2f}"])
     return rows

@@ -130,9 +130,7 @@ def _line(fit: MarkerFit, a: int, b: int) -> np.ndarray:
     return fit.measured_m[:, a] - fit.measured_m[:, b]
 
 
-def _between_reversals(
-    fit: MarkerFit, a: int, b: int, hit: np.ndarray, far: float
-) -> np.ndarray:
+def _between_reversals(fit: MarkerFit, a: int, b: int, hit: np.ndarray, far: float) -> np.ndarray:
     """The hits; where the line between two markers reverses, all frames between reversals."""
     line = _line(fit, a, b)
     seen = np.flatnonzero(np.isfinite(line[:, 0]))

@@ -48,13 +48,26 @@ class PersonTest:
 
     def values(self) -> tuple[Value, ...]:
         numbers = {
-            "williams_t": self.williams.t, "williams_df": self.williams.df,
-            "williams_p": self.williams.p, "fisher_z": self.fisher.z, "fisher_p": self.fisher.p,
+            "williams_t": self.williams.t,
+            "williams_df": self.williams.df,
+            "williams_p": self.williams.p,
+            "fisher_z": self.fisher.z,
+            "fisher_p": self.fisher.p,
         }
         component = self.topic.variable.removesuffix("_r")
         return tuple(
-            Value(self.participant, "", self.topic.task, self.topic.role, "", self.topic.table,
-                  f"{component}_{name}", PAIR, number, "1")
+            Value(
+                self.participant,
+                "",
+                self.topic.task,
+                self.topic.role,
+                "",
+                self.topic.table,
+                f"{component}_{name}",
+                PAIR,
+                number,
+                "1",
+            )
             for name, number in numbers.items()
         )
 
@@ -77,10 +90,14 @@ def person_tests(table: str, runs: Iterable[CorrelationRun]) -> tuple[PersonTest
             for name in ("r_om", "r_rm", "r_om_rm")
         )
         n = float(sum(run.n_effective for run in known)) if known else nan
-        tests.append(PersonTest(
-            participant, topic, williams_t(r_om, r_rm, r_om_rm, n),
-            fisher_z_difference(r_om, n, r_rm, n),
-        ))
+        tests.append(
+            PersonTest(
+                participant,
+                topic,
+                williams_t(r_om, r_rm, r_om_rm, n),
+                fisher_z_difference(r_om, n, r_rm, n),
+            )
+        )
     return tuple(tests)
 
 
@@ -108,11 +125,17 @@ def _counted(topic, test, origin, results: Sequence[tuple[float, float]], reason
     like = ", for instance" if len(reasons) > 1 else ""
     concerned = f"in {impossible} of {len(results)} participants{like}"
     return Comparison(
-        topic, test, origin, OM, RM, n=len(possible),
+        topic,
+        test,
+        origin,
+        OM,
+        RM,
+        n=len(possible),
         statistic=float(np.median([t for t, _ in possible])) if possible else nan,
         p_value=float(np.median([p for _, p in possible])) if possible else nan,
         effect_size=(better + worse) / len(possible) if possible else nan,
         effect_size_name="share of participants whose correlations differ",
-        count_a=better, count_b=worse,
+        count_a=better,
+        count_b=worse,
         reason=f"{concerned}: {reasons[0]}" if reasons else "",
     )

@@ -35,18 +35,34 @@ def methods_beside_each_other(
     groups = one_way_anova(list(complete.T), alpha)
     normality = [lilliefors_test(column, alpha) for column in complete.T]
     published = Comparison(
-        topic, "one_way_anova", "published", names, n=n,
-        statistic=groups.f, df1=groups.df_between, df2=groups.df_within, p_value=groups.p,
-        effect_size=groups.eta_squared, effect_size_name="eta squared",
+        topic,
+        "one_way_anova",
+        "published",
+        names,
+        n=n,
+        statistic=groups.f,
+        df1=groups.df_between,
+        df2=groups.df_within,
+        p_value=groups.p,
+        effect_size=groups.eta_squared,
+        effect_size_name="eta squared",
         lilliefors_p=_smallest(test.p_value for test in normality),
         reason=groups.reason or joined(*(test.reason for test in normality)),
     )
     same = repeated_measures_anova(complete, alpha)
     added = Comparison(
-        topic, "repeated_measures_anova", "added", names, n=n,
-        statistic=same.f, df1=same.epsilon * same.df_effect, df2=same.epsilon * same.df_error,
-        p_value=same.p_greenhouse_geisser, effect_size=same.partial_eta_squared,
-        effect_size_name="partial eta squared", epsilon=same.epsilon,
+        topic,
+        "repeated_measures_anova",
+        "added",
+        names,
+        n=n,
+        statistic=same.f,
+        df1=same.epsilon * same.df_effect,
+        df2=same.epsilon * same.df_error,
+        p_value=same.p_greenhouse_geisser,
+        effect_size=same.partial_eta_squared,
+        effect_size_name="partial eta squared",
+        epsilon=same.epsilon,
         lilliefors_p=_smallest(
             _normality_of_difference(complete, i, j, alpha)
             for i, j in combinations(range(len(methods)), 2)
@@ -55,18 +71,39 @@ def methods_beside_each_other(
     )
     return (
         published,
-        *_post_hoc(topic, "bonferroni_t", "published", complete, methods, groups.post_hoc,
-                   groups.reason, alpha),
+        *_post_hoc(
+            topic,
+            "bonferroni_t",
+            "published",
+            complete,
+            methods,
+            groups.post_hoc,
+            groups.reason,
+            alpha,
+        ),
         added,
-        *_post_hoc(topic, "bonferroni_paired_t", "added", complete, methods, same.post_hoc,
-                   same.reason, alpha),
+        *_post_hoc(
+            topic,
+            "bonferroni_paired_t",
+            "added",
+            complete,
+            methods,
+            same.post_hoc,
+            same.reason,
+            alpha,
+        ),
     )
 
 
 def _post_hoc(
-    topic: Topic, test: str, origin: Literal["published", "added"],
-    table: NDArray[np.float64], methods: Sequence[str],
-    done: Sequence[PairwiseComparison], reason: str, alpha: float,
+    topic: Topic,
+    test: str,
+    origin: Literal["published", "added"],
+    table: NDArray[np.float64],
+    methods: Sequence[str],
+    done: Sequence[PairwiseComparison],
+    reason: str,
+    alpha: float,
 ) -> tuple[Comparison, ...]:
     """A row for each pair of methods, with means also where the test was not possible."""
     results = {(pair.first, pair.second): pair for pair in done}
@@ -74,13 +111,28 @@ def _post_hoc(
     for i, j in combinations(range(len(methods)), 2):
         x, y = table[:, i], table[:, j]
         pair = results.get((i, j), PairwiseComparison(i, j, mean_of(x - y), reason=reason))
-        rows.append(Comparison(
-            topic, test, origin, methods[i], methods[j], len(x),
-            mean_of(x), standard_deviation(x), mean_of(y), standard_deviation(y),
-            pair.mean_difference, pair.ci_low, pair.ci_high,
-            statistic=pair.t, df1=pair.df, p_value=pair.p_bonferroni,
-            lilliefors_p=_normality_of_difference(table, i, j, alpha), reason=pair.reason,
-        ))
+        rows.append(
+            Comparison(
+                topic,
+                test,
+                origin,
+                methods[i],
+                methods[j],
+                len(x),
+                mean_of(x),
+                standard_deviation(x),
+                mean_of(y),
+                standard_deviation(y),
+                pair.mean_difference,
+                pair.ci_low,
+                pair.ci_high,
+                statistic=pair.t,
+                df1=pair.df,
+                p_value=pair.p_bonferroni,
+                lilliefors_p=_normality_of_difference(table, i, j, alpha),
+                reason=pair.reason,
+            )
+        )
     return tuple(rows)
 
 

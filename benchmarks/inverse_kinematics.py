@@ -16,23 +16,14 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from common import (  # first: one thread, before numpy is loaded
-    cpu_seconds,
-    interleaved,
-    machine,
-    markdown,
-    movement,
-    noisy_markers,
-    run_child,
-    sample_person,
-    standing,
-)
+from measure import cpu_seconds, interleaved, machine, markdown, run_child
 
 # isort: split
 import numpy as np
 import opensim_model
 import pinocchio as pin
 import pinocchio_loop
+from moving_person import movement, noisy_markers, sample_person, standing
 
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model

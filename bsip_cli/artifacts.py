@@ -299,6 +299,32 @@ SCHEMAS = {
             ),
         ),
         Schema(
+            "marker-events",
+            "trial",
+            1,
+            "markers that jump, slip, bear another's label or sit wrong",
+            (
+                _text("kind", "jump, slip, swap or offset"),
+                _text("marker", "name in the marker set"),
+                _text("partner", "the other marker of a swap, else empty"),
+                *_floats("start_s end_s", "s", "from when to when"),
+                Column(
+                    "size_m",
+                    "float",
+                    "m",
+                    "how far it moved on its segment; how far a swap's markers are apart",
+                ),
+                Column(
+                    "statistic",
+                    "float",
+                    "1",
+                    "jump, offset: size over the spread it is judged against; slip: unlikeliness "
+                    "as a number of standard deviations; swap: residual as labelled over exchanged",
+                ),
+                _text("sentence", "the same in words"),
+            ),
+        ),
+        Schema(
             "bsip",
             "participant",
             1,
@@ -505,6 +531,11 @@ SCHEMAS = {
         ),
     )
 }
+
+
+def empty_table(kind: str) -> pd.DataFrame:
+    """A table of this kind without rows."""
+    return pd.DataFrame({column.name: [] for column in SCHEMAS[kind].columns}, dtype=object)
 
 
 def write_artifact(path: Path, kind: str, frame: pd.DataFrame, provenance: Mapping) -> None:

@@ -109,10 +109,11 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
     stage = unit.stage
     gone = unit.missing()
     if gone:
+        if _refused_upstream(unit):
+            why = f"{unit.name}: left out of {stage.name}, since its input was refused"
+            return Outcome(stage.name, unit.name, "waiting", (why,))
         first = producer(gone[0]).name
         why = f"{unit.name}: {stage.name} has no {', '.join(gone)} to read"
-        if _refused_upstream(unit):
-            return Outcome(stage.name, unit.name, "waiting", (f"{why}: refused before",))
         return Outcome(stage.name, unit.name, "waiting", (f"{why}; run `bsip {first}` first",), 2)
     if not force and unit.is_fresh():
         return Outcome(stage.name, unit.name, "fresh")

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.special import chdtri, fdtrc
 
 _ROUNDS = 4
 _LARGEST_CORRELATION = 0.98
-# Columns are angles [rad]: skin travels some 30 mm a radian, so 0.3 mm for this.
-_MOVING = 0.01
+_LEAST_FREEDOM = 8
+_LEAST_ERROR = 1e-6  # keeps columns that stand still from making the equations singular
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,7 @@ class LevelChange:
     step_sd : standard deviation of the step, each direction.
     spread : standard deviation of what neither columns nor step explain, each direction.
     z : how unlikely the gain in likelihood is by chance at one place: the length of a normal
-        vector of d directions that is as unlikely (so it counts the samples, which F does).
+        vector of d directions that is as unlikely (so it counts the samples, as F does).
     """
 
     at: int
@@ -33,8 +35,22 @@ class LevelChange:
     z: float
 
 
+@dataclass(frozen=True)
+class _Problem:
+    """y (n, d), columns with the constant first (n, 1 + k), and where a step may be."""
+
+    y: np.ndarray
+    X: np.ndarray
+    places: np.ndarray
+    coefficient_sd: float
+
+
 def find_level_change(
-    y: np.ndarray, columns: np.ndarray, least: int, at: int | None = None
+    y: np.ndarray,
+    columns: np.ndarray,
+    coefficient_sd: float,
+    least: int,
+    at: int | None = None,
 ) -> LevelChange | None:
     """Generalised least squares of y (n, d) on a constant, columns (n, k) and one step.
 
@@ -44,67 +60,74 @@ def find_level_change(
 
     Parameters
     ----------
+    coefficient_sd : prior spread of the columns' coefficients: columns that show a small step of
+        their own cannot explain a large one of the signal.
     least : samples at least on each side of the step.
     at : where the step is, or None to look for the place with the largest gain.
 
     Returns
     -------
-    None where there are too few samples for the columns.
+    None where there are too few samples, or no place for a step.
     """
-    n, d = y.shape
-    X = np.concatenate([np.ones((n, 1)), _scaled(columns)], axis=1)
+    n = len(y)
     places = np.arange(least, n - least + 1) if at is None else np.array([at])
     places = places[(places > 0) & (places < n)]
-    if len(places) == 0 or n - X.shape[1] - 2 < max(10, n // 4):
+    if len(places) == 0 or n < _LEAST_FREEDOM + 2:
         return None
-    correlation, found = 0.0, None
+    X = np.concatenate([np.ones((n, 1)), columns - columns.mean(axis=0)], axis=1)
+    problem = _Problem(y, X, places, coefficient_sd)
+    correlation = 0.0
+    error = max(float(np.median(np.abs(np.diff(y, axis=0)))), _LEAST_ERROR)
     for _ in range(_ROUNDS):
-        found = _best(y, X, places, correlation)
+        found = _best(problem, correlation, error)
         if found is None:
             return None
-        correlation = _correlation(y, X, found.at, found.step)
-    return _best(y, X, places, correlation)
+        correlation = _correlation(problem, found, error)
+        error = max(found.spread * np.sqrt(1.0 - correlation**2), _LEAST_ERROR)
+    return _best(problem, correlation, error)
 
 
-def _best(
-    y: np.ndarray, X: np.ndarray, places: np.ndarray, correlation: float
-) -> LevelChange | None:
-    n, d = y.shape
-    Q, _ = np.linalg.qr(_whitened(X, correlation))
-    white = _whitened(y, correlation)
-    free = white - Q @ (Q.T @ white)
+def _best(problem: _Problem, correlation: float, error: float) -> LevelChange | None:
+    n, d = problem.y.shape
+    white = _whitened(problem.y, correlation)
+    Q = _basis(problem, correlation, error)
+    free = white - Q[:n] @ (Q[:n].T @ white)
     # A step whitened is 1 at its place and 1 - correlation after it.
     rest = (1.0 - correlation) * _after(free) + free
-    shadow = (1.0 - correlation) * _after(Q) + Q
+    shadow = (1.0 - correlation) * _after(Q[:n]) + Q[:n]
     length = 1.0 + (1.0 - correlation) ** 2 * (n - 1 - np.arange(n))
     own = length - (shadow**2).sum(axis=1)
-    usable = own[places] > 1e-3 * length[places]
-    if not usable.any():
+    places = problem.places[own[problem.places] > 1e-3 * length[problem.places]]
+    freedom = n - 1 - float((Q[:n] ** 2).sum())
+    if len(places) == 0 or freedom < _LEAST_FREEDOM:
         return None
-    places = places[usable]
     gain = (rest[places] ** 2).sum(axis=1) / own[places]
-    best = int(np.argmax(gain))
-    freedom = d * (n - Q.shape[1] - 1)
-    variance = max(((free**2).sum() - gain[best]) / freedom, 1e-18)
-    k = int(places[best])
+    k = int(places[np.argmax(gain)])
+    # What the prior holds back of the columns counts among the errors: y'(I - QQ')y.
+    squares = float((white**2).sum() - ((Q[:n].T @ white) ** 2).sum())
+    variance = max((squares - gain.max()) / (d * freedom), 1e-18)
+    z2 = chdtri(d, max(fdtrc(d, d * freedom, gain.max() / variance / d), 1e-300))
     return LevelChange(
-        k,
-        rest[k] / own[k],
-        float(np.sqrt(variance / own[k])),
-        float(np.sqrt(variance / (1.0 - correlation**2))),
-        _as_normal(float(gain[best] / variance), d, freedom),
+        at=k,
+        step=rest[k] / own[k],
+        step_sd=float(np.sqrt(variance / own[k])),
+        spread=float(np.sqrt(variance / (1.0 - correlation**2))),
+        z=float(np.sqrt(z2)),
     )
 
 
-def _as_normal(gain: float, d: int, freedom: int) -> float:
-    from scipy.stats import chi2, f
+def _basis(problem: _Problem, correlation: float, error: float) -> np.ndarray:
+    """(n + k, 1 + k) orthonormal columns; the last k rows are the prior's."""
+    k = problem.X.shape[1] - 1
+    prior = np.concatenate([np.zeros((k, 1)), error / problem.coefficient_sd * np.eye(k)], axis=1)
+    A = np.concatenate([_whitened(problem.X, correlation), prior])
+    return solve_triangular(np.linalg.cholesky(A.T @ A), A.T, lower=True).T
 
-    return float(np.sqrt(chi2.isf(max(f.sf(gain / d, d, freedom), 1e-300), d)))
 
-
-def _correlation(y: np.ndarray, X: np.ndarray, at: int, step: np.ndarray) -> float:
-    stepped = y - (np.arange(len(y)) >= at)[:, None] * step
-    Q, _ = np.linalg.qr(X)
+def _correlation(problem: _Problem, found: LevelChange, error: float) -> float:
+    n = len(problem.y)
+    stepped = problem.y - (np.arange(n) >= found.at)[:, None] * found.step
+    Q = _basis(problem, 0.0, error)[:n]
     left = stepped - Q @ (Q.T @ stepped)
     power = float((left[:-1] ** 2).sum())
     value = float((left[1:] * left[:-1]).sum()) / power if power > 0 else 0.0
@@ -120,13 +143,4 @@ def _whitened(x: np.ndarray, correlation: float) -> np.ndarray:
 
 def _after(x: np.ndarray) -> np.ndarray:
     """Sum of all later rows, for each row."""
-    total = np.cumsum(x[::-1], axis=0)[::-1]
-    return total - x
-
-
-def _scaled(columns: np.ndarray) -> np.ndarray:
-    """Columns about their mean, with unit spread; those that stand still are left out."""
-    centred = columns - columns.mean(axis=0)
-    spread = centred.std(axis=0)
-    moving = spread > _MOVING
-    return centred[:, moving] / spread[moving]
+    return np.cumsum(x[::-1], axis=0)[::-1] - x

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
+
+import numpy as np
 
 from bsip_cli.motion.marker_fit import MarkerFit
 
 Kind = Literal["jump", "slip", "swap", "offset"]
 
+_ORDER: tuple[Kind, ...] = ("swap", "offset", "slip", "jump")
 # Nothing is reported that stays within this many times what a marker is trusted to.
 BEYOND = 1.5
 
@@ -24,7 +28,8 @@ class MarkerEvent:
     size_m : length of the jump, the slip or the offset on the segment; of a swap the distance
         between the two places.
     statistic : size over the spread it is judged against (jump, offset), unlikeliness as the
-        length of a normal vector (slip), residual as labelled over residual exchanged (swap).
+        length of a normal vector (slip), residual as labelled over residual exchanged, or the line
+        between the two over what it lacks of an exact reversal (swap).
     """
 
     kind: Kind
@@ -64,12 +69,44 @@ def event(
     return MarkerEvent(kind, marker, other, start, end, size_m, statistic, sentence + note)
 
 
-def pieces(hit, joined=None, longest_break: int = 1) -> list[slice]:
+def summaries(events: Sequence[MarkerEvent], most: int) -> list[str]:
+    """Sentences for people: jumps of one marker, and swaps of one time, in one; then how many more.
+
+    Swaps first, then offsets, slips and jumps, the largest first.
+    """
+    groups: dict[tuple, list[MarkerEvent]] = {}
+    for one in events:
+        key = (one.start_s, one.end_s) if one.kind == "swap" else (one.marker,)
+        groups.setdefault((_ORDER.index(one.kind), *key), []).append(one)
+    ranked = sorted(groups.items(), key=lambda item: (item[0][0], -max(e.size_m for e in item[1])))
+    said = [_of_group(group) for _, group in ranked]
+    left = len(said) - most
+    return said if left <= 0 else [*said[:most], f"and {left} more, see marker-events"]
+
+
+def _of_group(group: list[MarkerEvent]) -> str:
+    first = group[0]
+    if len(group) == 1 or first.kind in ("offset", "slip"):
+        return "; ".join(one.sentence for one in group)
+    if first.kind == "swap":
+        mine, others = (
+            ", ".join(getattr(e, name) for e in group) for name in ("marker", "partner")
+        )
+        when = first.sentence.split("labels ")[1]
+        return f"{mine} and {others} bear each other's labels {when}"
+    mm = 1000 * max(one.size_m for one in group)
+    return (
+        f"{first.marker} jumps {len(group)} times, by up to {mm:.0f} mm, "
+        f"first at {first.start_s:.2f} s"
+    )
+
+
+def pieces(hit: np.ndarray, joined: np.ndarray, longest_break: int) -> list[slice]:
     """Stretches of hits (N,); ``joined`` frames and short breaks hold two of them together."""
     found: list[slice] = []
     for k in hit.nonzero()[0]:
         stop = found[-1].stop if found else 0
-        near = k - stop < longest_break or (joined is not None and joined[stop:k].all())
+        near = k - stop < longest_break or joined[stop:k].all()
         if found and near:
             found[-1] = slice(found[-1].start, int(k) + 1)
         else:

@@ -34,13 +34,12 @@ from bsip_cli.motion.marker_swaps import Refit, exchanged, swapped_limbs, swaps
 
 
 def marker_evidence(
-    fit: MarkerFit, noise_m: float, refit: Refit, filled: np.ndarray | None = None
+    fit: MarkerFit, refit: Refit, filled: np.ndarray | None = None
 ) -> tuple[MarkerEvent, ...]:
     """All events of one trial, in the order of time.
 
     Parameters
     ----------
-    noise_m : noise of a marker's position, each direction.
     refit : poses fitted to other markers (n, m, 3) at times (n,); called only where labels are
         exchanged.
     filled : (N, m) positions that were estimated over a gap: they may jump, but are no evidence
@@ -53,7 +52,7 @@ def marker_evidence(
     if pairs:
         fit = refit(exchanged(fit.measured_m, order), fit.times_s)
     residual = fit.residual_m
-    jumped, astray = jumps(fit, residual, noise_m, filled)
+    jumped, astray = jumps(fit, residual, filled)
     guessed = astray if filled is None else astray | filled
     residual = np.where(guessed[..., None], np.nan, residual)
     slipped, level = slips(fit, residual)

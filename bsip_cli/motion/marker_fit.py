@@ -12,6 +12,8 @@ from bsip_cli.motion.jacobian import model_markers, pose_columns, subtrees
 
 _RESPONSE_FRAMES = 16
 _POSTURE_SD_RAD = 3.0
+# Median length of a three-dimensional normal vector of unit spread.
+_MEDIAN_LENGTH = 1.538
 _USUAL_M = 0.03  # how far a displaced marker moves, before the data speak
 
 
@@ -46,6 +48,12 @@ class MarkerFit:
     def distance_m(self) -> np.ndarray:
         """(N, m) distance of each marker from its model, NaN where missing."""
         return np.linalg.norm(self.residual_m, axis=2)
+
+    def noise_m(self) -> float:
+        """Noise of a marker, each direction: from second differences of the residuals."""
+        bends = np.linalg.norm(np.diff(self.residual_m, n=2, axis=0), axis=2)
+        bends = bends[np.isfinite(bends)]
+        return float(np.median(bends)) / _MEDIAN_LENGTH / 6**0.5 if len(bends) else 0.0
 
     def step_s(self) -> float:
         """Time between two frames."""
@@ -85,8 +93,8 @@ def marker_fit(
 
 
 def _pose(person: Person, q: np.ndarray, segment: int) -> np.ndarray:
-    """(N, k) angles about a segment, which its skin may follow: vector parts of quaternions
-    (half the sine of the turn) and hinge angles."""
+    """(N, k) angles [rad] about a segment, which its skin may follow: hinge angles, and twice the
+    vector parts of quaternions (the turn, where it is small)."""
     skeleton, columns = person.skeleton, []
     for i, kind in enumerate(skeleton.joint_types):
         if kind == "free" or (i != segment and skeleton.parents[i] != segment):
@@ -95,7 +103,7 @@ def _pose(person: Person, q: np.ndarray, segment: int) -> np.ndarray:
         if kind == "revolute":
             columns.append(q[:, at : at + 1])
         else:
-            columns.append(q[:, at : at + 3] * np.where(q[:, at + 3 : at + 4] < 0, -1.0, 1.0))
+            columns.append(2.0 * q[:, at : at + 3] * np.where(q[:, at + 3 : at + 4] < 0, -1.0, 1.0))
     return np.concatenate(columns, axis=1) if columns else np.empty((len(q), 0))
 
 

@@ -17,7 +17,7 @@ _MEDIAN_LENGTH = 1.538
 
 
 def jumps(
-    fit: MarkerFit, residual: np.ndarray, noise_m: float, filled: np.ndarray | None
+    fit: MarkerFit, residual: np.ndarray, filled: np.ndarray | None
 ) -> tuple[list[MarkerEvent], np.ndarray]:
     """Events, and (N, m) frames in which a marker is astray.
 
@@ -32,7 +32,7 @@ def jumps(
         return [], astray
     own = _median(distance, 0)[None] / _MEDIAN_LENGTH
     frame = _median(distance, 1)[:, None] / _MEDIAN_LENGTH
-    spread = np.maximum(np.maximum(own, frame), noise_m)
+    spread = np.maximum(np.maximum(own, frame), fit.noise_m())
     with np.errstate(invalid="ignore"):
         beyond = distance > np.maximum(_JUMP * spread, BEYOND * fit.trusted_m)
     longest = round(0.5 * _WINDOW_S / fit.step_s())

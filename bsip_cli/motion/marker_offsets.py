@@ -34,7 +34,9 @@ def offsets(fit: MarkerFit, residual: np.ndarray) -> list[MarkerEvent]:
     events: list[MarkerEvent] = []
     for _ in range(len(mean)):
         shown = np.linalg.norm(mean, axis=1)
-        candidates = [m for m in np.flatnonzero(enough) if shown[m] > BEYOND * fit.trusted_m[m]]
+        candidates = [
+            int(m) for m in np.flatnonzero(enough) if shown[m] > BEYOND * fit.trusted_m[m]
+        ]
         if not candidates:
             break
         m, vector = best_source(fit.response, mean, sd, candidates)

@@ -11,11 +11,15 @@ from bsip_cli.motion.marker_events import BEYOND, MarkerEvent, event
 from bsip_cli.motion.marker_fit import MarkerFit, best_source
 
 _BLOCK_S = 0.1  # residuals are averaged over blocks
+_MOST_BLOCKS = 600  # longer ones in longer trials
 _STAYS_S = 0.5  # on each side of a slip
 _SLIP = 3.0  # spreads of what pose and step leave unexplained
 # A normal vector of three directions is this long once in 3e7 draws: 40 markers at 600 places give
 # one false alarm in a thousand trials, were the errors as the model says.
 _CHANCE = 6.0
+# Skin travels over the bone by some 15 mm in half a radian; a slip moves the pose too, by far less
+# for its size, and may not hide behind that.
+_SKIN_M_PER_RAD = 0.03
 _SAME = 0.7  # a change that is explained to 30 % by a slip at the same time is no second one
 _MOST = 12
 
@@ -42,7 +46,8 @@ class _Search:
 
     def __init__(self, fit: MarkerFit, residual: np.ndarray) -> None:
         self.fit, self.left = fit, residual.copy()
-        self.frames = max(1, round(_BLOCK_S / fit.step_s()))
+        frames, most = round(_BLOCK_S / fit.step_s()), len(residual) // _MOST_BLOCKS
+        self.frames = max(1, frames, most)
         self.least = max(3, round(_STAYS_S / (self.frames * fit.step_s())))
         self.columns = {
             name: block_means(_with_squares(x), self.frames) for name, x in fit.pose.items()
@@ -65,7 +70,7 @@ class _Search:
         if len(seen) < 2 * least:
             return None
         columns = self.columns[self.fit.segments[m]][seen]
-        found = find_level_change(means[seen, m], columns, least, at)
+        found = find_level_change(means[seen, m], columns, _SKIN_M_PER_RAD, least, at)
         return _Found(m, found, int(seen[found.at])) if found else None
 
     def source(self, first: _Found, changes: list[_Found]) -> tuple[_Slip, np.ndarray]:

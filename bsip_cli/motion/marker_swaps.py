@@ -36,14 +36,14 @@ def swaps(fit: MarkerFit) -> tuple[list[MarkerEvent], np.ndarray]:
         across = np.linalg.norm(fit.measured_m[:, [a, b]] - fit.model_m[:, [b, a]], axis=2)
         with np.errstate(invalid="ignore"):
             hit = (pair > far).all(axis=1) & (across < _NEARER * pair).all(axis=1)
-        hit = _between_reversals(fit, a, b, hit, far)
+        hit, sharp = _between_reversals(fit, a, b, hit, far)
         if hit.any():
             gain = float(np.nansum(np.linalg.norm(_line(fit, a, b)[hit], axis=1)))
-            found.append((gain, a, b, hit, across))
+            found.append((gain, a, b, hit, across, sharp))
     taken = np.zeros(own.shape, dtype=bool)
     order = np.tile(np.arange(own.shape[1]), (len(own), 1))
     events = []
-    for _, a, b, hit, across in sorted(found, key=lambda one: -one[0]):
+    for _, a, b, hit, across, sharp in sorted(found, key=lambda one: -one[0]):
         unseen = ~np.isfinite(own[:, [a, b]]).all(axis=1)
         hit = hit & ~taken[:, a] & ~taken[:, b]
         for piece in pieces(hit, unseen, 1 + round(_BRIDGE_S / fit.step_s())):
@@ -51,6 +51,7 @@ def swaps(fit: MarkerFit) -> tuple[list[MarkerEvent], np.ndarray]:
             order[piece, a], order[piece, b] = b, a
             inside = np.arange(piece.start, piece.stop)[hit[piece]]
             ratio = np.nanmedian(own[inside][:, [a, b]] / np.maximum(across[inside], 1e-4))
+            ratio = max(ratio, sharp)
             apart = float(np.nanmedian(np.linalg.norm(_line(fit, a, b)[inside], axis=1)))
             events.append(event(fit, "swap", a, piece, apart, float(ratio), partner=b))
     return events, order
@@ -130,21 +131,27 @@ def _line(fit: MarkerFit, a: int, b: int) -> np.ndarray:
     return fit.measured_m[:, a] - fit.measured_m[:, b]
 
 
-def _between_reversals(fit: MarkerFit, a: int, b: int, hit: np.ndarray, far: float) -> np.ndarray:
-    """The hits; where the line between two markers reverses, all frames between reversals."""
+def _between_reversals(
+    fit: MarkerFit, a: int, b: int, hit: np.ndarray, far: float
+) -> tuple[np.ndarray, float]:
+    """The hits; where the line between two markers reverses, all frames between reversals.
+
+    Also its length over what it lacks of an exact reversal, 0 where there is none.
+    """
     line = _line(fit, a, b)
     seen = np.flatnonzero(np.isfinite(line[:, 0]))
     if len(seen) < 4:
-        return hit
+        return hit, 0.0
     d, length = line[seen], np.linalg.norm(line[seen], axis=1)
     change = np.linalg.norm(np.diff(d, axis=0), axis=1)
-    turned = np.linalg.norm(d[1:] + d[:-1], axis=1) < 0.5 * length[1:]
+    lacking = np.linalg.norm(d[1:] + d[:-1], axis=1)
+    turned = lacking < 0.5 * length[1:]
     turned &= (length[1:] > far) & (np.diff(fit.times_s[seen]) < _UNSEEN_S)
     calm = np.ones(len(turned), dtype=bool)  # the line moves little before it reverses
     calm[1:] = (change[:-1] < 0.5 * length[1:-1]) | turned[:-1]
     flips = np.flatnonzero(turned & calm) + 1
     if not len(flips):
-        return hit
+        return hit, 0.0
     state = np.zeros(len(seen), dtype=int)
     state[flips] = 1
     state = np.cumsum(state) % 2
@@ -159,4 +166,5 @@ def _between_reversals(fit: MarkerFit, a: int, b: int, hit: np.ndarray, far: flo
         wrong = int((state == 1).mean() < 0.5)
     between = np.zeros(len(hit), dtype=bool)
     between[seen[state == wrong]] = True
-    return between
+    sharp = float(np.median(length[flips] / np.maximum(lacking[flips - 1], 1e-4)))
+    return between, sharp

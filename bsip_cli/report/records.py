@@ -48,6 +48,7 @@ class TrialRecord:
     reconstruction: pd.DataFrame | None
     fit: pd.DataFrame | None
     posturography: pd.DataFrame | None
+    marker_events: pd.DataFrame | None = None
 
     @property
     def label(self) -> str:

@@ -7,14 +7,13 @@ import importlib
 import numpy as np
 import pandas as pd
 
-from bsip_cli.artifacts import bsip_names
+from bsip_cli.artifacts import bsip_names, empty_table
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.dynamics.base_parameters import expressions, find_basis
 from bsip_cli.dynamics.lowpass import stretches
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.errors import BadDataError
 from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.equations import Recording, accumulate, residual_series
 from bsip_cli.identification.estimator import Estimate, Problem
@@ -40,6 +39,9 @@ def run(unit: Unit) -> None:
     prior = _prior(unit, regression, person)
     trials = _identification_trials(unit)
     recordings, blocks = _recordings(unit, skeleton, trials)
+    if _duration_s(recordings) < _SHORTEST_S:
+        _write_table_only(unit, regression, recordings)
+        return
     problem, reference = _problem(unit, person, prior, recordings)
     estimates: dict[str, Estimate] = {
         str(name): importlib.import_module(f"bsip_cli.identification.{name}").estimate(problem)
@@ -65,6 +67,17 @@ def run(unit: Unit) -> None:
     unit.write("excitation", _excitation_table(skeleton, problem))
     unit.write("identification", _summary(unit, problem, estimates, methods, trials))
     unit.write("used-blocks", blocks)
+
+
+def _write_table_only(unit: Unit, regression: pd.DataFrame, recordings: list[Recording]) -> None:
+    """Without forces that belong to the motion the table's values stand alone."""
+    unit.warn(
+        f"{unit.name}: {_duration_s(recordings):.2f} s of motion with every contact on a plate, "
+        f"needed are {_SHORTEST_S:g} s: nothing is identified, the table (RM) stands alone"
+    )
+    unit.write("bsip", regression.drop(columns="note"))
+    for kind in ("base-parameters", "excitation", "identification", "used-blocks"):
+        unit.write(kind, empty_table(kind))
 
 
 def _prior(unit: Unit, regression: pd.DataFrame, person: Person) -> Prior:
@@ -95,13 +108,8 @@ def _identification_trials(unit: Unit) -> list[Trial]:
         return named
     counts = {trial.stem: int(_usable(unit, trial).sum()) for trial in ready}
     moving = [t for t in ready if t.role != "static" and counts[t.stem] > 0] or list(ready)
-    if not moving or max(counts.values()) == 0:
-        raise BadDataError(
-            "no trial in which every contact is on a plate",
-            file=unit.name,
-            expected="a stretch of motion with all ground contacts measured",
-            remedy="record one; the table's values (RM) stand in the regression artifact",
-        )
+    if not any(counts.values()):
+        return []
     chosen = max(moving, key=lambda trial: counts[trial.stem])
     unit.warn(f"{unit.name}: no trial of an identification task; {chosen.stem} identifies")
     if len(ready) == 1 and unit.config.identify.hold_out_fraction == 0:
@@ -125,16 +133,11 @@ def _recordings(
             blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})
         measured = np.nan_to_num(wrench[WRENCH].to_numpy())
         recordings.append(Recording(*coordinates_from(kinematics, skeleton), measured, use, rate))
-    duration = sum(r.use.sum() / r.rate_hz for r in recordings)
-    if duration < _SHORTEST_S:
-        raise BadDataError(
-            f"{duration:.2f} s with every contact on a plate in "
-            f"{', '.join(t.stem for t in trials)}",
-            file=unit.name,
-            expected=f"at least {_SHORTEST_S:g} s",
-            remedy="record a longer trial on the plates",
-        )
     return recordings, pd.DataFrame(blocks, columns=["trial", "start_s", "end_s"])
+
+
+def _duration_s(recordings: list[Recording]) -> float:
+    return sum(float(r.use.sum()) / r.rate_hz for r in recordings)
 
 
 def _held_out(unit: Unit, times: np.ndarray) -> np.ndarray:

@@ -1,8 +1,8 @@
 """Report (participant): one HTML page with its figures, and the main figures as files.
 
-Reads quality, contacts, skeleton, marker-positions, person, kinematics, marker-residuals, bsip,
-base-parameters, excitation, identification, reconstruction, fit, posturography. Writes
-report-files.
+Reads quality, contacts, skeleton, marker-positions, person, kinematics, marker-residuals,
+marker-events, bsip, base-parameters, excitation, identification, reconstruction, fit,
+posturography. Writes report-files.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ _TABLES = {  # field of a trial's record: kind of artifact
     "contacts": "contacts",
     "kinematics": "kinematics",
     "residuals": "marker-residuals",
+    "marker_events": "marker-events",
     "reconstruction": "reconstruction",
     "fit": "fit",
     "posturography": "posturography",

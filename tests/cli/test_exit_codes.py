@@ -175,4 +175,4 @@ def test_everybody_refused(bsip, empty_study, tmp_path):
     assert "Traceback" not in answer.err
     assert " done" not in answer.summary
     assert "2 refused" in answer.summary
-    assert "sub-01: scale has no markers, wrench to read: refused before" in answer.err
+    assert "sub-01: left out of scale, since its input was refused" in answer.err

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from bsip_cli.report.blocks import Block, Heading, Paragraph, Picture, Section
+from bsip_cli.report.blocks import Block, Grid, Heading, Paragraph, Picture, Section
 from bsip_cli.report.figures.marker_residuals import MarkerResiduals, marker_residuals
 from bsip_cli.report.figures.residual_over_time import ResidualOverTime, residual_over_time
 from bsip_cli.report.figures.stick_strip import stick_strip
@@ -16,6 +16,7 @@ from bsip_cli.report.words import listing, number
 _INSTANTS = {"static": 2}
 _USUAL_INSTANTS = 8
 _WORST = 3
+_MOST_EVENTS = 30
 _MM = 1000.0
 
 
@@ -29,7 +30,8 @@ def section(record: ParticipantRecord) -> Section:
     ]
     for trial in record.trials:
         blocks += [Heading(trial.label), *_strip(record, trial), *_over_time(trial)]
-    return Section("motion", "The motion", (*blocks, Heading("Markers"), *_markers(record)))
+    markers = [Heading("Markers"), *_markers(record), *_events(record)]
+    return Section("motion", "The motion", (*blocks, *markers))
 
 
 def _strip(record: ParticipantRecord, trial: TrialRecord) -> list[Block]:
@@ -108,3 +110,22 @@ def _markers(record: ParticipantRecord) -> list[Block]:
             "slipped, is swapped, or sits where the model does not expect it."
         ),
     ]
+
+
+def _events(record: ParticipantRecord) -> list[Block]:
+    """What the inverse kinematics says of single markers; nothing where it was not asked."""
+    known = [(trial.label, t) for trial in record.trials if (t := trial.marker_events) is not None]
+    rows = [
+        (label, str(row["kind"]), str(row["sentence"]), number(_MM * float(row["size_m"]), 0))
+        for label, table in known
+        for _, row in table.iterrows()
+    ]
+    if not known:
+        return []
+    if not rows:
+        return [Paragraph("No marker jumps, slips, bears another's label or sits wrong.")]
+    caption = "Markers that jump, slip, bear another's label or sit wrong."
+    if len(rows) > _MOST_EVENTS:
+        caption += f" {len(rows) - _MOST_EVENTS} more are in the trials' marker-events."
+    head = ("trial", "what", "in words", "size [mm]")
+    return [Grid(head, tuple(rows[:_MOST_EVENTS]), caption, words=3)]

@@ -1,22 +1,13 @@
-"""What the benchmarks share: a person who moves, CPU-seconds, Markdown tables."""
+"""What the benchmarks share: a person who moves. Import ``measure`` before this."""
 
 from __future__ import annotations
 
-import os
-
-# One thread, as the command line has it; before numpy is loaded.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
-
-import re
-import statistics
-import subprocess
-import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
+from measure import ROOT
+
+# isort: split
 import numpy as np
 import pinocchio as pin
 
@@ -29,23 +20,10 @@ from bsip_cli.motion.inverse_kinematics import neutral, tree_of
 from bsip_cli.motion.jacobian import model_markers
 from bsip_cli.recordings.read import read_recording
 
-ROOT = Path(__file__).parents[1]
 _STATIC = ROOT / "sample_data" / "sub-01" / "sub-01_task-static.c3d"
 _HEIGHT_M = 1.77
 _FREQUENCIES_HZ = np.array([0.3, 0.7, 1.1])
 _TILT_RAD = 0.08
-
-
-@dataclass(frozen=True)
-class Usage:
-    """What a process and its children took."""
-
-    cpu_s: float
-    peak_mb: float
-    stdout: str
-
-
-# --- a person who moves -----------------------------------------------------------------------
 
 
 @cache
@@ -106,72 +84,3 @@ def noisy_markers(person: Person, q: np.ndarray, noise_m: float, seed: int = 2) 
     """(N, m, 3) markers of the poses with white noise per axis."""
     markers = model_markers(person, *tree_of(person).forward(q))
     return markers + np.random.default_rng(seed).normal(0, noise_m, markers.shape)
-
-
-# --- measuring --------------------------------------------------------------------------------
-
-
-def cpu_seconds(work: Callable[[], object]) -> float:
-    """CPU-seconds of this process, all threads: another's load on the machine does not count."""
-    before = time.process_time()
-    work()
-    return time.process_time() - before
-
-
-def interleaved(contestants: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, float]:
-    """Median of what each contestant returns, run in turns A B A B."""
-    found: dict[str, list[float]] = {name: [] for name in contestants}
-    for _ in range(rounds):
-        for name, work in contestants.items():
-            found[name].append(work())
-    return {name: statistics.median(values) for name, values in found.items()}
-
-
-def run_child(
-    arguments: Sequence[str],
-    environment: Mapping[str, str] | None = None,
-    folder: Path | None = None,
-    allowed: int = 0,
-) -> Usage:
-    """Run a process in a folder; CPU-seconds of it and its children, peak memory of the largest.
-
-    Raises
-    ------
-    RuntimeError
-        Its exit code is above ``allowed``.
-    """
-    child = subprocess.Popen(
-        list(arguments),
-        env={**os.environ, **(environment or {})},
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert child.stdout and child.stderr
-    out = child.stdout.read()
-    errors = child.stderr.read()
-    _, status, used = os.wait4(child.pid, 0)
-    child.returncode = os.waitstatus_to_exitcode(status)
-    if not 0 <= child.returncode <= allowed:
-        raise RuntimeError(f"{' '.join(arguments)} ended with {child.returncode}\n{errors}")
-    return Usage(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024, out)
-
-
-# --- showing ----------------------------------------------------------------------------------
-
-
-def markdown(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """A Markdown table."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
-
-
-def machine() -> str:
-    """Cores and GHz of this machine."""
-    try:
-        text = Path("/proc/cpuinfo").read_text(encoding="ascii")
-        ghz = max(float(mhz) for mhz in re.findall(r"cpu MHz\s*: ([\d.]+)", text)) / 1000
-        return f"{os.cpu_count()} cores, {ghz:.1f} GHz"
-    except (OSError, ValueError):
-        return f"{os.cpu_count()} cores"

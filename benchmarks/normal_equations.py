@@ -1,0 +1,103 @@
+"""Accumulating the identification's equations: CPU time over bare regressor calls, and memory."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import sys
+import tracemalloc
+from pathlib import Path
+
+from measure import cpu_seconds, interleaved, machine, markdown, run_child
+
+# isort: split
+import numpy as np
+import pinocchio as pin
+from moving_person import movement, sample_person
+
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.identification.equations import Recording, accumulate
+
+RATE_HZ = 100.0
+CUTOFF_HZ = 8.0  # as shipped
+REFERENCE_M = np.array([0.2, -0.1, 0.0])
+_PIECE_S = 60.0
+
+
+def recording(duration_s: float) -> Recording:
+    """A trial of that length: one minute of movement again and again, its wrench all zero."""
+    piece = movement(sample_person(), round(min(duration_s, _PIECE_S) * RATE_HZ), RATE_HZ)
+    times = max(1, round(duration_s / _PIECE_S))
+    q, v, a = (np.tile(part, (times, 1)) for part in piece)
+    return Recording(q, v, a, np.zeros((len(q), 6)), np.ones(len(q), dtype=bool), RATE_HZ)
+
+
+def bare_calls(model: pin.Model, one: Recording) -> None:
+    """What the equations cannot do without: Pinocchio's regressor of every frame."""
+    data = model.createData()
+    for q, v, a in zip(one.q, one.v, one.a, strict=True):
+        pin.computeJointTorqueRegressor(model, data, q, v, a)
+
+
+def speed_table(frames: int, rounds: int) -> str:
+    model = pinocchio_model(sample_person())
+    one = recording(frames / RATE_HZ)
+    accumulate(model, [one], CUTOFF_HZ, REFERENCE_M)  # the allocator has its blocks
+    seconds = interleaved(
+        {
+            "bare regressor calls": lambda: cpu_seconds(lambda: bare_calls(model, one)),
+            "accumulated equations": lambda: cpu_seconds(
+                lambda: accumulate(model, [one], CUTOFF_HZ, REFERENCE_M)
+            ),
+        },
+        rounds,
+    )
+    least = seconds["bare regressor calls"]
+    rows = [[name, f"{value:.3f}", f"{value / least:.2f}"] for name, value in seconds.items()]
+    return markdown([f"{len(one.q):,} frames", "CPU-s", "ratio (target: at most 2)"], rows)
+
+
+def print_memory(duration_s: float, traced: bool) -> None:
+    """What accumulating adds to the memory of this process [MB], beyond the recording."""
+    model, one = pinocchio_model(sample_person()), recording(duration_s)
+    accumulate(model, [recording(2.0)], CUTOFF_HZ, REFERENCE_M)  # libraries loaded
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    if traced:
+        tracemalloc.start()
+    accumulate(model, [one], CUTOFF_HZ, REFERENCE_M)
+    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    peak = tracemalloc.get_traced_memory()[1] if traced else 0
+    size = sum(part.nbytes for part in (one.q, one.v, one.a, one.wrench))
+    print(json.dumps([size / 1e6, (after - before) / 1024, peak / 1e6]))
+
+
+def memory_table(durations_s: list[float]) -> str:
+    rows = []
+    for duration in durations_s:
+        child = [sys.executable, str(Path(__file__).resolve()), "--memory", f"{duration}"]
+        plain, traced = (
+            json.loads(run_child([*child, *extra]).stdout) for extra in ([], ["traced"])
+        )
+        rows.append([f"{duration:g}", f"{plain[0]:.0f}", f"{plain[1]:.0f}", f"{traced[2]:.1f}"])
+    header = ["trial [s]", "recording itself [MB]", "growth of peak RSS [MB]", "traced peak [MB]"]
+    return markdown(header, rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--frames", type=int, default=12_000)
+    parser.add_argument("--durations", type=float, nargs="+", default=[60.0, 600.0], help="[s]")
+    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--memory", nargs="+", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.memory:
+        print_memory(float(options.memory[0]), "traced" in options.memory)
+        return
+    print(f"machine: {machine()}; medians of {options.rounds} rounds\n")
+    print(speed_table(options.frames, options.rounds))
+    print("\n" + memory_table(options.durations))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,113 @@
+"""CPU-seconds and memory of every stage for one simulated participant."""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import sys
+import tempfile
+from pathlib import Path
+
+from measure import ROOT, Usage, machine, markdown, run_child
+
+# isort: split
+from bsip_cli.pipeline import STAGES
+from bsip_cli.simulate.options import StudyOptions
+from bsip_cli.simulate.study import simulate_study
+
+TARGET_CPU_S = 20.0
+BAD_DATA = 3  # some trial was refused, the rest is done
+
+
+def study_options(sequence_s: float, seed: int) -> StudyOptions:
+    """Static, one sequence and four short trials of one person, everything at 100 Hz."""
+    return StudyOptions(
+        participants=1,
+        seed=seed,
+        tasks=("static", "sequence", "throwing", "basketball", "squat", "walking"),
+        durations_s={
+            "static": 3.0,
+            "sequence": sequence_s,
+            "throwing": 3.0,
+            "basketball": 3.0,
+            "squat": 8.0,
+            "walking": 1.2,
+        },
+    )
+
+
+def stage_names() -> list[str]:
+    """The commands, in the order of the pipeline."""
+    return list(dict.fromkeys(stage.name for stage in STAGES))
+
+
+def run_stage(name: str, study: Path, out: Path, *extra: str) -> Usage:
+    arguments = [sys.executable, "-m", "bsip_cli", name, str(study), "--out", str(out), *extra]
+    return run_child(arguments, folder=ROOT, allowed=BAD_DATA)
+
+
+def import_cpu_s(name: str) -> float:
+    """What importing the modules of a stage costs on top of what its command always imports."""
+    modules = [stage.module for stage in STAGES if stage.name == name]
+    levels = {stage.level == "cohort" for stage in STAGES if stage.name == name}
+    alone = len(levels) == 1  # else its modules are imported in two processes
+    groups = [modules] if alone else [[module] for module in modules]
+    base = run_child([sys.executable, "-c", "import bsip_cli.runner"], folder=ROOT).cpu_s
+    return sum(
+        run_child(
+            [sys.executable, "-c", f"import bsip_cli.runner, {', '.join(group)}"], folder=ROOT
+        ).cpu_s
+        - base
+        for group in groups
+    )
+
+
+def measure(study: Path, out: Path, rounds: int) -> list[tuple[str, float, float, float]]:
+    """Per command: CPU-seconds of its work, of starting and importing, and peak memory [MB]."""
+    found = []
+    for name in stage_names():
+        forced = [run_stage(name, study, out, "--force") for _ in range(rounds)]
+        fresh = [run_stage(name, study, out) for _ in range(rounds)]
+        imports = statistics.median(import_cpu_s(name) for _ in range(rounds))
+        start = statistics.median(usage.cpu_s for usage in fresh) + imports
+        total = statistics.median(usage.cpu_s for usage in forced)
+        found.append((name, max(total - start, 0.0), start, max(usage.peak_mb for usage in forced)))
+    return found
+
+
+def table(found: list[tuple[str, float, float, float]]) -> str:
+    rows = [
+        [name, f"{work:.2f}", f"{start:.2f}", f"{memory:.0f}"]
+        for name, work, start, memory in found
+    ]
+    work, start = (sum(row[k] for row in found) for k in (1, 2))
+    rows.append(["all", f"{work:.2f}", f"{start:.2f}", f"{max(row[3] for row in found):.0f}"])
+    header = ["stage", "work [CPU-s]", "starting and importing [CPU-s]", "peak memory [MB]"]
+    return markdown(header, rows)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sequence-s", type=float, default=120.0, help="[s]")
+    parser.add_argument("--seed", type=int, default=2017)
+    parser.add_argument("--rounds", type=int, default=3)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        study, out = Path(folder, "study"), Path(folder, "out")
+        simulate_study(study, study_options(options.sequence_s, options.seed))
+        run_stage("run", study, out)  # everything compiled once
+        print(f"machine: {machine()}; medians of {options.rounds} rounds\n")
+        print(table(measure(study, out, options.rounds)))
+        whole = statistics.median(
+            run_stage("run", study, out, "--force").cpu_s for _ in range(options.rounds)
+        )
+    print(f"\n`bsip run`, all stages in one command: {whole:.1f} CPU-s with starting and importing")
+    print(f"(target: at most {TARGET_CPU_S:g} CPU-s)")
+    help_s = statistics.median(
+        run_child([sys.executable, "-m", "bsip_cli", "--help"], folder=ROOT).cpu_s for _ in range(5)
+    )
+    print(f"`bsip --help`: {help_s:.2f} CPU-s (target: under 0.5)")
+
+
+if __name__ == "__main__":
+    main()

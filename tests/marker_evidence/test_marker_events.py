@@ -1,0 +1,157 @@
+"""Bad markers put into a recording are named with time and size, and nothing else is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from swinging_markers import MARKERS, PERSON, events_of, recording
+
+from bsip_cli.motion.marker_events import MarkerEvent, summaries
+
+START, STOP = 160, 175  # frames: 3.2 to 3.5 s
+
+
+def moved(seed: int, label: str, size_m: float, frames: slice, direction=(1.0, 1.0, 0.5)):
+    """The recording with one marker moved along a direction of its segment."""
+    times, clean, turns = recording(seed)
+    markers, m = clean.copy(), MARKERS.index(label)
+    along = np.array(direction) / np.linalg.norm(direction)
+    markers[frames, m] += size_m * turns[frames, m] @ along
+    return times, markers
+
+
+def only(events: tuple[MarkerEvent, ...]) -> MarkerEvent:
+    assert len(events) == 1, [one.sentence for one in events]
+    return events[0]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_skin_that_follows_the_joints_by_15_mm_is_no_event(seed):
+    assert events_of(*recording(seed)[:2]) == ()
+
+
+@pytest.mark.parametrize("label", ["RASIS", "LKNEL", "RMALL", "LELB", "RTEM", "XIPH"])
+def test_a_slip_of_15_mm(label):
+    event = only(events_of(*moved(1, label, 0.015, slice(START, None))))
+    assert (event.kind, event.marker, event.partner) == ("slip", label, "")
+    assert event.start_s == pytest.approx(3.2, abs=0.06)
+    assert event.end_s == pytest.approx(7.98)
+    assert event.size_m == pytest.approx(0.015, abs=0.005)
+    assert f"{label} slips" in event.sentence
+
+
+@pytest.mark.parametrize(("seed", "label"), [(1, "RKNEM"), (2, "RASIS"), (3, "LMALL")])
+def test_a_small_slip_is_none(seed, label):
+    assert events_of(*moved(seed, label, 0.003, slice(START, None))) == ()
+
+
+@pytest.mark.parametrize("label", ["RKNEL", "LHAND", "T10"])
+def test_a_ghost_of_three_frames(label):
+    event = only(events_of(*moved(2, label, 0.06, slice(START, START + 3))))
+    assert (event.kind, event.marker) == ("jump", label)
+    assert (event.start_s, event.end_s) == pytest.approx((3.20, 3.24))
+    assert 0.03 < event.size_m < 0.07
+
+
+def test_a_ghost_of_a_second_is_a_jump_and_not_two_slips():
+    event = only(events_of(*moved(2, "LASIS", 0.04, slice(START, START + 50))))
+    assert (event.kind, event.marker) == ("jump", "LASIS")
+    assert (event.start_s, event.end_s) == pytest.approx((3.2, 4.2), abs=0.06)
+
+
+def test_a_jump_in_a_filled_gap_says_so_and_a_filled_slip_is_none():
+    times, markers = moved(2, "LHAND", 0.05, slice(START, STOP))
+    filled = np.zeros(markers.shape[:2], dtype=bool)
+    filled[START:STOP, MARKERS.index("LHAND")] = True
+    events = [one for one in events_of(times, markers, filled) if one.kind != "jump"]
+    assert events == []
+    times, markers = moved(2, "LHAND", 0.05, slice(START, START + 4))
+    assert "where a gap was filled" in only(events_of(times, markers, filled)).sentence
+
+
+@pytest.mark.parametrize("label", ["LMALL", "RASIS", "LELB", "IJ"])
+def test_an_offset_of_25_mm(label):
+    event = only(events_of(*moved(3, label, 0.025, slice(None))))
+    assert (event.kind, event.marker) == ("offset", label)
+    assert (event.start_s, event.end_s) == pytest.approx((0.0, 7.98))
+    assert event.size_m == pytest.approx(0.025, abs=0.006)
+    assert "throughout the trial" in event.sentence
+
+
+PAIRS = [("RKNEL", "RKNEM"), ("LWRR", "LWRU"), ("RELB", "LELB")]
+
+
+@pytest.mark.parametrize(("a", "b"), PAIRS)
+@pytest.mark.parametrize("frames", [slice(START, STOP), slice(0, 250), slice(START, None)])
+def test_exchanged_labels(a, b, frames):
+    times, clean, _ = recording(4)
+    markers, pair = clean.copy(), [MARKERS.index(a), MARKERS.index(b)]
+    markers[frames, pair[0]], markers[frames, pair[1]] = (
+        clean[frames, pair[1]],
+        clean[frames, pair[0]],
+    )
+    event = only(events_of(times, markers))
+    assert event.kind == "swap"
+    assert {event.marker, event.partner} == {a, b}
+    first, last = times[frames][0], times[frames][-1]
+    assert (event.start_s, event.end_s) == pytest.approx((first, last), abs=0.021)
+    apart = np.linalg.norm(clean[frames, pair[0]] - clean[frames, pair[1]], axis=1)
+    assert event.size_m == pytest.approx(np.median(apart), rel=0.1)
+    assert event.statistic > 2
+
+
+def test_both_arms_exchanged_throughout():
+    times, clean, _ = recording(5)
+    arms = ("upper_arm", "forearm", "hand")
+    right = [
+        label
+        for label, k in zip(MARKERS, PERSON.marker_segments, strict=True)
+        if PERSON.skeleton.segments[k] in {f"{name}_r" for name in arms}
+    ]
+    assert len(right) == 6
+    markers = clean.copy()
+    for label in right:
+        a, b = MARKERS.index(label), MARKERS.index(f"L{label[1:]}")
+        markers[:, a], markers[:, b] = clean[:, b], clean[:, a]
+    events = events_of(times, markers)
+    assert {(one.kind, one.marker, one.partner) for one in events} == {
+        ("swap", label, f"L{label[1:]}") for label in right
+    }
+    said = summaries(events, 5)
+    assert len(said) == 1
+    assert "bear each other's labels throughout the trial" in said[0]
+
+
+def test_two_events_of_one_trial_are_both_found():
+    times, markers = moved(1, "LKNEL", 0.02, slice(START, None))
+    other, m = recording(1)[1].copy(), MARKERS.index("RTEM")
+    markers[300:303, m] = other[300:303, m] + [0.0, 0.0, 0.05]
+    events = events_of(times, markers)
+    assert [(one.kind, one.marker) for one in events] == [("slip", "LKNEL"), ("jump", "RTEM")]
+
+
+def test_missing_markers_and_short_trials_are_borne():
+    times, clean, _ = recording(1)
+    markers = clean.copy()
+    markers[:, MARKERS.index("RFA")] = np.nan
+    markers[50:90, MARKERS.index("C7")] = np.nan
+    assert events_of(times, markers) == ()
+    for frames in (1, 2, 5, 12):
+        assert events_of(times[:frames], clean[:frames]) == ()
+
+
+def test_summaries_gather_the_jumps_of_a_marker_and_count_the_rest():
+    def event(kind, marker, start, size):
+        return MarkerEvent(kind, marker, "", start, start + 0.1, size, 9.0, f"{marker} {kind}s")
+
+    events = [event("jump", "RCAL", 1.0 + k, 0.01 + 0.001 * k) for k in range(4)]
+    events += [event("offset", label, 0.0, 0.03) for label in ("C7", "T10")]
+    events += [event("slip", "IJ", 2.0, 0.02)]
+    assert summaries(events, 3) == [
+        "C7 offsets",
+        "T10 offsets",
+        "IJ slips",
+        "and 1 more, see marker-events",
+    ]
+    assert summaries(events, 9)[-1] == "RCAL jumps 4 times, by up to 13 mm, first at 1.00 s"
+    assert summaries([], 3) == []

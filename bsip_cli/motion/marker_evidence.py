@@ -48,9 +48,7 @@ def marker_evidence(
     events, order = swapped_limbs(fit, refit)
     if events:
         fit = refit(exchanged(fit.measured_m, order), fit.times_s)
-    pairs, order = swaps(fit)
-    if pairs:
-        fit = refit(exchanged(fit.measured_m, order), fit.times_s)
+    pairs, fit = swaps(fit, refit)
     residual = fit.residual_m
     jumped, astray = jumps(fit, residual, filled)
     guessed = astray if filled is None else astray | filled

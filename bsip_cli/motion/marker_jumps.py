@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.ndimage import median_filter
 
 from bsip_cli.motion.marker_events import BEYOND, MarkerEvent, event, pieces
-from bsip_cli.motion.marker_fit import MarkerFit
+from bsip_cli.motion.marker_fit import MarkerFit, best_source
 
 _WINDOW_S = 0.5  # of the running median: a jump lasts at most half of it
 _JUMP = 8.0  # spreads
 _LEAST_FRAMES = 5
-_DRAGGED = 0.25  # of the largest jump on the segment at the same time: the pose's, not its own
+_SAME = 0.7  # a jump that another one explains to 30 % is the pose's
 # Median length of a three-dimensional normal vector of unit spread.
 _MEDIAN_LENGTH = 1.538
+
+
+@dataclass(frozen=True)
+class _Jump:
+    m: int
+    frames: slice
 
 
 def jumps(
@@ -40,23 +48,44 @@ def jumps(
     for m in range(len(fit.labels)):
         for piece in pieces(beyond[:, m], ~np.isfinite(distance[:, m]), 2):
             if piece.stop - piece.start <= longest and _is_own(fit, m, piece, distance[:, m]):
-                found.append((float(np.nanmax(distance[piece, m])), m, piece))
+                found.append(_Jump(m, piece))
+                astray[piece, m] = True
     events = []
-    for size, m, piece in found:
-        astray[piece, m] = True
-        if any(
-            fit.segments[other] == fit.segments[m]
-            and size < _DRAGGED * larger
-            and near.start - 2 < piece.stop
-            and piece.start < near.stop + 2
-            for larger, other, near in found
-        ):
-            continue
+    for jump, size in _own(fit, away, spread, found):
+        m, piece = jump.m, jump.frames
         gap = filled is not None and filled[piece, m].mean() > 0.5
         note = ", where a gap was filled" if gap else ""
-        statistic = size / float(spread[piece, m].max())
+        statistic = float(np.nanmax(distance[piece, m]) / spread[piece, m].max())
         events.append(event(fit, "jump", m, piece, size, statistic, note=note))
     return events, astray
+
+
+def _own(
+    fit: MarkerFit, away: np.ndarray, spread: np.ndarray, found: list[_Jump]
+) -> list[tuple[_Jump, float]]:
+    """The jumps without those that another one at the same time drags along, and their sizes."""
+    distance = np.linalg.norm(away, axis=2)
+    left = sorted(found, key=lambda one: -float(np.nanmax(distance[one.frames, one.m])))
+    own: list[tuple[_Jump, float]] = []
+    while left:
+        first = left[0]
+        together = [one for one in left if one is first or _overlap(one.frames, first.frames)]
+        peak = first.frames.start + int(np.nanargmax(distance[first.frames, first.m]))
+        sd = np.hypot(spread[peak], 0.1 * distance[peak, first.m])
+        candidates = [one.m for one in together if np.isfinite(distance[peak, one.m])]
+        m, vector = best_source(fit.response, away[peak], sd, candidates)
+        made = np.einsum("jak,k->ja", fit.response[:, :, m], vector)
+        missed = np.linalg.norm(away[peak] - made, axis=1)
+        source = next(one for one in together if one.m == m)
+        size = max(float(np.linalg.norm(vector)), float(np.nanmax(distance[source.frames, m])))
+        own.append((source, size))
+        dragged = [one for one in together if not missed[one.m] > _SAME * distance[peak, one.m]]
+        left = [one for one in left if one is not source and one not in dragged]
+    return own
+
+
+def _overlap(a: slice, b: slice) -> bool:
+    return a.start < b.stop + 1 and b.start < a.stop + 1
 
 
 def _away(residual: np.ndarray, width: int) -> np.ndarray:

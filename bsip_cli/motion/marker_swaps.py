@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,16 +18,54 @@ _BRIDGE_S = 0.1  # breaks within one swap
 _UNSEEN_S = 0.25  # a reversal is looked for over gaps up to this long
 _LIMBS = (("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot"))
 _LIMB_FRAMES = 24
+_MOST = 12
 _LARGEST_M = 0.2  # a marker farther off says no more
 
 
-def swaps(fit: MarkerFit) -> tuple[list[MarkerEvent], np.ndarray]:
-    """Events of pairs, and (N, m) which marker's position each label should have.
+@dataclass(frozen=True)
+class _Pair:
+    """Two markers, the frames (N,) in which they may be exchanged, and how sharp the signs are."""
 
-    Two signs, and either is enough. The model's: both markers are far from their own places and
-    at least twice as near to the other's. The path's: the line between the two reverses from one
-    frame to the next, which no segment does; it shows also where the pose follows the labels.
+    a: int
+    b: int
+    hit: np.ndarray
+    ratio: float
+    reverses: bool
+
+
+def swaps(fit: MarkerFit, refit: Refit) -> tuple[list[MarkerEvent], MarkerFit]:
+    """Events of pairs, and the fit with their labels put right.
+
+    Two signs, and either is enough. The path's: the line between the two reverses from one frame
+    to the next, which no segment does; it shows also where the pose follows the labels. The
+    model's: both markers are far from their own places and at least twice as near to the other's.
+    One wrong pair may turn a whole limb of the model over, so pairs are put right one at a time,
+    and one after which the poses fit no better is none.
     """
+    events: list[MarkerEvent] = []
+    refused: set[tuple[int, int]] = set()
+    for _ in range(_MOST):
+        pairs = [one for one in _suspects(fit) if (one.a, one.b) not in refused]
+        if not pairs:
+            break
+        pair = max(pairs, key=lambda one: (one.reverses, one.ratio * one.hit.sum()))
+        refused.add((pair.a, pair.b))
+        unseen = ~np.isfinite(_line(fit, pair.a, pair.b)[:, 0])
+        found = pieces(pair.hit, unseen, 1 + round(_BRIDGE_S / fit.step_s()))
+        order = np.tile(np.arange(len(fit.labels)), (len(fit.times_s), 1))
+        for piece in found:
+            order[piece, pair.a], order[piece, pair.b] = pair.b, pair.a
+        again = refit(exchanged(fit.measured_m, order), fit.times_s)
+        if not _misfit_m(again.distance_m()) < _misfit_m(fit.distance_m()):
+            continue
+        for piece in found:
+            apart = float(np.nanmedian(np.linalg.norm(_line(fit, pair.a, pair.b)[piece], axis=1)))
+            events.append(event(fit, "swap", pair.a, piece, apart, pair.ratio, partner=pair.b))
+        fit = again
+    return events, fit
+
+
+def _suspects(fit: MarkerFit) -> list[_Pair]:
     own = fit.distance_m()
     usual = float(np.nanmedian(own)) if np.isfinite(own).any() else 0.0
     far = _FAR * max(float(fit.trusted_m.min()), usual)
@@ -38,51 +77,36 @@ def swaps(fit: MarkerFit) -> tuple[list[MarkerEvent], np.ndarray]:
             hit = (pair > far).all(axis=1) & (across < _NEARER * pair).all(axis=1)
         hit, sharp = _between_reversals(fit, a, b, hit, far)
         if hit.any():
-            gain = float(np.nansum(np.linalg.norm(_line(fit, a, b)[hit], axis=1)))
-            found.append((gain, a, b, hit, across, sharp))
-    taken = np.zeros(own.shape, dtype=bool)
-    order = np.tile(np.arange(own.shape[1]), (len(own), 1))
-    events = []
-    for _, a, b, hit, across, sharp in sorted(found, key=lambda one: -one[0]):
-        unseen = ~np.isfinite(own[:, [a, b]]).all(axis=1)
-        hit = hit & ~taken[:, a] & ~taken[:, b]
-        for piece in pieces(hit, unseen, 1 + round(_BRIDGE_S / fit.step_s())):
-            taken[piece, a] = taken[piece, b] = True
-            order[piece, a], order[piece, b] = b, a
-            inside = np.arange(piece.start, piece.stop)[hit[piece]]
-            ratio = np.nanmedian(own[inside][:, [a, b]] / np.maximum(across[inside], 1e-4))
-            ratio = max(ratio, sharp)
-            apart = float(np.nanmedian(np.linalg.norm(_line(fit, a, b)[inside], axis=1)))
-            events.append(event(fit, "swap", a, piece, apart, float(ratio), partner=b))
-    return events, order
+            ratio = float(np.nanmedian(pair[hit] / np.maximum(across[hit], 1e-4)))
+            found.append(_Pair(a, b, hit, max(ratio, sharp), sharp > 0))
+    return found
 
 
 def exchanged(markers: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """Markers (N, m, 3) under the labels that ``swaps`` says (N, m)."""
+    """Markers (N, m, 3) with, under each label, the one that ``order`` (N, m) says."""
     return np.take_along_axis(markers, order[..., None], axis=1)
 
 
 def swapped_limbs(fit: MarkerFit, refit: Refit) -> tuple[list[MarkerEvent], np.ndarray]:
-    """Both arms or both legs exchanged throughout: events, and order as of :func:`swaps`.
+    """Both arms or both legs exchanged throughout: events, and order (N, m).
 
-    All markers of one limb pull the other limb's model over, so single pairs need not show it.
-    The poses are fitted again to some frames with the limbs exchanged; if that at least halves
-    the limbs' residual, they are.
+    All markers of one limb pull the other limb's model over, or turn the trunk round, so single
+    pairs need not show it. Where the markers fit badly, the poses are fitted again to some frames
+    with the limbs exchanged; if that at least halves the residual of all markers, they are.
     """
     frames = np.unique(np.linspace(0, len(fit.times_s) - 1, _LIMB_FRAMES).astype(int))
     order = np.tile(np.arange(len(fit.labels)), (len(fit.times_s), 1))
     events: list[MarkerEvent] = []
     for limb in _LIMBS:
         pairs = _mirrored_pairs(fit, limb)
-        both = np.array(pairs, dtype=int).ravel()
-        before = _misfit_m(fit.distance_m()[frames][:, both])
-        if not before > _FAR * fit.trusted_m.min():
+        before = _misfit_m(fit.distance_m()[frames])
+        if not pairs or not before > _FAR * fit.trusted_m.min():
             continue
         trial = order.copy()
         for a, b in pairs:
             trial[:, [a, b]] = trial[:, [b, a]]
         again = refit(exchanged(fit.measured_m, trial)[frames], fit.times_s[frames])
-        after = _misfit_m(again.distance_m()[:, both])
+        after = _misfit_m(again.distance_m())
         if after < _NEARER * before:
             order = trial
             whole = slice(0, len(fit.times_s))

@@ -125,6 +125,7 @@ class Artifacts:
         self.write("contacts", self.contacts(trial), trial)
         self.write("kinematics", self.kinematics(trial), trial)
         self.write("marker-residuals", self.residuals(trial), trial)
+        self.write("marker-events", marker_events(), trial)
         self.write("reconstruction", self.reconstruction(trial), trial)
         self.write("fit", self.fit(trial), trial)
         self.write("posturography", posturography(), trial)
@@ -422,6 +423,23 @@ def excitation(skeleton: Skeleton) -> pd.DataFrame:
     rows = [("condition_number", "", 812.0), ("singular_value", "1", 3.5)]
     rows += [("segment", name, 0.05 * (k + 1)) for k, name in enumerate(skeleton.segments)]
     return pd.DataFrame(rows, columns=["quantity", "name", "value"])
+
+
+def marker_events() -> pd.DataFrame:
+    return pd.DataFrame(
+        [
+            {
+                "kind": "slip",
+                "marker": "RKNEL",
+                "partner": "",
+                "start_s": 1.0,
+                "end_s": 2.0,
+                "size_m": 0.015,
+                "statistic": 9.0,
+                "sentence": f"RKNEL slips 15 mm on {EVIL}",
+            }
+        ]
+    )
 
 
 def posturography() -> pd.DataFrame:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # artifacts needs pandas, and `bsip --help` must not wait for it
-    from bsip_cli.artifacts import Level
+    from bsip_cli.schemas import Level
 
 
 @dataclass(frozen=True)

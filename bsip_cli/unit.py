@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from bsip_cli.artifacts import SCHEMAS, read_artifact, read_header, write_artifact
+from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.config import Config
 from bsip_cli.errors import BadDataError
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.provenance import describe, file_hash
+from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study import Participant, Study, Trial
 
 

@@ -96,10 +96,10 @@ def swapped_limbs(fit: MarkerFit, refit: Refit) -> tuple[list[MarkerEvent], np.n
     """
     frames = np.unique(np.linspace(0, len(fit.times_s) - 1, _LIMB_FRAMES).astype(int))
     order = np.tile(np.arange(len(fit.labels)), (len(fit.times_s), 1))
+    before = _misfit_m(fit.distance_m()[frames])
     events: list[MarkerEvent] = []
     for limb in _LIMBS:
         pairs = _mirrored_pairs(fit, limb)
-        before = _misfit_m(fit.distance_m()[frames])
         if not pairs or not before > _FAR * fit.trusted_m.min():
             continue
         trial = order.copy()
@@ -113,6 +113,7 @@ def swapped_limbs(fit: MarkerFit, refit: Refit) -> tuple[list[MarkerEvent], np.n
             for a, b in pairs:
                 apart = float(np.nanmedian(np.linalg.norm(_line(fit, a, b), axis=1)))
                 events.append(event(fit, "swap", a, whole, apart, before / after, partner=b))
+            before = after
     return events, order
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from bsip_cli.artifacts import bsip_names, share_name
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
+from bsip_cli.schemas import bsip_names, share_name
 
 WRENCH = ["fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm"]
 

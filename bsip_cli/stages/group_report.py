@@ -5,13 +5,13 @@ Reads values, comparisons, person, identification, tables-files. Writes group-re
 
 from __future__ import annotations
 
-from bsip_cli.artifacts import SCHEMAS
 from bsip_cli.report.cohort.document import cohort_document
 from bsip_cli.report.cohort.record import CohortRecord, Member
 from bsip_cli.report.page import render
 from bsip_cli.report.records import Origin
 from bsip_cli.report.tables.build import build_tables
 from bsip_cli.report.words import listing
+from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.report import files_frame, origin_of, refusals_of, write_figures, write_text
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.study import Participant

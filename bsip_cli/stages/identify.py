@@ -7,7 +7,7 @@ import importlib
 import numpy as np
 import pandas as pd
 
-from bsip_cli.artifacts import bsip_names, empty_table
+from bsip_cli.artifacts import empty_table
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
@@ -21,6 +21,7 @@ from bsip_cli.identification.excitation import excitation
 from bsip_cli.identification.noise import Noise, noise_of
 from bsip_cli.identification.prior import Prior, Spread, prior_of
 from bsip_cli.identification.uncertainty import readable
+from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH, bsip_table, coordinates_from, person_from
 from bsip_cli.study import Trial
 from bsip_cli.unit import Unit

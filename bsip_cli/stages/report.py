@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from bsip_cli.artifacts import SCHEMAS, read_artifact, read_header, write_atomically
+from bsip_cli.artifacts import read_artifact, read_header, write_atomically
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.provenance import file_hash
 from bsip_cli.report.blocks import Document
@@ -20,6 +20,7 @@ from bsip_cli.report.page import render
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import Origin, ParticipantRecord, Refusal, TrialRecord
 from bsip_cli.report.words import ROLES, trial_label
+from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.frames import person_from
 from bsip_cli.study import Participant, Trial
 from bsip_cli.unit import Unit

@@ -13,9 +13,9 @@ from typing import Any
 
 import pandas as pd
 
-from bsip_cli.artifacts import SCHEMAS
 from bsip_cli.errors import BadDataError
 from bsip_cli.pipeline import STAGES
+from bsip_cli.schemas import SCHEMAS
 from bsip_cli.statistics.cohort import DATA_SHARE, Criteria, compare
 from bsip_cli.statistics.cohort_correlations import CorrelationRun, PersonTest, person_tests
 from bsip_cli.statistics.cohort_values import MEASURED, OM, RM, Value

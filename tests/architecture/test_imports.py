@@ -15,15 +15,16 @@ ALLOWED = {
     "errors": "",
     "config": "errors",
     "study": "errors",
-    "artifacts": "errors",
+    "schemas": "",
+    "artifacts": "errors schemas",
     "provenance": "__init__",
-    "pipeline": "artifacts",
-    "unit": "artifacts config errors pipeline provenance study",
+    "pipeline": "schemas",
+    "unit": "artifacts config errors pipeline provenance schemas study",
     "runner": "artifacts config errors pipeline study unit",
     "session": "body config errors pipeline runner study",
     "__main__": "cli",
     "cli": "__init__ errors pipeline provenance report session simulate",
-    "reference": "artifacts cli config pipeline",
+    "reference": "cli config pipeline schemas",
     "body": "config errors",
     "dynamics": "body errors",
     "motion": "body dynamics errors",
@@ -32,10 +33,10 @@ ALLOWED = {
     "identification": "body dynamics errors statistics",
     "effects": "body dynamics errors",
     "diagnosis": "body dynamics effects errors identification statistics",
-    "report": "artifacts body dynamics errors motion statistics",
+    "report": "body dynamics errors motion schemas statistics",
     "simulate": "body config errors",
     "stages": "artifacts body diagnosis dynamics effects errors identification motion pipeline "
-    "provenance recordings report statistics study unit",
+    "provenance recordings report schemas statistics study unit",
 }
 
 FOREIGN_TO_SCIENCE = {"pandas", "pyarrow", "click", "tqdm", "logging", "subprocess", "matplotlib"}

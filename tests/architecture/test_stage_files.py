@@ -8,9 +8,9 @@ import inspect
 
 import pytest
 
-from bsip_cli.artifacts import SCHEMAS
 from bsip_cli.config import Config
 from bsip_cli.pipeline import STAGES, producer, stages_named
+from bsip_cli.schemas import SCHEMAS
 
 LABELS = [stage.label for stage in STAGES]
 

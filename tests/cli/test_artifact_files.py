@@ -11,14 +11,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from bsip_cli import artifacts
-from bsip_cli.artifacts import (
-    SCHEMAS,
-    read_artifact,
-    read_header,
-    write_artifact,
-    write_atomically,
-)
+from bsip_cli.artifacts import read_artifact, read_header, write_artifact, write_atomically
 from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.schemas import SCHEMAS
 
 NOTES = {"made_by": {"stage": "identify"}, "messages": [], "facts": {}}
 BLOCKS = pd.DataFrame({"trial": ["a", "b"], "start_s": [0.0, 1.0], "end_s": [1.0, np.nan]})

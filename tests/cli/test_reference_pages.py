@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from bsip_cli.artifacts import SCHEMAS
 from bsip_cli.cli import cli
 from bsip_cli.reference import REGENERATE, OptionText, option_texts, pages, write_pages
+from bsip_cli.schemas import SCHEMAS
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -17,10 +17,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from bsip_cli import __version__
-from bsip_cli.artifacts import SCHEMAS, read_artifact, read_header, write_artifact
+from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.config import Config, load_config
 from bsip_cli.pipeline import STAGES, producer
 from bsip_cli.runner import Outcome, perform
+from bsip_cli.schemas import SCHEMAS
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.study import load_study

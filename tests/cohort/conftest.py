@@ -6,11 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bsip_cli.artifacts import bsip_names, read_artifact, share_name, write_artifact
+from bsip_cli.artifacts import read_artifact, write_artifact
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.config import Config, load_config
 from bsip_cli.pipeline import STAGES
 from bsip_cli.runner import Outcome, perform
+from bsip_cli.schemas import bsip_names, share_name
 from bsip_cli.statistics.correlation_tests import fisher_z_difference, williams_t
 from bsip_cli.study import Study, Trial, load_study
 from bsip_cli.unit import Unit

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from bsip_cli.artifacts import SCHEMAS, bsip_names, share_name, write_artifact
+from bsip_cli.artifacts import write_artifact
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.schemas import SCHEMAS, bsip_names, share_name
 from bsip_cli.study import Participant, Study, Trial
 
 MASS_KG, GRAVITY = 62.8, 9.80665

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from bsip_cli.artifacts import share_name
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Heading, Paragraph, Picture, Section
 from bsip_cli.report.figures.com_differences import ComDifferences, com_differences
 from bsip_cli.report.figures.segment_masses import SegmentMasses, segment_masses
@@ -21,6 +20,7 @@ from bsip_cli.report.words import (
     significant,
     with_spread,
 )
+from bsip_cli.schemas import share_name
 
 DECIDED, FROM_TABLE = 0.8, 0.2
 _COM = ("com_x_m", "com_y_m", "com_z_m")

@@ -1,0 +1,520 @@
+"""Every artifact: its columns with type, unit, frame and meaning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Level = Literal["trial", "participant", "cohort"]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column. ``name`` may end in ``*``: a family of columns of one type and meaning."""
+
+    name: str
+    type: Literal["float", "int", "bool", "text"]
+    unit: str
+    meaning: str
+    frame: str = ""
+
+
+@dataclass(frozen=True)
+class Schema:
+    kind: str
+    level: Level
+    version: int
+    meaning: str
+    columns: tuple[Column, ...]
+
+    def column(self, name: str) -> Column | None:
+        """The definition that a column of this name follows, or None."""
+        for column in self.columns:
+            if column.name == name:
+                return column
+            if column.name.endswith("*") and name.startswith(column.name[:-1]):
+                return column
+        return None
+
+
+def _floats(names: str, unit: str, meaning: str, frame: str = "") -> tuple[Column, ...]:
+    return tuple(Column(name, "float", unit, meaning, frame) for name in names.split())
+
+
+def _text(name: str, meaning: str) -> Column:
+    return Column(name, "text", "", meaning)
+
+
+_TIME = Column("time_s", "float", "s", "time from the start of the recording")
+_METHOD = _text("method", "measured, RM, OM or another estimator")
+_SEGMENT = _text("segment", "segment of the skeleton")
+_WRENCH = (
+    *_floats("fx_N fy_N fz_N", "N", "ground force on the body", "world"),
+    *_floats("mx_Nm my_Nm mz_Nm", "N m", "moment about the world origin", "world"),
+)
+_VALID = Column("valid", "bool", "", "every contact with the ground is on a plate")
+_INERTIA = ["ixx_kgm2", "iyy_kgm2", "izz_kgm2", "ixy_kgm2", "ixz_kgm2", "iyz_kgm2"]
+_BSIP_UNITS = {"mass_kg": "kg", "com_x_m": "m", "com_y_m": "m", "com_z_m": "m"} | dict.fromkeys(
+    _INERTIA, "kg m2"
+)
+
+
+def _bsip_columns() -> tuple[Column, ...]:
+    frame = "segment; inertia about its centre of mass"
+    values = [Column(n, "float", u, "inertial parameter", frame) for n, u in _BSIP_UNITS.items()]
+    spreads = [
+        Column(f"{n}_sd", "float", u, "standard deviation", frame) for n, u in _BSIP_UNITS.items()
+    ]
+    shares = [
+        Column(
+            f"{_without_unit(n)}_data_share",
+            "float",
+            "1",
+            "part of the prior's variance that the data removed",
+        )
+        for n in _BSIP_UNITS
+    ]
+    return (*values, *spreads, *shares)
+
+
+def _without_unit(name: str) -> str:
+    return name.rsplit("_", 1)[0]
+
+
+def bsip_names() -> tuple[str, ...]:
+    """The ten inertial columns of a segment, in the order of the table."""
+    return tuple(_BSIP_UNITS)
+
+
+def share_name(name: str) -> str:
+    """Name of the data-share column of an inertial column."""
+    return f"{_without_unit(name)}_data_share"
+
+
+_COMPARISON = (
+    _text("table", "table of the papers it belongs to"),
+    _text("variable", "what is compared"),
+    _text("task", "movement, or all"),
+    _text("role", "of the task: sequence (identified OM) or validation; empty if none"),
+    _text("unit", "unit of the means"),
+    _text("test", "name of the test; description: means without a test"),
+    _text("origin", "published: as in the papers; added: what a reviewer asks for"),
+    _text("method_a", "first method"),
+    _text("method_b", "second method; empty if the row concerns more or fewer than two"),
+    Column("n", "int", "1", "participants with all methods"),
+    *_floats("mean_a sd_a mean_b sd_b difference ci_low ci_high", "as unit", "of the comparison"),
+    Column("bound", "float", "as unit", "half-width of the range that counts as equivalent"),
+    *_floats("statistic df1 df2 p_value", "1", "of the test; correlations: medians"),
+    Column("p_holm", "float", "1", "Holm's correction over the same test's rows of the table"),
+    Column("effect_size", "float", "1", "of the test"),
+    _text("effect_size_name", "which effect size"),
+    Column("epsilon", "float", "1", "Greenhouse and Geisser's, already in df1, df2, p_value"),
+    Column("lilliefors_p", "float", "1", "normality of the differences; F tests: smallest of all"),
+    *_floats(
+        "count_a count_b",
+        "1",
+        "participants in whom the first, the second method is (significantly) better",
+    ),
+    _text("reason", "why the test is not possible, or what to mind"),
+)
+
+SCHEMAS = {
+    schema.kind: schema
+    for schema in (
+        Schema(
+            "markers",
+            "trial",
+            1,
+            "marker positions, one row per frame and marker",
+            (
+                _TIME,
+                _text("marker", "name in the marker set"),
+                *_floats("x_m y_m z_m", "m", "position, NaN where missing", "world"),
+                Column("filled", "bool", "", "estimated over a gap"),
+            ),
+        ),
+        Schema(
+            "wrench",
+            "trial",
+            1,
+            "measured ground wrench on the body at the marker rate",
+            (
+                _TIME,
+                *_WRENCH,
+                _VALID,
+                Column(
+                    "plate*",
+                    "float",
+                    "N, N m, m",
+                    "of one plate: force, moment about the world origin",
+                    "world",
+                ),
+            ),
+        ),
+        Schema(
+            "plates",
+            "trial",
+            1,
+            "outlines of the force plates, one row per corner",
+            (
+                _text("plate", "name of the plate"),
+                Column("corner", "int", "", "1 to 4"),
+                *_floats("x_m y_m z_m", "m", "position of the corner", "world"),
+            ),
+        ),
+        Schema(
+            "contacts",
+            "trial",
+            1,
+            "which foot stands where",
+            (
+                _TIME,
+                Column("left_on_ground", "bool", "", "the left foot touches the ground"),
+                Column("right_on_ground", "bool", "", "the right foot touches the ground"),
+                Column("left_on_plate", "bool", "", "the left foot's contact is measured"),
+                Column("right_on_plate", "bool", "", "the right foot's contact is measured"),
+                _VALID,
+            ),
+        ),
+        Schema(
+            "quality",
+            "trial",
+            1,
+            "what was found, corrected and excluded at ingest",
+            (
+                _text("check", "what was looked at"),
+                _text("subject", "plate, marker or segment"),
+                _text("found", "what was found"),
+                _text("expected", "what was expected"),
+                _text("action", "what was done"),
+                _text("level", "info, corrected, warning or excluded"),
+            ),
+        ),
+        Schema(
+            "skeleton",
+            "participant",
+            1,
+            "the person's joints, one row per segment",
+            (
+                _SEGMENT,
+                _text("parent", "segment it hangs on"),
+                _text("joint", "name of the joint to the parent"),
+                _text("joint_type", "free, spherical or revolute"),
+                *_floats("joint_x_m joint_y_m joint_z_m", "m", "joint centre", "parent segment"),
+                Column(
+                    "parent_tilt_rad", "float", "rad", "tilt of the hinge about X in the parent"
+                ),
+                Column(
+                    "child_tilt_rad", "float", "rad", "tilt of the hinge about X in the segment"
+                ),
+                *_floats(
+                    "origin_x_m origin_y_m origin_z_m",
+                    "m",
+                    "segment origin from the joint",
+                    "segment",
+                ),
+                Column("length_m", "float", "m", "length that scales the anthropometric table"),
+                Column("first_guess_m", "float", "m", "the same before refinement"),
+                Column("length_sd_m", "float", "m", "standard deviation after refinement"),
+                Column("joint_shift_m", "float", "m", "how far refinement moved the joint"),
+                Column("held", "bool", "", "no markers: the joint is held at its neutral pose"),
+            ),
+        ),
+        Schema(
+            "marker-positions",
+            "participant",
+            1,
+            "where each marker sits on its segment",
+            (
+                _text("marker", "name in the marker set"),
+                _SEGMENT,
+                *_floats("x_m y_m z_m", "m", "position", "segment"),
+                Column("weight", "float", "1", "relative weight in the inverse kinematics"),
+                Column(
+                    "shift_m", "float", "m", "how far refinement moved it from the static trial"
+                ),
+                Column("residual_m", "float", "m", "RMS residual over the refining frames"),
+            ),
+        ),
+        Schema(
+            "person",
+            "participant",
+            1,
+            "facts of the person that later stages use",
+            (
+                _text("sex", "M or F"),
+                Column("mass_kg", "float", "kg", "mass, from the scale or the plates"),
+                _text("mass_source", "participants.tsv or plates"),
+                Column(
+                    "plate_mass_kg", "float", "kg", "mass that the plates read in quiet standing"
+                ),
+                Column(
+                    "height_m", "float", "m", "stature; estimated from the segments if not given"
+                ),
+                *_floats(
+                    "anterior_x anterior_y", "1", "unit vector of the anterior direction", "world"
+                ),
+                _text("calibration_trial", "trial that calibrated the skeleton"),
+                Column("marker_rms_m", "float", "m", "marker residual over the refining frames"),
+            ),
+        ),
+        Schema(
+            "kinematics",
+            "trial",
+            1,
+            "joint coordinates and their derivatives",
+            (
+                _TIME,
+                Column("determined", "bool", "", "the markers determine this frame"),
+                Column("marker_rms_m", "float", "m", "RMS residual of the frame's markers"),
+                Column("angle_sd_rad", "float", "rad", "largest standard deviation of an angle"),
+                Column("q_*", "float", "m, rad, 1", "configuration (Pinocchio's order)"),
+                Column("v_*", "float", "m/s, rad/s", "velocity (Pinocchio's order)"),
+                Column("a_*", "float", "m/s2, rad/s2", "acceleration (Pinocchio's order)"),
+                Column("sd_*", "float", "m/s2, rad/s2", "noise level of the acceleration"),
+            ),
+        ),
+        Schema(
+            "marker-residuals",
+            "trial",
+            1,
+            "distance of each marker from its model",
+            (
+                _TIME,
+                _text("marker", "name in the marker set"),
+                Column("residual_m", "float", "m", "distance; NaN where missing"),
+            ),
+        ),
+        Schema(
+            "marker-events",
+            "trial",
+            1,
+            "markers that jump, slip, bear another's label or sit wrong",
+            (
+                _text("kind", "jump, slip, swap or offset"),
+                _text("marker", "name in the marker set"),
+                _text("partner", "the other marker of a swap, else empty"),
+                *_floats("start_s end_s", "s", "from when to when"),
+                Column(
+                    "size_m",
+                    "float",
+                    "m",
+                    "how far it moved on its segment; how far a swap's markers are apart",
+                ),
+                Column(
+                    "statistic",
+                    "float",
+                    "1",
+                    "jump, offset: size over the spread it is judged against; slip: unlikeliness "
+                    "as a number of standard deviations; swap: residual as labelled over exchanged",
+                ),
+                _text("sentence", "the same in words"),
+            ),
+        ),
+        Schema(
+            "bsip",
+            "participant",
+            1,
+            "inertial parameters per method and segment",
+            (
+                _METHOD,
+                _SEGMENT,
+                *_bsip_columns(),
+            ),
+        ),
+        Schema(
+            "regression",
+            "participant",
+            1,
+            "inertial parameters of the regression (RM)",
+            (
+                _METHOD,
+                _SEGMENT,
+                *_bsip_columns(),
+                _text("note", "what had to be repaired or assumed"),
+            ),
+        ),
+        Schema(
+            "base-parameters",
+            "participant",
+            1,
+            "identifiable combinations of parameters",
+            (
+                _text("name", "leading parameter"),
+                _text("expression", "the combination in words"),
+                Column("value", "float", "as unit", "least-squares estimate"),
+                _text("unit", "kg, kg m or kg m2"),
+                Column("sd", "float", "as unit", "standard deviation, autocorrelation counted"),
+                Column("sigma_percent", "float", "%", "100 sd / |value|"),
+                Column("rm_value", "float", "as unit", "the same combination of the regression"),
+            ),
+        ),
+        Schema(
+            "excitation",
+            "participant",
+            1,
+            "how well the motion excited the parameters",
+            (
+                _text("quantity", "singular_value, condition_number, segment"),
+                _text("name", "index or segment"),
+                Column("value", "float", "1", "of the quantity"),
+            ),
+        ),
+        Schema(
+            "identification",
+            "participant",
+            1,
+            "what the identification used and reached",
+            (
+                _text("estimator", "name of the estimator"),
+                _METHOD,
+                _text("trials", "identification trials"),
+                Column("samples", "int", "1", "samples per component after decimation"),
+                Column("duration_s", "float", "s", "time used"),
+                Column("effective_samples", "float", "1", "independent samples, all components"),
+                Column("rank", "int", "1", "base parameters found"),
+                Column("condition_number", "float", "1", "of the scaled base regressor"),
+                *_floats("rms_fx_N rms_fy_N rms_fz_N", "N", "residual of the fit"),
+                *_floats(
+                    "rms_mx_Nm rms_my_Nm rms_mz_Nm",
+                    "N m",
+                    "residual of the fit, about the middle of the motion",
+                ),
+                _text("note", "what a reader should mind"),
+            ),
+        ),
+        Schema(
+            "used-blocks",
+            "participant",
+            1,
+            "stretches that identified the parameters",
+            (
+                _text("trial", "identification trial"),
+                *_floats("start_s end_s", "s", "stretch that was used"),
+            ),
+        ),
+        Schema(
+            "reconstruction",
+            "trial",
+            1,
+            "ground wrench and COP, measured and simulated",
+            (
+                _TIME,
+                _METHOD,
+                *_WRENCH,
+                Column("cop_ap_m", "float", "m", "centre of pressure, anterior", "person"),
+                Column("cop_ml_m", "float", "m", "centre of pressure, to the right", "person"),
+                _VALID,
+                Column("used", "bool", "", "the sample helped to identify the parameters"),
+            ),
+        ),
+        Schema(
+            "fit",
+            "trial",
+            1,
+            "how well a method's wrench follows the measured one",
+            (
+                _METHOD,
+                _text("component", "fx fy fz mx my mz cop_ap cop_ml grf_vertical"),
+                Column("rmse", "float", "as unit", "root-mean-square error"),
+                _text("unit", "N, N m or mm"),
+                Column("rmse_percent_bw", "float", "% body weight", "forces only"),
+                *_floats("pearson_r schwer_m schwer_p schwer_c", "1", "agreement"),
+                Column("n", "int", "1", "samples"),
+                Column("n_effective", "float", "1", "independent samples"),
+                _text("data", "held_out, or identification where no other data are left"),
+            ),
+        ),
+        Schema(
+            "correlation-difference",
+            "trial",
+            1,
+            "test of r(RM) against r(OM)",
+            (
+                _text("component", "as in fit"),
+                _text("method_a", "first method"),
+                _text("method_b", "second method"),
+                *_floats("r_a r_b r_ab n_effective", "1", "correlations and samples"),
+                *_floats("williams_t df williams_p fisher_z fisher_p", "1", "of the tests"),
+                _text("reason", "why a test is not possible"),
+            ),
+        ),
+        Schema(
+            "posturography",
+            "trial",
+            1,
+            "sway measures of the centre of pressure",
+            (
+                _METHOD,
+                *_floats("rms_ap_mm rms_ml_mm", "mm", "about the mean"),
+                *_floats("rms_ap_origin_m rms_ml_origin_m", "m", "about the world origin"),
+                Column("mean_velocity_mm_s", "float", "mm/s", "mean speed of the COP"),
+                Column("sway_length_mm", "float", "mm", "length of the COP's path"),
+                Column("ellipse_area_mm2", "float", "mm2", "95 % prediction ellipse"),
+                Column("duration_s", "float", "s", "time with a COP"),
+            ),
+        ),
+        Schema(
+            "refusal",
+            "trial",
+            1,
+            "why a stage refused its input",
+            (
+                _text("stage", "stage that refused"),
+                _text("kind", "bad data or numerical failure"),
+                _text("sentence", "what was found, what was expected, what to do"),
+            ),
+        ),
+        Schema(
+            "values",
+            "cohort",
+            1,
+            "one row per participant, trial, method and variable",
+            (
+                _text("participant", "participant_id"),
+                _text("trial", "stem of the trial or empty"),
+                _text("task", "movement, or all"),
+                _text(
+                    "role", "of the trial: sequence (identified OM) or validation; empty if none"
+                ),
+                _text("data", "held_out or identification: what the trial was to OM; else empty"),
+                _text("table", "table of the papers"),
+                _text("variable", "what was computed"),
+                _METHOD,
+                Column("value", "float", "as unit", "the value"),
+                _text("unit", "unit of the value"),
+            ),
+        ),
+        Schema("comparisons", "cohort", 1, "tests between the methods", _COMPARISON),
+        Schema(
+            "tables-files",
+            "cohort",
+            1,
+            "the written tables, one row per file",
+            (
+                _text("file", "path below the output folder"),
+                _text("sha256", "of the file's bytes"),
+            ),
+        ),
+        Schema(
+            "report-files",
+            "participant",
+            1,
+            "the written report, one row per file",
+            (
+                _text("file", "path below the output folder"),
+                _text("sha256", "of the file's bytes"),
+            ),
+        ),
+        Schema(
+            "group-report-files",
+            "cohort",
+            1,
+            "the cohort's report, one row per file",
+            (
+                _text("file", "path below the output folder"),
+                _text("sha256", "of the file's bytes"),
+            ),
+        ),
+    )
+}

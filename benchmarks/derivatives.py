@@ -22,9 +22,9 @@ from scipy.signal import butter, filtfilt
 from bsip_cli.motion.splines import smooth
 
 SLOW_HZ, BURST_HZ = (0.05, 0.6), (1.5, 5.0)
-BURST_SD_S = 0.25  # the burst's envelope: 0.5 s between its standard deviations
-BURST_REACH = 2.0  # standard deviations that count as burst
-EVERY_S = 5.0  # one burst in so many seconds: a fifth of the time
+BURST_SD_S = 0.5 / 2.355  # the burst's envelope is 0.5 s wide at half its height
+BURST_REACH = 3.0  # standard deviations that count as burst
+EVERY_S = 6.4  # one burst in so many seconds: a fifth of the time
 EDGE_S = 0.25  # the ends rest on one side only and are not judged
 PACE_WINDOW_S = 0.5  # as shipped
 
@@ -240,7 +240,7 @@ def many_table(options: argparse.Namespace) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--trials", type=int, default=20)
-    parser.add_argument("--duration", type=float, default=15.0, help="of a trial [s]")
+    parser.add_argument("--duration", type=float, default=12.8, help="of a trial [s]")
     parser.add_argument("--bias", type=float, default=0.93, help="see above [m/s2]")
     parser.add_argument("--rates", type=float, nargs="+", default=[100.0, 250.0], help="[Hz]")
     parser.add_argument("--noises", type=float, nargs="+", default=[0.2, 0.5, 1.0], help="[mm]")

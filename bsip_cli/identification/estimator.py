@@ -17,7 +17,10 @@ from bsip_cli.identification.prior import Prior
 class Problem:
     """Everything an estimator may use.
 
-    ``trust_ratio``: how many times better than the table the data must know a combination.
+    The last five are options of [identify] that single estimators read: how many times better than
+    the table the data must know a combination; the sigma% below which a base parameter counts;
+    how far a segment may lie from where its frame says [m, rad]; and how many deviations as large
+    as [prior] says count beside this person's own.
     """
 
     equations: NormalEquations
@@ -25,15 +28,24 @@ class Problem:
     prior: Prior
     basis: Basis
     trust_ratio: float
+    sigma_percent_limit: float = 5.0
+    frame_sd_m: float = 0.010
+    frame_sd_rad: float = 0.03
+    spread_weight: float = 4.0
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Parameters (P,) about the joint centres, their covariance (P, P), and a note for people."""
+    """Parameters (P,) about the joint centres, their covariance (P, P), and a note for people.
+
+    ``prior_covariance`` (P, P) where the estimator weighs the prior itself: what the data share is
+    counted from.
+    """
 
     phi: np.ndarray
     covariance: np.ndarray
     note: str
+    prior_covariance: np.ndarray | None = None
 
     def residual_rms(self, problem: Problem) -> np.ndarray:
         """(6,) residual [N, N m] that the estimate leaves in its own data."""

@@ -31,6 +31,8 @@ class Prior:
     phi : (10 n,) mean, about the joint centres (Pinocchio's order).
     root : (10 n, 10 n) S with covariance S S^T.
     readable_sd : (n, 10) the same spread for mass, centre of mass and tensor.
+    spread_sd : (n, 10) spread of each on its own, before the masses' sum is known to
+        total_mass_sd_kg.
     """
 
     inertias: tuple[Inertia, ...]
@@ -38,6 +40,8 @@ class Prior:
     phi: np.ndarray
     root: np.ndarray
     readable_sd: np.ndarray
+    spread_sd: np.ndarray
+    total_mass_sd_kg: float
 
 
 def prior_of(inertias: tuple[Inertia, ...], person: Person, spread: Spread) -> Prior:
@@ -45,17 +49,19 @@ def prior_of(inertias: tuple[Inertia, ...], person: Person, spread: Spread) -> P
     origins = person.origin_in_joint_m
     n = len(inertias)
     phi, root = np.empty(10 * n), np.zeros((10 * n, 10 * n))
+    spread_sd = np.empty((n, 10))
     for i, inertia in enumerate(inertias):
         block = slice(10 * i, 10 * i + 10)
         phi[block] = inertia.moved(-origins[i]).phi()
-        spreads = np.diag(_readable_sd(inertia, person.lengths_m[i], spread))
-        root[block, block] = np.linalg.solve(readable_jacobian(phi[block]), spreads)
-    root = _with_total_mass(root, spread.total_mass_sd_percent / 100 * phi[::10].sum())
+        spread_sd[i] = _readable_sd(inertia, person.lengths_m[i], spread)
+        root[block, block] = np.linalg.solve(readable_jacobian(phi[block]), np.diag(spread_sd[i]))
+    total_mass_sd_kg = spread.total_mass_sd_percent / 100 * float(phi[::10].sum())
+    root = _with_total_mass(root, total_mass_sd_kg)
     readable_sd = np.empty((n, 10))
     for i in range(n):
         block = slice(10 * i, 10 * i + 10)
         readable_sd[i] = np.linalg.norm(readable_jacobian(phi[block]) @ root[block], axis=1)
-    return Prior(inertias, origins, phi, root, readable_sd)
+    return Prior(inertias, origins, phi, root, readable_sd, spread_sd, total_mass_sd_kg)
 
 
 def _with_total_mass(root: np.ndarray, sd_kg: float) -> np.ndarray:

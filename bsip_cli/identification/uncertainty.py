@@ -33,7 +33,11 @@ def readable(estimate: Estimate, prior: Prior) -> ReadableParameters:
         covariance = estimate.covariance[block, block]
         values[i] = from_phi(phi).moved(prior.origin_in_joint_m[i]).readable()
         sd[i] = _sd(readable_jacobian(phi), covariance)
-        left = _sd(readable_jacobian(prior.phi[block]), covariance) / prior.readable_sd[i]
+        at_table = readable_jacobian(prior.phi[block])
+        before = prior.readable_sd[i]
+        if estimate.prior_covariance is not None:
+            before = _sd(at_table, estimate.prior_covariance[block, block])
+        left = _sd(at_table, covariance) / before
         share[i] = np.clip(1.0 - left**2, 0.0, 1.0)
     return ReadableParameters(values, sd, share)
 

@@ -16,7 +16,10 @@ _FAR = 3.0  # own residual over the trusted distance and over the trial's median
 _NEARER = 0.5  # distance to the other's place over that to the own
 _BRIDGE_S = 0.1  # breaks within one swap
 _UNSEEN_S = 0.25  # a reversal is looked for over gaps up to this long
-_LIMBS = (("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot"))
+_ARM, _LEG = ("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot")
+_LIMBS = (_ARM, ("upper_torso", *_ARM), _LEG)  # the shoulders' labels may go with the arms'
+_LATERAL_M = 0.05  # a marker of the trunk this far beside its middle belongs to a side
+_MIRRORED_M = 0.1  # the places of a pair are mirrored to this
 _LIMB_FRAMES = 24
 _MOST = 12
 _LARGEST_M = 0.2  # a marker farther off says no more
@@ -95,25 +98,24 @@ def swapped_limbs(fit: MarkerFit, refit: Refit) -> tuple[list[MarkerEvent], np.n
     with the limbs exchanged; if that at least halves the residual of all markers, they are.
     """
     frames = np.unique(np.linspace(0, len(fit.times_s) - 1, _LIMB_FRAMES).astype(int))
-    order = np.tile(np.arange(len(fit.labels)), (len(fit.times_s), 1))
     before = _misfit_m(fit.distance_m()[frames])
-    events: list[MarkerEvent] = []
+    same = np.tile(np.arange(len(fit.labels)), (len(fit.times_s), 1))
+    if not before > _FAR * fit.trusted_m.min():
+        return [], same
+    tried = []
     for limb in _LIMBS:
-        pairs = _mirrored_pairs(fit, limb)
-        if not pairs or not before > _FAR * fit.trusted_m.min():
-            continue
-        trial = order.copy()
+        pairs, order = _mirrored_pairs(fit, limb), same.copy()
         for a, b in pairs:
-            trial[:, [a, b]] = trial[:, [b, a]]
-        again = refit(exchanged(fit.measured_m, trial)[frames], fit.times_s[frames])
-        after = _misfit_m(again.distance_m())
-        if after < _NEARER * before:
-            order = trial
-            whole = slice(0, len(fit.times_s))
-            for a, b in pairs:
-                apart = float(np.nanmedian(np.linalg.norm(_line(fit, a, b), axis=1)))
-                events.append(event(fit, "swap", a, whole, apart, before / after, partner=b))
-            before = after
+            order[:, [a, b]] = order[:, [b, a]]
+        again = refit(exchanged(fit.measured_m, order)[frames], fit.times_s[frames])
+        tried.append((_misfit_m(again.distance_m()), pairs, order))
+    after, pairs, order = min(tried, key=lambda one: one[0])
+    if not after < _NEARER * before:
+        return [], same
+    whole, events = slice(0, len(fit.times_s)), []
+    for a, b in pairs:
+        apart = float(np.nanmedian(np.linalg.norm(_line(fit, a, b), axis=1)))
+        events.append(event(fit, "swap", a, whole, apart, before / after, partner=b))
     return events, order
 
 
@@ -135,20 +137,24 @@ def _mirrored(segment: str) -> str:
 
 
 def _mirrored_pairs(fit: MarkerFit, limb: tuple[str, ...]) -> list[tuple[int, int]]:
-    """Markers of the right limb and those that lie mirrored on the left one."""
-    pairs, used = [], set()
-    for a, segment in enumerate(fit.segments):
-        if segment[:-2] not in limb or not segment.endswith("_r"):
-            continue
-        mirrored = fit.place_m[a] * [1.0, 1.0, -1.0]
-        others = [
-            (float(np.linalg.norm(fit.place_m[b] - mirrored)), b)
-            for b, other in enumerate(fit.segments)
-            if other == _mirrored(segment) and b not in used
+    """Markers of the right side of some segments and those that lie mirrored on the left one."""
+    side = np.array(
+        [
+            {"_r": 1, "_l": -1}.get(name[-2:], int(np.sign(z)) * (abs(z) > _LATERAL_M))
+            for name, z in zip(fit.segments, fit.place_m[:, 2], strict=True)
         ]
-        if others:
-            used.add(min(others)[1])
-            pairs.append((a, min(others)[1]))
+    )
+    near = sorted(
+        (float(np.linalg.norm(fit.place_m[a] * [1.0, 1.0, -1.0] - fit.place_m[b])), a, b)
+        for a, segment in enumerate(fit.segments)
+        for b, other in enumerate(fit.segments)
+        if segment.removesuffix("_r") in limb and other == _mirrored(segment)
+        if side[a] == 1 and side[b] == -1 and np.isfinite(_line(fit, a, b)).any()
+    )
+    pairs: list[tuple[int, int]] = []
+    for apart, a, b in near:
+        if apart < _MIRRORED_M and not {a, b} & {k for pair in pairs for k in pair}:
+            pairs.append((a, b))
     return pairs
 
 

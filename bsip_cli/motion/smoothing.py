@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import binary_erosion
 from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.body.person import Person
@@ -25,8 +26,8 @@ _LOOSE, _WEAK_PRIOR = 60.0, 200.0  # rad/m
 class Motion:
     """q (N, nq), v (N, nv), a (N, nv) in Pinocchio's conventions, and the noise of a (N, nv).
 
-    ``inner`` (N,) is False near the ends of the trial, where an acceleration rests on one side
-    only; ``marker_noise_m`` is the noise of the markers that the poses show.
+    ``inner`` (N,) is False in gaps and near their and the trial's ends, where an acceleration
+    rests on one side only; ``marker_noise_m`` is the noise of the markers that the poses show.
     """
 
     q: np.ndarray
@@ -55,7 +56,8 @@ def smooth_motion(
 
     Parameters
     ----------
-    q : (N, nq) poses; those not ``determined`` (N,) are bridged.
+    q : (N, nq) poses.
+    determined : (N,), or (N, joints): which are to be believed; the others are bridged.
     method, butterworth_cutoff_hz, pace_window_s, edge_s : as in configs/default.toml, [smoothing].
 
     Raises
@@ -63,22 +65,26 @@ def smooth_motion(
     BadDataError
         Too few frames are determined.
     """
-    if determined.sum() < 12:
+    skeleton = person.skeleton
+    known = determined.reshape(len(q), -1) & np.ones(len(skeleton.joints), dtype=bool)
+    whole = np.asarray(known.all(axis=1))
+    if whole.sum() < 12:
         raise BadDataError(
-            f"{int(determined.sum())} frames with a pose",
+            f"{int(whole.sum())} frames with a pose",
             expected="at least 12 to differentiate",
             remedy="check the markers of this trial",
         )
-    skeleton = person.skeleton
-    curves = np.where(determined[:, None], _continuous(skeleton, q), np.nan)
-    marker_noise, noise = _noise(person, curves, determined, rate_hz)
+    joint_of_curve = np.repeat(
+        np.arange(len(skeleton.joints)), np.diff([*skeleton.q_starts, q.shape[1]])
+    )
+    curves = np.where(known[:, joint_of_curve], _continuous(skeleton, q), np.nan)
+    marker_noise, noise = _noise(person, curves, whole, rate_hz)
     if method == "spline":
         smoothed = smooth(curves, rate_hz, pace_window_s, noise)
     else:
         smoothed = _butterworth(curves, rate_hz, butterworth_cutoff_hz, noise)
-    inner = np.zeros(len(q), dtype=bool)
     edge = round(edge_s * rate_hz)
-    inner[edge : len(q) - edge] = True
+    inner = np.asarray(binary_erosion(whole, np.ones(2 * edge + 1)) if edge else whole)
     return _on_manifold(skeleton, smoothed, inner, marker_noise)
 
 

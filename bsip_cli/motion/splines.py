@@ -51,7 +51,7 @@ def smooth(
 
     Parameters
     ----------
-    samples : (N, channels); rows with NaN are missing, and bridged.
+    samples : (N, channels); NaN where missing, which is bridged, each channel on its own.
     window_s : time over which the pace of the motion is judged.
     noise_sd : (channels,) noise of the samples, estimated from them where not given.
 
@@ -66,13 +66,30 @@ def smooth(
     sigma = noise_level(samples, rate_hz) if noise_sd is None else noise_sd
     basis = _Basis(count, max(1, round(rate_hz / _KNOT_RATE_HZ)), rate_hz)
     window = max(9, round(window_s * rate_hz / basis.samples_per_knot))
-    seen = np.isfinite(samples).all(axis=1)
-    offset = samples[seen].mean(axis=0)
-    c, spread = _coefficients((samples - offset) / sigma, seen, window, basis)
-    c = c * sigma
-    return SmoothSignal(
-        basis.values @ c + offset, basis.slopes @ c, basis.curves @ c, np.outer(spread, sigma)
-    )
+    seen = np.isfinite(samples)
+    offset = np.nanmean(samples, axis=0)
+    scaled = np.where(seen, (samples - offset) / sigma, 0.0)
+    groups = _alike(seen)
+    first = max(groups, key=lambda columns: seen[:, columns[0]].sum())
+    stiffness = _stiffness(scaled[:, first], seen[:, first[0]], window, basis)
+    c, spread = np.empty((basis.size, samples.shape[1])), np.empty(samples.shape)
+    for columns in groups:
+        weights = seen[:, columns[0]].astype(float)
+        c[:, columns], inverse = _fit(
+            _normal(basis, weights), stiffness, basis.values.T @ scaled[:, columns]
+        )
+        sd = np.sqrt(_variances(basis.curves, inverse))
+        spread[:, columns] = np.outer(sd, sigma[columns])
+    c *= sigma
+    return SmoothSignal(basis.values @ c + offset, basis.slopes @ c, basis.curves @ c, spread)
+
+
+def _alike(seen: np.ndarray) -> list[list[int]]:
+    """Channels (columns) that miss the same samples, together."""
+    groups: dict[bytes, list[int]] = {}
+    for k in range(seen.shape[1]):
+        groups.setdefault(seen[:, k].tobytes(), []).append(k)
+    return list(groups.values())
 
 
 def noise_level(samples: np.ndarray, rate_hz: float) -> np.ndarray:
@@ -152,31 +169,32 @@ class _Basis:
         return np.clip(np.round(self.x).astype(int), 0, self.size - 5)
 
 
-def _coefficients(
-    y: np.ndarray, seen: np.ndarray, window: int, basis: _Basis
-) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients of all channels, and the standard deviation (N,) of the second derivative.
+def _stiffness(y: np.ndarray, seen: np.ndarray, window: int, basis: _Basis) -> np.ndarray:
+    """The stiffness at each fourth difference that the channels y (N, channels) share.
 
-    y (N, channels) in units of its noise. All channels share one stiffness: where each has its
-    own, the errors of pelvis and legs no longer cancel and a planted foot accelerates.
+    y in units of its noise. All channels share one stiffness: where each has its own, the errors
+    of pelvis and legs no longer cancel and a planted foot accelerates.
     """
     weights = seen.astype(float)
-    right = basis.values.T @ np.where(seen[:, None], y, 0.0)
-    normal = _lower_band(basis.values.T @ (basis.values * weights[:, None]))
+    right = basis.values.T @ y
+    normal = _normal(basis, weights)
     stiffness = np.full(basis.size - 4, _FIRST_STIFFNESS)
     for _ in range(_ROUNDS):
         c, inverse = _fit(normal, stiffness, right)
         leverage = weights * _variances(basis.values, inverse)
         known = np.bincount(basis.knot_of_sample, leverage, minlength=len(stiffness))
-        rough = _pace(c)
-        new = _mean(known, window) / np.maximum(_mean(rough, window), 1e-300)
+        new = _mean(known, window) / np.maximum(_mean(_pace(c), window), 1e-300)
         new = np.exp(_mean(np.log(np.clip(new, *_STIFFNESS_RANGE)), max(3, window // 4)))
         settled = np.max(np.abs(np.log(new / stiffness))) < 0.1
         stiffness = new
         if settled:
             break
-    c, inverse = _fit(normal, stiffness, right)
-    return c, np.sqrt(_variances(basis.curves, inverse))
+    return stiffness
+
+
+def _normal(basis: _Basis, weights: np.ndarray) -> np.ndarray:
+    """(6, n) lower band of B^T diag(weights) B."""
+    return _lower_band(basis.values.T @ (basis.values * weights[:, None]))
 
 
 def _pace(c: np.ndarray) -> np.ndarray:

@@ -28,16 +28,15 @@ def run(unit: Unit) -> None:
     times, labels, positions = markers_from(frame)
     markers = ordered_markers(labels, positions, person.markers)
     poses, decided = _poses(unit, person, markers)
-    determined, angle_sd = _determined(unit, poses, decided)
+    known, angle_sd = _determined(unit, person, poses, decided)
     rate = 1.0 / float(np.median(np.diff(times)))
     filled = frame["filled"].to_numpy().reshape(len(times), len(labels), 1)
     filled = ordered_markers(labels, filled, person.markers)[..., 0] == 1
-    events = _events(unit, person, markers, filled, times, poses, decided)
-    motion = smooth_motion(person, poses.q, determined, rate, **unit.config.smoothing.model_dump())
-    determined &= motion.inner
+    events = _events(unit, person, markers, filled, times, poses)
+    motion = smooth_motion(person, poses.q, known, rate, **unit.config.smoothing.model_dump())
     unit.write(
         "kinematics",
-        _kinematics(times, determined, angle_sd, poses, motion, skeleton),
+        _kinematics(times, angle_sd, poses, motion, skeleton),
         facts={"marker_noise_m": motion.marker_noise_m, "marker_rms_m": poses.rms_m()},
     )
     unit.write(
@@ -55,27 +54,46 @@ def run(unit: Unit) -> None:
 
 def _poses(unit: Unit, person: Person, markers: np.ndarray) -> tuple[Poses, np.ndarray]:
     """Poses, and which coordinates (nv,) the markers decide; the others are held near neutral."""
+    poses, decided = _solved(unit, person, markers)
+    if not decided.all():
+        names = ", ".join(np.array(person.skeleton.v_names)[~decided])
+        unit.warn(f"{unit.name}: no markers decide {names}; held near the neutral pose")
+    return poses, decided
+
+
+def _solved(unit: Unit, person: Person, markers: np.ndarray) -> tuple[Poses, np.ndarray]:
     options = unit.config.ik
     fixed = options.model_dump(include={"marker_sd_m", "robust_limit_m", "iterations"})
     poses = solve_trial(person, markers, posture_sd_rad=options.posture_sd_rad, **fixed)
     decided = np.median(poses.coordinate_sd, axis=0) < options.undetermined_sd_rad
     decided[:3] = True  # the base's position is in metres
     if not decided.all():
-        names = ", ".join(np.array(person.skeleton.v_names)[~decided])
-        unit.warn(f"{unit.name}: no markers decide {names}; held near the neutral pose")
         sd = np.where(decided, options.posture_sd_rad, options.held_sd_rad)
         poses = solve_trial(person, markers, posture_sd_rad=sd, **fixed)
     return poses, decided
 
 
-def _determined(unit: Unit, poses: Poses, decided: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frames in which the markers decide every angle that they decide in most frames."""
-    angle_sd = poses.coordinate_sd[:, 3:][:, decided[3:]].max(axis=1)
-    seen = np.isfinite(poses.residual_m).any(axis=1)
-    determined = (angle_sd < unit.config.ik.undetermined_sd_rad) & poses.converged & seen
-    if not determined.all():
-        unit.warn(f"{unit.name}: {int((~determined).sum())} frames without a pose")
-    return determined, angle_sd
+def _determined(
+    unit: Unit, person: Person, poses: Poses, decided: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Joints (N, joints) whose angles the markers decide in a frame as they do in most frames.
+
+    A joint beyond an undecided one is undecided too. Also the largest standard deviation (N,) of
+    an angle that most frames decide.
+    """
+    skeleton = person.skeleton
+    sd = np.where(decided, poses.coordinate_sd, 0.0)
+    sd[:, :3] = 0.0  # the base's position is in metres
+    of_joint = np.maximum.reduceat(sd, skeleton.v_starts, axis=1)
+    seen = poses.converged & np.isfinite(poses.residual_m).any(axis=1)
+    known = (of_joint < unit.config.ik.undetermined_sd_rad) & seen[:, None]
+    for i, parent in enumerate(skeleton.parents[1:], start=1):
+        known[:, i] &= known[:, parent]
+    lost = [name for name, ok in zip(skeleton.joints, known.all(axis=0), strict=True) if not ok]
+    if lost:
+        count = int((~known.all(axis=1)).sum())
+        unit.warn(f"{unit.name}: {count} frames without a pose of {', '.join(lost)}")
+    return known, of_joint.max(axis=1)
 
 
 def _events(
@@ -85,18 +103,12 @@ def _events(
     filled: np.ndarray,
     times: np.ndarray,
     poses: Poses,
-    decided: np.ndarray,
 ) -> pd.DataFrame:
     """Markers that jump, slip, bear another's label or sit wrong; the user is told the worst."""
-    options = unit.config.ik
-    scales = options.model_dump(include={"marker_sd_m", "robust_limit_m"})
-    sd = np.where(decided, options.posture_sd_rad, options.held_sd_rad)
+    scales = unit.config.ik.model_dump(include={"marker_sd_m", "robust_limit_m"})
 
     def refit(other: np.ndarray, at: np.ndarray) -> MarkerFit:
-        again = solve_trial(
-            person, other, posture_sd_rad=sd, iterations=options.iterations, **scales
-        )
-        return marker_fit(person, other, again.q, at, **scales)
+        return marker_fit(person, other, _solved(unit, person, other)[0].q, at, **scales)
 
     found = marker_evidence(marker_fit(person, markers, poses.q, times, **scales), refit, filled)
     for sentence in summaries(found, _MOST_SAID):
@@ -105,12 +117,12 @@ def _events(
     return pd.DataFrame([astuple(one) for one in found], columns=columns)
 
 
-def _kinematics(times, determined, angle_sd, poses: Poses, motion: Motion, skeleton):
+def _kinematics(times, angle_sd, poses: Poses, motion: Motion, skeleton):
     tables = [
         pd.DataFrame(
             {
                 "time_s": times,
-                "determined": determined,
+                "determined": motion.inner,
                 "marker_rms_m": poses.frame_rms_m(),
                 "angle_sd_rad": angle_sd,
             }

@@ -185,6 +185,24 @@ def test_undetermined_frames_are_bridged(swing, method):
         assert relative(motion.v[270:336], v[270:336]) < 0.02
 
 
+def test_a_joint_without_a_pose_leaves_the_others_alone(swing):
+    """A hand lost for a third of a second must not shake the pelvis."""
+    person, _, (_, q, _, a) = swing
+    skeleton = person.skeleton
+    wrist = skeleton.joints.index("wrist_l")
+    known = np.ones((len(q), len(skeleton.joints)), dtype=bool)
+    known[250:284, wrist] = False
+    noisy = q + np.random.default_rng(7).normal(0, 2e-4, q.shape)
+    holed = smooth_motion(person, noisy, known, RATE_HZ, **OPTIONS)
+    whole = smoothed(person, noisy)
+    own = slice(skeleton.v_starts[wrist], skeleton.v_starts[wrist] + 3)
+    others = np.delete(np.arange(a.shape[1]), range(own.start, own.stop))
+    error, before = ((m.a - a)[200:334][:, others].std() for m in (holed, whole))
+    assert error < 1.1 * before
+    assert not holed.inner[240:294].any()
+    assert holed.inner[200:239].all()
+
+
 def test_inner_frames_keep_away_from_the_ends(swing):
     person, _, (_, q, _, _) = swing
     inner = smoothed(person, q, edge_s=0.25).inner

@@ -197,12 +197,8 @@ def test_a_joint_without_a_pose_leaves_the_others_alone(swing):
     whole = smoothed(person, noisy)
     own = slice(skeleton.v_starts[wrist], skeleton.v_starts[wrist] + 3)
     others = np.delete(np.arange(a.shape[1]), range(own.start, own.stop))
-    lost = smooth_motion(person, noisy, known.all(axis=1), RATE_HZ, **OPTIONS)
-    error, before, all_lost = (
-        (motion.a - a)[200:334][:, others].std() for motion in (holed, whole, lost)
-    )
+    error, before = ((motion.a - a)[200:334][:, others].std() for motion in (holed, whole))
     assert error < 1.3 * before
-    assert all_lost > 3 * before  # what a gap in all joints would do
     assert not holed.inner[240:294].any()
     assert holed.inner[200:239].all()
 

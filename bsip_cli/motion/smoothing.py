@@ -47,6 +47,7 @@ def smooth_motion(
     method: str,
     butterworth_cutoff_hz: float,
     pace_window_s: float,
+    noise_factor: float,
     edge_s: float,
 ) -> Motion:
     """Smooth poses and differentiate them twice.
@@ -58,7 +59,8 @@ def smooth_motion(
     ----------
     q : (N, nq) poses.
     determined : (N,), or (N, joints): which are to be believed; the others are bridged.
-    method, butterworth_cutoff_hz, pace_window_s, edge_s : as in configs/default.toml, [smoothing].
+    method, butterworth_cutoff_hz, pace_window_s, noise_factor, edge_s : as in
+        configs/default.toml, [smoothing].
 
     Raises
     ------
@@ -80,7 +82,7 @@ def smooth_motion(
     curves = np.where(known[:, joint_of_curve], _continuous(skeleton, q), np.nan)
     marker_noise, noise = _noise(person, curves, whole, rate_hz)
     if method == "spline":
-        smoothed = smooth(curves, rate_hz, pace_window_s, noise)
+        smoothed = smooth(curves, rate_hz, pace_window_s, noise_factor * noise)
     else:
         smoothed = _butterworth(curves, rate_hz, butterworth_cutoff_hz, noise)
     edge = round(edge_s * rate_hz)

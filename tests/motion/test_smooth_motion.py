@@ -17,6 +17,7 @@ OPTIONS = {
     "method": "spline",
     "butterworth_cutoff_hz": 6.0,
     "pace_window_s": 0.5,
+    "noise_factor": 1.0,
     "edge_s": 0.1,
 }
 

@@ -50,16 +50,29 @@ def _stage_command(name: str, summary: str) -> click.Command:
         "--jobs", default=1, show_default=True, type=click.IntRange(1), help="Participants at once."
     )
     @click.option("--force", is_flag=True, help="Redo what is up to date.")
-    def command(study, out, chosen, config_file, jobs, force):
+    def command(study, out, chosen, config_file, jobs, force, estimators=()):
         from bsip_cli.session import run_session
 
-        sys.exit(run_session(name, study, out, chosen, config_file, jobs=jobs, force=force))
+        sys.exit(
+            run_session(
+                name, study, out, chosen, config_file, jobs=jobs, force=force, estimators=estimators
+            )
+        )
 
     return command
 
 
 for _stage in {stage.name: stage for stage in STAGES}.values():
     cli.add_command(_stage_command(_stage.name, _stage.summary))
+cli.commands["identify"].params.append(
+    click.Option(
+        ["--estimator", "estimators"],
+        multiple=True,
+        metavar="NAME",
+        help="Instead of identify.estimators (may be repeated): the first is OM, others appear "
+        "under their names.",
+    )
+)
 cli.add_command(_stage_command("run", "All stages, from recordings to the report."))
 
 

@@ -60,6 +60,7 @@ class Smoothing(Section):
     method: Literal["spline", "butterworth"]
     butterworth_cutoff_hz: float = Field(gt=0)
     pace_window_s: float = Field(gt=0)
+    noise_factor: float = Field(gt=0)
     edge_s: float = Field(ge=0)
 
 
@@ -75,12 +76,17 @@ class Prior(Section):
 
 
 class Identify(Section):
-    estimators: tuple[Literal["base", "hansen2017"], ...] = Field(min_length=1)
+    estimators: tuple[Literal["consistent", "hansen2017", "robert2017", "base"], ...] = Field(
+        min_length=1
+    )
     cutoff_hz: float = Field(gt=0)
     hold_out_fraction: float = Field(ge=0, lt=1)
     block_s: float = Field(gt=0)
     trust_ratio: float = Field(ge=1)
     sigma_percent_limit: float = Field(gt=0)
+    frame_sd_m: float = Field(gt=0)
+    frame_sd_rad: float = Field(gt=0)
+    spread_weight: float = Field(gt=0)
 
 
 class Reconstruct(Section):
@@ -136,6 +142,27 @@ def load_config(files: Iterable[Path]) -> Config:
             "; ".join(_fault(e, merged) for e in error.errors()),
             file=", ".join(sources),
             remedy="configs/default.toml lists every option with its unit",
+        ) from None
+
+
+def with_estimators(config: Config, names: tuple[str, ...]) -> Config:
+    """The configuration with other estimators, in order; unchanged without names.
+
+    Raises
+    ------
+    UsageError
+        A name is no estimator.
+    """
+    if not names:
+        return config
+    values = config.model_dump()
+    values["identify"]["estimators"] = tuple(dict.fromkeys(names))
+    try:
+        return Config.model_validate(values)
+    except ValidationError as error:
+        raise UsageError(
+            "; ".join(_fault(e, values) for e in error.errors() if len(e["loc"]) > 2),
+            remedy="check --estimator",
         ) from None
 
 

@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.config import Config, load_config
+from bsip_cli.config import Config, load_config, with_estimators
 from bsip_cli.errors import UsageError
 from bsip_cli.pipeline import stages_named
 from bsip_cli.runner import Outcome, refusal_sentence, run_stages
@@ -30,9 +30,13 @@ def run_session(
     *,
     jobs: int,
     force: bool,
+    estimators: tuple[str, ...] = (),
 ) -> int:
-    """Run a command's stages on a study and return the exit code."""
-    config = _config(root, config_file)
+    """Run a command's stages on a study and return the exit code.
+
+    ``estimators`` stand for the configured ones, unless empty.
+    """
+    config = with_estimators(_config(root, config_file), estimators)
     study, refusals = load_study(root, config.roles.model_dump())
     participants = _choose(study, chosen)
     _check_out(out)

@@ -30,26 +30,24 @@ def estimate(problem: Problem) -> Estimate:
     """
     terms = terms_of(problem)
     fit = fit_with_weights(terms)
-    size = terms.table.size
+    shown = terms.shown
     return Estimate(
-        terms.table + fit.optimum.x[:size],
-        fit.optimum.covariance[:size, :size],
+        terms.table + shown @ fit.optimum.x,
+        shown @ fit.optimum.covariance @ shown.T,
         _note(fit, terms),
-        prior_covariance=fit.prior_covariance[:size, :size],
+        prior_covariance=shown @ fit.prior_covariance @ shown.T,
     )
 
 
 def _note(fit: Fit, terms: Terms) -> str:
-    decided = fit.decided
-    spread = ", ".join(
-        f"{name} {100 / np.sqrt(weight):.0f} %"
-        for name, weight in zip(terms.names, fit.weights.spread, strict=True)
-    )
+    masses, centres, *tensors = 100 / np.sqrt(fit.weights.spread)
     note = (
-        f"the data decide {decided:.0f} of {terms.table.size} parameters; spread of this person "
-        f"against [prior]: {spread}; log-det weight {fit.weights.gamma:g}; "
-        f"noise variance times {fit.weights.noise:.2f}"
+        f"the data decide {fit.decided:.0f} of {terms.table.size} parameters; this person's spread "
+        f"as a part of [prior]'s: masses {masses:.0f} %, centres of mass {centres:.0f} %, tensors "
+        f"{min(tensors):.0f} to {max(tensors):.0f} %; log-det weight {fit.weights.gamma:g}"
     )
-    if decided < _LITTLE:
-        note += "; too little motion: the parameters stay with the table (RM)"
+    if fit.weights.noise > 1.0:
+        note += f"; noise variance times {fit.weights.noise:.2f}"
+    if fit.decided < _LITTLE:
+        note += "; too little motion: the parameters stay near the table (RM)"
     return note

@@ -1,6 +1,6 @@
 """The convex problem behind ``consistent``, and a damped Newton method for it.
 
-minimise over steps x = (phi - phi_RM, frame errors):
+minimise over x, with phi = phi_RM + shown x,
     1/2 x^T Q x - b^T x + gamma * sum over segments of the log-det divergence from the table
 """
 
@@ -22,15 +22,16 @@ _SHORTEST = 1e-10
 
 @dataclass(frozen=True)
 class Objective:
-    """quadratic (P + k, P + k), linear (P + k,), table (P,) of J > 0, gamma > 0."""
+    """quadratic (k, k), linear (k,), shown (P, k), table (P,) of J > 0, gamma > 0."""
 
     quadratic: np.ndarray
     linear: np.ndarray
+    shown: np.ndarray
     table: np.ndarray
     gamma: float
 
     def phi(self, x: np.ndarray) -> np.ndarray:
-        return self.table + x[: self.table.size]
+        return self.table + self.shown @ x
 
     def value(self, x: np.ndarray) -> float:
         """Infinite where a segment is not physical."""
@@ -38,15 +39,12 @@ class Objective:
         return float(0.5 * x @ self.quadratic @ x - self.linear @ x) + self.gamma * divergence
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        slope = self.quadratic @ x - self.linear
-        slope[: self.table.size] += self.gamma * pseudo_inertia.gradient(self.phi(x), self.table)
-        return slope
+        slope = pseudo_inertia.gradient(self.phi(x), self.table)
+        return self.quadratic @ x - self.linear + self.gamma * self.shown.T @ slope
 
     def hessian(self, x: np.ndarray) -> np.ndarray:
-        size = self.table.size
-        curvature = self.quadratic.copy()
-        curvature[:size, :size] += self.gamma * pseudo_inertia.hessian(self.phi(x))
-        return curvature
+        curvature = pseudo_inertia.hessian(self.phi(x))
+        return self.quadratic + self.gamma * self.shown.T @ curvature @ self.shown
 
 
 @dataclass(frozen=True)

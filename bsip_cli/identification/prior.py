@@ -53,7 +53,7 @@ def prior_of(inertias: tuple[Inertia, ...], person: Person, spread: Spread) -> P
     for i, inertia in enumerate(inertias):
         block = slice(10 * i, 10 * i + 10)
         phi[block] = inertia.moved(-origins[i]).phi()
-        spread_sd[i] = _readable_sd(inertia, person.lengths_m[i], spread)
+        spread_sd[i] = _readable_sd(inertia, spread)
         root[block, block] = np.linalg.solve(readable_jacobian(phi[block]), np.diag(spread_sd[i]))
     total_mass_sd_kg = spread.total_mass_sd_percent / 100 * float(phi[::10].sum())
     root = _with_total_mass(root, total_mass_sd_kg)
@@ -72,7 +72,7 @@ def _with_total_mass(root: np.ndarray, sd_kg: float) -> np.ndarray:
     return root - shrink * np.outer(root @ total, total) / variance
 
 
-def _readable_sd(inertia: Inertia, length_m: float, spread: Spread) -> np.ndarray:
+def _readable_sd(inertia: Inertia, spread: Spread) -> np.ndarray:
     """(10,) in the order of :meth:`Inertia.readable`."""
     moments = np.diag(inertia.tensor_kgm2)
     products = np.sqrt([moments[0] * moments[1], moments[0] * moments[2], moments[1] * moments[2]])
@@ -80,8 +80,17 @@ def _readable_sd(inertia: Inertia, length_m: float, spread: Spread) -> np.ndarra
     return np.array(
         [
             spread.mass_sd_percent / 100 * inertia.mass_kg,
-            *[spread.com_sd_percent / 100 * length_m] * 3,
+            *[spread.com_sd_percent / 100 * _rod_length_m(inertia)] * 3,
             *(part * moments),
             *(0.5 * part * products),
         ]
     )
+
+
+def _rod_length_m(inertia: Inertia) -> float:
+    """Length of the rod whose mass lies as far from its centre, in the mean, as the segment's.
+
+    Near to the length of a limb; the tables' lengths of pelvis and hand are a third and a half of
+    what these segments measure.
+    """
+    return float(np.sqrt(6 * np.trace(inertia.tensor_kgm2) / inertia.mass_kg))

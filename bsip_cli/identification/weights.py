@@ -4,7 +4,8 @@ The weights are those of the largest marginal likelihood of the measured wrench,
 approximation. The spreads follow MacKay's rule (1992, Bayesian interpolation): a spread is the
 mean square of the deviations over the number of them that the data decided; the option
 ``spread_weight`` says how many deviations as large as [prior] says count beside them, so that
-little data leave [prior] as it is. The log-det weight is the best of a grid.
+little data leave [prior] as it is. Masses share one spread and centres of mass another; every tensor
+has its own, because a table may miss a single one by far (Dumas 2007's trunk). The log-det weight is the best of a grid.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.logdet_fit import Objective, Optimum, minimise
 from bsip_cli.identification.prior import Prior
 
-_KINDS = (("masses", (0,)), ("centres", (1, 2, 3)), ("tensors", (4, 5, 6, 7, 8, 9)))
+_MASS, _CENTRE, _TENSOR = (0,), (1, 2, 3), (4, 5, 6, 7, 8, 9)  # of the readable parameters
 # 6 is about the weight at which the log-det term alone spreads people as [prior] does; from far
 # below, where it is a mere barrier, to far above.
 _GAMMAS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
@@ -30,28 +31,31 @@ _LARGEST_CHANGE = 4.0  # per round
 
 @dataclass(frozen=True)
 class Terms:
-    """The sums behind the objective, in steps x from the table and frame errors (P + 6 n).
+    """The sums behind the objective, in coordinates x in which people scatter as N(0, 1) as [prior]
+    says, along the directions that the data show from best to not at all: in the parameters' own
+    units rounding would hide what the prior says about the latter.
 
-    information, right, square : of the weighted wrench residual 1/2 (x^T A x - 2 b^T x + square)
-    with ``effective`` independent samples. spreads : precision per kind in ``names``; fixed : what
-    keeps its weight (total mass, frames). table (P,).
+    strength, right, square : of the weighted wrench residual 1/2 (x^T diag(strength) x - 2 right^T
+    x + square) with ``effective`` independent samples. spreads : precision of all masses, of all
+    centres of mass, and of each segment's tensor; fixed : what keeps its weight (total mass,
+    frames). phi = table + shown x.
     """
 
-    information: np.ndarray
+    strength: np.ndarray
     right: np.ndarray
     square: float
     effective: float
-    names: tuple[str, ...]
     spreads: tuple[np.ndarray, ...]
     fixed: np.ndarray
+    shown: np.ndarray
     table: np.ndarray
     spread_weight: float
 
 
 @dataclass(frozen=True)
 class Weights:
-    """Of the kinds of deviations (1 = as [prior] says), of the log-det term, and the factor by
-    which the variance of the noise grows."""
+    """Of the deviations (2 + n,), 1 as [prior] says, of the log-det term, and the factor by which
+    the variance of the noise grows."""
 
     spread: np.ndarray
     gamma: float
@@ -77,24 +81,41 @@ def terms_of(problem: Problem) -> Terms:
     slope = right - information @ prior.phi
     square = weights @ problem.equations.squares - prior.phi @ (right + slope)
     shown = np.hstack([np.eye(prior.phi.size), pseudo_inertia.frame_jacobian(prior.phi)])
+    spreads, fixed = _spreads(prior), _fixed(prior, problem.frame_sd_m, problem.frame_sd_rad)
+    root = _inverse_root(sum(spreads, fixed))
+    strength, directions = np.linalg.eigh((shown @ root).T @ information @ (shown @ root))
+    axes = root @ directions
     return Terms(
-        shown.T @ information @ shown,
-        shown.T @ slope,
+        np.maximum(strength, 0.0),
+        axes.T @ (shown.T @ slope),
         float(square),
         float(problem.noise.effective.sum()),
-        tuple(name for name, _ in _KINDS),
-        tuple(_spread(prior, members) for _, members in _KINDS),
-        _fixed(prior, problem.frame_sd_m, problem.frame_sd_rad),
+        tuple(axes.T @ precision @ axes for precision in spreads),
+        axes.T @ fixed @ axes,
+        axes[: prior.phi.size],
         prior.phi,
         problem.spread_weight,
     )
 
 
-def _spread(prior: Prior, members: tuple[int, ...]) -> np.ndarray:
-    """Precision of one kind of readable parameters, all segments, linearised about the table."""
-    n = len(prior.inertias)
-    out = np.zeros((16 * n, 16 * n))
-    for i in range(n):
+def _inverse_root(precision: np.ndarray) -> np.ndarray:
+    """R with R R^T the inverse of a matrix whose rows have different units."""
+    scale = 1 / np.sqrt(np.diag(precision))
+    lower = np.linalg.cholesky(precision * np.outer(scale, scale))
+    return scale[:, None] * np.linalg.inv(lower).T
+
+
+def _spreads(prior: Prior) -> tuple[np.ndarray, ...]:
+    every = tuple(range(len(prior.inertias)))
+    groups = [(every, _MASS), (every, _CENTRE), *(((i,), _TENSOR) for i in every)]
+    return tuple(_spread(prior, segments, members) for segments, members in groups)
+
+
+def _spread(prior: Prior, segments: tuple[int, ...], members: tuple[int, ...]) -> np.ndarray:
+    """Precision of some readable parameters of some segments, linearised about the table."""
+    size = 16 * len(prior.inertias)
+    out = np.zeros((size, size))
+    for i in segments:
         block = slice(10 * i, 10 * i + 10)
         jacobian = readable_jacobian(prior.phi[block])[list(members)]
         scaled = jacobian / prior.spread_sd[i, list(members), None]
@@ -114,15 +135,17 @@ def _fixed(prior: Prior, frame_sd_m: float, frame_sd_rad: float) -> np.ndarray:
 def objective_of(terms: Terms, weights: Weights) -> Objective:
     """The convex problem for given weights."""
     return Objective(
-        terms.information / weights.noise + _precision(terms, weights),
+        np.diag(terms.strength / weights.noise) + _precision(terms, weights),
         terms.right / weights.noise,
+        terms.shown,
         terms.table,
         weights.gamma,
     )
 
 
 def _precision(terms: Terms, weights: Weights) -> np.ndarray:
-    return terms.fixed + sum(w * p for w, p in zip(weights.spread, terms.spreads, strict=True))
+    weighted = (w * p for w, p in zip(weights.spread, terms.spreads, strict=True))
+    return sum(weighted, terms.fixed)
 
 
 def fit_with_weights(terms: Terms) -> Fit:
@@ -152,9 +175,8 @@ def _settled(terms: Terms, weights: Weights, near: Fit | None) -> Fit:
 def fit_at(terms: Terms, weights: Weights, near: Fit | None = None) -> Fit:
     """Optimum and evidence for given weights."""
     optimum = minimise(objective_of(terms, weights), near.optimum.x if near else None)
-    size = terms.table.size
-    before = _precision(terms, weights)
-    before[:size, :size] += weights.gamma * pseudo_inertia.hessian(terms.table)
+    curvature = pseudo_inertia.hessian(terms.table)
+    before = _precision(terms, weights) + weights.gamma * terms.shown.T @ curvature @ terms.shown
     evidence = (
         -optimum.value
         - 0.5 * terms.square / weights.noise
@@ -162,9 +184,11 @@ def fit_at(terms: Terms, weights: Weights, near: Fit | None = None) -> Fit:
         + 0.5 * np.linalg.slogdet(optimum.covariance)[1]
         + 0.5 * np.linalg.slogdet(before)[1]
     )
-    inverse = np.linalg.inv(before)
-    decided = float(np.sum(optimum.covariance * terms.information) / weights.noise)
-    return Fit(weights, optimum, float(evidence), inverse, decided)
+    root = _inverse_root(before)
+    spared = terms.shown @ root @ root.T @ terms.shown.T
+    left = np.linalg.solve(spared, terms.shown @ optimum.covariance @ terms.shown.T)
+    decided = float(np.clip(len(left) - np.trace(left), 0.0, len(left)))
+    return Fit(weights, optimum, float(evidence), root @ root.T, decided)
 
 
 def _updated(terms: Terms, fit: Fit) -> tuple[np.ndarray, float]:
@@ -182,7 +206,8 @@ def _updated(terms: Terms, fit: Fit) -> tuple[np.ndarray, float]:
         ]
     )
     spread = np.clip(spread, old / _LARGEST_CHANGE, old * _LARGEST_CHANGE)
-    residual = terms.square - 2 * terms.right @ x + x @ terms.information @ x
-    free = max(terms.effective - fit.decided, 1.0)
+    residual = terms.square - 2 * terms.right @ x + terms.strength @ x**2
+    spent = terms.strength @ np.diag(covariance) / fit.weights.noise
+    free = max(terms.effective - spent, 1.0)
     noise = max(residual / free, 1.0)
     return spread, min(noise, fit.weights.noise * _LARGEST_CHANGE)

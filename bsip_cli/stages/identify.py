@@ -161,14 +161,22 @@ def _problem(
     reference = np.mean(
         [np.append(r.q[r.use, :2].mean(axis=0), 0.0) for r in recordings if r.use.any()], axis=0
     )
-    cutoff, trust = unit.config.identify.cutoff_hz, unit.config.identify.trust_ratio
+    options = unit.config.identify
+    cutoff = options.cutoff_hz
+    judgement = (
+        options.trust_ratio,
+        options.sigma_percent_limit,
+        options.frame_sd_m,
+        options.frame_sd_rad,
+        options.spread_weight,
+    )
     equations = accumulate(model, recordings, cutoff, reference)
     noise = Noise(_FIRST_NOISE, np.full(6, float(equations.samples)), equations.samples)
     estimator = importlib.import_module("bsip_cli.identification.hansen2017")
     for _ in range(_WEIGHT_ROUNDS):
-        fitted = estimator.estimate(Problem(equations, noise, prior, basis, trust))
+        fitted = estimator.estimate(Problem(equations, noise, prior, basis, *judgement))
         noise = noise_of(residual_series(model, recordings, cutoff, reference, fitted.phi))
-    return Problem(equations, noise, prior, basis, trust), reference
+    return Problem(equations, noise, prior, basis, *judgement), reference
 
 
 def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:

@@ -55,7 +55,8 @@ def test_every_stage_takes_the_same_arguments(name):
     arguments = [each.name for each in params if isinstance(each, click.Argument)]
     options = [each.opts for each in params if isinstance(each, click.Option)]
     assert arguments == ["study"]
-    assert options == [["--out"], ["--participant"], ["--config"], ["--jobs"], ["--force"]]
+    own = [["--estimator"]] if name == "identify" else []
+    assert options == [["--out"], ["--participant"], ["--config"], ["--jobs"], ["--force"], *own]
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.label)

@@ -68,7 +68,10 @@ def test_the_priors_spread_is_that_of_the_options():
     # Masses spread by 20 % each before their sum is known to 3 %: conditional variance.
     known = alone**2 - alone**4 / ((alone**2).sum() + scale**2)
     np.testing.assert_allclose(sd[:, 0], np.sqrt(known), rtol=0.05)
-    np.testing.assert_allclose(sd[:, 1:4], 0.06 * person.lengths_m[:, None] * np.ones(3), rtol=0.05)
+    rods = np.sqrt([6 * np.trace(b.tensor_kgm2) / b.mass_kg for b in prior.inertias])
+    np.testing.assert_allclose(sd[:, 1:4], 0.06 * rods[:, None] * np.ones(3), rtol=0.05)
+    limbs = [person.skeleton.index(f"{name}_l") for name in ("thigh", "shank", "forearm")]
+    np.testing.assert_allclose(rods[limbs], person.lengths_m[limbs], rtol=0.12)
     moments = np.array([np.diag(body.tensor_kgm2) for body in prior.inertias])
     np.testing.assert_allclose(sd[:, 4:7], 0.30 * moments, rtol=0.05)
     products = np.sqrt(moments[:, [0, 0, 1]] * moments[:, [1, 2, 2]])

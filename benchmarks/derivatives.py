@@ -19,6 +19,7 @@ import numpy as np
 from scipy.interpolate import make_smoothing_spline
 from scipy.signal import butter, filtfilt
 
+from bsip_cli.config import load_config
 from bsip_cli.motion.splines import smooth
 
 SLOW_HZ, BURST_HZ = (0.05, 0.6), (1.5, 5.0)
@@ -26,7 +27,7 @@ BURST_SD_S = 0.5 / 2.355  # the burst's envelope is 0.5 s wide at half its heigh
 BURST_REACH = 3.0  # standard deviations that count as burst
 EVERY_S = 6.4  # one burst in so many seconds: a fifth of the time
 EDGE_S = 0.25  # the ends rest on one side only and are not judged
-PACE_WINDOW_S = 0.5  # as shipped
+PACE_WINDOW_S = load_config([]).smoothing.pace_window_s
 
 # m/s2 in all, burst and slow parts; noise in mm. The published bench.
 PUBLISHED = {

@@ -26,6 +26,7 @@ import pinocchio_loop
 from moving_person import movement, noisy_markers, sample_person, standing
 
 from bsip_cli.body.person import Person
+from bsip_cli.config import load_config
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.motion.inverse_kinematics import Poses, solve_poses, tree_of
 from bsip_cli.motion.jacobian import model_markers
@@ -39,13 +40,9 @@ SAME_PROBLEM = {
     "posture_sd_rad": 1e5,
     "iterations": 50,
 }
-AS_SHIPPED = SAME_PROBLEM | {"robust_limit_m": 0.025, "posture_sd_rad": 3.0}
-SMOOTHING = {
-    "method": "spline",
-    "butterworth_cutoff_hz": 6.0,
-    "pace_window_s": 0.5,
-    "edge_s": 0.1,
-}
+CONFIG = load_config([])
+AS_SHIPPED = CONFIG.ik.model_dump(include=set(SAME_PROBLEM))
+SMOOTHING = CONFIG.smoothing.model_dump()
 FEW = 10
 OPTIMUM = (
     "marker RMS, bsip [mm]",

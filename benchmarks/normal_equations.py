@@ -16,11 +16,12 @@ import numpy as np
 import pinocchio as pin
 from moving_person import movement, sample_person
 
+from bsip_cli.config import load_config
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.identification.equations import Recording, accumulate
 
 RATE_HZ = 100.0
-CUTOFF_HZ = 8.0  # as shipped
+CUTOFF_HZ = load_config([]).identify.cutoff_hz
 REFERENCE_M = np.array([0.2, -0.1, 0.0])
 _PIECE_S = 60.0
 

@@ -29,7 +29,7 @@ class Problem:
     basis: Basis
     trust_ratio: float
     sigma_percent_limit: float = 5.0
-    frame_sd_m: float = 0.006
+    frame_sd_m: float = 0.008
     frame_sd_rad: float = 0.03
     spread_weight: float = 4.0
 

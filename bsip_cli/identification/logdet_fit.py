@@ -15,7 +15,10 @@ from bsip_cli.errors import NumericalError
 from bsip_cli.identification import pseudo_inertia
 
 _STEPS = 60
-_DECREMENT = 1e-12  # of the objective, relative to its size: Newton's own distance to the optimum
+# A step that promises less than this part of the objective is the last: after it, Newton's
+# quadratic convergence leaves nothing that the objective's own rounding would show.
+_LAST = 1e-11
+_RIDGES = (0.0, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6)
 _ARMIJO = 1e-4
 _SHORTEST = 1e-10
 
@@ -67,11 +70,13 @@ def minimise(objective: Objective, start: np.ndarray | None = None) -> Optimum:
     """
     x = np.zeros_like(objective.linear) if start is None else start
     value = objective.value(x)
-    for count in range(_STEPS):
+    steps = 0
+    while steps < _STEPS:
         slope, (scale, factor) = objective.gradient(x), _factor(objective.hessian(x))
         step = -scale * cho_solve(factor, scale * slope)
         promise = float(-slope @ step)
-        if promise <= _DECREMENT * (1.0 + abs(value)):
+        if promise <= _LAST * (1.0 + abs(value)):
+            x = x + step if pseudo_inertia.are_physical(objective.phi(x + step)) else x
             break
         length = 1.0
         while length > _SHORTEST:
@@ -81,19 +86,28 @@ def minimise(objective: Objective, start: np.ndarray | None = None) -> Optimum:
             length *= 0.5
         else:
             break  # at the limit of the arithmetic
-        x, value = x + length * step, candidate
+        x, value, steps = x + length * step, candidate, steps + 1
     inverse = scale[:, None] * cho_solve(factor, np.diag(scale))
-    return Optimum(x, value, 0.5 * (inverse + inverse.T), count)
+    return Optimum(x, value, 0.5 * (inverse + inverse.T), steps)
 
 
 def _factor(matrix: np.ndarray) -> tuple[np.ndarray, tuple]:
-    """Scale (n,) and Cholesky factor of the matrix scaled to a unit diagonal."""
+    """Scale (n,) and Cholesky factor of the matrix scaled to a unit diagonal.
+
+    Beside a segment that the data press flat, rounding may hide the rest: then a little is added to
+    the diagonal, which shortens the step and changes no optimum.
+    """
     scale = 1.0 / np.sqrt(np.diag(matrix))
-    try:
-        return scale, cho_factor(matrix * np.outer(scale, scale))
-    except (np.linalg.LinAlgError, ValueError) as error:
-        raise NumericalError(
-            f"the normal equations cannot be solved ({error})",
-            expected="finite motion and forces",
-            remedy="look at the kinematics and the wrench of the identification trial",
-        ) from None
+    scaled = matrix * np.outer(scale, scale)
+    for ridge in _RIDGES:
+        try:
+            return scale, cho_factor(scaled + ridge * np.eye(len(scale)))
+        except np.linalg.LinAlgError:
+            continue
+        except ValueError:
+            break
+    raise NumericalError(
+        "the normal equations of the identification cannot be solved",
+        expected="finite motion and forces",
+        remedy="look at the kinematics and the wrench of the identification trial",
+    )

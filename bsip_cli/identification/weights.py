@@ -4,8 +4,9 @@ The weights are those of the largest marginal likelihood of the measured wrench,
 approximation. The spreads follow MacKay's rule (1992, Bayesian interpolation): a spread is the
 mean square of the deviations over the number of them that the data decided; the option
 ``spread_weight`` says how many deviations as large as [prior] says count beside them, so that
-little data leave [prior] as it is. Masses share one spread and centres of mass another; every tensor
-has its own, because a table may miss a single one by far (Dumas 2007's trunk). The log-det weight is the best of a grid.
+little data leave [prior] as it is. Masses share one spread and centres of mass another; every
+tensor has its own, because a table may miss a single one by far (Dumas 2007's trunk). The log-det
+weight is the best of a grid.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ from bsip_cli.identification.logdet_fit import Objective, Optimum, minimise
 from bsip_cli.identification.prior import Prior
 
 _MASS, _CENTRE, _TENSOR = (0,), (1, 2, 3), (4, 5, 6, 7, 8, 9)  # of the readable parameters
-# 6 is about the weight at which the log-det term alone spreads people as [prior] does; from far
-# below, where it is a mere barrier, to far above.
-_GAMMAS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
+# At 6 the log-det term alone would spread people about as [prior] does. From a mere barrier to half
+# of that: it shapes what [prior] spreads, and little data must not make it a narrower prior.
+_GAMMAS = (0.03, 0.1, 0.3, 1.0, 3.0)
 _ROUNDS = 20
 _SETTLED = 0.02  # relative change of the weights
 _LARGEST_CHANGE = 4.0  # per round

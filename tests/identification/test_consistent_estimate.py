@@ -1,0 +1,194 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+from synthetic_identification import motion, problem_of, regressor, world
+
+from bsip_cli.body.inertia import from_phi, from_readable
+from bsip_cli.dynamics.regressor import predicted_wrench, wrench_regressor
+from bsip_cli.identification.consistent import estimate
+from bsip_cli.identification.pseudo_inertia import are_physical, frame_jacobian
+from bsip_cli.identification.uncertainty import readable
+from bsip_cli.identification.weights import Weights, fit_at, fit_with_weights, terms_of
+
+EXACT = {"frame_sd_m": 1e-6, "frame_sd_rad": 1e-6}  # frames where the model puts them
+
+
+def distance(phi):
+    """From RM, in standard deviations of people."""
+    return np.linalg.solve(world().prior.root, phi - world().prior.phi)
+
+
+def test_rich_noise_free_data_are_reproduced():
+    rows = regressor()
+    measured = rows @ world().phi_true
+    found = estimate(replace(problem_of(rows, measured, 1e-2), **EXACT))
+    assert np.abs(rows @ found.phi - measured).max() < 1e-4 * np.abs(measured).max()
+    assert are_physical(found.phi)
+    q, v, a = motion(3.0, seed=9)
+    both = np.stack([found.phi, world().phi_true], axis=1)
+    wrench = predicted_wrench(world().model, q, v, a, both, np.zeros(3))
+    assert np.abs(wrench[..., 0] - wrench[..., 1]).max() < 1e-3 * np.abs(wrench).max()
+
+
+def test_almost_no_data_leave_rm_and_say_so():
+    rows = regressor()[:3]
+    found = estimate(problem_of(rows, rows @ world().phi_true, 1e7))
+    np.testing.assert_allclose(distance(found.phi), 0.0, atol=1e-5)
+    read = readable(found, world().prior)
+    np.testing.assert_allclose(read.share, 0.0, atol=1e-4)
+    assert np.all(read.sd[:, :4] < 1.001 * world().prior.readable_sd[:, :4])
+    assert "decide 0 of 150" in found.note
+    assert "table (RM)" in found.note
+
+
+def standing():
+    """A person who stands still for a while."""
+    q, v, a = motion(30.0)
+    model = world().model
+    still = wrench_regressor(model, model.createData(), q[:1], 0 * v[:1], 0 * a[:1], np.zeros(3))
+    return np.repeat(still, 200, axis=0)
+
+
+def test_standing_still_tells_the_mass_and_leaves_the_rest():
+    rows = standing()
+    rng = np.random.default_rng(4)
+    measured = rows @ world().phi_true + rng.normal(0, 3.0, rows.shape[:2])
+    found = estimate(problem_of(rows, measured, 3.0))
+    total = world().phi_true[::10].sum()
+    assert found.phi[::10].sum() == pytest.approx(total, abs=0.1)
+    assert "too little motion" in found.note
+    assert readable(found, world().prior).share.mean() < 0.1
+    assert np.sqrt(np.mean(distance(found.phi) ** 2)) < 0.3
+
+
+def test_one_arm_that_never_moved_stays_near_the_table():
+    """Its rows are empty: nothing but the scale's total speaks about it."""
+    rows = regressor().copy()
+    arm = 10 * world().person.skeleton.index("forearm_l")
+    rows[..., arm : arm + 10] = 0.0
+    rng = np.random.default_rng(5)
+    measured = rows @ world().phi_true + rng.normal(0, 3.0, rows.shape[:2])
+    found = estimate(problem_of(rows, measured, 3.0))
+    body, table = (from_phi(x[arm : arm + 10]) for x in (found.phi, world().prior.phi))
+    assert body.mass_kg == pytest.approx(table.mass_kg, rel=0.05)
+    np.testing.assert_allclose(body.com_m, table.com_m, atol=1e-3)
+    share = readable(found, world().prior).share
+    assert share[arm // 10].max() < 0.02 < share.mean()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_physical_with_data_of_no_body(seed):
+    """Sign lost, forces of nothing, noise that no plate makes, components that disagree."""
+    rng = np.random.default_rng(seed)
+    rows = regressor()[: (5, 30, 100)[seed % 3]]
+    clean = rows @ world().phi_true
+    measured = [-clean, rng.normal(0, 1e4, clean.shape), clean * rng.normal(0, 2, 6)][seed // 2]
+    found = estimate(problem_of(rows, measured, (1.0, 30.0)[seed % 2]))
+    assert are_physical(found.phi)
+    assert np.isfinite(found.covariance).all()
+    share = readable(found, world().prior).share
+    assert np.all((share >= 0) & (share <= 1))
+
+
+def test_noise_that_is_larger_than_said_is_found():
+    rows = regressor()
+    rng = np.random.default_rng(6)
+    measured = rows @ world().phi_true + rng.normal(0, 6.0, rows.shape[:2])
+    fit = fit_with_weights(terms_of(problem_of(rows, measured, 3.0)))
+    assert fit.weights.noise == pytest.approx(4.0, rel=0.1)
+    quiet = fit_with_weights(terms_of(problem_of(rows, measured, 12.0)))
+    assert quiet.weights.noise == 1.0  # never below what was said
+
+
+def drawn(scale, rng):
+    """A physical person off the table by ``scale`` (10,) times what [prior] says; (15, 10)."""
+    prior = world().prior
+    table = np.array([body.readable() for body in prior.inertias])
+    rows = []
+    while len(rows) < len(table):
+        i = len(rows)
+        row = table[i] + scale * prior.spread_sd[i] * rng.normal(size=10)
+        if from_readable(row).is_physical():
+            rows.append(row)
+    off = sum(row[0] for row in rows) - table[:, 0].sum()
+    rows = np.array(rows)
+    share = prior.spread_sd[:, 0] ** 2
+    rows[:, 0] -= off * share / share.sum()  # the scale knows the sum
+    return rows
+
+
+def parameters(rows):
+    origins = world().prior.origin_in_joint_m
+    bodies = [from_readable(row) for row in rows]
+    return np.concatenate([b.moved(-o).phi() for b, o in zip(bodies, origins, strict=True)])
+
+
+def test_the_spread_of_a_person_is_found():
+    """One as the table says but for noise, one whose centres of mass are far off."""
+    rows = regressor()
+    rng = np.random.default_rng(7)
+    spreads = []
+    for centres in (0.0, 1.5):
+        scale = np.array([0.1, *[centres] * 3, *[0.1] * 6])
+        true = parameters(drawn(scale, rng))
+        measured = rows @ true + rng.normal(0, 1.0, rows.shape[:2])
+        fit = fit_with_weights(terms_of(replace(problem_of(rows, measured, 1.0), **EXACT)))
+        spreads.append(1 / np.sqrt(fit.weights.spread))
+    assert spreads[0][1] < 0.7
+    assert spreads[1][1] > 1.1
+    assert spreads[0][0] < 0.8  # the masses, of which the data say little
+
+
+def test_the_spreads_have_the_largest_evidence():
+    """Nothing said beforehand: no spread of masses or centres twice or half as wide is likelier."""
+    rows = regressor()
+    rng = np.random.default_rng(8)
+    true = parameters(drawn(np.array([1.0, 1.0, 1.0, 1.0, *[0.3] * 6]), rng))
+    measured = rows @ true + rng.normal(0, 1.0, rows.shape[:2])
+    problem = replace(problem_of(rows, measured, 1.0), spread_weight=1e-3, **EXACT)
+    terms = terms_of(problem)
+    tensors = sum(terms.spreads[2:], terms.fixed)  # as said
+    terms = replace(terms, spreads=terms.spreads[:2], fixed=tensors)
+    fit = fit_with_weights(terms)
+    for k in (0, 1):
+        for factor in (0.25, 4.0):
+            spread = fit.weights.spread.copy()
+            spread[k] *= factor
+            other = fit_at(terms, Weights(spread, fit.weights.gamma, fit.weights.noise))
+            assert other.evidence < fit.evidence
+    for gamma in (0.03, 0.3, 3.0):
+        other = fit_at(terms, Weights(fit.weights.spread, gamma, fit.weights.noise))
+        assert other.evidence <= fit.evidence + 1e-9
+
+
+def test_intervals_cover_the_truth():
+    """People, frames that are off and noise drawn as the estimator believes."""
+    rows = regressor()
+    rng = np.random.default_rng(9)
+    quantile = stats.norm.ppf(0.975)
+    hits = []
+    for _ in range(8):
+        person = drawn(0.5 * np.ones(10), rng)
+        true = parameters(person)
+        twist = np.tile([0.008] * 3 + [0.03] * 3, 15) * rng.normal(size=90)
+        seen = true + frame_jacobian(true) @ twist
+        measured = rows @ seen + rng.normal(0, 3.0, rows.shape[:2])
+        read = readable(estimate(problem_of(rows, measured, 3.0)), world().prior)
+        hits.append(np.abs(read.values - person) < quantile * read.sd)
+    assert 0.90 < np.mean(hits) < 0.995
+    assert np.mean(hits, axis=(0, 1)).min() > 0.85
+
+
+def test_frames_that_may_be_off_leave_more_to_the_table():
+    rows = regressor()
+    rng = np.random.default_rng(10)
+    measured = rows @ world().phi_true + rng.normal(0, 3.0, rows.shape[:2])
+    shares = [
+        readable(estimate(replace(problem_of(rows, measured, 3.0), frame_sd_m=sd)), world().prior)
+        .share[:, 1:4]
+        .mean()
+        for sd in (0.001, 0.006, 0.03)
+    ]
+    assert shares[0] > shares[1] > shares[2] > 0

@@ -12,7 +12,7 @@ from scipy import sparse
 from bsip_cli.dynamics.lowpass import lowpass_operator
 from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
 
-_ROWS = 200  # outputs per block: some 30 MB of regressor
+_ROWS = 100  # outputs per block: some 15 MB of regressor
 _OVERSAMPLING = 2.5  # samples kept per period of the cut-off
 
 

@@ -23,8 +23,9 @@ Tree = namedtuple(
 # which a marker's pull fades; and the precision (nv,) [1/rad2] that pulls angles to zero.
 Task = namedtuple("Task", "segments positions weights limit prior")
 # Sums over the markers on each segment and beyond: weight, weighted place, its second moments,
-# weighted residual and its moment; places count from the base's origin.
-Sums = namedtuple("Sums", "weight first second force moment")
+# weighted residual and its moment, and products of place and residual; places count from the base's
+# origin.
+Sums = namedtuple("Sums", "weight first second force moment product")
 
 
 @njit(cache=True)
@@ -197,6 +198,7 @@ def _gather(residuals, measured, base, tree, task, sums):
     sums.second[:] = 0.0
     sums.force[:] = 0.0
     sums.moment[:] = 0.0
+    sums.product[:] = 0.0
     x, moment = np.empty(3), np.empty(3)
     for m in range(task.weights.size):
         if np.isnan(residuals[m, 0]):
@@ -215,13 +217,17 @@ def _gather(residuals, measured, base, tree, task, sums):
             sums.moment[i, j] += weight * moment[j]
             for k in range(3):
                 sums.second[i, j, k] += weight * x[j] * x[k]
+                sums.product[i, j, k] += weight * x[j] * r[k]
     for i in range(tree.kinds.size - 1, 0, -1):
         a = tree.parents[i]
         sums.weight[a] += sums.weight[i]
-        sums.first[a] += sums.first[i]
-        sums.force[a] += sums.force[i]
-        sums.moment[a] += sums.moment[i]
-        sums.second[a] += sums.second[i]
+        for j in range(3):
+            sums.first[a, j] += sums.first[i, j]
+            sums.force[a, j] += sums.force[i, j]
+            sums.moment[a, j] += sums.moment[i, j]
+            for k in range(3):
+                sums.second[a, j, k] += sums.second[i, j, k]
+                sums.product[a, j, k] += sums.product[i, j, k]
 
 
 @njit(cache=True)
@@ -251,6 +257,36 @@ def _assemble(d, w, sums, tree, H, g):
 
 
 @njit(cache=True)
+def _bend(d, w, sums, tree, N, H):
+    """Add to H what the curvature of the markers' paths makes of the residuals (Newton's term).
+
+    A marker at x moves by d_k + w_k x x when velocity k does, and an ancestor's rotation w_a turns
+    that: r . (w_a x (d_k + w_k x x)), summed over the markers, is w_a . N_k. Two rotations of one
+    joint act together, which symmetrises the term.
+    """
+    for k in range(len(d)):
+        i = tree.v_segments[k]
+        M = sums.product[i]
+        trace = M[0, 0] + M[1, 1] + M[2, 2]
+        _cross(d[k], sums.force[i], N[k])
+        for j in range(3):
+            N[k, j] -= trace * w[k, j]
+            for b in range(3):
+                N[k, j] += M[j, b] * w[k, b]
+        if tree.kinds[i] == FREE and k < tree.v_starts[i] + 3:
+            continue  # translations of the base bend nothing
+        a = k
+        while a >= 0:
+            if tree.v_segments[a] != i:
+                for j in range(3):
+                    H[k, a] -= w[a, j] * N[k, j]
+            elif not (tree.kinds[i] == FREE and a < tree.v_starts[i] + 3):
+                for j in range(3):
+                    H[k, a] -= 0.5 * (w[a, j] * N[k, j] + w[k, j] * N[a, j])
+            a = tree.v_parents[a]
+
+
+@njit(cache=True)
 def _add_prior(q, tree, task, H, g):
     """Pull the joint angles to zero."""
     turn = np.empty(3)
@@ -268,7 +304,11 @@ def _add_prior(q, tree, task, H, g):
 
 @njit(cache=True)
 def _factor(H, damping, v_parents, L):
-    """L with H + damping diag(H) = L^T L; no fill-in (Featherstone 2008, table 6.3)."""
+    """L with H + damping diag(H) = L^T L; no fill-in (Featherstone 2008, table 6.3).
+
+    Returns whether the matrix is positive definite.
+    """
+    definite = True
     nv = v_parents.size
     for k in range(nv):
         a = k
@@ -277,6 +317,7 @@ def _factor(H, damping, v_parents, L):
             a = v_parents[a]
         L[k, k] += damping * H[k, k] + 1e-12
     for k in range(nv - 1, -1, -1):
+        definite &= L[k, k] > 0
         L[k, k] = np.sqrt(max(L[k, k], 1e-12))
         i = v_parents[k]
         while i >= 0:
@@ -289,6 +330,7 @@ def _factor(H, damping, v_parents, L):
                 L[i, j] -= L[k, i] * L[k, j]
                 j = v_parents[j]
             i = v_parents[i]
+    return definite
 
 
 @njit(cache=True)
@@ -336,8 +378,14 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
     R, p = np.zeros((n, 3, 3)), np.zeros((n, 3))
     d, w = np.zeros((nv, 3)), np.zeros((nv, 3))
     H, g, dv = np.zeros((nv, nv)), np.zeros(nv), np.zeros(nv)
+    N = np.zeros((nv, 3))
     sums = Sums(
-        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))
+        np.zeros(n),
+        np.zeros((n, 3)),
+        np.zeros((n, 3, 3)),
+        np.zeros((n, 3)),
+        np.zeros((n, 3)),
+        np.zeros((n, 3, 3)),
     )
     trial, trial_residuals = q.copy(), residuals.copy()
     cost = _evaluate(q, tree, task, measured, R, p, residuals)
@@ -348,15 +396,28 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
         _assemble(d, w, sums, tree, H, g)
         _add_prior(q, tree, task, H, g)
         base, trial_cost = R[0].copy(), np.inf
+        newton = step > 0 and damping == 0.0  # near the optimum: quadratic convergence
+        if newton:
+            _bend(d, w, sums, tree, N, H)
         while damping < 1e6:
-            _factor(H, damping, tree.v_parents, L)
+            definite = _factor(H, damping, tree.v_parents, L)
+            if newton and not definite:
+                _assemble(d, w, sums, tree, H, g)
+                _add_prior(q, tree, task, H, g)
+                newton = False
+                continue
             dv[:] = g
             _solve(L, tree.v_parents, dv)
             _step(q, dv, tree, base, trial)
             trial_cost = _evaluate(trial, tree, task, measured, R, p, trial_residuals)
             if trial_cost <= cost * (1 + 1e-14):
                 break
-            damping = max(10 * damping, 1e-4)
+            if newton:
+                _assemble(d, w, sums, tree, H, g)
+                _add_prior(q, tree, task, H, g)
+                newton = False
+            else:
+                damping = max(10 * damping, 1e-4)
         if trial_cost > cost * (1 + 1e-14):  # no step helps: q is the optimum
             taken = step
             break
@@ -368,6 +429,8 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
         if gain <= 1e-9 * cost + 1e-14 or np.max(np.abs(dv)) < 1e-8:
             taken = step + 1
             break
+    _assemble(d, w, sums, tree, H, g)
+    _add_prior(q, tree, task, H, g)
     _factor(H, 0.0, tree.v_parents, L)
     return taken
 

@@ -27,8 +27,10 @@ _FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 _NOISE_ORDER, _NOISE_BAND_HZ, _NOISE_WINDOW_S = 3, (12.0, 20.0), 0.64
 _ROUNDS = 20
 _FEWEST = 12
-# sigma^2 / tau^2: where the evidence begins, and its limits (a cut-off of 20 Hz and of 0.3 Hz).
-_FIRST_STIFFNESS, _STIFFNESS_RANGE = 1e1, (1e-2, 1e12)
+# sigma^2 / tau^2: where the evidence begins, and its limits (a cut-off of 28 Hz and of 1.2 Hz).
+# Stiffer equations would lose the digits of the samples (weight 1) and of the bridges.
+_FIRST_STIFFNESS, _STIFFNESS_RANGE = 1e1, (1e-2, 1e9)
+_BRIDGE_WEIGHT = 1e-4  # of a missing sample, against 1: keeps long gaps solvable
 
 
 @dataclass(frozen=True)
@@ -68,16 +70,15 @@ def smooth(
     window = max(9, round(window_s * rate_hz / basis.samples_per_knot))
     seen = np.isfinite(samples)
     offset = np.nanmean(samples, axis=0)
-    scaled = np.where(seen, (samples - offset) / sigma, 0.0)
+    scaled = (np.stack([_bridged(channel) for channel in samples.T], axis=1) - offset) / sigma
     groups = _alike(seen)
     first = max(groups, key=lambda columns: seen[:, columns[0]].sum())
     stiffness = _stiffness(scaled[:, first], seen[:, first[0]], window, basis)
     c, spread = np.empty((basis.size, samples.shape[1])), np.empty(samples.shape)
     for columns in groups:
-        weights = seen[:, columns[0]].astype(float)
-        c[:, columns], inverse = _fit(
-            _normal(basis, weights), stiffness, basis.values.T @ scaled[:, columns]
-        )
+        weights = np.where(seen[:, columns[0]], 1.0, _BRIDGE_WEIGHT)
+        right = basis.values.T @ (weights[:, None] * scaled[:, columns])
+        c[:, columns], inverse = _fit(_normal(basis, weights), stiffness, right)
         sd = np.sqrt(_variances(basis.curves, inverse))
         spread[:, columns] = np.outer(sd, sigma[columns])
     c *= sigma
@@ -104,7 +105,7 @@ def noise_level(samples: np.ndarray, rate_hz: float) -> np.ndarray:
     width = min(max(16, round(_NOISE_WINDOW_S * rate_hz)), len(samples) - _NOISE_ORDER)
     bridged = np.stack([_bridged(channel) for channel in samples.T], axis=1)
     # Differences first: slow motion, a thousand times the noise, must not leak into the band.
-    f, _, power = spectrogram(
+    f, t, power = spectrogram(
         np.diff(bridged, _NOISE_ORDER, axis=0),
         rate_hz,
         axis=0,
@@ -113,15 +114,25 @@ def noise_level(samples: np.ndarray, rate_hz: float) -> np.ndarray:
         detrend="linear",
     )
     inside = (f >= band[0]) & (f <= band[1])
+    inside[1 + np.argmin(np.abs(f[1:] - np.mean(band)))] = True  # few frequencies if short
     gain = (2 * np.sin(np.pi * f[inside] / rate_hz)) ** (2 * _NOISE_ORDER)
     density = (power[inside] / gain[:, None, None]).mean(axis=0)
     # The lower third of such a mean lies below it; a Hann window ties neighbouring frequencies.
     freedom = 2 * inside.sum() / 1.9
+    whole = _whole_windows(samples, (t * rate_hz - 0.5 * width).round().astype(int), width)
     level = np.sqrt(
-        np.quantile(density, 1 / 3, axis=1) * freedom / chi2.ppf(1 / 3, freedom) * nyquist
+        np.quantile(density[:, whole], 1 / 3, axis=1) * freedom / chi2.ppf(1 / 3, freedom) * nyquist
     )
     scale = np.abs(bridged).max(axis=0)
     return np.maximum(level, 1e-9 * np.maximum(scale, 1.0))
+
+
+def _whole_windows(samples: np.ndarray, first: np.ndarray, width: int) -> np.ndarray:
+    """Which windows hold no bridged sample, whose noise is nil; all of them where none does."""
+    missing = np.concatenate([[0], np.cumsum(~np.isfinite(samples).all(axis=1))])
+    last = np.minimum(first + width + _NOISE_ORDER, len(samples))
+    whole = missing[last] == missing[first]
+    return whole if whole.any() else np.ones(len(first), dtype=bool)
 
 
 def _bridged(channel: np.ndarray) -> np.ndarray:
@@ -175,13 +186,13 @@ def _stiffness(y: np.ndarray, seen: np.ndarray, window: int, basis: _Basis) -> n
     y in units of its noise. All channels share one stiffness: where each has its own, the errors
     of pelvis and legs no longer cancel and a planted foot accelerates.
     """
-    weights = seen.astype(float)
-    right = basis.values.T @ y
+    weights = np.where(seen, 1.0, _BRIDGE_WEIGHT)
+    right = basis.values.T @ (weights[:, None] * y)
     normal = _normal(basis, weights)
     stiffness = np.full(basis.size - 4, _FIRST_STIFFNESS)
     for _ in range(_ROUNDS):
         c, inverse = _fit(normal, stiffness, right)
-        leverage = weights * _variances(basis.values, inverse)
+        leverage = seen * _variances(basis.values, inverse)
         known = np.bincount(basis.knot_of_sample, leverage, minlength=len(stiffness))
         new = _mean(known, window) / np.maximum(_mean(_pace(c), window), 1e-300)
         new = np.exp(_mean(np.log(np.clip(new, *_STIFFNESS_RANGE)), max(3, window // 4)))
@@ -221,7 +232,6 @@ def _fit(normal: np.ndarray, stiffness: np.ndarray, right: np.ndarray):
     for a in range(5):
         for b in range(a, 5):
             matrix[b - a, a : a + len(stiffness)] += _FOURTH[a] * _FOURTH[b] * stiffness
-    matrix[0] += 1e-13 * matrix[0].max()
     factor = cholesky_banded(matrix, lower=True)
     return cho_solve_banded((factor, True), right), _inverse_band(factor)
 

@@ -60,7 +60,8 @@ class Smoothing(Section):
     method: Literal["spline", "butterworth"]
     butterworth_cutoff_hz: float = Field(gt=0)
     pace_window_s: float = Field(gt=0)
-    noise_factor: float = Field(gt=0)
+    skin_factor: float = Field(ge=0)
+    skin_from_hz: float = Field(gt=0)
     edge_s: float = Field(ge=0)
 
 

@@ -268,6 +268,7 @@ SCHEMAS = {
                 Column("determined", "bool", "", "the markers determine this frame"),
                 Column("marker_rms_m", "float", "m", "RMS residual of the frame's markers"),
                 Column("angle_sd_rad", "float", "rad", "largest standard deviation of an angle"),
+                Column("cutoff_hz", "float", "Hz", "where the local smoother's gain is one half"),
                 Column("q_*", "float", "m, rad, 1", "configuration (Pinocchio's order)"),
                 Column("v_*", "float", "m/s, rad/s", "velocity (Pinocchio's order)"),
                 Column("a_*", "float", "m/s2, rad/s2", "acceleration (Pinocchio's order)"),

@@ -33,7 +33,9 @@ def run(unit: Unit) -> None:
     filled = frame["filled"].to_numpy().reshape(len(times), len(labels), 1)
     filled = ordered_markers(labels, filled, person.markers)[..., 0] == 1
     events = _events(unit, person, markers, filled, times, poses)
-    motion = smooth_motion(person, poses.q, known, rate, **unit.config.smoothing.model_dump())
+    options = unit.config.smoothing.model_dump()
+    options["robust_limit_m"] = unit.config.ik.robust_limit_m
+    motion = smooth_motion(person, poses.q, known, rate, markers=markers, **options)
     unit.write(
         "kinematics",
         _kinematics(times, angle_sd, poses, motion, skeleton),
@@ -125,6 +127,7 @@ def _kinematics(times, angle_sd, poses: Poses, motion: Motion, skeleton):
                 "determined": motion.inner,
                 "marker_rms_m": poses.frame_rms_m(),
                 "angle_sd_rad": angle_sd,
+                "cutoff_hz": motion.cutoff_hz,
             }
         )
     ]

@@ -294,6 +294,7 @@ class Artifacts:
             "determined": np.ones(len(t), bool),
             "marker_rms_m": 0.006 + 0.001 * np.sin(t),
             "angle_sd_rad": np.full(len(t), 0.01),
+            "cutoff_hz": np.full(len(t), 6.0),
         }
         return pd.concat([pd.DataFrame(table), q], axis=1)
 

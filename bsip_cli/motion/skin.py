@@ -1,7 +1,7 @@
 """How much the skin swings against the bones, from the residuals of the inverse kinematics.
 
-In recordings of three labs the residuals' power falls like 1 / f^4 from 2 Hz to where white noise
-begins, as if the skin were shaken by white accelerations.
+In recordings of two labs the residuals' power falls like 1 / f^4 from 2 Hz to where white noise
+begins, as if the skin were shaken by white accelerations; in a third lab's it falls more slowly.
 """
 
 from __future__ import annotations

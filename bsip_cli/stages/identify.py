@@ -18,11 +18,17 @@ from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.equations import Recording, accumulate, residual_series
 from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.identification.excitation import excitation
-from bsip_cli.identification.noise import Noise, noise_of
-from bsip_cli.identification.prior import Prior, Spread, prior_of
+from bsip_cli.identification.noise import even_noise, noise_of
+from bsip_cli.identification.prior import Prior, Spread, likeliest, prior_of
 from bsip_cli.identification.uncertainty import readable
 from bsip_cli.schemas import bsip_names
-from bsip_cli.stages.frames import WRENCH, bsip_table, coordinates_from, person_from
+from bsip_cli.stages.frames import (
+    WRENCH,
+    acceleration_noise,
+    bsip_table,
+    coordinates_from,
+    person_from,
+)
 from bsip_cli.study import Trial
 from bsip_cli.unit import Unit
 
@@ -133,7 +139,9 @@ def _recordings(
         for start, stop in stretches(use):
             blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})
         measured = np.nan_to_num(wrench[WRENCH].to_numpy())
-        recordings.append(Recording(*coordinates_from(kinematics, skeleton), measured, use, rate))
+        motion = coordinates_from(kinematics, skeleton)
+        level = acceleration_noise(kinematics, skeleton)
+        recordings.append(Recording(*motion, measured, use, rate, level))
     return recordings, pd.DataFrame(blocks, columns=["trial", "start_s", "end_s"])
 
 
@@ -171,11 +179,11 @@ def _problem(
         options.spread_weight,
     )
     equations = accumulate(model, recordings, cutoff, reference)
-    noise = Noise(_FIRST_NOISE, np.full(6, float(equations.samples)), equations.samples)
-    estimator = importlib.import_module("bsip_cli.identification.hansen2017")
+    noise = even_noise(_FIRST_NOISE, equations.samples)
     for _ in range(_WEIGHT_ROUNDS):
-        fitted = estimator.estimate(Problem(equations, noise, prior, basis, *judgement))
-        noise = noise_of(residual_series(model, recordings, cutoff, reference, fitted.phi))
+        likely = likeliest(prior, *equations.weighted(noise.weights()))
+        noise = noise_of(residual_series(model, recordings, cutoff, reference, likely))
+        equations = accumulate(model, recordings, cutoff, reference, noise.weights_at)
     return Problem(equations, noise, prior, basis, *judgement), reference
 
 

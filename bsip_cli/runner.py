@@ -123,7 +123,8 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
         if not isinstance(error, UsageError):  # nothing is wrong with the data
             _write_refusal(unit, error)
         sentence = str(error) if unit.name in str(error) else f"{unit.name}: {error}"
-        return Outcome(stage.name, unit.name, "refused", (sentence,), error.exit_code)
+        said = (*unit.messages, sentence)  # a warning may tell why it came to this
+        return Outcome(stage.name, unit.name, "refused", said, error.exit_code)
     unit.refusal_path().unlink(missing_ok=True)
     return Outcome(stage.name, unit.name, "done", tuple(unit.messages))
 
@@ -136,7 +137,7 @@ def _refused_upstream(unit: Unit) -> bool:
 def _write_refusal(unit: Unit, error: BsipError) -> None:
     kind = "numerical failure" if isinstance(error, NumericalError) else "bad data"
     row = pd.DataFrame([{"stage": unit.stage.name, "kind": kind, "sentence": str(error)}])
-    notes = {"made_by": unit.provenance(), "messages": [], "facts": {}}
+    notes = {"made_by": unit.provenance(), "messages": list(unit.messages), "facts": {}}
     write_artifact(unit.refusal_path(), "refusal", row, notes)
 
 

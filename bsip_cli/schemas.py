@@ -288,7 +288,7 @@ SCHEMAS = {
         Schema(
             "marker-events",
             "trial",
-            1,
+            2,
             "markers that jump, slip, bear another's label or sit wrong",
             (
                 _text("kind", "jump, slip, swap or offset"),
@@ -309,6 +309,12 @@ SCHEMAS = {
                     "as a number of standard deviations; swap: residual as labelled over exchanged",
                 ),
                 _text("sentence", "the same in words"),
+                Column(
+                    "put_right",
+                    "bool",
+                    "",
+                    "a swap's labels were exchanged back for kinematics and marker-residuals",
+                ),
             ),
         ),
         Schema(

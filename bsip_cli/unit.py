@@ -37,7 +37,7 @@ class Unit:
         return self.participant.id if self.participant else "group"
 
     def warn(self, message: str) -> None:
-        """Tell the user now, and the reader of the artifact later."""
+        """Tell the user when the unit is done or refused, and the reader of its artifacts later."""
         self.messages.append(message)
 
     # --- where things lie -------------------------------------------------------------------

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
+from bsip_cli.body.names import in_words
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.calibration import Calibration, calibrate
@@ -211,7 +212,9 @@ def _warn_missing(unit: Unit, skeleton: Skeleton, marker_set: MarkerSet, fit: Re
         if held:
             known = [m.label for m in marker_set.markers if m.segment == segment]
             serve = f"; {', '.join(known)} would do" if known else ""
-            unit.warn(f"{unit.name}: no markers on {segment}, its joint is held{serve}")
+            unit.warn(
+                f"{unit.name}: no markers on the {in_words(segment)}, its joint is held{serve}"
+            )
 
 
 def _skeleton_table(skeleton: Skeleton, calibration: Calibration, fit: Refinement) -> pd.DataFrame:

@@ -438,6 +438,7 @@ def marker_events() -> pd.DataFrame:
                 "size_m": 0.015,
                 "statistic": 9.0,
                 "sentence": f"RKNEL slips 15 mm on {EVIL}",
+                "put_right": False,
             }
         ]
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
@@ -36,23 +37,63 @@ def run_session(
 
     ``estimators`` stand for the configured ones, unless empty.
     """
-    config = with_estimators(_config(root, config_file), estimators)
-    study, refusals = load_study(root, config.roles.model_dump())
-    participants = _choose(study, chosen)
-    _check_out(out)
+    opened = open_study(root, out, chosen, config_file, estimators)
+    participants = opened.participants
     stages = stages_named(command)
     if chosen and command == "run":
         stages = tuple(stage for stage in stages if stage.level != "cohort")
-    outcomes = list(refusal_sentence(refusals))
-    for outcome in outcomes:
-        _tell(outcome)
-    running = run_stages(stages, study, out, config, participants, force=force, jobs=jobs)
+    running = run_stages(
+        stages, opened.study, out, opened.config, participants, force=force, jobs=jobs
+    )
     total = sum(
         1
         if s.level == "cohort"
         else sum(len(p.trials) if s.level == "trial" else 1 for p in participants)
         for s in stages
     )
+    return follow(command, opened.refusals, running, total, out)
+
+
+@dataclass(frozen=True)
+class OpenedStudy:
+    """A study as a command meets it: the chosen participants, and who could not be listed."""
+
+    study: Study
+    config: Config
+    participants: tuple[Participant, ...]
+    refusals: tuple[Outcome, ...]
+
+
+def open_study(
+    root: Path,
+    out: Path,
+    chosen: tuple[str, ...],
+    config_file: Path | None,
+    estimators: tuple[str, ...] = (),
+) -> OpenedStudy:
+    """Read configuration and study, and make sure that there is a folder for the results.
+
+    Raises
+    ------
+    UsageError
+        An option, the study, a participant or the folder is not what it should be.
+    BadDataError
+        participants.tsv cannot be used.
+    """
+    config = with_estimators(_config(root, config_file), estimators)
+    study, refusals = load_study(root, config.roles.model_dump())
+    participants = _choose(study, chosen)
+    _check_out(out)
+    return OpenedStudy(study, config, participants, tuple(refusal_sentence(refusals)))
+
+
+def follow(
+    command: str, refusals: Iterable[Outcome], running: Iterable[Outcome], total: int, out: Path
+) -> int:
+    """Tell the user what becomes of the units, with a bar of ``total`` steps; the exit code."""
+    outcomes = list(refusals)
+    for outcome in outcomes:
+        _tell(outcome)
     with tqdm(total=total, desc=command, unit="unit", disable=None) as progress:
         for outcome in running:
             outcomes.append(outcome)

@@ -23,7 +23,9 @@ ALLOWED = {
     "runner": "artifacts config errors pipeline study unit",
     "session": "body config errors pipeline runner study",
     "__main__": "cli",
-    "cli": "__init__ errors pipeline provenance report session simulate",
+    "export": "__init__ artifacts body errors pipeline provenance runner schemas session stages "
+    "unit",
+    "cli": "__init__ errors export pipeline provenance report session simulate",
     "reference": "cli config pipeline schemas",
     "body": "config errors",
     "dynamics": "body errors",
@@ -45,6 +47,7 @@ FOREIGN_TO_SCIENCE = {"pandas", "pyarrow", "click", "tqdm", "logging", "subproce
 ONLY = {
     "simulate": {"body": {"body.names"}},
     "cli": {"report": {"report.tables.build"}, "simulate": {"simulate.command"}},
+    "export": {"stages": {"stages.frames"}},
     "session": {"body": {"body.markersets", "body.skeleton"}},
 }
 

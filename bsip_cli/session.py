@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.check_loads import check_segments, check_trials
 from bsip_cli.config import Config, load_config, with_estimators
 from bsip_cli.errors import UsageError
 from bsip_cli.pipeline import stages_named
@@ -38,6 +39,8 @@ def run_session(
     """
     config = with_estimators(_config(root, config_file), estimators)
     study, refusals = load_study(root, config.roles.model_dump())
+    if not refusals:  # else a load may belong to who or what was refused
+        check_trials(config.loads, study)
     participants = _choose(study, chosen)
     _check_out(out)
     stages = stages_named(command)
@@ -71,7 +74,7 @@ def _config(root: Path, config_file: Path | None) -> Config:
     )
     if config.marker_set != "auto":
         load_marker_set(config.marker_set)
-    load_skeleton(config.skeleton)
+    check_segments(config.loads, load_skeleton(config.skeleton))
     return config
 
 

@@ -14,6 +14,7 @@ from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.dynamics.base_parameters import expressions, find_basis
 from bsip_cli.dynamics.lowpass import stretches
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.equations import Recording, accumulate, residual_series
 from bsip_cli.identification.estimator import Estimate, Problem
@@ -23,6 +24,7 @@ from bsip_cli.identification.prior import Prior, Spread, prior_of
 from bsip_cli.identification.uncertainty import readable
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH, bsip_table, coordinates_from, person_from
+from bsip_cli.stages.known_loads import load_phi, load_words, loads_record
 from bsip_cli.study import Trial
 from bsip_cli.unit import Unit
 
@@ -39,7 +41,7 @@ def run(unit: Unit) -> None:
     regression = unit.read("regression")
     prior = _prior(unit, regression, person)
     trials = _identification_trials(unit)
-    recordings, blocks = _recordings(unit, skeleton, trials)
+    recordings, blocks = _recordings(unit, person, trials)
     if _duration_s(recordings) < _SHORTEST_S:
         _write_table_only(unit, regression, recordings)
         return
@@ -62,6 +64,7 @@ def run(unit: Unit) -> None:
         facts={
             "reference_m": reference.tolist(),
             "noise_rms": problem.noise.rms.tolist(),
+            "loads": {trial.stem: loads_record(unit, trial) for trial in trials},
         },
     )
     unit.write("base-parameters", _base_table(skeleton, problem))
@@ -122,8 +125,9 @@ def _identification_trials(unit: Unit) -> list[Trial]:
 
 
 def _recordings(
-    unit: Unit, skeleton: Skeleton, trials: list[Trial]
+    unit: Unit, person: Person, trials: list[Trial]
 ) -> tuple[list[Recording], pd.DataFrame]:
+    """Motion and the wrench of the person alone, and the stretches that may identify."""
     recordings, blocks = [], []
     for trial in trials:
         kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
@@ -132,9 +136,24 @@ def _recordings(
         use = _usable(unit, trial) & ~_held_out(unit, times)
         for start, stop in stretches(use):
             blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})
-        measured = np.nan_to_num(wrench[WRENCH].to_numpy())
-        recordings.append(Recording(*coordinates_from(kinematics, skeleton), measured, use, rate))
+        motion = coordinates_from(kinematics, person.skeleton)
+        measured = np.nan_to_num(wrench[WRENCH].to_numpy()) - _load_wrench(
+            unit, person, trial, *motion
+        )
+        recordings.append(Recording(*motion, measured, use, rate))
     return recordings, pd.DataFrame(blocks, columns=["trial", "start_s", "end_s"])
+
+
+def _load_wrench(
+    unit: Unit, person: Person, trial: Trial, q: np.ndarray, v: np.ndarray, a: np.ndarray
+) -> np.ndarray:
+    """(N, 6) part of the ground wrench that a trial's known loads need."""
+    if not unit.loads(trial):
+        return np.zeros((len(q), 6))
+    known = load_words(unit, trial)
+    unit.warn(f"{unit.name}: taken off the forces of {trial.stem} as a known load: {known}")
+    phi = load_phi(unit, person, trial)[:, None]
+    return predicted_wrench(pinocchio_model(person), q, v, a, phi, np.zeros(3))[..., 0]
 
 
 def _duration_s(recordings: list[Recording]) -> float:

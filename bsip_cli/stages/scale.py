@@ -171,13 +171,15 @@ def _refine(
 
 
 def _plate_mass(unit: Unit, still: _Recorded, quiet: slice) -> float:
-    """Mass [kg] that the plates read in quiet standing, NaN where they do not tell."""
+    """Mass [kg] that the plates read in quiet standing, known loads taken off; NaN if unknown."""
     wrench = unit.read("wrench", still.trial)
     valid = wrench["valid"].to_numpy().copy()
     inside = np.zeros(len(valid), dtype=bool)
     inside[quiet] = True
     force = wrench[WRENCH[2]].to_numpy()[valid & inside]
-    return float(force.mean() / _GRAVITY_M_S2) if len(force) else float("nan")
+    if not len(force):
+        return float("nan")
+    return float(force.mean() / _GRAVITY_M_S2) - unit.load_kg(still.trial)
 
 
 def _mass(unit: Unit, plate_mass: float) -> tuple[float, str]:

@@ -69,7 +69,7 @@ def run(unit: Unit) -> None:
     )
     unit.write("base-parameters", _base_table(skeleton, problem))
     unit.write("excitation", _excitation_table(skeleton, problem))
-    unit.write("identification", _summary(unit, problem, estimates, methods, trials))
+    unit.write("identification", _summary(unit, problem, estimates, methods, blocks))
     unit.write("used-blocks", blocks)
 
 
@@ -134,6 +134,11 @@ def _recordings(
         times = kinematics["time_s"].to_numpy()
         rate = 1.0 / float(np.median(np.diff(times)))
         use = _usable(unit, trial) & ~_held_out(unit, times)
+        if not use.any():
+            unit.warn(
+                f"{unit.name}: {trial.stem} has no frame with all contacts on plates; left out"
+            )
+            continue
         for start, stop in stretches(use):
             blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})
         motion = coordinates_from(kinematics, person.skeleton)
@@ -230,7 +235,7 @@ def _summary(
     problem: Problem,
     estimates: dict[str, Estimate],
     methods: dict[str, str],
-    trials: list[Trial],
+    blocks: pd.DataFrame,
 ) -> pd.DataFrame:
     names = [f"rms_{name}" for name in WRENCH]
     condition = excitation(problem).condition_number
@@ -240,7 +245,7 @@ def _summary(
             {
                 "estimator": name,
                 "method": methods[name],
-                "trials": ", ".join(trial.stem for trial in trials),
+                "trials": ", ".join(blocks["trial"].unique()),
                 "samples": problem.equations.samples,
                 "duration_s": problem.equations.duration_s,
                 "effective_samples": float(problem.noise.effective.sum()),

@@ -246,7 +246,10 @@ SCHEMAS = {
                 Column("mass_kg", "float", "kg", "mass, from the scale or the plates"),
                 _text("mass_source", "participants.tsv or plates"),
                 Column(
-                    "plate_mass_kg", "float", "kg", "mass that the plates read in quiet standing"
+                    "plate_mass_kg",
+                    "float",
+                    "kg",
+                    "mass that the plates read in quiet standing, known loads taken off",
                 ),
                 Column(
                     "height_m", "float", "m", "stature; estimated from the segments if not given"

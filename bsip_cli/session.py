@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.check_loads import check_segments, check_trials
 from bsip_cli.config import Config, load_config, with_estimators
 from bsip_cli.errors import UsageError
 from bsip_cli.pipeline import stages_named
@@ -82,6 +83,8 @@ def open_study(
     """
     config = with_estimators(_config(root, config_file), estimators)
     study, refusals = load_study(root, config.roles.model_dump())
+    if not refusals:  # else a load may belong to who or what was refused
+        check_trials(config.loads, study)
     participants = _choose(study, chosen)
     _check_out(out)
     return OpenedStudy(study, config, participants, tuple(refusal_sentence(refusals)))
@@ -112,7 +115,7 @@ def _config(root: Path, config_file: Path | None) -> Config:
     )
     if config.marker_set != "auto":
         load_marker_set(config.marker_set)
-    load_skeleton(config.skeleton)
+    check_segments(config.loads, load_skeleton(config.skeleton))
     return config
 
 

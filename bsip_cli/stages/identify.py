@@ -14,6 +14,7 @@ from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.dynamics.base_parameters import expressions, find_basis
 from bsip_cli.dynamics.lowpass import stretches
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.equations import Recording, accumulate, residual_series
 from bsip_cli.identification.estimator import Estimate, Problem
@@ -29,6 +30,7 @@ from bsip_cli.stages.frames import (
     coordinates_from,
     person_from,
 )
+from bsip_cli.stages.known_loads import load_phi, load_words, loads_record
 from bsip_cli.study import Trial
 from bsip_cli.unit import Unit
 
@@ -45,7 +47,7 @@ def run(unit: Unit) -> None:
     regression = unit.read("regression")
     prior = _prior(unit, regression, person)
     trials = _identification_trials(unit)
-    recordings, blocks = _recordings(unit, skeleton, trials)
+    recordings, blocks = _recordings(unit, person, trials)
     if _duration_s(recordings) < _SHORTEST_S:
         _write_table_only(unit, regression, recordings)
         return
@@ -68,11 +70,12 @@ def run(unit: Unit) -> None:
         facts={
             "reference_m": reference.tolist(),
             "noise_rms": problem.noise.rms.tolist(),
+            "loads": {trial.stem: loads_record(unit, trial) for trial in trials},
         },
     )
     unit.write("base-parameters", _base_table(skeleton, problem))
     unit.write("excitation", _excitation_table(skeleton, problem))
-    unit.write("identification", _summary(unit, problem, estimates, methods, trials))
+    unit.write("identification", _summary(unit, problem, estimates, methods, blocks))
     unit.write("used-blocks", blocks)
 
 
@@ -128,21 +131,40 @@ def _identification_trials(unit: Unit) -> list[Trial]:
 
 
 def _recordings(
-    unit: Unit, skeleton: Skeleton, trials: list[Trial]
+    unit: Unit, person: Person, trials: list[Trial]
 ) -> tuple[list[Recording], pd.DataFrame]:
+    """Motion and the wrench of the person alone, and the stretches that may identify."""
     recordings, blocks = [], []
     for trial in trials:
         kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
         times = kinematics["time_s"].to_numpy()
         rate = 1.0 / float(np.median(np.diff(times)))
         use = _usable(unit, trial) & ~_held_out(unit, times)
+        if not use.any():
+            unit.warn(
+                f"{unit.name}: {trial.stem} has no frame with all contacts on plates; left out"
+            )
+            continue
         for start, stop in stretches(use):
             blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})
-        measured = np.nan_to_num(wrench[WRENCH].to_numpy())
-        motion = coordinates_from(kinematics, skeleton)
-        level = acceleration_noise(kinematics, skeleton)
+        motion = coordinates_from(kinematics, person.skeleton)
+        carried = _load_wrench(unit, person, trial, *motion)
+        measured = np.nan_to_num(wrench[WRENCH].to_numpy()) - carried
+        level = acceleration_noise(kinematics, person.skeleton)
         recordings.append(Recording(*motion, measured, use, rate, level))
     return recordings, pd.DataFrame(blocks, columns=["trial", "start_s", "end_s"])
+
+
+def _load_wrench(
+    unit: Unit, person: Person, trial: Trial, q: np.ndarray, v: np.ndarray, a: np.ndarray
+) -> np.ndarray:
+    """(N, 6) part of the ground wrench that a trial's known loads need."""
+    if not unit.loads(trial):
+        return np.zeros((len(q), 6))
+    known = load_words(unit, trial)
+    unit.warn(f"{unit.name}: taken off the forces of {trial.stem} as a known load: {known}")
+    phi = load_phi(unit, person, trial)[:, None]
+    return predicted_wrench(pinocchio_model(person), q, v, a, phi, np.zeros(3))[..., 0]
 
 
 def _duration_s(recordings: list[Recording]) -> float:
@@ -219,7 +241,7 @@ def _summary(
     problem: Problem,
     estimates: dict[str, Estimate],
     methods: dict[str, str],
-    trials: list[Trial],
+    blocks: pd.DataFrame,
 ) -> pd.DataFrame:
     names = [f"rms_{name}" for name in WRENCH]
     condition = excitation(problem).condition_number
@@ -229,7 +251,7 @@ def _summary(
             {
                 "estimator": name,
                 "method": methods[name],
-                "trials": ", ".join(trial.stem for trial in trials),
+                "trials": ", ".join(blocks["trial"].unique()),
                 "samples": problem.equations.samples,
                 "duration_s": problem.equations.duration_s,
                 "effective_samples": float(problem.noise.effective.sum()),

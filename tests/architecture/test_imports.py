@@ -21,7 +21,8 @@ ALLOWED = {
     "pipeline": "schemas",
     "unit": "artifacts config errors pipeline provenance schemas study",
     "runner": "artifacts config errors pipeline study unit",
-    "session": "body config errors pipeline runner study",
+    "check_loads": "body config errors study",
+    "session": "body check_loads config errors pipeline runner study",
     "__main__": "cli",
     "export": "__init__ artifacts body errors pipeline provenance runner schemas session stages "
     "unit",
@@ -49,6 +50,7 @@ ONLY = {
     "cli": {"report": {"report.tables.build"}, "simulate": {"simulate.command"}},
     "export": {"stages": {"stages.frames"}},
     "session": {"body": {"body.markersets", "body.skeleton"}},
+    "check_loads": {"body": {"body.skeleton"}},
 }
 
 
@@ -117,7 +119,7 @@ def test_the_fitted_side_does_not_know_the_simulator():
 
 def test_stages_do_not_know_each_other():
     """They meet in files; two reports share their writing of files."""
-    helpers = {"stages.frames", "stages.report"}
+    helpers = {"stages.frames", "stages.known_loads", "stages.report"}
     pairs = {
         (name, other)
         for name in modules()

@@ -44,6 +44,11 @@ class Beforehand:
         removed = np.sum(self.readable @ self._removed(information) * self.readable, axis=1)
         return removed.reshape(-1, 10)
 
+    def wrench_variance(self, information: np.ndarray, motion: np.ndarray) -> float:
+        """Sum of squares of the wrench that stays unknown in a motion of information ``motion``."""
+        weight = self.seen.T @ motion @ self.seen
+        return float(np.trace(weight) - np.sum(weight * self._removed(information)))
+
     def _removed(self, information: np.ndarray) -> np.ndarray:
         one = np.eye(len(self.seen))
         return one - np.linalg.inv(self.seen.T @ information @ self.seen + one)

@@ -25,11 +25,17 @@ _STRIDE = 2  # frames; squares of 2.2 Hz need 9 Hz
 
 @dataclass(frozen=True)
 class Gain:
-    """Increase of the mean data share of all parameters (0 to 1), and of each segment's (n,)."""
+    """What a movement adds.
+
+    share : increase of the mean data share of all parameters (0 to 1); segments (n,) of each.
+    wrench : part of the unknown variance of the ground wrench that it removes, in the mean of all
+        movements (0 to 1): there the heavy segments count.
+    """
 
     movement: Movement
     share: float
     segments: np.ndarray
+    wrench: float
 
     @property
     def best_segment(self) -> int:
@@ -61,14 +67,15 @@ def advice(problem: Problem, person: Person, model: pin.Model) -> Advice:
         if possible(movement, person)
     ]
     before = beforehand(problem)
-    alone = _gains(before, known, offers)
+    all_motion = np.sum([added for _, added in offers], axis=0)
+    alone = _gains(before, known, offers, all_motion)
     together: list[Gain] = []
     best = alone
     while best and len(together) < _ADVISED:
         together.append(best[0])
         known = known + next(added for m, added in offers if m is best[0].movement)
         offers = [offer for offer in offers if offer[0] is not best[0].movement]
-        best = _gains(before, known, offers)
+        best = _gains(before, known, offers, all_motion)
     return Advice(tuple(alone), tuple(together))
 
 
@@ -88,12 +95,18 @@ def _information(
 
 
 def _gains(
-    before: Beforehand, known: np.ndarray, offers: list[tuple[Movement, np.ndarray]]
+    before: Beforehand,
+    known: np.ndarray,
+    offers: list[tuple[Movement, np.ndarray]],
+    all_motion: np.ndarray,
 ) -> list[Gain]:
     """Gain of each offer on its own over what is known, best first."""
-    now = before.share(known)
+    if not offers:
+        return []
+    now, unknown = before.share(known), before.wrench_variance(known, all_motion)
     gains = []
     for movement, added in offers:
         more = before.share(known + added) - now
-        gains.append(Gain(movement, float(more.mean()), more.mean(axis=1)))
+        left = before.wrench_variance(known + added, all_motion) / unknown
+        gains.append(Gain(movement, float(more.mean()), more.mean(axis=1), 1.0 - left))
     return sorted(gains, key=lambda gain: -gain.share)

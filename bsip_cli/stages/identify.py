@@ -219,6 +219,10 @@ def _excitation_table(person: Person, problem: Problem, share: np.ndarray) -> pd
             (quantity, g.movement.name, 100 * g.share, "%", names[g.best_segment], g.movement.text)
             for g in gains
         ]
+    rows += [
+        ("movement_forces", g.movement.name, 100 * g.wrench, "%", "", g.movement.text)
+        for g in helpful.alone
+    ]
     return pd.DataFrame(rows, columns=["quantity", "name", "value", "unit", "segment", "text"])
 
 

@@ -8,6 +8,7 @@ import pytest
 from synthetic_identification import equations_of, regressor, world
 
 from bsip_cli.dynamics.regressor import wrench_regressor
+from bsip_cli.identification.data_share import beforehand
 from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.excitation import excitation
 from bsip_cli.identification.movement_gain import advice
@@ -113,3 +114,19 @@ def test_little_is_left_to_gain_after_much():
     noise = Noise(NOISE / 100, np.full(6, float(len(rows))), len(rows))
     rich = Problem(equations, noise, world().prior, world().basis, 1.0)
     assert advise(rich).alone[0].share < 0.1 * advise(problem_after(("squats",))).alone[0].share
+
+
+def test_forces_become_known_where_the_wrench_is_known():
+    """Part of the unknown variance of the wrench, against the covariance of what it sees."""
+    before, after = problem_after(("trunk_bends",)), problem_after(("trunk_bends", "squats"))
+    promised = next(g for g in advise(before).alone if g.movement.name == "squats")
+    names = tuple(gain.movement.name for gain in advise(before).alone)
+    motion, _ = problem_after(names).equations.weighted(1 / NOISE**2)
+    left = []
+    for problem in (before, after):
+        seen = beforehand(problem).seen
+        known, _ = problem.equations.weighted(problem.noise.weights())
+        covariance = np.linalg.inv(known + np.linalg.inv(seen @ seen.T))
+        left.append(np.trace(motion @ covariance))
+    assert promised.wrench == pytest.approx(1 - left[1] / left[0], rel=0.02)
+    assert 0.1 < promised.wrench < 1

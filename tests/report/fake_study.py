@@ -433,6 +433,10 @@ def excitation(skeleton: Skeleton) -> pd.DataFrame:
             (quantity, "kicks_l", 3.21, "%", "shank_l", "swing the left shank"),
             (quantity, "head_nods", 1.25, "%", "head", "nod"),
         ]
+    rows += [
+        ("movement_forces", "head_nods", 7.0, "%", "", "nod"),
+        ("movement_forces", "kicks_l", 43.0, "%", "", "swing the left shank"),
+    ]
     return pd.DataFrame(rows, columns=["quantity", "name", "value", "unit", "segment", "text"])
 
 

@@ -118,6 +118,7 @@ def test_excitation_and_advice_are_said_in_words(text):
     assert "Swing the left shank: 3.2 points, most of all for the left shank." in text
     assert "Nod: another 1.2 points, most of all for the head." in text
     assert "it would help least to nod (1.25)" in text
+    assert "Swing the left shank left shank 3.21 43 Nod head 1.25 7" in text
     assert "lets the data decide 40 %" in text
 
 

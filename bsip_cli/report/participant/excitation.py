@@ -84,9 +84,15 @@ def _next(table: pd.DataFrame) -> list[Block]:
         for k, (_, row) in enumerate(together.iterrows())
     )
     best = alone.head(_BEST_MOVEMENTS)
+    forces = _rows(table, "movement_forces")["value"].reindex(best.index)
     rows = tuple(
-        (_sentence(row["text"]), segment_label(row["segment"]), number(row["value"], 2))
-        for _, row in best.iterrows()
+        (
+            _sentence(row["text"]),
+            segment_label(row["segment"]),
+            number(row["value"], 2),
+            number(known, 0),
+        )
+        for (_, row), known in zip(best.iterrows(), forces, strict=True)
     )
     least = alone.iloc[-1]
     return [
@@ -99,9 +105,11 @@ def _next(table: pd.DataFrame) -> list[Block]:
         ),
         Bullets(steps),
         Grid(
-            ("movement", "gains most", "gain [% points]"),
+            ("movement", "gains most", "data share [+ % points]", "forces [− %]"),
             rows,
-            f"The {len(rows)} movements that help most, each on its own; of all, it would help "
+            f"The {len(rows)} movements that help most, each on its own: rise of the mean data share, "
+            "and how much of the ground forces' variance that the parameters leave unknown it "
+            "would remove (there heavy segments count most). Of all, it would help "
             f"least to {least['text']} ({number(least['value'], 2)})",
             words=2,
         ),

@@ -347,7 +347,7 @@ SCHEMAS = {
             "base-parameters",
             "participant",
             1,
-            "identifiable combinations of parameters",
+            "identifiable combinations of parameters, the best known first",
             (
                 _text("name", "leading parameter"),
                 _text("expression", "the combination in words"),
@@ -361,12 +361,24 @@ SCHEMAS = {
         Schema(
             "excitation",
             "participant",
-            1,
-            "how well the motion excited the parameters",
+            2,
+            "how well the motion excited the parameters, and what to record next",
             (
-                _text("quantity", "singular_value, condition_number, segment"),
-                _text("name", "index or segment"),
-                Column("value", "float", "1", "of the quantity"),
+                _text(
+                    "quantity",
+                    "singular_value: of the scaled base regressor; condition_number; segment: mean "
+                    "share of its ten parameters that the motion could decide; combinations: of "
+                    "the ten, how many the data know better than the table (0: not excited); "
+                    "data_share: OM's, mean of the ten; movement: what 10 s of it would add to the "
+                    "mean data share; next: the same beside the rows of next above it; "
+                    "movement_forces: how much of the unknown variance of the ground forces it "
+                    "would remove, in the mean of all movements",
+                ),
+                _text("name", "index, segment or movement"),
+                Column("value", "float", "as unit", "of the quantity"),
+                _text("unit", "1; % for percent points of data share and percent of variance"),
+                _text("segment", "segment the row is about; of movements the one that gains most"),
+                _text("text", "data share in words; what to ask the person for; else empty"),
             ),
         ),
         Schema(

@@ -16,9 +16,11 @@ from bsip_cli.dynamics.lowpass import stretches
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.identification.base import base_parameters
+from bsip_cli.identification.data_share import in_words
 from bsip_cli.identification.equations import Recording, accumulate, residual_series
 from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.identification.excitation import excitation
+from bsip_cli.identification.movement_gain import advice
 from bsip_cli.identification.noise import even_noise, noise_of
 from bsip_cli.identification.prior import Prior, Spread, likeliest, prior_of
 from bsip_cli.identification.uncertainty import readable
@@ -74,7 +76,8 @@ def run(unit: Unit) -> None:
         },
     )
     unit.write("base-parameters", _base_table(skeleton, problem))
-    unit.write("excitation", _excitation_table(skeleton, problem))
+    first = readable(next(iter(estimates.values())), prior)
+    unit.write("excitation", _excitation_table(person, problem, first.share))
     unit.write("identification", _summary(unit, problem, estimates, methods, blocks))
     unit.write("used-blocks", blocks)
 
@@ -222,18 +225,35 @@ def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
             "sigma_percent": fit.sigma_percent(),
             "rm_value": fit.rm_values,
         }
-    )
+    ).sort_values("sigma_percent", kind="stable", ignore_index=True)
 
 
-def _excitation_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
+def _excitation_table(person: Person, problem: Problem, share: np.ndarray) -> pd.DataFrame:
+    """``share`` (n, 10) are OM's data shares."""
     found = excitation(problem)
-    rows = [("condition_number", "", found.condition_number)]
-    rows += [("singular_value", str(k + 1), v) for k, v in enumerate(found.singular_values)]
+    names = person.skeleton.segments
+    rows = [("condition_number", "", found.condition_number, "1", "", "")]
     rows += [
-        ("segment", name, share)
-        for name, share in zip(skeleton.segments, found.segment_share, strict=True)
+        ("singular_value", str(k + 1), value, "1", "", "")
+        for k, value in enumerate(found.singular_values)
     ]
-    return pd.DataFrame(rows, columns=["quantity", "name", "value"])
+    for k, name in enumerate(names):
+        rows += [
+            ("segment", name, found.segment_share[k], "1", name, ""),
+            ("combinations", name, float(found.combinations[k]), "1", name, ""),
+            ("data_share", name, share[k].mean(), "1", name, in_words(share[k])),
+        ]
+    helpful = advice(problem, person, pinocchio_model(person))
+    for quantity, gains in (("movement", helpful.alone), ("next", helpful.together)):
+        rows += [
+            (quantity, g.movement.name, 100 * g.share, "%", names[g.best_segment], g.movement.text)
+            for g in gains
+        ]
+    rows += [
+        ("movement_forces", g.movement.name, 100 * g.wrench, "%", "", g.movement.text)
+        for g in helpful.alone
+    ]
+    return pd.DataFrame(rows, columns=["quantity", "name", "value", "unit", "segment", "text"])
 
 
 def _summary(

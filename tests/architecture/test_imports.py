@@ -33,7 +33,7 @@ ALLOWED = {
     "motion": "body dynamics errors",
     "recordings": "body errors",
     "statistics": "errors",
-    "identification": "body dynamics errors statistics",
+    "identification": "body config dynamics errors statistics",
     "effects": "body dynamics errors",
     "diagnosis": "body dynamics effects errors identification statistics",
     "report": "body dynamics errors motion schemas statistics",

@@ -31,7 +31,9 @@ def recording(duration_s: float) -> Recording:
     piece = movement(sample_person(), round(min(duration_s, _PIECE_S) * RATE_HZ), RATE_HZ)
     times = max(1, round(duration_s / _PIECE_S))
     q, v, a = (np.tile(part, (times, 1)) for part in piece)
-    return Recording(q, v, a, np.zeros((len(q), 6)), np.ones(len(q), dtype=bool), RATE_HZ)
+    return Recording(
+        q, v, a, np.zeros((len(q), 6)), np.ones(len(q), dtype=bool), RATE_HZ, np.ones(len(q))
+    )
 
 
 def bare_calls(model: pin.Model, one: Recording) -> None:

@@ -27,25 +27,30 @@ def cli() -> None:
     """
 
 
+_OUT = click.option(
+    "--out", required=True, type=click.Path(path_type=Path), help="Folder for all results."
+)
+_PARTICIPANT = click.option(
+    "--participant",
+    "chosen",
+    multiple=True,
+    metavar="sub-01",
+    help="Only this participant (may be repeated).",
+)
+_CONFIG = click.option(
+    "--config",
+    "config_file",
+    type=click.Path(path_type=Path),
+    help="TOML file with options that differ from the study's.",
+)
+
+
 def _stage_command(name: str, summary: str) -> click.Command:
     @click.command(name, help=summary)
     @click.argument("study", type=click.Path(path_type=Path))
-    @click.option(
-        "--out", required=True, type=click.Path(path_type=Path), help="Folder for all results."
-    )
-    @click.option(
-        "--participant",
-        "chosen",
-        multiple=True,
-        metavar="sub-01",
-        help="Only this participant (may be repeated).",
-    )
-    @click.option(
-        "--config",
-        "config_file",
-        type=click.Path(path_type=Path),
-        help="TOML file with options that differ from the study's.",
-    )
+    @_OUT
+    @_PARTICIPANT
+    @_CONFIG
     @click.option(
         "--jobs", default=1, show_default=True, type=click.IntRange(1), help="Participants at once."
     )
@@ -97,6 +102,51 @@ def simulate(study, preset, participants, seed, sequence_s):
     from bsip_cli.simulate.command import simulate_command
 
     simulate_command(study, preset, participants, seed, sequence_s)
+
+
+@cli.command()
+@click.argument("study", type=click.Path(path_type=Path))
+@_OUT
+@_PARTICIPANT
+@click.option(
+    "--method",
+    default="OM",
+    show_default=True,
+    help="Whose inertial parameters: OM, RM or the name of an estimator.",
+)
+@click.option(
+    "--format",
+    "formats",
+    multiple=True,
+    type=click.Choice(["urdf", "mjcf", "osim", "biomod", "csv"]),
+    help="Only this format (may be repeated); without it, all.",
+)
+@click.option(
+    "--model-file",
+    type=click.Path(path_type=Path),
+    help="An .osim file (OpenSim 4) that gets the inertial parameters, in place of a model of "
+    "bsip's own tree.",
+)
+@click.option(
+    "--model-bodies",
+    metavar="MAP",
+    help="Which bodies of --model-file are which segments: rajagopal, gait2392 or a .toml file; "
+    "without it, the shipped map that fits.",
+)
+@click.option(
+    "--repair",
+    is_flag=True,
+    help="Replace inertia tensors that no body can have by the nearest possible ones, and say so; "
+    "without it such a person gets the .csv only.",
+)
+@_CONFIG
+def export(study, out, chosen, method, formats, model_file, model_bodies, repair, config_file):
+    """Write identified people as models for Pinocchio, MuJoCo, OpenSim, biorbd and Visual3D:
+    OUT/sub-XX/export/sub-XX_METHOD with .urdf, .xml (MuJoCo), .osim, .bioMod and .csv."""
+    from bsip_cli.export import Request, export_session
+
+    request = Request(method, formats, model_file, model_bodies, repair)
+    sys.exit(export_session(study, out, chosen, config_file, request))
 
 
 @cli.command()

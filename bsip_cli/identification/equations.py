@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,12 +16,17 @@ _ROWS = 100  # outputs per block: some 15 MB of regressor
 _OVERSAMPLING = 2.5  # samples kept per period of the cut-off
 
 
+def _alike(noise_level: np.ndarray) -> np.ndarray:
+    return np.ones((len(noise_level), 6))
+
+
 @dataclass(frozen=True)
 class Recording:
     """Motion and measured wrench of one trial.
 
     q (N, nq), v and a (N, nv); wrench (N, 6) about the world's origin [N, N m]; use (N,) frames
-    that may enter; rate [Hz].
+    that may enter; rate [Hz]; noise_level (N,) of the accelerations, in any unit: only its course
+    counts.
     """
 
     q: np.ndarray
@@ -30,14 +35,15 @@ class Recording:
     wrench: np.ndarray
     use: np.ndarray
     rate_hz: float
+    noise_level: np.ndarray
 
 
 @dataclass(frozen=True)
 class NormalEquations:
     """Sums over samples of the wrench equation, one set per component c of the wrench.
 
-    information (6, P, P) = sum Y_c^T Y_c, right (6, P) = sum Y_c^T F_c, squares (6,) = sum F_c^2;
-    ``samples`` per component, ``duration_s`` of motion behind them.
+    information (6, P, P) = sum w Y_c^T Y_c, right (6, P) = sum w Y_c^T F_c, squares (6,) = sum w
+    F_c^2 with weights w of mean 1; ``samples`` per component, ``duration_s`` of motion behind them.
     """
 
     information: np.ndarray
@@ -54,26 +60,51 @@ class NormalEquations:
         )
 
     def residual_rms(self, phi: np.ndarray) -> np.ndarray:
-        """(6,) root-mean-square residual [N, N m] of a parameter vector (P,)."""
+        """(6,) root-mean-square residual [N, N m], weighted, of a parameter vector (P,)."""
         fitted = np.einsum("i,cij,j->c", phi, self.information, phi)
         squares = self.squares - 2 * self.right @ phi + fitted
         return np.sqrt(np.maximum(squares, 0.0) / self.samples)
 
 
-def accumulate(
-    model: pin.Model, recordings: list[Recording], cutoff_hz: float, reference_m: np.ndarray
-) -> NormalEquations:
-    """Both sides of the equations through the same low-pass, decimated, and summed.
+@dataclass(frozen=True)
+class Samples:
+    """Filtered and decimated equations of some frames: regressor (n, 6, P) and measured wrench
+    (n, 6) about the reference, and the accelerations' noise level (n,)."""
 
-    Memory does not grow with the length of the trials.
+    regressor: np.ndarray
+    measured: np.ndarray
+    noise_level: np.ndarray
+
+
+@dataclass(frozen=True)
+class ResidualSeries:
+    """What a parameter vector leaves of one recording: residual (n, 6), noise level (n,)."""
+
+    residual: np.ndarray
+    noise_level: np.ndarray
+
+
+def accumulate(
+    model: pin.Model,
+    recordings: list[Recording],
+    cutoff_hz: float,
+    reference_m: np.ndarray,
+    weights_at: Callable[[np.ndarray], np.ndarray] = _alike,
+) -> NormalEquations:
+    """Both sides of the equations through the same low-pass, decimated, weighted and summed.
+
+    ``weights_at`` turns noise levels (n,) into weights (n, 6). Memory does not grow with the length
+    of the trials.
     """
     size = 10 * (model.njoints - 1)
     information, right = np.zeros((6, size, size)), np.zeros((6, size))
     squares, samples, duration = np.zeros(6), 0, 0.0
     for recording in recordings:
-        for regressor, measured in _filtered_blocks(model, recording, cutoff_hz, reference_m):
+        for block in _filtered_blocks(model, recording, cutoff_hz, reference_m):
+            root = np.sqrt(weights_at(block.noise_level))
+            measured = root * block.measured
             for c in range(6):
-                rows = regressor[:, c]
+                rows = root[:, c, None] * block.regressor[:, c]
                 information[c] += rows.T @ rows
                 right[c] += rows.T @ measured[:, c]
             squares += (measured**2).sum(axis=0)
@@ -88,24 +119,27 @@ def residual_series(
     cutoff_hz: float,
     reference_m: np.ndarray,
     phi: np.ndarray,
-) -> list[np.ndarray]:
-    """Per stretch of motion, the filtered residual (n, 6) of a parameter vector."""
+) -> list[ResidualSeries]:
+    """Per recording with usable frames, the filtered residual of a parameter vector."""
     series = []
     for recording in recordings:
-        blocks = [
-            measured - regressor @ phi
-            for regressor, measured in _filtered_blocks(model, recording, cutoff_hz, reference_m)
-        ]
+        blocks = list(_left_over(model, recording, cutoff_hz, reference_m, phi))
         if blocks:
-            series.append(np.concatenate(blocks))
+            residuals, levels = zip(*blocks, strict=True)
+            series.append(ResidualSeries(np.concatenate(residuals), np.concatenate(levels)))
     return series
+
+
+def _left_over(model, recording, cutoff_hz, reference_m, phi):
+    for block in _filtered_blocks(model, recording, cutoff_hz, reference_m):
+        yield block.measured - block.regressor @ phi, block.noise_level
 
 
 def _filtered_blocks(
     model: pin.Model, recording: Recording, cutoff_hz: float, reference_m: np.ndarray
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+) -> Iterator[Samples]:
     stride = max(1, int(recording.rate_hz / (_OVERSAMPLING * cutoff_hz)))
-    operator, _ = lowpass_operator(recording.use, recording.rate_hz, cutoff_hz, stride)
+    operator, frames = lowpass_operator(recording.use, recording.rate_hz, cutoff_hz, stride)
     measured = operator @ np.where(
         recording.use[:, None], move_moments(recording.wrench, reference_m), 0.0
     )
@@ -118,4 +152,8 @@ def _filtered_blocks(
             model, data, recording.q[part], recording.v[part], recording.a[part], reference_m
         )
         filtered = rows[:, part] @ regressor.reshape(last - first, -1)
-        yield filtered.reshape(rows.shape[0], 6, -1), measured[start : start + _ROWS]
+        yield Samples(
+            filtered.reshape(rows.shape[0], 6, -1),
+            measured[start : start + _ROWS],
+            recording.noise_level[frames[start : start + _ROWS]],
+        )

@@ -64,6 +64,16 @@ def prior_of(inertias: tuple[Inertia, ...], person: Person, spread: Spread) -> P
     return Prior(inertias, origins, phi, root, readable_sd, spread_sd, total_mass_sd_kg)
 
 
+def likeliest(prior: Prior, information: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """(P,) parameters of the largest posterior density, everything Gaussian.
+
+    ``information`` (P, P) and ``right`` (P,) of the weighted normal equations.
+    """
+    scaled = prior.root.T @ information @ prior.root + np.eye(len(prior.phi))
+    slope = prior.root.T @ (right - information @ prior.phi)
+    return prior.phi + prior.root @ np.linalg.solve(scaled, slope)
+
+
 def _with_total_mass(root: np.ndarray, sd_kg: float) -> np.ndarray:
     """The root of the covariance once the sum of the masses is known to ``sd_kg``."""
     total = root[::10].sum(axis=0)

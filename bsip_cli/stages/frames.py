@@ -61,6 +61,15 @@ def coordinates_from(
     return q, v, a
 
 
+def acceleration_noise(frame: pd.DataFrame, skeleton: Skeleton) -> np.ndarray:
+    """(N,) noise level of the pelvis' acceleration [m/s2] of a ``kinematics`` table.
+
+    All coordinates are smoothed alike, so theirs run the same course.
+    """
+    linear = frame[[f"sd_{name}" for name in skeleton.v_names[:3]]].to_numpy()
+    return np.sqrt((linear**2).mean(axis=1))
+
+
 def bsip_table(
     method: str, segments: tuple[str, ...], values: np.ndarray, sd: np.ndarray, share: np.ndarray
 ) -> pd.DataFrame:

@@ -17,7 +17,7 @@ from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench, wrench_regressor
 from bsip_cli.identification.equations import NormalEquations, Recording
 from bsip_cli.identification.estimator import Problem
-from bsip_cli.identification.noise import Noise
+from bsip_cli.identification.noise import even_noise
 from bsip_cli.identification.prior import Prior, Spread, prior_of
 
 MASS_KG = 72.0
@@ -75,7 +75,7 @@ def recording(duration_s: float, seed: int = 1, phi: np.ndarray | None = None) -
     q, v, a = motion(duration_s, seed)
     phi = world().phi_true if phi is None else phi
     wrench = predicted_wrench(world().model, q, v, a, phi[:, None], np.zeros(3))[..., 0]
-    return Recording(q, v, a, wrench, np.ones(len(q), dtype=bool), RATE_HZ)
+    return Recording(q, v, a, wrench, np.ones(len(q), dtype=bool), RATE_HZ, np.ones(len(q)))
 
 
 @cache
@@ -111,6 +111,6 @@ def problem_of(
     trust_ratio: float = 1.0,
 ) -> Problem:
     count = len(rows)
-    noise = Noise(np.broadcast_to(noise_rms, 6).astype(float), np.full(6, float(count)), count)
+    noise = even_noise(np.broadcast_to(noise_rms, 6).astype(float), count)
     equations = equations_of(rows, measured)
     return Problem(equations, noise, world().prior, world().basis, trust_ratio)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -14,9 +16,9 @@ from synthetic_identification import (
 from bsip_cli.dynamics.lowpass import lowpass_operator
 from bsip_cli.dynamics.regressor import predicted_wrench, wrench_regressor
 from bsip_cli.identification.base import base_parameters, estimate
-from bsip_cli.identification.equations import accumulate
+from bsip_cli.identification.equations import ResidualSeries, accumulate
 from bsip_cli.identification.estimator import Problem
-from bsip_cli.identification.noise import Noise, noise_of
+from bsip_cli.identification.noise import even_noise, noise_of
 
 NOISE = np.array([3.0, 3.0, 5.0, 1.5, 1.5, 1.0])  # N, N m
 
@@ -24,7 +26,7 @@ NOISE = np.array([3.0, 3.0, 5.0, 1.5, 1.5, 1.0])  # N, N m
 def test_noise_free_parameters_come_back_to_eight_digits():
     one = recording(30.0)
     equations = accumulate(world().model, [one], 8.0, np.zeros(3))
-    noise = Noise(np.full(6, 1e-3), np.full(6, float(equations.samples)), equations.samples)
+    noise = even_noise(np.full(6, 1e-3), equations.samples)
     fit = base_parameters(Problem(equations, noise, world().prior, world().basis, 1.0))
     true = world().basis.combine @ world().phi_true
     mapped = world().basis.combine @ world().prior.root
@@ -66,7 +68,8 @@ def covered(count, effective_share=1.0):
     quantile = stats.norm.ppf(0.975)
     hits = []
     equations = equations_of(rows, clean)
-    noise = Noise(NOISE, effective_share * np.full(6, float(len(rows))), len(rows))
+    even = even_noise(NOISE, len(rows))
+    noise = replace(even, effective=effective_share * even.effective)
     for _ in range(count):
         drawn = remeasured(equations, rows, clean + rng.normal(0, NOISE, clean.shape))
         fit = base_parameters(Problem(drawn, noise, world().prior, world().basis, 1.0))
@@ -96,10 +99,11 @@ def test_intervals_cover_the_truth_through_the_whole_chain():
     hits = []
     for _ in range(25):
         measured = operator @ (one.wrench + rng.normal(0, NOISE, one.wrench.shape))
-        noise = Noise(NOISE, np.full(6, float(len(rows))), len(rows))
+        noise = even_noise(NOISE, len(rows))
         equations = remeasured(motion_only, rows, measured)
         problem = Problem(equations, noise, world().prior, world().basis, 1.0)
-        noise = noise_of([measured - rows @ estimate(problem).phi])
+        left = measured - rows @ estimate(problem).phi
+        noise = noise_of([ResidualSeries(left, np.ones(len(left)))])
         fit = base_parameters(Problem(equations, noise, world().prior, world().basis, 1.0))
         hits.append(np.abs(fit.values - true) < 1.96 * np.sqrt(np.diag(fit.covariance)))
     assert 0.90 < np.mean(hits) < 0.98

@@ -4,6 +4,7 @@ from scipy.signal import lfilter
 from synthetic_identification import world
 
 from bsip_cli.body.inertia import PARAMETERS, from_phi
+from bsip_cli.identification.equations import ResidualSeries
 from bsip_cli.identification.estimator import Estimate
 from bsip_cli.identification.noise import noise_of
 from bsip_cli.identification.uncertainty import readable
@@ -14,16 +15,21 @@ def ar1(a, count, seed):
     return lfilter([1.0], [1.0, -a], white, axis=0)[200:]
 
 
+def even(residual):
+    """As if the accelerations were equally noisy throughout."""
+    return ResidualSeries(residual, np.ones(len(residual)))
+
+
 @pytest.mark.parametrize("a", [0.0, 0.5, 0.9])
 def test_memory_of_the_residuals_reduces_the_samples(a):
-    noise = noise_of([ar1(a, 6000, seed=1)])
+    noise = noise_of([even(ar1(a, 6000, seed=1))])
     assert noise.samples == 6000
     assert np.mean(noise.effective) == pytest.approx(6000 * (1 - a) / (1 + a), rel=0.15)
     np.testing.assert_allclose(noise.rms, np.sqrt(1 / (1 - a**2)), rtol=0.1)
 
 
 def test_weights_count_independent_samples():
-    noise = noise_of([ar1(0.9, 6000, seed=2) * [1, 2, 3, 4, 5, 6]])
+    noise = noise_of([even(ar1(0.9, 6000, seed=2) * [1, 2, 3, 4, 5, 6])])
     expected = noise.effective / 6000 / noise.rms**2
     np.testing.assert_allclose(noise.weights(), expected)
     np.testing.assert_allclose(noise.weights() * noise.rms**2, 0.1 / 1.9, rtol=0.3)
@@ -32,16 +38,29 @@ def test_weights_count_independent_samples():
 def test_stretches_do_not_run_into_each_other():
     """Two long stretches with a jump between: the same as one series of both, not less."""
     parts = [ar1(0.5, 3000, seed=3), ar1(0.5, 3000, seed=4)]
-    apart, joined = noise_of(parts), noise_of([np.concatenate(parts)])
+    apart, joined = noise_of([even(p) for p in parts]), noise_of([even(np.concatenate(parts))])
     np.testing.assert_allclose(apart.rms, joined.rms)
     np.testing.assert_allclose(apart.effective, joined.effective, rtol=0.1)
 
 
 def test_degenerate_residuals_keep_finite_weights():
     for series in (np.zeros((50, 6)), np.ones((2, 6))):
-        noise = noise_of([series])
+        noise = noise_of([even(series)])
         assert np.isfinite(noise.weights()).all()
         assert np.all(noise.effective >= 1)
+
+
+def test_fast_frames_count_less():
+    """Noise of 1 everywhere and 2 per unit of level, found back, and the weights undo it."""
+    rng = np.random.default_rng(6)
+    level = rng.uniform(0.1, 3.0, 8000)
+    spread = np.sqrt(1.0 + 4.0 * level**2)
+    noise = noise_of([ResidualSeries(spread[:, None] * rng.normal(size=(8000, 6)), level)])
+    np.testing.assert_allclose(noise.steady, 1.0, rtol=0.25)
+    np.testing.assert_allclose(noise.with_level, 2.0, rtol=0.1)
+    weights = noise.weights_at(level)
+    np.testing.assert_allclose(weights.mean(axis=0), 1.0, rtol=1e-9)
+    np.testing.assert_allclose(weights * spread[:, None] ** 2 / noise.rms**2, 1.0, rtol=0.3)
 
 
 def test_the_priors_mean_is_rm_about_the_joints():

@@ -11,6 +11,7 @@ from bsip_cli.identification.equations import Recording, accumulate, residual_se
 
 CUTOFF_HZ = 8.0
 REFERENCE = np.array([0.2, -0.1, 0.0])
+STRIDE = int(RATE_HZ / (2.5 * CUTOFF_HZ))
 
 
 def moved(wrench):
@@ -21,8 +22,7 @@ def moved(wrench):
 
 def dense(one):
     """Filtered rows (n, 6, 150) and wrench (n, 6), all at once."""
-    stride = int(RATE_HZ / (2.5 * CUTOFF_HZ))
-    operator, _ = lowpass_operator(one.use, RATE_HZ, CUTOFF_HZ, stride)
+    operator, _ = lowpass_operator(one.use, RATE_HZ, CUTOFF_HZ, STRIDE)
     model = world().model
     Y = wrench_regressor(model, model.createData(), one.q, one.v, one.a, REFERENCE)
     rows = (operator @ Y.reshape(len(Y), -1)).reshape(-1, 6, 150)
@@ -74,21 +74,42 @@ def test_weights_per_component(recordings):
     np.testing.assert_allclose(right, expected, atol=1e-12 * np.abs(expected).max())
 
 
+def test_weights_per_frame(recordings):
+    """A frame's weight multiplies its share of every sum."""
+    one = replace(recordings[0], noise_level=np.linspace(1.0, 4.0, len(recordings[0].use)))
+    rows, measured = dense(one)
+    frames = lowpass_operator(one.use, RATE_HZ, CUTOFF_HZ, STRIDE)[1]
+    weights = np.outer(1 / one.noise_level[frames], np.arange(1.0, 7.0))
+    found = accumulate(
+        world().model,
+        [one],
+        CUTOFF_HZ,
+        REFERENCE,
+        lambda level: np.outer(1 / level, np.arange(1.0, 7.0)),
+    )
+    for c in range(6):
+        expected = rows[:, c].T @ (weights[:, c, None] * rows[:, c])
+        np.testing.assert_allclose(
+            found.information[c], expected, rtol=0, atol=1e-12 * np.abs(expected).max()
+        )
+    np.testing.assert_allclose(found.squares, (weights * measured**2).sum(axis=0), rtol=1e-12)
+
+
 def test_residuals_from_the_sums_and_from_the_series_agree(recordings):
     equations = accumulate(world().model, recordings, CUTOFF_HZ, REFERENCE)
     phi = world().prior.phi
     series = residual_series(world().model, recordings, CUTOFF_HZ, REFERENCE, phi)
-    assert [len(s) for s in series] == [len(dense(one)[0]) for one in recordings]
+    assert [len(s.residual) for s in series] == [len(dense(one)[0]) for one in recordings]
     rows, measured = dense(recordings[0])
-    np.testing.assert_allclose(series[0], measured - rows @ phi, atol=1e-8)
-    rms = np.sqrt((np.concatenate(series) ** 2).mean(axis=0))
+    np.testing.assert_allclose(series[0].residual, measured - rows @ phi, atol=1e-8)
+    rms = np.sqrt((np.concatenate([s.residual for s in series]) ** 2).mean(axis=0))
     np.testing.assert_allclose(equations.residual_rms(phi), rms, rtol=1e-6)
 
 
 def test_the_true_parameters_leave_no_residual():
     one = recording(4.0, 2)
     series = residual_series(world().model, [one], CUTOFF_HZ, REFERENCE, world().phi_true)
-    assert np.abs(series[0]).max() < 1e-8
+    assert np.abs(series[0].residual).max() < 1e-8
 
 
 def test_a_trial_without_a_usable_frame_adds_nothing(recordings):
@@ -112,6 +133,7 @@ def test_memory_does_not_grow_with_the_trial():
             np.zeros((frames, 6)),
             np.ones(frames, dtype=bool),
             RATE_HZ,
+            np.ones(frames),
         )
         tracemalloc.start()
         accumulate(world().model, [one], CUTOFF_HZ, REFERENCE)

@@ -23,11 +23,13 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from bsip_cli.errors import NumericalError
 from bsip_cli.simulate.calculus import HALF_WIDTH, bridge, derivative, integral
-from bsip_cli.simulate.kinematics import Poses, poses_of
+from bsip_cli.simulate.kinematics import poses_of
+from bsip_cli.simulate.loads import GRAVITY, total_load
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
+from bsip_cli.simulate.poses import Poses
 from bsip_cli.simulate.rotations import euler_zxy, from_rotation_vector
-from bsip_cli.simulate.wrench import GRAVITY, Momentum, ball_load, locked_inertia, momentum_of
+from bsip_cli.simulate.wrench import Momentum, locked_inertia, momentum_of
 
 G = -GRAVITY[1]
 UP = np.array([0.0, 1.0, 0.0])
@@ -148,12 +150,12 @@ def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[Sta
     for _ in range(MOST_ROUNDS):
         poses = state.poses(person, plan)
         momentum = momentum_of(person.inertias, poses, plan.step_s)
-        ball_force, ball_moment = ball_load(plan.ball, poses, plan.step_s)
-        shift = _com_target(plan, momentum, cop, ball_force, ball_moment) - momentum.com_m
+        load_force, load_moment = total_load(plan.all_loads(), poses, plan.step_s)
+        shift = _com_target(plan, momentum, cop, load_force, load_moment) - momentum.com_m
         turn = np.zeros_like(shift)
         if final and plan.flights:
             locked = locked_inertia(person.inertias, poses, momentum.com_m)
-            rate = _turn_rate(plan, state.turn_rate, momentum, locked, ball_force, ball_moment)
+            rate = _turn_rate(plan, state.turn_rate, momentum, locked, load_force, load_moment)
             turn = rate - state.turn_rate
         state = State(state.pelvis_m + shift, state.turn_rate + turn)
         turned = plan.step_s * np.abs(turn).sum(axis=0)
@@ -183,19 +185,19 @@ def _com_target(
     plan: Plan,
     momentum: Momentum,
     cop_m: np.ndarray,
-    ball_force: np.ndarray,
-    ball_moment: np.ndarray,
+    load_force: np.ndarray,
+    load_moment: np.ndarray,
 ) -> np.ndarray:
     """(T, 3) path of the centre of mass that puts the COP where it is planned."""
-    height = _height_target(plan, momentum, ball_force)
+    height = _height_target(plan, momentum, load_force)
     mass = momentum.mass_kg
     lift = mass * (derivative(derivative(height, plan.step_s), plan.step_s) + G)
-    load = derivative(momentum.spin(), plan.step_s) + ball_moment
+    load = derivative(momentum.spin(), plan.step_s) + load_moment
     for first, last in plan.flights:  # only the ball acts, and the spin is kept
         air = slice(first, last + 1)
-        lift[air] = -ball_force[air, 1]
-        load[air] = np.cross(momentum.com_m[air], ball_force[air])
-    total = lift + ball_force[:, 1]
+        lift[air] = -load_force[air, 1]
+        load[air] = np.cross(momentum.com_m[air], load_force[air])
+    total = lift + load_force[:, 1]
     table = _CartTable(mass * height, lift, plan.step_s)
     ahead = _ahead(table, total * cop_m[:, 0] - load[:, 2], plan)
     aside = table.solve(total * cop_m[:, 1] + load[:, 0], 0.0)
@@ -238,7 +240,7 @@ def _ahead(table: _CartTable, moment: np.ndarray, plan: Plan) -> np.ndarray:
     return path
 
 
-def _height_target(plan: Plan, momentum: Momentum, ball_force: np.ndarray) -> np.ndarray:
+def _height_target(plan: Plan, momentum: Momentum, load_force: np.ndarray) -> np.ndarray:
     """(T,) height of the centre of mass; a held ball slows its rise in flight.
 
     The prescribed height holds from the release on; before it, the body rises a little
@@ -250,7 +252,7 @@ def _height_target(plan: Plan, momentum: Momentum, ball_force: np.ndarray) -> np
     if plan.ball is None:
         return height
     for first, last in plan.flights:
-        sink = -ball_force[first : last + 1, 1] / momentum.mass_kg
+        sink = -load_force[first : last + 1, 1] / momentum.mass_kg
         speed = integral(sink, plan.step_s)
         speed = speed - speed[-1]
         rise = integral(speed, plan.step_s)
@@ -270,8 +272,8 @@ def _turn_rate(
     rate: np.ndarray,
     momentum: Momentum,
     locked: np.ndarray,
-    ball_force: np.ndarray,
-    ball_moment: np.ndarray,
+    load_force: np.ndarray,
+    load_moment: np.ndarray,
 ) -> np.ndarray:
     """(T, 3) the pelvis' turning rate that keeps the angular momentum in flight.
 
@@ -283,7 +285,7 @@ def _turn_rate(
     result = np.zeros_like(rate)
     for group in _runs(weight > 0.0):
         w = weight[group, None]
-        torque = np.cross(momentum.com_m[group], ball_force[group]) - ball_moment[group]
+        torque = np.cross(momentum.com_m[group], load_force[group]) - load_moment[group]
         spin = momentum.spin()[group] - integral(torque, plan.step_s)
         mobility = np.linalg.inv(locked[group])
         lacking = w * (rate[group] - HASTE * _apply(mobility, spin))

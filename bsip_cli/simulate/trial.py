@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsip_cli.simulate.balance import balanced
-from bsip_cli.simulate.kinematics import Poses
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
 from bsip_cli.simulate.people import SIDES, Person
 from bsip_cli.simulate.plan import STEP_S, Foot, Plan
+from bsip_cli.simulate.poses import Poses
 from bsip_cli.simulate.wrench import ground_wrench
 
 THIN = 4  # trials without flight are balanced at 250 Hz and interpolated
@@ -83,7 +83,7 @@ def simulate_trial(
 
 def trial_of(person: Person, task: str, plan: Plan, poses: Poses) -> Trial:
     """Wrenches of a balanced movement, cut to what is recorded."""
-    force, moment = ground_wrench(person.inertias, poses, plan.step_s, plan.ball)
+    force, moment = ground_wrench(person.inertias, poses, plan.step_s, plan.all_loads())
     keep, planned = plan.keep, plan.cop_m()
     feet_force, feet_moment = {}, {}
     for side in SIDES:

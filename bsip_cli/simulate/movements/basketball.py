@@ -9,12 +9,12 @@ import numpy as np
 from bsip_cli.simulate.calculus import bridge
 from bsip_cli.simulate.curves import glide, soft_polyline, step
 from bsip_cli.simulate.kinematics import centre_of_mass, poses_of
+from bsip_cli.simulate.loads import GRAVITY
 from bsip_cli.simulate.movements.standing import add_breath_of_motion, add_sway, plate_under
 from bsip_cli.simulate.people import SIDES, Person
 from bsip_cli.simulate.plan import STEP_S, Plan
 from bsip_cli.simulate.rotations import euler_zxy
 from bsip_cli.simulate.sketch import Sketch, held_ball, sketch_for
-from bsip_cli.simulate.wrench import GRAVITY
 
 G = -GRAVITY[1]
 

@@ -15,6 +15,7 @@ fixed-point iteration on the pelvis' pose:
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -38,6 +39,7 @@ LONGEST_BRIDGE_S = 0.30
 LOWERING_REACH_S = 0.45
 TURN_REACH_S = 0.16
 HASTE = 1.35  # over-relaxation of the turns: the feet do not follow the pelvis
+LOADED_HASTE = 0.7  # what is carried turns with it, and `locked` does not know it
 CLOSE_ENOUGH_M = 2e-7  # and rad
 STANDING_CLOSE_ENOUGH_M = 1e-6
 ROUGH_M = 1e-4
@@ -100,14 +102,20 @@ def _within_reach(person: Person, plan: Plan) -> tuple[State, float]:
     state = State(plan.pelvis_m, np.zeros_like(plan.pelvis_m))
     final = False
     for _ in range(MOST_LOWERINGS):
-        state, poses = _balance(person, _lowered(plan, lowered), state, final)
+        state, poses, left = _balance(person, _lowered(plan, lowered), state, final)
         excess = poses.excess_reach_m
-        if excess.max() == 0.0 and final:
+        if excess.max() == 0.0 and final and left < ROUGH_M:
             break
         final = final or excess.max() == 0.0
         further = _lowering(excess, plan)
         lowered = lowered + further
         state = state.moved(-further[:, None] * UP)
+    if not left < ROUGH_M:
+        raise NumericalError(
+            f"the movement does not come into balance: {1000 * left:.2g} mm or mrad are left",
+            expected=f"less than {1000 * ROUGH_M:g}",
+            remedy="use another seed or a smaller effect",
+        )
     return state, float(lowered.max())
 
 
@@ -139,8 +147,11 @@ def _lowered(plan: Plan, by_m: np.ndarray) -> Plan:
     return replace(plan, pelvis_m=plan.pelvis_m - by_m[:, None] * UP, com_height_m=height)
 
 
-def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[State, Poses]:
-    """The fixed-point iteration; a rough one, without turns in flight, unless `final`."""
+def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[State, Poses, float]:
+    """The fixed-point iteration; a rough one, without turns in flight, unless `final`.
+
+    The number is the size of the last correction, in m or rad.
+    """
     cop = plan.cop_m()
     if plan.sway_share:
         state, cop = _with_sway(person, plan, state, cop)
@@ -159,9 +170,10 @@ def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[Sta
             turn = rate - state.turn_rate
         state = State(state.pelvis_m + shift, state.turn_rate + turn)
         turned = plan.step_s * np.abs(turn).sum(axis=0)
-        if max(np.abs(shift).max(), turned.max()) < tolerance:
+        left = max(np.abs(shift).max(), turned.max())
+        if left < tolerance:
             break
-    return state, state.poses(person, plan)
+    return state, state.poses(person, plan), float(left)
 
 
 def _with_sway(
@@ -193,7 +205,7 @@ def _com_target(
     mass = momentum.mass_kg
     lift = mass * (derivative(derivative(height, plan.step_s), plan.step_s) + G)
     load = derivative(momentum.spin(), plan.step_s) + load_moment
-    for first, last in plan.flights:  # only the ball acts, and the spin is kept
+    for first, last in plan.flights:  # only the loads act, and the spin is kept
         air = slice(first, last + 1)
         lift[air] = -load_force[air, 1]
         load[air] = np.cross(momentum.com_m[air], load_force[air])
@@ -241,30 +253,47 @@ def _ahead(table: _CartTable, moment: np.ndarray, plan: Plan) -> np.ndarray:
 
 
 def _height_target(plan: Plan, momentum: Momentum, load_force: np.ndarray) -> np.ndarray:
-    """(T,) height of the centre of mass; a held ball slows its rise in flight.
+    """(T,) height of the centre of mass; what the body carries slows its rise in flight.
 
-    The prescribed height holds from the release on; before it, the body rises a little
-    faster, which a septic bridge in the stance before the flight prepares.
+    The prescribed height holds at each landing. Before it the body rises a little faster,
+    which a septic bridge in the stance before the flight prepares; another one in the
+    stance after it takes up what the load still does at the landing.
     """
     if plan.com_height_m is None:
         return momentum.com_m[:, 1]
     height = plan.com_height_m.copy()
-    if plan.ball is None:
+    if not plan.all_loads():
         return height
-    for first, last in plan.flights:
+    for (first, last), (before, after) in zip(plan.flights, _stances(plan), strict=True):
         sink = -load_force[first : last + 1, 1] / momentum.mass_kg
         speed = integral(sink, plan.step_s)
         speed = speed - speed[-1]
         rise = integral(speed, plan.step_s)
         rise = rise - rise[-1]
         height[first : last + 1] += rise
-        before = min(first, round(LONGEST_BRIDGE_S / plan.step_s))
-        jerk = (sink[HALF_WIDTH + 1] - sink[0]) / ((HALF_WIDTH + 1) * plan.step_s)
-        takeoff = np.array([[rise[0]], [speed[0]], [sink[0]], [jerk]])
-        times = np.arange(before) * plan.step_s
-        prepared = bridge(np.zeros((4, 1)), takeoff, before * plan.step_s, times)
-        height[first - before : first] += prepared[:, 0]
+        k = HALF_WIDTH + 1  # beside the edges, where differences reach out of the flight
+        takeoff = np.array([rise[0], speed[0], sink[0], (sink[k] - sink[0]) / (k * plan.step_s)])
+        landing = np.array([0.0, 0.0, sink[-1], (sink[-1] - sink[-k - 1]) / (k * plan.step_s)])
+        height[first - before : first] += _bridge_from_rest(takeoff, before, plan.step_s)
+        # the same bridge, run backwards in time
+        settled = _bridge_from_rest(landing * [1.0, -1.0, 1.0, -1.0], after, plan.step_s)
+        height[last + 1 : last + 1 + after] += settled[::-1]
     return height
+
+
+def _bridge_from_rest(end: np.ndarray, samples: int, step_s: float) -> np.ndarray:
+    """(samples,) from nothing to a state: value, first, second and third derivative (4,)."""
+    times = np.arange(samples) * step_s
+    return bridge(np.zeros((4, 1)), end[:, None], samples * step_s, times)[:, 0]
+
+
+def _stances(plan: Plan) -> list[tuple[int, int]]:
+    """For each flight, how many samples on the ground before and after it serve as bridges."""
+    longest = round(LONGEST_BRIDGE_S / plan.step_s)
+    starts = [first for first, _ in plan.flights] + [len(plan)]
+    ends = [-1] + [last for _, last in plan.flights]
+    grounded = [min(longest, a - b - 1) for a, b in zip(starts, ends, strict=True)]
+    return list(pairwise(grounded))
 
 
 def _turn_rate(
@@ -282,16 +311,17 @@ def _turn_rate(
     for each group of flights, so that the pelvis comes back to its planned orientation.
     """
     weight = _near_flights(plan, TURN_REACH_S)
+    haste = LOADED_HASTE if plan.loads else HASTE
     result = np.zeros_like(rate)
     for group in _runs(weight > 0.0):
         w = weight[group, None]
         torque = np.cross(momentum.com_m[group], load_force[group]) - load_moment[group]
         spin = momentum.spin()[group] - integral(torque, plan.step_s)
         mobility = np.linalg.inv(locked[group])
-        lacking = w * (rate[group] - HASTE * _apply(mobility, spin))
-        gain = HASTE * np.einsum("t,tij->ij", weight[group], mobility)
+        lacking = w * (rate[group] - haste * _apply(mobility, spin))
+        gain = haste * np.einsum("t,tij->ij", weight[group], mobility)
         kept = np.linalg.solve(gain, -lacking.sum(axis=0))
-        result[group] = lacking + HASTE * w * _apply(mobility, kept)
+        result[group] = lacking + haste * w * _apply(mobility, kept)
     return result
 
 

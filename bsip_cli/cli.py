@@ -144,6 +144,28 @@ def simulate(study, preset, participants, seed, sequence_s, **effects):
 
 
 @cli.command()
+@click.argument("source", metavar="IN", type=click.Path(path_type=Path))
+@click.argument("out", type=click.Path(path_type=Path))
+@click.option(
+    "--participant",
+    "participants",
+    multiple=True,
+    metavar="sub-01",
+    help="Only in this participant's recordings (may be repeated).",
+)
+@click.option("--seed", default=1, show_default=True, type=int, help="Draws what is left open.")
+@_effect_options
+def inject(source, out, participants, seed, **effects):
+    """Hide effects in measured recordings, where that is physically possible.
+
+    IN is a study folder, a C3D file, or a TRC file with its MOT file beside it; OUT is the copy.
+    """
+    from bsip_cli.simulate.command import inject_command
+
+    sys.exit(inject_command(source, out, participants, seed, **effects))
+
+
+@cli.command()
 @click.argument("out", type=click.Path(path_type=Path))
 def show(out):
     """Print the tables of a finished run and where its reports lie."""

@@ -49,6 +49,8 @@ class Instruments:
         multiple of F.
     up : (3,) vertical direction of the lab, as its files say.
     start_s : when the first frame lies on the clock of the movement (0 if nothing was cut).
+    stamps_s : (F,) times of frames that are not evenly spaced; then N is F.
+    surfaces_known : whether the plates' places are true (a MOT file has none).
     """
 
     labels: tuple[str, ...]
@@ -59,6 +61,8 @@ class Instruments:
     analog_hz: float
     up: np.ndarray
     start_s: float = 0.0
+    stamps_s: np.ndarray | None = None
+    surfaces_known: bool = True
 
     @property
     def per_frame(self) -> int:
@@ -67,10 +71,14 @@ class Instruments:
 
     def frame_times_s(self) -> np.ndarray:
         """(F,) from the first frame."""
+        if self.stamps_s is not None:
+            return self.stamps_s
         return np.arange(len(self.points_m)) / self.marker_hz
 
     def sample_times_s(self) -> np.ndarray:
         """(N,) from the first sample."""
+        if self.stamps_s is not None:
+            return self.stamps_s
         return np.arange(self.readings.shape[1]) / self.analog_hz
 
     def column(self, label: str) -> int:
@@ -95,6 +103,7 @@ class Instruments:
             points_m=self.points_m[first:last],
             readings=self.readings[:, first * ratio : last * ratio],
             start_s=self.start_s + first / self.marker_hz,
+            stamps_s=None if self.stamps_s is None else self.stamps_s[first:last],
         )
 
     def with_forces_from(self, times_s: np.ndarray) -> Instruments:
@@ -107,7 +116,8 @@ class Instruments:
         UsageError : nothing is left.
         """
         count = self.readings.shape[1]
-        position = times_s * self.analog_hz
+        index = np.arange(count)
+        position = np.interp(times_s, self.sample_times_s(), index, left=-1.0, right=count)
         frames, ratio = len(self.points_m), self.per_frame
         there = (position > -1e-6) & (position < count - 1 + 1e-6)
         whole = np.flatnonzero(there.reshape(frames, ratio).all(axis=1))

@@ -25,7 +25,7 @@ HEAVY = [
     "statsmodels",
 ]
 STAGE_COMMANDS = [*dict.fromkeys(stage.name for stage in STAGES), "run"]
-OTHER_COMMANDS = ["simulate", "show", "info"]
+OTHER_COMMANDS = ["simulate", "inject", "show", "info"]
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["ingest", "--help"], ["simulate", "--help"]])

@@ -35,6 +35,7 @@ class AddedMass(Effect):
     least, most = 0.0, 60.0
     targets = SEGMENT_NAMES + " (else drawn); in measured data also markers LABEL+LABEL"
     injectable = True
+    needs_plates = True
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:

@@ -41,6 +41,7 @@ class Effect:
     spares_static : not in static trials, unless they are asked for.
     personal : drawn for each participant; else once for the lab.
     injectable : whether it can be hidden in measured data.
+    needs_plates : whether it works on forces. needs_surface : and on where a plate lies.
     hint : for those that are not, why.
     """
 
@@ -54,6 +55,8 @@ class Effect:
     settings: ClassVar[tuple[str, ...]] = ()
     spares_static: ClassVar[bool] = False
     injectable: ClassVar[bool] = False
+    needs_plates: ClassVar[bool] = False
+    needs_surface: ClassVar[bool] = False
     personal: ClassVar[bool] = True
     hint: ClassVar[str] = "the person would have moved otherwise"
 

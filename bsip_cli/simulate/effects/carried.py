@@ -81,6 +81,6 @@ def _shares(instruments: Instruments) -> tuple[np.ndarray, float]:
         ]
     )
     sign = 1.0 if np.nansum(vertical) > 0.0 else -1.0
-    load = np.clip(np.nan_to_num(sign * vertical), 0.0, None)
-    total = load.sum(axis=0)
-    return np.where(total > LOADED_N, load / np.maximum(total, LOADED_N), 0.0), sign
+    load = np.nan_to_num(sign * vertical)
+    load = np.where(load > LOADED_N, load, 0.0)
+    return load / np.maximum(load.sum(axis=0), LOADED_N), sign

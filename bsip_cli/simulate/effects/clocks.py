@@ -16,6 +16,7 @@ class SyncOffset(Effect):
     unit = "s"
     least, most = -0.5, 0.5
     injectable = True
+    needs_plates = True
     personal = False
 
     def measured(self, instruments: Instruments) -> Instruments:
@@ -30,6 +31,7 @@ class ClockDrift(Effect):
     unit = "1"
     least, most = -0.02, 0.02
     injectable = True
+    needs_plates = True
     personal = False
 
     def measured(self, instruments: Instruments) -> Instruments:

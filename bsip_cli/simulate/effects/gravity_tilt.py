@@ -27,6 +27,7 @@ class GravityTilt(Effect):
     least, most = -0.2, 0.2
     targets = "the lab axis x or y that the vertical turns about (else a horizontal one is drawn)"
     injectable = True
+    needs_plates = True
     personal = False
 
     @classmethod

@@ -35,6 +35,7 @@ class BeltVibration(Effect):
     unit = "N"
     least, most = 0.0, 300.0
     injectable = True
+    needs_plates = True
     personal = False
 
     @classmethod
@@ -62,6 +63,7 @@ class PlateHysteresis(Effect):
     unit = "N"
     least, most = 0.0, 100.0
     injectable = True
+    needs_plates = True
     personal = False
 
     def measured(self, instruments: Instruments) -> Instruments:
@@ -97,6 +99,7 @@ class PlateSaturation(Effect):
     unit = "1"
     least, most = 0.0, 0.3
     injectable = True
+    needs_plates = True
     personal = False
 
     def measured(self, instruments: Instruments) -> Instruments:

@@ -41,6 +41,7 @@ class _ChannelFault(Effect):
     targets = "fx, fy, fz (if none), mx, my or mz, plate=NUMBER"
     settings = ("plate",)
     injectable = True
+    needs_plates = True
     personal = False
 
     @classmethod
@@ -117,6 +118,7 @@ class PlateCrosstalk(Effect):
     targets = "FROM:TO, two of fx, fy, fz, mx, my, mz (fz:fx if none), plate=NUMBER"
     settings = ("plate",)
     injectable = True
+    needs_plates = True
     personal = False
 
     @classmethod

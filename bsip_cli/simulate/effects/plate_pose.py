@@ -31,6 +31,7 @@ class PlateTranslation(Effect):
     targets = "a lab axis x, y or z (else a horizontal direction is drawn), plate=NUMBER"
     settings = ("plate",)
     injectable = True
+    needs_plates = True
     personal = False
 
     @classmethod
@@ -64,9 +65,11 @@ class PlateRotation(Effect):
     name = "plate_rotation"
     unit = "rad"
     least, most = -0.5, 0.5
+    needs_surface = True
     targets = "yaw (if none), tilt_x or tilt_y (about lab axes), plate=NUMBER"
     settings = ("plate",)
     injectable = True
+    needs_plates = True
     personal = False
 
     @classmethod

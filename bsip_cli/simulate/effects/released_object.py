@@ -48,6 +48,7 @@ class ReleasedObject(Effect):
     settings = ("release_s",)
     spares_static = True
     injectable = True
+    needs_plates = True
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:

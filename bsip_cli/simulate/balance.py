@@ -26,6 +26,7 @@ from bsip_cli.errors import NumericalError
 from bsip_cli.simulate.calculus import HALF_WIDTH, bridge, derivative, integral
 from bsip_cli.simulate.kinematics import poses_of
 from bsip_cli.simulate.loads import GRAVITY, total_load
+from bsip_cli.simulate.mixing import Mixer
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
 from bsip_cli.simulate.poses import Poses
@@ -39,8 +40,11 @@ LONGEST_BRIDGE_S = 0.30
 LOWERING_REACH_S = 0.45
 TURN_REACH_S = 0.16
 HASTE = 1.35  # over-relaxation of the turns: the feet do not follow the pelvis
+RATE_WEIGHT_S = 0.05  # metres of path per rad/s of turning, in what mixing makes small
 LOADED_HASTE = 0.7  # what is carried turns with it, and `locked` does not know it
 CLOSE_ENOUGH_M = 2e-7  # and rad
+LOADED_CLOSE_ENOUGH_M = 2e-5
+EDGE_S = 0.05  # of the margin: one-sided differences of a load's acceleration
 STANDING_CLOSE_ENOUGH_M = 1e-6
 ROUGH_M = 1e-4
 REFINING_SLACK = 0.0005  # reach kept back for what interpolation adds
@@ -155,9 +159,13 @@ def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[Sta
     cop = plan.cop_m()
     if plan.sway_share:
         state, cop = _with_sway(person, plan, state, cop)
-    tolerance = ROUGH_M
+    tolerance, mixer = ROUGH_M, Mixer()
     if final:
         tolerance = CLOSE_ENOUGH_M if plan.flights else STANDING_CLOSE_ENOUGH_M
+    if final and plan.loads and plan.flights:
+        tolerance = LOADED_CLOSE_ENOUGH_M
+    edge = EDGE_S / plan.step_s if plan.loads else 0
+    inner = slice(round(edge), len(plan) - round(edge))
     for _ in range(MOST_ROUNDS):
         poses = state.poses(person, plan)
         momentum = momentum_of(person.inertias, poses, plan.step_s)
@@ -168,12 +176,24 @@ def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[Sta
             locked = locked_inertia(person.inertias, poses, momentum.com_m)
             rate = _turn_rate(plan, state.turn_rate, momentum, locked, load_force, load_moment)
             turn = rate - state.turn_rate
-        state = State(state.pelvis_m + shift, state.turn_rate + turn)
         turned = plan.step_s * np.abs(turn).sum(axis=0)
-        left = max(np.abs(shift).max(), turned.max())
+        left = max(np.abs(shift[inner]).max(), turned.max())
+        if plan.loads:  # what is carried couples the pelvis' path and turns
+            shift, turn = _mixed(mixer, state, shift, turn)
+        state = State(state.pelvis_m + shift, state.turn_rate + turn)
         if left < tolerance:
             break
     return state, state.poses(person, plan), float(left)
+
+
+def _mixed(
+    mixer: Mixer, state: State, shift: np.ndarray, turn: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Better corrections of path and turning rate, both weighed alike."""
+    point = np.stack([state.pelvis_m, RATE_WEIGHT_S * state.turn_rate])
+    plain = np.stack([shift, RATE_WEIGHT_S * turn])
+    step = mixer.step(point.ravel(), plain.ravel()).reshape(point.shape)
+    return step[0], step[1] / RATE_WEIGHT_S
 
 
 def _with_sway(

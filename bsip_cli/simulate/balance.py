@@ -47,6 +47,7 @@ LOADED_CLOSE_ENOUGH_M = 2e-5
 EDGE_S = 0.05  # of the margin: one-sided differences of a load's acceleration
 STANDING_CLOSE_ENOUGH_M = 1e-6
 ROUGH_M = 1e-4
+DIVERGED_M = 50.0
 REFINING_SLACK = 0.0005  # reach kept back for what interpolation adds
 MOST_ROUNDS = 60
 MOST_LOWERINGS = 12
@@ -115,12 +116,16 @@ def _within_reach(person: Person, plan: Plan) -> tuple[State, float]:
         lowered = lowered + further
         state = state.moved(-further[:, None] * UP)
     if not left < ROUGH_M:
-        raise NumericalError(
-            f"the movement does not come into balance: {1000 * left:.2g} mm or mrad are left",
-            expected=f"less than {1000 * ROUGH_M:g}",
-            remedy="use another seed or a smaller effect",
-        )
+        raise _out_of_balance(left)
     return state, float(lowered.max())
+
+
+def _out_of_balance(left: float) -> NumericalError:
+    return NumericalError(
+        f"the movement does not come into balance: {1000 * left:.2g} mm or mrad are left",
+        expected=f"less than {1000 * ROUGH_M:g}",
+        remedy="use another seed or a smaller effect",
+    )
 
 
 def _lowering(excess_m: np.ndarray, plan: Plan) -> np.ndarray:
@@ -178,6 +183,8 @@ def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[Sta
             turn = rate - state.turn_rate
         turned = plan.step_s * np.abs(turn).sum(axis=0)
         left = max(np.abs(shift[inner]).max(), turned.max())
+        if not left < DIVERGED_M:
+            raise _out_of_balance(left)
         if plan.loads:  # what is carried couples the pelvis' path and turns
             shift, turn = _mixed(mixer, state, shift, turn)
         state = State(state.pelvis_m + shift, state.turn_rate + turn)

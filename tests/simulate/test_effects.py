@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import cache
 from itertools import pairwise
 
@@ -18,10 +19,12 @@ from bsip_cli.simulate.effects.outside import play
 from bsip_cli.simulate.effects.wobbling_mass import Swinging
 from bsip_cli.simulate.instruments import Instruments, SensingPlate, interpolated
 from bsip_cli.simulate.loads import GRAVITY
+from bsip_cli.simulate.mixing import Mixer
 from bsip_cli.simulate.options import Asked, Laboratory, Rates, Richness, StudyOptions
 from bsip_cli.simulate.poses import Poses
 from bsip_cli.simulate.recording import MM, Measurement, measure_trial
 from bsip_cli.simulate.rotations import about_z
+from bsip_cli.simulate.study import simulate_study
 from bsip_cli.simulate.trial import Trial, simulate_trial
 
 G = 9.81
@@ -181,6 +184,50 @@ def test_every_effect_is_seen_in_a_recording(name):
     assert np.abs(force).max() > 0.1 or np.abs(markers).max() > 1e-3
     assert np.isfinite(force).all()
     assert effect.record()["effect"] == name
+
+
+def test_a_study_keeps_the_truth_about_two_effects_and_is_the_same_again(tmp_path):
+    options = StudyOptions(
+        participants=1,
+        tasks=("static", "squat"),
+        durations_s={"static": 1.0, "squat": 3.0},
+        effects=(Asked("added_mass", 2.0, "hand_l"), Asked("sync_offset", 0.02)),
+        effect_tasks=("squat",),
+    )
+    for name in ("a", "b"):
+        simulate_study(tmp_path / name, options)
+    files = [path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*.*")]
+    for file in files:
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+    truth = json.loads((tmp_path / "a" / "truth" / "sub-01_truth.json").read_text())
+    mass, delay = truth["effects"]
+    assert (mass["effect"], mass["target"], mass["size"]) == ("added_mass", "hand_l", 2.0)
+    assert len(mass["position_m"]) == 3
+    assert (delay["effect"], delay["size"], delay["unit"]) == ("sync_offset", 0.02, "s")
+    static, squat = (truth["trials"][f"sub-01_task-{t}"] for t in ("static", "squat_run-1"))
+    assert static["effects"] == []
+    assert static["recorded_from_s"] == 0.0
+    assert squat["effects"] == ["added_mass", "sync_offset"]
+    assert squat["recorded_from_s"] == 0.02
+    assert squat["duration_s"] == pytest.approx(2.98)
+    segments = sum(s["mass_kg"] for s in truth["person"]["segments"].values())
+    assert segments == pytest.approx(truth["person"]["mass_kg"])  # the scale saw no added mass
+
+
+def test_effects_in_tasks_that_the_study_lacks_are_refused(tmp_path):
+    options = StudyOptions(tasks=("static",), effect_tasks=("hops",))
+    with pytest.raises(UsageError, match="no trials"):
+        simulate_study(tmp_path, options)
+
+
+def test_mixing_solves_an_iteration_that_alone_would_explode():
+    rng = np.random.default_rng(3)
+    axes = np.linalg.qr(rng.standard_normal((6, 6)))[0]
+    growth = axes @ np.diag([-1.6, -1.2, 0.2, 0.5, 0.9, 0.97]) @ axes.T
+    aim, x, mixer = rng.standard_normal(6), np.zeros(6), Mixer()
+    for _ in range(30):
+        x = x + mixer.step(x, growth @ (x - aim) + aim - x)
+    assert np.abs(x - aim).max() < 1e-8
 
 
 # --- clocks -----------------------------------------------------------------------------------

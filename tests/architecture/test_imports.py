@@ -46,7 +46,7 @@ FOREIGN_TO_SCIENCE = {"pandas", "pyarrow", "click", "tqdm", "logging", "subproce
 
 # Single modules of a part that may be imported, where the part as a whole may not.
 ONLY = {
-    "simulate": {"body": {"body.names"}},
+    "simulate": {"body": {"body.names", "body.markersets"}},
     "cli": {"report": {"report.tables.build"}, "simulate": {"simulate.command"}},
     "export": {"stages": {"stages.frames"}},
     "session": {"body": {"body.markersets", "body.skeleton"}},

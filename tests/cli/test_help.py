@@ -25,7 +25,7 @@ HEAVY = [
     "statsmodels",
 ]
 STAGE_COMMANDS = [*dict.fromkeys(stage.name for stage in STAGES), "run"]
-OTHER_COMMANDS = ["simulate", "export", "show", "info"]
+OTHER_COMMANDS = ["simulate", "inject", "export", "show", "info"]
 
 
 @pytest.mark.parametrize(

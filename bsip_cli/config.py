@@ -113,8 +113,6 @@ class Identify(Section):
     block_s: float = Field(gt=0)
     trust_ratio: float = Field(ge=1)
     sigma_percent_limit: float = Field(gt=0)
-    frame_sd_m: float = Field(gt=0)
-    frame_sd_rad: float = Field(gt=0)
     spread_weight: float = Field(gt=0)
 
 

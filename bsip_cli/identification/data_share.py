@@ -9,7 +9,6 @@ import numpy as np
 from bsip_cli.body.inertia import readable_jacobian
 from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.prior import Prior
-from bsip_cli.identification.pseudo_inertia import frame_jacobian
 
 _GROUPS = (("mass", slice(0, 1)), ("centre of mass", slice(1, 4)), ("inertia", slice(4, 10)))
 _FROM_TABLE = 0.2
@@ -19,25 +18,21 @@ _FROM_TABLE = 0.2
 class Beforehand:
     """What is known before any wrench, about the table, in coordinates that scatter as N(0, 1).
 
-    How far a segment lies from where its frame says looks in the wrench like other parameters; the
-    coordinates are of the sum of both, which is all that the wrench sees.
-
-    seen : (P, P) change of the parameters as the wrench sees them.
-    readable : (P, P) change of mass, centre of mass and tensor of each segment that goes along in
-        the mean, in units of their standard deviations.
-    spread : (P, P) covariance of those in the same units.
+    seen : (P, P) change of the parameters.
+    readable : (P, P) change of mass, centre of mass and tensor of each segment that goes along, in
+        units of their standard deviations.
     """
 
     seen: np.ndarray
     readable: np.ndarray
-    spread: np.ndarray
 
     def covariance(self, information: np.ndarray) -> np.ndarray:
         """(P, P) of the readable parameters, in units of their prior standard deviations.
 
         ``information`` (P, P) is the weighted sum of Y^T Y of the wrench's regressor.
         """
-        return self.spread - self.readable @ self._removed(information) @ self.readable.T
+        left = np.eye(len(self.seen)) - self._removed(information)
+        return self.readable @ left @ self.readable.T
 
     def share(self, information: np.ndarray) -> np.ndarray:
         """(n, 10) part of each parameter's prior variance that the information removes."""
@@ -55,13 +50,8 @@ class Beforehand:
 
 
 def beforehand(problem: Problem) -> Beforehand:
-    """The table's spread and the frames' uncertainty of a problem, linearised about the table."""
-    prior = problem.prior
-    frame_sd = np.array([problem.frame_sd_m] * 3 + [problem.frame_sd_rad] * 3)
-    frames = frame_jacobian(prior.phi) * np.tile(frame_sd, len(prior.inertias))
-    directions, triangle = np.linalg.qr(np.hstack([prior.root, frames]).T)
-    readable = _readable(prior)
-    return Beforehand(triangle.T, readable @ directions[: prior.phi.size], readable @ readable.T)
+    """The table's spread of a problem, linearised about the table."""
+    return Beforehand(problem.prior.root, _readable(problem.prior))
 
 
 def _readable(prior: Prior) -> np.ndarray:

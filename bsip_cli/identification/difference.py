@@ -22,7 +22,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.identification import pseudo_inertia
 from bsip_cli.identification.estimator import Estimate, Problem
 
 
@@ -63,13 +62,12 @@ def change_of_segment(a: Problem, b: Problem, segment: int) -> SegmentChange:
     """The change of one segment that explains how b's wrench differs from a's; all else the same.
 
     Generalised least squares for the person's deviation from the table (common to both, with the
-    prior and the frames' uncertainty) and the ten parameters of the segment (free in b, zero in
-    a); the former is marginalised. ``segment`` is an index. Both problems need the same prior. The
-    covariance holds that the segment's frame lies on the bone to ``frame_sd_m, frame_sd_rad`` only.
+    prior) and the ten parameters of the segment (free in b, zero in a); the former is marginalised.
+    ``segment`` is an index. Both problems need the same prior.
     """
     (information_a, right_a), (information_b, right_b) = (_about_table(p) for p in (a, b))
     part = slice(10 * segment, 10 * segment + 10)
-    root = _prior_root(a)
+    root = a.prior.root
     inner = np.eye(root.shape[1]) + root.T @ (information_a + information_b) @ root
     common = root @ np.linalg.solve(inner, root.T)  # covariance of the common deviation
     seen = information_b[:, part]
@@ -77,26 +75,13 @@ def change_of_segment(a: Problem, b: Problem, segment: int) -> SegmentChange:
     right = right_b[part] - seen.T @ common @ (right_a + right_b)
     scale = 1 / np.sqrt(np.diag(precision))  # kg beside kg m2
     covariance = np.outer(scale, scale) * np.linalg.inv(np.outer(scale, scale) * precision)
-    phi = covariance @ right
-    frame = pseudo_inertia.frame_jacobian(phi) * _frame_sd(a)
-    return SegmentChange(phi, covariance + frame @ frame.T)
+    return SegmentChange(covariance @ right, covariance)
 
 
 def _about_table(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     """Information (P, P) of the data, and its right side (P,) for deviations from the table."""
-    information, right = problem.equations.weighted(problem.noise.weights())
+    information, right = problem.trusted_equations()
     return information, right - information @ problem.prior.phi
-
-
-def _prior_root(problem: Problem) -> np.ndarray:
-    """(P, P + 6 n) root of the covariance of people about the table, frames included."""
-    prior = problem.prior
-    frames = np.tile(_frame_sd(problem), len(prior.inertias))
-    return np.hstack([prior.root, pseudo_inertia.frame_jacobian(prior.phi) * frames])
-
-
-def _frame_sd(problem: Problem) -> np.ndarray:
-    return np.array([problem.frame_sd_m] * 3 + [problem.frame_sd_rad] * 3)
 
 
 def _resolved(estimate: Estimate, prior_covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

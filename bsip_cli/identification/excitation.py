@@ -31,7 +31,7 @@ class Excitation:
 
 def excitation(problem: Problem) -> Excitation:
     """Singular values, condition number and what the data could know of each segment."""
-    information, _ = problem.equations.weighted(problem.noise.weights())
+    information, _ = problem.trusted_equations()
     root = problem.prior.root
     strength = np.linalg.eigvalsh(root.T @ information @ root)[::-1][: problem.basis.rank]
     singular = np.sqrt(np.maximum(strength, 0.0))

@@ -60,7 +60,7 @@ def advice(problem: Problem, person: Person, model: pin.Model) -> Advice:
 
     A second of movement is taken to hold as many independent samples as one of the recordings'.
     """
-    known, _ = problem.equations.weighted(problem.noise.weights())
+    known, _ = problem.trusted_equations()
     offers = [
         (movement, _information(movement, problem, person, model))
         for movement in load_movements()
@@ -89,7 +89,7 @@ def _information(
     regressor = wrench_regressor(model, model.createData(), q, v, a, reference)
     noise = problem.noise
     independent = noise.effective * DURATION_S / problem.equations.duration_s
-    rows = regressor * (np.sqrt(independent / len(q)) / noise.rms)[:, None]
+    rows = regressor * (np.sqrt(independent / len(q)) / noise.rms / problem.trust_ratio)[:, None]
     rows = rows.reshape(-1, rows.shape[-1])
     return rows.T @ rows
 

@@ -199,8 +199,6 @@ def _problem(
     judgement = (
         options.trust_ratio,
         options.sigma_percent_limit,
-        options.frame_sd_m,
-        options.frame_sd_rad,
         options.spread_weight,
     )
     equations = accumulate(model, recordings, cutoff, reference)

@@ -26,33 +26,29 @@ def test_the_same_from_the_side_of_the_measurements():
     """Information form against covariance form (Kalman's): the same linear Gaussian update."""
     rows = regressor()[::100].reshape(-1, 150) / 5.0
     before = beforehand(problem())
-    exact = beforehand(replace(problem(), frame_sd_m=0.0, frame_sd_rad=0.0))
-    seen = before.seen @ before.seen.T  # covariance; the frames add to the parameters' own
-    cross = exact.readable @ exact.seen.T
+    seen = before.seen @ before.seen.T
+    cross = before.readable @ before.seen.T
     gain = cross @ rows.T @ np.linalg.inv(rows @ seen @ rows.T + np.eye(len(rows)))
-    left = exact.readable @ exact.readable.T - gain @ rows @ cross.T
+    left = before.readable @ before.readable.T - gain @ rows @ cross.T
     np.testing.assert_allclose(before.covariance(rows.T @ rows), left, atol=1e-7)
 
 
-def test_frames_without_error_leave_the_estimators_own_share():
+def test_what_the_estimators_say_where_the_data_are_strong():
     """hansen2017 drops the table's part of a known direction: alike where the data are strong."""
-    exact = replace(problem(stride=4, noise=0.3), frame_sd_m=0.0, frame_sd_rad=0.0)
-    information, _ = exact.equations.weighted(exact.noise.weights())
-    share = beforehand(exact).share(information)
-    own = readable(estimate(exact), exact.prior).share
+    sharp = problem(stride=4, noise=0.3)
+    information, _ = sharp.trusted_equations()
+    share = beforehand(sharp).share(information)
+    own = readable(estimate(sharp), sharp.prior).share
     assert (own > 0.95).sum() > 30
     np.testing.assert_allclose(share[own > 0.95], own[own > 0.95], atol=0.05)
 
 
-def test_doubtful_frames_leave_less_to_the_data():
-    sure = replace(problem(noise=0.01), frame_sd_m=1e-6, frame_sd_rad=1e-6)
-    doubtful = replace(sure, frame_sd_m=0.02, frame_sd_rad=0.05)
-    centres = []
-    for one in (sure, doubtful):
-        information, _ = one.equations.weighted(one.noise.weights())
-        centres.append(beforehand(one).share(information)[:, 1:4].mean())
-    assert centres[0] > 0.8
-    assert centres[1] < centres[0] - 0.2
+def test_data_that_are_trusted_less_decide_less():
+    means = []
+    for ratio in (1.0, 4.0):
+        information, _ = replace(problem(), trust_ratio=ratio).trusted_equations()
+        means.append(beforehand(problem()).share(information).mean())
+    assert means[1] < means[0] - 0.05
 
 
 def test_combinations_that_the_data_know():

@@ -41,7 +41,7 @@ def draws(seeds: tuple[int, int]):
             measured = r @ phi + NOISE * rng.standard_normal(r.shape[:2])
             right = np.stack([r[:, c].T @ measured[:, c] for c in range(6)])
             equations = replace(problem.equations, right=right, squares=(measured**2).sum(axis=0))
-            pair.append(replace(problem, equations=equations, frame_sd_m=1e-9, frame_sd_rad=1e-9))
+            pair.append(replace(problem, equations=equations))
         yield tuple(pair)
 
 
@@ -89,13 +89,3 @@ def test_change_of_one_segment_returns_the_load_within_its_interval():
     np.testing.assert_allclose(np.std(scores, axis=0), 1.0, atol=0.15)
     np.testing.assert_allclose(np.mean(scores, axis=0), 0.0, atol=0.25)
     assert np.sqrt(found[0].covariance[0, 0]) < 0.05
-
-
-def test_a_frame_that_may_lie_elsewhere_widens_the_first_moment_but_not_the_mass():
-    a, b = next(draws((1, 2)))
-    i = world().person.skeleton.index(SHANK)
-    sharp = change_of_segment(a, b, i).covariance
-    frames = [replace(problem, frame_sd_m=0.01, frame_sd_rad=1e-9) for problem in (a, b)]
-    wide = change_of_segment(*frames, i).covariance
-    assert wide[0, 0] == pytest.approx(sharp[0, 0], rel=0.5)
-    assert wide[1, 1] > sharp[1, 1] + 0.9 * 0.01**2  # 1 kg, 10 mm

@@ -13,7 +13,7 @@ from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.excitation import excitation
 from bsip_cli.identification.movement_gain import advice
 from bsip_cli.identification.movements import DURATION_S, load_movements, motion_of
-from bsip_cli.identification.noise import Noise
+from bsip_cli.identification.noise import even_noise
 
 BY_NAME = {movement.name: movement for movement in load_movements()}
 ARMS = ("arms_forward", "arms_sideways", "arm_circles_l", "arm_circles_r", "elbows", "throw_l")
@@ -43,7 +43,7 @@ def problem_after(names: tuple[str, ...]) -> Problem:
     rows = rows_of(names)
     equations = equations_of(rows, rows @ world().phi_true)
     equations = replace(equations, duration_s=DURATION_S * len(names))
-    noise = Noise(NOISE, np.full(6, float(len(rows))), len(rows))
+    noise = even_noise(NOISE, len(rows))
     return Problem(equations, noise, world().prior, world().basis, 1.0)
 
 
@@ -111,7 +111,7 @@ def test_no_movement_is_advised_without_joints_to_see():
 def test_little_is_left_to_gain_after_much():
     rows = regressor()
     equations = replace(equations_of(rows, rows @ world().phi_true), duration_s=20.0)
-    noise = Noise(NOISE / 100, np.full(6, float(len(rows))), len(rows))
+    noise = even_noise(NOISE / 100, len(rows))
     rich = Problem(equations, noise, world().prior, world().basis, 1.0)
     assert advise(rich).alone[0].share < 0.1 * advise(problem_after(("squats",))).alone[0].share
 

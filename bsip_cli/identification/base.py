@@ -1,7 +1,7 @@
 """Estimator ``base``: base parameters by weighted least squares (Hansen 2017, equation 7).
 
-Only combinations are estimated; as segment parameters the leading ones carry all and the
-regrouped ones are zero, which no body has: they serve to predict the wrench, not to be read.
+Only combinations are estimated. As segment parameters stands the person nearest to the table that
+has them, which may be one whom no body has: they serve to predict the wrench, not to be read.
 """
 
 from __future__ import annotations
@@ -46,10 +46,18 @@ def base_parameters(problem: Problem) -> BaseParameters:
 
 
 def estimate(problem: Problem) -> Estimate:
-    """Base parameters laid into the full vector: zeros where a parameter was regrouped."""
+    """The smallest step from the table, in how far people stray, with these combinations.
+
+    What no wrench shows keeps the table's spread.
+    """
     fit = base_parameters(problem)
-    size = problem.basis.combine.shape[1]
-    phi, covariance = np.zeros(size), np.zeros((size, size))
-    phi[problem.basis.independent] = fit.values
-    covariance[np.ix_(problem.basis.independent, problem.basis.independent)] = fit.covariance
-    return Estimate(phi, covariance, "combinations only: single segments are not to be read")
+    prior, combine = problem.prior, problem.basis.combine
+    step = np.linalg.pinv(combine @ prior.root)
+    z = step @ (fit.values - fit.rm_values)
+    hidden = prior.root @ (np.eye(prior.phi.size) - step @ combine @ prior.root)
+    shown = prior.root @ step
+    return Estimate(
+        prior.phi + prior.root @ z,
+        shown @ fit.covariance @ shown.T + hidden @ hidden.T,
+        "combinations only: single segments are not to be read",
+    )

@@ -19,6 +19,7 @@ from bsip_cli.identification.base import base_parameters, estimate
 from bsip_cli.identification.equations import ResidualSeries, accumulate
 from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.noise import even_noise, noise_of
+from bsip_cli.identification.uncertainty import readable
 
 NOISE = np.array([3.0, 3.0, 5.0, 1.5, 1.5, 1.0])  # N, N m
 
@@ -42,7 +43,22 @@ def test_prediction_of_another_motion():
     both = np.stack([phi, world().phi_true], axis=1)
     wrench = predicted_wrench(world().model, q, v, a, both, np.zeros(3))
     assert np.abs(wrench[..., 0] - wrench[..., 1]).max() < 1e-6 * np.abs(wrench).max()
-    assert np.count_nonzero(phi) == 128
+
+
+def test_segments_have_the_combinations_and_can_be_written():
+    """A segment without a mass would have no centre of mass."""
+    rows = regressor()
+    problem = problem_of(rows, rows @ world().phi_true, 1e-3)
+    fit, found = base_parameters(problem), estimate(problem)
+    combine, prior = world().basis.combine, world().prior
+    spread = np.sqrt(np.diag(combine @ prior.root @ prior.root.T @ combine.T))
+    np.testing.assert_allclose((combine @ found.phi - fit.values) / spread, 0.0, atol=1e-8)
+    read = readable(found, prior)
+    assert np.isfinite(read.values).all()
+    assert np.isfinite(read.sd).all()
+    step = np.linalg.solve(prior.root, found.phi - prior.phi)
+    nearer = np.linalg.solve(prior.root, world().phi_true - prior.phi)
+    assert np.linalg.norm(step) < np.linalg.norm(nearer)
 
 
 def test_equals_dense_weighted_least_squares():

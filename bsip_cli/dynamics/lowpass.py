@@ -34,17 +34,21 @@ def lowpass_operator(
     """
     sigma = np.sqrt(np.log(2)) / (2 * np.pi * cutoff_hz) * rate_hz
     reach = int(np.ceil(_REACH * sigma))
-    rows, columns, weights = [], [], []
-    frames: list[int] = []
+    starts, stops, frames = _outputs(valid, stride)
+    columns = frames[:, None] + np.arange(-reach, reach + 1)
+    inside = (columns >= starts[:, None]) & (columns < stops[:, None])
+    kernel = inside * np.exp(-0.5 * ((columns - frames[:, None]) / sigma) ** 2)
+    weights = (kernel / kernel.sum(axis=1, keepdims=True))[inside]
+    ends = np.concatenate([[0], np.cumsum(inside.sum(axis=1))])
+    shape = (len(frames), len(valid))
+    return sparse.csr_array((weights, columns[inside], ends), shape=shape), frames
+
+
+def _outputs(valid: np.ndarray, stride: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(n_out,) start and stop of each output's stretch, and its frame."""
+    parts = [np.empty((0, 3), dtype=int)]
     for start, stop in stretches(valid):
-        for frame in range(start + min(stride, stop - start) // 2, stop, stride):
-            around = np.arange(max(start, frame - reach), min(stop, frame + reach + 1))
-            kernel = np.exp(-0.5 * ((around - frame) / sigma) ** 2)
-            rows.append(np.full(len(around), len(frames)))
-            columns.append(around)
-            weights.append(kernel / kernel.sum())
-            frames.append(frame)
-    if not frames:
-        return sparse.csr_array((0, len(valid))), np.empty(0, dtype=int)
-    entries = (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns)))
-    return sparse.csr_array(entries, shape=(len(frames), len(valid))), np.array(frames)
+        frames = np.arange(start + min(stride, stop - start) // 2, stop, stride)
+        parts.append(np.stack([np.full_like(frames, start), np.full_like(frames, stop), frames], 1))
+    starts, stops, frames = np.concatenate(parts).T
+    return starts, stops, frames

@@ -178,7 +178,7 @@ def cost_table(bsip: dict, figaroh: dict, frames: int) -> str:
     totals = [one["equations_s"] + one["solve_s"] for one in (bsip, figaroh)]
     rows.append(["together [CPU-s]", *(f"{t:.2f}" for t in totals), f"{totals[1] / totals[0]:.1f}"])
     used = [one["used_mb"] - one["imported_mb"] for one in (bsip, figaroh)]
-    rows.append(["memory for it [MB]", *(f"{m:.0f}" for m in used), f"{used[1] / used[0]:.0f}"])
+    rows.append(["memory for it [MB]", *(f"{m:.0f}" for m in used), ""])
     peaks = [one["used_mb"] for one in (bsip, figaroh)]
     rows.append(["peak of the process [MB]", *(f"{m:.0f}" for m in peaks), ""])
     return markdown(

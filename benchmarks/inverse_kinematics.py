@@ -42,7 +42,7 @@ SAME_PROBLEM = {
 }
 CONFIG = load_config([])
 AS_SHIPPED = CONFIG.ik.model_dump(include=set(SAME_PROBLEM))
-SMOOTHING = CONFIG.smoothing.model_dump()
+SMOOTHING = CONFIG.smoothing.model_dump() | {"robust_limit_m": CONFIG.ik.robust_limit_m}
 FEW = 10
 OPTIMUM = (
     "marker RMS, bsip [mm]",
@@ -171,7 +171,8 @@ def long_trial_rows(person: Person, rounds: int) -> list[list[str]]:
         return 0.0
 
     def smoothing() -> None:
-        smooth_motion(person, last[0].q, np.ones(count, dtype=bool), rate, **SMOOTHING)
+        known = np.ones(count, dtype=bool)
+        smooth_motion(person, last[0].q, known, rate, markers=markers, **SMOOTHING)
 
     poses()
     smoothing()  # compiled once

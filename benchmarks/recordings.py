@@ -221,11 +221,13 @@ markers, all of them together, and the three worst.
 
 {markers}
 
-Where it is not well below 20 mm, labels are wrong: in `biobuddy_ech` the knee's and elbow's
-epicondyles change places between trials, so they only calibrate there (weight 0.02 in the marker
-set) and their own distance is the exchange's; its fingertip markers (RFT3, LFT3) sit on fingers,
-which the hand does not carry rigidly. Acromion markers stand out in `opencap_subject4` and
-`figaroh_human`: the shoulder girdle moves, and this skeleton has none.
+In `biobuddy_ech` the knee's and elbow's epicondyles change places between trials. `ik` puts them
+right, but the calibration meets them as labelled: they only calibrate there (weight 0.02 in the
+marker set), and where the trials disagree their places are a compromise. `figaroh_human`'s right
+wrist markers change places at 45.6 s and are put right too. The fingertip markers of
+`biobuddy_ech` (RFT3, LFT3) sit on fingers, which the hand does not carry rigidly. Acromion markers
+stand out in `opencap_subject4` and `figaroh_human`: the shoulder girdle moves, and this skeleton
+has none.
 
 ## Forces and centre of pressure: RM / OM
 

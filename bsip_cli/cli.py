@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -27,25 +28,30 @@ def cli() -> None:
     """
 
 
+_OUT = click.option(
+    "--out", required=True, type=click.Path(path_type=Path), help="Folder for all results."
+)
+_PARTICIPANT = click.option(
+    "--participant",
+    "chosen",
+    multiple=True,
+    metavar="sub-01",
+    help="Only this participant (may be repeated).",
+)
+_CONFIG = click.option(
+    "--config",
+    "config_file",
+    type=click.Path(path_type=Path),
+    help="TOML file with options that differ from the study's.",
+)
+
+
 def _stage_command(name: str, summary: str) -> click.Command:
     @click.command(name, help=summary)
     @click.argument("study", type=click.Path(path_type=Path))
-    @click.option(
-        "--out", required=True, type=click.Path(path_type=Path), help="Folder for all results."
-    )
-    @click.option(
-        "--participant",
-        "chosen",
-        multiple=True,
-        metavar="sub-01",
-        help="Only this participant (may be repeated).",
-    )
-    @click.option(
-        "--config",
-        "config_file",
-        type=click.Path(path_type=Path),
-        help="TOML file with options that differ from the study's.",
-    )
+    @_OUT
+    @_PARTICIPANT
+    @_CONFIG
     @click.option(
         "--jobs", default=1, show_default=True, type=click.IntRange(1), help="Participants at once."
     )
@@ -76,14 +82,52 @@ cli.commands["identify"].params.append(
 cli.add_command(_stage_command("run", "All stages, from recordings to the report."))
 
 
+def _effect_options(command: Any) -> Any:
+    """What to hide in recordings; matched in the order given."""
+    options = (
+        click.option(
+            "--effect",
+            "effects",
+            multiple=True,
+            metavar="NAME",
+            help="Hide this effect (may be repeated, each with its --size).",
+        ),
+        click.option(
+            "--size",
+            "sizes",
+            multiple=True,
+            type=float,
+            help="Its size, in the effect's unit.",
+        ),
+        click.option(
+            "--target",
+            "targets",
+            multiple=True,
+            metavar="T",
+            help="Where it sits: segment, channel, marker or joint, and settings as key=number, "
+            "joined by commas; - for none. Drawn if not given.",
+        ),
+        click.option(
+            "--effect-tasks",
+            multiple=True,
+            metavar="TASK",
+            help="Only in the trials of this task (may be repeated).",
+        ),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
 @cli.command()
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option(
     "--preset",
     default="sample",
     show_default=True,
-    type=click.Choice(["sample", "cohort"]),
-    help="sample: 6 people, short trials, low rates; cohort: 12 people, 120 s sequences at 100 Hz.",
+    type=click.Choice(["sample", "cohort", "diagnosis"]),
+    help="sample: 6 people, short trials, low rates; cohort: 12 people, 120 s sequences at 100 Hz; "
+    "diagnosis: one person, 60 s, with squats, hops and steps onto the plate.",
 )
 @click.option("--participants", type=click.IntRange(1, 10000), help="How many people.")
 @click.option("--seed", type=int, help="Draws other people and movements.")
@@ -92,11 +136,83 @@ cli.add_command(_stage_command("run", "All stages, from recordings to the report
     type=click.FloatRange(5, 1200),
     help="Length of the identification sequence [s].",
 )
-def simulate(study, preset, participants, seed, sequence_s):
-    """Make a study of simulated people whose inertial parameters are known."""
+@_effect_options
+def simulate(study, preset, participants, seed, sequence_s, **effects):
+    """Make a study of simulated people whose inertial parameters are known.
+
+    With --effect, something is hidden in the recordings that a simulation would get wrong; the
+    folder truth/ says what.
+    """
     from bsip_cli.simulate.command import simulate_command
 
-    simulate_command(study, preset, participants, seed, sequence_s)
+    simulate_command(study, preset, participants, seed, sequence_s, **effects)
+
+
+@cli.command()
+@click.argument("source", metavar="IN", type=click.Path(path_type=Path))
+@click.argument("out", type=click.Path(path_type=Path))
+@click.option(
+    "--participant",
+    "participants",
+    multiple=True,
+    metavar="sub-01",
+    help="Only in this participant's recordings (may be repeated).",
+)
+@click.option("--seed", default=1, show_default=True, type=int, help="Draws what is left open.")
+@_effect_options
+def inject(source, out, participants, seed, **effects):
+    """Hide effects in measured recordings, where that is physically possible.
+
+    IN is a study folder, a C3D file, or a TRC file with its MOT file beside it; OUT is the copy.
+    """
+    from bsip_cli.simulate.command import inject_command
+
+    sys.exit(inject_command(source, out, participants, seed, **effects))
+
+
+@cli.command()
+@click.argument("study", type=click.Path(path_type=Path))
+@_OUT
+@_PARTICIPANT
+@click.option(
+    "--method",
+    default="OM",
+    show_default=True,
+    help="Whose inertial parameters: OM, RM or the name of an estimator.",
+)
+@click.option(
+    "--format",
+    "formats",
+    multiple=True,
+    type=click.Choice(["urdf", "mjcf", "osim", "biomod", "csv"]),
+    help="Only this format (may be repeated); without it, all.",
+)
+@click.option(
+    "--model-file",
+    type=click.Path(path_type=Path),
+    help="An .osim file (OpenSim 4) that gets the inertial parameters, in place of a model of "
+    "bsip's own tree.",
+)
+@click.option(
+    "--model-bodies",
+    metavar="MAP",
+    help="Which bodies of --model-file are which segments: rajagopal, gait2392 or a .toml file; "
+    "without it, the shipped map that fits.",
+)
+@click.option(
+    "--repair",
+    is_flag=True,
+    help="Replace inertia tensors that no body can have by the nearest possible ones, and say so; "
+    "without it such a person gets the .csv only.",
+)
+@_CONFIG
+def export(study, out, chosen, method, formats, model_file, model_bodies, repair, config_file):
+    """Write identified people as models for Pinocchio, MuJoCo, OpenSim, biorbd and Visual3D:
+    OUT/sub-XX/export/sub-XX_METHOD with .urdf, .xml (MuJoCo), .osim, .bioMod and .csv."""
+    from bsip_cli.export import Request, export_session
+
+    request = Request(method, formats, model_file, model_bodies, repair)
+    sys.exit(export_session(study, out, chosen, config_file, request))
 
 
 @cli.command()

@@ -6,7 +6,7 @@ import difflib
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -27,6 +27,34 @@ class Section(BaseModel):
 class Roles(Section):
     static: tuple[str, ...]
     sequence: tuple[str, ...]
+
+
+Metre = Annotated[float, Field(ge=-2, le=2)]
+
+
+class Load(Section):
+    """A mass that is worn or carried, a point in the frame of its segment.
+
+    Attributes
+    ----------
+    position_m : in the segment's frame (X anterior, Y up, Z right), from the segment's origin.
+    participants, tasks, runs : which trials carry it; empty means all.
+    """
+
+    segment: str
+    mass_kg: float = Field(gt=0, le=200)
+    position_m: tuple[Metre, Metre, Metre]
+    participants: tuple[str, ...] = ()
+    tasks: tuple[str, ...] = ()
+    runs: tuple[int, ...] = ()
+
+    def is_worn_by(self, participant_id: str) -> bool:
+        return not self.participants or participant_id in self.participants
+
+    def is_carried_in(self, participant_id: str, task: str, run: int | None) -> bool:
+        """Whether a trial carries it; ``run`` is None where the recording has no run number."""
+        named = not self.tasks or task in self.tasks
+        return self.is_worn_by(participant_id) and named and (not self.runs or run in self.runs)
 
 
 class Ingest(Section):
@@ -60,7 +88,8 @@ class Smoothing(Section):
     method: Literal["spline", "butterworth"]
     butterworth_cutoff_hz: float = Field(gt=0)
     pace_window_s: float = Field(gt=0)
-    noise_factor: float = Field(gt=0)
+    skin_factor: float = Field(ge=0)
+    skin_from_hz: float = Field(gt=0)
     edge_s: float = Field(ge=0)
 
 
@@ -84,8 +113,6 @@ class Identify(Section):
     block_s: float = Field(gt=0)
     trust_ratio: float = Field(ge=1)
     sigma_percent_limit: float = Field(gt=0)
-    frame_sd_m: float = Field(gt=0)
-    frame_sd_rad: float = Field(gt=0)
     spread_weight: float = Field(gt=0)
 
 
@@ -104,6 +131,7 @@ class Config(Section):
 
     marker_set: str
     skeleton: str
+    loads: tuple[Load, ...]
     roles: Roles
     ingest: Ingest
     scale: Scale
@@ -188,10 +216,14 @@ def _merge(base: Mapping, over: Mapping) -> dict:
 def _fault(error: Mapping, values: Mapping) -> str:
     path = [str(part) for part in error["loc"]]
     name = ".".join(path)
+    if error["type"] == "missing":
+        return f"{name} is missing"
     if error["type"] != "extra_forbidden":
         return f"{name} = {error['input']!r}: {error['msg']}"
     model: type[BaseModel] = Config
     for part in path[:-1]:
-        model = model.model_fields[part].annotation  # type: ignore[assignment]
+        if not part.isdigit():
+            inner = model.model_fields[part].annotation
+            model = (get_args(inner) or (inner,))[0]  # the rows of a [[table]]
     near = difflib.get_close_matches(path[-1], model.model_fields, n=1, cutoff=0.4)
     return f"unknown option {name}" + (f" (did you mean {near[0]}?)" if near else "")

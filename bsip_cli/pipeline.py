@@ -39,7 +39,7 @@ STAGES = (
         "Read recordings: markers and ground wrench in SI units, gaps filled, contacts found.",
         reads=(),
         writes=("markers", "wrench", "plates", "contacts", "quality"),
-        options=("marker_set", "ingest"),
+        options=("marker_set", "loads", "ingest"),
         module="bsip_cli.stages.ingest",
     ),
     Stage(
@@ -48,7 +48,7 @@ STAGES = (
         "Build the person's skeleton: lengths, joint centres, markers on their segments.",
         reads=("markers", "wrench"),
         writes=("skeleton", "marker-positions", "person"),
-        options=("marker_set", "skeleton", "roles", "ingest", "scale", "ik"),
+        options=("marker_set", "skeleton", "loads", "roles", "ingest", "scale", "ik"),
         module="bsip_cli.stages.scale",
     ),
     Stage(
@@ -75,7 +75,7 @@ STAGES = (
         "Inertial parameters that explain the measured ground forces (OM).",
         reads=("kinematics", "wrench", "skeleton", "marker-positions", "regression"),
         writes=("bsip", "base-parameters", "excitation", "identification", "used-blocks"),
-        options=("skeleton", "roles", "prior", "identify"),
+        options=("skeleton", "loads", "roles", "prior", "identify"),
         module="bsip_cli.stages.identify",
     ),
     Stage(
@@ -93,7 +93,7 @@ STAGES = (
             "used-blocks",
         ),
         writes=("reconstruction", "fit", "correlation-difference", "posturography"),
-        options=("skeleton", "reconstruct"),
+        options=("skeleton", "loads", "reconstruct"),
         module="bsip_cli.stages.reconstruct",
     ),
     Stage(
@@ -136,7 +136,7 @@ STAGES = (
             "posturography",
         ),
         writes=("report-files",),
-        options=("skeleton", "roles"),
+        options=("skeleton", "loads", "roles"),
         module="bsip_cli.stages.report",
     ),
     Stage(

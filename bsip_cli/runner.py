@@ -107,14 +107,9 @@ def _forget_gone_recordings(folder: Path, participant: Participant) -> None:
 def perform(unit: Unit, force: bool = False) -> Outcome:
     """Do one unit unless it is fresh or lacks its inputs."""
     stage = unit.stage
-    gone = unit.missing()
-    if gone:
-        if _refused_upstream(unit):
-            why = f"{unit.name}: left out of {stage.name}, since its input was refused"
-            return Outcome(stage.name, unit.name, "waiting", (why,))
-        first = producer(gone[0]).name
-        why = f"{unit.name}: {stage.name} has no {', '.join(gone)} to read"
-        return Outcome(stage.name, unit.name, "waiting", (f"{why}; run `bsip {first}` first",), 2)
+    waiting = lacking(unit)
+    if waiting is not None:
+        return waiting
     if not force and unit.is_fresh():
         return Outcome(stage.name, unit.name, "fresh")
     try:
@@ -123,9 +118,23 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
         if not isinstance(error, UsageError):  # nothing is wrong with the data
             _write_refusal(unit, error)
         sentence = str(error) if unit.name in str(error) else f"{unit.name}: {error}"
-        return Outcome(stage.name, unit.name, "refused", (sentence,), error.exit_code)
+        said = (*unit.messages, sentence)  # a warning may tell why it came to this
+        return Outcome(stage.name, unit.name, "refused", said, error.exit_code)
     unit.refusal_path().unlink(missing_ok=True)
     return Outcome(stage.name, unit.name, "done", tuple(unit.messages))
+
+
+def lacking(unit: Unit) -> Outcome | None:
+    """Why a unit cannot begin: what it reads is not there, or was refused."""
+    stage, gone = unit.stage.name, unit.missing()
+    if not gone:
+        return None
+    if _refused_upstream(unit):
+        why = f"{unit.name}: left out of {stage}, since its input was refused"
+        return Outcome(stage, unit.name, "waiting", (why,))
+    first = producer(gone[0]).name
+    why = f"{unit.name}: {stage} has no {', '.join(gone)} to read"
+    return Outcome(stage, unit.name, "waiting", (f"{why}; run `bsip {first}` first",), 2)
 
 
 def _refused_upstream(unit: Unit) -> bool:
@@ -136,7 +145,7 @@ def _refused_upstream(unit: Unit) -> bool:
 def _write_refusal(unit: Unit, error: BsipError) -> None:
     kind = "numerical failure" if isinstance(error, NumericalError) else "bad data"
     row = pd.DataFrame([{"stage": unit.stage.name, "kind": kind, "sentence": str(error)}])
-    notes = {"made_by": unit.provenance(), "messages": [], "facts": {}}
+    notes = {"made_by": unit.provenance(), "messages": list(unit.messages), "facts": {}}
     write_artifact(unit.refusal_path(), "refusal", row, notes)
 
 

@@ -246,7 +246,10 @@ SCHEMAS = {
                 Column("mass_kg", "float", "kg", "mass, from the scale or the plates"),
                 _text("mass_source", "participants.tsv or plates"),
                 Column(
-                    "plate_mass_kg", "float", "kg", "mass that the plates read in quiet standing"
+                    "plate_mass_kg",
+                    "float",
+                    "kg",
+                    "mass that the plates read in quiet standing, known loads taken off",
                 ),
                 Column(
                     "height_m", "float", "m", "stature; estimated from the segments if not given"
@@ -268,6 +271,7 @@ SCHEMAS = {
                 Column("determined", "bool", "", "the markers determine this frame"),
                 Column("marker_rms_m", "float", "m", "RMS residual of the frame's markers"),
                 Column("angle_sd_rad", "float", "rad", "largest standard deviation of an angle"),
+                Column("cutoff_hz", "float", "Hz", "where the local smoother's gain is one half"),
                 Column("q_*", "float", "m, rad, 1", "configuration (Pinocchio's order)"),
                 Column("v_*", "float", "m/s, rad/s", "velocity (Pinocchio's order)"),
                 Column("a_*", "float", "m/s2, rad/s2", "acceleration (Pinocchio's order)"),
@@ -288,7 +292,7 @@ SCHEMAS = {
         Schema(
             "marker-events",
             "trial",
-            1,
+            2,
             "markers that jump, slip, bear another's label or sit wrong",
             (
                 _text("kind", "jump, slip, swap or offset"),
@@ -309,6 +313,12 @@ SCHEMAS = {
                     "as a number of standard deviations; swap: residual as labelled over exchanged",
                 ),
                 _text("sentence", "the same in words"),
+                Column(
+                    "put_right",
+                    "bool",
+                    "",
+                    "a swap's labels were exchanged back for kinematics and marker-residuals",
+                ),
             ),
         ),
         Schema(
@@ -338,7 +348,7 @@ SCHEMAS = {
             "base-parameters",
             "participant",
             1,
-            "identifiable combinations of parameters",
+            "identifiable combinations of parameters, the best known first",
             (
                 _text("name", "leading parameter"),
                 _text("expression", "the combination in words"),
@@ -352,12 +362,24 @@ SCHEMAS = {
         Schema(
             "excitation",
             "participant",
-            1,
-            "how well the motion excited the parameters",
+            2,
+            "how well the motion excited the parameters, and what to record next",
             (
-                _text("quantity", "singular_value, condition_number, segment"),
-                _text("name", "index or segment"),
-                Column("value", "float", "1", "of the quantity"),
+                _text(
+                    "quantity",
+                    "singular_value: of the scaled base regressor; condition_number; segment: mean "
+                    "share of its ten parameters that the motion could decide; combinations: of "
+                    "the ten, how many the data know better than the table (0: not excited); "
+                    "data_share: OM's, mean of the ten; movement: what 10 s of it would add to the "
+                    "mean data share; next: the same beside the rows of next above it; "
+                    "movement_forces: how much of the unknown variance of the ground forces it "
+                    "would remove, in the mean of all movements",
+                ),
+                _text("name", "index, segment or movement"),
+                Column("value", "float", "as unit", "of the quantity"),
+                _text("unit", "1; % for percent points of data share and percent of variance"),
+                _text("segment", "segment the row is about; of movements the one that gains most"),
+                _text("text", "data share in words; what to ask the person for; else empty"),
             ),
         ),
         Schema(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
@@ -12,6 +13,7 @@ from tqdm import tqdm
 
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.check_loads import check_segments, check_trials
 from bsip_cli.config import Config, load_config, with_estimators
 from bsip_cli.errors import UsageError
 from bsip_cli.pipeline import stages_named
@@ -36,23 +38,65 @@ def run_session(
 
     ``estimators`` stand for the configured ones, unless empty.
     """
-    config = with_estimators(_config(root, config_file), estimators)
-    study, refusals = load_study(root, config.roles.model_dump())
-    participants = _choose(study, chosen)
-    _check_out(out)
+    opened = open_study(root, out, chosen, config_file, estimators)
+    participants = opened.participants
     stages = stages_named(command)
     if chosen and command == "run":
         stages = tuple(stage for stage in stages if stage.level != "cohort")
-    outcomes = list(refusal_sentence(refusals))
-    for outcome in outcomes:
-        _tell(outcome)
-    running = run_stages(stages, study, out, config, participants, force=force, jobs=jobs)
+    running = run_stages(
+        stages, opened.study, out, opened.config, participants, force=force, jobs=jobs
+    )
     total = sum(
         1
         if s.level == "cohort"
         else sum(len(p.trials) if s.level == "trial" else 1 for p in participants)
         for s in stages
     )
+    return follow(command, opened.refusals, running, total, out)
+
+
+@dataclass(frozen=True)
+class OpenedStudy:
+    """A study as a command meets it: the chosen participants, and who could not be listed."""
+
+    study: Study
+    config: Config
+    participants: tuple[Participant, ...]
+    refusals: tuple[Outcome, ...]
+
+
+def open_study(
+    root: Path,
+    out: Path,
+    chosen: tuple[str, ...],
+    config_file: Path | None,
+    estimators: tuple[str, ...] = (),
+) -> OpenedStudy:
+    """Read configuration and study, and make sure that there is a folder for the results.
+
+    Raises
+    ------
+    UsageError
+        An option, the study, a participant or the folder is not what it should be.
+    BadDataError
+        participants.tsv cannot be used.
+    """
+    config = with_estimators(_config(root, config_file), estimators)
+    study, refusals = load_study(root, config.roles.model_dump())
+    if not refusals:  # else a load may belong to who or what was refused
+        check_trials(config.loads, study)
+    participants = _choose(study, chosen)
+    _check_out(out)
+    return OpenedStudy(study, config, participants, tuple(refusal_sentence(refusals)))
+
+
+def follow(
+    command: str, refusals: Iterable[Outcome], running: Iterable[Outcome], total: int, out: Path
+) -> int:
+    """Tell the user what becomes of the units, with a bar of ``total`` steps; the exit code."""
+    outcomes = list(refusals)
+    for outcome in outcomes:
+        _tell(outcome)
     with tqdm(total=total, desc=command, unit="unit", disable=None) as progress:
         for outcome in running:
             outcomes.append(outcome)
@@ -71,7 +115,7 @@ def _config(root: Path, config_file: Path | None) -> Config:
     )
     if config.marker_set != "auto":
         load_marker_set(config.marker_set)
-    load_skeleton(config.skeleton)
+    check_segments(config.loads, load_skeleton(config.skeleton))
     return config
 
 

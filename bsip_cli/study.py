@@ -22,13 +22,14 @@ _NAME_RULE = "names like sub-01_task-sequence_run-1.c3d (letters and digits only
 
 @dataclass(frozen=True)
 class Trial:
-    """One recording: ``stem`` names all its artifacts."""
+    """One recording: ``stem`` names all its artifacts; ``run`` is None without run-... in it."""
 
     participant_id: str
     task: str
     stem: str
     path: Path
     role: Role
+    run: int | None = None
 
 
 @dataclass(frozen=True)
@@ -207,7 +208,8 @@ def _trials(
             )
             continue
         role = _role(match["task"], roles)
-        trials.append(Trial(participant, match["task"], path.stem, path, role))
+        run = int(match["run"]) if match["run"] else None
+        trials.append(Trial(participant, match["task"], path.stem, path, role, run))
     stems = [trial.stem for trial in trials]
     double = {stem for stem in stems if stems.count(stem) > 1}
     if double:

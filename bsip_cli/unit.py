@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
-from bsip_cli.config import Config
+from bsip_cli.config import Config, Load
 from bsip_cli.errors import BadDataError
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.provenance import describe, file_hash
@@ -37,7 +37,7 @@ class Unit:
         return self.participant.id if self.participant else "group"
 
     def warn(self, message: str) -> None:
-        """Tell the user now, and the reader of the artifact later."""
+        """Tell the user when the unit is done or refused, and the reader of its artifacts later."""
         self.messages.append(message)
 
     # --- where things lie -------------------------------------------------------------------
@@ -60,6 +60,23 @@ class Unit:
         folder = self.participant.id if self.participant else "group"
         stem = trial.stem if trial else self.name
         return self.out / folder / f"{stem}_refusal-{stage or self.stage.name}.parquet"
+
+    def loads(self, trial: Trial | None = None) -> tuple[Load, ...]:
+        """Known loads of a trial (by default the unit's own; without one, of the participant)."""
+        trial = trial or self.trial
+        if trial is None:
+            worn = (
+                load
+                for load in self.config.loads
+                if any(load.is_worn_by(person.id) for person in self.participants())
+            )
+            return tuple(worn)
+        where = (trial.participant_id, trial.task, trial.run)
+        return tuple(load for load in self.config.loads if load.is_carried_in(*where))
+
+    def load_kg(self, trial: Trial | None = None) -> float:
+        """What the known loads of a trial weigh together."""
+        return sum((load.mass_kg for load in self.loads(trial)), 0.0)
 
     def participants(self) -> tuple[Participant, ...]:
         return (self.participant,) if self.participant else self.study.participants
@@ -149,6 +166,8 @@ class Unit:
         for name in ("marker_set", "skeleton"):
             if str(options.get(name, "")).endswith(".toml"):  # its content counts, not its place
                 options[name] = Path(options[name]).name
+        if "loads" in options:  # another person's or trial's load changes nothing here
+            options["loads"] = [load.model_dump(mode="json") for load in self.loads()]
         if self.participant is not None:
             options["participant"] = {
                 "sex": self.participant.sex,

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.body.names import in_words
 from bsip_cli.errors import BadDataError
 
 # Fractions of the distance between the ASIS, from their middle; X anterior, Y up, Z right.
@@ -98,7 +99,11 @@ _REQUIRED = (
 
 def _require(landmarks: Mapping[str, np.ndarray]) -> None:
     missing = [name for name in _REQUIRED if name not in landmarks]
-    missing += [f"a metatarsal of foot_{s}" for s in "lr" if _mean(landmarks, _toes(s)) is None]
+    missing += [
+        f"a metatarsal of the {in_words(f'foot_{s}')}"
+        for s in "lr"
+        if _mean(landmarks, _toes(s)) is None
+    ]
     if _mean(landmarks, ("psis_l", "psis_r", "sacrum")) is None:
         missing.append("psis_l and psis_r, or sacrum")
     if missing:
@@ -112,7 +117,7 @@ def _require(landmarks: Mapping[str, np.ndarray]) -> None:
 def _require_sides(landmarks: Mapping[str, np.ndarray], right: np.ndarray) -> None:
     """Right-hand landmarks must lie to the right of left-hand ones, as the pelvis has it."""
     swapped = [
-        name
+        in_words(name)
         for name in ("acromion", "knee_lateral", "malleolus_lateral", "calcaneus")
         if (landmarks[f"{name}_r"] - landmarks[f"{name}_l"]) @ right < 0
     ]
@@ -154,7 +159,7 @@ def _arm(landmarks, centres, hinges, ends, side, outward, stature_m, notes):
     if medial is not None:
         elbow, across = 0.5 * (lateral + medial), lateral - medial
     else:
-        notes.append(f"elbow_{side} has a lateral marker only: centre from the mean breadth")
+        notes.append(_lateral_only(f"elbow_{side}"))
         across = _across_bent_elbow(long_axis, lateral - wrist, outward)
         elbow = lateral - _HALF_BREADTH["elbow"] * stature_m * unit(across)
     centres[f"elbow_{side}"], centres[f"wrist_{side}"] = elbow, wrist
@@ -180,12 +185,16 @@ def _leg(landmarks, centres, hinges, ends, side, outward, stature_m, notes):
         if medial is not None:
             centres[f"{joint}_{side}"], across = 0.5 * (lateral + medial), lateral - medial
         else:
-            notes.append(f"{joint}_{side} has a lateral marker only: centre from the mean breadth")
+            notes.append(_lateral_only(f"{joint}_{side}"))
             across = outward
             half = _HALF_BREADTH[name] * stature_m
             centres[f"{joint}_{side}"] = lateral - half * unit(across)
         hinges[f"{joint}_{side}"] = unit(across if side == "r" else -across)
     ends[f"foot_{side}"] = _mean(landmarks, _toes(side))
+
+
+def _lateral_only(joint: str) -> str:
+    return f"the {in_words(joint)} has a lateral marker only: centre from the mean breadth"
 
 
 def _toes(side: str) -> tuple[str, ...]:

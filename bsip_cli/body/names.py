@@ -1,4 +1,4 @@
-"""The names of the 15 segments, fixed for every table and file."""
+"""The names of the 15 segments, fixed for every table and file, and names as people read them."""
 
 from __future__ import annotations
 
@@ -19,3 +19,23 @@ SEGMENTS = (
     "foot_l",
     "foot_r",
 )
+
+_SIDES = {"_l": "left", "_r": "right"}
+
+
+def in_words(name: str) -> str:
+    """A segment, joint or landmark as people say it: ``left upper arm`` for upper_arm_l."""
+    side = _SIDES.get(name[-2:])
+    words = name[:-2] if side else name
+    return f"{side} {words}".replace("_", " ") if side else words.replace("_", " ")
+
+
+def the_joint(name: str) -> str:
+    """A joint with its article; the floating base, which is no joint, by what hangs on it."""
+    return "the whole body" if name == "root" else f"the {in_words(name)}"
+
+
+def mirrored(name: str) -> str:
+    """The same on the other side: upper_arm_r for upper_arm_l; what has no side, itself."""
+    other = {"_l": "_r", "_r": "_l"}.get(name[-2:])
+    return name[:-2] + other if other else name

@@ -3,13 +3,10 @@
 Least squares on the wrench, regularised by the log-det (Bregman) divergence of every segment's
 pseudo-inertia from the table's (Wensing 2018, Lee 2020, Rucker 2022) and by the spread of people
 about the table, the sum of the masses tied to the scale. Every segment is physically possible with
-any data. Two things keep the data from being trusted too far:
-
-- Frames. The model knows where a segment's joint lies to a centimetre only, and a segment that
-  sits elsewhere in its frame looks in the wrench like one with another centre of mass. Each
-  segment's shift and turn in its frame are estimated along, about zero.
-- Weights. How far this person strays from the table in masses, centres and tensors, the weight of
-  the log-det term and an inflation of the noise follow from the data (``weights``).
+any data. Errors of the kinematics follow the movement and look like parameters, so the data are
+trusted less than their residual says (``trust_ratio``). How far this person strays from the table
+in masses, centres and tensors and the weight of the log-det term follow from the data
+(``weights``).
 """
 
 from __future__ import annotations
@@ -46,8 +43,6 @@ def _note(fit: Fit, terms: Terms) -> str:
         f"as a part of [prior]'s: masses {masses:.0f} %, centres of mass {centres:.0f} %, tensors "
         f"{min(tensors):.0f} to {max(tensors):.0f} %; log-det weight {fit.weights.gamma:g}"
     )
-    if fit.weights.noise > 1.0:
-        note += f"; noise variance times {fit.weights.noise:.2f}"
     if fit.decided < _LITTLE:
         note += "; too little motion: the parameters stay near the table (RM)"
     return note

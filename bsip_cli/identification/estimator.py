@@ -17,10 +17,9 @@ from bsip_cli.identification.prior import Prior
 class Problem:
     """Everything an estimator may use.
 
-    The last five are options of [identify] that single estimators read: how many times better than
-    the table the data must know a combination; the sigma% below which a base parameter counts;
-    how far a segment may lie from where its frame says [m, rad]; and how many deviations as large
-    as [prior] says count beside this person's own.
+    The last three are options of [identify]: how many times worse the data are than they look; the
+    sigma% below which a base parameter counts; and how many deviations as large as [prior] says
+    count beside this person's own.
     """
 
     equations: NormalEquations
@@ -29,9 +28,11 @@ class Problem:
     basis: Basis
     trust_ratio: float
     sigma_percent_limit: float = 5.0
-    frame_sd_m: float = 0.008
-    frame_sd_rad: float = 0.03
     spread_weight: float = 4.0
+
+    def trusted_equations(self) -> tuple[np.ndarray, np.ndarray]:
+        """Information (P, P) and right side (P,), each component in its noise as it is trusted."""
+        return self.equations.weighted(self.noise.weights() / self.trust_ratio**2)
 
 
 @dataclass(frozen=True)

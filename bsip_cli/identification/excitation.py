@@ -6,29 +6,40 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.identification.data_share import beforehand
 from bsip_cli.identification.estimator import Problem
+
+_BETTER_THAN_TABLE = 0.5  # part of the prior variance: below it the data know more than the table
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """singular_values (rank,) of the base regressor, each parameter in its prior spread and each
-    component in its noise (below 1: the table knows better than the data); their ratio; and per
-    segment (n,) the mean share that the data could decide of its ten parameters."""
+    """What the motion shows, each parameter in its prior spread, each component in its noise.
+
+    singular_values : (rank,) of the base regressor; below 1 the table knows better than the data.
+    condition_number : their ratio.
+    segment_share : (n,) mean share of its ten parameters that the data could decide.
+    combinations : (n,) of a segment's ten parameters, how many independent combinations the data
+        know better than the table does. With none the segment was not excited.
+    """
 
     singular_values: np.ndarray
     condition_number: float
     segment_share: np.ndarray
+    combinations: np.ndarray
 
 
 def excitation(problem: Problem) -> Excitation:
     """Singular values, condition number and what the data could know of each segment."""
-    information, _ = problem.equations.weighted(problem.noise.weights())
+    information, _ = problem.trusted_equations()
     root = problem.prior.root
-    scaled = root.T @ information @ root
-    strength = np.linalg.eigvalsh(scaled)[::-1][: problem.basis.rank]
+    strength = np.linalg.eigvalsh(root.T @ information @ root)[::-1][: problem.basis.rank]
     singular = np.sqrt(np.maximum(strength, 0.0))
-    posterior = np.linalg.inv(scaled + np.eye(len(scaled)))
-    share = 1.0 - np.diag(posterior).reshape(-1, 10).mean(axis=1)
     smallest = singular[-1]
     condition = float(singular[0] / smallest) if smallest > 0 else float("inf")
-    return Excitation(singular, condition, share)
+    covariance = beforehand(problem).covariance(information)
+    n = len(problem.prior.inertias)
+    blocks = covariance.reshape(n, 10, n, 10)[np.arange(n), :, np.arange(n)]
+    share = 1.0 - np.einsum("nii->n", blocks) / 10
+    known = (np.linalg.eigvalsh(blocks) < _BETTER_THAN_TABLE).sum(axis=1)
+    return Excitation(singular, condition, share, known)

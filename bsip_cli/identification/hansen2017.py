@@ -23,8 +23,7 @@ def estimate(problem: Problem) -> Estimate:
     """Least squares in the directions that the data know clearly better than the table.
 
     In coordinates z with phi = phi_RM + S z, where z is N(0, 1) among people, the data give each
-    eigendirection of their information a variance; those whose standard deviation is below
-    1 / trust_ratio are taken from the data.
+    eigendirection of their information a variance; those below 1 are taken from the data.
 
     Raises
     ------
@@ -32,11 +31,11 @@ def estimate(problem: Problem) -> Estimate:
         No parameters with positive masses satisfy the data.
     """
     prior = problem.prior
-    information, right = problem.equations.weighted(problem.noise.weights())
+    information, right = problem.trusted_equations()
     scaled = prior.root.T @ information @ prior.root
     gradient = prior.root.T @ (right - information @ prior.phi)
     strength, directions = np.linalg.eigh(scaled)
-    known = strength > problem.trust_ratio**2
+    known = strength > 1.0
     shown = directions[:, known]
     target = (shown.T @ gradient) / strength[known]
     z = shown @ target

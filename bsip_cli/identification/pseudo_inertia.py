@@ -64,30 +64,3 @@ def hessian(phi: np.ndarray) -> np.ndarray:
     for i, block in enumerate(blocks):
         out[10 * i : 10 * i + 10, 10 * i : 10 * i + 10] = block
     return out
-
-
-def frame_jacobian(phi: np.ndarray) -> np.ndarray:
-    """(10 n, 6 n) change of the parameters when each segment moves in its frame.
-
-    Per segment a shift along x, y, z [m] and a turn about x, y, z [rad].
-    """
-    out = np.zeros((phi.size, 6 * (phi.size // 10)))
-    for i, J in enumerate(pseudo_inertias(phi)):
-        for k, twist in enumerate(_twists()):
-            out[10 * i : 10 * i + 10, 6 * i + k] = _parameters(twist @ J + J @ twist.T)
-    return out
-
-
-def _twists() -> np.ndarray:
-    twists = np.zeros((6, 4, 4))
-    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-        twists[k, k, 3] = 1.0
-        twists[3 + k, j, i], twists[3 + k, i, j] = 1.0, -1.0
-    return twists
-
-
-def _parameters(J: np.ndarray) -> np.ndarray:
-    """(10,) parameters of a (4, 4) pseudo-inertia."""
-    S = J[:3, :3]
-    tensor = np.trace(S) * np.eye(3) - S
-    return np.array([J[3, 3], *J[:3, 3], *tensor[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])

@@ -1,12 +1,12 @@
-"""How much each part of the prior and the data count, from the data themselves.
+"""How much each part of the prior counts beside the data, from the data themselves.
 
 The weights are those of the largest marginal likelihood of the measured wrench, by Laplace's
 approximation. The spreads follow MacKay's rule (1992, Bayesian interpolation): a spread is the
 mean square of the deviations over the number of them that the data decided; the option
 ``spread_weight`` says how many deviations as large as [prior] says count beside them, so that
-little data leave [prior] as it is. Masses share one spread and centres of mass another; every
-tensor has its own, because a table may miss a single one by far (Dumas 2007's trunk). The log-det
-weight is the best of a grid.
+little data leave [prior] as it is. Masses share one spread and centres of mass another, neither
+wider than [prior] says; every tensor has its own, because a table may miss a single one by far
+(Dumas 2007's trunk). The log-det weight is the best of a grid.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from bsip_cli.identification.logdet_fit import Objective, Optimum, minimise
 from bsip_cli.identification.prior import Prior
 
 _MASS, _CENTRE, _TENSOR = (0,), (1, 2, 3), (4, 5, 6, 7, 8, 9)  # of the readable parameters
+_NEVER_WIDER = slice(0, 2)  # of the spreads: masses, centres
 # At 6 the log-det term alone would spread people about as [prior] does. From a mere barrier to half
 # of that: it shapes what [prior] spreads, and little data must not make it a narrower prior.
 _GAMMAS = (0.03, 0.1, 0.3, 1.0, 3.0)
@@ -36,16 +37,13 @@ class Terms:
     says, along the directions that the data show from best to not at all: in the parameters' own
     units rounding would hide what the prior says about the latter.
 
-    strength, right, square : of the weighted wrench residual 1/2 (x^T diag(strength) x - 2 right^T
-    x + square) with ``effective`` independent samples. spreads : precision of all masses, of all
-    centres of mass, and of each segment's tensor; fixed : what keeps its weight (total mass,
-    frames). phi = table + shown x.
+    strength, right : of the weighted wrench residual 1/2 x^T diag(strength) x - right^T x.
+    spreads : precision of all masses, of all centres of mass, and of each segment's tensor; fixed :
+    that of the total mass, which keeps its weight. phi = table + shown x.
     """
 
     strength: np.ndarray
     right: np.ndarray
-    square: float
-    effective: float
     spreads: tuple[np.ndarray, ...]
     fixed: np.ndarray
     shown: np.ndarray
@@ -55,12 +53,10 @@ class Terms:
 
 @dataclass(frozen=True)
 class Weights:
-    """Of the deviations (2 + n,), 1 as [prior] says, of the log-det term, and the factor by which
-    the variance of the noise grows."""
+    """Of the deviations (2 + n,), 1 as [prior] says, and of the log-det term."""
 
     spread: np.ndarray
     gamma: float
-    noise: float
 
 
 @dataclass(frozen=True)
@@ -77,23 +73,18 @@ class Fit:
 
 def terms_of(problem: Problem) -> Terms:
     """Normal equations and priors of a problem, about the table's values."""
-    prior, weights = problem.prior, problem.noise.weights()
-    information, right = problem.equations.weighted(weights)
-    slope = right - information @ prior.phi
-    square = weights @ problem.equations.squares - prior.phi @ (right + slope)
-    shown = np.hstack([np.eye(prior.phi.size), pseudo_inertia.frame_jacobian(prior.phi)])
-    spreads, fixed = _spreads(prior), _fixed(prior, problem.frame_sd_m, problem.frame_sd_rad)
+    prior = problem.prior
+    information, right = problem.trusted_equations()
+    spreads, fixed = _spreads(prior), _total_mass(prior)
     root = _inverse_root(sum(spreads, fixed))
-    strength, directions = np.linalg.eigh((shown @ root).T @ information @ (shown @ root))
+    strength, directions = np.linalg.eigh(root.T @ information @ root)
     axes = root @ directions
     return Terms(
         np.maximum(strength, 0.0),
-        axes.T @ (shown.T @ slope),
-        float(square),
-        float(problem.noise.effective.sum()),
+        axes.T @ (right - information @ prior.phi),
         tuple(axes.T @ precision @ axes for precision in spreads),
         axes.T @ fixed @ axes,
-        axes[: prior.phi.size],
+        axes,
         prior.phi,
         problem.spread_weight,
     )
@@ -114,8 +105,7 @@ def _spreads(prior: Prior) -> tuple[np.ndarray, ...]:
 
 def _spread(prior: Prior, segments: tuple[int, ...], members: tuple[int, ...]) -> np.ndarray:
     """Precision of some readable parameters of some segments, linearised about the table."""
-    size = 16 * len(prior.inertias)
-    out = np.zeros((size, size))
+    out = np.zeros((prior.phi.size, prior.phi.size))
     for i in segments:
         block = slice(10 * i, 10 * i + 10)
         jacobian = readable_jacobian(prior.phi[block])[list(members)]
@@ -124,20 +114,17 @@ def _spread(prior: Prior, segments: tuple[int, ...], members: tuple[int, ...]) -
     return out
 
 
-def _fixed(prior: Prior, frame_sd_m: float, frame_sd_rad: float) -> np.ndarray:
-    n = len(prior.inertias)
-    frames = np.tile([frame_sd_m] * 3 + [frame_sd_rad] * 3, n)
-    out = np.diag(np.concatenate([np.zeros(10 * n), 1 / frames**2]))
-    masses = np.zeros(16 * n)
-    masses[: 10 * n : 10] = 1 / prior.total_mass_sd_kg
-    return out + np.outer(masses, masses)
+def _total_mass(prior: Prior) -> np.ndarray:
+    masses = np.zeros(prior.phi.size)
+    masses[::10] = 1 / prior.total_mass_sd_kg
+    return np.outer(masses, masses)
 
 
 def objective_of(terms: Terms, weights: Weights) -> Objective:
     """The convex problem for given weights."""
     return Objective(
-        np.diag(terms.strength / weights.noise) + _precision(terms, weights),
-        terms.right / weights.noise,
+        np.diag(terms.strength) + _precision(terms, weights),
+        terms.right,
         terms.shown,
         terms.table,
         weights.gamma,
@@ -152,23 +139,23 @@ def _precision(terms: Terms, weights: Weights) -> np.ndarray:
 def fit_with_weights(terms: Terms) -> Fit:
     """The fit of the largest evidence over the grid of log-det weights."""
     best: Fit | None = None
-    start = Weights(np.ones(len(terms.spreads)), _GAMMAS[0], 1.0)
+    spread = np.ones(len(terms.spreads))
     for gamma in _GAMMAS:
-        fit = _settled(terms, Weights(start.spread, gamma, start.noise), best)
+        fit = _settled(terms, Weights(spread, gamma), best)
         if best is None or fit.evidence > best.evidence:
-            best, start = fit, fit.weights
+            best, spread = fit, fit.weights.spread
     assert best is not None
     return best
 
 
 def _settled(terms: Terms, weights: Weights, near: Fit | None) -> Fit:
-    """Weights of the spreads and the noise that no longer change, for one log-det weight."""
+    """Spreads that no longer change, for one log-det weight."""
     fit = fit_at(terms, weights, near)
     for _ in range(_ROUNDS):
-        spread, noise = _updated(terms, fit)
-        change = np.append(spread / fit.weights.spread, noise / fit.weights.noise)
-        fit = fit_at(terms, Weights(spread, weights.gamma, noise), fit)
-        if np.abs(np.log(change)).max() < _SETTLED:
+        spread = _updated(terms, fit)
+        change = np.log(spread / fit.weights.spread)
+        fit = fit_at(terms, Weights(spread, weights.gamma), fit)
+        if np.abs(change).max() < _SETTLED:
             break
     return fit
 
@@ -180,26 +167,19 @@ def fit_at(terms: Terms, weights: Weights, near: Fit | None = None) -> Fit:
     before = _precision(terms, weights) + weights.gamma * terms.shown.T @ curvature @ terms.shown
     evidence = (
         -optimum.value
-        - 0.5 * terms.square / weights.noise
-        - 0.5 * terms.effective * np.log(weights.noise)
         + 0.5 * np.linalg.slogdet(optimum.covariance)[1]
         + 0.5 * np.linalg.slogdet(before)[1]
     )
     root = _inverse_root(before)
-    spared = terms.shown @ root @ root.T @ terms.shown.T
-    left = np.linalg.solve(spared, terms.shown @ optimum.covariance @ terms.shown.T)
+    left = np.linalg.solve(root @ root.T, optimum.covariance)
     decided = float(np.clip(len(left) - np.trace(left), 0.0, len(left)))
     return Fit(weights, optimum, float(evidence), root @ root.T, decided)
 
 
-def _updated(terms: Terms, fit: Fit) -> tuple[np.ndarray, float]:
-    """MacKay's rule for the spreads, residual over degrees of freedom for the noise.
-
-    The noise never shrinks: what the frames explain in the fit they may not explain elsewhere.
-    """
-    x, covariance, old = fit.optimum.x, fit.optimum.covariance, fit.weights.spread
-    removed = fit.prior_covariance - covariance
-    count = terms.spread_weight
+def _updated(terms: Terms, fit: Fit) -> np.ndarray:
+    """MacKay's rule for the spreads."""
+    x, old, count = fit.optimum.x, fit.weights.spread, terms.spread_weight
+    removed = fit.prior_covariance - fit.optimum.covariance
     spread = np.array(
         [
             (count + max(weight * np.sum(removed * precision), 0.0)) / (count + x @ precision @ x)
@@ -207,8 +187,5 @@ def _updated(terms: Terms, fit: Fit) -> tuple[np.ndarray, float]:
         ]
     )
     spread = np.clip(spread, old / _LARGEST_CHANGE, old * _LARGEST_CHANGE)
-    residual = terms.square - 2 * terms.right @ x + terms.strength @ x**2
-    spent = terms.strength @ np.diag(covariance) / fit.weights.noise
-    free = max(terms.effective - spent, 1.0)
-    noise = max(residual / free, 1.0)
-    return spread, min(noise, fit.weights.noise * _LARGEST_CHANGE)
+    spread[_NEVER_WIDER] = np.maximum(spread[_NEVER_WIDER], 1.0)
+    return spread

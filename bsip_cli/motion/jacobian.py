@@ -14,6 +14,13 @@ def model_markers(person: Person, R: np.ndarray, p: np.ndarray) -> np.ndarray:
     return p[:, segments] + np.einsum("fmij,mj->fmi", R[:, segments], person.markers_in_joint_m())
 
 
+def marker_residuals(person: Person, q: np.ndarray, markers: np.ndarray) -> np.ndarray:
+    """(N, m, 3) markers less the model's, in the axes of their segments [m]; NaN where missing."""
+    R, p = tree_of(person).forward(q)
+    world = markers - model_markers(person, R, p)
+    return np.einsum("fmij,fmi->fmj", R[:, person.marker_segments], world)
+
+
 def subtrees(person: Person) -> np.ndarray:
     """(n, m) True where marker m hangs on segment n or beyond it."""
     parents = person.skeleton.parents

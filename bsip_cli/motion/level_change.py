@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.special import chdtri, fdtrc
 
 _ROUNDS = 4
@@ -37,12 +36,46 @@ class LevelChange:
 
 @dataclass(frozen=True)
 class _Problem:
-    """y (n, d), columns with the constant first (n, 1 + k), and where a step may be."""
+    """Sums over the samples z = [X, y] (n, 1 + k + d): the constant, the columns, the signal.
 
-    y: np.ndarray
-    X: np.ndarray
+    Whitened by a correlation r, the sample at t is z[t] - r z[t - 1], the first one
+    sqrt(1 - r^2) z[0]; so every product of whitened signals follows from these sums, and no
+    correlation that is tried needs the samples again.
+
+    Attributes
+    ----------
+    z : (n, 1 + k + d); ``of_x`` = 1 + k.
+    squares, neighbours, ends : sums of z z', of z[t] z[t - 1]' and its transpose, and of the
+        first and the last sample's z z'.
+    places : (p,) where a step may be.
+    after, beside : (p, 1 + k + d) sums of the samples from a place on, and of those from the
+        places before and after it on.
+    penalised : (1 + k, 1 + k) ones on the diagonal for the columns, zero for the constant.
+    coefficient_sd : prior spread of the columns' coefficients.
+    """
+
+    z: np.ndarray
+    of_x: int
+    squares: np.ndarray
+    neighbours: np.ndarray
+    ends: np.ndarray
     places: np.ndarray
+    after: np.ndarray
+    beside: np.ndarray
+    penalised: np.ndarray
     coefficient_sd: float
+
+    def products(self, r: float) -> np.ndarray:
+        """Sum of z z', whitened."""
+        return (1.0 + r * r) * self.squares - r * self.neighbours - r * r * self.ends
+
+    def with_steps(self, r: float) -> np.ndarray:
+        """(p, 1 + k + d) products of z with a step at each place, both whitened."""
+        return (1.0 + r * r) * self.after - r * self.beside + r * (1.0 - r) * self.z[-1]
+
+    def prior(self, error: float) -> np.ndarray:
+        """(1 + k, 1 + k) what the prior adds to the equations."""
+        return self.penalised * (error / self.coefficient_sd) ** 2
 
 
 def find_level_change(
@@ -74,8 +107,7 @@ def find_level_change(
     places = places[(places > 0) & (places < n)]
     if len(places) == 0 or n < _LEAST_FREEDOM + 2:
         return None
-    X = np.concatenate([np.ones((n, 1)), columns - columns.mean(axis=0)], axis=1)
-    problem = _Problem(y, X, places, coefficient_sd)
+    problem = _problem(y, columns, places, coefficient_sd)
     correlation = 0.0
     error = max(float(np.median(np.abs(np.diff(y, axis=0)))), _LEAST_ERROR)
     for _ in range(_ROUNDS):
@@ -87,28 +119,50 @@ def find_level_change(
     return _best(problem, correlation, error)
 
 
+def _problem(
+    y: np.ndarray, columns: np.ndarray, places: np.ndarray, coefficient_sd: float
+) -> _Problem:
+    z = np.concatenate([np.ones((len(y), 1)), columns, y], axis=1)
+    z[:, 1:] -= z[:, 1:].mean(axis=0)
+    follow = z[1:].T @ z[:-1]
+    from_on = np.zeros((len(z) + 1, z.shape[1]))
+    from_on[:-1] = np.cumsum(z[::-1], axis=0)[::-1]
+    return _Problem(
+        z,
+        1 + columns.shape[1],
+        z.T @ z,
+        follow + follow.T,
+        np.outer(z[0], z[0]) + np.outer(z[-1], z[-1]),
+        places,
+        from_on[places],
+        from_on[places - 1] + from_on[places + 1],
+        np.diag([0.0] + [1.0] * columns.shape[1]),
+        coefficient_sd,
+    )
+
+
 def _best(problem: _Problem, correlation: float, error: float) -> LevelChange | None:
-    n, d = problem.y.shape
-    white = _whitened(problem.y, correlation)
-    Q = _basis(problem, correlation, error)
-    free = white - Q[:n] @ (Q[:n].T @ white)
-    # A step whitened is 1 at its place and 1 - correlation after it.
-    rest = (1.0 - correlation) * _after(free) + free
-    shadow = (1.0 - correlation) * _after(Q[:n]) + Q[:n]
-    length = 1.0 + (1.0 - correlation) ** 2 * (n - 1 - np.arange(n))
-    own = length - (shadow**2).sum(axis=1)
-    places = problem.places[own[problem.places] > 1e-3 * length[problem.places]]
-    freedom = n - 1 - float((Q[:n] ** 2).sum())
-    if len(places) == 0 or freedom < _LEAST_FREEDOM:
+    n, x = len(problem.z), problem.of_x
+    d = problem.z.shape[1] - x
+    products, steps = problem.products(correlation), problem.with_steps(correlation)
+    inverse = np.linalg.inv(products[:x, :x] + problem.prior(error))
+    coefficients = inverse @ products[:x, x:]
+    # What the columns leave of the signal and of the steps: the gain of each step follows.
+    rest = steps[:, x:] - steps[:, :x] @ coefficients
+    length = 1.0 + (1.0 - correlation) ** 2 * (n - 1 - problem.places)
+    own = length - ((steps[:, :x] @ inverse) * steps[:, :x]).sum(axis=1)
+    freedom = n - 1 - float((inverse * products[:x, :x]).sum())
+    possible = own > 1e-3 * length
+    if not possible.any() or freedom < _LEAST_FREEDOM:
         return None
-    gain = (rest[places] ** 2).sum(axis=1) / own[places]
-    k = int(places[np.argmax(gain)])
-    # What the prior holds back of the columns counts among the errors: y'(I - QQ')y.
-    squares = float((white**2).sum() - ((Q[:n].T @ white) ** 2).sum())
-    variance = max((squares - gain.max()) / (d * freedom), 1e-18)
-    z2 = chdtri(d, max(fdtrc(d, d * freedom, gain.max() / variance / d), 1e-300))
+    gain = np.where(possible, (rest**2).sum(axis=1) / np.where(possible, own, 1.0), -1.0)
+    k = int(np.argmax(gain))
+    # What the prior holds back of the columns counts among the errors.
+    squares = float(np.trace(products[x:, x:]) - (coefficients * products[:x, x:]).sum())
+    variance = max((squares - gain[k]) / (d * freedom), 1e-18)
+    z2 = chdtri(d, max(fdtrc(d, d * freedom, gain[k] / variance / d), 1e-300))
     return LevelChange(
-        at=k,
+        at=int(problem.places[k]),
         step=rest[k] / own[k],
         step_sd=float(np.sqrt(variance / own[k])),
         spread=float(np.sqrt(variance / (1.0 - correlation**2))),
@@ -116,31 +170,14 @@ def _best(problem: _Problem, correlation: float, error: float) -> LevelChange | 
     )
 
 
-def _basis(problem: _Problem, correlation: float, error: float) -> np.ndarray:
-    """(n + k, 1 + k) orthonormal columns; the last k rows are the prior's."""
-    k = problem.X.shape[1] - 1
-    prior = np.concatenate([np.zeros((k, 1)), error / problem.coefficient_sd * np.eye(k)], axis=1)
-    A = np.concatenate([_whitened(problem.X, correlation), prior])
-    return solve_triangular(np.linalg.cholesky(A.T @ A), A.T, lower=True).T
-
-
 def _correlation(problem: _Problem, found: LevelChange, error: float) -> float:
-    n = len(problem.y)
-    stepped = problem.y - (np.arange(n) >= found.at)[:, None] * found.step
-    Q = _basis(problem, 0.0, error)[:n]
-    left = stepped - Q @ (Q.T @ stepped)
+    """Of neighbours among what columns and step leave, fitted as if there were none."""
+    x = problem.of_x
+    stepped = problem.z[:, x:].copy()
+    stepped[found.at :] -= found.step
+    X = problem.z[:, :x]
+    system = problem.squares[:x, :x] + problem.prior(error)
+    left = stepped - X @ np.linalg.solve(system, X.T @ stepped)
     power = float((left[:-1] ** 2).sum())
     value = float((left[1:] * left[:-1]).sum()) / power if power > 0 else 0.0
     return float(np.clip(value, 0.0, _LARGEST_CORRELATION))
-
-
-def _whitened(x: np.ndarray, correlation: float) -> np.ndarray:
-    white = x.copy()
-    white[1:] -= correlation * x[:-1]
-    white[0] *= np.sqrt(1.0 - correlation**2)
-    return white
-
-
-def _after(x: np.ndarray) -> np.ndarray:
-    """Sum of all later rows, for each row."""
-    return np.cumsum(x[::-1], axis=0)[::-1] - x

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from bsip_cli.body.names import in_words
 from bsip_cli.motion.marker_fit import MarkerFit
 
 Kind = Literal["jump", "slip", "swap", "offset"]
@@ -15,6 +16,8 @@ Kind = Literal["jump", "slip", "swap", "offset"]
 _ORDER: tuple[Kind, ...] = ("swap", "offset", "slip", "jump")
 # Nothing is reported that stays within this many times what a marker is trusted to.
 BEYOND = 1.5
+_BEAR = "bear each other's labels"
+_DONE = {True: "put right", False: "not clear enough to put right, left as recorded"}
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,7 @@ class MarkerEvent:
     statistic : residual over the spread it is judged against (jump, offset), unlikeliness as the
         length of a normal vector (slip), residual as labelled over residual exchanged, or the line
         between the two over what it lacks of an exact reversal (swap).
+    put_right : the labels of a swap were exchanged back before the poses were fitted.
     """
 
     kind: Kind
@@ -40,6 +44,7 @@ class MarkerEvent:
     size_m: float
     statistic: float
     sentence: str
+    put_right: bool = False
 
 
 def event(
@@ -51,10 +56,11 @@ def event(
     statistic: float,
     *,
     partner: int | None = None,
+    put_right: bool = False,
     note: str = "",
 ) -> MarkerEvent:
     """An event of marker number ``m`` over a stretch of frames."""
-    marker, segment = fit.labels[m], fit.segments[m]
+    marker, segment = fit.labels[m], f"the {in_words(fit.segments[m])}"
     other = "" if partner is None else fit.labels[partner]
     start, end = float(fit.times_s[frames.start]), float(fit.times_s[frames.stop - 1])
     whole = frames.start == 0 and frames.stop == len(fit.times_s)
@@ -63,10 +69,11 @@ def event(
     sentence = {
         "jump": f"{marker} jumps {mm} away {when} and comes back",
         "slip": f"{marker} slips {mm} on {segment} at {start:.2f} s and stays there",
-        "swap": f"{marker} and {other}, {mm} apart, bear each other's labels {when}",
+        "swap": f"{marker} and {other}, {mm} apart, {_BEAR} {when}; {_DONE[put_right]}",
         "offset": f"{marker} sits {mm} from its calibrated place on {segment} {when}",
     }[kind]
-    return MarkerEvent(kind, marker, other, start, end, size_m, statistic, sentence + note)
+    sentence += note
+    return MarkerEvent(kind, marker, other, start, end, size_m, statistic, sentence, put_right)
 
 
 def summaries(events: Sequence[MarkerEvent], most: int) -> list[str]:
@@ -76,7 +83,8 @@ def summaries(events: Sequence[MarkerEvent], most: int) -> list[str]:
     """
     groups: dict[tuple, list[MarkerEvent]] = {}
     for one in events:
-        key = (one.start_s, one.end_s) if one.kind == "swap" else (one.marker,)
+        same = (one.start_s, one.end_s, one.put_right)
+        key = same if one.kind == "swap" else (one.marker,)
         groups.setdefault((_ORDER.index(one.kind), *key), []).append(one)
     ranked = sorted(groups.items(), key=lambda item: (item[0][0], -max(e.size_m for e in item[1])))
     said = [_of_group(group) for _, group in ranked]
@@ -92,8 +100,7 @@ def _of_group(group: list[MarkerEvent]) -> str:
         mine, others = (
             ", ".join(getattr(e, name) for e in group) for name in ("marker", "partner")
         )
-        when = first.sentence.split("labels ")[1]
-        return f"{mine} and {others} bear each other's labels {when}"
+        return f"{mine} and {others} {_BEAR}{first.sentence.split(_BEAR)[1]}"
     mm = 1000 * max(one.size_m for one in group)
     return (
         f"{first.marker} jumps {len(group)} times, by up to {mm:.0f} mm, "

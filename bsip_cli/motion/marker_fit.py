@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -30,8 +32,7 @@ class MarkerFit:
     place_m : (m, 3) where the markers sit in their segments.
     trusted_m : (m,) what a marker's position is trusted to, as in the inverse kinematics.
     pose : segment to (N, k) columns, the angles of its own joint and of those it carries.
-    response : (m, 3, m, 3) change of the residual of a marker (first) for each metre by which
-        another (third) moves on its segment: the pose follows the marker and bends the others.
+    respond : computes ``response``, which a fit that is only compared does not need.
     """
 
     labels: tuple[str, ...]
@@ -43,11 +44,17 @@ class MarkerFit:
     place_m: np.ndarray
     trusted_m: np.ndarray
     pose: dict[str, np.ndarray]
-    response: np.ndarray
+    respond: Callable[[], np.ndarray]
 
-    def distance_m(self) -> np.ndarray:
-        """(N, m) distance of each marker from its model, NaN where missing."""
-        return np.linalg.norm(self.residual_m, axis=2)
+    @cached_property
+    def response(self) -> np.ndarray:
+        """(m, 3, m, 3) change of the residual of a marker (first) for each metre by which another
+        (third) moves on its segment: the pose follows the marker and bends the others."""
+        return self.respond()
+
+    def distance_m(self, m: int | slice = slice(None)) -> np.ndarray:
+        """(N, m) distance of each marker from its model, NaN where missing; of one marker (N,)."""
+        return np.linalg.norm(self.residual_m[:, m], axis=-1)
 
     def noise_m(self) -> float:
         """Noise of a marker, each direction: from second differences of the residuals."""
@@ -88,7 +95,7 @@ def marker_fit(
         person.marker_positions_m,
         marker_sd_m / np.sqrt(np.maximum(person.marker_weights, 1e-6)),
         {names[k]: _pose(person, q, int(k)) for k in np.unique(person.marker_segments)},
-        _response(person, residual, R, p, model, marker_sd_m, robust_limit_m),
+        partial(_response, person, residual, R, p, model, marker_sd_m, robust_limit_m),
     )
 
 

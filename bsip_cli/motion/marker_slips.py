@@ -21,6 +21,7 @@ _CHANCE = 6.0
 # for its size, and may not hide behind that.
 _SKIN_M_PER_RAD = 0.03
 _SAME = 0.7  # a change that is explained to 30 % by a slip at the same time is no second one
+_LEAST_RESPONSE = 0.003  # what follows a slip by less says nothing of it
 _MOST = 12
 
 
@@ -52,37 +53,35 @@ class _Search:
         self.columns = {
             name: block_means(_with_squares(x), self.frames) for name, x in fit.pose.items()
         }
+        self.means = block_means(self.left, self.frames)
         self.best: dict[int, _Found | None] = {}
 
     def changes(self) -> list[_Found]:
         """The changes that are slips, of all markers."""
-        means = block_means(self.left, self.frames)
         for m in range(len(self.fit.labels)):
             if m not in self.best:
-                self.best[m] = self._change(means, m, self.least)
+                self.best[m] = self._change(m, self.least)
         return [f for f in self.best.values() if f and _is_slip(f.change, self.fit.trusted_m[f.m])]
 
-    def _change(
-        self, means: np.ndarray, m: int, least: int, block: int | None = None
-    ) -> _Found | None:
-        seen = np.flatnonzero(np.isfinite(means[:, m, 0]))
+    def _change(self, m: int, least: int, block: int | None = None) -> _Found | None:
+        seen = np.flatnonzero(np.isfinite(self.means[:, m, 0]))
         at = None if block is None else int(np.searchsorted(seen, block))
         if len(seen) < 2 * least:
             return None
         columns = self.columns[self.fit.segments[m]][seen]
-        found = find_level_change(means[seen, m], columns, _SKIN_M_PER_RAD, least, at)
+        found = find_level_change(self.means[seen, m], columns, _SKIN_M_PER_RAD, least, at)
         return _Found(m, found, int(seen[found.at])) if found else None
 
     def source(self, first: _Found, changes: list[_Found]) -> tuple[_Slip, np.ndarray]:
         """Whose slip makes the strongest change, and the change it makes of all (m, 3)."""
         fit = self.fit
-        means = block_means(self.left, self.frames)
         field, sd = np.full((len(fit.labels), 3), np.nan), np.full(len(fit.labels), np.nan)
-        for k in range(len(fit.labels)):
-            found = self._change(means, k, 1, first.block)
+        near = {f.m: f for f in changes if abs(f.block - first.block) <= self.least}
+        reach = np.abs(fit.response[:, :, list(near)]).max(axis=(1, 2, 3))
+        for k in np.flatnonzero(reach > _LEAST_RESPONSE):
+            found = self._change(int(k), 1, first.block)
             if found:
                 field[k], sd[k] = found.change.step, found.change.step_sd
-        near = {f.m: f for f in changes if abs(f.block - first.block) <= self.least}
         near = {m: f for m, f in near.items() if np.isfinite(sd[m])} or {first.m: first}
         field[first.m], sd[first.m] = first.change.step, first.change.step_sd
         sd = np.hypot(sd, 0.1 * np.linalg.norm(first.change.step))
@@ -97,6 +96,7 @@ class _Search:
     def take(self, slip: _Slip, made: np.ndarray) -> None:
         """Take a slip out of the residuals."""
         self.left[slip.frame :] -= made
+        self.means = block_means(self.left, self.frames)
         moved = np.linalg.norm(made, axis=1) > 0.1 * self.fit.trusted_m
         self.best = {k: f for k, f in self.best.items() if not moved[k]}
 

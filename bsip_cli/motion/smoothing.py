@@ -13,7 +13,8 @@ from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.jacobian import coordinate_covariance
-from bsip_cli.motion.splines import SmoothSignal, noise_level, smooth
+from bsip_cli.motion.skin import skin_corner_hz
+from bsip_cli.motion.splines import SkinNoise, SmoothSignal, bridged, noise_level, smooth
 
 # Winter: a dual-pass second-order filter has its -3 dB point lower by this factor.
 _DUAL_PASS = 0.802
@@ -27,7 +28,8 @@ class Motion:
     """q (N, nq), v (N, nv), a (N, nv) in Pinocchio's conventions, and the noise of a (N, nv).
 
     ``inner`` (N,) is False in gaps and near their and the trial's ends, where an acceleration
-    rests on one side only; ``marker_noise_m`` is the noise of the markers that the poses show.
+    rests on one side only; ``marker_noise_m`` is the white noise of the markers that the poses
+    show; ``cutoff_hz`` (N,) is where the smoother's gain is one half.
     """
 
     q: np.ndarray
@@ -36,6 +38,7 @@ class Motion:
     a_sd: np.ndarray
     inner: np.ndarray
     marker_noise_m: float
+    cutoff_hz: np.ndarray
 
 
 def smooth_motion(
@@ -44,10 +47,13 @@ def smooth_motion(
     determined: np.ndarray,
     rate_hz: float,
     *,
+    markers: np.ndarray,
+    robust_limit_m: float,
     method: str,
     butterworth_cutoff_hz: float,
     pace_window_s: float,
-    noise_factor: float,
+    skin_factor: float,
+    skin_from_hz: float,
     edge_s: float,
 ) -> Motion:
     """Smooth poses and differentiate them twice.
@@ -59,7 +65,9 @@ def smooth_motion(
     ----------
     q : (N, nq) poses.
     determined : (N,), or (N, joints): which are to be believed; the others are bridged.
-    method, butterworth_cutoff_hz, pace_window_s, noise_factor, edge_s : as in
+    markers : (N, m, 3) where they were seen [m]; NaN where not.
+    robust_limit_m : beyond it a marker's pull on the poses fades.
+    method, butterworth_cutoff_hz, pace_window_s, skin_factor, skin_from_hz, edge_s : as in
         configs/default.toml, [smoothing].
 
     Raises
@@ -82,7 +90,13 @@ def smooth_motion(
     curves = np.where(known[:, joint_of_curve], _continuous(skeleton, q), np.nan)
     marker_noise, noise = _noise(person, curves, whole, rate_hz)
     if method == "spline":
-        smoothed = smooth(curves, rate_hz, pace_window_s, noise_factor * noise)
+        pose_known = np.where(whole[:, None, None], markers, np.nan)
+        shown = skin_corner_hz(
+            person, q, pose_known, rate_hz, white_m=marker_noise, robust_limit_m=robust_limit_m
+        )
+        # Power that falls like 1 / f^4: the corner goes with the root of the amplitude.
+        skin = SkinNoise(np.sqrt(skin_factor) * shown, skin_from_hz)
+        smoothed = smooth(curves, rate_hz, pace_window_s, noise, skin)
     else:
         smoothed = _butterworth(curves, rate_hz, butterworth_cutoff_hz, noise)
     edge = round(edge_s * rate_hz)
@@ -164,19 +178,18 @@ def _butterworth(
     curves: np.ndarray, rate_hz: float, cutoff_hz: float, noise: np.ndarray
 ) -> SmoothSignal:
     """Zero-phase second-order Butterworth and central differences (Winter 2009, chapter 3)."""
-    times = np.arange(len(curves))
-    bridged = np.empty_like(curves)
-    for k in range(curves.shape[1]):
-        seen = np.isfinite(curves[:, k])
-        bridged[:, k] = np.interp(times, times[seen], curves[seen, k])
     corner = min(cutoff_hz / _DUAL_PASS, 0.45 * rate_hz)
     sections = butter(2, corner, fs=rate_hz, output="sos")
-    value = sosfiltfilt(sections, bridged, axis=0, padlen=min(len(curves) - 1, int(rate_hz)))
+    value = sosfiltfilt(
+        sections, bridged(curves), axis=0, padlen=min(len(curves) - 1, int(rate_hz))
+    )
     first = np.gradient(value, 1 / rate_hz, axis=0)
     second = np.gradient(first, 1 / rate_hz, axis=0)
     # White noise below the cut-off, differentiated twice: the integral of omega^4 up to there.
     sd = noise * np.sqrt(2 * cutoff_hz / rate_hz / 5) * (2 * np.pi * cutoff_hz) ** 2
-    return SmoothSignal(value, first, second, np.broadcast_to(sd, value.shape).copy())
+    spread = np.broadcast_to(sd, value.shape).copy()
+    # Each pass halves the power at its corner, so both together halve the amplitude there.
+    return SmoothSignal(value, first, second, spread, np.full(len(value), corner))
 
 
 def _on_manifold(
@@ -200,7 +213,7 @@ def _on_manifold(
             v[:, av : av + 3], a[:, av : av + 3], sd[:, av : av + 3] = _linear(
                 s, slice(at, at + 3), unit, v[:, turning]
             )
-    return Motion(q, v, a, sd, inner, marker_noise_m)
+    return Motion(q, v, a, sd, inner, marker_noise_m, s.cutoff_hz)
 
 
 def _angular(s: SmoothSignal, part: slice):

@@ -5,12 +5,18 @@ variance ``tau^2(t)``, the samples the noise variance ``sigma^2`` (P-splines: Ei
 1996). Both come from the data: sigma from the power above human movement, tau
 by evidence maximisation (MacKay 1992) over a window that moves along. Derivatives are those of
 the spline.
+
+Skin adds noise that is not white: its acceleration has the same power at all frequencies, so it
+grows like 1 / f^4 towards low ones, and it keeps pace with the motion. The best gain against both
+is 1 / (1 + (sigma^2 / tau^2) w^8 + rho w^4) with the skin's share rho: a penalty on the second
+differences beside the one on the fourth.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations_with_replacement
 
 import numpy as np
 from numba import njit
@@ -23,7 +29,7 @@ from scipy.stats import chi2
 
 _DEGREE = 5
 _KNOT_RATE_HZ = 100.0  # at most; human motion ends far below
-_FOURTH = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+_SECOND, _FOURTH = np.array([1.0, -2.0, 1.0]), np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 _NOISE_ORDER, _NOISE_BAND_HZ, _NOISE_WINDOW_S = 3, (12.0, 20.0), 0.64
 _ROUNDS = 20
 _FEWEST = 12
@@ -31,23 +37,50 @@ _FEWEST = 12
 # Stiffer equations would lose the digits of the samples (weight 1) and of the bridges.
 _FIRST_STIFFNESS, _STIFFNESS_RANGE = 1e1, (1e-2, 1e9)
 _BRIDGE_WEIGHT = 1e-4  # of a missing sample, against 1: keeps long gaps solvable
+_FREQUENCIES = 1000  # at which a gain is computed to find the cut-off
 
 
 @dataclass(frozen=True)
 class SmoothSignal:
     """A smoothed signal and its derivatives at the samples, each (N, channels).
 
-    ``second_sd`` is the standard deviation of the second derivative.
+    ``second_sd`` is the standard deviation of the second derivative; ``cutoff_hz`` (N,) the
+    frequency at which the smoother's gain is one half.
     """
 
     value: np.ndarray
     first: np.ndarray
     second: np.ndarray
     second_sd: np.ndarray
+    cutoff_hz: np.ndarray
+
+
+@dataclass(frozen=True)
+class SkinNoise:
+    """Noise that falls with frequency, beside the white one.
+
+    Below ``corner_hz`` its power, mean over the trial, is larger than that of the white noise;
+    below ``from_hz`` it is never taken to be larger than the signal's.
+    """
+
+    corner_hz: float
+    from_hz: float
+
+
+@dataclass(frozen=True)
+class _Penalty:
+    """Weights of the squared fourth (n - 4,) and second differences of n coefficients."""
+
+    fourth: np.ndarray
+    second: float
 
 
 def smooth(
-    samples: np.ndarray, rate_hz: float, window_s: float, noise_sd: np.ndarray | None = None
+    samples: np.ndarray,
+    rate_hz: float,
+    window_s: float,
+    noise_sd: np.ndarray | None = None,
+    skin: SkinNoise | None = None,
 ) -> SmoothSignal:
     """Smooth all channels by one stiffness that changes over time.
 
@@ -55,7 +88,8 @@ def smooth(
     ----------
     samples : (N, channels); NaN where missing, which is bridged, each channel on its own.
     window_s : time over which the pace of the motion is judged.
-    noise_sd : (channels,) noise of the samples, estimated from them where not given.
+    noise_sd : (channels,) white noise of the samples, estimated from them where not given.
+    skin : coloured noise beside it; none where not given.
 
     Raises
     ------
@@ -70,19 +104,24 @@ def smooth(
     window = max(9, round(window_s * rate_hz / basis.samples_per_knot))
     seen = np.isfinite(samples)
     offset = np.nanmean(samples, axis=0)
-    scaled = (np.stack([_bridged(channel) for channel in samples.T], axis=1) - offset) / sigma
+    scaled = (bridged(samples) - offset) / sigma
     groups = _alike(seen)
     first = max(groups, key=lambda columns: seen[:, columns[0]].sum())
-    stiffness = _stiffness(scaled[:, first], seen[:, first[0]], window, basis)
+    penalty = _penalty(scaled[:, first], seen[:, first[0]], window, basis, skin)
     c, spread = np.empty((basis.size, samples.shape[1])), np.empty(samples.shape)
     for columns in groups:
         weights = np.where(seen[:, columns[0]], 1.0, _BRIDGE_WEIGHT)
         right = basis.values.T @ (weights[:, None] * scaled[:, columns])
-        c[:, columns], inverse = _fit(_normal(basis, weights), stiffness, right)
-        sd = np.sqrt(_variances(basis.curves, inverse))
-        spread[:, columns] = np.outer(sd, sigma[columns])
+        c[:, columns], inverse = _fit(_normal(basis, weights), penalty, right)
+        spread[:, columns] = np.outer(_curve_sd(basis, penalty, inverse), sigma[columns])
     c *= sigma
-    return SmoothSignal(basis.values @ c + offset, basis.slopes @ c, basis.curves @ c, spread)
+    return SmoothSignal(
+        basis.values @ c + offset,
+        basis.slopes @ c,
+        basis.curves @ c,
+        spread,
+        _cutoff_hz(basis, penalty),
+    )
 
 
 def _alike(seen: np.ndarray) -> list[list[int]]:
@@ -103,10 +142,10 @@ def noise_level(samples: np.ndarray, rate_hz: float) -> np.ndarray:
     nyquist = 0.5 * rate_hz
     band = (min(_NOISE_BAND_HZ[0], 0.5 * nyquist), min(_NOISE_BAND_HZ[1], 0.9 * nyquist))
     width = min(max(16, round(_NOISE_WINDOW_S * rate_hz)), len(samples) - _NOISE_ORDER)
-    bridged = np.stack([_bridged(channel) for channel in samples.T], axis=1)
+    whole_curves = bridged(samples)
     # Differences first: slow motion, a thousand times the noise, must not leak into the band.
     f, t, power = spectrogram(
-        np.diff(bridged, _NOISE_ORDER, axis=0),
+        np.diff(whole_curves, _NOISE_ORDER, axis=0),
         rate_hz,
         axis=0,
         nperseg=width,
@@ -123,7 +162,7 @@ def noise_level(samples: np.ndarray, rate_hz: float) -> np.ndarray:
     level = np.sqrt(
         np.quantile(density[:, whole], 1 / 3, axis=1) * freedom / chi2.ppf(1 / 3, freedom) * nyquist
     )
-    scale = np.abs(bridged).max(axis=0)
+    scale = np.abs(whole_curves).max(axis=0)
     return np.maximum(level, 1e-9 * np.maximum(scale, 1.0))
 
 
@@ -135,9 +174,14 @@ def _whole_windows(samples: np.ndarray, first: np.ndarray, width: int) -> np.nda
     return whole if whole.any() else np.ones(len(first), dtype=bool)
 
 
-def _bridged(channel: np.ndarray) -> np.ndarray:
-    seen = np.isfinite(channel)
-    return np.interp(np.arange(len(channel)), np.flatnonzero(seen), channel[seen])
+def bridged(samples: np.ndarray) -> np.ndarray:
+    """(N, channels) with straight lines where NaN was; every channel has a sample."""
+    times = np.arange(len(samples))
+    out = np.empty_like(samples)
+    for k, channel in enumerate(samples.T):
+        seen = np.isfinite(channel)
+        out[:, k] = np.interp(times, times[seen], channel[seen])
+    return out
 
 
 class _Basis:
@@ -174,33 +218,77 @@ class _Basis:
     def curves(self) -> sparse.csr_array:
         return self._derivative(2)
 
+    def power(self, omega: np.ndarray) -> np.ndarray:
+        """Gain of B^T B far from the ends at these frequencies (radians per knot)."""
+        k = np.arange(-_DEGREE, _DEGREE + 1)
+        x = np.arange(-3 * self.samples_per_knot, 3 * self.samples_per_knot) / self.samples_per_knot
+        spline = BSpline.basis_element(np.arange(-3.0, 4.0), extrapolate=False)
+        products = [np.nansum(spline(x) * spline(x - shift)) for shift in k]
+        return np.cos(np.outer(omega, k)) @ np.array(products)
+
     @cached_property
     def knot_of_sample(self) -> np.ndarray:
         """(N,) fourth difference that is centred on each sample."""
         return np.clip(np.round(self.x).astype(int), 0, self.size - 5)
 
 
-def _stiffness(y: np.ndarray, seen: np.ndarray, window: int, basis: _Basis) -> np.ndarray:
-    """The stiffness at each fourth difference that the channels y (N, channels) share.
+def _penalty(
+    y: np.ndarray, seen: np.ndarray, window: int, basis: _Basis, skin: SkinNoise | None
+) -> _Penalty:
+    """The penalty that the channels y (N, channels) share; y in units of its white noise.
 
-    y in units of its noise. All channels share one stiffness: where each has its own, the errors
-    of pelvis and legs no longer cancel and a planted foot accelerates.
+    All channels share one: where each has its own, the errors of pelvis and legs no longer cancel
+    and a planted foot accelerates.
     """
     weights = np.where(seen, 1.0, _BRIDGE_WEIGHT)
     right = basis.values.T @ (weights[:, None] * y)
     normal = _normal(basis, weights)
     stiffness = np.full(basis.size - 4, _FIRST_STIFFNESS)
+    penalty = _Penalty(stiffness, _skin_share(stiffness, basis, skin))
     for _ in range(_ROUNDS):
-        c, inverse = _fit(normal, stiffness, right)
+        c, inverse = _fit(normal, penalty, right)
         leverage = seen * _variances(basis.values, inverse)
         known = np.bincount(basis.knot_of_sample, leverage, minlength=len(stiffness))
         new = _mean(known, window) / np.maximum(_mean(_pace(c), window), 1e-300)
         new = np.exp(_mean(np.log(np.clip(new, *_STIFFNESS_RANGE)), max(3, window // 4)))
         settled = np.max(np.abs(np.log(new / stiffness))) < 0.1
         stiffness = new
+        penalty = _Penalty(stiffness, _skin_share(stiffness, basis, skin))
         if settled:
             break
-    return stiffness
+    return penalty
+
+
+def _skin_share(stiffness: np.ndarray, basis: _Basis, skin: SkinNoise | None) -> float:
+    """Weight of the second differences: the skin's power over tau^2, both means over the trial."""
+    if skin is None:
+        return 0.0
+    corner, lowest = (2 * np.pi * f / basis.per_s for f in (skin.corner_hz, skin.from_hz))
+    share = corner**4 / float(np.mean(1.0 / stiffness))
+    return min(share, basis.samples_per_knot / lowest**4)
+
+
+def _curve_sd(basis: _Basis, penalty: _Penalty, inverse: np.ndarray) -> np.ndarray:
+    """(N,) sd of the second derivative over that of the white noise.
+
+    The skin's part has as much power at all frequencies that pass: the value's variance times it.
+    """
+    skin = penalty.second / penalty.fourth[basis.knot_of_sample] * basis.per_s**4
+    white = _variances(basis.curves, inverse)
+    return np.sqrt(white + skin * _variances(basis.values, inverse))
+
+
+def _cutoff_hz(basis: _Basis, penalty: _Penalty) -> np.ndarray:
+    """(N,) frequency at which the gain of the spline, were its stiffness constant, is one half."""
+    omega = np.linspace(0.0, np.pi, _FREQUENCIES + 1)[1:]
+    difference = 2 * np.sin(0.5 * omega)
+    signal = basis.power(omega)
+    stiffness = (signal - penalty.second * difference**4) / difference**8
+    falling = stiffness > 0.0  # beyond, the second differences alone leave less than half
+    hz = np.interp(
+        -np.log(penalty.fourth), -np.log(stiffness[falling]), omega[falling] * basis.per_s
+    ) / (2 * np.pi)
+    return hz[basis.knot_of_sample]
 
 
 def _normal(basis: _Basis, weights: np.ndarray) -> np.ndarray:
@@ -226,12 +314,13 @@ def _lower_band(matrix: sparse.csr_array) -> np.ndarray:
     return band
 
 
-def _fit(normal: np.ndarray, stiffness: np.ndarray, right: np.ndarray):
+def _fit(normal: np.ndarray, penalty: _Penalty, right: np.ndarray):
     """Coefficients and the band of the posterior covariance over sigma^2."""
     matrix = normal.copy()
-    for a in range(5):
-        for b in range(a, 5):
-            matrix[b - a, a : a + len(stiffness)] += _FOURTH[a] * _FOURTH[b] * stiffness
+    second = np.full(normal.shape[1] - 2, penalty.second)
+    for signs, weights in ((_FOURTH, penalty.fourth), (_SECOND, second)):
+        for a, b in combinations_with_replacement(range(len(signs)), 2):
+            matrix[b - a, a : a + len(weights)] += signs[a] * signs[b] * weights
     factor = cholesky_banded(matrix, lower=True)
     return cho_solve_banded((factor, True), right), _inverse_band(factor)
 

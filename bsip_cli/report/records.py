@@ -57,7 +57,8 @@ class TrialRecord:
 
 @dataclass(frozen=True)
 class ParticipantRecord:
-    """One participant; ``facts`` is the single row of the ``person`` artifact."""
+    """One participant; ``facts`` is the single row of the ``person`` artifact, ``loads`` the known
+    loads as (trial label, words)."""
 
     id: str
     facts: pd.Series
@@ -71,6 +72,7 @@ class ParticipantRecord:
     trials: tuple[TrialRecord, ...]
     refusals: tuple[Refusal, ...]
     origins: tuple[Origin, ...]
+    loads: tuple[tuple[str, str], ...] = ()
 
     def mass_kg(self) -> float:
         return float(self.facts["mass_kg"])

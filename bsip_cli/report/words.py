@@ -6,6 +6,8 @@ import math
 import re
 from collections.abc import Sequence
 
+from bsip_cli.body.names import in_words
+
 MISSING = "–"
 METHODS = {"measured": "measured", "RM": "RM (table)", "OM": "OM (identified)"}
 COMPONENTS = {
@@ -87,8 +89,7 @@ def trial_label(stem: str) -> str:
 
 def segment_label(segment: str) -> str:
     """``left upper arm`` for upper_arm_l."""
-    side = {"_l": "left ", "_r": "right "}.get(segment[-2:], "")
-    return (side + (segment[:-2] if side else segment)).replace("_", " ")
+    return in_words(segment)
 
 
 def component_label(component: str) -> str:

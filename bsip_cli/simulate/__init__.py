@@ -6,5 +6,7 @@ physically possible; `kinematics` poses all bodies; `wrench` gets the ground wre
 rate of momentum; `trial` splits it between the feet; `markers` and `recording` measure it
 as a lab would; `study` writes the folder, with the truth beside it.
 
-Nothing here is shared with the fitted side but the names of the segments.
+What `effects` hide changes the person, the plan or the instruments on this way; `injection`
+hides them in measured files. Nothing here is shared with the fitted side but names of
+segments and tables of markers.
 """

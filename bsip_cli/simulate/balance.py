@@ -15,6 +15,7 @@ fixed-point iteration on the pelvis' pose:
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -23,11 +24,14 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from bsip_cli.errors import NumericalError
 from bsip_cli.simulate.calculus import HALF_WIDTH, bridge, derivative, integral
-from bsip_cli.simulate.kinematics import Poses, poses_of
+from bsip_cli.simulate.kinematics import poses_of
+from bsip_cli.simulate.loads import GRAVITY, total_load
+from bsip_cli.simulate.mixing import Mixer
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
+from bsip_cli.simulate.poses import Poses
 from bsip_cli.simulate.rotations import euler_zxy, from_rotation_vector
-from bsip_cli.simulate.wrench import GRAVITY, Momentum, ball_load, locked_inertia, momentum_of
+from bsip_cli.simulate.wrench import Momentum, locked_inertia, momentum_of
 
 G = -GRAVITY[1]
 UP = np.array([0.0, 1.0, 0.0])
@@ -36,9 +40,14 @@ LONGEST_BRIDGE_S = 0.30
 LOWERING_REACH_S = 0.45
 TURN_REACH_S = 0.16
 HASTE = 1.35  # over-relaxation of the turns: the feet do not follow the pelvis
+RATE_WEIGHT_S = 0.05  # metres of path per rad/s of turning, in what mixing makes small
+LOADED_HASTE = 0.7  # what is carried turns with it, and `locked` does not know it
 CLOSE_ENOUGH_M = 2e-7  # and rad
+LOADED_CLOSE_ENOUGH_M = 2e-5
+EDGE_S = 0.05  # of the margin: one-sided differences of a load's acceleration
 STANDING_CLOSE_ENOUGH_M = 1e-6
 ROUGH_M = 1e-4
+DIVERGED_M = 50.0
 REFINING_SLACK = 0.0005  # reach kept back for what interpolation adds
 MOST_ROUNDS = 60
 MOST_LOWERINGS = 12
@@ -98,15 +107,25 @@ def _within_reach(person: Person, plan: Plan) -> tuple[State, float]:
     state = State(plan.pelvis_m, np.zeros_like(plan.pelvis_m))
     final = False
     for _ in range(MOST_LOWERINGS):
-        state, poses = _balance(person, _lowered(plan, lowered), state, final)
+        state, poses, left = _balance(person, _lowered(plan, lowered), state, final)
         excess = poses.excess_reach_m
-        if excess.max() == 0.0 and final:
+        if excess.max() == 0.0 and final and left < ROUGH_M:
             break
         final = final or excess.max() == 0.0
         further = _lowering(excess, plan)
         lowered = lowered + further
         state = state.moved(-further[:, None] * UP)
+    if not left < ROUGH_M:
+        raise _out_of_balance(left)
     return state, float(lowered.max())
+
+
+def _out_of_balance(left: float) -> NumericalError:
+    return NumericalError(
+        f"the movement does not come into balance: {1000 * left:.2g} mm or mrad are left",
+        expected=f"less than {1000 * ROUGH_M:g}",
+        remedy="use another seed or a smaller effect",
+    )
 
 
 def _lowering(excess_m: np.ndarray, plan: Plan) -> np.ndarray:
@@ -137,29 +156,51 @@ def _lowered(plan: Plan, by_m: np.ndarray) -> Plan:
     return replace(plan, pelvis_m=plan.pelvis_m - by_m[:, None] * UP, com_height_m=height)
 
 
-def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[State, Poses]:
-    """The fixed-point iteration; a rough one, without turns in flight, unless `final`."""
+def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[State, Poses, float]:
+    """The fixed-point iteration; a rough one, without turns in flight, unless `final`.
+
+    The number is the size of the last correction, in m or rad.
+    """
     cop = plan.cop_m()
     if plan.sway_share:
         state, cop = _with_sway(person, plan, state, cop)
-    tolerance = ROUGH_M
+    tolerance, mixer = ROUGH_M, Mixer()
     if final:
         tolerance = CLOSE_ENOUGH_M if plan.flights else STANDING_CLOSE_ENOUGH_M
+    if final and plan.loads and plan.flights:
+        tolerance = LOADED_CLOSE_ENOUGH_M
+    edge = EDGE_S / plan.step_s if plan.loads else 0
+    inner = slice(round(edge), len(plan) - round(edge))
     for _ in range(MOST_ROUNDS):
         poses = state.poses(person, plan)
         momentum = momentum_of(person.inertias, poses, plan.step_s)
-        ball_force, ball_moment = ball_load(plan.ball, poses, plan.step_s)
-        shift = _com_target(plan, momentum, cop, ball_force, ball_moment) - momentum.com_m
+        load_force, load_moment = total_load(plan.all_loads(), poses, plan.step_s)
+        shift = _com_target(plan, momentum, cop, load_force, load_moment) - momentum.com_m
         turn = np.zeros_like(shift)
         if final and plan.flights:
             locked = locked_inertia(person.inertias, poses, momentum.com_m)
-            rate = _turn_rate(plan, state.turn_rate, momentum, locked, ball_force, ball_moment)
+            rate = _turn_rate(plan, state.turn_rate, momentum, locked, load_force, load_moment)
             turn = rate - state.turn_rate
-        state = State(state.pelvis_m + shift, state.turn_rate + turn)
         turned = plan.step_s * np.abs(turn).sum(axis=0)
-        if max(np.abs(shift).max(), turned.max()) < tolerance:
+        left = max(np.abs(shift[inner]).max(), turned.max())
+        if not left < DIVERGED_M:
+            raise _out_of_balance(left)
+        if plan.loads:  # what is carried couples the pelvis' path and turns
+            shift, turn = _mixed(mixer, state, shift, turn)
+        state = State(state.pelvis_m + shift, state.turn_rate + turn)
+        if left < tolerance:
             break
-    return state, state.poses(person, plan)
+    return state, state.poses(person, plan), float(left)
+
+
+def _mixed(
+    mixer: Mixer, state: State, shift: np.ndarray, turn: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Better corrections of path and turning rate, both weighed alike."""
+    point = np.stack([state.pelvis_m, RATE_WEIGHT_S * state.turn_rate])
+    plain = np.stack([shift, RATE_WEIGHT_S * turn])
+    step = mixer.step(point.ravel(), plain.ravel()).reshape(point.shape)
+    return step[0], step[1] / RATE_WEIGHT_S
 
 
 def _with_sway(
@@ -183,19 +224,19 @@ def _com_target(
     plan: Plan,
     momentum: Momentum,
     cop_m: np.ndarray,
-    ball_force: np.ndarray,
-    ball_moment: np.ndarray,
+    load_force: np.ndarray,
+    load_moment: np.ndarray,
 ) -> np.ndarray:
     """(T, 3) path of the centre of mass that puts the COP where it is planned."""
-    height = _height_target(plan, momentum, ball_force)
+    height = _height_target(plan, momentum, load_force)
     mass = momentum.mass_kg
     lift = mass * (derivative(derivative(height, plan.step_s), plan.step_s) + G)
-    load = derivative(momentum.spin(), plan.step_s) + ball_moment
-    for first, last in plan.flights:  # only the ball acts, and the spin is kept
+    load = derivative(momentum.spin(), plan.step_s) + load_moment
+    for first, last in plan.flights:  # only the loads act, and the spin is kept
         air = slice(first, last + 1)
-        lift[air] = -ball_force[air, 1]
-        load[air] = np.cross(momentum.com_m[air], ball_force[air])
-    total = lift + ball_force[:, 1]
+        lift[air] = -load_force[air, 1]
+        load[air] = np.cross(momentum.com_m[air], load_force[air])
+    total = lift + load_force[:, 1]
     table = _CartTable(mass * height, lift, plan.step_s)
     ahead = _ahead(table, total * cop_m[:, 0] - load[:, 2], plan)
     aside = table.solve(total * cop_m[:, 1] + load[:, 0], 0.0)
@@ -238,31 +279,48 @@ def _ahead(table: _CartTable, moment: np.ndarray, plan: Plan) -> np.ndarray:
     return path
 
 
-def _height_target(plan: Plan, momentum: Momentum, ball_force: np.ndarray) -> np.ndarray:
-    """(T,) height of the centre of mass; a held ball slows its rise in flight.
+def _height_target(plan: Plan, momentum: Momentum, load_force: np.ndarray) -> np.ndarray:
+    """(T,) height of the centre of mass; what the body carries slows its rise in flight.
 
-    The prescribed height holds from the release on; before it, the body rises a little
-    faster, which a septic bridge in the stance before the flight prepares.
+    The prescribed height holds at each landing. Before it the body rises a little faster,
+    which a septic bridge in the stance before the flight prepares; another one in the
+    stance after it takes up what the load still does at the landing.
     """
     if plan.com_height_m is None:
         return momentum.com_m[:, 1]
     height = plan.com_height_m.copy()
-    if plan.ball is None:
+    if not plan.all_loads():
         return height
-    for first, last in plan.flights:
-        sink = -ball_force[first : last + 1, 1] / momentum.mass_kg
+    for (first, last), (before, after) in zip(plan.flights, _stances(plan), strict=True):
+        sink = -load_force[first : last + 1, 1] / momentum.mass_kg
         speed = integral(sink, plan.step_s)
         speed = speed - speed[-1]
         rise = integral(speed, plan.step_s)
         rise = rise - rise[-1]
         height[first : last + 1] += rise
-        before = min(first, round(LONGEST_BRIDGE_S / plan.step_s))
-        jerk = (sink[HALF_WIDTH + 1] - sink[0]) / ((HALF_WIDTH + 1) * plan.step_s)
-        takeoff = np.array([[rise[0]], [speed[0]], [sink[0]], [jerk]])
-        times = np.arange(before) * plan.step_s
-        prepared = bridge(np.zeros((4, 1)), takeoff, before * plan.step_s, times)
-        height[first - before : first] += prepared[:, 0]
+        k = HALF_WIDTH + 1  # beside the edges, where differences reach out of the flight
+        takeoff = np.array([rise[0], speed[0], sink[0], (sink[k] - sink[0]) / (k * plan.step_s)])
+        landing = np.array([0.0, 0.0, sink[-1], (sink[-1] - sink[-k - 1]) / (k * plan.step_s)])
+        height[first - before : first] += _bridge_from_rest(takeoff, before, plan.step_s)
+        # the same bridge, run backwards in time
+        settled = _bridge_from_rest(landing * [1.0, -1.0, 1.0, -1.0], after, plan.step_s)
+        height[last + 1 : last + 1 + after] += settled[::-1]
     return height
+
+
+def _bridge_from_rest(end: np.ndarray, samples: int, step_s: float) -> np.ndarray:
+    """(samples,) from nothing to a state: value, first, second and third derivative (4,)."""
+    times = np.arange(samples) * step_s
+    return bridge(np.zeros((4, 1)), end[:, None], samples * step_s, times)[:, 0]
+
+
+def _stances(plan: Plan) -> list[tuple[int, int]]:
+    """For each flight, how many samples on the ground before and after it serve as bridges."""
+    longest = round(LONGEST_BRIDGE_S / plan.step_s)
+    starts = [first for first, _ in plan.flights] + [len(plan)]
+    ends = [-1] + [last for _, last in plan.flights]
+    grounded = [min(longest, a - b - 1) for a, b in zip(starts, ends, strict=True)]
+    return list(pairwise(grounded))
 
 
 def _turn_rate(
@@ -270,8 +328,8 @@ def _turn_rate(
     rate: np.ndarray,
     momentum: Momentum,
     locked: np.ndarray,
-    ball_force: np.ndarray,
-    ball_moment: np.ndarray,
+    load_force: np.ndarray,
+    load_moment: np.ndarray,
 ) -> np.ndarray:
     """(T, 3) the pelvis' turning rate that keeps the angular momentum in flight.
 
@@ -280,16 +338,17 @@ def _turn_rate(
     for each group of flights, so that the pelvis comes back to its planned orientation.
     """
     weight = _near_flights(plan, TURN_REACH_S)
+    haste = LOADED_HASTE if plan.loads else HASTE
     result = np.zeros_like(rate)
     for group in _runs(weight > 0.0):
         w = weight[group, None]
-        torque = np.cross(momentum.com_m[group], ball_force[group]) - ball_moment[group]
+        torque = np.cross(momentum.com_m[group], load_force[group]) - load_moment[group]
         spin = momentum.spin()[group] - integral(torque, plan.step_s)
         mobility = np.linalg.inv(locked[group])
-        lacking = w * (rate[group] - HASTE * _apply(mobility, spin))
-        gain = HASTE * np.einsum("t,tij->ij", weight[group], mobility)
+        lacking = w * (rate[group] - haste * _apply(mobility, spin))
+        gain = haste * np.einsum("t,tij->ij", weight[group], mobility)
         kept = np.linalg.solve(gain, -lacking.sum(axis=0))
-        result[group] = lacking + HASTE * w * _apply(mobility, kept)
+        result[group] = lacking + haste * w * _apply(mobility, kept)
     return result
 
 

@@ -1,13 +1,21 @@
-"""The command ``bsip simulate``: presets and the few options a user chooses."""
+"""The commands ``bsip simulate`` and ``bsip inject``: presets and the options a user chooses."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import click
 
-from bsip_cli.errors import UsageError
+from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.simulate.asked import effects_of, pair_up
+from bsip_cli.simulate.injection.folder import (
+    inject_recording,
+    inject_study,
+    write_truth_of_recording,
+)
+from bsip_cli.simulate.options import StudyOptions
 from bsip_cli.simulate.presets import preset
 from bsip_cli.simulate.study import simulate_study
 
@@ -18,6 +26,10 @@ def simulate_command(
     participants: int | None,
     seed: int | None,
     sequence_s: float | None,
+    effects: Sequence[str] = (),
+    sizes: Sequence[float] = (),
+    targets: Sequence[str] = (),
+    effect_tasks: Sequence[str] = (),
 ) -> None:
     """Write a simulated study into a new or empty folder."""
     if study.exists() and any(study.iterdir()):
@@ -31,5 +43,51 @@ def simulate_command(
         options = replace(options, seed=seed)
     if sequence_s is not None:
         options = replace(options, durations_s={**options.durations_s, "sequence": sequence_s})
+    asked = pair_up(effects, sizes, targets)
+    options = replace(options, effects=asked, effect_tasks=tuple(effect_tasks))
     simulate_study(study, options)
     click.echo(f"bsip simulate: {options.participants} people in {study}", err=True)
+
+
+def inject_command(
+    source: Path,
+    out: Path,
+    participants: Sequence[str],
+    seed: int,
+    effects: Sequence[str],
+    sizes: Sequence[float],
+    targets: Sequence[str],
+    effect_tasks: Sequence[str],
+) -> int:
+    """Copy a study or one recording with effects hidden in it; returns the exit code."""
+    if not effects:
+        raise UsageError("nothing to hide", expected="at least one --effect with its --size")
+    if not source.exists():
+        raise UsageError("it does not exist", file=source, expected="a study or a recording")
+    asked = pair_up(effects, sizes, targets, simulated=False)
+    options = StudyOptions(seed=seed, effects=asked, effect_tasks=tuple(effect_tasks))
+    if source.is_file():
+        if participants or effect_tasks:
+            raise UsageError("one recording has no participants or tasks to choose from")
+        return _inject_one(source, out, options)
+    if out.exists() and any(out.iterdir()):
+        raise UsageError(
+            "the folder is not empty", file=out, remedy="name a new folder for the copy"
+        )
+    done = inject_study(source, out, options, participants)
+    for error in done.refused:
+        click.echo(f"bsip inject: {error}", err=True)
+    click.echo(f"bsip inject: {len(done.changed)} recordings changed in {out}", err=True)
+    return BadDataError.exit_code if done.refused or not done.changed else 0
+
+
+def _inject_one(source: Path, out: Path, options: StudyOptions) -> int:
+    """One recording; OUT is the new file, or a folder for it."""
+    copy = out if out.suffix.lower() == source.suffix.lower() else out / source.name
+    if copy.exists():
+        raise UsageError("the file is there already", file=copy, remedy="name a new one")
+    hidden = effects_of(options, 1)
+    facts = inject_recording(source, copy, hidden)
+    write_truth_of_recording(copy, hidden, facts)
+    click.echo(f"bsip inject: {copy}", err=True)
+    return 0

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from bsip_cli.simulate.people import SIDE_SIGN, SIDES, Person
 from bsip_cli.simulate.plan import Plan
+from bsip_cli.simulate.poses import Poses
 from bsip_cli.simulate.rotations import (
     about_axis,
     about_x,
@@ -22,37 +21,12 @@ from bsip_cli.simulate.rotations import (
 DOWN = np.array([0.0, -1.0, 0.0])
 
 
-@dataclass(frozen=True)
-class Poses:
-    """Poses of all bodies in one world frame.
-
-    rotation : (T, 3, 3) by body. origin_m : (T, 3) by body.
-    excess_reach_m : (T,) how far the feet were out of the legs' reach (0 = reachable).
-    """
-
-    rotation: dict[str, np.ndarray]
-    origin_m: dict[str, np.ndarray]
-    excess_reach_m: np.ndarray
-
-    def point(self, body: str, position_m: np.ndarray) -> np.ndarray:
-        """(T, 3) world path of a point (3,) of a body."""
-        return self.origin_m[body] + rotate(self.rotation[body], position_m)
-
-    def part(self, samples: slice) -> Poses:
-        """The same poses at some of the samples."""
-        return Poses(
-            {name: R[samples] for name, R in self.rotation.items()},
-            {name: p[samples] for name, p in self.origin_m.items()},
-            self.excess_reach_m[samples],
-        )
-
-
 def centre_of_mass(person: Person, poses: Poses) -> np.ndarray:
     """(T, 3) centre of mass of the whole body."""
     first = np.zeros_like(poses.origin_m["lower_torso"])
     for body, part in person.inertias.items():
         first += part.mass_kg * poses.point(body, part.com_m)
-    return first / person.mass_kg
+    return first / sum(part.mass_kg for part in person.inertias.values())
 
 
 def poses_of(
@@ -76,6 +50,8 @@ def _trunk(
     waist, bend = plan.angles_rad["waist"], person.trunk_bend
     abdomen = rotation["lower_torso"] @ euler_zxy((1.0 - bend) * waist)
     thorax = abdomen @ euler_zxy(bend * waist) if bend else abdomen
+    if "spine" in plan.angles_rad:
+        thorax = thorax @ euler_zxy(plan.angles_rad["spine"])
     rotation["abdomen"], rotation["thorax"] = abdomen, thorax
     origin["abdomen"] = origin["lower_torso"]
     upper_joint = origin["abdomen"] + rotate(abdomen, person.joints_m["tjc"])

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from bsip_cli.simulate.kinematics import Poses
 from bsip_cli.simulate.landmarks import Marker
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import Person
+from bsip_cli.simulate.poses import Poses
 from bsip_cli.simulate.rotations import rotate, transpose, unskew
 
 LAG_SMOOTHING_S = 0.02

@@ -14,6 +14,7 @@ ALL_TASKS = (
     "walking",
     "running",
 )
+MORE_TASKS = ("hops", "stepon")
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,15 @@ class Laboratory:
 
 
 @dataclass(frozen=True)
+class Asked:
+    """One effect as asked for; `target` as on the command line, may be empty."""
+
+    name: str
+    size: float
+    target: str = ""
+
+
+@dataclass(frozen=True)
 class StudyOptions:
     """A whole simulated study.
 
@@ -101,6 +111,8 @@ class StudyOptions:
     rates : by task name; "default" serves the others.
     ball_mass_kg : range from which the thrown ball's mass is drawn.
     sexes : one letter per participant, or empty to draw them alternately.
+    effects : hidden in the recordings. effect_tasks : in these tasks only; empty: wherever
+        each effect usually is.
     """
 
     participants: int = 6
@@ -112,6 +124,8 @@ class StudyOptions:
     laboratory: Laboratory = field(default_factory=Laboratory)
     ball_mass_kg: tuple[float, float] = (0.15, 0.40)
     sexes: str = ""
+    effects: tuple[Asked, ...] = ()
+    effect_tasks: tuple[str, ...] = ()
 
     def rates_of(self, task: str) -> Rates:
         return self.rates.get(task, self.rates.get("default", Rates()))

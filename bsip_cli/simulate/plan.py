@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bsip_cli.simulate.loads import Ball, Load
+
 STEP_S = 0.001
 
 
@@ -31,26 +33,11 @@ class Foot:
 
 
 @dataclass(frozen=True)
-class Ball:
-    """A ball in a hand; a point mass.
-
-    position_m : (3,) in the hand's frame.
-    hold : (T,) 1 while held, falling smoothly to 0 at the release.
-    release_s : when half the ball's load has left the hand, on the recording's clock.
-    """
-
-    body: str
-    mass_kg: float
-    position_m: np.ndarray
-    hold: np.ndarray
-    release_s: float
-
-
-@dataclass(frozen=True)
 class Plan:
     """A movement before balance. All arrays share one time axis.
 
     angles_rad : waist, neck (T, 3): flexion about Z, about X, about Y;
+        spine (T, 3), if given: the same, of the thorax on the abdomen;
         shoulder_* (T, 3): flexion, abduction, internal rotation; elbow_* (T,): flexion;
         wrist_* (T, 3): flexion, radial deviation, pronation.
     pelvis_angles_rad : (T, 3) about Z, X, Y in the walkway frame; (nominal in flight).
@@ -63,6 +50,7 @@ class Plan:
     sway_share : part of the unbalanced motion's COP excursion that is left standing.
     longest_reach : of a leg, as part of thigh plus shank; keeps knees from locking.
     keep : the part of the samples that is recorded.
+    ball : a ball in a hand. loads : what else the body carries or leans on.
     plate_centre_m : X and Z of the first plate's centre, walkway frame.
     """
 
@@ -78,6 +66,7 @@ class Plan:
     sway_share: float = 0.0
     longest_reach: float = 0.9985
     ball: Ball | None = None
+    loads: tuple[Load, ...] = ()
     plate_centre_m: tuple[float, float] = (0.0, 0.0)
     notes: dict[str, object] = field(default_factory=dict)
 
@@ -89,10 +78,13 @@ class Plan:
         left, right = self.feet["l"], self.feet["r"]
         return left.share[:, None] * left.cop_m + right.share[:, None] * right.cop_m
 
+    def all_loads(self) -> tuple[Load, ...]:
+        """The ball and everything else that the body has to move or to lean on."""
+        return self.loads if self.ball is None else (self.ball, *self.loads)
+
     def thinned(self, factor: int) -> Plan:
         """Every `factor`-th sample."""
         s = slice(None, None, factor)
-        ball = replace(self.ball, hold=self.ball.hold[s]) if self.ball else None
         return replace(
             self,
             step_s=self.step_s * factor,
@@ -101,7 +93,8 @@ class Plan:
             pelvis_m=self.pelvis_m[s],
             feet={side: _thinned_foot(foot, s) for side, foot in self.feet.items()},
             com_height_m=None if self.com_height_m is None else self.com_height_m[s],
-            ball=ball,
+            ball=self.ball.thinned(s) if self.ball else None,
+            loads=tuple(load.thinned(s) for load in self.loads),
             keep=slice(self.keep.start // factor, -(-self.keep.stop // factor)),
         )
 

@@ -51,7 +51,23 @@ def cohort() -> StudyOptions:
     )
 
 
-PRESETS = {"sample": sample, "cohort": cohort}
+def diagnosis() -> StudyOptions:
+    """One person for hidden effects: stiff trunk, no ball, landings, and an unloaded plate."""
+    return StudyOptions(
+        participants=1,
+        seed=2026,
+        tasks=("static", "sequence", "squat", "hops", "stepon"),
+        durations_s={
+            "static": 3.0,
+            "sequence": 60.0,
+            "squat": 10.0,
+            "hops": 6.0,
+            "stepon": 9.0,
+        },
+    )
+
+
+PRESETS = {"sample": sample, "cohort": cohort, "diagnosis": diagnosis}
 
 
 def preset(name: str) -> StudyOptions:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import ezc3d
 import numpy as np
 
+from bsip_cli.simulate.effects.base import Effect
+from bsip_cli.simulate.instruments import Instruments, SensingPlate
 from bsip_cli.simulate.markers import marker_paths
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
 from bsip_cli.simulate.people import Person
@@ -67,12 +70,9 @@ class Plate:
         """(3,) as in FORCE_PLATFORM:ORIGIN: from the transducers to the surface, z negative."""
         return np.array([0.0, 0.0, -self.depth_m])
 
-    def channels(self, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
-        """(T, 6) N and N mm for a ground wrench on the body about the lab's origin."""
-        local_force = force @ self.axes
-        at_centre = (moment - np.cross(self.centre_m, force)) @ self.axes
-        at_transducers = at_centre + np.cross(self.origin_m(), local_force)
-        return np.hstack([local_force, MM * at_transducers])
+    def sensing(self) -> SensingPlate:
+        """How it reads a wrench."""
+        return SensingPlate(self.axes, self.centre_m, self.centre_m - self.axes @ self.origin_m())
 
 
 def walkway_pose(trial: Trial, laboratory: Laboratory, heading_error_rad: float) -> Pose:
@@ -141,6 +141,7 @@ class Measurement:
     points_m : (frames, markers, 3) in the lab, NaN where a marker is lost.
     channels : (samples, 6 per plate) N and N mm in each plate's frame, not yet quantised.
     pose : where the walkway lies in the lab (truth).
+    start_s : of the first frame on the movement's clock (truth).
     """
 
     labels: list[str]
@@ -149,6 +150,7 @@ class Measurement:
     plates: list[Plate]
     rates: Rates
     pose: Pose
+    start_s: float
 
 
 def measure_trial(
@@ -159,8 +161,9 @@ def measure_trial(
     richness: Richness,
     rng: np.random.Generator,
     heading_error_rad: float = 0.0,
+    effects: Sequence[Effect] = (),
 ) -> Measurement:
-    """Sample markers and plates of a trial, with soft tissue, noise and gaps."""
+    """Sample markers and plates of a trial, with soft tissue, noise, gaps and hidden effects."""
     pose = walkway_pose(trial, laboratory, heading_error_rad)
     plates = plates_of(laboratory)
     frames = len(trial.time_s) * rates.marker_hz // SIMULATION_HZ
@@ -168,24 +171,35 @@ def measure_trial(
     paths = marker_paths(person, sampled, rates.marker_hz, richness, rng)
     points = np.stack([pose.points(path[:frames]) for path in paths.values()], axis=1)
     samples = frames * rates.analog_hz // rates.marker_hz
-    channels = [
-        _noisy_channels(wrench, plate, rates.analog_hz, richness, rng)[:samples]
+    every = SIMULATION_HZ // rates.analog_hz
+    readings = [
+        plate.sensing().reading(*wrench, np.zeros(3))[::every][:samples]
         for wrench, plate in zip(plate_wrenches(trial, plates, pose), plates, strict=True)
     ]
-    return Measurement(list(paths), points, np.hstack(channels), plates, rates, pose)
+    delivered = Instruments(
+        labels=tuple(paths),
+        points_m=points,
+        marker_hz=rates.marker_hz,
+        plates=tuple(plate.sensing() for plate in plates),
+        readings=np.stack(readings),
+        analog_hz=rates.analog_hz,
+        up=np.array([0.0, 0.0, 1.0]),
+    )
+    for effect in effects:
+        delivered = effect.measured(delivered)
+    channels = np.hstack([_noisy_channels(r, richness, rng) for r in delivered.readings])
+    return Measurement(
+        list(delivered.labels), delivered.points_m, channels, plates, rates, pose, delivered.start_s
+    )
 
 
 def _noisy_channels(
-    wrench: tuple[np.ndarray, np.ndarray],
-    plate: Plate,
-    rate_hz: int,
-    richness: Richness,
-    rng: np.random.Generator,
+    reading: np.ndarray, richness: Richness, rng: np.random.Generator
 ) -> np.ndarray:
-    """(N, 6) channels of one plate at the analog rate, sampled directly."""
-    channels = plate.channels(*wrench)[:: SIMULATION_HZ // rate_hz]
-    noise = np.repeat([richness.force_noise_n, MM * richness.moment_noise_nm], 3)
-    return channels + noise * rng.standard_normal(channels.shape)
+    """(N, 6) channels of one plate in N and N mm."""
+    noise = np.repeat([richness.force_noise_n, richness.moment_noise_nm], 3)
+    unit = np.repeat([1.0, MM], 3)
+    return unit * (reading + noise * rng.standard_normal(reading.shape))
 
 
 def quantised(channels: np.ndarray) -> np.ndarray:
@@ -204,11 +218,14 @@ def write_trial(
     rng: np.random.Generator,
     heading_error_rad: float = 0.0,
     subject: str = "sub-01",
-) -> Pose:
-    """Measure a trial and write it; returns where the walkway lies in the lab."""
-    measurement = measure_trial(trial, person, rates, laboratory, richness, rng, heading_error_rad)
+    effects: Sequence[Effect] = (),
+) -> Measurement:
+    """Measure a trial and write it; returns what was measured."""
+    measurement = measure_trial(
+        trial, person, rates, laboratory, richness, rng, heading_error_rad, effects
+    )
     write_measurement(path, measurement, richness.quantised, subject)
-    return measurement.pose
+    return measurement
 
 
 def write_measurement(

@@ -9,8 +9,9 @@ import numpy as np
 
 from bsip_cli.simulate.curves import step
 from bsip_cli.simulate.landmarks import heel_and_toe_m
+from bsip_cli.simulate.loads import Ball
 from bsip_cli.simulate.people import SIDE_SIGN, SIDES, Person
-from bsip_cli.simulate.plan import STEP_S, Ball, Foot, Plan
+from bsip_cli.simulate.plan import STEP_S, Foot, Plan
 from bsip_cli.simulate.rotations import about_y, about_z, euler_zxy, rotate
 
 MARGIN_S = 0.1  # simulated before and after what is recorded

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import UsageError
+from bsip_cli.simulate.asked import effects_of, touches
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
-from bsip_cli.simulate.options import ALL_TASKS, Rates, StudyOptions
+from bsip_cli.simulate.options import ALL_TASKS, MORE_TASKS, Rates, StudyOptions
 from bsip_cli.simulate.people import Person, draw_person
 from bsip_cli.simulate.recording import SIMULATION_HZ, write_trial
 from bsip_cli.simulate.trial import simulate_trial
@@ -21,6 +22,7 @@ HEADING_SPREAD_RAD = np.deg2rad(2.0)
 SCALE_SPREAD_KG = 0.1
 # Which stream of random numbers serves what, so that no draw depends on another's count.
 PERSON, MOVEMENT, RECORDING, LABORATORY = range(4)
+TASK_STREAMS = (*ALL_TASKS, "", *MORE_TASKS)  # new tasks at the end: old studies stay the same
 
 
 def simulate_study(folder: Path, options: StudyOptions) -> StudyTruth:
@@ -41,7 +43,12 @@ def check_options(options: StudyOptions) -> None:
     """Refuse options that no study can have."""
     unknown = [task for task in options.tasks if task not in MOVEMENTS]
     if unknown:
-        raise UsageError(f"unknown tasks {unknown}", expected=", ".join(ALL_TASKS))
+        raise UsageError(f"unknown tasks {unknown}", expected=", ".join(MOVEMENTS))
+    absent = [task for task in options.effect_tasks if task not in options.tasks]
+    if absent:
+        raise UsageError(
+            f"no trials of the tasks {absent} to hide effects in", expected=", ".join(options.tasks)
+        )
     if options.participants < 1:
         raise UsageError("no participants", expected="at least one")
     for task in options.tasks:
@@ -64,7 +71,7 @@ def generator(options: StudyOptions, number: int, use: int, task: str = "") -> n
 
 def seed_of(options: StudyOptions, number: int, use: int, task: str = "") -> list[int]:
     """The seed sequence behind `generator`."""
-    return [options.seed, number, use, ALL_TASKS.index(task) if task else len(ALL_TASKS)]
+    return [options.seed, number, use, TASK_STREAMS.index(task)]
 
 
 def participant_person(options: StudyOptions, number: int) -> Person:
@@ -78,6 +85,9 @@ def simulate_participant(folder: Path, options: StudyOptions, number: int) -> Pa
     """Write all recordings and the truth of one participant."""
     name = f"sub-{number:02d}"
     person = participant_person(options, number)
+    effects = effects_of(options, number)
+    for effect in effects:
+        person = effect.person(person)
     lab = generator(options, number, LABORATORY)
     heading_error = HEADING_SPREAD_RAD * lab.standard_normal()
     ball_mass = float(lab.uniform(*options.ball_mass_kg))
@@ -85,14 +95,16 @@ def simulate_participant(folder: Path, options: StudyOptions, number: int) -> Pa
     trials = {}
     for task in options.tasks:
         stem = f"{name}_task-{task}" + ("" if task == "static" else "_run-1")
+        active = [e for e in effects if touches(e, task, options.effect_tasks)]
         trial = simulate_trial(
             person,
             task,
             generator(options, number, MOVEMENT, task),
             options.durations_s.get(task, DEFAULT_DURATION_S[task]),
             ball_mass,
+            active,
         )
-        pose = write_trial(
+        measurement = write_trial(
             folder / name / f"{stem}.c3d",
             trial,
             person,
@@ -102,13 +114,17 @@ def simulate_participant(folder: Path, options: StudyOptions, number: int) -> Pa
             generator(options, number, RECORDING, task),
             heading_error,
             name,
+            active,
         )
-        trials[stem] = trial_record(trial, pose, seed_of(options, number, MOVEMENT, task))
+        trials[stem] = trial_record(
+            trial, measurement, active, seed_of(options, number, MOVEMENT, task)
+        )
     truth = ParticipantTruth(name, person, trials)
     record = {
         "participant_id": name,
         "options": asdict(options),
         "person": person_record(person),
+        "effects": [{**effect.record(), **effect.facts(person)} for effect in effects],
         "trials": trials,
     }
     _write_text(folder / "truth" / f"{name}_truth.json", json.dumps(record, indent=1) + "\n")

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from bsip_cli.simulate.balance import balanced
-from bsip_cli.simulate.kinematics import Poses
+from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
 from bsip_cli.simulate.people import SIDES, Person
 from bsip_cli.simulate.plan import STEP_S, Foot, Plan
+from bsip_cli.simulate.poses import Poses
 from bsip_cli.simulate.wrench import ground_wrench
 
 THIN = 4  # trials without flight are balanced at 250 Hz and interpolated
@@ -73,17 +75,22 @@ def simulate_trial(
     rng: np.random.Generator,
     duration_s: float | None = None,
     ball_mass_kg: float = 0.3,
+    effects: Sequence[Effect] = (),
 ) -> Trial:
-    """Draw a movement and make it physically possible."""
+    """Draw a movement, hide effects in it, and make it physically possible."""
     duration = DEFAULT_DURATION_S[task] if duration_s is None else duration_s
+    for effect in effects:
+        person = effect.body(person)
     plan = MOVEMENTS[task](person, rng, duration, ball_mass_kg)
+    for effect in effects:
+        plan = effect.plan(person, plan)
     poses = balanced(person, plan, 1 if plan.flights else THIN)
     return trial_of(person, task, plan, poses)
 
 
 def trial_of(person: Person, task: str, plan: Plan, poses: Poses) -> Trial:
     """Wrenches of a balanced movement, cut to what is recorded."""
-    force, moment = ground_wrench(person.inertias, poses, plan.step_s, plan.ball)
+    force, moment = ground_wrench(person.inertias, poses, plan.step_s, plan.all_loads())
     keep, planned = plan.keep, plan.cop_m()
     feet_force, feet_moment = {}, {}
     for side in SIDES:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.inertia import Inertia
 from bsip_cli.simulate.people import Person
-from bsip_cli.simulate.recording import Pose
+from bsip_cli.simulate.recording import Measurement
 from bsip_cli.simulate.trial import Trial
 
 
@@ -64,13 +66,21 @@ def inertia_record(part: Inertia) -> dict[str, float]:
     return {name: float(value) for name, value in record.items()}
 
 
-def trial_record(trial: Trial, pose: Pose, seed: list[int]) -> dict[str, object]:
-    """Contacts, ball, plate pose and summary of one trial."""
+def trial_record(
+    trial: Trial, measurement: Measurement, effects: Sequence[Effect], seed: list[int]
+) -> dict[str, object]:
+    """Contacts, ball, effects, plate pose and summary of one trial.
+
+    Times are on the movement's clock, on which the file starts at `recorded_from_s`.
+    """
+    pose = measurement.pose
     ball = trial.plan.ball
     force, _ = trial.plate_wrench()
     return {
         "seed": seed,
-        "duration_s": len(trial.time_s) / 1000.0,
+        "duration_s": len(measurement.points_m) / measurement.rates.marker_hz,
+        "recorded_from_s": measurement.start_s,
+        "effects": [effect.name for effect in effects],
         "ball": None
         if ball is None
         else {

@@ -6,17 +6,16 @@ numerical differentiation of positions and rotations. No equations of motion of 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from bsip_cli.simulate.calculus import derivative
 from bsip_cli.simulate.inertia import Inertia
-from bsip_cli.simulate.kinematics import Poses
-from bsip_cli.simulate.plan import Ball
+from bsip_cli.simulate.loads import GRAVITY, Load, total_load
+from bsip_cli.simulate.poses import Poses
 from bsip_cli.simulate.rotations import rotate, transpose, unskew
-
-GRAVITY = np.array([0.0, -9.81, 0.0])
 
 
 @dataclass(frozen=True)
@@ -68,27 +67,16 @@ def _parallel(r: np.ndarray) -> np.ndarray:
     return square - r[:, :, None] * r[:, None, :]
 
 
-def ball_load(ball: Ball | None, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Force (T, 3) that moves the ball, and its moment (T, 3) about the origin."""
-    zero = np.zeros_like(next(iter(poses.origin_m.values())))
-    if ball is None:
-        return zero, zero
-    r = poses.point(ball.body, ball.position_m)
-    acceleration = derivative(derivative(r, step_s), step_s)
-    force = ball.hold[:, None] * ball.mass_kg * (acceleration - GRAVITY)
-    return force, np.cross(r, force)
-
-
 def ground_wrench(
-    inertias: dict[str, Inertia], poses: Poses, step_s: float, ball: Ball | None = None
+    inertias: dict[str, Inertia], poses: Poses, step_s: float, loads: Iterable[Load] = ()
 ) -> tuple[np.ndarray, np.ndarray]:
     """Force (T, 3) [N] on the body and moment (T, 3) [N m] about the walkway's origin."""
     momentum = momentum_of(inertias, poses, step_s)
     weight = momentum.mass_kg * GRAVITY
-    ball_force, ball_moment = ball_load(ball, poses, step_s)
-    force = derivative(momentum.linear, step_s) - weight + ball_force
+    load_force, load_moment = total_load(loads, poses, step_s)
+    force = derivative(momentum.linear, step_s) - weight + load_force
     gravity_moment = np.cross(momentum.com_m, weight)
-    moment = derivative(momentum.angular, step_s) - gravity_moment + ball_moment
+    moment = derivative(momentum.angular, step_s) - gravity_moment + load_moment
     return force, moment
 
 

@@ -14,10 +14,13 @@ from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.dynamics.base_parameters import expressions, find_basis
 from bsip_cli.dynamics.lowpass import stretches
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.identification.base import base_parameters
+from bsip_cli.identification.data_share import in_words
 from bsip_cli.identification.equations import Recording, accumulate, residual_series
 from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.identification.excitation import excitation
+from bsip_cli.identification.movement_gain import advice
 from bsip_cli.identification.noise import even_noise, noise_of
 from bsip_cli.identification.prior import Prior, Spread, likeliest, prior_of
 from bsip_cli.identification.uncertainty import readable
@@ -29,6 +32,7 @@ from bsip_cli.stages.frames import (
     coordinates_from,
     person_from,
 )
+from bsip_cli.stages.known_loads import load_phi, load_words, loads_record
 from bsip_cli.study import Trial
 from bsip_cli.unit import Unit
 
@@ -45,7 +49,7 @@ def run(unit: Unit) -> None:
     regression = unit.read("regression")
     prior = _prior(unit, regression, person)
     trials = _identification_trials(unit)
-    recordings, blocks = _recordings(unit, skeleton, trials)
+    recordings, blocks = _recordings(unit, person, trials)
     if _duration_s(recordings) < _SHORTEST_S:
         _write_table_only(unit, regression, recordings)
         return
@@ -68,11 +72,13 @@ def run(unit: Unit) -> None:
         facts={
             "reference_m": reference.tolist(),
             "noise_rms": problem.noise.rms.tolist(),
+            "loads": {trial.stem: loads_record(unit, trial) for trial in trials},
         },
     )
     unit.write("base-parameters", _base_table(skeleton, problem))
-    unit.write("excitation", _excitation_table(skeleton, problem))
-    unit.write("identification", _summary(unit, problem, estimates, methods, trials))
+    first = readable(next(iter(estimates.values())), prior)
+    unit.write("excitation", _excitation_table(person, problem, first.share))
+    unit.write("identification", _summary(unit, problem, estimates, methods, blocks))
     unit.write("used-blocks", blocks)
 
 
@@ -128,21 +134,40 @@ def _identification_trials(unit: Unit) -> list[Trial]:
 
 
 def _recordings(
-    unit: Unit, skeleton: Skeleton, trials: list[Trial]
+    unit: Unit, person: Person, trials: list[Trial]
 ) -> tuple[list[Recording], pd.DataFrame]:
+    """Motion and the wrench of the person alone, and the stretches that may identify."""
     recordings, blocks = [], []
     for trial in trials:
         kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
         times = kinematics["time_s"].to_numpy()
         rate = 1.0 / float(np.median(np.diff(times)))
         use = _usable(unit, trial) & ~_held_out(unit, times)
+        if not use.any():
+            unit.warn(
+                f"{unit.name}: {trial.stem} has no frame with all contacts on plates; left out"
+            )
+            continue
         for start, stop in stretches(use):
             blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})
-        measured = np.nan_to_num(wrench[WRENCH].to_numpy())
-        motion = coordinates_from(kinematics, skeleton)
-        level = acceleration_noise(kinematics, skeleton)
+        motion = coordinates_from(kinematics, person.skeleton)
+        carried = _load_wrench(unit, person, trial, *motion)
+        measured = np.nan_to_num(wrench[WRENCH].to_numpy()) - carried
+        level = acceleration_noise(kinematics, person.skeleton)
         recordings.append(Recording(*motion, measured, use, rate, level))
     return recordings, pd.DataFrame(blocks, columns=["trial", "start_s", "end_s"])
+
+
+def _load_wrench(
+    unit: Unit, person: Person, trial: Trial, q: np.ndarray, v: np.ndarray, a: np.ndarray
+) -> np.ndarray:
+    """(N, 6) part of the ground wrench that a trial's known loads need."""
+    if not unit.loads(trial):
+        return np.zeros((len(q), 6))
+    known = load_words(unit, trial)
+    unit.warn(f"{unit.name}: taken off the forces of {trial.stem} as a known load: {known}")
+    phi = load_phi(unit, person, trial)[:, None]
+    return predicted_wrench(pinocchio_model(person), q, v, a, phi, np.zeros(3))[..., 0]
 
 
 def _duration_s(recordings: list[Recording]) -> float:
@@ -174,8 +199,6 @@ def _problem(
     judgement = (
         options.trust_ratio,
         options.sigma_percent_limit,
-        options.frame_sd_m,
-        options.frame_sd_rad,
         options.spread_weight,
     )
     equations = accumulate(model, recordings, cutoff, reference)
@@ -200,18 +223,35 @@ def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
             "sigma_percent": fit.sigma_percent(),
             "rm_value": fit.rm_values,
         }
-    )
+    ).sort_values("sigma_percent", kind="stable", ignore_index=True)
 
 
-def _excitation_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
+def _excitation_table(person: Person, problem: Problem, share: np.ndarray) -> pd.DataFrame:
+    """``share`` (n, 10) are OM's data shares."""
     found = excitation(problem)
-    rows = [("condition_number", "", found.condition_number)]
-    rows += [("singular_value", str(k + 1), v) for k, v in enumerate(found.singular_values)]
+    names = person.skeleton.segments
+    rows = [("condition_number", "", found.condition_number, "1", "", "")]
     rows += [
-        ("segment", name, share)
-        for name, share in zip(skeleton.segments, found.segment_share, strict=True)
+        ("singular_value", str(k + 1), value, "1", "", "")
+        for k, value in enumerate(found.singular_values)
     ]
-    return pd.DataFrame(rows, columns=["quantity", "name", "value"])
+    for k, name in enumerate(names):
+        rows += [
+            ("segment", name, found.segment_share[k], "1", name, ""),
+            ("combinations", name, float(found.combinations[k]), "1", name, ""),
+            ("data_share", name, share[k].mean(), "1", name, in_words(share[k])),
+        ]
+    helpful = advice(problem, person, pinocchio_model(person))
+    for quantity, gains in (("movement", helpful.alone), ("next", helpful.together)):
+        rows += [
+            (quantity, g.movement.name, 100 * g.share, "%", names[g.best_segment], g.movement.text)
+            for g in gains
+        ]
+    rows += [
+        ("movement_forces", g.movement.name, 100 * g.wrench, "%", "", g.movement.text)
+        for g in helpful.alone
+    ]
+    return pd.DataFrame(rows, columns=["quantity", "name", "value", "unit", "segment", "text"])
 
 
 def _summary(
@@ -219,7 +259,7 @@ def _summary(
     problem: Problem,
     estimates: dict[str, Estimate],
     methods: dict[str, str],
-    trials: list[Trial],
+    blocks: pd.DataFrame,
 ) -> pd.DataFrame:
     names = [f"rms_{name}" for name in WRENCH]
     condition = excitation(problem).condition_number
@@ -229,7 +269,7 @@ def _summary(
             {
                 "estimator": name,
                 "method": methods[name],
-                "trials": ", ".join(trial.stem for trial in trials),
+                "trials": ", ".join(blocks["trial"].unique()),
                 "samples": problem.equations.samples,
                 "duration_s": problem.equations.duration_s,
                 "effective_samples": float(problem.noise.effective.sum()),

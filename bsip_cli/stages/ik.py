@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import astuple, fields
 
 import numpy as np
 import pandas as pd
 
+from bsip_cli.body.names import the_joint
 from bsip_cli.body.person import Person
-from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.motion.inverse_kinematics import Poses, solve_trial
 from bsip_cli.motion.marker_events import MarkerEvent, summaries
-from bsip_cli.motion.marker_evidence import marker_evidence
+from bsip_cli.motion.marker_evidence import Evidence, marker_evidence
 from bsip_cli.motion.marker_fit import MarkerFit, marker_fit
 from bsip_cli.motion.smoothing import Motion, smooth_motion
 from bsip_cli.stages.frames import markers_from, ordered_markers, person_from
@@ -21,19 +23,26 @@ _MOST_SAID = 5  # of a trial's sentences about single markers
 
 
 def run(unit: Unit) -> None:
-    """Read markers and the person; write kinematics, marker-residuals and marker-events."""
+    """Read markers and the person; write kinematics, marker-residuals and marker-events.
+
+    Poses and residuals are those after exchanged labels were put right.
+    """
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     frame = unit.read("markers")
     times, labels, positions = markers_from(frame)
     markers = ordered_markers(labels, positions, person.markers)
-    poses, decided = _poses(unit, person, markers)
-    known, angle_sd = _determined(unit, person, poses, decided)
-    rate = 1.0 / float(np.median(np.diff(times)))
     filled = frame["filled"].to_numpy().reshape(len(times), len(labels), 1)
     filled = ordered_markers(labels, filled, person.markers)[..., 0] == 1
-    events = _events(unit, person, markers, filled, times, poses)
-    motion = smooth_motion(person, poses.q, known, rate, **unit.config.smoothing.model_dump())
+    poses, decided = _solved(unit, person, markers)
+    evidence = _evidence(unit, person, markers, filled, times, poses)
+    if evidence.put_right():
+        poses, decided = _solved(unit, person, evidence.markers_m)
+    known, angle_sd = _determined(unit, person, poses, decided)
+    rate = 1.0 / float(np.median(np.diff(times)))
+    options = unit.config.smoothing.model_dump()
+    options["robust_limit_m"] = unit.config.ik.robust_limit_m
+    motion = smooth_motion(person, poses.q, known, rate, markers=evidence.markers_m, **options)
     unit.write(
         "kinematics",
         _kinematics(times, angle_sd, poses, motion, skeleton),
@@ -49,19 +58,14 @@ def run(unit: Unit) -> None:
             }
         ),
     )
-    unit.write("marker-events", events)
-
-
-def _poses(unit: Unit, person: Person, markers: np.ndarray) -> tuple[Poses, np.ndarray]:
-    """Poses, and which coordinates (nv,) the markers decide; the others are held near neutral."""
-    poses, decided = _solved(unit, person, markers)
-    if not decided.all():
-        names = ", ".join(np.array(person.skeleton.v_names)[~decided])
-        unit.warn(f"{unit.name}: no markers decide {names}; held near the neutral pose")
-    return poses, decided
+    columns = [field.name for field in fields(MarkerEvent)]
+    unit.write(
+        "marker-events", pd.DataFrame([astuple(one) for one in evidence.events], columns=columns)
+    )
 
 
 def _solved(unit: Unit, person: Person, markers: np.ndarray) -> tuple[Poses, np.ndarray]:
+    """Poses, and which coordinates (nv,) the markers decide; the others are held near neutral."""
     options = unit.config.ik
     fixed = options.model_dump(include={"marker_sd_m", "robust_limit_m", "iterations"})
     poses = solve_trial(person, markers, posture_sd_rad=options.posture_sd_rad, **fixed)
@@ -79,9 +83,12 @@ def _determined(
     """Joints (N, joints) whose angles the markers decide in a frame as they do in most frames.
 
     A joint beyond an undecided one is undecided too. Also the largest standard deviation (N,) of
-    an angle that most frames decide.
+    an angle that most frames decide. The user is told what markers do not decide.
     """
     skeleton = person.skeleton
+    if not decided.all():
+        names = ", ".join(_undecided(skeleton, decided))
+        unit.warn(f"{unit.name}: no markers decide {names}; held near the neutral pose")
     sd = np.where(decided, poses.coordinate_sd, 0.0)
     sd[:, :3] = 0.0  # the base's position is in metres
     of_joint = np.maximum.reduceat(sd, skeleton.v_starts, axis=1)
@@ -89,21 +96,36 @@ def _determined(
     known = (of_joint < unit.config.ik.undetermined_sd_rad) & seen[:, None]
     for i, parent in enumerate(skeleton.parents[1:], start=1):
         known[:, i] &= known[:, parent]
-    lost = [name for name, ok in zip(skeleton.joints, known.all(axis=0), strict=True) if not ok]
+    lost = [
+        the_joint(name)
+        for name, ok in zip(skeleton.joints, known.all(axis=0), strict=True)
+        if not ok
+    ]
     if lost:
         count = int((~known.all(axis=1)).sum())
         unit.warn(f"{unit.name}: {count} frames without a pose of {', '.join(lost)}")
     return known, of_joint.max(axis=1)
 
 
-def _events(
+def _undecided(skeleton: Skeleton, decided: np.ndarray) -> Iterator[str]:
+    """Joints of which some coordinates are not decided, in words."""
+    of_joints = np.split(decided, skeleton.v_starts[1:])
+    for joint, angles in zip(skeleton.joints, of_joints, strict=True):
+        count = int((~angles).sum())
+        if count == len(angles):
+            yield the_joint(joint)
+        elif count:
+            yield f"{count} of {len(angles)} coordinates of {the_joint(joint)}"
+
+
+def _evidence(
     unit: Unit,
     person: Person,
     markers: np.ndarray,
     filled: np.ndarray,
     times: np.ndarray,
     poses: Poses,
-) -> pd.DataFrame:
+) -> Evidence:
     """Markers that jump, slip, bear another's label or sit wrong; the user is told the worst."""
     scales = unit.config.ik.model_dump(include={"marker_sd_m", "robust_limit_m"})
 
@@ -111,10 +133,9 @@ def _events(
         return marker_fit(person, other, _solved(unit, person, other)[0].q, at, **scales)
 
     found = marker_evidence(marker_fit(person, markers, poses.q, times, **scales), refit, filled)
-    for sentence in summaries(found, _MOST_SAID):
+    for sentence in summaries(found.events, _MOST_SAID):
         unit.warn(f"{unit.name}: {sentence}")
-    columns = [field.name for field in fields(MarkerEvent)]
-    return pd.DataFrame([astuple(one) for one in found], columns=columns)
+    return found
 
 
 def _kinematics(times, angle_sd, poses: Poses, motion: Motion, skeleton):
@@ -125,6 +146,7 @@ def _kinematics(times, angle_sd, poses: Poses, motion: Motion, skeleton):
                 "determined": motion.inner,
                 "marker_rms_m": poses.frame_rms_m(),
                 "angle_sd_rad": angle_sd,
+                "cutoff_hz": motion.cutoff_hz,
             }
         )
     ]

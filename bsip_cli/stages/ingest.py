@@ -123,10 +123,10 @@ def _contacts(unit, recording, marker_set, names, filled, wrench: FrameWrench) -
 
 
 def _mass_kg(unit: Unit, wrench: FrameWrench) -> float:
-    """Stated mass; without one, what the plates carry in the middle of the trial."""
+    """Mass on the plates: stated mass and known loads, or what the plates carry in mid-trial."""
     assert unit.participant is not None
     if unit.participant.mass_kg is not None:
-        return unit.participant.mass_kg
+        return unit.participant.mass_kg + unit.load_kg()
     vertical = wrench.total[:, 2]
     loaded = vertical[vertical > 100.0]
     return float(np.median(loaded) / _GRAVITY_M_S2) if len(loaded) else 70.0

@@ -16,6 +16,7 @@ from bsip_cli.dynamics.pinocchio_model import GRAVITY_M_S2, pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH, coordinates_from, person_from
+from bsip_cli.stages.known_loads import load_phi, loads_record
 from bsip_cli.statistics.correlation_tests import fisher_z_difference, williams_t
 from bsip_cli.statistics.effective_samples import effective_samples_of_pair
 from bsip_cli.statistics.fit_measures import fit_measures
@@ -46,7 +47,11 @@ def run(unit: Unit) -> None:
     signals = {
         name: _signals(wrench, height, anterior, min_force) for name, wrench in wrenches.items()
     }
-    unit.write("reconstruction", _reconstruction(times, wrenches, signals, valid, used))
+    unit.write(
+        "reconstruction",
+        _reconstruction(times, wrenches, signals, valid, used),
+        facts={"loads": loads_record(unit)},
+    )
     unit.write("fit", _fit(signals, judged, weight, data))
     unit.write("correlation-difference", _correlations(signals, judged))
     unit.write("posturography", _sway(signals, judged, times))
@@ -56,8 +61,9 @@ def run(unit: Unit) -> None:
 
 
 def _wrenches(unit: Unit, person: Person, kinematics, measured, valid, times) -> dict:
-    """(N, 6) per method, all through the same low-pass within valid stretches."""
+    """(N, 6) per method, known loads included, all through the same low-pass in valid stretches."""
     methods, phi = _parameters(unit.read("bsip"), person)
+    phi = phi + load_phi(unit, person)[:, None]
     q, v, a = coordinates_from(kinematics, person.skeleton)
     simulated = predicted_wrench(pinocchio_model(person), q, v, a, phi, np.zeros(3))
     raw = {"measured": measured[WRENCH].to_numpy()}

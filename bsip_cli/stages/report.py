@@ -22,6 +22,7 @@ from bsip_cli.report.records import Origin, ParticipantRecord, Refusal, TrialRec
 from bsip_cli.report.words import ROLES, trial_label
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.frames import person_from
+from bsip_cli.stages.known_loads import load_words
 from bsip_cli.study import Participant, Trial
 from bsip_cli.unit import Unit
 
@@ -97,7 +98,15 @@ def record_of(unit: Unit) -> ParticipantRecord:
         trials=tuple(_trial_record(unit, trial, usable) for trial in _by_role(unit.participant)),
         refusals=refusals_of(unit, unit.participant),
         origins=_origins(unit, usable),
+        loads=_loads(unit),
     )
+
+
+def _loads(unit: Unit) -> tuple[tuple[str, str], ...]:
+    """Label of a trial and the known loads in it, for the trials that carry any."""
+    assert unit.participant is not None
+    carrying = [trial for trial in _by_role(unit.participant) if unit.loads(trial)]
+    return tuple((trial_label(trial.stem), load_words(unit, trial)) for trial in carrying)
 
 
 def _by_role(participant: Participant) -> list[Trial]:

@@ -8,12 +8,14 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
+from bsip_cli.body.names import in_words
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.calibration import Calibration, calibrate
 from bsip_cli.motion.inverse_kinematics import solve_poses, solve_trial, tree_of
 from bsip_cli.motion.scaling import Refinement, ScalingOptions, refine, varied_frames
 from bsip_cli.stages.frames import WRENCH, markers_from, ordered_markers
+from bsip_cli.stages.known_loads import load_words
 from bsip_cli.study import Trial
 from bsip_cli.unit import Unit
 
@@ -54,7 +56,7 @@ def run(unit: Unit) -> None:
         unit.warn(f"{unit.name}: {note}")
     fit = _refine(unit, calibration, recorded, still, quiet)
     plate_mass = _plate_mass(unit, still, quiet)
-    mass, source = _mass(unit, plate_mass)
+    mass, source = _mass(unit, plate_mass, load_words(unit, still.trial))
     _warn_missing(unit, skeleton, marker_set, fit)
     unit.write("skeleton", _skeleton_table(skeleton, calibration, fit))
     unit.write("marker-positions", _marker_table(skeleton, calibration, fit))
@@ -171,18 +173,22 @@ def _refine(
 
 
 def _plate_mass(unit: Unit, still: _Recorded, quiet: slice) -> float:
-    """Mass [kg] that the plates read in quiet standing, NaN where they do not tell."""
+    """Mass [kg] that the plates read in quiet standing, known loads taken off; NaN if unknown."""
     wrench = unit.read("wrench", still.trial)
     valid = wrench["valid"].to_numpy().copy()
     inside = np.zeros(len(valid), dtype=bool)
     inside[quiet] = True
     force = wrench[WRENCH[2]].to_numpy()[valid & inside]
-    return float(force.mean() / _GRAVITY_M_S2) if len(force) else float("nan")
+    if not len(force):
+        return float("nan")
+    return float(force.mean() / _GRAVITY_M_S2) - unit.load_kg(still.trial)
 
 
-def _mass(unit: Unit, plate_mass: float) -> tuple[float, str]:
+def _mass(unit: Unit, plate_mass: float, load: str) -> tuple[float, str]:
+    """Mass of the person and where it is from; ``load``: what was taken off the plates' reading."""
     assert unit.participant is not None
     stated = unit.participant.mass_kg
+    without = f" without the known load ({load})" if load else ""
     if stated is None:
         if not plate_mass > 10:
             raise BadDataError(
@@ -191,14 +197,14 @@ def _mass(unit: Unit, plate_mass: float) -> tuple[float, str]:
                 expected="a stated mass, or a quiet stretch with all contacts on plates",
                 remedy="put the mass into participants.tsv",
             )
-        unit.warn(f"{unit.name}: mass {plate_mass:.2f} kg taken from the plates")
+        unit.warn(f"{unit.name}: mass {plate_mass:.2f} kg taken from the plates{without}")
         return plate_mass, "plates"
     difference = 100 * (plate_mass - stated) / stated
     limit = unit.config.ingest.mass_tolerance_percent
     if abs(difference) > limit:
         unit.warn(
-            f"{unit.name}: the plates read {plate_mass:.2f} kg in quiet standing, stated are "
-            f"{stated:.2f} kg ({difference:+.1f} %, tolerance {limit:g} %)"
+            f"{unit.name}: the plates read {plate_mass:.2f} kg in quiet standing{without}, stated "
+            f"are {stated:.2f} kg ({difference:+.1f} %, tolerance {limit:g} %)"
         )
     return stated, "participants.tsv"
 
@@ -211,7 +217,9 @@ def _warn_missing(unit: Unit, skeleton: Skeleton, marker_set: MarkerSet, fit: Re
         if held:
             known = [m.label for m in marker_set.markers if m.segment == segment]
             serve = f"; {', '.join(known)} would do" if known else ""
-            unit.warn(f"{unit.name}: no markers on {segment}, its joint is held{serve}")
+            unit.warn(
+                f"{unit.name}: no markers on the {in_words(segment)}, its joint is held{serve}"
+            )
 
 
 def _skeleton_table(skeleton: Skeleton, calibration: Calibration, fit: Refinement) -> pd.DataFrame:

@@ -43,15 +43,17 @@ def kinds(tree: ast.Module, *methods: str) -> set[str]:
     }
 
 
-def knows_roles(tree: ast.Module) -> bool:
-    return any(isinstance(node, ast.Attribute) and node.attr == "role" for node in ast.walk(tree))
+def attributes(tree: ast.Module) -> set[str]:
+    return {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=LABELS)
 def test_declares_every_option_it_looks_up(stage):
     """An undeclared option would change results without a rerun."""
     tree = tree_of(stage)
-    used = options_used(tree) | ({"roles"} if knows_roles(tree) else set())
+    used, looked_at = options_used(tree), attributes(tree)
+    used |= {"roles"} if "role" in looked_at else set()
+    used |= {"loads"} if {"loads", "load_kg"} & looked_at else set()
     assert used <= set(stage.options)
 
 

@@ -163,7 +163,7 @@ def test_missing_landmarks_are_all_named():
     with pytest.raises(BadDataError) as caught:
         joint_centres(landmarks, "M", STATURE_M)
     found = caught.value.found
-    for name in [*gone[:5], "a metatarsal of foot_l", "psis_l and psis_r, or sacrum"]:
+    for name in [*gone[:5], "a metatarsal of the left foot", "psis_l and psis_r, or sacrum"]:
         assert name in found
     assert "foot_r" not in found
     assert caught.value.remedy

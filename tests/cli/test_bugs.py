@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bsip_cli import session
+from bsip_cli.artifacts import read_header
 from bsip_cli.config import load_config
 from bsip_cli.pipeline import Stage
 from bsip_cli.runner import run_stages
@@ -17,6 +18,9 @@ STAGES = {
     "deadly": 'import os\ndef run(unit):\n    if unit.name == "sub-01":\n        os._exit(9)\n',
     "numeric": "from bsip_cli.errors import NumericalError\ndef run(unit):\n"
     '    raise NumericalError("no optimum", file=unit.name)\n',
+    "doubtful": "from bsip_cli.errors import BadDataError\ndef run(unit):\n"
+    '    unit.warn(f"{unit.name}: the labels look exchanged")\n'
+    '    raise BadDataError("no pose", file=unit.name)\n',
 }
 
 
@@ -94,3 +98,18 @@ def test_numerical_failure_is_code_4(stage, empty_study, tmp_path, monkeypatch, 
     code = session.run_session("run", empty_study, tmp_path / "out", (), None, jobs=1, force=True)
     assert code == 4
     assert "numeric: sub-01: no optimum." in capsys.readouterr().err
+
+
+def test_warnings_of_a_refused_unit_are_told_before_the_refusal_and_kept_with_it(
+    stage, empty_study, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(session, "stages_named", lambda name: (stage("doubtful", "participant"),))
+    out = tmp_path / "out"
+    code = session.run_session("run", empty_study, out, (), None, jobs=1, force=True)
+    assert code == 3
+    assert capsys.readouterr().err.splitlines()[:2] == [
+        "doubtful: sub-01: the labels look exchanged",
+        "doubtful: sub-01: no pose.",
+    ]
+    refusal = read_header(out / "sub-01" / "sub-01_refusal-doubtful.parquet", "refusal")
+    assert refusal["provenance"]["messages"] == ["sub-01: the labels look exchanged"]

@@ -25,10 +25,12 @@ HEAVY = [
     "statsmodels",
 ]
 STAGE_COMMANDS = [*dict.fromkeys(stage.name for stage in STAGES), "run"]
-OTHER_COMMANDS = ["simulate", "show", "info"]
+OTHER_COMMANDS = ["simulate", "inject", "export", "show", "info"]
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["ingest", "--help"], ["simulate", "--help"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["ingest", "--help"], ["simulate", "--help"], ["export", "--help"]]
+)
 def test_imports_nothing_heavy(arguments):
     code = (
         "import sys; from bsip_cli.cli import cli; "

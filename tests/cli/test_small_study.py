@@ -447,6 +447,28 @@ def test_warnings_are_told_and_kept(run, bsip):
     assert told.removeprefix("scale: ") in kept
 
 
+def test_exchanged_labels_are_put_right_before_the_poses(run):
+    """The knee's markers bear each other's labels for a second: as if nothing had been."""
+    stem = f"sub-01_{TRIALS[1]}"
+    clean = read_artifact(run.path("kinematics", stem), "kinematics")
+    path = run.path("markers", stem)
+    markers, notes = read_artifact(path, "markers"), read_header(path)["provenance"]
+    swap = {"RKNEL": "RKNEM", "RKNEM": "RKNEL"}
+    wrong = markers["time_s"].between(1.0, 2.0)
+    markers.loc[wrong, "marker"] = markers.loc[wrong, "marker"].replace(swap)
+    markers = markers.sort_values(["time_s", "marker"], kind="stable", ignore_index=True)
+    write_artifact(path, "markers", markers, notes)
+    outcome = perform(unit_of(run, "ik", stem))
+    assert any("; put right" in sentence for sentence in outcome.sentences)
+    events = read_artifact(run.path("marker-events", stem), "marker-events")
+    (event,) = events[events["kind"] == "swap"].itertuples()
+    assert {event.marker, event.partner} == set(swap)
+    assert (event.start_s, event.end_s) == pytest.approx((1.0, 2.0), abs=0.021)
+    assert event.put_right
+    kinematics = read_artifact(run.path("kinematics", stem), "kinematics")
+    pd.testing.assert_frame_equal(kinematics, clean, atol=1e-6)
+
+
 def test_every_schema_is_exercised(first_run):
     """Nothing above would notice a kind that no run writes."""
     kinds = {Path(name).stem.split("_")[-1] for name in first_run.files() if "parquet" in name}

@@ -59,4 +59,4 @@ def fitted(markers: np.ndarray, times: np.ndarray) -> MarkerFit:
 
 
 def events_of(times: np.ndarray, markers: np.ndarray, filled: np.ndarray | None = None):
-    return marker_evidence(fitted(markers, times), fitted, filled)
+    return marker_evidence(fitted(markers, times), fitted, filled).events

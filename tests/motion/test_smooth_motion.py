@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing_person import Swing, standing
+from standing_person import Swing, markers_of, standing
 
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.errors import BadDataError
@@ -17,7 +17,9 @@ OPTIONS = {
     "method": "spline",
     "butterworth_cutoff_hz": 6.0,
     "pace_window_s": 0.5,
-    "noise_factor": 1.0,
+    "skin_factor": 1.0,
+    "skin_from_hz": 5.0,
+    "robust_limit_m": 0.025,
     "edge_s": 0.1,
 }
 
@@ -30,7 +32,13 @@ def swing():
 
 
 def smoothed(person, q, **changes):
-    return smooth_motion(person, q, np.ones(len(q), dtype=bool), RATE_HZ, **(OPTIONS | changes))
+    """Where no ``markers`` are given, they lie where the poses put them."""
+    return smoothed_where(person, q, np.ones(len(q), dtype=bool), **changes)
+
+
+def smoothed_where(person, q, determined, **changes):
+    given = {"markers": markers_of(person, q)} | OPTIONS | changes
+    return smooth_motion(person, q, determined, RATE_HZ, **given)
 
 
 def relative(found, true):
@@ -123,7 +131,9 @@ def test_a_curve_off_the_unit_sphere_turns_as_the_one_on_it():
     second = (270 * (x[4] + x[2]) - 27 * (x[5] + x[1]) + 2 * (x[6] + x[0]) - 490 * x[3]) / (
         180 * h**2
     )
-    signal = SmoothSignal(*(part[None] for part in (x[3], first, second, np.zeros(4))))
+    signal = SmoothSignal(
+        *(part[None] for part in (x[3], first, second, np.zeros(4), np.zeros(())))
+    )
     unit, found_omega, found_alpha, _ = _angular(signal, slice(0, 4))
     np.testing.assert_allclose(unit[0], [0, 0, 0, 1], atol=1e-12)
     np.testing.assert_allclose(found_omega[0], omega, atol=1e-8)
@@ -132,8 +142,6 @@ def test_a_curve_off_the_unit_sphere_turns_as_the_one_on_it():
 
 def noisy(person, q, sd_m, seed):
     """Poses solved from shaken markers."""
-    from standing_person import markers_of
-
     from bsip_cli.motion.inverse_kinematics import solve_poses
 
     markers = markers_of(person, q)
@@ -173,6 +181,33 @@ def test_butterworth_halves_power_at_its_cutoff():
     assert gain == pytest.approx(np.sqrt(0.5), rel=0.02)
 
 
+def test_butterworth_leaves_half_at_the_stated_cutoff():
+    person = standing().person
+    times = np.arange(1000) / RATE_HZ
+    q = np.repeat(standing().q[None], 1000, axis=0)
+    stated = smoothed(person, q, method="butterworth", butterworth_cutoff_hz=5.0).cutoff_hz
+    q[:, 0] += 0.1 * np.sin(2 * np.pi * stated[0] * times)
+    motion = smoothed(person, q, method="butterworth", butterworth_cutoff_hz=5.0)
+    assert np.std(motion.q[200:-200, 0]) / np.std(q[200:-200, 0]) == pytest.approx(0.5, rel=0.02)
+
+
+def test_swinging_skin_lowers_the_cutoff(swing):
+    """Markers that swing about their places: the poses are smoothed more."""
+    person, _, (times, q, _, _) = swing
+    shaken = q + np.random.default_rng(4).normal(0, 2e-4, q.shape)
+    still = markers_of(person, shaken)
+    hz = np.arange(2.0, 10.0)
+    phase = np.random.default_rng(3).uniform(0, 2 * np.pi, (len(hz), *still.shape[1:]))
+    waves = np.sin(2 * np.pi * hz[:, None, None] * times[:, None, None, None] + phase)
+    skin = (0.02 / hz[:, None, None] ** 2 * waves).sum(axis=1)
+    plain, soft = (smoothed(person, shaken, markers=m) for m in (still, still + skin))
+    assert np.median(soft.cutoff_hz) < 0.9 * np.median(plain.cutoff_hz)
+    unmoved, moved = (
+        smoothed(person, shaken, markers=m, skin_factor=0.0) for m in (still, still + skin)
+    )
+    np.testing.assert_array_equal(moved.a, unmoved.a)
+
+
 @pytest.mark.parametrize("method", ["spline", "butterworth"])
 def test_undetermined_frames_are_bridged(swing, method):
     person, _, (_, q, v, _) = swing
@@ -180,7 +215,7 @@ def test_undetermined_frames_are_bridged(swing, method):
     determined[300:306] = False
     wild = q.copy()
     wild[300:306] = wild[0]
-    motion = smooth_motion(person, wild, determined, RATE_HZ, **(OPTIONS | {"method": method}))
+    motion = smoothed_where(person, wild, determined, method=method)
     assert np.isfinite(motion.a).all()
     if method == "spline":
         assert relative(motion.v[270:336], v[270:336]) < 0.02
@@ -194,7 +229,7 @@ def test_a_joint_without_a_pose_leaves_the_others_alone(swing):
     known = np.ones((len(q), len(skeleton.joints)), dtype=bool)
     known[250:284, wrist] = False
     noisy = q + np.random.default_rng(7).normal(0, 2e-4, q.shape)
-    holed = smooth_motion(person, noisy, known, RATE_HZ, **OPTIONS)
+    holed = smoothed_where(person, noisy, known)
     whole = smoothed(person, noisy)
     own = slice(skeleton.v_starts[wrist], skeleton.v_starts[wrist] + 3)
     others = np.delete(np.arange(a.shape[1]), range(own.start, own.stop))
@@ -216,4 +251,4 @@ def test_too_few_frames(swing):
     determined = np.zeros(len(q), dtype=bool)
     determined[:11] = True
     with pytest.raises(BadDataError, match="11 frames"):
-        smooth_motion(person, q, determined, RATE_HZ, **OPTIONS)
+        smoothed_where(person, q, determined)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from bsip_cli.motion.splines import noise_level, smooth
+from bsip_cli.motion.splines import SkinNoise, noise_level, smooth
 
 NOISE = 0.0005  # m
 WINDOW_S = 0.5
@@ -150,6 +150,74 @@ def test_channels_are_smoothed_by_one_linear_operator():
     np.testing.assert_allclose(
         found.second[:, 0] + found.second[:, 1], found.second[:, 2], atol=1e-8
     )
+
+
+def shaken(rng, times, corner_hz, white):
+    """White noise, and noise of the same power at the corner that falls like 1 / f^4."""
+    f = np.fft.rfftfreq(len(times), times[1] - times[0])
+    f[0] = np.inf
+    spectrum = np.fft.rfft(rng.normal(0, white, len(times))) * (corner_hz / f) ** 2
+    return rng.normal(0, white, len(times)) + np.fft.irfft(spectrum, len(times))
+
+
+@pytest.mark.parametrize("rate_hz", [100.0, 250.0])
+def test_knowing_the_skins_noise_helps(rate_hz):
+    """And the stated standard deviation of the acceleration is that of its error."""
+    times = np.arange(round(20 * rate_hz)) / rate_hz
+    frequency = 2 * np.pi * np.array([0.4, 0.8, 1.1, 1.6])
+    value = (0.1 * np.sin(times[:, None] * frequency)).sum(axis=1)
+    second = -(0.1 * frequency**2 * np.sin(times[:, None] * frequency)).sum(axis=1)
+    rng = np.random.default_rng(10)
+    samples = np.stack([value + shaken(rng, times, 20.0, 1e-4) for _ in range(12)], axis=1)
+    inner = (times > 1) & (times < times[-1] - 1)
+
+    def found(skin):
+        signal = smooth(samples, rate_hz, WINDOW_S, np.full(12, 1e-4), skin)
+        return rms((signal.second - second[:, None])[inner]), rms(signal.second_sd[inner])
+
+    blind, _ = found(None)
+    error, stated = found(SkinNoise(corner_hz=20.0, from_hz=2.0))
+    assert error < 0.75 * blind
+    assert stated == pytest.approx(error, rel=0.25)
+
+
+@pytest.mark.parametrize("rate_hz", [50.0, 100.0, 250.0])
+@pytest.mark.parametrize("skin", [None, SkinNoise(corner_hz=9.0, from_hz=3.0)])
+def test_the_gain_is_one_half_at_the_stated_cutoff(rate_hz, skin):
+    """A small ripple at the cut-off goes through by half."""
+    times = np.arange(round(16 * rate_hz)) / rate_hz
+    rng = np.random.default_rng(11)
+    swing = 0.1 * np.sin(2 * np.pi * 1.2 * times) + 0.01 * np.sin(2 * np.pi * 2.9 * times)
+    samples = swing[:, None] + rng.normal(0, NOISE, (len(times), 20))
+    sigma = np.full(20, NOISE)
+    plain = smooth(samples, rate_hz, 4.0, sigma, skin)
+    middle = slice(len(times) // 4, -len(times) // 4)
+    cutoff = np.median(plain.cutoff_hz[middle])
+    ripple = 1e-3 * NOISE * np.sin(2 * np.pi * cutoff * times)
+    through = smooth(samples + ripple[:, None], rate_hz, 4.0, sigma, skin).value - plain.value
+    gain = rms(through[middle]) / rms(ripple[middle])
+    assert gain == pytest.approx(0.5, abs=0.04)
+
+
+def test_the_skin_is_never_taken_to_swing_more_than_the_motion_below_a_frequency():
+    times = np.arange(2000) / 100
+    samples = 0.01 * np.sin(2 * np.pi * 1.0 * times)[:, None]
+    samples = samples + np.random.default_rng(12).normal(0, 1e-4, samples.shape)
+    skin = SkinNoise(corner_hz=1000.0, from_hz=4.0)
+    found = smooth(samples, 100.0, WINDOW_S, np.array([1e-4]), skin)
+    inner = slice(100, -100)
+    kept = rms(found.value[inner]) / rms(samples[inner])
+    assert kept > 0.98
+    assert found.cutoff_hz.max() < 4.1
+
+
+def test_a_burst_has_a_higher_cutoff():
+    times = np.arange(1000) / 100
+    value, _, _ = paced(times)
+    samples = value[:, None] + np.random.default_rng(13).normal(0, NOISE, (1000, 8))
+    cutoff = smooth(samples, 100.0, WINDOW_S).cutoff_hz
+    assert cutoff.shape == (1000,)
+    assert cutoff[500] > 2 * np.median(cutoff[:300])
 
 
 @pytest.mark.parametrize(

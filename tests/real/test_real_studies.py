@@ -51,6 +51,20 @@ def marker_rms_mm(out: Path, stem: str) -> float:
     return 1000 * float(np.sqrt((rms**2).mean()))
 
 
+def swaps_of(out: Path, stem: str) -> list[tuple[set[str], bool]]:
+    """Pairs of markers that bear each other's labels, and whether that was put right."""
+    events = pd.read_parquet(out / stem.split("_")[0] / f"{stem}_marker-events.parquet")
+    swaps = events[events["kind"] == "swap"]
+    return [({one.marker, one.partner}, one.put_right) for one in swaps.itertuples()]
+
+
+def residuals_mm(out: Path, stem: str) -> pd.Series:
+    """RMS distance of each marker from the model."""
+    table = pd.read_parquet(out / stem.split("_")[0] / f"{stem}_marker-residuals.parquet")
+    squares = table.assign(square=table["residual_m"] ** 2).groupby("marker")["square"].mean()
+    return 1000 * np.sqrt(squares)
+
+
 @pytest.fixture(scope="module")
 def opencap(tmp_path_factory):
     root = tmp_path_factory.mktemp("opencap")
@@ -68,7 +82,7 @@ def test_opencap_runs_and_says_what_it_met(opencap):
     done, out = opencap
     assert done.returncode == 0, done.stderr
     assert "the plates read 60.06 kg in quiet standing, stated are 62.60 kg" in done.stderr
-    assert "no markers on head" in done.stderr
+    assert "no markers on the head" in done.stderr
     assert (out / "sub-01" / "report.html").exists()
     assert (out / "group" / "tables" / "table2_cop_rmse.csv").exists()
 
@@ -116,8 +130,15 @@ def test_figaroh_runs_without_static_trial_mass_or_height(figaroh):
 def test_figaroh_om_beats_rm_on_blocks_it_has_not_seen(figaroh):
     rmse = fit_of(figaroh[1], "sub-01_task-sequence_run-1")
     assert (rmse["data"] == "held_out").all()
-    assert rmse.loc["cop_ap", "OM"] < 0.7 * rmse.loc["cop_ap", "RM"]
+    assert rmse.loc["cop_ap", "OM"] < 0.75 * rmse.loc["cop_ap", "RM"]
     assert rmse.loc["fz", "OM"] < rmse.loc["fz", "RM"]
+
+
+def test_figaroh_wrist_labels_that_change_place_are_put_right(figaroh):
+    """From 45.6 s on; as labelled, the hand was turned over and the worst of them 7.4 mm off."""
+    stem = "sub-01_task-sequence_run-1"
+    assert swaps_of(figaroh[1], stem) == [({"RWRA", "RWRB"}, True)]
+    assert residuals_mm(figaroh[1], stem)[["RWRA", "RWRB", "RFIN"]].max() < 6.6
 
 
 def test_biobuddy_runs_and_the_four_kilograms_show(tmp_path):
@@ -134,6 +155,10 @@ def test_biobuddy_runs_and_the_four_kilograms_show(tmp_path):
     # Identified from a one-leg trial that reads 62 kg, OM misses the static trial's 66 kg.
     rmse = fit_of(tmp_path / "out", "sub-01_task-static")
     assert rmse.loc["fz", "OM"] > 20 > rmse.loc["fz", "RM"]
+    # The epicondyles' labels change place between trials; as labelled they are 100 mm off.
+    assert ({"RLHE", "RMHE"}, True) in swaps_of(tmp_path / "out", "sub-01_task-rightknee")
+    assert residuals_mm(tmp_path / "out", "sub-01_task-rightknee")[["RLHE", "RMHE"]].max() < 10
+    assert ({"RLFE", "RMFE"}, True) in swaps_of(tmp_path / "out", "sub-01_task-righthip")
     knee = fit_of(tmp_path / "out", "sub-01_task-rightknee")
     assert knee.loc["cop_ml", "OM"] < knee.loc["cop_ml", "RM"]
 

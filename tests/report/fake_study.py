@@ -294,6 +294,7 @@ class Artifacts:
             "determined": np.ones(len(t), bool),
             "marker_rms_m": 0.006 + 0.001 * np.sin(t),
             "angle_sd_rad": np.full(len(t), 0.01),
+            "cutoff_hz": np.full(len(t), 6.0),
         }
         return pd.concat([pd.DataFrame(table), q], axis=1)
 
@@ -421,9 +422,23 @@ def base_parameters() -> pd.DataFrame:
 
 
 def excitation(skeleton: Skeleton) -> pd.DataFrame:
-    rows = [("condition_number", "", 812.0), ("singular_value", "1", 3.5)]
-    rows += [("segment", name, 0.05 * (k + 1)) for k, name in enumerate(skeleton.segments)]
-    return pd.DataFrame(rows, columns=["quantity", "name", "value"])
+    rows = [("condition_number", "", 812.0, "1", "", ""), ("singular_value", "1", 3.5, "1", "", "")]
+    for k, name in enumerate(skeleton.segments):
+        rows += [
+            ("segment", name, 0.05 * (k + 1), "1", name, ""),
+            ("combinations", name, float(k), "1", name, ""),
+            ("data_share", name, 0.04 * (k + 1), "1", name, f"mass: data {k} %"),
+        ]
+    for quantity in ("movement", "next"):
+        rows += [
+            (quantity, "kicks_l", 3.21, "%", "shank_l", "swing the left shank"),
+            (quantity, "head_nods", 1.25, "%", "head", "nod"),
+        ]
+    rows += [
+        ("movement_forces", "head_nods", 7.0, "%", "", "nod"),
+        ("movement_forces", "kicks_l", 43.0, "%", "", "swing the left shank"),
+    ]
+    return pd.DataFrame(rows, columns=["quantity", "name", "value", "unit", "segment", "text"])
 
 
 def marker_events() -> pd.DataFrame:
@@ -438,6 +453,7 @@ def marker_events() -> pd.DataFrame:
                 "size_m": 0.015,
                 "statistic": 9.0,
                 "sentence": f"RKNEL slips 15 mm on {EVIL}",
+                "put_right": False,
             }
         ]
     )

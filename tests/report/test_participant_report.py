@@ -107,3 +107,24 @@ def test_second_run_gives_the_same_bytes(reports):
     before = reports.files("report-files", person)
     reports.run("report", person)
     assert reports.files("report-files", person).equals(before)
+
+
+def test_excitation_and_advice_are_said_in_words(text):
+    assert (
+        "Of 1 combination of parameters that ground forces can show, this movement shows 1" in text
+    )
+    assert "Not excited: lower torso." in text  # the only one without a known combination
+    assert "mass: data 4 %" in text
+    assert "Swing the left shank: 3.2 points, most of all for the left shank." in text
+    assert "Nod: another 1.2 points, most of all for the head." in text
+    assert "it would help least to nod (1.25)" in text
+    assert "Swing the left shank left shank 3.21 43 Nod head 1.25 7" in text
+    assert "lets the data decide 40 %" in text
+
+
+def test_base_parameters_best_first_and_counted(text):
+    """The fake ones have sigma from 1 to 77 %, one of 14 below 5 %."""
+    assert "determine 14 combinations of the parameters. 1 of them is known" in text
+    assert "The 10 base parameters known best" in text
+    assert "The 4 base parameters known worst" in text
+    assert text.index("parameter 0 ") < text.index("parameter 13 ")

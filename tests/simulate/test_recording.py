@@ -25,7 +25,7 @@ def _written(tmp_path, trial, person, richness, laboratory=None, rates=None):
     path = tmp_path / "trial.c3d"
     rng = np.random.default_rng(5)
     rates = rates or Rates(100, 1000)
-    pose = write_trial(path, trial, person, rates, laboratory, richness, rng, 0.03)
+    pose = write_trial(path, trial, person, rates, laboratory, richness, rng, 0.03).pose
     return ezc3d.c3d(str(path), extract_forceplat_data=True), pose, plates_of(laboratory)
 
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from bsip_cli.simulate.inertia import Inertia
-from bsip_cli.simulate.kinematics import Poses
+from bsip_cli.simulate.loads import GRAVITY
+from bsip_cli.simulate.poses import Poses
 from bsip_cli.simulate.rotations import about_z
 from bsip_cli.simulate.trial import Trial
-from bsip_cli.simulate.wrench import GRAVITY, centre_of_pressure, ground_wrench, momentum_of
+from bsip_cli.simulate.wrench import centre_of_pressure, ground_wrench, momentum_of
 
 STEP_S = 0.001
 STANDING = ("static", "sequence", "squat", "throwing")

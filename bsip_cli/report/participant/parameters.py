@@ -9,6 +9,7 @@ import pandas as pd
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Heading, Paragraph, Picture, Section
 from bsip_cli.report.figures.com_differences import ComDifferences, com_differences
 from bsip_cli.report.figures.segment_masses import SegmentMasses, segment_masses
+from bsip_cli.report.participant.excitation import base_blocks, excitation_blocks
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.words import (
     count,
@@ -17,7 +18,6 @@ from bsip_cli.report.words import (
     percent,
     segment_label,
     signed,
-    significant,
     with_spread,
 )
 from bsip_cli.schemas import share_name
@@ -26,7 +26,6 @@ DECIDED, FROM_TABLE = 0.8, 0.2
 _COM = ("com_x_m", "com_y_m", "com_z_m")
 _MOMENTS = ("ixx_kgm2", "iyy_kgm2", "izz_kgm2")
 _MM, _KG_CM2 = 1e3, 1e4
-_WORST, _LEAST = 10, 3
 
 
 def section(record: ParticipantRecord) -> Section:
@@ -53,9 +52,9 @@ def section(record: ParticipantRecord) -> Section:
         "The inertial parameters",
         (
             *blocks,
-            Heading("How well the movement excited the parameters"),
-            *_excitation(record),
-            *_base(record),
+            *excitation_blocks(record),
+            *_identification(record.identification),
+            *base_blocks(record),
         ),
     )
 
@@ -80,7 +79,8 @@ def _in_words(om: pd.DataFrame) -> str:
         text += f"For {count(unknown, 'segment')} the data share is not known. "
     return text + (
         "The data share is the part of the table's variance that the data removed: at 0 "
-        "% the number is the table's, at 100 % the table has no say."
+        "% the number is the table's, at 100 % the table has no say. Each estimator counts it against "
+        "the spread it starts from itself, so shares of different estimators do not compare."
     )
 
 
@@ -209,33 +209,7 @@ def _three_axes(
     return Grid(head, tuple(rows), caption, groups=groups)
 
 
-# --- excitation, base parameters ----------------------------------------------------------------
-
-
-def _excitation(record: ParticipantRecord) -> list[Block]:
-    table = record.excitation
-    condition = table.loc[table["quantity"] == "condition_number", "value"]
-    segments = table[table["quantity"] == "segment"].sort_values("value", kind="stable")
-    text = ""
-    if len(condition):
-        text += (
-            f"The condition number of the identification is {significant(condition.iloc[0])}: "
-            "the larger, the more some combinations of parameters hang on noise. "
-        )
-    if len(segments):
-        least = [segment_label(name) for name in segments["name"].head(_LEAST)]
-        text += (
-            f"The movement excited {listing(least)} least; a sequence that swings and turns "
-            "them faster would tell more about them."
-        )
-    blocks: list[Block] = [Paragraph(text or "The excitation was not computed.")]
-    if len(segments):
-        rows = tuple(
-            (segment_label(row["name"]), significant(row["value"]))
-            for _, row in segments.iterrows()
-        )
-        blocks.append(Grid(("segment", "excitation [1]"), rows, "Excitation, the least first"))
-    return [*blocks, *_identification(record.identification)]
+# --- what the identification used ---------------------------------------------------------------
 
 
 def _identification(table: pd.DataFrame) -> list[Block]:
@@ -283,37 +257,3 @@ def _identification(table: pd.DataFrame) -> list[Block]:
         groups=(("", 6), ("residual", 6)),
     )
     return [grid, Bullets(notes)] if notes else [grid]
-
-
-def _base(record: ParticipantRecord) -> list[Block]:
-    table = record.base_parameters
-    if table.empty:
-        return [Paragraph("No base parameters were written.", "note")]
-    limit = record.option("identify", "sigma_percent_limit", 5.0)
-    good = int((table["sigma_percent"] < limit).sum())
-    worst = table.sort_values("sigma_percent", ascending=False, kind="stable").head(_WORST)
-    rows = tuple(
-        (
-            row["name"],
-            row["expression"],
-            row["unit"],
-            significant(row["rm_value"]),
-            significant(row["value"]),
-            significant(row["sd"], 2),
-            significant(row["sigma_percent"]),
-        )
-        for _, row in worst.iterrows()
-    )
-    return [
-        Heading("Base parameters"),
-        Paragraph(
-            f"The ground forces determine {len(table)} combinations of the parameters. "
-            f"{good} of them are known to better than {limit:g} %; the worst are below."
-        ),
-        Grid(
-            ("leading parameter", "combination", "unit", "RM", "identified", "sd", "sigma [%]"),
-            rows,
-            f"The {len(rows)} base parameters with the largest sd relative to their value",
-            words=3,
-        ),
-    ]

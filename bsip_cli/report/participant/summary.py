@@ -26,6 +26,7 @@ def section(record: ParticipantRecord) -> Section:
         Paragraph(_who(record)),
         Paragraph(_trials(record)),
         Paragraph(_markers(record)),
+        *_loads(record),
         Heading("Do the identified parameters follow the forces better than the table's?"),
         *_gain(record),
         Heading("What to mind first"),
@@ -95,6 +96,23 @@ def _markers(record: ParticipantRecord) -> str:
         f"{sentence}; over all trials {number(1000.0 * np.sqrt(np.mean(squares)), 1)} mm. "
         "Skin markers of careful recordings usually stay below 10 mm."
     )
+
+
+def _loads(record: ParticipantRecord) -> list[Block]:
+    """What the person carried as the study says, and what was made of it."""
+    if not record.loads:
+        return []
+    trials_of: dict[str, list[str]] = {}
+    for trial, words in record.loads:
+        trials_of.setdefault(words, []).append(trial)
+    carried = "; ".join(f"{words} in {listing(trials)}" for words, trials in trials_of.items())
+    return [
+        Paragraph(
+            f"Known loads, as study.toml states them: {carried}. They are no part of the masses "
+            "above and below: their share of the ground forces was computed as of point masses, "
+            "taken off before the identification and added to every simulated force."
+        )
+    ]
 
 
 # --- gain -----------------------------------------------------------------------------------

@@ -11,8 +11,10 @@ import numpy as np
 
 from bsip_cli.simulate.movements.basketball import basketball
 from bsip_cli.simulate.movements.gait import running, walking
+from bsip_cli.simulate.movements.hops import hops
 from bsip_cli.simulate.movements.sequence import sequence
 from bsip_cli.simulate.movements.standing import squat, static
+from bsip_cli.simulate.movements.stepon import stepon
 from bsip_cli.simulate.movements.steps import steps
 from bsip_cli.simulate.movements.throwing import throwing
 from bsip_cli.simulate.people import Person
@@ -27,6 +29,8 @@ MOVEMENTS: dict[str, Callable[[Person, np.random.Generator, float, float], Plan]
     "steps": steps,
     "walking": walking,
     "running": running,
+    "hops": hops,
+    "stepon": stepon,
 }
 DEFAULT_DURATION_S = {
     "static": 2.0,
@@ -37,4 +41,6 @@ DEFAULT_DURATION_S = {
     "steps": 5.0,
     "walking": 1.2,
     "running": 0.8,
+    "hops": 5.0,
+    "stepon": 9.0,
 }

@@ -9,12 +9,12 @@ import numpy as np
 from bsip_cli.simulate.calculus import bridge
 from bsip_cli.simulate.curves import glide, soft_polyline, step
 from bsip_cli.simulate.kinematics import centre_of_mass, poses_of
+from bsip_cli.simulate.loads import GRAVITY
 from bsip_cli.simulate.movements.standing import add_breath_of_motion, add_sway, plate_under
 from bsip_cli.simulate.people import SIDES, Person
 from bsip_cli.simulate.plan import STEP_S, Plan
 from bsip_cli.simulate.rotations import euler_zxy
 from bsip_cli.simulate.sketch import Sketch, held_ball, sketch_for
-from bsip_cli.simulate.wrench import GRAVITY
 
 G = -GRAVITY[1]
 
@@ -48,15 +48,16 @@ def basketball(
     add_sway(sketch, rng, 0.6)
     ball = held_ball(sketch, rng, side, release, ball_mass_kg)
     return sketch.plan(
-        com_height_m=_standing_height(sketch) + _rise(sketch, jump),
-        flights=(tuple(_sample(sketch, s) for s in (jump.takeoff_s, jump.landing_s)),),
+        com_height_m=standing_com_height(sketch) + _rise(sketch, jump),
+        flights=(tuple(sample_of(sketch, s) for s in (jump.takeoff_s, jump.landing_s)),),
         plate_centre_m=plate_under(sketch, rng),
         ball=ball,
         notes={"throwing_side": side},
     )
 
 
-def _sample(sketch: Sketch, time_s: float) -> int:
+def sample_of(sketch: Sketch, time_s: float) -> int:
+    """The sample at a time of the sketch."""
     return round((time_s - sketch.t_s[0]) / STEP_S)
 
 
@@ -73,7 +74,7 @@ def _draw_jump(sketch: Sketch, rng: np.random.Generator, duration_s: float) -> J
     return Jump(start, bottom, takeoff, landing, caught, end, 0.01, depth, speed)
 
 
-def _standing_height(sketch: Sketch) -> float:
+def standing_com_height(sketch: Sketch) -> float:
     """Height of the centre of mass in the first sample."""
     first = sketch.plan().thinned(len(sketch.t_s))
     poses = poses_of(sketch.person, first, first.pelvis_m, euler_zxy(first.pelvis_angles_rad))

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from bsip_cli.simulate.curves import glide, step
+from bsip_cli.simulate.loads import GRAVITY
 from bsip_cli.simulate.movements.standing import add_breath_of_motion
 from bsip_cli.simulate.people import SIDE_SIGN, SIDES, Person
 from bsip_cli.simulate.plan import STEP_S, Plan
 from bsip_cli.simulate.sketch import Sketch
-from bsip_cli.simulate.wrench import GRAVITY
 
 G = -GRAVITY[1]
 LONGEST_REACH = 0.985  # the knee stays bent, about 20 degrees

@@ -1,0 +1,82 @@
+"""bioMod: for biorbd and bioptim."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bsip_cli.body.exports.identified import (
+    BALL_AXES,
+    GRAVITY_M_S2,
+    IdentifiedPerson,
+    numbers,
+    plain_names,
+)
+
+_NOTES = (
+    "SI units, Z up. Segment frames: origin at the joint to the parent, axes of the segment (X",
+    "anterior, Y up, Z right); the inertia is about the centre of mass. 'base' only translates,",
+    "a segment called like a joint only turns about its hinge.",
+)
+
+
+def biomod_text(body: IdentifiedPerson) -> str:
+    """A bioMod file, version 4.
+
+    Raises
+    ------
+    BadDataError
+        A segment's inertia is impossible, or two markers would have one name.
+    """
+    body.check_bodies()
+    lines = ["version 4", *(f"// {line}" for line in (*body.made_of, *_NOTES)), ""]
+    lines += [f"gravity {numbers([0.0, 0.0, -GRAVITY_M_S2])}", ""]
+    lines += ["segment base", "    translations xyz", "    mass 0", "endsegment", ""]
+    for i in range(len(body.inertias)):
+        lines += [*_segment_lines(body, i), ""]
+    lines += _marker_lines(body)
+    return "\n".join(lines)
+
+
+def _segment_lines(body: IdentifiedPerson, i: int) -> Iterator[str]:
+    """A hinge takes two: one that turns, and one that leans back to the segment's axes."""
+    person = body.person
+    skeleton = person.skeleton
+    kind, segment = skeleton.joint_types[i], skeleton.segments[i]
+    parent = skeleton.segments[skeleton.parents[i]] if i else "base"
+    position, tilt = person.joint_positions_m()[i], 0.0
+    rotations = BALL_AXES
+    if kind == "free":
+        tilt = np.pi / 2
+    if kind == "revolute":
+        hinge = skeleton.joints[i]
+        yield f"segment {hinge}"
+        yield f"    parent {parent}"
+        yield f"    RT {numbers([person.parent_tilt_rad[i], 0, 0])} xyz {numbers(position)}"
+        yield "    rotations z"
+        yield "    mass 0"
+        yield "endsegment"
+        parent, position, tilt, rotations = hinge, np.zeros(3), -person.child_tilt_rad[i], ""
+    yield f"segment {segment}"
+    yield f"    parent {parent}"
+    yield f"    RT {numbers([tilt, 0, 0])} xyz {numbers(position)}"
+    if rotations:
+        yield f"    rotations {rotations}"
+    inertia = body.in_joint(i)
+    yield f"    mass {numbers([inertia.mass_kg])}"
+    yield "    inertia"
+    for row in inertia.tensor_kgm2:
+        yield f"        {numbers(row)}"
+    yield f"    com {numbers(inertia.com_m)}"
+    yield "endsegment"
+
+
+def _marker_lines(body: IdentifiedPerson) -> Iterator[str]:
+    person = body.person
+    names, places = plain_names(person.markers), person.markers_in_joint_m()
+    for name, segment, place in zip(names, person.marker_segments, places, strict=True):
+        yield f"marker {name}"
+        yield f"    parent {person.skeleton.segments[segment]}"
+        yield f"    position {numbers(place)}"
+        yield "endmarker"

@@ -1,0 +1,131 @@
+"""What an exported file is made of: a person's tree with inertias, and where they come from."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bsip_cli.body.inertia import Inertia, nearest_physical_tensor
+from bsip_cli.body.person import Person
+from bsip_cli.errors import BadDataError
+
+# Ball joints turn in this order where a format wants three angles: flexion about Z, then X, then Y
+# (ISB); the two other axes coincide only with the middle angle at 90 degrees.
+BALL_AXES = "zxy"
+GRAVITY_M_S2 = 9.80665
+
+
+@dataclass(frozen=True)
+class IdentifiedPerson:
+    """One person's geometry with the inertial parameters of one method.
+
+    Attributes
+    ----------
+    inertias : per segment of the skeleton, in its segment frame.
+    made_of : lines that say what the numbers come from; they stand in every file.
+    """
+
+    person: Person
+    inertias: tuple[Inertia, ...]
+    participant: str
+    method: str
+    made_of: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        return f"{self.participant}_{self.method}"
+
+    @property
+    def mass_kg(self) -> float:
+        return sum(inertia.mass_kg for inertia in self.inertias)
+
+    def in_joint(self, i: int) -> Inertia:
+        """Inertia of segment ``i`` seen from its joint centre, segment axes."""
+        return self.inertias[i].moved(-self.person.origin_in_joint_m[i])
+
+    def check_bodies(self) -> None:
+        """Simulators take real bodies only.
+
+        Raises
+        ------
+        BadDataError
+            A segment has an inertia that no body can have.
+        """
+        names = self.person.skeleton.segments
+        bodies = zip(names, self.inertias, strict=True)
+        impossible = [name for name, inertia in bodies if not inertia.is_physical()]
+        if impossible:
+            raise BadDataError(
+                f"{self.method} has an inertia that no body can have at {', '.join(impossible)}",
+                file=self.participant,
+                expected="positive masses and second moments, as simulators ask for",
+                remedy="identify with --estimator consistent, export --method RM, or take the "
+                "nearest possible tensors with --repair",
+            )
+
+    def repaired(self) -> IdentifiedPerson:
+        """With the nearest tensors that bodies can have; ``made_of`` says which were changed."""
+        inertias, said = list(self.inertias), []
+        for i, (name, old) in enumerate(zip(self.person.skeleton.segments, inertias, strict=True)):
+            if old.is_physical() or old.mass_kg <= 0:  # a mass is not mended
+                continue
+            tensor = nearest_physical_tensor(old.tensor_kgm2)
+            change = np.linalg.norm(tensor - old.tensor_kgm2) / np.linalg.norm(old.tensor_kgm2)
+            inertias[i] = replace(old, tensor_kgm2=tensor)
+            away = f"{100 * change:.1f} % away"
+            said.append(f"{name}: impossible tensor replaced by the nearest, {away}")
+        return replace(self, inertias=tuple(inertias), made_of=(*self.made_of, *said))
+
+    def height_of_base_m(self) -> float:
+        """How high the base joint stands in the neutral pose over the lowest marker or joint."""
+        rotations, joints = neutral_pose(self.person)
+        at = self.person.marker_segments
+        local = self.person.markers_in_joint_m()
+        markers = joints[at] + np.einsum("mij,mj->mi", rotations[at], local)
+        return -float(min(joints[:, 1].min(), markers[:, 1].min(initial=0.0)))
+
+
+def neutral_pose(person: Person) -> tuple[np.ndarray, np.ndarray]:
+    """Orientation (n, 3, 3) and joint centre (n, 3) [m] of every segment, all angles zero.
+
+    Seen from the base segment's joint, in its axes (Y up).
+    """
+    turns, steps = person.joint_rotations(), person.joint_positions_m()
+    rotations, joints = [np.eye(3)], [np.zeros(3)]
+    for i, parent in enumerate(person.skeleton.parents[1:], start=1):
+        rotations.append(rotations[parent] @ turns[i])
+        joints.append(joints[parent] + rotations[parent] @ steps[i])
+    return np.array(rotations), np.array(joints)
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Numbers separated by blanks, with all their digits."""
+    return " ".join(f"{value:.17g}" for value in np.asarray(values, dtype=float).ravel())
+
+
+def xml_comment(lines: Iterable[str]) -> str:
+    """Text for an XML comment, which must hold no two hyphens in a row."""
+    text = "\n".join(lines)
+    return f"\n{re.sub('-(?=-|$)', '- ', text)}\n"
+
+
+def plain_names(names: Iterable[str]) -> tuple[str, ...]:
+    """Marker names in letters, digits, ``_``, ``.`` and ``-``, as every format takes them.
+
+    Raises
+    ------
+    BadDataError
+        Two markers would get the same name.
+    """
+    plain = tuple(re.sub(r"[^A-Za-z0-9_.-]", "_", name) for name in names)
+    twice = sorted({name for name in plain if plain.count(name) > 1})
+    if twice:
+        raise BadDataError(
+            f"more than one marker would be called {', '.join(twice)} in the file",
+            expected="names that differ in letters and digits",
+            remedy="rename them in the marker set",
+        )
+    return plain

@@ -1,0 +1,84 @@
+"""MJCF: for MuJoCo."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+
+from bsip_cli.body.exports.identified import (
+    GRAVITY_M_S2,
+    IdentifiedPerson,
+    numbers,
+    plain_names,
+    xml_comment,
+)
+
+_MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # the order of fullinertia
+_NOTES = (
+    "SI units, Z up. Body frames: origin at the joint to the parent, axes of the segment (X",
+    "anterior, Y up, Z right); at qpos0 the person stands upright, facing along X. Sites are the",
+    "markers. There are no geoms, no limits and no actuators.",
+)
+
+
+def mjcf_text(body: IdentifiedPerson) -> str:
+    """A MuJoCo model with a free base, ball joints and hinges.
+
+    Raises
+    ------
+    BadDataError
+        A segment's inertia is impossible, or two markers would have one name.
+    """
+    body.check_bodies()
+    root = ET.Element("mujoco", model=body.name)
+    root.append(ET.Comment(xml_comment((*body.made_of, *_NOTES))))
+    ET.SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
+    ET.SubElement(root, "option", gravity=numbers([0.0, 0.0, -GRAVITY_M_S2]))
+    world = ET.SubElement(root, "worldbody")
+    elements: list[ET.Element] = []
+    for i, parent in enumerate(body.person.skeleton.parents):
+        above = elements[parent] if parent >= 0 else world
+        elements.append(_add_body(above, body, i))
+    _add_sites(elements, body)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _add_body(above: ET.Element, body: IdentifiedPerson, i: int) -> ET.Element:
+    person = body.person
+    skeleton = person.skeleton
+    position = person.joint_positions_m()[i]
+    turn = person.parent_tilt_rad[i] - person.child_tilt_rad[i]
+    kind, name = skeleton.joint_types[i], skeleton.joints[i]
+    if kind == "free":
+        position, turn = np.array([0.0, 0.0, body.height_of_base_m()]), np.pi / 2
+    half = 0.5 * turn
+    place = {"pos": numbers(position), "quat": numbers([np.cos(half), np.sin(half), 0.0, 0.0])}
+    element = ET.SubElement(above, "body", {"name": skeleton.segments[i], **place})
+    if kind == "free":
+        ET.SubElement(element, "freejoint", name=name)
+    elif kind == "spherical":
+        ET.SubElement(element, "joint", name=name, type="ball")
+    else:
+        axis = numbers(person.hinge_axes()[i])
+        ET.SubElement(element, "joint", name=name, type="hinge", axis=axis)
+    inertia = body.in_joint(i)
+    ET.SubElement(
+        element,
+        "inertial",
+        pos=numbers(inertia.com_m),
+        mass=numbers([inertia.mass_kg]),
+        fullinertia=numbers([inertia.tensor_kgm2[entry] for entry in _MOMENTS]),
+    )
+    return element
+
+
+def _add_sites(elements: list[ET.Element], body: IdentifiedPerson) -> None:
+    person = body.person
+    names, places = plain_names(person.markers), person.markers_in_joint_m()
+    for name, segment, place in zip(names, person.marker_segments, places, strict=True):
+        # Sites go before the child bodies, which is how such files are read.
+        first = next((k for k, e in enumerate(elements[segment]) if e.tag == "body"), None)
+        site = ET.Element("site", name=name, pos=numbers(place))
+        elements[segment].insert(len(elements[segment]) if first is None else first, site)

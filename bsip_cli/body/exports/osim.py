@@ -1,0 +1,105 @@
+"""OpenSim: a model with the tree of our own skeleton (.osim of OpenSim 4)."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+
+from bsip_cli.body.exports.identified import (
+    GRAVITY_M_S2,
+    IdentifiedPerson,
+    numbers,
+    plain_names,
+    xml_comment,
+)
+from bsip_cli.body.inertia import Inertia
+
+_JOINTS = {"free": "FreeJoint", "spherical": "BallJoint", "revolute": "PinJoint"}
+_COORDINATES = {
+    "free": ("rx", "ry", "rz", "tx", "ty", "tz"),
+    "spherical": ("rx", "ry", "rz"),
+    "revolute": ("angle",),
+}
+_NOTES = (
+    "SI units, Y up. Body frames: origin at the joint to the parent, axes of the segment (X",
+    "anterior, Y up, Z right). No muscles, no geometry, no limits.",
+)
+
+
+def osim_text(body: IdentifiedPerson) -> str:
+    """An OpenSim 4 model: bodies, free base, ball and pin joints, markers.
+
+    Raises
+    ------
+    BadDataError
+        A segment's inertia is impossible, or two markers would have one name.
+    """
+    body.check_bodies()
+    document = ET.Element("OpenSimDocument", Version="40000")
+    document.append(ET.Comment(xml_comment((*body.made_of, *_NOTES))))
+    model = ET.SubElement(document, "Model", name=body.name)
+    ET.SubElement(model, "gravity").text = numbers([0.0, -GRAVITY_M_S2, 0.0])
+    bodies = _set_of(model, "BodySet", "bodyset")
+    joints = _set_of(model, "JointSet", "jointset")
+    markers = _set_of(model, "MarkerSet", "markerset")
+    for i, name in enumerate(body.person.skeleton.segments):
+        set_inertia(ET.SubElement(bodies, "Body", name=name), body.in_joint(i))
+        _add_joint(joints, body, i)
+    _add_markers(markers, body)
+    ET.indent(document)
+    return ET.tostring(document, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def set_inertia(element: ET.Element, inertia: Inertia) -> None:
+    """Write mass, mass centre and inertia about it (xx yy zz xy xz yz) of a ``Body``."""
+    values = inertia.readable()
+    for tag, part in (
+        ("mass", values[:1]),
+        ("mass_center", values[1:4]),
+        ("inertia", values[4:]),
+    ):
+        found = element.find(tag)
+        child = ET.SubElement(element, tag) if found is None else found
+        child.text = numbers(part)
+
+
+def _set_of(model: ET.Element, tag: str, name: str) -> ET.Element:
+    return ET.SubElement(ET.SubElement(model, tag, name=name), "objects")
+
+
+def _add_joint(joints: ET.Element, body: IdentifiedPerson, i: int) -> None:
+    person = body.person
+    skeleton = person.skeleton
+    kind, name = skeleton.joint_types[i], skeleton.joints[i]
+    parent = f"/bodyset/{skeleton.segments[skeleton.parents[i]]}" if i else "/ground"
+    joint = ET.SubElement(joints, _JOINTS[kind], name=name)
+    ET.SubElement(joint, "socket_parent_frame").text = "in_parent"
+    ET.SubElement(joint, "socket_child_frame").text = "in_child"
+    coordinates = ET.SubElement(joint, "coordinates")
+    for part in _COORDINATES[kind]:
+        coordinate = ET.SubElement(coordinates, "Coordinate", name=f"{name}_{part}")
+        if part == "ty":
+            height = numbers([body.height_of_base_m()])
+            ET.SubElement(coordinate, "default_value").text = height
+    frames = ET.SubElement(joint, "frames")
+    position = person.joint_positions_m()[i]
+    for frame, socket, tilt, place in (
+        ("in_parent", parent, person.parent_tilt_rad[i], position),
+        ("in_child", f"/bodyset/{skeleton.segments[i]}", person.child_tilt_rad[i], np.zeros(3)),
+    ):
+        offset = ET.SubElement(frames, "PhysicalOffsetFrame", name=frame)
+        ET.SubElement(offset, "socket_parent").text = socket
+        ET.SubElement(offset, "translation").text = numbers(place)
+        ET.SubElement(offset, "orientation").text = numbers([tilt, 0.0, 0.0])
+
+
+def _add_markers(markers: ET.Element, body: IdentifiedPerson) -> None:
+    person = body.person
+    names, places = plain_names(person.markers), person.markers_in_joint_m()
+    for name, segment, place in zip(names, person.marker_segments, places, strict=True):
+        marker = ET.SubElement(markers, "Marker", name=name)
+        socket = f"/bodyset/{person.skeleton.segments[segment]}"
+        ET.SubElement(marker, "socket_parent_frame").text = socket
+        ET.SubElement(marker, "location").text = numbers(place)
+        ET.SubElement(marker, "fixed").text = "true"

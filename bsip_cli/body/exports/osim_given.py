@@ -1,0 +1,276 @@
+"""OpenSim: the person's masses, centres of mass and inertias in a model that somebody gives.
+
+The axes of the model's bodies at zero coordinates are taken for those of the segments in the
+neutral pose (X anterior, Y up, Z to the right), as published models have them; origins are placed
+on each other by joint centres that both have.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from copy import deepcopy
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.body.exports.body_map import BodyGroup, BodyMap
+from bsip_cli.body.exports.identified import IdentifiedPerson, neutral_pose, xml_comment
+from bsip_cli.body.exports.osim import set_inertia
+from bsip_cli.body.exports.united import seen_from, segments_as_one
+from bsip_cli.body.inertia import Inertia
+from bsip_cli.errors import UsageError
+
+_BODIES = "Model/BodySet/objects/Body"
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Orientation (3, 3) and origin (3,) [m] of a frame in another."""
+
+    rotation: np.ndarray
+    origin_m: np.ndarray
+
+    def __matmul__(self, inner: Placement) -> Placement:
+        origin = self.origin_m + self.rotation @ inner.origin_m
+        return Placement(self.rotation @ inner.rotation, origin)
+
+    def inverse(self) -> Placement:
+        return Placement(self.rotation.T, -self.rotation.T @ self.origin_m)
+
+
+@dataclass(frozen=True)
+class GivenJoint:
+    """A joint at zero coordinates: its frame in the parent body and in the child body."""
+
+    parent: str
+    child: str
+    in_parent: Placement
+    in_child: Placement
+
+
+@dataclass(frozen=True)
+class GivenModel:
+    """An OpenSim 4 model as XML, masses by body, and joints by the body they carry."""
+
+    file: str
+    document: ET.Element
+    masses_kg: dict[str, float]
+    joints: dict[str, GivenJoint]
+
+
+@dataclass(frozen=True)
+class Replacement:
+    """The model with the person's inertias, and what a user should know of it.
+
+    ``misfit_m`` is the largest distance, by body, between joint centres that should coincide;
+    ``untouched`` are the model's other bodies and their masses [kg].
+    """
+
+    text: str
+    misfit_m: dict[str, float]
+    untouched: dict[str, float]
+    sentence: str
+
+
+def read_given_model(content: bytes, file: str) -> GivenModel:
+    """Parse an .osim file.
+
+    Raises
+    ------
+    UsageError
+        It is not a model of OpenSim 4.
+    """
+    builder = ET.TreeBuilder(insert_comments=True)
+    try:
+        document = ET.fromstring(content, ET.XMLParser(target=builder))
+        is_model = document.tag == "OpenSimDocument" and document.find("Model") is not None
+        version = int(document.get("Version", "0")) if is_model else 0
+        if version < 40000:
+            raise ValueError(f"OpenSimDocument of version {version}" if is_model else document.tag)
+        bodies = document.iterfind(_BODIES)
+        masses = {each.attrib["name"]: _number(each.findtext("mass", "0")) for each in bodies}
+        elements = document.iterfind("Model/JointSet/objects/*")
+        joints = [_joint(each) for each in elements if isinstance(each.tag, str)]
+    except (ET.ParseError, ValueError, KeyError, TypeError) as error:
+        raise UsageError(
+            f"cannot be read as a model ({error})",
+            file=file,
+            expected="an .osim file of OpenSim 4",
+            remedy="open the model in OpenSim 4 and save it",
+        ) from None
+    return GivenModel(file, document, masses, {joint.child: joint for joint in reversed(joints)})
+
+
+def check_fits(model: GivenModel, body_map: BodyMap) -> None:
+    """The model has every body and joint that the map names.
+
+    Raises
+    ------
+    UsageError
+        It lacks some, or bodies of a group are not joined to each other or have no mass.
+    """
+    lost = sorted(body_map.bodies() - set(model.masses_kg))
+    anchors = {body for group in body_map.groups for _, body in group.joints}
+    loose = sorted(anchors - set(model.joints))
+    for fault, names in (("body", lost), ("joint that carries", loose)):
+        if names:
+            raise UsageError(
+                f"has no {fault} {', '.join(names)}",
+                file=model.file,
+                expected=f"what the map {body_map.name} names",
+                remedy="give a map of this model's bodies with --model-bodies",
+            )
+    for group in body_map.groups:
+        placed = _placements(model, group)
+        for segment, body in group.joints:
+            if not {body, model.joints[body].parent} & set(placed):
+                raise _bad_group(model, group, f"{body} ({segment}) is no joint of these bodies")
+        if set(placed) != set(group.bodies):
+            raise _bad_group(model, group, "its bodies are not joined to each other")
+        if sum(model.masses_kg[body] for body in group.bodies) <= 0:
+            raise _bad_group(model, group, "its bodies have no mass to share by")
+
+
+def with_inertias(model: GivenModel, body_map: BodyMap, person: IdentifiedPerson) -> Replacement:
+    """The model with the inertial parameters of the person; nothing else changes.
+
+    Raises
+    ------
+    BadDataError
+        A segment's inertia is impossible.
+    """
+    person.check_bodies()
+    changed: dict[str, Inertia] = {}
+    misfit: dict[str, float] = {}
+    for group in body_map.groups:
+        shift, misfit[group.bodies[0]] = _fit(model, group, person)
+        whole = segments_as_one(person, group.segments).moved(-shift)
+        changed |= _shared(model, group, whole)
+    document = deepcopy(model.document)
+    for element in document.iterfind(_BODIES):
+        if element.attrib["name"] in changed:
+            set_inertia(element, changed[element.attrib["name"]])
+    untouched = {name: mass for name, mass in model.masses_kg.items() if name not in changed}
+    sentence = _sentence(misfit, untouched)
+    lines = (*person.made_of, f"map of bodies: {body_map.name}", sentence)
+    document.insert(0, ET.Comment(xml_comment(lines)))
+    text = ET.tostring(document, encoding="unicode", xml_declaration=True) + "\n"
+    return Replacement(text, misfit, untouched, sentence)
+
+
+def _sentence(misfit_m: dict[str, float], untouched: dict[str, float]) -> str:
+    body, worst = max(misfit_m.items(), key=lambda item: item[1])
+    left = ", ".join(untouched)
+    kept = f"; {left} stay as they were ({sum(untouched.values()):.3g} kg)" if left else ""
+    return (
+        f"bodies placed by common joint centres, which differ by up to {1000 * worst:.0f} mm "
+        f"({body}){kept}; the model's axes at zero coordinates are taken for the segments' "
+        "(X anterior, Y up, Z right)"
+    )
+
+
+def _fit(model: GivenModel, group: BodyGroup, person: IdentifiedPerson) -> tuple[np.ndarray, float]:
+    """Where the first segment's joint lies in the group's frame (3,), and the misfit [m]."""
+    skeleton = person.person.skeleton
+    rotations, joints = neutral_pose(person.person)
+    first = skeleton.index(group.segments[0])
+    theirs = np.array([_joint_centre(model, group, body) for _, body in group.joints])
+    ours = np.array(
+        [
+            rotations[first].T @ (joints[skeleton.index(segment)] - joints[first])
+            for segment, _ in group.joints
+        ]
+    )
+    shifts = theirs - ours
+    shift = shifts.mean(axis=0)
+    return shift, float(np.linalg.norm(shifts - shift, axis=1).max())
+
+
+def _joint_centre(model: GivenModel, group: BodyGroup, body: str) -> np.ndarray:
+    """(3,) centre of the joint that carries a body, in the group's frame."""
+    joint, placed = model.joints[body], _placements(model, group)
+    if body in placed:
+        return (placed[body] @ joint.in_child).origin_m
+    return (placed[joint.parent] @ joint.in_parent).origin_m
+
+
+def _shared(model: GivenModel, group: BodyGroup, whole: Inertia) -> dict[str, Inertia]:
+    """Each body's part of the whole: all parts have its shape, so together they are it."""
+    total = sum(model.masses_kg[body] for body in group.bodies)
+    parts = {}
+    for body, place in _placements(model, group).items():
+        part = model.masses_kg[body] / total
+        own = Inertia(part * whole.mass_kg, whole.com_m, part * whole.tensor_kgm2)
+        parts[body] = seen_from(own, place.rotation, place.origin_m)
+    return parts
+
+
+def _placements(model: GivenModel, group: BodyGroup) -> dict[str, Placement]:
+    """The group's bodies in the frame of its first one, at zero coordinates."""
+    placed = {group.bodies[0]: Placement(np.eye(3), np.zeros(3))}
+    inner = [
+        joint for joint in model.joints.values() if {joint.parent, joint.child} <= set(group.bodies)
+    ]
+    for _ in inner:  # every round places at least one more body, if it can be placed at all
+        for joint in inner:
+            across = joint.in_parent @ joint.in_child.inverse()
+            if joint.parent in placed:
+                placed.setdefault(joint.child, placed[joint.parent] @ across)
+            elif joint.child in placed:
+                placed[joint.parent] = placed[joint.child] @ across.inverse()
+    return placed
+
+
+def _bad_group(model: GivenModel, group: BodyGroup, found: str) -> UsageError:
+    return UsageError(
+        f"group {', '.join(group.bodies)}: {found}",
+        file=model.file,
+        remedy="correct the map of bodies",
+    )
+
+
+def _joint(element: ET.Element) -> GivenJoint:
+    frames = {frame.get("name"): frame for frame in element.iterfind("frames/PhysicalOffsetFrame")}
+    ends = []
+    for side in ("parent", "child"):
+        socket = _last(element.findtext(f"socket_{side}_frame"))
+        if socket in frames:
+            ends.append((_last(frames[socket].findtext("socket_parent")), _offset(frames[socket])))
+        else:
+            ends.append((socket, Placement(np.eye(3), np.zeros(3))))
+    (parent, in_parent), (child, in_child) = ends
+    return GivenJoint(parent, child, in_parent, in_child)
+
+
+def _last(path: str | None) -> str:
+    """``pelvis`` of ``/bodyset/pelvis``."""
+    if path is None:
+        raise ValueError("a joint without frames")
+    return path.strip().rpartition("/")[2]
+
+
+def _offset(frame: ET.Element) -> Placement:
+    """Of an offset frame: turned about X, then the new Y, then the new Z."""
+    turns = _three(frame.findtext("orientation", "0 0 0"))
+    rotation = np.eye(3)
+    for k, angle in enumerate(turns):
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.eye(3)
+        a, b = (k + 1) % 3, (k + 2) % 3
+        turn[a, a], turn[a, b], turn[b, a], turn[b, b] = c, -s, s, c
+        rotation = rotation @ turn
+    return Placement(rotation, _three(frame.findtext("translation", "0 0 0")))
+
+
+def _three(text: str) -> np.ndarray:
+    values = np.array([_number(word) for word in text.split()])
+    if values.shape != (3,):
+        raise ValueError(f"{text!r} instead of three numbers")
+    return values
+
+
+def _number(text: str) -> float:
+    value = float(text)
+    if not np.isfinite(value):
+        raise ValueError(f"{text!r} instead of a number")
+    return value

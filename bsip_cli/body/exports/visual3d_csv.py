@@ -1,0 +1,85 @@
+"""A flat table of the segments in the manner of Visual3D: z axial, x to the right."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import Any
+
+import numpy as np
+
+from bsip_cli.body.exports.identified import IdentifiedPerson
+
+# Visual3D's default names of segments; what it lacks stays empty.
+VISUAL3D_SEGMENTS = {
+    "lower_torso": "RPV",
+    "upper_torso": "RTA",
+    "head": "RHE",
+    "upper_arm_l": "LAR",
+    "upper_arm_r": "RAR",
+    "forearm_l": "LFA",
+    "forearm_r": "RFA",
+    "hand_l": "LHA",
+    "hand_r": "RHA",
+    "thigh_l": "LTH",
+    "thigh_r": "RTH",
+    "shank_l": "LSK",
+    "shank_r": "RSK",
+    "foot_l": "LFT",
+    "foot_r": "RFT",
+}
+
+# Rows are x, y and z of the table in the segment's axes (X anterior, Y up, Z right).
+_UPRIGHT = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+# The foot lies: its axial direction points back to the ankle.
+_LYING = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+
+_NOTES = (
+    "Axes after Visual3D: z axial, x to the right. From bsip's X anterior, Y up, Z right: x = Z,",
+    "y = X, z = Y; of the foot x = Z, y = Y, z = -X. The CG is seen from the segment's origin (its",
+    "proximal joint; of the trunk and the head the cervical joint centre, of the pelvis the lumbar",
+    "one). cg_axial_m runs along the segment's length (head: up; foot: forward; others: down),",
+    "cg_axial_fraction is its part of length_m. Moments of inertia are about the CG; ixy, ixz and",
+    "iyz are entries of the tensor.",
+)
+
+
+def visual3d_csv_text(body: IdentifiedPerson) -> str:
+    """One row per segment; lines that begin with ``#`` say what made it and which axes it has."""
+    text = io.StringIO()
+    for line in (*body.made_of, *_NOTES):
+        text.write(f"# {line}\n")
+    rows = [_row(body, i) for i in range(len(body.inertias))]
+    table = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    return text.getvalue()
+
+
+def _row(body: IdentifiedPerson, i: int) -> dict[str, Any]:
+    """Column to value of one segment."""
+    skeleton = body.person.skeleton
+    inertia, length = body.inertias[i], body.person.lengths_m[i]
+    lies = skeleton.table_rows[i] == "foot"
+    turn = _LYING if lies else _UPRIGHT
+    cg, moments = turn @ inertia.com_m, turn @ inertia.tensor_kgm2 @ turn.T
+    along = cg[2] if skeleton.table_rows[i] == "head" else -cg[2]
+    values = {
+        "mass_kg": inertia.mass_kg,
+        "mass_percent": 100 * inertia.mass_kg / body.mass_kg,
+        "length_m": length,
+        "cg_axial_fraction": along / length,
+        "cg_axial_m": along,
+        **{f"cg_{axis}_m": cg[k] for k, axis in enumerate("xyz")},
+        **{f"i{axis}{axis}_kgm2": moments[k, k] for k, axis in enumerate("xyz")},
+        "ixy_kgm2": moments[0, 1],
+        "ixz_kgm2": moments[0, 2],
+        "iyz_kgm2": moments[1, 2],
+    }
+    segment = skeleton.segments[i]
+    return {
+        "segment": segment,
+        "visual3d_segment": VISUAL3D_SEGMENTS.get(segment, ""),
+        "axes": "x right, y up, z backward" if lies else "x right, y anterior, z up",
+        **{name: f"{value:.17g}" for name, value in values.items()},
+    }

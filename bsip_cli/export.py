@@ -1,0 +1,251 @@
+"""The command ``bsip export``: participants as models that other software reads."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli import __version__
+from bsip_cli.artifacts import write_atomically
+from bsip_cli.body.exports.body_map import (
+    BodyMap,
+    check_segments,
+    fitting_map,
+    load_body_map,
+    shipped_names,
+)
+from bsip_cli.body.exports.formats import FORMATS
+from bsip_cli.body.exports.identified import IdentifiedPerson
+from bsip_cli.body.exports.osim_given import (
+    GivenModel,
+    check_fits,
+    read_given_model,
+    with_inertias,
+)
+from bsip_cli.body.inertia import from_readable
+from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.errors import BadDataError, BsipError, UsageError
+from bsip_cli.pipeline import Stage
+from bsip_cli.provenance import file_hash
+from bsip_cli.runner import Outcome, lacking
+from bsip_cli.schemas import bsip_names
+from bsip_cli.session import follow, open_study
+from bsip_cli.stages.frames import person_from
+from bsip_cli.unit import Unit
+
+# Not a stage of the pipeline, but it reads as one.
+_READER = Stage(
+    "export",
+    "participant",
+    "Models for other software.",
+    reads=("skeleton", "marker-positions", "bsip"),
+    writes=(),
+    options=("skeleton",),
+)
+_FILE_NAME = re.compile(r"[A-Za-z0-9_-]+")
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the user asks for; no ``formats`` are all of them.
+
+    ``model_file`` is an OpenSim model to be given the inertias, ``model_bodies`` names its map;
+    ``repair`` replaces tensors that no body can have by the nearest possible ones.
+    """
+
+    method: str
+    formats: tuple[str, ...] = ()
+    model_file: Path | None = None
+    model_bodies: str | None = None
+    repair: bool = False
+
+
+# Of an identified person: the text of the file, and what else the user should know of it.
+Writer = Callable[[IdentifiedPerson], tuple[str, str]]
+
+
+def export_session(
+    root: Path,
+    out: Path,
+    chosen: tuple[str, ...],
+    config_file: Path | None,
+    request: Request,
+) -> int:
+    """Export a study's participants and return the exit code."""
+    opened = open_study(root, out, chosen, config_file)
+    skeleton = load_skeleton(opened.config.skeleton)
+    writers = _writers(request, skeleton)
+
+    def running() -> Iterator[Outcome]:
+        for participant in opened.participants:
+            unit = Unit(_READER, opened.study, out, opened.config, participant)
+            yield _export(unit, skeleton, request, writers)
+
+    return follow("export", opened.refusals, running(), len(opened.participants), out)
+
+
+def _writers(request: Request, skeleton: Skeleton) -> dict[str, Writer]:
+    """Ending of the file and who writes it, for every format that is asked for."""
+    formats = dict.fromkeys(request.formats or FORMATS)
+    writers: dict[str, Writer] = {}
+    for name in formats:
+        ending, text_of = FORMATS[name]
+        writers[ending] = partial(_without_note, text_of)
+    if request.model_file is None:
+        if request.model_bodies is not None:
+            raise UsageError("--model-bodies belongs to --model-file", remedy="give both")
+        return writers
+    if "osim" not in formats:
+        raise UsageError("--model-file belongs to --format osim", remedy="ask for that format")
+    model, body_map = _given_model(request.model_file, request.model_bodies, skeleton)
+
+    def given(body: IdentifiedPerson) -> tuple[str, str]:
+        result = with_inertias(model, body_map, body)
+        return result.text, f"{model.file}, map {body_map.name}: {result.sentence}"
+
+    return {**writers, FORMATS["osim"][0]: given}
+
+
+def _without_note(
+    text_of: Callable[[IdentifiedPerson], str], body: IdentifiedPerson
+) -> tuple[str, str]:
+    return text_of(body), ""
+
+
+def _given_model(file: Path, name: str | None, skeleton: Skeleton) -> tuple[GivenModel, BodyMap]:
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise UsageError(
+            f"cannot be read ({error.strerror})", file=file, remedy="check --model-file"
+        ) from None
+    model = read_given_model(content, file.name)
+    body_map = load_body_map(name) if name else fitting_map(model.masses_kg)
+    if body_map is None:
+        raise UsageError(
+            f"its bodies fit no shipped map ({', '.join(shipped_names())})",
+            file=file,
+            expected=f"bodies as in one of them; it has {', '.join(model.masses_kg) or 'none'}",
+            remedy="write a map like configs/opensim/rajagopal.toml and give it with "
+            "--model-bodies",
+        )
+    check_segments(body_map, skeleton)
+    check_fits(model, body_map)
+    return model, body_map
+
+
+def _export(
+    unit: Unit, skeleton: Skeleton, request: Request, writers: dict[str, Writer]
+) -> Outcome:
+    """All files of one participant; a format that cannot be written does not stop the others."""
+    waiting = lacking(unit)
+    if waiting is not None:
+        return replace(waiting, exit_code=waiting.exit_code or BadDataError.exit_code)
+    written: list[str] = []
+    notes: list[str] = []
+    errors: list[BsipError] = []
+    try:
+        body = _identified(unit, skeleton, request.method)
+        if request.repair:
+            known = body.made_of
+            body = body.repaired()
+            notes += body.made_of[len(known) :]
+        for ending, writer in writers.items():
+            path = unit.out / unit.name / "export" / f"{body.name}{ending}"
+            try:
+                text, note = writer(body)
+            except BadDataError as error:
+                _remove(path)  # an older one would pass for this method's
+                errors.append(error)
+                continue
+            write_atomically(path, partial(_write, text))
+            written.append(path.name)
+            notes += [note] if note else []
+    except BsipError as error:
+        errors.append(error)
+    return _outcome(unit, written, notes, errors)
+
+
+def _outcome(unit: Unit, written: list[str], notes: list[str], errors: list[BsipError]) -> Outcome:
+    sentences = [f"{unit.name}: {note}" for note in notes]
+    if written:
+        sentences.append(f"{unit.name}: {unit.out / unit.name / 'export'}: {', '.join(written)}")
+    sentences += dict.fromkeys(map(str, errors))
+    code = max((error.exit_code for error in errors), default=0)
+    return Outcome("export", unit.name, "refused" if errors else "done", tuple(sentences), code)
+
+
+def _write(text: str, path: Path) -> None:
+    path.write_bytes(text.encode())
+
+
+def _remove(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise UsageError(f"cannot be removed ({error.strerror})", file=path) from None
+
+
+def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson:
+    """The participant's geometry and one method's inertias, as the artifacts have them.
+
+    Raises
+    ------
+    UsageError
+        There is no such method.
+    BadDataError
+        The tables belong to another skeleton, or hold no numbers.
+    """
+    tables = {kind: unit.read(kind) for kind in _READER.reads}
+    rows = tables["bsip"]
+    methods = [name for name in dict.fromkeys(rows["method"]) if _FILE_NAME.fullmatch(name)]
+    if method not in methods:
+        raise UsageError(
+            f"has no method {method}",
+            file=unit.path("bsip"),
+            expected=f"one of {', '.join(methods)}",
+            remedy="name one of them, or identify with --estimator",
+        )
+    rows = _of_skeleton(unit, "bsip", rows[rows["method"] == method], skeleton)
+    geometry = _of_skeleton(unit, "skeleton", tables["skeleton"], skeleton)
+    person = person_from(geometry, tables["marker-positions"], skeleton)
+    values = rows[list(bsip_names())].to_numpy()
+    if not np.isfinite(values).all():
+        raise BadDataError(
+            f"{method} holds values that are no numbers",
+            file=unit.path("bsip"),
+            remedy="run `bsip identify` again with --force",
+        )
+    return IdentifiedPerson(
+        person,
+        tuple(from_readable(row) for row in values),
+        unit.name,
+        method,
+        _made_of(unit, method),
+    )
+
+
+def _of_skeleton(unit: Unit, kind: str, rows: pd.DataFrame, skeleton: Skeleton) -> pd.DataFrame:
+    """Rows in the order of the skeleton's segments."""
+    if sorted(rows["segment"]) != sorted(skeleton.segments):
+        raise BadDataError(
+            "its segments are not those of the skeleton",
+            file=unit.path(kind),
+            expected=f"each of {', '.join(skeleton.segments)} once",
+            remedy="name the skeleton that the results were made with, or run the stages again",
+        )
+    ordered = rows.set_index("segment").loc[list(skeleton.segments)]
+    return ordered.reset_index()
+
+
+def _made_of(unit: Unit, method: str) -> tuple[str, ...]:
+    """What stands at the head of every file."""
+    paths = (unit.path(kind) for kind in _READER.reads)
+    inputs = (f"{path.name} sha256 {file_hash(path)}" for path in paths)
+    return (f"bsip {__version__} export: participant {unit.name}, method {method}", *inputs)

@@ -1,0 +1,97 @@
+"""What changed between two recordings of one person: a mass put on, a prosthesis, a diet.
+
+Two identifications share the person's deviation x ~ N(0, P) from the table, so the difference of
+their estimates is far better known than the sum of their variances says. Linearised, an estimate
+is x_hat = R (x + change) + noise with the resolution R = 1 - C P^-1 (C its covariance) and noise
+of covariance R C. The difference of a recording b from a recording a is therefore
+
+    d = R_b change + (R_b - R_a) x + noise_a + noise_b,
+
+- the change seen through R_b: what the wrench does not show of it is missing or lies in other
+  segments (masses behind spherical joints);
+- the person's own deviation where the two motions resolve it differently;
+- the noise of both.
+
+If the change is known to sit on one segment only, both recordings together give that segment's
+change without this blur: ``change_of_segment``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.identification.estimator import Estimate, Problem
+
+
+@dataclass(frozen=True)
+class Difference:
+    """phi (P,) of b minus a, its covariance (P, P) about ``resolution @ change`` for a true change
+    (P,), and the resolution (P, P)."""
+
+    phi: np.ndarray
+    covariance: np.ndarray
+    resolution: np.ndarray
+
+
+@dataclass(frozen=True)
+class SegmentChange:
+    """Change (10,) of one segment's parameters about its joint, and its covariance (10, 10)."""
+
+    phi: np.ndarray
+    covariance: np.ndarray
+
+
+def difference(a: Estimate, b: Estimate, prior_covariance: np.ndarray) -> Difference:
+    """Estimate b minus estimate a of the same person with the same estimator.
+
+    ``prior_covariance`` (P, P) stands for estimators that do not weigh the prior themselves; of
+    those that do, the mean of both is the person's.
+    """
+    priors = [
+        prior_covariance if e.prior_covariance is None else e.prior_covariance for e in (a, b)
+    ]
+    (seen_a, noise_a), (seen_b, noise_b) = map(_resolved, (a, b), priors)
+    unequal = seen_b - seen_a
+    covariance = unequal @ (0.5 * (priors[0] + priors[1])) @ unequal.T + noise_a + noise_b
+    return Difference(b.phi - a.phi, covariance, seen_b)
+
+
+def change_of_segment(a: Problem, b: Problem, segment: int) -> SegmentChange:
+    """The change of one segment that explains how b's wrench differs from a's; all else the same.
+
+    Generalised least squares for the person's deviation from the table (common to both, with the
+    prior) and the ten parameters of the segment (free in b, zero in a); the former is marginalised.
+    ``segment`` is an index. Both problems need the same prior.
+    """
+    (information_a, right_a), (information_b, right_b) = (_about_table(p) for p in (a, b))
+    part = slice(10 * segment, 10 * segment + 10)
+    root = a.prior.root
+    inner = np.eye(root.shape[1]) + root.T @ (information_a + information_b) @ root
+    common = root @ np.linalg.solve(inner, root.T)  # covariance of the common deviation
+    seen = information_b[:, part]
+    precision = information_b[part, part] - seen.T @ common @ seen
+    right = right_b[part] - seen.T @ common @ (right_a + right_b)
+    scale = 1 / np.sqrt(np.diag(precision))  # kg beside kg m2
+    covariance = np.outer(scale, scale) * np.linalg.inv(np.outer(scale, scale) * precision)
+    return SegmentChange(covariance @ right, covariance)
+
+
+def _about_table(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
+    """Information (P, P) of the data, and its right side (P,) for deviations from the table."""
+    information, right = problem.trusted_equations()
+    return information, right - information @ problem.prior.phi
+
+
+def _resolved(estimate: Estimate, prior_covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Resolution R = 1 - C P^-1 (P, P), and the noise's covariance R C, along the directions in
+    which C is a part w of the prior; a w above 1 (C is linearised elsewhere) counts as 1."""
+    scale = np.sqrt(np.diag(prior_covariance))  # kg beside kg m2
+    root = np.linalg.cholesky(prior_covariance / np.outer(scale, scale)) * scale[:, None]
+    inverse = np.linalg.inv(root / scale[:, None]) / scale
+    part, directions = np.linalg.eigh(inverse @ estimate.covariance @ inverse.T)
+    part = np.clip(part, 0.0, 1.0)
+    axes = root @ directions
+    resolution = (axes * (1 - part)) @ (directions.T @ inverse)
+    return resolution, (axes * (part * (1 - part))) @ axes.T

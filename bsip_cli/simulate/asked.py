@@ -1,0 +1,109 @@
+"""From what a user asks for (names, sizes, targets) to drawn effects."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+
+import numpy as np
+
+from bsip_cli.errors import UsageError
+from bsip_cli.simulate.effects import EFFECTS
+from bsip_cli.simulate.effects.base import Effect, Target
+from bsip_cli.simulate.options import Asked, StudyOptions
+
+NO_TARGET = ("", "-")
+EFFECT = 4  # the stream of random numbers, beside those of `study`
+
+
+def pair_up(
+    names: Sequence[str], sizes: Sequence[float], targets: Sequence[str], simulated: bool = True
+) -> tuple[Asked, ...]:
+    """Match names, sizes and targets in the order they are given.
+
+    simulated : whether the effects are for simulated recordings or for measured ones.
+
+    Raises
+    ------
+    UsageError : unknown effect; not one size for each; targets for some effects only; a size
+        out of bounds or a target that the effect cannot have.
+    """
+    for name in names:
+        _check_name(name)
+    if len(sizes) != len(names):
+        raise UsageError(
+            f"{len(names)} effects with {len(sizes)} sizes", expected="one --size per --effect"
+        )
+    if len(targets) not in (0, len(names)):
+        raise UsageError(
+            f"{len(names)} effects with {len(targets)} targets",
+            expected="no --target, or one per --effect (- for none)",
+        )
+    asked = tuple(
+        Asked(name, size, target)
+        for name, size, target in zip(names, sizes, targets or [""] * len(names), strict=True)
+    )
+    for one in asked:
+        effect = drawn(one, np.random.default_rng(0))
+        if simulated:
+            effect.check_simulated()
+    return asked
+
+
+def _check_name(name: str) -> None:
+    if name in EFFECTS:
+        return
+    near = difflib.get_close_matches(name, EFFECTS, n=1, cutoff=0.0)[0]
+    raise UsageError(
+        f"unknown effect {name!r}, did you mean {near!r}?", expected=", ".join(EFFECTS)
+    )
+
+
+def drawn(asked: Asked, rng: np.random.Generator) -> Effect:
+    """The effect, with what its target leaves open drawn."""
+    kind = EFFECTS[asked.name]
+    if not kind.least <= asked.size <= kind.most or asked.size == 0.0:
+        raise UsageError(
+            f"{asked.name} of size {asked.size:g}",
+            expected=f"{kind.least:g} to {kind.most:g} {kind.unit}, not 0",
+        )
+    return kind.draw(asked.size, parsed_target(asked), rng)
+
+
+def parsed_target(asked: Asked) -> Target:
+    """Split ``NAME,key=number,...`` and check the keys."""
+    kind = EFFECTS[asked.name]
+    name = ""
+    settings: dict[str, float] = {}
+    for part in asked.target.split(",") if asked.target not in NO_TARGET else []:
+        key, equals, number = part.partition("=")
+        if not equals and not name and not settings:
+            name = part
+            continue
+        try:
+            settings[key] = float(number)
+        except ValueError as error:
+            raise kind.wrong_target(asked.target) from error
+        if key not in kind.settings:
+            raise kind.wrong_target(asked.target)
+    return Target(name, settings)
+
+
+def effects_of(options: StudyOptions, number: int) -> tuple[Effect, ...]:
+    """The effects of a participant; those of the lab are the same for all."""
+    return tuple(
+        drawn(one, np.random.default_rng([options.seed, _owner(one, number), EFFECT, index]))
+        for index, one in enumerate(options.effects)
+    )
+
+
+def _owner(asked: Asked, number: int) -> int:
+    """Whose random numbers draw it: the participant's, or 0 for the lab's."""
+    return number if EFFECTS[asked.name].personal else 0
+
+
+def touches(effect: Effect, task: str, tasks: tuple[str, ...]) -> bool:
+    """Whether the effect is in the trials of a task; `tasks` as asked for, or empty."""
+    if tasks:
+        return task in tasks
+    return not (effect.spares_static and task == "static")

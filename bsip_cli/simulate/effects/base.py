@@ -1,0 +1,121 @@
+"""What an effect is: something hidden in a recording that a simulation of it would get wrong.
+
+An effect may change the person who is measured, what the body carries (`body`, `plan`) or
+what the instruments deliver (`measured`). It is drawn once for a participant, and then does
+the same in every trial that it touches.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from bsip_cli.errors import UsageError
+from bsip_cli.simulate.instruments import Instruments
+from bsip_cli.simulate.people import Person
+from bsip_cli.simulate.plan import Plan
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where an effect sits: a name, and settings that would be drawn otherwise.
+
+    On the command line ``NAME,key=number,key=number``; every part may be missing.
+    """
+
+    name: str = ""
+    settings: dict[str, float] = field(default_factory=dict)
+
+    def get(self, key: str, otherwise: float) -> float:
+        return self.settings.get(key, otherwise)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Base of all effects. A concrete one is a frozen dataclass of its drawn parameters.
+
+    name, unit : of the effect and of its size. least, most : bounds of the size.
+    targets : what a target may be, in words. settings : keys that a target may set.
+    spares_static : not in static trials, unless they are asked for.
+    personal : drawn for each participant; else once for the lab.
+    injectable : whether it can be hidden in measured data.
+    needs_plates : whether it works on forces. needs_surface : and on where a plate lies.
+    hint : for those that are not, why.
+    """
+
+    size: float
+
+    name: ClassVar[str]
+    unit: ClassVar[str]
+    least: ClassVar[float]
+    most: ClassVar[float]
+    targets: ClassVar[str] = "none"
+    settings: ClassVar[tuple[str, ...]] = ()
+    spares_static: ClassVar[bool] = False
+    injectable: ClassVar[bool] = False
+    needs_plates: ClassVar[bool] = False
+    needs_surface: ClassVar[bool] = False
+    personal: ClassVar[bool] = True
+    hint: ClassVar[str] = "the person would have moved otherwise"
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        """The effect with all its parameters; those that the target leaves open are drawn."""
+        if target.name:
+            raise cls.wrong_target(target.name)
+        return cls(size)
+
+    @classmethod
+    def wrong_target(cls, name: str) -> UsageError:
+        return UsageError(f"{cls.name} cannot have the target {name!r}", expected=cls.targets)
+
+    def check_simulated(self) -> None:
+        """Refuse what only measured data can have."""
+
+    def person(self, person: Person) -> Person:
+        """The person as she or he really is, in all trials."""
+        return person
+
+    def body(self, person: Person) -> Person:
+        """The moving body of one trial, with what is fixed to it."""
+        return person
+
+    def plan(self, person: Person, plan: Plan) -> Plan:
+        """The movement, with what the body carries or leans on."""
+        return plan
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        """What markers and plates deliver."""
+        return instruments
+
+    def injected(self, instruments: Instruments) -> Instruments:
+        """Measured data as they would have been with the effect."""
+        return self.measured(instruments)
+
+    def facts(self, person: Person) -> dict[str, Any]:
+        """Further truth that depends on the person."""
+        return {}
+
+    def place(self) -> str:
+        """Segment, plate channel, marker or joint that it sits at, for the truth."""
+        return ""
+
+    def record(self) -> dict[str, Any]:
+        """The drawn parameters, for the truth."""
+        return {"effect": self.name, "target": self.place(), "unit": self.unit, **plain(self)}
+
+
+def plain(effect: Effect) -> dict[str, Any]:
+    """The fields of an effect as JSON has them."""
+    return {
+        name: value.tolist() if isinstance(value, np.ndarray) else value
+        for name, value in asdict(effect).items()
+    }
+
+
+def direction(rng: np.random.Generator) -> np.ndarray:
+    """(3,) a random unit vector."""
+    vector = rng.standard_normal(3)
+    return vector / np.linalg.norm(vector)

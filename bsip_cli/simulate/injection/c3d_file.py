@@ -1,0 +1,138 @@
+"""A measured C3D file as instruments, and back into a copy of the file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import ezc3d
+import numpy as np
+
+from bsip_cli.errors import BadDataError
+from bsip_cli.simulate.effects.base import Effect
+from bsip_cli.simulate.injection.c3d_plates import METRES, WiredPlate, wired_plates
+from bsip_cli.simulate.injection.changes import changed_by
+from bsip_cli.simulate.instruments import Instruments
+
+MODEL_OUTPUTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS")
+
+
+def inject_c3d(source: Path, copy: Path, effects: Sequence[Effect]) -> Instruments:
+    """Write a copy of a C3D file with the effects hidden in it; returns what it now holds.
+
+    Raises
+    ------
+    BadDataError : not a readable C3D file; plates that cannot be changed; nothing changed.
+    """
+    try:
+        c3d = ezc3d.c3d(str(source), extract_forceplat_data=True)
+    except (OSError, RuntimeError, ValueError) as error:
+        raise BadDataError(f"ezc3d cannot read it ({error})", file=source) from error
+    wired = wired_plates(c3d, source)
+    columns = _marker_columns(c3d)
+    before = _instruments(c3d, columns, wired, source)
+    after = changed_by(effects, before, source)
+    _cut(c3d, before, after)
+    first = _first_frame(before, after)
+    frames = len(after.points_m)
+    _put_points(c3d, columns, after)
+    _put_forces(c3d, wired, before.frames(first, first + frames), after)
+    c3d.write(str(copy))
+    return after
+
+
+def _labels(c3d: Any) -> list[str]:
+    """POINT:LABELS, LABELS2 and so on."""
+    point = c3d["parameters"]["POINT"]
+    labels = list(point["LABELS"]["value"])
+    number = 2
+    while f"LABELS{number}" in point and len(labels) < c3d["data"]["points"].shape[1]:
+        labels += list(point[f"LABELS{number}"]["value"])
+        number += 1
+    return labels
+
+
+def _marker_columns(c3d: Any) -> np.ndarray:
+    """Points that are markers, not angles or forces of a model."""
+    point = c3d["parameters"]["POINT"]
+    outputs = {label for name in MODEL_OUTPUTS if name in point for label in point[name]["value"]}
+    labels = _labels(c3d)[: c3d["data"]["points"].shape[1]]
+    return np.array([k for k, label in enumerate(labels) if label not in outputs], dtype=int)
+
+
+def _scale_m(c3d: Any, file: object) -> float:
+    unit = str(c3d["parameters"]["POINT"]["UNITS"]["value"][0]).strip()
+    if unit not in METRES:
+        raise BadDataError(f"points are in {unit!r}", expected="m, cm or mm", file=file)
+    return METRES[unit]
+
+
+def _instruments(
+    c3d: Any, columns: np.ndarray, wired: list[WiredPlate], file: object
+) -> Instruments:
+    points = _scale_m(c3d, file) * c3d["data"]["points"][:3, columns].transpose(2, 1, 0)
+    labels, analogs = _labels(c3d), c3d["data"]["analogs"][0]
+    readings = np.array([plate.reading(analogs) for plate in wired])
+    rate = float(c3d["parameters"]["POINT"]["RATE"]["value"][0])
+    ratio = max(analogs.shape[1] // max(len(points), 1), 1)
+    if not wired:
+        readings = np.zeros((0, ratio * len(points), 6))
+    return Instruments(
+        labels=tuple(labels[k] for k in columns),
+        points_m=points,
+        marker_hz=rate,
+        plates=tuple(plate.plate for plate in wired),
+        readings=readings,
+        analog_hz=rate * ratio,
+        up=_up(points, wired),
+    )
+
+
+def _up(points_m: np.ndarray, wired: list[WiredPlate]) -> np.ndarray:
+    """The lab axis nearest to the first plate's normal, to the side where the markers are."""
+    if not wired:
+        return np.array([0.0, 0.0, 1.0])
+    plate = wired[0].plate
+    axis = int(np.argmax(np.abs(plate.axes[:, 2])))
+    above = np.nanmedian(points_m[..., axis]) - plate.centre_m[axis]
+    return np.sign(above) * np.eye(3)[axis]
+
+
+def _first_frame(before: Instruments, after: Instruments) -> int:
+    return round((after.start_s - before.start_s) * before.marker_hz)
+
+
+def _cut(c3d: Any, before: Instruments, after: Instruments) -> None:
+    """Keep only the frames that are left."""
+    first, frames = _first_frame(before, after), len(after.points_m)
+    kept, ratio = slice(first, first + frames), before.per_frame
+    data, header = c3d["data"], c3d["header"]["points"]
+    data["points"] = data["points"][:, :, kept]
+    for name in ("residuals", "camera_masks"):
+        data["meta_points"][name] = data["meta_points"][name][:, :, kept]
+    data["analogs"] = data["analogs"][:, :, first * ratio : (first + frames) * ratio]
+    header["first_frame"] += first
+    header["last_frame"] = header["first_frame"] + frames - 1
+
+
+def _put_points(c3d: Any, columns: np.ndarray, after: Instruments) -> None:
+    """Markers that are seen; a lost one stays as it was written."""
+    scale = _scale_m(c3d, "")
+    points = c3d["data"]["points"].copy()
+    placed = after.points_m.transpose(2, 1, 0) / scale
+    lost = np.isnan(placed).any(axis=0)
+    points[:3, columns] = np.where(lost, np.nan, placed)
+    residuals = c3d["data"]["meta_points"]["residuals"].copy()
+    residuals[:, columns] = np.where(lost, -1.0, residuals[:, columns])
+    c3d["data"]["points"] = points
+    c3d["data"]["meta_points"]["residuals"] = residuals
+
+
+def _put_forces(c3d: Any, wired: list[WiredPlate], before: Instruments, after: Instruments) -> None:
+    """Channels whose plate reads otherwise."""
+    analogs = c3d["data"]["analogs"].copy()
+    for plate, old, new in zip(wired, before.readings, after.readings, strict=True):
+        if not np.array_equal(old, new, equal_nan=True):
+            analogs[0, plate.channels] = plate.changed(analogs[0], new - old)
+    c3d["data"]["analogs"] = analogs

@@ -1,0 +1,240 @@
+"""A TRC file with its MOT file as instruments, and back into copies of both."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bsip_cli.errors import BadDataError
+from bsip_cli.simulate.effects.base import Effect
+from bsip_cli.simulate.injection.changes import changed_by
+from bsip_cli.simulate.instruments import Instruments, SensingPlate
+
+METRES = {"m": 1.0, "mm": 1e-3}
+LOADED_N = 20.0
+UNEVEN_SHARE = 0.02  # of a frame's length, by which a stamp may be off
+
+
+@dataclass(frozen=True)
+class Table:
+    """A text table. head : its lines before the data. values : (rows, columns)."""
+
+    head: list[str]
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class ForceSet:
+    """The nine columns of one plate in a MOT table: force, point, torque."""
+
+    force: list[int]
+    point: list[int]
+    torque: list[int]
+
+
+def inject_trc_mot(trc: Path, copy: Path, effects: Sequence[Effect]) -> Instruments:
+    """Write copies of a TRC file and of the MOT file beside it with the effects hidden in them.
+
+    copy : the TRC file to be written; the MOT file goes beside it.
+
+    Raises
+    ------
+    BadDataError : a file that is not what its ending says; times that do not match.
+    """
+    mot = mot_beside(trc)
+    markers, forces = _read_trc(trc), _read_mot(mot)
+    sets = _force_sets(forces, mot)
+    scale = _scale_m(markers, trc)
+    before = _instruments(markers, forces, sets, scale, trc)
+    after = changed_by(effects, before, trc)
+    _write(copy, _new_trc(markers, before, after, scale))
+    _write(
+        copy.with_name(copy.stem + mot.name.removeprefix(trc.stem)),
+        _new_mot(forces, sets, before, after),
+    )
+    return after
+
+
+def mot_beside(trc: Path) -> Path:
+    """The MOT file of a TRC file: the same stem, or with _grf after it."""
+    with_grf = trc.with_name(f"{trc.stem}_grf.mot")
+    return with_grf if with_grf.exists() else trc.with_suffix(".mot")
+
+
+def _read_trc(file: Path) -> Table:
+    lines = _lines(file)
+    start = next((k for k in range(5, min(8, len(lines))) if _is_row(lines[k])), 0)
+    if not start or not lines[0].startswith("PathFileType"):
+        raise BadDataError("this is no TRC file", file=file)
+    return Table(lines[:start], _values(lines[start:], "\t"))
+
+
+def _read_mot(file: Path) -> Table:
+    lines = _lines(file)
+    ends = [k for k, line in enumerate(lines) if line.strip().lower() == "endheader"]
+    if not ends:
+        raise BadDataError("the line endheader is missing", file=file)
+    start = ends[0] + 2
+    return Table(lines[:start], _values(lines[start:], None))
+
+
+def _lines(file: Path) -> list[str]:
+    try:
+        return file.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as error:
+        raise BadDataError(f"it cannot be read ({error.strerror})", file=file) from error
+
+
+def _is_row(line: str) -> bool:
+    return bool(re.match(r"\s*\d+\s+[-\d.]", line))
+
+
+def _values(lines: list[str], separator: str | None) -> np.ndarray:
+    """(rows, columns); an empty or unreadable field is NaN."""
+    rows = [line.rstrip("\r\n").split(separator) for line in lines if line.strip()]
+    width = max(map(len, rows))
+    table = np.full((len(rows), width), np.nan)
+    for k, row in enumerate(rows):
+        for j, field in enumerate(row):
+            table[k, j] = float(field) if field.strip() else np.nan
+    return table
+
+
+def _trc_labels(table: Table) -> list[str]:
+    return [name.strip() for name in table.head[3].split("\t")[2:] if name.strip()]
+
+
+def _scale_m(table: Table, file: Path) -> float:
+    names, values = table.head[1].split("\t"), table.head[2].split("\t")
+    unit = dict(zip(names, values, strict=False)).get("Units", "").strip()
+    if unit not in METRES:
+        raise BadDataError(f"markers are in {unit!r}", expected="m or mm", file=file)
+    return METRES[unit]
+
+
+def _force_sets(table: Table, file: Path) -> list[ForceSet]:
+    names = table.head[-1].split()
+    column = {name: k for k, name in enumerate(names)}
+    sets = []
+    for prefix in [name[:-3] for name in names if name.endswith("_vx")]:
+        torque = prefix.replace("force", "torque")
+        for pattern in (f"{prefix}_m", f"{torque}_"):
+            wanted = [f"{prefix}_v{a}" for a in "xyz"] + [f"{prefix}_p{a}" for a in "xyz"]
+            wanted += [f"{pattern}{a}" for a in "xyz"]
+            if all(name in column for name in wanted):
+                at = [column[name] for name in wanted]
+                sets.append(ForceSet(at[:3], at[3:6], at[6:]))
+                break
+    if not sets:
+        raise BadDataError(
+            "no force, point and torque columns", expected="names as ground_force_vx", file=file
+        )
+    return sets
+
+
+def _instruments(
+    markers: Table, forces: Table, sets: list[ForceSet], scale: float, file: Path
+) -> Instruments:
+    labels = _trc_labels(markers)
+    times, samples = markers.values[:, 1], forces.values[:, 0]
+    points = scale * markers.values[:, 2 : 2 + 3 * len(labels)].reshape(len(times), -1, 3)
+    ratio = round(len(samples) / len(times))
+    if ratio < 1 or ratio * len(times) != len(samples):
+        raise BadDataError(
+            f"{len(samples)} rows of forces for {len(times)} frames",
+            expected="a whole multiple, from the same start",
+            file=file,
+        )
+    step = (times[-1] - times[0]) / (len(times) - 1)
+    if np.abs(samples[::ratio] - times).max() > 0.1 * step:
+        raise BadDataError("forces and markers have other times", file=file)
+    even = np.abs(times - times[0] - step * np.arange(len(times))).max() < UNEVEN_SHARE * step
+    if not even and ratio != 1:
+        raise BadDataError("the frames' times are uneven", expected="even ones", file=file)
+    readings = np.stack([_about_origin(forces.values, each) for each in sets])
+    plate = SensingPlate(np.eye(3), np.zeros(3), np.zeros(3))
+    return Instruments(
+        labels=tuple(labels),
+        points_m=points,
+        marker_hz=1.0 / step,
+        plates=(plate,) * len(sets),
+        readings=readings,
+        analog_hz=ratio / step,
+        up=_up(readings),
+        stamps_s=None if even else times - times[0],
+        surfaces_known=False,
+    )
+
+
+def _up(readings: np.ndarray) -> np.ndarray:
+    """The lab axis that carries most of the force."""
+    force = np.nansum(readings[..., :3], axis=(0, 1))
+    return np.eye(3)[int(np.argmax(np.abs(force)))]
+
+
+def _about_origin(values: np.ndarray, each: ForceSet) -> np.ndarray:
+    """(N, 6) force and its moment about the origin."""
+    force = values[:, each.force]
+    return np.hstack([force, np.cross(values[:, each.point], force) + values[:, each.torque]])
+
+
+def _with_reading(
+    values: np.ndarray, each: ForceSet, reading: np.ndarray, up: np.ndarray
+) -> np.ndarray:
+    """Nine columns (N, 9) for a reading (N, 6): the point moves in its plane.
+
+    The torque keeps its horizontal parts; below LOADED_N the point stays where it was.
+    """
+    force, moment = reading[:, :3], reading[:, 3:]
+    point, torque = values[:, each.point], values[:, each.torque]
+    level = np.eye(3) - np.outer(up, up)
+    upward = force @ up
+    rest = moment - np.cross(point, force) - torque @ level
+    loaded = np.abs(upward) > LOADED_N
+    shift = np.cross(up, rest @ level) / np.where(loaded, upward, np.inf)[:, None]
+    point = point + shift
+    return np.hstack([force, point, moment - np.cross(point, force)])
+
+
+def _first(before: Instruments, after: Instruments) -> int:
+    return round((after.start_s - before.start_s) * before.marker_hz)
+
+
+def _new_trc(table: Table, before: Instruments, after: Instruments, scale: float) -> str:
+    first, frames = _first(before, after), len(after.points_m)
+    values = table.values[first : first + frames].copy()
+    count = after.points_m.shape[1]
+    values[:, 2 : 2 + 3 * count] = after.points_m.reshape(frames, -1) / scale
+    head = list(table.head)
+    names, facts = head[1].split("\t"), head[2].split("\t")
+    pairs = zip(names, facts, strict=False)
+    facts = [str(frames) if name == "NumFrames" else fact for name, fact in pairs]
+    head[2] = "\t".join(facts)
+    rows = ["\t".join([f"{row[0]:.0f}", *map(_number, row[1:])]) for row in values]
+    return "\n".join([*head, *rows]) + "\n"
+
+
+def _new_mot(table: Table, sets: list[ForceSet], before: Instruments, after: Instruments) -> str:
+    first = _first(before, after) * before.per_frame
+    values = table.values[first : first + after.readings.shape[1]].copy()
+    for each, reading in zip(sets, after.readings, strict=True):
+        values[:, [*each.force, *each.point, *each.torque]] = _with_reading(
+            values, each, reading, after.up
+        )
+    head = [re.sub(r"(?i)^nRows=.*", f"nRows={len(values)}", line) for line in table.head]
+    rows = ["\t".join(map(_number, row)) for row in values]
+    return "\n".join([*head, *rows]) + "\n"
+
+
+def _number(value: float) -> str:
+    return "" if np.isnan(value) else f"{value:.9g}"
+
+
+def _write(file: Path, text: str) -> None:
+    partial = file.with_name(file.name + ".part")
+    partial.write_text(text, encoding="utf-8")
+    partial.replace(file)

@@ -1,0 +1,324 @@
+"""[[loads]] of study.toml: what it may say, and what it changes in a simulated study."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bsip_cli.artifacts import read_artifact, read_header, write_artifact
+from bsip_cli.config import Config, Load, load_config
+from bsip_cli.pipeline import STAGES
+from bsip_cli.runner import Outcome, perform
+from bsip_cli.schemas import bsip_names
+from bsip_cli.simulate.inertia import Inertia, combined
+from bsip_cli.simulate.options import Rates, StudyOptions
+from bsip_cli.simulate.recording import write_trial
+from bsip_cli.simulate.study import participant_person, simulate_study
+from bsip_cli.simulate.trial import simulate_trial
+from bsip_cli.study import load_study
+from bsip_cli.unit import Unit
+
+GOOD = '[[loads]]\nsegment = "shank_r"\nmass_kg = 1.0\nposition_m = [0.0, -0.15, 0.03]\n'
+
+
+# --- what it may say ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            GOOD.replace("shank_r", "shnk_r"),
+            "loads.0.segment: there is no shnk_r (did you mean shank_r?); expected one of",
+        ),
+        (GOOD.replace("1.0", "-1.0"), "loads.0.mass_kg = -1.0: Input should be greater than 0"),
+        (GOOD.replace("-0.15", "-150"), "loads.0.position_m.1 = -150: Input should be greater"),
+        (GOOD.replace("-0.15, ", ""), "loads.0.position_m.2 is missing"),
+        (GOOD.replace("mass_kg = 1.0\n", ""), "loads.0.mass_kg is missing"),
+        (GOOD + 'task = "static"\n', "unknown option loads.0.task (did you mean tasks?)"),
+        (GOOD + 'tasks = ["statik"]\n', "loads.0.tasks: there is no statik (did you mean static?)"),
+        (
+            GOOD + 'participants = ["sub-1"]\n',
+            "loads.0.participants: there is no sub-1 (did you mean sub-0",
+        ),
+        (GOOD + "runs = [2]\n", "loads.0.runs: there is no 2; expected none, no recording has any"),
+    ],
+)
+def test_load_that_cannot_be(bsip, empty_study, tmp_path, text, said):
+    (empty_study / "study.toml").write_text(text)
+    answer = bsip("ingest", empty_study, "--out", tmp_path / "out")
+    assert answer.code == 2
+    (line,) = answer.err.splitlines()
+    assert said in line
+
+
+def test_load_that_no_recording_carries(bsip, empty_study, tmp_path):
+    (empty_study / "sub-01" / "sub-01_task-squat_run-1.c3d").write_bytes(b"")
+    (empty_study / "study.toml").write_text(GOOD + 'participants = ["sub-02"]\ntasks = ["squat"]\n')
+    answer = bsip("ingest", empty_study, "--out", tmp_path / "out")
+    assert answer.code == 2
+    assert "loads.0: 1 kg on shank_r are carried in no recording" in answer.err
+
+
+@pytest.mark.parametrize(
+    ("who", "trial", "carried"),
+    [
+        ({}, ("sub-01", "static", None), True),
+        ({"tasks": ("squat",)}, ("sub-01", "squat", 2), True),
+        ({"tasks": ("squat",)}, ("sub-01", "static", None), False),
+        ({"runs": (2,)}, ("sub-01", "squat", 2), True),
+        ({"runs": (2,)}, ("sub-01", "squat", 1), False),
+        ({"runs": (2,)}, ("sub-01", "static", None), False),
+        ({"participants": ("sub-02",)}, ("sub-01", "squat", 1), False),
+    ],
+)
+def test_which_trials_carry_a_load(who, trial, carried):
+    load = Load(segment="hand_l", mass_kg=0.5, position_m=(0.0, -0.1, 0.0), **who)
+    assert load.is_carried_in(*trial) == carried
+
+
+# --- what it changes ----------------------------------------------------------------------------
+
+PLAIN, LOADED = "sub-01_task-sequence_run-1", "sub-01_task-sequence_run-2"
+STATIC = "sub-01_task-static"
+BACKPACK = Load(segment="upper_torso", mass_kg=8.0, position_m=(-0.2, -0.2, 0.0))
+OPTIONS = StudyOptions(
+    participants=1,
+    seed=5,
+    sexes="M",
+    tasks=("static", "sequence"),
+    durations_s={"static": 1.0, "sequence": 14.0},
+    rates={"default": Rates(marker_hz=50, analog_hz=250)},
+)
+
+
+def with_backpack(person):
+    point = Inertia(BACKPACK.mass_kg, np.array(BACKPACK.position_m), np.zeros((3, 3)))
+    thorax = combined([(person.inertias["thorax"], np.zeros(3)), (point, np.zeros(3))])
+    return replace(person, inertias={**person.inertias, "thorax": thorax})
+
+
+class Run:
+    """A study of one person and its output; runs units in this process."""
+
+    def __init__(self, root, loads: tuple[Load, ...] = ()) -> None:
+        self.study, self.out = root / "study", root / "out"
+        self.config = load_config([self.study / "study.toml"])
+        self.declare(*loads)
+
+    def declare(self, *loads: Load) -> None:
+        self.config = self.config.model_copy(update={"loads": loads})
+
+    def options(self, section: str, **values) -> None:
+        changed = getattr(self.config, section).model_copy(update=values)
+        self.config = self.config.model_copy(update={section: changed})
+
+    def unit(self, stage: str, stem: str = "", config: Config | None = None) -> Unit:
+        config = config or self.config
+        study, refusals = load_study(self.study, config.roles.model_dump())
+        assert not refusals
+        person = study.participants[0]
+        trial = next((trial for trial in person.trials if trial.stem == stem), None)
+        first = next(each for each in STAGES if each.name == stage)
+        return Unit(first, study, self.out, config, person, trial)
+
+    def perform(self, stage: str, stem: str = "") -> Outcome:
+        return perform(self.unit(stage, stem))
+
+    def everything(self, until: str) -> dict[str, str]:
+        """All stages up to one; the state of each unit."""
+        states = {}
+        for stage in STAGES[: [each.name for each in STAGES].index(until) + 1]:
+            stems = (STATIC, PLAIN, LOADED) if stage.level == "trial" else ("",)
+            for stem in stems:
+                states[f"{stage.name} {stem}".strip()] = self.perform(stage.name, stem).state
+        return states
+
+    def read(self, kind: str, owner: str = "sub-01") -> pd.DataFrame:
+        return read_artifact(self.out / "sub-01" / f"{owner}_{kind}.parquet", kind)
+
+    def facts(self, kind: str, owner: str = "sub-01") -> dict:
+        path = self.out / "sub-01" / f"{owner}_{kind}.parquet"
+        return read_header(path, kind)["provenance"]["facts"]
+
+
+@pytest.fixture(scope="session")
+def carried(tmp_path_factory):
+    """Run 1 with nothing, the static trial and run 2 with 8 kg on the back; undeclared."""
+    root = tmp_path_factory.mktemp("carried")
+    simulate_study(root / "study", OPTIONS)
+    person = participant_person(OPTIONS, 1)
+    for number, (task, stem) in enumerate((("static", STATIC), ("sequence", LOADED))):
+        rng = np.random.default_rng([5, number])
+        moved = simulate_trial(with_backpack(person), task, rng, OPTIONS.durations_s[task])
+        path = root / "study" / "sub-01" / f"{stem}.c3d"
+        write_trial(
+            path,
+            moved,
+            person,
+            OPTIONS.rates_of(task),
+            OPTIONS.laboratory,
+            OPTIONS.richness,
+            rng,
+        )
+    run = Run(root)
+    states = run.everything("identify")
+    assert set(states.values()) == {"done"}
+    return run
+
+
+@pytest.fixture
+def run(carried, tmp_path) -> Run:
+    """A copy to change."""
+    shutil.copytree(carried.study, tmp_path / "study")
+    shutil.copytree(carried.out, tmp_path / "out")
+    return Run(tmp_path)
+
+
+WORN = (
+    BACKPACK.model_copy(update={"tasks": ("static",)}),
+    BACKPACK.model_copy(update={"runs": (2,)}),
+)
+
+
+@pytest.mark.slow
+def test_load_in_the_static_trial_is_no_mass_of_the_person(carried, run):
+    stated = run.unit("scale").participant.mass_kg
+    before = carried.read("person").iloc[0]
+    assert before["plate_mass_kg"] - stated == pytest.approx(8.0, abs=0.3)
+    run.declare(*WORN)
+    assert run.perform("ingest", STATIC).state == "done"
+    told = run.perform("scale")
+    assert not [sentence for sentence in told.sentences if "the plates read" in sentence]
+    assert run.read("person").iloc[0]["plate_mass_kg"] == pytest.approx(stated, abs=0.3)
+
+
+@pytest.mark.slow
+def test_mass_taken_from_the_plates_is_without_the_load(run):
+    table = run.study / "participants.tsv"
+    header, line = table.read_text().splitlines()
+    name, sex, mass, height = line.split("\t")
+    table.write_text(f"{header}\n{name}\t{sex}\tn/a\t{height}\n")
+    run.declare(*WORN)
+    for stem in (STATIC, PLAIN, LOADED):
+        run.perform("ingest", stem)
+    told = run.perform("scale").sentences
+    assert any("plates without the known load (8 kg on the upper torso)" in line for line in told)
+    person = run.read("person").iloc[0]
+    assert person["mass_source"] == "plates"
+    assert person["mass_kg"] == pytest.approx(float(mass), abs=0.3)
+
+
+@pytest.mark.slow
+def test_declared_load_is_not_taken_for_the_body(carried, run):
+    """Both runs together identify: without a word no body explains both, declared one does."""
+    run.declare(*WORN)
+    assert run.everything("identify")["identify"] == "done"
+    stated = run.unit("identify").participant.mass_kg
+    masses = run.read("bsip").query("method == 'OM'")["mass_kg"]
+    assert masses.sum() == pytest.approx(stated, abs=0.4)
+    misfit, fit = (r.read("identification").iloc[0]["rms_fz_N"] for r in (carried, run))
+    assert misfit > 30.0  # half of the weight of 8 kg is 39 N
+    assert fit < 0.3 * misfit
+
+
+@pytest.mark.slow
+def test_prediction_and_report_include_the_load(run):
+    run.declare(*WORN)
+    run.everything("reconstruct")
+    assert run.perform("report").state == "done"
+    for stem in (PLAIN, LOADED):
+        table = run.read("reconstruction", stem)
+        table = table[table["valid"]]
+        force = table.groupby("method")["fz_N"].mean()
+        assert force["OM"] == pytest.approx(force["measured"], abs=5.0)
+        assert force["RM"] == pytest.approx(force["measured"], abs=5.0)
+    load = {"segment": "upper_torso", "mass_kg": 8.0, "position_m": [-0.2, -0.2, 0.0]}
+    assert run.facts("reconstruction", LOADED)["loads"] == [load]
+    assert run.facts("reconstruction", PLAIN)["loads"] == []
+    assert run.facts("bsip")["loads"] == {PLAIN: [], LOADED: [load]}
+    report = (run.out / "sub-01" / "report.html").read_text(encoding="utf-8")
+    plain = report.replace("\N{NO-BREAK SPACE}", " ")
+    assert "8 kg on the upper torso in static and sequence (run 2)" in plain
+
+
+@pytest.mark.slow
+def test_changed_load_redoes_what_it_touches_and_nothing_else(run):
+    run.everything("reconstruct")
+    assert set(run.everything("reconstruct").values()) == {"fresh"}
+    run.declare(BACKPACK.model_copy(update={"participants": ("sub-02",)}))
+    assert set(run.everything("reconstruct").values()) == {"fresh"}
+    run.declare(WORN[1])
+    touched = {f"ingest {LOADED}", f"ik {LOADED}", "scale", "identify"}
+    states = run.everything("reconstruct")
+    assert states[f"ingest {PLAIN}"] == states[f"ingest {STATIC}"] == "fresh"
+    assert {states[name] for name in touched} == {"done"}
+    assert {states[f"reconstruct {stem}"] for stem in (STATIC, PLAIN, LOADED)} == {"done"}
+
+
+# --- several identification trials --------------------------------------------------------------
+
+
+def without_forces(run: Run, stem: str) -> None:
+    """As if a foot had stood beside the plate for the whole trial."""
+    path = run.out / "sub-01" / f"{stem}_wrench.parquet"
+    header = read_header(path, "wrench")["provenance"]
+    write_artifact(path, "wrench", run.read("wrench", stem).assign(valid=False), header)
+
+
+@pytest.mark.slow
+def test_two_runs_identify_together(run):
+    run.declare(*WORN)
+    run.everything("identify")
+    table = run.read("identification").iloc[0]
+    assert table["trials"] == f"{PLAIN}, {LOADED}"
+    blocks = run.read("used-blocks")
+    assert set(blocks["trial"]) == {PLAIN, LOADED}
+    used = (blocks["end_s"] - blocks["start_s"]).sum()
+    assert table["duration_s"] == pytest.approx(used + 0.02 * len(blocks))
+
+
+@pytest.mark.slow
+def test_run_with_unusable_forces_does_not_identify(run):
+    run.declare(*WORN)
+    run.everything("regress")
+    without_forces(run, PLAIN)
+    assert run.perform("identify").state == "done"
+    assert set(run.read("used-blocks")["trial"]) == {LOADED}
+    assert run.read("identification").iloc[0]["trials"] == LOADED
+
+
+@pytest.mark.slow
+def test_blocks_are_left_out_in_each_run(run):
+    run.declare(*WORN)
+    run.options("identify", hold_out_fraction=0.25, block_s=2.0)
+    run.everything("identify")
+    blocks = run.read("used-blocks")
+    for stem in (PLAIN, LOADED):
+        kinematics, wrench = run.read("kinematics", stem), run.read("wrench", stem)
+        times = kinematics["time_s"].to_numpy()
+        usable = kinematics["determined"].to_numpy() & wrench["valid"].to_numpy()
+        used = np.zeros(len(times), dtype=bool)
+        for row in blocks[blocks["trial"] == stem].itertuples():
+            used |= (times >= row.start_s) & (times <= row.end_s)
+        left_out = ((times - times[0]) // 2.0) % 4 == 3  # every fourth block
+        assert (used == usable & ~left_out).all()
+        assert (usable & left_out).any()
+
+
+@pytest.mark.slow
+def test_order_of_the_runs_does_not_matter(run):
+    run.declare(*WORN)
+    run.everything("identify")
+    first = run.read("bsip").query("method == 'OM'")
+    unit = run.unit("identify")
+    turned = replace(unit.participant, trials=unit.participant.trials[::-1])
+    assert perform(replace(unit, participant=turned), force=True).state == "done"
+    second = run.read("bsip").query("method == 'OM'")
+    for name in bsip_names():
+        moved = (second[name] - first[name]).abs() / first[f"{name}_sd"]
+        assert moved.max() < 1e-3, name  # what is left is the solver's tolerance

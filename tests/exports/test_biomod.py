@@ -1,0 +1,82 @@
+"""bioMod: biorbd reads the same person as our own model has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from exported_person import configuration, our_model, velocity, whole_body
+
+from bsip_cli.body.exports.biomod import biomod_text
+
+biorbd = pytest.importorskip("biorbd", reason="the biorbd package is not installed")
+
+H_S = 1e-5
+
+
+@pytest.fixture(scope="module")
+def read(identified, tmp_path_factory):
+    file = tmp_path_factory.mktemp("biomod") / "person.bioMod"
+    file.write_text(biomod_text(identified), encoding="utf-8")
+    return biorbd.Model(str(file))
+
+
+def numbered(read) -> dict[str, int]:
+    return {read.segment(k).name().to_string(): k for k in range(read.nbSegment())}
+
+
+def placements(read, q: np.ndarray, names) -> dict[str, pin.SE3]:
+    order = numbered(read)
+    frames = {}
+    for name in names:
+        matrix = read.globalJCS(q, order[name]).to_array()
+        frames[name] = pin.SE3(matrix[:3, :3], matrix[:3, 3])
+    return frames
+
+
+def test_has_a_free_base_and_forty_coordinates(read, identified):
+    assert (read.nbQ(), read.nbQdot()) == (40, 40)
+    assert read.mass() == pytest.approx(identified.mass_kg, rel=1e-12)
+    assert read.getGravity().to_array() == pytest.approx([0, 0, -9.80665])
+
+
+def test_every_segment_has_its_inertia(read, identified):
+    order = numbered(read)
+    for i, segment in enumerate(identified.person.skeleton.segments):
+        found = read.segment(order[segment]).characteristics()
+        wanted = identified.inertias[i]
+        com = wanted.com_m + identified.person.origin_in_joint_m[i]
+        assert found.mass() == pytest.approx(wanted.mass_kg, rel=1e-12)
+        assert found.CoM().to_array() == pytest.approx(com, abs=1e-12)
+        assert found.inertia().to_array() == pytest.approx(wanted.tensor_kgm2, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_same_whole_body_in_any_state(read, identified, seed):
+    rng, own = np.random.default_rng(seed), our_model(identified)
+    names = identified.person.skeleton.segments
+    q, v = rng.normal(0, 0.5, 40), rng.normal(0, 1.0, 40)
+    before, here, after = (
+        configuration(identified, placements(read, q + step * v, names)) for step in (-H_S, 0, H_S)
+    )
+    wanted = whole_body(own, here, velocity(own, before, after, 2 * H_S))
+    assert read.CoM(q).to_array() == pytest.approx(wanted.com_m, abs=1e-10)
+    momentum = identified.mass_kg * read.CoMdot(q, v).to_array()
+    assert momentum == pytest.approx(wanted.momentum[:3], abs=1e-6)
+    turning = read.angularMomentum(q, v).to_array()
+    assert turning == pytest.approx(wanted.momentum[3:], abs=1e-6)
+
+
+def test_markers_are_where_they_are(read, identified):
+    person, q = identified.person, np.zeros(40)
+    placed = placements(read, q, person.skeleton.segments)
+    assert [name.to_string() for name in read.markerNames()] == list(person.markers)
+    for k, place in enumerate(person.markers_in_joint_m()):
+        frame = placed[person.skeleton.segments[person.marker_segments[k]]]
+        assert read.marker(q, k).to_array() == pytest.approx(frame.act(place), abs=1e-10)
+
+
+def test_stands_upright_at_zero(read):
+    placed = placements(read, np.zeros(40), ("lower_torso", "head", "foot_r"))
+    assert placed["lower_torso"].rotation @ [0, 1, 0] == pytest.approx([0, 0, 1], abs=1e-12)
+    assert placed["head"].translation[2] > placed["foot_r"].translation[2] + 1

@@ -1,0 +1,295 @@
+"""`bsip export`: which files, where, what they say, and which exit code."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pinocchio as pin
+import pytest
+from exported_person import identified_person
+from test_osim_given import draw, inertias_in
+
+from bsip_cli import __version__
+from bsip_cli.artifacts import write_artifact
+from bsip_cli.body.exports.formats import FORMATS
+from bsip_cli.body.exports.identified import IdentifiedPerson, plain_names, xml_comment
+from bsip_cli.cli import cli
+from bsip_cli.errors import BadDataError
+from bsip_cli.provenance import file_hash
+from bsip_cli.stages.frames import bsip_table
+
+ENDINGS = {".urdf", ".xml", ".osim", ".bioMod", ".csv"}
+NOTES = {"made_by": {}, "messages": [], "facts": {}}
+
+
+@dataclass(frozen=True)
+class Results:
+    """A study of two participants and what `identify` would have left of it."""
+
+    study: Path
+    out: Path
+
+    def call(self, *arguments: object) -> subprocess.CompletedProcess:
+        command = [sys.executable, "-m", "bsip_cli", "export", self.study, "--out", self.out]
+        return subprocess.run(
+            list(map(str, [*command, *arguments])), capture_output=True, text=True, check=False
+        )
+
+    def files(self) -> set[str]:
+        return {p.relative_to(self.out).as_posix() for p in self.out.glob("*/export/*")}
+
+    def artifact(self, kind: str, participant: str = "sub-01") -> Path:
+        return self.out / participant / f"{participant}_{kind}.parquet"
+
+    def write_inertias(self, rows: dict[str, np.ndarray], participant: str = "sub-01") -> None:
+        segments = identified_person().person.skeleton.segments
+        nothing = np.zeros((15, 10))
+        tables = [bsip_table(name, segments, v, nothing, nothing) for name, v in rows.items()]
+        path = self.artifact("bsip", participant)
+        write_artifact(path, "bsip", pd.concat(tables, ignore_index=True), NOTES)
+
+
+def readable(body: IdentifiedPerson) -> np.ndarray:
+    return np.array([inertia.readable() for inertia in body.inertias])
+
+
+def impossible(values: np.ndarray, segment: int) -> np.ndarray:
+    """Izz beyond Ixx + Iyy."""
+    changed = values.copy()
+    changed[segment, 6] = 1.5 * (changed[segment, 4] + changed[segment, 5])
+    return changed
+
+
+@pytest.fixture
+def results(tmp_path) -> Results:
+    made = Results(tmp_path / "study", tmp_path / "out")
+    lines = ["participant_id\tsex\tmass_kg\theight_m"]
+    for name in ("sub-01", "sub-02"):
+        (made.study / name).mkdir(parents=True)
+        (made.study / name / f"{name}_task-static.c3d").write_bytes(b"")
+        lines.append(f"{name}\tM\t71.3\t1.77")
+        write_person(made, name)
+        values = readable(identified_person())
+        made.write_inertias({"RM": values, "OM": values * 1.0}, name)
+    (made.study / "participants.tsv").write_text("\n".join(lines) + "\n")
+    return made
+
+
+def write_person(made: Results, participant: str) -> None:
+    person = identified_person().person
+    skeleton, zeros = person.skeleton, np.zeros(15)
+    parents = ["", *(skeleton.segments[k] for k in skeleton.parents[1:])]
+    table = {
+        "segment": skeleton.segments,
+        "parent": parents,
+        "joint": skeleton.joints,
+        "joint_type": skeleton.joint_types,
+        "parent_tilt_rad": person.parent_tilt_rad,
+        "child_tilt_rad": person.child_tilt_rad,
+        "length_m": person.lengths_m,
+        **dict.fromkeys(("first_guess_m", "length_sd_m", "joint_shift_m"), zeros),
+        "held": person.held,
+    }
+    for k, axis in enumerate("xyz"):
+        table[f"joint_{axis}_m"] = person.joint_in_parent_m[:, k]
+        table[f"origin_{axis}_m"] = person.origin_in_joint_m[:, k]
+    path = made.artifact("skeleton", participant)
+    write_artifact(path, "skeleton", pd.DataFrame(table), NOTES)
+    markers = {
+        "marker": person.markers,
+        "segment": [skeleton.segments[k] for k in person.marker_segments],
+        **{f"{axis}_m": person.marker_positions_m[:, k] for k, axis in enumerate("xyz")},
+        "weight": person.marker_weights,
+        **dict.fromkeys(("shift_m", "residual_m"), np.zeros(len(person.markers))),
+    }
+    path = made.artifact("marker-positions", participant)
+    write_artifact(path, "marker-positions", pd.DataFrame(markers), NOTES)
+
+
+# --- files --------------------------------------------------------------------------------------
+
+
+def test_writes_every_format_of_everybody(results):
+    done = results.call()
+    assert (done.returncode, done.stdout) == (0, "")
+    wanted = {f"{s}/export/{s}_OM{e}" for s in ("sub-01", "sub-02") for e in ENDINGS}
+    assert results.files() == wanted
+    first, _, summary = done.stderr.splitlines()
+    assert first.startswith(f"export: sub-01: {results.out / 'sub-01' / 'export'}: sub-01_OM.urdf")
+    assert summary == f"bsip export: 2 done; results in {results.out}"
+
+
+def test_written_model_is_the_person_of_the_tables(results):
+    assert results.call("--participant", "sub-02", "--format", "urdf").returncode == 0
+    file = results.out / "sub-02" / "export" / "sub-02_OM.urdf"
+    model = pin.buildModelFromUrdf(str(file), pin.JointModelFreeFlyer())
+    assert pin.computeTotalMass(model) == pytest.approx(identified_person().mass_kg, rel=1e-12)
+
+
+def test_every_file_says_what_made_it(results):
+    assert results.call("--method", "RM", "--participant", "sub-01").returncode == 0
+    for file in (results.out / "sub-01" / "export").iterdir():
+        text = file.read_text(encoding="utf-8")
+        assert f"bsip {__version__} export: participant sub-01, method RM" in text
+        for kind in ("bsip", "skeleton", "marker-positions"):
+            path = results.artifact(kind)
+            assert f"{path.name} sha256 {file_hash(path)}" in text
+
+
+def test_twice_gives_the_same_bytes_and_no_rest(results):
+    assert results.call().returncode == 0
+    before = {name: (results.out / name).read_bytes() for name in results.files()}
+    assert results.call().returncode == 0
+    assert {name: (results.out / name).read_bytes() for name in results.files()} == before
+
+
+def test_only_what_is_asked_for(results):
+    done = results.call("--participant", "sub-01", "--format", "csv", "--format", "mjcf")
+    assert done.returncode == 0
+    assert results.files() == {"sub-01/export/sub-01_OM.csv", "sub-01/export/sub-01_OM.xml"}
+
+
+def test_formats_of_the_command_are_those_there_are():
+    option = next(each for each in cli.commands["export"].params if each.name == "formats")
+    assert list(option.type.choices) == list(FORMATS)
+    assert {ending for ending, _ in FORMATS.values()} == ENDINGS
+
+
+# --- a given model ------------------------------------------------------------------------------
+
+
+def test_given_model_gets_the_inertias(results, tmp_path):
+    given = tmp_path / "given.osim"
+    given.write_text(draw(identified_person(), arms=True).text, encoding="utf-8")
+    done = results.call("--participant", "sub-01", "--format", "osim", "--model-file", given)
+    assert done.returncode == 0
+    assert "sub-01: given.osim, map rajagopal: bodies placed by common joint centres" in done.stderr
+    text = (results.out / "sub-01" / "export" / "sub-01_OM.osim").read_text(encoding="utf-8")
+    assert ET.fromstring(text).find("Model").get("name") == "given"
+    total = sum(inertia.mass for inertia in inertias_in(text).values())
+    assert total == pytest.approx(identified_person().mass_kg + 0.09)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--model-file", "nowhere.osim"], "nowhere.osim: cannot be read (No such file"),
+        (["--model-file", "{table}"], "expected an .osim file of OpenSim 4"),
+        (["--model-file", "{odd}"], "its bodies fit no shipped map (gait2392, rajagopal)"),
+        (["--model-file", "{odd}", "--model-bodies", "x"], "there is no such map of bodies"),
+        (["--model-file", "{odd}", "--format", "urdf"], "--model-file belongs to --format osim"),
+        (["--model-bodies", "rajagopal"], "--model-bodies belongs to --model-file"),
+        (["--method", "nobody"], "has no method nobody; expected one of RM, OM"),
+        (["--format", "pdf"], "'pdf' is not one of"),
+    ],
+)
+def test_usage(results, tmp_path, arguments, said):
+    odd = tmp_path / "odd.osim"
+    odd.write_text('<OpenSimDocument Version="40000"><Model name="odd"/></OpenSimDocument>')
+    places = {"table": results.study / "participants.tsv", "odd": odd}
+    done = results.call(*(word.format(**places) for word in arguments))
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert results.files() == set()
+
+
+# --- data that cannot be used -------------------------------------------------------------------
+
+
+def test_without_results_the_stage_to_run_is_named(results):
+    results.artifact("bsip").unlink()
+    done = results.call()
+    assert done.returncode == 2
+    assert "sub-01: export has no bsip to read; run `bsip identify` first" in done.stderr
+    assert {name.split("/")[0] for name in results.files()} == {"sub-02"}
+
+
+def test_refused_participant_is_left_out(results):
+    """There is no file for somebody who was asked for: bad data, also a command later."""
+    results.artifact("bsip").unlink()
+    row = pd.DataFrame([{"stage": "scale", "kind": "bad data", "sentence": "no markers."}])
+    write_artifact(results.artifact("refusal-scale"), "refusal", row, NOTES)
+    done = results.call()
+    assert done.returncode == 3
+    assert "sub-01: left out of export, since its input was refused" in done.stderr
+    assert {name.split("/")[0] for name in results.files()} == {"sub-02"}
+
+
+def test_damaged_table_is_refused_and_the_others_done(results):
+    results.artifact("bsip").write_bytes(b"nothing")
+    done = results.call()
+    assert done.returncode == 3
+    assert f"{results.artifact('bsip')}: is not an artifact of bsip" in done.stderr
+    assert {name.split("/")[0] for name in results.files()} == {"sub-02"}
+
+
+def test_values_that_are_no_numbers_are_refused(results):
+    values = readable(identified_person())
+    values[3, 0] = np.nan
+    results.write_inertias({"OM": values})
+    done = results.call("--participant", "sub-01")
+    assert done.returncode == 3
+    assert "OM holds values that are no numbers" in done.stderr
+    assert results.files() == set()
+
+
+def test_impossible_inertia_goes_into_the_table_only(results):
+    """And takes away the model of an earlier identification under the same name."""
+    assert results.call("--participant", "sub-01").returncode == 0
+    results.write_inertias({"OM": impossible(readable(identified_person()), 2)})
+    done = results.call("--participant", "sub-01")
+    assert done.returncode == 3
+    assert done.stderr.count("OM has an inertia that no body can have at head") == 1
+    assert results.files() == {"sub-01/export/sub-01_OM.csv"}
+
+
+def test_repaired_inertia_is_told_in_the_file(results):
+    results.write_inertias({"OM": impossible(readable(identified_person()), 2)})
+    done = results.call("--participant", "sub-01", "--repair")
+    assert done.returncode == 0
+    said = "head: impossible tensor replaced by the nearest, "
+    assert f"export: sub-01: {said}" in done.stderr
+    for name in results.files():
+        assert said in (results.out / name).read_text(encoding="utf-8")
+
+
+def test_no_file_outside_of_the_folder(results):
+    """A method's name out of a strange table is no path."""
+    values = readable(identified_person())
+    results.write_inertias({"RM": values, "../../../evil": values})
+    done = results.call("--participant", "sub-01", "--method", "../../../evil")
+    assert done.returncode == 2
+    assert "has no method ../../../evil; expected one of RM" in done.stderr
+    assert results.files() == set()
+    assert not list(results.out.parent.rglob("*evil*"))
+
+
+# --- strange names ------------------------------------------------------------------------------
+
+
+def test_strange_marker_names_become_plain_ones(identified):
+    names = ('a<b&"c', "d e//f", *identified.person.markers[2:])
+    person = replace(identified.person, markers=names)
+    strange = replace(identified, person=person)
+    for _, text_of in FORMATS.values():
+        text = text_of(strange)
+        assert "a<b" not in text
+        assert "d e" not in text
+    assert plain_names(names)[:2] == ("a_b__c", "d_e__f")
+    with pytest.raises(BadDataError, match="more than one marker would be called a_b"):
+        plain_names(("a b", "a/b"))
+
+
+def test_comment_stays_a_comment():
+    """Two hyphens would end it."""
+    element = ET.Comment(xml_comment(["--><evil/>", "---", "end-"]))
+    text = f"<a>{ET.tostring(element, encoding='unicode')}</a>"
+    assert len(ET.fromstring(text)) == 0
+    assert "evil" in text

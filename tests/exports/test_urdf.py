@@ -1,0 +1,77 @@
+"""URDF: Pinocchio reads the same person as our own model has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from exported_person import configuration, our_model, velocity, whole_body
+
+from bsip_cli.body.exports.urdf import urdf_text
+
+H_S = 1e-5
+
+
+@pytest.fixture(scope="module")
+def read(identified) -> pin.Model:
+    return pin.buildModelFromXML(urdf_text(identified), pin.JointModelFreeFlyer())
+
+
+def placements(model: pin.Model, q: np.ndarray, names) -> dict[str, pin.SE3]:
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return {name: data.oMf[model.getBodyId(name)].copy() for name in names}
+
+
+def test_has_a_free_base_and_forty_velocities(read, identified):
+    assert read.nv == 40
+    assert pin.computeTotalMass(read) == pytest.approx(identified.mass_kg, rel=1e-12)
+    assert np.array_equal(read.gravity.linear[:2], [0, 0])
+    assert read.gravity.linear[2] < 0
+
+
+def test_every_body_has_its_inertia(read, identified):
+    """Of the frame of its link, into which Pinocchio's joint frame is turned back."""
+    for i, segment in enumerate(identified.person.skeleton.segments):
+        frame = read.frames[read.getBodyId(segment)]
+        found = frame.placement.actInv(read.inertias[frame.parentJoint])
+        wanted = identified.inertias[i]
+        com = wanted.com_m + identified.person.origin_in_joint_m[i]
+        assert found.mass == pytest.approx(wanted.mass_kg, rel=1e-12)
+        assert found.lever == pytest.approx(com, abs=1e-12)
+        assert found.inertia == pytest.approx(wanted.tensor_kgm2, abs=1e-12)
+
+
+def test_links_between_ball_axes_have_no_mass(read, identified):
+    names = identified.person.skeleton.segments
+    with_mass = {read.frames[read.getBodyId(name)].parentJoint for name in names}
+    others = set(range(read.njoints)) - with_mass
+    assert len(with_mass) == 15
+    assert [read.inertias[joint].mass for joint in others] == [0.0] * len(others)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_same_whole_body_in_any_state(read, identified, seed):
+    """Centre of mass, inertia about it and momentum follow; so does the ground wrench."""
+    rng, own = np.random.default_rng(seed), our_model(identified)
+    names = identified.person.skeleton.segments
+    q = pin.integrate(read, pin.neutral(read), rng.normal(0, 0.6, read.nv))
+    v = rng.normal(0, 1.0, read.nv)
+    before, here, after = (
+        configuration(identified, placements(read, pin.integrate(read, q, step * v), names))
+        for step in (-H_S, 0.0, H_S)
+    )
+    wanted = whole_body(own, here, velocity(own, before, after, 2 * H_S))
+    found = whole_body(read, q, v)
+    assert found.com_m == pytest.approx(wanted.com_m, abs=1e-10)
+    assert found.inertia_kgm2 == pytest.approx(wanted.inertia_kgm2, abs=1e-9)
+    assert found.momentum == pytest.approx(wanted.momentum, abs=1e-6)
+
+
+def test_base_is_upright_with_z_up(read, identified):
+    placed = placements(read, pin.neutral(read), ("lower_torso", "head", "foot_r", "foot_l"))
+    up = placed["lower_torso"].rotation @ [0, 1, 0]
+    assert up == pytest.approx([0, 0, 1], abs=1e-12)
+    assert placed["head"].translation[2] > 0.4
+    assert placed["foot_r"].translation[2] < -0.7
+    assert placed["foot_l"].translation[1] > placed["foot_r"].translation[1]

@@ -1,0 +1,165 @@
+"""Exchanged labels are put right where that is clear, and never to the worse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from swinging_markers import MARKERS, PERSON, fitted, recording
+
+from bsip_cli.motion.marker_evidence import Evidence, marker_evidence
+from bsip_cli.motion.marker_exchange import Exchange, as_recorded, misfit_m, put_right, refitted
+
+ARM = ("upper_arm_r", "forearm_r", "hand_r")
+
+
+def exchange(markers: np.ndarray, a: str, b: str, frames: slice) -> None:
+    pair = [MARKERS.index(a), MARKERS.index(b)]
+    markers[frames, pair] = markers[frames, pair[::-1]]
+
+
+def judged(markers: np.ndarray, times: np.ndarray, filled: np.ndarray | None = None) -> Evidence:
+    return marker_evidence(fitted(markers, times), fitted, filled)
+
+
+def misfit_of(markers: np.ndarray, times: np.ndarray) -> float:
+    return misfit_m(fitted(markers, times).distance_m())
+
+
+@pytest.mark.parametrize(
+    ("a", "b"), [("RKNEL", "RKNEM"), ("LWRR", "LWRU"), ("RELB", "LELB"), ("RTEM", "LTEM")]
+)
+@pytest.mark.parametrize("frames", [slice(160, 205), slice(0, 250), slice(160, None)])
+def test_a_swap_is_undone(a, b, frames):
+    times, clean, _ = recording(4)
+    markers = clean.copy()
+    exchange(markers, a, b, frames)
+    found = judged(markers, times)
+    (event,) = found.events
+    assert event.put_right
+    assert found.put_right()
+    assert event.sentence.endswith("; put right")
+    assert np.array_equal(found.markers_m, clean)
+
+
+def test_swaps_of_any_pair_are_undone_and_none_to_the_worse():
+    """Twelve pairs of one segment or of mirrored ones, for a tenth of a second or more."""
+    rng = np.random.default_rng(8)
+    segments = [PERSON.skeleton.segments[k] for k in PERSON.marker_segments]
+    pairs = [
+        (a, b)
+        for i, a in enumerate(MARKERS)
+        for j, b in enumerate(MARKERS[:i])
+        if segments[i][:-2] == segments[j][:-2] and segments[i] != "upper_torso"
+    ]
+    restored = 0
+    for k in rng.permutation(len(pairs))[:12]:
+        times, clean, _ = recording(int(rng.integers(6)))
+        start = int(rng.integers(20, 300))
+        markers = clean.copy()
+        exchange(markers, *pairs[k], slice(start, start + int(rng.integers(5, 90))))
+        found = judged(markers, times)
+        assert misfit_of(found.markers_m, times) <= misfit_of(markers, times)
+        restored += np.array_equal(found.markers_m, clean)
+    assert restored >= 11
+
+
+def test_swaps_at_two_times_are_both_undone():
+    times, clean, _ = recording(2)
+    markers = clean.copy()
+    exchange(markers, "RKNEL", "RKNEM", slice(60, 100))
+    exchange(markers, "RKNEL", "RKNEM", slice(250, 300))
+    exchange(markers, "LMALL", "LMALM", slice(80, 140))
+    found = judged(markers, times)
+    assert [(one.kind, one.put_right) for one in found.events] == [("swap", True)] * 3
+    assert np.array_equal(found.markers_m, clean)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_right_labels_stay(seed):
+    times, clean, _ = recording(seed)
+    found = judged(clean, times)
+    assert not found.put_right()
+    assert found.markers_m is clean
+
+
+def test_of_an_exchanged_arm_the_marker_that_kept_its_label_keeps_it():
+    times, clean, _ = recording(5)
+    right = [
+        label
+        for label, k in zip(MARKERS, PERSON.marker_segments, strict=True)
+        if PERSON.skeleton.segments[k] in ARM
+    ]
+    markers = clean.copy()
+    for label in right:
+        if label != "RUA":
+            exchange(markers, label, f"L{label[1:]}", slice(None))
+    found = judged(markers, times)
+    done = {one.marker for one in found.events if one.put_right}
+    assert done == set(right) - {"RUA"}
+    assert np.array_equal(found.markers_m, clean)
+
+
+def test_filled_frames_go_with_their_marker():
+    """A jump in a gap that was filled under the other label is still one of a filled gap."""
+    times, clean, turns = recording(4)
+    markers, filled = clean.copy(), np.zeros(clean.shape[:2], dtype=bool)
+    m, other = MARKERS.index("RKNEL"), MARKERS.index("RKNEM")
+    markers[190:194, m] += 0.06 * turns[190:194, m] @ [1.0, 0.0, 0.0]
+    exchange(markers, "RKNEL", "RKNEM", slice(160, 250))
+    filled[190:194, other] = True
+    jumps = [one for one in judged(markers, times, filled).events if one.kind == "jump"]
+    assert [one.marker for one in jumps] == ["RKNEL"]
+    assert "where a gap was filled" in jumps[0].sentence
+
+
+# --- what is not clear ------------------------------------------------------------------------
+
+
+def suspected(farther: str, factor: float):
+    """A swap of the right knee's markers, and a fit of it undone that leaves one farther off."""
+    times, clean, _ = recording(4)
+    markers, frames = clean.copy(), slice(160, 205)
+    exchange(markers, "RKNEL", "RKNEM", frames)
+    fit, a, b = fitted(markers, times), MARKERS.index("RKNEL"), MARKERS.index("RKNEM")
+
+    def refit(other: np.ndarray, at: np.ndarray):
+        again = fitted(other, at)
+        if np.array_equal(other[frames], markers[frames]):
+            return again
+        m = MARKERS.index(farther)
+        residual = again.residual_m.copy()
+        residual[frames, m] = factor * fit.residual_m[frames, m]
+        return replace(again, residual_m=residual)
+
+    one = [Exchange(a, b, frames, 9.0)]
+    return put_right(as_recorded(fit), refitted(fit, refit, one), refit, one), fit
+
+
+@pytest.mark.parametrize("label", ["RKNEL", "RKNEM"])
+def test_a_swap_that_leaves_one_of_the_two_farther_off_is_only_reported(label):
+    labelling, fit = suspected(label, 1.1)
+    (event,) = labelling.events
+    assert not event.put_right
+    assert event.sentence.endswith("; not clear enough to put right, left as recorded")
+    assert labelling.fit is fit
+    assert np.array_equal(labelling.order, as_recorded(fit).order)
+
+
+def test_a_swap_that_brings_both_nearer_is_undone():
+    labelling, fit = suspected("RKNEL", 0.5)
+    assert labelling.events[0].put_right
+    assert (labelling.order != as_recorded(fit).order).sum() == 2 * 45
+
+
+def test_a_swap_after_which_all_markers_fit_worse_is_not_undone():
+    times, clean, _ = recording(4)
+    fit, one = fitted(clean, times), [Exchange(0, 1, slice(0, 40), 9.0)]
+    a_worse_fit = replace(fit, residual_m=fit.residual_m + 0.001)
+    near = replace(fit, residual_m=a_worse_fit.residual_m.copy())
+    near.residual_m[:40, :2] = 0.0
+    near.residual_m[40:] += 0.01
+    labelling = put_right(as_recorded(a_worse_fit), near, lambda m, t: near, one)
+    assert not labelling.events[0].put_right
+    assert labelling.fit is a_worse_fit

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from bsip_cli.body.inertia import SYMMETRIC
 from bsip_cli.dynamics.pinocchio_model import GRAVITY_M_S2
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -47,6 +48,29 @@ class SegmentMotion:
             + np.cross(turning, np.cross(turning, arm))
         )
         return Point(self.position_m[:, segment] + arm, acceleration)
+
+    def wrenches(self, segment: int) -> np.ndarray:
+        """(N, 6, 10) ground wrench about the world's origin for each inertial parameter.
+
+        Newton and Euler for a body about its joint centre; parameters as in ``body.inertia``.
+        """
+        R, w = self.rotation[:, segment], self.turning_rad_s[:, segment]
+        dw = self.turning_acceleration_rad_s2[:, segment]
+        fall = self.acceleration_m_s2[:, segment] + GRAVITY_M_S2 * UP
+        force, moment = np.zeros((2, len(R), 3, 10))
+        force[:, :, 0] = fall
+        for k in range(3):
+            arm = R[:, :, k]
+            force[:, :, 1 + k] = np.cross(dw, arm) + np.cross(w, np.cross(w, arm))
+            moment[:, :, 1 + k] = np.cross(arm, fall)
+        for k, (i, j) in enumerate(SYMMETRIC):
+            unit = np.zeros((3, 3))
+            unit[i, j] = unit[j, i] = 1.0
+            tensor = R @ unit @ R.swapaxes(1, 2)
+            spin = (tensor @ w[..., None])[..., 0]
+            moment[:, :, 4 + k] = (tensor @ dw[..., None])[..., 0] + np.cross(w, spin)
+        moment += np.cross(self.position_m[:, segment, :, None], force, axis=1)
+        return np.concatenate([force, moment], axis=1)
 
 
 def segment_motion(

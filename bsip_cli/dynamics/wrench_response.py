@@ -38,6 +38,16 @@ class WrenchResponse:
             + self.to_acceleration @ acceleration
         )
 
+    def parts(self, errors: np.ndarray) -> np.ndarray:
+        """(3, N, 6, k) what s, s' and s'' add to the wrench, for pose errors s(t) d(t).
+
+        ``errors`` (N, nv, k) are d; so one course serves every s.
+        """
+        speed = self._rate_of(errors)
+        both = np.gradient(errors, 1 / self.rate_hz, axis=0) + speed
+        with_rate = self.to_velocity @ errors + self.to_acceleration @ both
+        return np.stack([self.of(errors), with_rate, self.to_acceleration @ errors])
+
     def _rate_of(self, errors: np.ndarray) -> np.ndarray:
         """Error of v for a course of pose errors: d' + v x d where axes turn with the body."""
         speed = np.gradient(errors, 1 / self.rate_hz, axis=0)

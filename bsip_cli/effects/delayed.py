@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from bsip_cli.effects.scene import Scene
 
@@ -12,4 +11,4 @@ def delayed(scene: Scene, late_s: np.ndarray) -> np.ndarray:
     """(N, 6) simulated wrench that comes ``late_s`` (N,) [s] late; its ends stay as they are."""
     times = scene.times_s
     at = np.clip(times - late_s, times[0], times[-1])
-    return CubicSpline(times, scene.predicted)(at)
+    return scene.predicted_course(at)

@@ -58,6 +58,20 @@ class Effect(ABC):
     def sentence(self, target: str, values: np.ndarray) -> str:
         """What a person should read, without interval."""
 
+    def marker_change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray | None:
+        """(N, m, 3) what it adds to the residuals of the inverse kinematics [m], segment axes.
+
+        A marker's error less what the pose follows of it; None where no marker is touched.
+        """
+        return None
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        """Name, unit and value of what the diagnosis prints; by default the parameters."""
+        parameters = self.parameters(scene, target)
+        return tuple((p.name, p.unit, float(x)) for p, x in zip(parameters, values, strict=True))
+
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Whether the values can be true of a body or a lab."""
         parameters = self.parameters(scene, target)

@@ -73,9 +73,7 @@ class SegmentMotion:
         return np.concatenate([force, moment], axis=1)
 
 
-def segment_motion(
-    model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray
-) -> SegmentMotion:
+def segment_motion(model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> SegmentMotion:
     """Forward kinematics of q (N, nq), v and a (N, nv)."""
     data, n = model.createData(), model.njoints - 1
     rotation = np.empty((len(q), n, 3, 3))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bsip_cli.body.names import in_words
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
@@ -13,8 +14,9 @@ REACH_M = 0.6
 class AddedMass(Effect):
     """A point mass fixed to a segment.
 
-    Its position enters as first moment, in which the wrench is linear; a first moment without a
-    mass within reach of the segment is no explanation.
+    Its position enters as first moment about the segment's centre of mass, segment axes, in which
+    the wrench is linear; a first moment without a mass within reach of the segment is no
+    explanation.
     """
 
     name = "added_mass"
@@ -22,7 +24,7 @@ class AddedMass(Effect):
     remedy = "weigh the person as recorded, and record once without the load"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
-        return scene.person.skeleton.segments
+        return scene.bodies
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         most = 20.0
@@ -33,15 +35,30 @@ class AddedMass(Effect):
         return (Parameter("mass", "kg", 0.0, most, 0.5), *moments)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        centre = scene.centre_of(target)
-        here = scene.point(target, centre).carrying_wrench()
-        total = values[0] * here
-        for axis, moment in zip(np.eye(3), values[1:], strict=True):
-            total += moment * (scene.point(target, centre + axis).carrying_wrench() - here)
-        return total
+        return scene.once((self.name, target), lambda: _wrenches(scene, target)) @ values
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        """Mass and its position in the segment's axes, from the segment's origin."""
+        if values[0] == 0:
+            return (("mass", "kg", 0.0),)
+        place = scene.centre_of(target) + values[1:] / values[0]
+        positions = (
+            (f"position_{axis}", "m", float(x)) for axis, x in zip("xyz", place, strict=True)
+        )
+        return (("mass", "kg", float(values[0])), *positions)
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         return values[0] > 0 and bool(np.linalg.norm(values[1:]) <= REACH_M * values[0])
 
     def sentence(self, target: str, values: np.ndarray) -> str:
-        return f"{values[0]:.2f} kg more than the model knows move with the {words(target)}"
+        return f"{values[0]:.2f} kg more than the model knows move with the {in_words(target)}"
+
+
+def _wrenches(scene: Scene, target: str) -> np.ndarray:
+    """(N, 6, 4) wrench for 1 kg at the segment's centre of mass, and for a unit of each moment."""
+    centre = scene.centre_of(target)
+    here = scene.point(target, centre).carrying_wrench()
+    there = [scene.point(target, centre + axis).carrying_wrench() - here for axis in np.eye(3)]
+    return np.stack([here, *there], axis=2)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
 
 class GravityTilt(Effect):
-    """Gravity turned about the lab's x and y axes; markers and plates agree with each other."""
+    """The lab's axes are turned against the world by the angles about x and y (rotation vector).
+
+    Markers and plates are turned together, so only gravity does not point down the lab's Z.
+    """
 
     name = "gravity_tilt"
     of_the_lab = True
@@ -23,10 +27,17 @@ class GravityTilt(Effect):
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         down = scene.model.gravity.linear
-        turned = down + np.cross([values[0], values[1], 0.0], down)
+        turned = Rotation.from_rotvec([values[0], values[1], 0.0]).apply(down)
         weight = scene.mass_kg * (down - turned)
         force = np.broadcast_to(weight, (len(scene.times_s), 3))
         return np.hstack([force, np.cross(scene.centre_of_mass_m, force)])
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        """The angle, and its parts about the lab's axes."""
+        parts = super().reported(scene, target, values)
+        return (("angle", "rad", float(np.hypot(*values))), *parts)
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         return f"the lab's vertical is off by {np.degrees(np.hypot(*values)):.2f} degrees"

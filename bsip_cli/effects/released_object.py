@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bsip_cli.body.names import in_words
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
@@ -32,8 +33,13 @@ class ReleasedObject(Effect):
         mass, release = values
         # A ramp over one frame keeps the derivative with respect to the moment alive.
         held = np.clip((release - scene.times_s) * scene.rate_hz + 0.5, 0.0, 1.0)
-        return mass * held[:, None] * scene.point(target, scene.centre_of(target)).carrying_wrench()
+        carried = scene.once((self.name, target), lambda: _carried(scene, target))
+        return mass * held[:, None] * carried
 
     def sentence(self, target: str, values: np.ndarray) -> str:
-        side = {"l": "left", "r": "right"}[target[-1]]
-        return f"the {side} hand holds {values[0]:.2f} kg and lets go at {values[1]:.2f} s"
+        return f"the {in_words(target)} holds {values[0]:.2f} kg and lets go at {values[1]:.2f} s"
+
+
+def _carried(scene: Scene, target: str) -> np.ndarray:
+    """(N, 6) ground wrench of 1 kg at the segment's centre of mass."""
+    return scene.point(target, scene.centre_of(target)).carrying_wrench()

@@ -97,9 +97,9 @@ class Scene:
 
     def wrench_of(self, phi: np.ndarray) -> np.ndarray:
         """(N, 6) wrench of other parameters and the same motion."""
-        return predicted_wrench(
-            self.model, self.q, self.v, self.a, phi[:, None], np.zeros(3)
-        )[..., 0]
+        return predicted_wrench(self.model, self.q, self.v, self.a, phi[:, None], np.zeros(3))[
+            ..., 0
+        ]
 
     @cached_property
     def predicted_course(self) -> CubicSpline:

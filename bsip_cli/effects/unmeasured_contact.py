@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bsip_cli.body.names import in_words
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
@@ -11,7 +12,8 @@ WINDOWS_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 
 
 class UnmeasuredContact(Effect):
-    """A constant force on a body point during a window; the plates carry as much less."""
+    """A constant force on the segment's centre of mass during a window; the plates carry as much
+    less. The point where it truly acts is not estimated."""
 
     name = "unmeasured_contact"
     of_the_lab = False
@@ -36,12 +38,31 @@ class UnmeasuredContact(Effect):
         inside = length / 2 - np.abs(scene.times_s - middle)
         touching = np.clip(inside * scene.rate_hz + 0.5, 0.0, 1.0)
         missing = -touching[:, None] * force
-        point = scene.point(target, scene.centre_of(target)).position_m
+        point = scene.once((self.name, target), lambda: _contact_m(scene, target))
         return np.hstack([missing, np.cross(point, missing)])
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        """The window, and the mean force in it: its size and its parts along the lab's axes."""
+        start, end = values[3] - values[4] / 2, values[3] + values[4] / 2
+        parts = ((f"force_{c}", "N", float(x)) for c, x in zip("xyz", values, strict=False))
+        return (
+            ("start", "s", max(float(start), float(scene.times_s[0]))),
+            ("end", "s", min(float(end), float(scene.times_s[-1]))),
+            ("force", "N", float(np.linalg.norm(values[:3]))),
+            *parts,
+        )
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         start, end = values[3] - values[4] / 2, values[3] + values[4] / 2
         return (
-            f"from {start:.2f} to {end:.2f} s something beside the plates pushes on the {target} "
+            f"from {start:.2f} to {end:.2f} s something beside the plates pushes on the "
+            f"{in_words(target)} "
             f"with {np.linalg.norm(values[:3]):.0f} N"
         )
+
+
+def _contact_m(scene: Scene, target: str) -> np.ndarray:
+    """(N, 3) the segment's centre of mass, world."""
+    return scene.point(target, scene.centre_of(target)).position_m

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
+from bsip_cli.body.names import in_words
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
@@ -34,38 +35,35 @@ class WobblingMass(Effect):
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         mass, frequency, damping = values
-        point = scene.point(target, scene.centre_of(target))
-        swing = _relative_acceleration(
-            point.acceleration_m_s2, scene.rate_hz, 2 * np.pi * frequency, damping
-        )
-        force = mass * swing
-        return np.hstack([force, np.cross(point.position_m, force)])
+        key = (self.name, target, float(frequency), float(damping))
+        return mass * scene.once(key, lambda: _swing(scene, target, frequency, damping))
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         return (
-            f"{values[0]:.1f} kg of the {target} swing against the bone at {values[1]:.1f} Hz "
-            f"(damping ratio {values[2]:.2f})"
+            f"{values[0]:.1f} kg of the {in_words(target)} swing against the bone at "
+            f"{values[1]:.1f} Hz (damping ratio {values[2]:.2f})"
         )
 
 
-def _relative_acceleration(
-    ground: np.ndarray, rate_hz: float, pace_rad_s: float, damping: float
+def _swing(scene: Scene, target: str, frequency_hz: float, damping: float) -> np.ndarray:
+    """(N, 6) what 1 kg adds to the wrench by swinging instead of staying in its segment."""
+    point = scene.point(target, scene.centre_of(target))
+    ground, pace = point.acceleration_m_s2, 2 * np.pi * frequency_hz
+    travel = _response([-1.0], ground, scene.rate_hz, pace, damping)
+    force = _response([-1.0, 0.0, 0.0], ground, scene.rate_hz, pace, damping)
+    carried = ground + force - scene.model.gravity.linear
+    moment = np.cross(point.position_m, force) + np.cross(travel, carried)
+    return np.hstack([force, moment])
+
+
+def _response(
+    numerator: list[float], ground: np.ndarray, rate_hz: float, pace_rad_s: float, damping: float
 ) -> np.ndarray:
-    """(N, 3) acceleration of the mass against its segment, at rest when the trial begins.
+    """(N, 3) travel of the mass against its segment [m], or with s^2 its acceleration.
 
-    x'' = -2 damping pace x' - pace^2 x - ground, by the exact discretisation between samples.
+    x'' = -2 damping pace x' - pace^2 x - ground, at rest when the trial begins; exact where the
+    ground's acceleration is linear between samples.
     """
-    system = (
-        np.array([[0.0, 1.0], [-(pace_rad_s**2), -2 * damping * pace_rad_s]]),
-        np.array([[0.0], [-1.0]]),
-        np.array([[-(pace_rad_s**2), -2 * damping * pace_rad_s]]),
-        np.array([[-1.0]]),
-    )
-    A, B, C, D, _ = cont2discrete(system, 1 / rate_hz, method="foh")
-    trace, determinant = float(np.trace(A)), float(np.linalg.det(A))
-    # The same as a difference equation: characteristic polynomial and the first three responses.
-    response = [float(D[0, 0]), float((C @ B)[0, 0]), float((C @ A @ B)[0, 0])]
-    recursion = np.array([1.0, -trace, determinant])
-    numerator = np.convolve(recursion, response)[:3]
-    return lfilter(numerator, recursion, ground - ground[0], axis=0)
-
+    denominator = [1.0, 2 * damping * pace_rad_s, pace_rad_s**2]
+    b, a, _ = cont2discrete((numerator, denominator), 1 / rate_hz, method="foh")
+    return lfilter(np.ravel(b), a, ground - ground[0], axis=0)

@@ -34,7 +34,7 @@ ALLOWED = {
     "recordings": "body errors",
     "statistics": "errors",
     "identification": "body config dynamics errors statistics",
-    "effects": "body dynamics errors",
+    "effects": "body dynamics errors motion",
     "diagnosis": "body dynamics effects errors identification statistics",
     "report": "body dynamics errors motion schemas statistics",
     "simulate": "body config errors",

@@ -19,11 +19,6 @@ def step(times_s: np.ndarray, at_s: float) -> np.ndarray:
     return np.stack([ndtr(x), slope, -x * slope / RISE_S])
 
 
-def window(times_s: np.ndarray, start_s: float, end_s: float) -> np.ndarray:
-    """(3, N) 1 between two moments, else 0, and its first two derivatives."""
-    return step(times_s, start_s) - step(times_s, end_s)
-
-
 def wrench_parts(scene: Scene, errors_m: np.ndarray, markers: Sequence[int]) -> np.ndarray:
     """(3, N, 6, k) what s, s' and s'' change of the simulated wrench for marker errors s(t) e(t).
 

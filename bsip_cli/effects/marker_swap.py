@@ -5,10 +5,11 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.body.names import mirrored
 from bsip_cli.effects.effect import Effect, Parameter
-from bsip_cli.effects.marker_course import during, window, wrench_parts
+from bsip_cli.effects.marker_course import RISE_S
 from bsip_cli.effects.scene import Scene
 
 NEARER = 0.5  # distance to the other's place over that to the own
@@ -42,17 +43,14 @@ class MarkerSwap(Effect):
         )
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        pair = _pair(scene, target)
-        parts = scene.once(
-            (self.name, pair), lambda: wrench_parts(scene, _errors(scene, pair), pair)
-        )
-        return values[0] * during(window(scene.times_s, *values[1:]), parts)[..., 0]
+        start, end = float(values[1]), float(values[2])
+        key = (self.name, target, start, end)
+        return values[0] * scene.once(key, lambda: _wrench(scene, _pair(scene, target), start, end))
 
     def marker_change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         pair = _pair(scene, target)
-        exchanged = values[0] * window(scene.times_s, *values[1:])[0]
-        errors = exchanged[:, None, None, None] * _errors(scene, pair)
-        return scene.pose_response.left(errors, pair)[..., 0]
+        errors, moved = _pulled(scene, pair, float(values[1]), float(values[2]))
+        return values[0] * scene.pose_response.left(errors, pair, moved)[..., 0]
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Labels are exchanged or not: half of it is something else."""
@@ -76,10 +74,27 @@ def _pair(scene: Scene, target: str) -> tuple[int, int]:
     return scene.person.markers.index(first), scene.person.markers.index(second)
 
 
-def _errors(scene: Scene, pair: tuple[int, int]) -> np.ndarray:
-    """(N, 2, 3, 1) from where each of the two is to where its label was seen, world."""
+def _wrench(scene: Scene, pair: tuple[int, int], start_s: float, end_s: float) -> np.ndarray:
+    """(N, 6) what the simulated wrench lacks when the pose follows exchanged labels."""
+    _, moved = _pulled(scene, pair, start_s, end_s)
+    return -scene.response.of(moved)[..., 0]
+
+
+def _pulled(
+    scene: Scene, pair: tuple[int, int], start_s: float, end_s: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Errors (N, 2, 3, 1) of the two markers, world, and what the pose follows of them (N, nv, 1).
+
+    An error is from where the marker is to where its label was seen. A marker so far off pulls
+    with the trust of its frame, not with the mean over neighbours that are not exchanged.
+    """
+    inside = (scene.times_s >= start_s) & (scene.times_s <= end_s)
     apart = scene.markers_m[:, pair[0]] - scene.markers_m[:, pair[1]]
-    return np.stack([apart, -apart], axis=1)[..., None]
+    errors = (inside[:, None, None] * np.stack([apart, -apart], axis=1))[..., None]
+    given = scene.pose_response.weights[:, pair] / scene.person.marker_weights[list(pair)]
+    pull = scene.trust[:, pair] / np.maximum(given, 1e-9)
+    moved = scene.pose_response.of(pull[..., None, None] * errors, pair)
+    return errors, gaussian_filter1d(moved, RISE_S * scene.rate_hz, axis=0, mode="nearest")
 
 
 def _suspects(scene: Scene) -> dict[str, tuple[float, float]]:

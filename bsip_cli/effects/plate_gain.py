@@ -33,4 +33,8 @@ class PlateGain(Effect):
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         name, channel = target.rsplit(" ", 1)
-        return f"channel {channel} of plate {name} shows {100 * values[0]:+.1f} % of its true value"
+        order = "more" if values[0] > 0 else "less"
+        return (
+            f"channel {channel} of plate {name} shows {100 * abs(values[0]):.1f} % {order} than "
+            "the truth"
+        )

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
@@ -19,6 +20,8 @@ from bsip_cli.dynamics.wrench_response import WrenchResponse, wrench_response
 from bsip_cli.motion.inverse_kinematics import tree_of
 from bsip_cli.motion.jacobian import model_markers
 from bsip_cli.motion.pose_response import PoseResponse, marker_trust, pose_responses
+
+TRUST_S = 0.05  # standard deviation of what smooths the markers' trust
 
 
 @dataclass(frozen=True)
@@ -122,10 +125,19 @@ class Scene:
         return wrench_response(self.person, self.phi, self.q, self.v, self.a, self.rate_hz)
 
     @cached_property
+    def trust(self) -> np.ndarray:
+        """(N, m) part of its weight that the robust fit leaves each marker."""
+        if self.residual_m is None:
+            return np.ones((len(self.q), len(self.person.markers)))
+        return marker_trust(self.residual_m, self.robust_limit_m)
+
+    @cached_property
     def pose_response(self) -> PoseResponse:
-        """Of the inverse kinematics to small errors of the markers."""
-        known = self.residual_m is not None
-        trust = marker_trust(self.residual_m, self.robust_limit_m) if known else None
+        """Of the inverse kinematics to small errors of the markers.
+
+        The trust is smoothed, lest a marker that comes and goes shake the answer.
+        """
+        trust = gaussian_filter1d(self.trust, TRUST_S * self.rate_hz, axis=0, mode="nearest")
         return pose_responses(self.person, self.q, trust)
 
     @cached_property

@@ -15,7 +15,7 @@ LEAST_FORCE_N = 50.0
 
 
 class SegmentInertia(Effect):
-    """Deviation of a segment's ten parameters, about its joint centre, from those simulated with."""
+    """Deviation of a segment's ten parameters from those simulated with, about the joint."""
 
     name = "segment_inertia"
     of_the_lab = False

@@ -42,13 +42,19 @@ class PoseResponse:
             moved[part] = _flat(columns).swapaxes(1, 2) @ _flat(weighted)
         return self.inverse @ moved
 
-    def left(self, errors_m: np.ndarray, markers: Sequence[int] | None = None) -> np.ndarray:
+    def left(
+        self,
+        errors_m: np.ndarray,
+        markers: Sequence[int] | None = None,
+        moved: np.ndarray | None = None,
+    ) -> np.ndarray:
         """(N, m, 3, k) change of every marker's residual: its error less what the pose follows.
 
         In the axes of the markers' segments, as :func:`motion.jacobian.marker_residuals`.
+        ``moved`` (N, nv, k) is the pose's answer where it is not :meth:`of` the errors.
         """
         chosen = range(len(self.person.markers)) if markers is None else markers
-        moved = self.of(errors_m, markers)
+        moved = self.of(errors_m, markers) if moved is None else moved
         left = np.empty((*self.weights.shape, 3, errors_m.shape[-1]))
         for part, columns, turn in _columns(self.person, self.q):
             change = -(_flat(columns) @ moved[part]).reshape(left[part].shape)

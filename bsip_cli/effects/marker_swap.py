@@ -91,8 +91,8 @@ def _pulled(
     inside = (scene.times_s >= start_s) & (scene.times_s <= end_s)
     apart = scene.markers_m[:, pair[0]] - scene.markers_m[:, pair[1]]
     errors = (inside[:, None, None] * np.stack([apart, -apart], axis=1))[..., None]
-    given = scene.pose_response.weights[:, pair] / scene.person.marker_weights[list(pair)]
-    pull = scene.trust[:, pair] / np.maximum(given, 1e-9)
+    weights = scene.trust[:, pair] * scene.person.marker_weights[list(pair)]
+    pull = weights / np.maximum(scene.pose_response.weights[:, pair], 1e-9)
     moved = scene.pose_response.of(pull[..., None, None] * errors, pair)
     return errors, gaussian_filter1d(moved, RISE_S * scene.rate_hz, axis=0, mode="nearest")
 
@@ -102,8 +102,6 @@ def _suspects(scene: Scene) -> dict[str, tuple[float, float]]:
     assert scene.residual_m is not None
     names, segments = scene.person.markers, scene.person.skeleton.segments
     own = np.linalg.norm(scene.residual_m, axis=2)
-    turn = scene.motion.rotation[:, scene.person.marker_segments]
-    model = scene.markers_m - np.einsum("fmij,fmj->fmi", turn, np.nan_to_num(scene.residual_m))
     found = {}
     for a, b in combinations(range(len(names)), 2):
         home, other = (segments[scene.person.marker_segments[k]] for k in (a, b))
@@ -111,7 +109,7 @@ def _suspects(scene: Scene) -> dict[str, tuple[float, float]]:
             continue
         hit = np.ones(len(own), dtype=bool)
         for k, j in ((a, b), (b, a)):
-            across = np.linalg.norm(scene.markers_m[:, k] - model[:, j], axis=1)
+            across = np.linalg.norm(scene.markers_m[:, k] - scene.model_markers_m[:, j], axis=1)
             hit &= (own[:, k] > ASTRAY_M) & (across < NEARER * own[:, k])
         if hit.sum() >= max(2, LEAST_S * scene.rate_hz):
             times = scene.times_s[hit]

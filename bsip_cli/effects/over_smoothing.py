@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
-from scipy.spatial.transform import Rotation
 
-from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
@@ -19,8 +17,7 @@ CORNER = (np.sqrt(2.0) - 1.0) ** -0.25
 class OverSmoothing(Effect):
     """The markers went through a zero-phase Butterworth of order four, and the pose with them.
 
-    ``share`` is 1 where the cut-off is right. What the markers' residuals show of it is of second
-    order and left out.
+    ``share`` is 1 where the cut-off is right.
     """
 
     name = "over_smoothing"
@@ -38,9 +35,17 @@ class OverSmoothing(Effect):
         )
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        share, cutoff = values
-        lost = scene.once((self.name, float(cutoff)), lambda: _lost_wrench(scene, float(cutoff)))
-        return share * lost
+        share, cutoff = float(values[0]), float(values[1])
+        scanned = self.parameters(scene, target)[1].scan
+        # All that are scanned cost little more than one.
+        cutoffs = scanned if cutoff in scanned else (cutoff,)
+        lost = scene.once((self.name, cutoffs), lambda: _lost_wrenches(scene, cutoffs))
+        return share * lost[..., cutoffs.index(cutoff)]
+
+    def marker_change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """The filter bends the body: markers that move on circles come nearer to the centre."""
+        errors = -values[0] * _lost_m(scene, float(values[1]))[..., None]
+        return scene.pose_response.left(errors)[..., 0]
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """A share far from 1 belongs to another cut-off."""
@@ -63,32 +68,19 @@ def effective_cutoff_hz(values: np.ndarray) -> float:
     return float(values[1] * max(values[0], 1e-6) ** -0.25)
 
 
-def _lost_wrench(scene: Scene, cutoff_hz: float) -> np.ndarray:
-    """(N, 6) what the wrench lacks for want of the motion beyond the cut-off."""
+def _lost_m(scene: Scene, cutoff_hz: float) -> np.ndarray:
+    """(N, m, 3) what the filter took from the markers, of the model's own, which have no noise."""
     sections = butter(2, CORNER * cutoff_hz, fs=scene.rate_hz, output="sos")
     padding = min(len(scene.q) - 1, round(2 * scene.rate_hz / cutoff_hz))
-    left, lost = scene.q, np.zeros_like(scene.q)
+    left, lost = scene.model_markers_m, np.zeros_like(scene.model_markers_m)
     # Van Cittert: (1 - L) + (1 - L)^2 + ... is 1/L - 1, what the low-pass L took.
     for _ in range(ROUNDS):
         left = left - sosfiltfilt(sections, left, axis=0, padlen=padding)
         lost = lost + left
-    errors = tangent(scene.person.skeleton, scene.q, lost)
-    return scene.response.of(errors[..., None])[..., 0]
+    return lost
 
 
-def tangent(skeleton: Skeleton, q: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """(N, nv) a small change of the entries of q (N, nq) in the tangent space."""
-    moved = np.empty((len(q), len(skeleton.v_names)))
-    starts = zip(skeleton.q_starts, skeleton.v_starts, skeleton.joint_types, strict=True)
-    for at, av, kind in starts:
-        if kind == "revolute":
-            moved[:, av] = change[:, at]
-            continue
-        if kind == "free":
-            turn = Rotation.from_quat(q[:, at + 3 : at + 7])
-            moved[:, av : av + 3] = turn.inv().apply(change[:, at : at + 3])
-            at, av = at + 3, av + 3
-        u, w = q[:, at : at + 3], q[:, at + 3 : at + 4]
-        p, r = change[:, at : at + 3], change[:, at + 3 : at + 4]
-        moved[:, av : av + 3] = 2 * (w * p - r * u - np.cross(u, p))
-    return moved
+def _lost_wrenches(scene: Scene, cutoffs_hz: tuple[float, ...]) -> np.ndarray:
+    """(N, 6, k) what the simulated wrench lacks for want of what the filter took."""
+    lost = np.stack([_lost_m(scene, cutoff) for cutoff in cutoffs_hz], axis=-1)
+    return scene.response.of(scene.pose_response.of(lost))

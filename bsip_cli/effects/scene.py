@@ -143,12 +143,16 @@ class Scene:
     @cached_property
     def markers_m(self) -> np.ndarray:
         """(N, m, 3) world positions: as measured where that is known, else the model's."""
-        model = model_markers(self.person, *tree_of(self.person).forward(self.q))
         if self.residual_m is None:
-            return model
+            return self.model_markers_m
         turn = self.motion.rotation[:, self.person.marker_segments]
         apart = np.einsum("fmij,fmj->fmi", turn, self.residual_m)
-        return model + np.nan_to_num(apart)
+        return self.model_markers_m + np.nan_to_num(apart)
+
+    @cached_property
+    def model_markers_m(self) -> np.ndarray:
+        """(N, m, 3) where the pose puts the markers, world."""
+        return model_markers(self.person, *tree_of(self.person).forward(self.q))
 
     @cached_property
     def _kept(self) -> dict[Hashable, Any]:

@@ -56,11 +56,12 @@ def standing_still(duration_s: float = 2.0) -> Scene:
     return scene_of(np.tile(standing().q, (count, 1)), still, still)
 
 
-def derivatives(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def derivatives(q: np.ndarray, person: Person | None = None) -> tuple[np.ndarray, np.ndarray]:
     """v, a (N, nv) of poses (N, nq), by differences on the manifold."""
-    model = pinocchio_model(standing().person)
+    person = person or standing().person
+    model, skeleton = pinocchio_model(person), person.skeleton
     q = q.copy()
-    for start, kind in zip(*kinds(), strict=True):
+    for start, kind in zip(skeleton.q_starts, skeleton.joint_types, strict=True):
         if kind != "revolute":
             part = slice(start + 3, start + 7) if kind == "free" else slice(start, start + 4)
             signs = np.sign(np.einsum("fi,fi->f", q[1:, part], q[:-1, part]))
@@ -68,11 +69,6 @@ def derivatives(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     far = [pin.difference(model, q[k - 1], q[k + 1]) for k in range(1, len(q) - 1)]
     v = np.stack([far[0], *far, far[-1]]) * RATE_HZ / 2
     return v, np.gradient(v, 1 / RATE_HZ, axis=0)
-
-
-def kinds():
-    skeleton = standing().person.skeleton
-    return skeleton.q_starts, skeleton.joint_types
 
 
 def rms(x: np.ndarray) -> np.ndarray:

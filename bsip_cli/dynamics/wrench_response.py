@@ -88,4 +88,5 @@ def wrench_response(
     types = person.skeleton.joint_types
     starts = person.skeleton.v_starts
     free = tuple(s for s, kind in zip(starts, types, strict=True) if kind == "spherical")
-    return WrenchResponse(*parts, v, (3, *free), rate_hz)
+    by_q, by_v, by_a = parts
+    return WrenchResponse(by_q, by_v, by_a, v, (3, *free), rate_hz)

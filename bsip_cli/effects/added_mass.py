@@ -15,8 +15,8 @@ class AddedMass(Effect):
     """A point mass fixed to a segment.
 
     Its position enters as first moment about the segment's centre of mass, segment axes, in which
-    the wrench is linear; a first moment without a mass within reach of the segment is no
-    explanation.
+    the wrench is linear but for the small inertia of the mass about that centre, left out here. A
+    first moment without a mass within reach of the segment is no explanation.
     """
 
     name = "added_mass"
@@ -59,6 +59,8 @@ class AddedMass(Effect):
 def _wrenches(scene: Scene, target: str) -> np.ndarray:
     """(N, 6, 4) wrench for 1 kg at the segment's centre of mass, and for a unit of each moment."""
     centre = scene.centre_of(target)
-    here = scene.point(target, centre).carrying_wrench()
-    there = [scene.point(target, centre + axis).carrying_wrench() - here for axis in np.eye(3)]
-    return np.stack([here, *there], axis=2)
+    columns = [scene.point(target, centre).carrying_wrench()]
+    for axis in np.eye(3):  # the wrench is quadratic in the place: this is its exact derivative
+        ahead, behind = (scene.point(target, centre + x).carrying_wrench() for x in (axis, -axis))
+        columns.append(0.5 * (ahead - behind))
+    return np.stack(columns, axis=2)

@@ -70,11 +70,12 @@ class MarkerShift(Effect):
         """Throughout, and where the marker's residual changes its level most; else everywhere."""
         first, last = float(scene.times_s[0]), float(scene.times_s[-1])
         throughout = first - BEFORE_S
-        if scene.residual_m is None:
+        residual = scene.residual_m
+        if residual is None:
             inside = np.arange(first + APART_S, last, APART_S)
             return (throughout, *(float(t) for t in inside))
         m = scene.person.markers.index(target)
-        at = scene.once(("level", m), lambda: _level_change(scene.residual_m[:, m], scene.rate_hz))
+        at = scene.once(("level", m), lambda: _level_change(residual[:, m], scene.rate_hz))
         return (throughout,) if at is None else (throughout, float(scene.times_s[at]))
 
 

@@ -10,7 +10,7 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
 BELOW = 0.4  # of length and mass of the upper torso: up to T12/L1
-CHORD = 0.5  # share at which the change is taken for linear
+CHORD = 0.3  # share at which the change is exact; for others it is taken for linear
 AXES = {"flexion": 2, "lateral": 0, "axial": 1}
 
 

@@ -52,9 +52,8 @@ class SegmentInertia(Effect):
         """The part of the squared error of wrench and centre of pressure that it takes away."""
         after = scene.predicted + self.change(scene, target, values)
         wrench = _share(scene.measured, scene.predicted, after, scene.valid)
-        cop = _share(
-            *(_cop(scene, w) for w in (scene.measured, scene.predicted, after)), scene.valid
-        )
+        measured, before, now = (_cop(scene, w) for w in (scene.measured, scene.predicted, after))
+        cop = _share(measured, before, now, scene.valid)
         return (("share", "1", wrench), ("cop_share", "1", cop))
 
     def sentence(self, target: str, values: np.ndarray) -> str:

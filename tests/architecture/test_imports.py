@@ -35,7 +35,7 @@ ALLOWED = {
     "statistics": "errors",
     "identification": "body config dynamics errors statistics",
     "effects": "body dynamics errors motion",
-    "diagnosis": "body dynamics effects errors identification statistics",
+    "diagnosis": "body dynamics effects errors identification motion statistics",
     "report": "body dynamics errors motion schemas statistics",
     "simulate": "body config errors",
     "stages": "artifacts body diagnosis dynamics effects errors identification motion pipeline "

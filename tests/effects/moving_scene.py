@@ -19,6 +19,8 @@ MASS_KG, RATE_HZ = 72.0, 100.0
 # Corners as in a C3D file: x from the second to the first, y from the fourth to the first.
 CORNERS = np.array([[0.3, 0.5, 0.0], [-0.3, 0.5, 0.0], [-0.3, -0.5, 0.0], [0.3, -0.5, 0.0]])
 
+ASIDE = np.array([0.0, 0.55, 0.0])
+
 
 def phi_of(person: Person, inertias: tuple[Inertia, ...]) -> np.ndarray:
     """(10 n,) parameters about the joint centres."""
@@ -37,8 +39,8 @@ def scene_of(q: np.ndarray, v: np.ndarray, a: np.ndarray, **fields) -> Scene:
     times = np.arange(len(q)) / RATE_HZ
     bare = Scene(times, standing().person, q, v, a, phi(), (), np.ones(len(q), dtype=bool))
     plates = (
-        Plate("1", CORNERS + [0.0, 0.55, 0.0], 0.4 * bare.predicted),
-        Plate("2", CORNERS - [0.0, 0.55, 0.0], 0.6 * bare.predicted),
+        Plate("1", CORNERS + ASIDE, 0.4 * bare.predicted),
+        Plate("2", CORNERS - ASIDE, 0.6 * bare.predicted),
     )
     return replace(bare, plates=plates, **fields)
 
@@ -71,6 +73,6 @@ def derivatives(q: np.ndarray, person: Person | None = None) -> tuple[np.ndarray
     return v, np.gradient(v, 1 / RATE_HZ, axis=0)
 
 
-def rms(x: np.ndarray) -> np.ndarray:
+def rms(x: np.ndarray, ends: int = 20) -> np.ndarray:
     """(6,) over frames, without the trial's ends."""
-    return np.sqrt((x[20:-20] ** 2).mean(axis=0))
+    return np.sqrt((x[ends:-ends] ** 2).mean(axis=0))

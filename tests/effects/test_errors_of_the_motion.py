@@ -76,7 +76,7 @@ def quaternions() -> list[slice]:
 
 def explained(change: np.ndarray, truth: np.ndarray) -> np.ndarray:
     """(6,) part of the true change that is left, root mean square."""
-    return rms(change - truth) / np.maximum(rms(truth), 0.02 * rms(truth).max())
+    return rms(change - truth) / np.maximum(rms(truth), 0.1 * rms(truth).max())
 
 
 @cache
@@ -89,7 +89,7 @@ def true_scene() -> Scene:
 def test_a_shifted_marker(marker):
     true = true_scene()
     m = PERSON.markers.index(marker)
-    shift, start = np.array([0.008, -0.006, 0.01]), 3.0
+    shift, start = np.array([0.004, -0.003, 0.005]), 3.0
     slipped = step(true.times_s, start)[0]
     markers = markers_of(PERSON, true.q)
     along = true.motion.rotation[:, PERSON.marker_segments[m]] @ shift
@@ -97,11 +97,11 @@ def test_a_shifted_marker(marker):
     seen = followed(markers)
     effect, values = MarkerShift(), np.array([*shift, start])
     change = effect.change(seen, marker, values)
-    assert explained(change, true.predicted - seen.predicted).max() < 0.12
+    assert explained(change, true.predicted - seen.predicted).max() < 0.15
     moved = effect.marker_change(seen, marker, values)
-    np.testing.assert_allclose(moved, seen.residual_m, atol=6e-4)
+    np.testing.assert_allclose(moved, seen.residual_m, atol=2e-4)
     assert np.linalg.norm(seen.residual_m, axis=2).max() > 2e-3
-    assert effect.parameters(seen, marker)[3].scan[-1] == pytest.approx(start, abs=0.3)
+    assert effect.parameters(seen, marker)[3].scan[-1] == pytest.approx(start, abs=0.1)
 
 
 def test_swapped_markers():
@@ -151,8 +151,9 @@ def with_centre_at(joint: str, shift: np.ndarray) -> tuple[Person, np.ndarray]:
     return replace(PERSON, joint_in_parent_m=joints, marker_positions_m=places), parameters
 
 
-@pytest.mark.parametrize("share", [0.3, 0.6])
+@pytest.mark.parametrize("share", [0.1, 0.3])
 def test_a_missing_joint(share):
+    """What is left of the wrench is a tenth of what body and pose change one by one."""
     true = true_scene()
     person, parameters = two_part_trunk()
     q = bent_twice(true.q, share)
@@ -161,13 +162,13 @@ def test_a_missing_joint(share):
     seen = followed(markers_of(person, q))
     effect, values = MissingJoint(), np.full(3, share)
     change = effect.change(seen, "upper_torso", values)
-    assert explained(change, truth - seen.predicted)[:5].max() < 0.3
+    assert explained(change, truth - seen.predicted)[:5].max() < 0.4
     moved = effect.marker_change(seen, "upper_torso", values)
-    assert rms3(seen.residual_m) > 1e-3
-    assert rms3(moved - seen.residual_m) < 0.35 * rms3(seen.residual_m)
+    assert rms3(seen.residual_m) > 4e-3 * share
+    assert rms3(moved - seen.residual_m) < 0.25 * rms3(seen.residual_m)
     ranges = np.ptp(Rotation.from_quat(true.q[:, 7:11]).as_rotvec(), axis=0)[[2, 0, 1]] * share
     reported = effect.reported(seen, "upper_torso", values)
-    np.testing.assert_allclose([x for *_, x in reported], ranges, rtol=0.15)
+    np.testing.assert_allclose([x for *_, x in reported], ranges, rtol=0.2)
 
 
 def rms3(residual: np.ndarray) -> float:
@@ -220,22 +221,26 @@ def bent_twice(q: np.ndarray, share: float) -> np.ndarray:
     return np.hstack([q[:, :7], *parts, q[:, 11:]])
 
 
-@pytest.mark.parametrize("cutoff", [2.0, 4.5])
-def test_smoothed_markers(cutoff):
+@pytest.mark.parametrize(("cutoff", "left"), [(2.0, 0.6), (3.0, 0.3), (4.5, 0.1)])
+def test_smoothed_markers(cutoff, left):
+    """The nearer the cut-off comes to the motion's own frequencies, the less can be restored."""
     true = true_scene()
     sections = butter(2, CORNER * cutoff, fs=RATE_HZ, output="sos")
     seen = followed(sosfiltfilt(sections, markers_of(PERSON, true.q), axis=0))
     values = np.array([1.0, cutoff])
     effect, gone = OverSmoothing(), true.predicted - seen.predicted
-    assert rms(effect.change(seen, "", values) - gone).max() < 0.2 * rms(gone).max()
-    assert effect.reported(seen, "", values)[0] == ("cutoff", "Hz", pytest.approx(cutoff))
+    assert rms(effect.change(seen, "", values) - gone, 50).max() < left * rms(gone, 50).max()
+    moved = effect.marker_change(seen, "", values)[50:-50]
+    assert rms3(moved - seen.residual_m[50:-50]) < left * rms3(seen.residual_m[50:-50])
+    name, unit, told = effect.reported(seen, "", values)[0]
+    assert (name, unit) == ("cutoff", "Hz") and told == pytest.approx(cutoff)
 
 
 def test_the_share_turns_into_the_cutoff_that_loses_as_much():
-    """Near the cut-off the loss falls like its fourth power."""
+    """Below the cut-off the loss falls like its fourth power."""
     seen = true_scene()
-    name, _, cutoff = OverSmoothing().reported(seen, "", np.array([0.5, 4.0]))[0]
-    assert name == "cutoff" and cutoff == pytest.approx(4.0 * 2**0.25)
+    name, _, cutoff = OverSmoothing().reported(seen, "", np.array([0.5, 6.0]))[0]
+    assert name == "cutoff" and cutoff == pytest.approx(6.0 * 2**0.25)
     right = OverSmoothing().change(seen, "", np.array([1.0, cutoff]))
-    scaled = OverSmoothing().change(seen, "", np.array([0.5, 4.0]))
-    assert rms(right - scaled).max() < 0.1 * rms(right).max()
+    scaled = OverSmoothing().change(seen, "", np.array([0.5, 6.0]))
+    assert rms(right - scaled, 50).max() < 0.2 * rms(right, 50).max()

@@ -12,12 +12,28 @@ from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.jacobian import marker_residuals
 
-VOCABULARY = (
-    "sync_offset clock_drift plate_translation plate_rotation plate_gain plate_crosstalk "
-    "plate_zero plate_drift gravity_tilt added_mass released_object wobbling_mass breathing "
-    "unmeasured_contact joint_centre missing_joint marker_shift marker_swap over_smoothing "
-    "segment_inertia"
-).split()
+VOCABULARY = [
+    "sync_offset",
+    "clock_drift",
+    "plate_translation",
+    "plate_rotation",
+    "plate_gain",
+    "plate_crosstalk",
+    "plate_zero",
+    "plate_drift",
+    "gravity_tilt",
+    "added_mass",
+    "released_object",
+    "wobbling_mass",
+    "breathing",
+    "unmeasured_contact",
+    "joint_centre",
+    "missing_joint",
+    "marker_shift",
+    "marker_swap",
+    "over_smoothing",
+    "segment_inertia",
+]
 UNITS = {"m", "rad", "1", "s", "Hz", "kg", "kg m", "kg m2", "N", "N m", "N/s", "N m/s"}
 EVERY = [pytest.param(effect, id=effect.name) for effect in CATALOGUE]
 

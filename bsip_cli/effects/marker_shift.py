@@ -10,13 +10,15 @@ from bsip_cli.effects.scene import Scene
 
 APART_S = 0.5
 BEFORE_S = 1.0
+ABSORBED = (0.0, 0.5)
 
 
 class MarkerShift(Effect):
     """A marker sits elsewhere on its segment from a moment on, in the segment's axes.
 
     The pose follows it in part, which bends the simulated wrench; the rest stays as residual. A
-    moment before the trial means throughout.
+    moment before the trial means throughout. Scaling that used the trial has put the model's marker
+    between both places: ``absorbed`` is the part of the shift that it took.
     """
 
     name = "marker_shift"
@@ -33,6 +35,7 @@ class MarkerShift(Effect):
             Parameter(
                 "from_time", "s", first - BEFORE_S, last, APART_S, self._moments(scene, target)
             ),
+            Parameter("absorbed", "1", 0.0, 1.0, 0.25, ABSORBED),
         )
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
@@ -40,11 +43,11 @@ class MarkerShift(Effect):
         parts = scene.once(
             (self.name, m), lambda: wrench_parts(scene, self._directions(scene, m), [m])
         )
-        return during(step(scene.times_s, values[3]), parts) @ values[:3]
+        return during(_course(scene, values), parts) @ values[:3]
 
     def marker_change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         m = scene.person.markers.index(target)
-        slipped = step(scene.times_s, values[3])[0][:, None]
+        slipped = _course(scene, values)[0][:, None]
         errors = slipped * (self._directions(scene, m)[:, 0] @ values[:3])
         return scene.pose_response.left(errors[:, None, :, None], [m])[..., 0]
 
@@ -77,6 +80,13 @@ class MarkerShift(Effect):
         m = scene.person.markers.index(target)
         at = scene.once(("level", m), lambda: _level_change(residual[:, m], scene.rate_hz))
         return (throughout,) if at is None else (throughout, float(scene.times_s[at]))
+
+
+def _course(scene: Scene, values: np.ndarray) -> np.ndarray:
+    """(3, N) the part of the shift by which the marker is off, and its derivatives."""
+    course = step(scene.times_s, values[3])
+    course[0] -= values[4]
+    return course
 
 
 def _level_change(residual_m: np.ndarray, rate_hz: float) -> int | None:

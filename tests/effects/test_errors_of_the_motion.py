@@ -95,13 +95,27 @@ def test_a_shifted_marker(marker):
     along = true.motion.rotation[:, PERSON.marker_segments[m]] @ shift
     markers[:, m] += slipped[:, None] * along
     seen = followed(markers)
-    effect, values = MarkerShift(), np.array([*shift, start])
+    effect, values = MarkerShift(), np.array([*shift, start, 0.0])
     change = effect.change(seen, marker, values)
     assert explained(change, true.predicted - seen.predicted).max() < 0.15
     moved = effect.marker_change(seen, marker, values)
     np.testing.assert_allclose(moved, seen.residual_m, atol=2e-4)
     assert np.linalg.norm(seen.residual_m, axis=2).max() > 2e-3
     assert effect.parameters(seen, marker)[3].scan[-1] == pytest.approx(start, abs=0.1)
+
+
+def test_a_shift_that_scaling_has_taken_half():
+    """Half a shift throughout, less than the whole one from a moment on."""
+    scene, shift = moving(), np.array([0.01, 0.0, 0.02])
+    effect = MarkerShift()
+    parts = [
+        weight * effect.change(scene, "RKNEL", np.array([*shift, start, 0.0]))
+        for weight, start in ((1.0, 3.0), (-0.5, -1.0))
+    ]
+    whole = effect.change(scene, "RKNEL", np.array([*shift, 3.0, 0.5]))
+    np.testing.assert_allclose(whole, sum(parts), atol=1e-9)
+    moved = effect.marker_change(scene, "RKNEL", np.array([*shift, 3.0, 0.5]))
+    np.testing.assert_allclose(moved[100], -moved[500], atol=0.3 * np.abs(moved).max())
 
 
 def test_swapped_markers():

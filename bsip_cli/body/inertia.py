@@ -13,7 +13,7 @@ import numpy as np
 PARAMETERS = ("m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 UNITS = ("kg", "kg m", "kg m", "kg m", *["kg m2"] * 6)
 
-_SYMMETRIC = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # Pinocchio's order of I
+SYMMETRIC = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # Pinocchio's order of I
 _READABLE = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # the tables' order of I
 
 
@@ -28,7 +28,7 @@ class Inertia:
     def phi(self) -> np.ndarray:
         """(10,) parameters about the frame's origin."""
         about_origin = self.tensor_kgm2 + self.mass_kg * _steiner(self.com_m)
-        moments = [about_origin[i, j] for i, j in _SYMMETRIC]
+        moments = [about_origin[i, j] for i, j in SYMMETRIC]
         return np.array([self.mass_kg, *(self.mass_kg * self.com_m), *moments])
 
     def readable(self) -> np.ndarray:
@@ -60,7 +60,7 @@ def from_phi(phi: np.ndarray) -> Inertia:
         raise ZeroDivisionError("a body without mass has no centre of mass")
     com = np.asarray(phi[1:4]) / mass
     tensor = np.empty((3, 3))
-    for (i, j), value in zip(_SYMMETRIC, phi[4:], strict=True):
+    for (i, j), value in zip(SYMMETRIC, phi[4:], strict=True):
         tensor[i, j] = tensor[j, i] = value
     return Inertia(mass, com, tensor - mass * _steiner(com))
 

@@ -34,8 +34,8 @@ ALLOWED = {
     "recordings": "body errors",
     "statistics": "errors",
     "identification": "body config dynamics errors statistics",
-    "effects": "body dynamics errors",
-    "diagnosis": "body dynamics effects errors identification statistics",
+    "effects": "body dynamics errors motion",
+    "diagnosis": "body dynamics effects errors identification motion statistics",
     "report": "body dynamics errors motion schemas statistics",
     "simulate": "body config errors",
     "stages": "artifacts body diagnosis dynamics effects errors identification motion pipeline "

@@ -1,0 +1,63 @@
+"""What skin that slides over the bones can do to the simulated wrench.
+
+Skin moves with the pose: a marker's error is taken as a random linear function of the angles of the
+joints beside its segment, as large as the residual that the marker itself shows. Each draw of such
+functions bends the pose, and the pose bends the wrench. The draws span what no diagnosis may take
+for an effect.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.body.person import Person
+from bsip_cli.body.skeleton import Skeleton
+from bsip_cli.effects.scene import Scene
+from bsip_cli.motion.pose_response import pose_response
+
+
+def skin_draws(
+    scene: Scene, marker_rms_m: np.ndarray, count: int, rng: np.random.Generator
+) -> np.ndarray:
+    """(N, 6, count) changes of the wrench, one per draw of all markers' errors.
+
+    marker_rms_m (m,) : how far each marker slides, root mean square.
+    """
+    features = joint_angles(scene.person.skeleton, scene.q)
+    errors = _marker_errors(scene, features, marker_rms_m, count, rng)
+    return scene.response.of(pose_response(scene.person, scene.q, errors))
+
+
+def _marker_errors(scene, features, marker_rms_m, count, rng) -> np.ndarray:
+    """(N, m, 3, count) [m] in the world."""
+    person, rotation = scene.person, scene.motion.rotation
+    errors = np.empty((len(scene.q), len(person.markers), 3, count))
+    for k, segment in enumerate(person.marker_segments):
+        nearby = np.concatenate([features[i] for i in beside(person, int(segment))], axis=1)
+        scale = np.sqrt((nearby**2).sum(axis=1).mean())
+        mixing = rng.normal(size=(3, nearby.shape[1], count))
+        local = np.einsum("fj,xjc->fxc", nearby / max(scale, 1e-9), mixing)
+        errors[:, k] = marker_rms_m[k] * (rotation[:, segment] @ local)
+    return errors
+
+
+def beside(person: Person, segment: int) -> list[int]:
+    """Indices of the joints at a segment: its own and those of its children; not the base."""
+    parents = person.skeleton.parents
+    return [i for i in range(1, len(parents)) if i == segment or parents[i] == segment]
+
+
+def joint_angles(skeleton: Skeleton, q: np.ndarray) -> list[np.ndarray]:
+    """Per joint (N, 1 or 3) angles against their mean [rad]; nothing for the base."""
+    angles = []
+    for at, kind in zip(skeleton.q_starts, skeleton.joint_types, strict=True):
+        if kind == "free":
+            angle = np.zeros((len(q), 0))
+        elif kind == "spherical":
+            x = q[:, at : at + 4]
+            x = x * np.sign(x[:, 3:] + 1e-300)
+            angle = 2 * x[:, :3]
+        else:
+            angle = q[:, at : at + 1]
+        angles.append(angle - angle.mean(axis=0))
+    return angles

@@ -1,0 +1,94 @@
+"""The interface of all effects: what else could make the measured wrench differ."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from bsip_cli.effects.scene import Scene
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect.
+
+    Attributes
+    ----------
+    name, unit : as in the diagnosis artifact.
+    least, most : physical bounds; outside, the explanation is none.
+    typical : a size that labs meet: the unit of steps and the spread before the data.
+    scan : values to try where the derivative at the null says nothing (a frequency, a moment in
+        time); empty for a parameter that is zero where the effect is absent.
+    """
+
+    name: str
+    unit: str
+    least: float
+    most: float
+    typical: float
+    scan: tuple[float, ...] = ()
+
+
+class Effect(ABC):
+    """A cause outside the inertial parameters that changes wrench or markers.
+
+    All parameters without a scan vanish together: then there is no effect.
+    """
+
+    name: ClassVar[str]
+    of_the_lab: ClassVar[bool]  # the same in every trial of a recording session
+    remedy: ClassVar[str]  # what would separate it from its rivals
+
+    @abstractmethod
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        """Segments, plates or markers it may sit at; one empty name where there is no choice."""
+
+    @abstractmethod
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        """Its numbers, in the order in which ``change`` takes them."""
+
+    @abstractmethod
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """(N, 6) what it adds to the simulated wrench, about the world's origin [N, N m]."""
+
+    @abstractmethod
+    def sentence(self, target: str, values: np.ndarray) -> str:
+        """What a person should read, without interval."""
+
+    def marker_change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray | None:
+        """(N, m, 3) what it adds to the residuals of the inverse kinematics [m], segment axes.
+
+        A marker's error less what the pose follows of it; None where no marker is touched.
+        """
+        return None
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        """Name, unit and value of what the diagnosis prints; by default the parameters."""
+        parameters = self.parameters(scene, target)
+        return tuple((p.name, p.unit, float(x)) for p, x in zip(parameters, values, strict=True))
+
+    def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
+        """Whether the values can be true of a body or a lab."""
+        parameters = self.parameters(scene, target)
+        return all(p.least <= x <= p.most for p, x in zip(parameters, values, strict=True))
+
+    def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """(N, 6, k) derivative of ``change`` for the k parameters without a scan.
+
+        By central differences of a thousandth of typical.
+        """
+        parameters = self.parameters(scene, target)
+        columns = []
+        for k, parameter in enumerate(parameters):
+            if parameter.scan:
+                continue
+            step = np.zeros(len(parameters))
+            step[k] = 1e-3 * parameter.typical
+            ahead = self.change(scene, target, values + step)
+            columns.append((ahead - self.change(scene, target, values - step)) / (2 * step[k]))
+        return np.stack(columns, axis=-1)

@@ -1,0 +1,103 @@
+"""A marker that slips on the skin and stays there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.marker_course import during, step, wrench_parts
+from bsip_cli.effects.scene import Scene
+
+APART_S = 0.5
+BEFORE_S = 1.0
+ABSORBED = (0.0, 0.5)
+
+
+class MarkerShift(Effect):
+    """A marker sits elsewhere on its segment from a moment on, in the segment's axes.
+
+    The pose follows it in part, which bends the simulated wrench; the rest stays as residual. A
+    moment before the trial means throughout. Scaling that used the trial has put the model's marker
+    between both places: ``absorbed`` is the part of the shift that it took.
+    """
+
+    name = "marker_shift"
+    of_the_lab = False
+    remedy = "put the marker back to its place and record the trial again"
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        return scene.person.markers
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        first, last = float(scene.times_s[0]), float(scene.times_s[-1])
+        return (
+            *(Parameter(axis, "m", -0.15, 0.15, 0.02) for axis in "xyz"),
+            Parameter(
+                "from_time", "s", first - BEFORE_S, last, APART_S, self._moments(scene, target)
+            ),
+            Parameter("absorbed", "1", 0.0, 1.0, 0.25, ABSORBED),
+        )
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        m = scene.person.markers.index(target)
+        parts = scene.once(
+            (self.name, m), lambda: wrench_parts(scene, self._directions(scene, m), [m])
+        )
+        return during(_course(scene, values), parts) @ values[:3]
+
+    def marker_change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        m = scene.person.markers.index(target)
+        slipped = _course(scene, values)[0][:, None]
+        errors = slipped * (self._directions(scene, m)[:, 0] @ values[:3])
+        return scene.pose_response.left(errors[:, None, :, None], [m])[..., 0]
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        """A slip before the trial counts from its first frame."""
+        shift = tuple((f"shift_{c}", "m", float(x)) for c, x in zip("xyz", values, strict=False))
+        return (*shift, ("from_time", "s", max(float(values[3]), float(scene.times_s[0]))))
+
+    def sentence(self, target: str, values: np.ndarray) -> str:
+        since = f"from {values[3]:.1f} s on" if values[3] > 0 else "throughout"
+        size = 1000 * np.linalg.norm(values[:3])
+        return f"marker {target} sits {size:.0f} mm from its place {since}"
+
+    @staticmethod
+    def _directions(scene: Scene, m: int) -> np.ndarray:
+        """(N, 1, 3, 3) the axes of the marker's segment, world."""
+        return scene.motion.rotation[:, None, scene.person.marker_segments[m]]
+
+    @staticmethod
+    def _moments(scene: Scene, target: str) -> tuple[float, ...]:
+        """Throughout, and where the marker's residual changes its level most; else everywhere."""
+        first, last = float(scene.times_s[0]), float(scene.times_s[-1])
+        throughout = first - BEFORE_S
+        residual = scene.residual_m
+        if residual is None:
+            inside = np.arange(first + APART_S, last, APART_S)
+            return (throughout, *(float(t) for t in inside))
+        m = scene.person.markers.index(target)
+        at = scene.once(("level", m), lambda: _level_change(residual[:, m], scene.rate_hz))
+        return (throughout,) if at is None else (throughout, float(scene.times_s[at]))
+
+
+def _course(scene: Scene, values: np.ndarray) -> np.ndarray:
+    """(3, N) the part of the shift by which the marker is off, and its derivatives."""
+    course = step(scene.times_s, values[3])
+    course[0] -= values[4]
+    return course
+
+
+def _level_change(residual_m: np.ndarray, rate_hz: float) -> int | None:
+    """Frame at which a residual (N, 3) splits into the two most different levels, if any can."""
+    seen = np.flatnonzero(np.isfinite(residual_m).all(axis=1))
+    least = round(APART_S * rate_hz)
+    if len(seen) < 2 * least + 1:
+        return None
+    known = residual_m[seen]
+    before = np.arange(1, len(known))[:, None]
+    left = np.cumsum(known, axis=0)[:-1]
+    right = known.sum(axis=0) - left
+    between = (left**2 / before + right**2 / (len(known) - before)).sum(axis=1)
+    return int(seen[1 + least + np.argmax(between[least : len(known) - least])])

@@ -1,0 +1,107 @@
+"""A trunk that bends a second time between waist and neck."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from bsip_cli.effects.displaced import displaced
+from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.scene import Scene
+
+BELOW = 0.4  # of length and mass of the upper torso: up to T12/L1
+CHORD = 0.3  # share at which the change is exact; for others it is taken for linear
+AXES = {"flexion": 2, "lateral": 0, "axial": 1}
+
+
+class MissingJoint(Effect):
+    """A part of the waist's turn happens at T12/L1 instead.
+
+    The parameters are that part, per axis. What lies above is turned as the model has it, but
+    shifted; the part below turns less. The markers above follow and drag the pose along.
+    """
+
+    name = "missing_joint"
+    of_the_lab = False
+    remedy = "put markers on both sides of T12/L1 and bend the trunk"
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        skeleton = scene.person.skeleton
+        jointed = zip(skeleton.segments, skeleton.joint_types, strict=True)
+        return tuple(s for s, kind in jointed if s == "upper_torso" and kind == "spherical")
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        return tuple(Parameter(axis, "1", -0.5, 1.5, 0.3) for axis in AXES)
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        return scene.once(self.name, lambda: _wrenches(scene, target)) @ values
+
+    def marker_change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        errors = _errors(scene, target) @ values
+        markers = scene.markers_beyond(scene.person.skeleton.index(target))
+        return scene.pose_response.left(errors[..., None], markers)[..., 0]
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        """Range of the second bend about each axis."""
+        turn = _turn(scene, scene.person.skeleton.index(target))
+        ranges = np.ptp(turn[:, list(AXES.values())], axis=0) * values
+        return tuple((axis, "rad", float(x)) for axis, x in zip(AXES, ranges, strict=True))
+
+    def sentence(self, target: str, values: np.ndarray) -> str:
+        parts = ", ".join(
+            f"{100 * share:.0f} % of its {axis} bend"
+            for axis, share in zip(AXES, values, strict=True)
+        )
+        return f"the trunk bends a second time between waist and neck ({parts})"
+
+
+def _turn(scene: Scene, i: int) -> np.ndarray:
+    """(N, 3) rotation vector of a spherical joint [rad]."""
+    at = scene.person.skeleton.q_starts[i]
+    return Rotation.from_quat(scene.q[:, at : at + 4]).as_rotvec()
+
+
+def _shift_of(scene: Scene, i: int, place_m: np.ndarray) -> np.ndarray:
+    """(N, 3, 3) how a place (3,) below the second joint truly lies off, per share and axis."""
+    turn = _turn(scene, i)
+    parent = scene.motion.rotation[:, scene.person.skeleton.parents[i]]
+    parent = parent @ scene.person.joint_rotations()[i]
+    straight = Rotation.from_rotvec(turn).apply(place_m)
+    columns = []
+    for axis in AXES.values():
+        less = turn.copy()
+        less[:, axis] *= 1 - CHORD
+        columns.append((Rotation.from_rotvec(less).apply(place_m) - straight) / CHORD)
+    return parent @ np.stack(columns, axis=2)
+
+
+def _second_joint(scene: Scene, i: int) -> np.ndarray:
+    """(3,) T12/L1 from the waist, on the line to the neck, torso axes [m]."""
+    return BELOW * scene.person.origin_in_joint_m[i]
+
+
+def _errors(scene: Scene, target: str) -> np.ndarray:
+    """(N, m', 3, 3) how markers of the torso and beyond lie off, per share and axis."""
+    person, i = scene.person, scene.person.skeleton.index(target)
+    joint, places = _second_joint(scene, i), person.markers_in_joint_m()
+    above = _shift_of(scene, i, joint)
+    shifts = []
+    for m in scene.markers_beyond(i):
+        below = person.marker_segments[m] == i and places[m, 1] < joint[1]
+        shifts.append(_shift_of(scene, i, places[m]) if below else above)
+    return np.stack(shifts, axis=1)
+
+
+def _wrenches(scene: Scene, target: str) -> np.ndarray:
+    """(N, 6, 3) change of the simulated wrench, per share and axis."""
+    i = scene.person.skeleton.index(target)
+    joint = _second_joint(scene, i)
+    shift = _shift_of(scene, i, joint)
+    moved = displaced(*scene.mass_beyond(i), shift, scene.rate_hz)
+    # The part below is shifted by half as much on average.
+    middle = scene.motion.point(i, 0.5 * joint)
+    moved -= displaced(0.5 * BELOW * float(scene.phi[10 * i]), middle, shift, scene.rate_hz)
+    markers = scene.markers_beyond(i)
+    return moved - scene.response.of(scene.pose_response.of(_errors(scene, target), markers))

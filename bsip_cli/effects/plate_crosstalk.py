@@ -1,0 +1,38 @@
+"""A channel of a force plate that leaks into another."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.plate_frame import CHANNELS, in_plate, in_world, loaded_plates, plate_of
+from bsip_cli.effects.scene import Scene
+
+
+class PlateCrosstalk(Effect):
+    """A horizontal force channel also shows a part of another force channel."""
+
+    name = "plate_crosstalk"
+    of_the_lab = True
+    remedy = "load the plate with a weight at several places"
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        pairs = [(a, b) for a in CHANNELS[:3] for b in CHANNELS[:3] if a != b]
+        return tuple(f"{p} {a}>{b}" for p in loaded_plates(scene) for a, b in pairs)
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        return (Parameter("coefficient", "1", -0.3, 0.3, 0.02),)
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        name, pair = target.rsplit(" ", 1)
+        source, sink = (CHANNELS.index(c) for c in pair.split(">"))
+        plate = plate_of(scene, name)
+        reading = in_plate(plate, np.nan_to_num(plate.wrench))
+        change = np.zeros_like(reading)
+        change[:, sink] = values[0] * reading[:, source]
+        return in_world(plate, change)
+
+    def sentence(self, target: str, values: np.ndarray) -> str:
+        name, pair = target.rsplit(" ", 1)
+        source, sink = pair.split(">")
+        return f"{100 * values[0]:+.1f} % of channel {source} of plate {name} leaks into {sink}"

@@ -1,0 +1,46 @@
+"""What a plate shows, seen in its own axes.
+
+A channel, as the diagnosis names it ("1 fz"), is a component of the force or moment *on the body*
+about the plate's sensor, in the plate's own axes turned about x until z points up. So a person who
+stands reads a positive fz, and an offset of +10 N in fz makes everybody seem 1 kg heavier.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.effects.scene import Plate, Scene
+
+CHANNELS = ("fx", "fy", "fz", "mx", "my", "mz")
+
+
+def plate_of(scene: Scene, name: str) -> Plate:
+    return next(plate for plate in scene.plates if plate.name == name)
+
+
+def loaded_plates(scene: Scene, least_N: float = 50.0) -> tuple[str, ...]:
+    """Names of the plates that carry something in valid frames."""
+    return tuple(
+        plate.name
+        for plate in scene.plates
+        if scene.valid.any() and np.nanmax(plate.wrench[scene.valid, 2]) > least_N
+    )
+
+
+def in_plate(plate: Plate, wrench: np.ndarray) -> np.ndarray:
+    """(N, 6) force and moment on the body about the plate's sensor, plate axes."""
+    axes, about = plate.axes(), sensor_m(plate)
+    moment = wrench[:, 3:] - np.cross(about, wrench[:, :3])
+    return np.hstack([wrench[:, :3] @ axes.T, moment @ axes.T])
+
+
+def in_world(plate: Plate, reading: np.ndarray) -> np.ndarray:
+    """(N, 6) wrench about the world's origin, from a reading in the plate's frame."""
+    axes, about = plate.axes(), sensor_m(plate)
+    force = reading[:, :3] @ axes
+    return np.hstack([force, reading[:, 3:] @ axes + np.cross(about, force)])
+
+
+def sensor_m(plate: Plate) -> np.ndarray:
+    """(3,) the point that the plate's moments are about."""
+    return plate.centre_m() if plate.sensor_m is None else plate.sensor_m

@@ -1,0 +1,35 @@
+"""A force plate that lies elsewhere than the file says."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.plate_frame import loaded_plates, plate_of
+from bsip_cli.effects.scene import Scene
+
+
+class PlateTranslation(Effect):
+    """The plate truly lies at its stated place plus the shift: the measured moment lacks
+    shift x force."""
+
+    name = "plate_translation"
+    of_the_lab = True
+    remedy = "stand on the plate with both feet, then turn by 90 degrees and stand again"
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        return loaded_plates(scene)
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        return tuple(Parameter(axis, "m", -0.3, 0.3, 0.02) for axis in "xyz")
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        force = np.nan_to_num(plate_of(scene, target).wrench[:, :3])
+        return np.hstack([np.zeros_like(force), -np.cross(values, force)])
+
+    def sentence(self, target: str, values: np.ndarray) -> str:
+        x, y, z = 1000 * values
+        return (
+            f"plate {target} lies {np.linalg.norm(1000 * values[:2]):.0f} mm (x {x:+.0f}, "
+            f"y {y:+.0f}, height {z:+.0f}) from where the file says"
+        )

@@ -1,0 +1,45 @@
+"""An object that the person holds at first and lets go."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.body.names import in_words
+from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.scene import Scene
+
+STEP_S = 0.25
+
+
+class ReleasedObject(Effect):
+    """A point mass at the hand's centre until the moment of release."""
+
+    name = "released_object"
+    of_the_lab = False
+    remedy = "stand still with the object and again without"
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        return tuple(s for s in scene.person.skeleton.segments if s.startswith("hand"))
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        start, end = scene.times_s[0], scene.times_s[-1]
+        moments = tuple(float(t) for t in np.arange(start + 2 * STEP_S, end - STEP_S, STEP_S))
+        return (
+            Parameter("mass", "kg", 0.0, 20.0, 0.5),
+            Parameter("release_time", "s", float(start), float(end), STEP_S, moments),
+        )
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        mass, release = values
+        # A ramp over one frame keeps the derivative with respect to the moment alive.
+        held = np.clip((release - scene.times_s) * scene.rate_hz + 0.5, 0.0, 1.0)
+        carried = scene.once((self.name, target), lambda: _carried(scene, target))
+        return mass * held[:, None] * carried
+
+    def sentence(self, target: str, values: np.ndarray) -> str:
+        return f"the {in_words(target)} holds {values[0]:.2f} kg and lets go at {values[1]:.2f} s"
+
+
+def _carried(scene: Scene, target: str) -> np.ndarray:
+    """(N, 6) ground wrench of 1 kg at the segment's centre of mass."""
+    return scene.point(target, scene.centre_of(target)).carrying_wrench()

@@ -1,0 +1,217 @@
+"""One trial as the effects see it: motion, parameters, plates, and the wrench they predict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+
+from bsip_cli.body.person import Person
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.regressor import predicted_wrench
+from bsip_cli.dynamics.segment_motion import Point, SegmentMotion, segment_motion
+from bsip_cli.dynamics.wrench_response import WrenchResponse, wrench_response
+from bsip_cli.motion.inverse_kinematics import tree_of
+from bsip_cli.motion.jacobian import model_markers
+from bsip_cli.motion.pose_response import PoseResponse, marker_trust, pose_responses
+
+TRUST_S = 0.05  # standard deviation of what smooths the markers' trust
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A force plate and what it measured.
+
+    corners_m : (4, 3) in the world, in the file's order: x runs from the second to the first.
+    wrench : (N, 6) on the body, about the world's origin; NaN where there is none.
+    sensor_m : (3,) the point that its moments are about; the middle of its surface if unknown.
+    """
+
+    name: str
+    corners_m: np.ndarray
+    wrench: np.ndarray
+    sensor_m: np.ndarray | None = None
+
+    def centre_m(self) -> np.ndarray:
+        """(3,) middle of the surface."""
+        return self.corners_m.mean(axis=0)
+
+    def axes(self) -> np.ndarray:
+        """(3, 3) rows: the plate's own x, along the plate across it, and its normal upwards.
+
+        The plate's own axes turned about x until z points up: in a file whose z points into the
+        floor, y and z have the other sign.
+        """
+        first = self.corners_m[0] - self.corners_m[1]
+        first = first / np.linalg.norm(first)
+        normal = np.cross(first, self.corners_m[2] - self.corners_m[1])
+        normal *= np.sign(normal[2]) / np.linalg.norm(normal)
+        return np.stack([first, np.cross(normal, first), normal])
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One trial: what was measured of the motion and the ground, and a body to simulate.
+
+    Attributes
+    ----------
+    times_s : (N,).
+    q, v, a : (N, nq), (N, nv), (N, nv) in Pinocchio's conventions.
+    phi : (10 n,) inertial parameters about the joint centres.
+    valid : (N,) frames whose ground contacts are all measured.
+    residual_m : (N, m, 3) markers less the model's, in the axes of their segments [m], NaN where
+        missing; None if they are not known.
+    robust_limit_m : residual beyond which a marker's pull on the pose fades.
+    """
+
+    times_s: np.ndarray
+    person: Person
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    phi: np.ndarray
+    plates: tuple[Plate, ...]
+    valid: np.ndarray
+    residual_m: np.ndarray | None = None
+    robust_limit_m: float = np.inf
+
+    @property
+    def rate_hz(self) -> float:
+        return 1.0 / float(np.median(np.diff(self.times_s)))
+
+    @property
+    def mass_kg(self) -> float:
+        return float(self.phi[::10].sum())
+
+    @cached_property
+    def model(self) -> pin.Model:
+        return pinocchio_model(self.person)
+
+    @cached_property
+    def predicted(self) -> np.ndarray:
+        """(N, 6) simulated wrench about the world's origin [N, N m]."""
+        return self.wrench_of(self.phi)
+
+    def wrench_of(self, phi: np.ndarray) -> np.ndarray:
+        """(N, 6) wrench of other parameters and the same motion."""
+        return predicted_wrench(self.model, self.q, self.v, self.a, phi[:, None], np.zeros(3))[
+            ..., 0
+        ]
+
+    @cached_property
+    def predicted_course(self) -> CubicSpline:
+        """The simulated wrench between the frames too."""
+        return CubicSpline(self.times_s, self.predicted)
+
+    @cached_property
+    def measured(self) -> np.ndarray:
+        """(N, 6) sum of the plates; 0 where a plate has no reading."""
+        return np.nan_to_num(sum((plate.wrench for plate in self.plates), np.zeros((1, 6))))
+
+    @cached_property
+    def motion(self) -> SegmentMotion:
+        """Of every segment's joint centre."""
+        return segment_motion(self.model, self.q, self.v, self.a)
+
+    @cached_property
+    def response(self) -> WrenchResponse:
+        """To small errors of the motion."""
+        return wrench_response(self.person, self.phi, self.q, self.v, self.a, self.rate_hz)
+
+    @cached_property
+    def trust(self) -> np.ndarray:
+        """(N, m) part of its weight that the robust fit leaves each marker."""
+        if self.residual_m is None:
+            return np.ones((len(self.q), len(self.person.markers)))
+        return marker_trust(self.residual_m, self.robust_limit_m)
+
+    @cached_property
+    def pose_response(self) -> PoseResponse:
+        """Of the inverse kinematics to small errors of the markers.
+
+        The trust is smoothed, lest a marker that comes and goes shake the answer.
+        """
+        trust = gaussian_filter1d(self.trust, TRUST_S * self.rate_hz, axis=0, mode="nearest")
+        return pose_responses(self.person, self.q, trust)
+
+    @cached_property
+    def markers_m(self) -> np.ndarray:
+        """(N, m, 3) world positions: as measured where that is known, else the model's."""
+        if self.residual_m is None:
+            return self.model_markers_m
+        turn = self.motion.rotation[:, self.person.marker_segments]
+        apart = np.einsum("fmij,fmj->fmi", turn, self.residual_m)
+        return self.model_markers_m + np.nan_to_num(apart)
+
+    @cached_property
+    def model_markers_m(self) -> np.ndarray:
+        """(N, m, 3) where the pose puts the markers, world."""
+        return model_markers(self.person, *tree_of(self.person).forward(self.q))
+
+    @cached_property
+    def _kept(self) -> dict[Hashable, Any]:
+        return {}
+
+    def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """What ``make`` returns, computed when it is first asked for under this key."""
+        if key not in self._kept:
+            self._kept[key] = make()
+        return self._kept[key]
+
+    @cached_property
+    def centre_of_mass_m(self) -> np.ndarray:
+        """(N, 3) of the whole body, world."""
+        R, p = self.motion.rotation, self.motion.position_m
+        masses, moments = self.phi[::10], self.phi.reshape(-1, 10)[:, 1:4]
+        total = np.einsum("i,fix->fx", masses, p) + np.einsum("fixy,iy->fx", R, moments)
+        return total / masses.sum()
+
+    def point(self, segment: str, offset_m: np.ndarray) -> Point:
+        """A point fixed in a segment, ``offset_m`` (3,) from the segment's origin."""
+        i = self.person.skeleton.index(segment)
+        return self.motion.point(i, self.person.origin_in_joint_m[i] + offset_m)
+
+    def centre_of(self, segment: str) -> np.ndarray:
+        """(3,) centre of mass of a segment from its origin [m]."""
+        i = self.person.skeleton.index(segment)
+        mass, *moment = self.phi[10 * i : 10 * i + 4]
+        return np.array(moment) / mass - self.person.origin_in_joint_m[i]
+
+    def length_of(self, segment: str) -> float:
+        """Length that scales a segment's inertia [m]."""
+        return float(self.person.lengths_m[self.person.skeleton.index(segment)])
+
+    @cached_property
+    def bodies(self) -> tuple[str, ...]:
+        """Segments that have a mass."""
+        segments = self.person.skeleton.segments
+        return tuple(s for s, m in zip(segments, self.phi[::10], strict=True) if m > 0)
+
+    def markers_beyond(self, segment: int) -> list[int]:
+        """Numbers of the markers on a segment and on all that hang on it."""
+        return [m for m, s in enumerate(self.person.marker_segments) if s in self.beyond(segment)]
+
+    def beyond(self, segment: int) -> list[int]:
+        """A segment and all that hang on it."""
+        found = [segment]
+        for i, parent in enumerate(self.person.skeleton.parents):
+            if parent in found:
+                found.append(i)
+        return found
+
+    def mass_beyond(self, segment: int) -> tuple[float, Point]:
+        """Mass [kg] of a segment and all that hang on it, and their common centre of mass."""
+        mass, total = 0.0, np.zeros((2, len(self.times_s), 3))
+        for i in self.beyond(segment):
+            own, *moment = self.phi[10 * i : 10 * i + 4]
+            if own > 0:
+                point = self.motion.point(i, np.array(moment) / own)
+                total += own * np.stack([point.position_m, point.acceleration_m_s2])
+                mass += own
+        return mass, Point(*(total / mass))

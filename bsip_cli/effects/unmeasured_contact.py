@@ -1,0 +1,68 @@
+"""A contact that no plate measures: a hand on a rail, a chair, a foot beside the plate."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.body.names import in_words
+from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.scene import Scene
+
+WINDOWS_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+
+
+class UnmeasuredContact(Effect):
+    """A constant force on the segment's centre of mass during a window; the plates carry as much
+    less. The point where it truly acts is not estimated."""
+
+    name = "unmeasured_contact"
+    of_the_lab = False
+    remedy = "record without anything in reach"
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        touching = ("lower_torso", "hand_l", "hand_r", "foot_l", "foot_r")
+        return tuple(s for s in scene.person.skeleton.segments if s in touching)
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        start, end = float(scene.times_s[0]), float(scene.times_s[-1])
+        lengths = tuple(w for w in WINDOWS_S if w <= 0.8 * (end - start))
+        middles = tuple(float(t) for t in np.arange(start, end, 0.25))
+        return (
+            *(Parameter(f"force_{axis}", "N", -800.0, 800.0, 30.0) for axis in "xyz"),
+            Parameter("middle", "s", start, end, 0.25, middles),
+            Parameter("length", "s", 0.2, end - start, 0.5, lengths),
+        )
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        force, middle, length = values[:3], values[3], values[4]
+        inside = length / 2 - np.abs(scene.times_s - middle)
+        touching = np.clip(inside * scene.rate_hz + 0.5, 0.0, 1.0)
+        missing = -touching[:, None] * force
+        point = scene.once((self.name, target), lambda: _contact_m(scene, target))
+        return np.hstack([missing, np.cross(point, missing)])
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        """The window, and the mean force in it: its size and its parts along the lab's axes."""
+        start, end = values[3] - values[4] / 2, values[3] + values[4] / 2
+        parts = ((f"force_{c}", "N", float(x)) for c, x in zip("xyz", values, strict=False))
+        return (
+            ("start", "s", max(float(start), float(scene.times_s[0]))),
+            ("end", "s", min(float(end), float(scene.times_s[-1]))),
+            ("force", "N", float(np.linalg.norm(values[:3]))),
+            *parts,
+        )
+
+    def sentence(self, target: str, values: np.ndarray) -> str:
+        start, end = values[3] - values[4] / 2, values[3] + values[4] / 2
+        return (
+            f"from {start:.2f} to {end:.2f} s something beside the plates pushes on the "
+            f"{in_words(target)} "
+            f"with {np.linalg.norm(values[:3]):.0f} N"
+        )
+
+
+def _contact_m(scene: Scene, target: str) -> np.ndarray:
+    """(N, 3) the segment's centre of mass, world."""
+    return scene.point(target, scene.centre_of(target)).position_m

@@ -1,0 +1,69 @@
+"""A part of a segment's mass that swings against the bone."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import cont2discrete, lfilter
+
+from bsip_cli.body.names import in_words
+from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.scene import Scene
+
+FREQUENCIES_HZ = (3.0, 4.0, 5.0, 6.5, 8.0, 10.0)
+DAMPING = (0.1, 0.2, 0.4)
+
+
+class WobblingMass(Effect):
+    """A mass on a spring and a damper at the segment's centre of mass, free in all directions."""
+
+    name = "wobbling_mass"
+    of_the_lab = False
+    remedy = "hop three times, or drop on the heels"
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        soft = ("lower_torso", "upper_torso", "thigh", "shank")
+        return tuple(s for s in scene.person.skeleton.segments if s.startswith(soft))
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        i = scene.person.skeleton.index(target)
+        most = max(0.8 * float(scene.phi[10 * i]), 0.1)
+        return (
+            Parameter("mass", "kg", 0.0, most, 1.0),
+            Parameter("frequency", "Hz", 2.0, 20.0, 1.0, FREQUENCIES_HZ),
+            Parameter("damping_ratio", "1", 0.02, 1.0, 0.1, DAMPING),
+        )
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        mass, frequency, damping = values
+        key = (self.name, target, float(frequency), float(damping))
+        return mass * scene.once(key, lambda: _swing(scene, target, frequency, damping))
+
+    def sentence(self, target: str, values: np.ndarray) -> str:
+        return (
+            f"{values[0]:.1f} kg of the {in_words(target)} swing against the bone at "
+            f"{values[1]:.1f} Hz (damping ratio {values[2]:.2f})"
+        )
+
+
+def _swing(scene: Scene, target: str, frequency_hz: float, damping: float) -> np.ndarray:
+    """(N, 6) what 1 kg adds to the wrench by swinging instead of staying in its segment."""
+    point = scene.point(target, scene.centre_of(target))
+    ground, pace = point.acceleration_m_s2, 2 * np.pi * frequency_hz
+    travel = _response([-1.0], ground, scene.rate_hz, pace, damping)
+    force = _response([-1.0, 0.0, 0.0], ground, scene.rate_hz, pace, damping)
+    carried = ground + force - scene.model.gravity.linear
+    moment = np.cross(point.position_m, force) + np.cross(travel, carried)
+    return np.hstack([force, moment])
+
+
+def _response(
+    numerator: list[float], ground: np.ndarray, rate_hz: float, pace_rad_s: float, damping: float
+) -> np.ndarray:
+    """(N, 3) travel of the mass against its segment [m], or with s^2 its acceleration.
+
+    x'' = -2 damping pace x' - pace^2 x - ground, at rest when the trial begins; exact where the
+    ground's acceleration is linear between samples.
+    """
+    denominator = [1.0, 2 * damping * pace_rad_s, pace_rad_s**2]
+    b, a, _ = cont2discrete((numerator, denominator), 1 / rate_hz, method="foh")
+    return lfilter(np.ravel(b), a, ground - ground[0], axis=0)

@@ -1,0 +1,145 @@
+"""What must hold of every effect: nothing at the null, right derivatives, words for people."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from moving_scene import moving
+from standing_person import standing
+
+from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
+from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.scene import Scene
+from bsip_cli.motion.jacobian import marker_residuals
+
+VOCABULARY = [
+    "sync_offset",
+    "clock_drift",
+    "plate_translation",
+    "plate_rotation",
+    "plate_gain",
+    "plate_crosstalk",
+    "plate_zero",
+    "plate_drift",
+    "gravity_tilt",
+    "added_mass",
+    "released_object",
+    "wobbling_mass",
+    "breathing",
+    "unmeasured_contact",
+    "joint_centre",
+    "missing_joint",
+    "marker_shift",
+    "marker_swap",
+    "over_smoothing",
+    "segment_inertia",
+]
+UNITS = {"m", "rad", "1", "s", "Hz", "kg", "kg m", "kg m2", "N", "N m", "N/s", "N m/s"}
+EVERY = [pytest.param(effect, id=effect.name) for effect in CATALOGUE]
+
+
+def scene_with_swapped_markers() -> Scene:
+    """Residuals as exchanged labels leave them if the pose does not follow."""
+    scene, names = moving(), standing().person.markers
+    seen = scene.markers_m.copy()
+    a, b = names.index("RKNEM"), names.index("LKNEM")
+    seen[200:320, [a, b]] = seen[200:320, [b, a]]
+    residual = marker_residuals(scene.person, scene.q, seen)
+    return replace(scene, residual_m=residual, robust_limit_m=0.025)
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return scene_with_swapped_markers()
+
+
+def some(effect: Effect, scene: Scene) -> list[str]:
+    """First, middle and last target."""
+    targets = effect.targets(scene)
+    assert targets
+    return sorted({targets[0], targets[len(targets) // 2], targets[-1]})
+
+
+def values_of(effect, scene, target, size: float) -> np.ndarray:
+    """``size`` times typical, at the middle of what is scanned."""
+    parameters = effect.parameters(scene, target)
+    return np.array([p.scan[len(p.scan) // 2] if p.scan else size * p.typical for p in parameters])
+
+
+def test_the_catalogue_is_the_vocabulary():
+    assert [effect.name for effect in CATALOGUE] == VOCABULARY
+    assert list(EFFECTS) == VOCABULARY
+
+
+@pytest.mark.parametrize("effect", EVERY)
+def test_nothing_changes_at_the_null(effect, scene):
+    for target in some(effect, scene):
+        values = values_of(effect, scene, target, 0.0)
+        change = effect.change(scene, target, values)
+        assert change.shape == scene.predicted.shape
+        np.testing.assert_allclose(change, 0, atol=1e-8)
+        moved = effect.marker_change(scene, target, values)
+        assert moved is None or (moved.shape == scene.markers_m.shape and not moved.any())
+
+
+@pytest.mark.parametrize("effect", EVERY)
+@pytest.mark.parametrize("size", [0.0, 1.0])
+def test_the_tangent_is_the_derivative(effect, scene, size):
+    for target in some(effect, scene):
+        values = values_of(effect, scene, target, size)
+        tangent = effect.tangent(scene, target, values)
+        at = [k for k, p in enumerate(effect.parameters(scene, target)) if not p.scan]
+        assert tangent.shape == (*scene.predicted.shape, len(at))
+        for column, k in enumerate(at):
+            step = np.zeros(len(values))
+            step[k] = 1e-2 * effect.parameters(scene, target)[k].typical
+
+            def moved(n, target=target, values=values, step=step):
+                return effect.change(scene, target, values + n * step)
+
+            far, near = moved(2) - moved(-2), moved(1) - moved(-1)
+            expected = (8 * near - far) / (12 * step[k])
+            scale = max(float(np.abs(expected).max()), 1e-9)
+            np.testing.assert_allclose(tangent[..., column], expected, atol=1e-4 * scale)
+
+
+@pytest.mark.parametrize("effect", EVERY)
+def test_a_typical_size_is_possible_visible_and_in_words(effect, scene):
+    target = effect.targets(scene)[0]
+    values = values_of(effect, scene, target, 1.0)
+    if effect.name == "added_mass":
+        values[1:] /= 10  # of 0.5 kg, not of 5
+    if effect.name == "segment_inertia":
+        values[4:] = 0
+        values[1:4] = 0
+    assert effect.possible(scene, target, values)
+    assert np.abs(effect.change(scene, target, values)).max() > 0.1
+    sentence = effect.sentence(target, values)
+    assert "_" not in sentence and not sentence.endswith(".") and len(sentence) > 20
+    assert effect.remedy and "_" not in effect.remedy
+
+
+@pytest.mark.parametrize("effect", EVERY)
+def test_reports_numbers_with_units(effect, scene):
+    for target in some(effect, scene):
+        reported = effect.reported(scene, target, values_of(effect, scene, target, 1.0))
+        assert reported
+        for name, unit, value in reported:
+            assert name.isidentifier() and unit in UNITS and isinstance(value, float)
+            assert np.isfinite(value) or effect.name == "segment_inertia"
+
+
+@pytest.mark.parametrize("effect", EVERY)
+def test_scans_lie_within_the_bounds(effect, scene):
+    for target in some(effect, scene):
+        for p in effect.parameters(scene, target):
+            assert p.unit in UNITS and p.typical > 0 and p.least < p.most
+            assert all(p.least <= x <= p.most for x in p.scan)
+            assert p.scan or p.least <= 0 <= p.most
+
+
+@pytest.mark.parametrize("effect", EVERY)
+def test_beyond_the_bounds_nothing_is_possible(effect, scene):
+    target = effect.targets(scene)[0]
+    far = [2 * p.most + 1 for p in effect.parameters(scene, target)]
+    assert not effect.possible(scene, target, np.array(far))

@@ -1,0 +1,169 @@
+"""Masses, contacts and tissue against mechanics written out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from moving_scene import RATE_HZ, moving, rms, standing_still
+from scipy.integrate import solve_ivp
+
+from bsip_cli.body.inertia import Inertia
+from bsip_cli.effects.added_mass import AddedMass
+from bsip_cli.effects.breathing import OUTWARD, Breathing
+from bsip_cli.effects.released_object import ReleasedObject
+from bsip_cli.effects.segment_inertia import SegmentInertia
+from bsip_cli.effects.unmeasured_contact import UnmeasuredContact
+from bsip_cli.effects.wobbling_mass import WobblingMass
+
+G = 9.80665
+UP = np.array([0.0, 0.0, G])
+TIMES = moving().times_s
+
+
+def place(scene, segment: str, offset=(0.0, 0.0, 0.0)) -> np.ndarray:
+    """(N, 3) of a point ``offset`` from a segment's centre of mass."""
+    i = scene.person.skeleton.index(segment)
+    body = scene.phi[10 * i : 10 * i + 4]
+    local = body[1:] / body[0] + offset
+    return scene.motion.position_m[:, i] + scene.motion.rotation[:, i] @ local
+
+
+def fall(path: np.ndarray) -> np.ndarray:
+    """(N, 3) acceleration of a path less gravity, by differences."""
+    speed = np.gradient(path, 1 / RATE_HZ, axis=0, edge_order=2)
+    return np.gradient(speed, 1 / RATE_HZ, axis=0, edge_order=2) + UP
+
+
+def carried(path: np.ndarray) -> np.ndarray:
+    """(N, 6) ground wrench of 1 kg on a path."""
+    return np.hstack([fall(path), np.cross(path, fall(path))])
+
+
+def test_a_kilogram_on_a_standing_person():
+    scene = standing_still()
+    change = AddedMass().change(scene, "hand_l", np.array([1.0, 0.0, 0.02, 0.0]))
+    x, y, _ = place(scene, "hand_l", [0.0, 0.02, 0.0])[0]
+    np.testing.assert_allclose(change[10], [0, 0, G, y * G, -x * G, 0], atol=1e-9)
+
+
+def test_a_mass_that_moves_is_another_body_of_the_tree():
+    """To first order in the place: its own inertia about the segment's centre is left out."""
+    scene, offset = moving(), np.array([0.003, -0.01, 0.002])
+    values = np.array([2.0, *(2.0 * offset)])
+    i = scene.person.skeleton.index("thigh_r")
+    centre = scene.phi[10 * i + 1 : 10 * i + 4] / scene.phi[10 * i]
+    heavier = scene.phi.copy()
+    heavier[10 * i : 10 * i + 10] += Inertia(2.0, centre + offset, np.zeros((3, 3))).phi()
+    change = AddedMass().change(scene, "thigh_r", values)
+    np.testing.assert_allclose(change, scene.wrench_of(heavier) - scene.predicted, atol=5e-3)
+    assert np.abs(change - 2.0 * carried(place(scene, "thigh_r")))[20:-20, 3:].max() > 0.1
+    reported = {name: value for name, _, value in AddedMass().reported(scene, "thigh_r", values)}
+    origin = scene.person.origin_in_joint_m[i]
+    told = [reported[f"position_{axis}"] for axis in "xyz"]
+    np.testing.assert_allclose(told, centre - origin + offset, atol=1e-12)
+    assert reported["mass"] == 2.0
+
+
+def test_a_moment_without_mass_within_reach_is_no_load():
+    effect, scene = AddedMass(), standing_still()
+    assert effect.possible(scene, "head", np.array([3.0, 0.0, 0.5, 0.0]))
+    assert not effect.possible(scene, "head", np.array([0.5, 0.0, 1.6, 0.0]))
+    assert not effect.possible(scene, "head", np.array([-1.0, 0.0, 0.0, 0.0]))
+
+
+def test_an_object_weighs_until_it_is_let_go():
+    scene = moving()
+    change = ReleasedObject().change(scene, "hand_r", np.array([1.5, 3.0]))
+    held = TIMES < 2.99
+    expected = 1.5 * carried(place(scene, "hand_r"))
+    assert rms(change[held] - expected[held]).max() < 0.02 * rms(expected[held]).max()
+    assert not change[TIMES > 3.01].any()
+
+
+def test_a_contact_takes_its_force_off_the_plates():
+    scene, force = moving(), np.array([10.0, -20.0, 80.0])
+    values = np.array([*force, 3.0, 2.0])
+    change = UnmeasuredContact().change(scene, "hand_l", values)
+    inside = np.abs(TIMES - 3.0) < 0.98
+    np.testing.assert_allclose(change[inside, :3], np.tile(-force, (inside.sum(), 1)))
+    moment = -np.cross(place(scene, "hand_l"), force)
+    np.testing.assert_allclose(change[inside, 3:], moment[inside], atol=1e-9)
+    assert not change[np.abs(TIMES - 3.0) > 1.02].any()
+    reported = [(name, value) for name, _, value in UnmeasuredContact().reported(scene, "", values)]
+    size = float(np.linalg.norm(force))
+    assert reported[:3] == [("start", 2.0), ("end", 4.0), ("force", pytest.approx(size))]
+
+
+@pytest.mark.parametrize(("frequency", "damping"), [(3.0, 0.1), (6.5, 0.3)])
+def test_a_wobbling_mass_is_an_oscillator_on_a_moving_ground(frequency, damping):
+    scene, pace = moving(), 2 * np.pi * frequency
+    path = place(scene, "thigh_l")
+    ground = scene.point("thigh_l", scene.centre_of("thigh_l")).acceleration_m_s2
+
+    def rate(t, state):
+        push = np.array([np.interp(t, TIMES, column) for column in ground.T]) - ground[0]
+        u, du = state[:3], state[3:]
+        return np.concatenate([du, -2 * damping * pace * du - pace**2 * u - push])
+
+    found = solve_ivp(rate, (0, TIMES[-1]), np.zeros(6), t_eval=TIMES, rtol=1e-9, atol=1e-10)
+    u, du = found.y[:3].T, found.y[3:].T
+    swing = -2 * damping * pace * du - pace**2 * u - (ground - ground[0])
+    own = ground + swing + UP
+    both = np.hstack([own, np.cross(path + u, own)])
+    stiff = np.hstack([ground + UP, np.cross(path, ground + UP)])
+    change = WobblingMass().change(scene, "thigh_l", np.array([1.0, frequency, damping]))
+    np.testing.assert_allclose(change, both - stiff, atol=2e-3 * np.abs(change).max())
+
+
+def test_breath_moves_a_mass_out_and_back():
+    scene, tiny = moving(), 1e-6
+    values = np.array([0.06, -0.08, 0.3])
+    phase = 2 * np.pi * 0.3 * TIMES
+    course = 0.06 * np.cos(phase) - 0.08 * np.sin(phase)
+    i = scene.person.skeleton.index("upper_torso")
+    out = scene.motion.rotation[:, i] @ OUTWARD
+    still = place(scene, "upper_torso")
+    moved = carried(still + tiny * course[:, None] * out)
+    expected = (moved - carried(still)) / tiny
+    change = Breathing().change(scene, "upper_torso", values)
+    assert rms(change - expected).max() < 0.01 * rms(expected).max()
+    amplitude, frequency = Breathing().reported(scene, "upper_torso", values)
+    assert amplitude == ("amplitude", "kg m", pytest.approx(0.1))
+    assert frequency == ("frequency", "Hz", 0.3)
+
+
+def test_breath_pushes_as_much_as_it_pulls():
+    scene = standing_still(10.0)
+    change = Breathing().change(scene, "upper_torso", np.array([0.1, 0.05, 0.3]))
+    whole = change[: round(3 / 0.3 * RATE_HZ)]
+    np.testing.assert_allclose(whole.mean(axis=0), 0, atol=1e-3 * np.abs(change).max())
+    assert np.abs(change[:, 4]).max() > 0.5  # of a sway of 0.1 kg m under gravity
+
+
+def test_another_inertia_is_another_simulation():
+    scene = moving()
+    for segment in ("upper_torso", "shank_r", "head"):
+        i = scene.person.skeleton.index(segment)
+        deviation = 0.1 * np.random.default_rng(i).normal(size=10)
+        other = scene.phi.copy()
+        other[10 * i : 10 * i + 10] += deviation
+        change = SegmentInertia().change(scene, segment, deviation)
+        np.testing.assert_allclose(change, scene.wrench_of(other) - scene.predicted, atol=1e-8)
+
+
+def test_the_share_of_the_error_that_a_segment_makes():
+    scene = moving()
+    i = scene.person.skeleton.index("thigh_r")
+    other = scene.phi.copy()
+    other[10 * i : 10 * i + 10] *= 1.2
+    fast = replace(scene, phi=other)
+    deviation = -other[10 * i : 10 * i + 10] / 6
+    shares = SegmentInertia().reported(fast, "thigh_r", deviation)
+    assert [name for name, *_ in shares] == ["share", "cop_share"]
+    np.testing.assert_allclose([value for *_, value in shares], 1, atol=1e-6)
+    half = SegmentInertia().reported(fast, "thigh_r", 0.5 * deviation)[0][2]
+    assert half == pytest.approx(0.75)
+    assert SegmentInertia().possible(fast, "thigh_r", deviation)
+    assert not SegmentInertia().possible(fast, "thigh_r", 7 * deviation)

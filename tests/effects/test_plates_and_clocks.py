@@ -1,0 +1,178 @@
+"""What plates and clocks get wrong, against readings spoilt by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from moving_scene import MASS_KG, RATE_HZ, moving, phi, rms, scene_of, standing_still
+from scipy.spatial.transform import Rotation
+from standing_person import Swing, standing
+
+from bsip_cli.dynamics.cop import centre_of_pressure
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.regressor import predicted_wrench
+from bsip_cli.effects.clock_drift import ClockDrift
+from bsip_cli.effects.gravity_tilt import GravityTilt
+from bsip_cli.effects.plate_crosstalk import PlateCrosstalk
+from bsip_cli.effects.plate_drift import PlateDrift
+from bsip_cli.effects.plate_gain import PlateGain
+from bsip_cli.effects.plate_rotation import PlateRotation
+from bsip_cli.effects.plate_translation import PlateTranslation
+from bsip_cli.effects.plate_zero import PlateZero
+from bsip_cli.effects.scene import Plate, Scene
+from bsip_cli.effects.sync_offset import SyncOffset
+
+# A plate as files have it: turned by 30 degrees, x from the second corner to the first, y from the
+# fourth to the first, z into the floor, moments about a sensor below the surface.
+X = np.array([np.cos(0.5), np.sin(0.5), 0.0])
+Y = np.array([np.sin(0.5), -np.cos(0.5), 0.0])
+OWN = np.stack([X, Y, np.cross(X, Y)])
+CENTRE = np.array([0.2, -0.1, 0.01])
+SENSOR = CENTRE - np.array([0.0, 0.0, 0.04])
+CORNERS = CENTRE + np.array(
+    [0.3 * X * i + 0.2 * Y * j for i, j in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+)
+
+CHANNELS = ("fx", "fy", "fz", "mx", "my", "mz")
+
+
+def reading_of(wrench: np.ndarray) -> np.ndarray:
+    """(N, 6) channels on the body in the plate's own axes, z down, about the sensor."""
+    force = wrench[:, :3]
+    return np.hstack([force @ OWN.T, (wrench[:, 3:] - np.cross(SENSOR, force)) @ OWN.T])
+
+
+def wrench_of(reading: np.ndarray) -> np.ndarray:
+    force = reading[:, :3] @ OWN
+    return np.hstack([force, reading[:, 3:] @ OWN + np.cross(SENSOR, force)])
+
+
+def scene_with(spoil) -> tuple[Scene, np.ndarray]:
+    """One plate that carries all and shows ``spoil(its true reading)``; and what it shows too much.
+
+    The spoiling function takes channels in the plate's own axes turned until z points up.
+    """
+    scene, turned = moving(), np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+    shown = wrench_of(turned * spoil(turned * reading_of(scene.predicted)))
+    return (
+        replace(scene, plates=(Plate("1", CORNERS, shown, SENSOR),)),
+        shown - scene.predicted,
+    )
+
+
+def test_the_plates_axes_are_its_own_with_z_up():
+    plate = Plate("1", CORNERS, np.zeros((1, 6)))
+    np.testing.assert_allclose(plate.axes(), [X, -Y, [0, 0, 1]], atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(plate.axes()), 1)
+
+
+@pytest.mark.parametrize("channel", CHANNELS)
+def test_errors_of_one_channel(channel):
+    k = CHANNELS.index(channel)
+    unit = np.eye(6)[k]
+    times = moving().times_s[:, None]
+    cases = [
+        (PlateGain(), 0.05, lambda r: r * (1 + 0.05 * unit)),
+        (PlateZero(), -7.0, lambda r: r - 7.0 * unit),
+        (PlateDrift(), 0.3, lambda r: r + 0.3 * times * unit),
+    ]
+    for effect, size, spoil in cases:
+        scene, too_much = scene_with(spoil)
+        change = effect.change(scene, f"1 {channel}", np.array([size]))
+        np.testing.assert_allclose(change, too_much, atol=1e-8, err_msg=effect.name)
+
+
+@pytest.mark.parametrize(("source", "sink"), [("fz", "fx"), ("fx", "fy"), ("fy", "fz")])
+def test_crosstalk(source, sink):
+    names = ("fx", "fy", "fz")
+
+    def spoil(reading):
+        spoilt = reading.copy()
+        spoilt[:, names.index(sink)] += 0.03 * reading[:, names.index(source)]
+        return spoilt
+
+    scene, too_much = scene_with(spoil)
+    change = PlateCrosstalk().change(scene, f"1 {source}>{sink}", np.array([0.03]))
+    np.testing.assert_allclose(change, too_much, atol=1e-8)
+
+
+def test_an_offset_in_fz_makes_everybody_heavier():
+    scene = scene_with(lambda r: r)[0]
+    change = PlateZero().change(scene, "1 fz", np.array([9.80665]))
+    np.testing.assert_allclose(change[:, 2], 9.80665)
+    assert "+9.8 N" in PlateZero().sentence("1 fz", np.array([9.80665]))
+
+
+def test_a_shifted_plate_shows_the_pressure_short_of_the_shift():
+    scene = standing_still()
+    shift = np.array([0.03, -0.02, 0.0])
+    plate = Plate("1", scene.plates[0].corners_m, scene.predicted)
+    alone = replace(scene, plates=(plate,))
+    shown = scene.predicted + PlateTranslation().change(alone, "1", shift)
+    before, after = (centre_of_pressure(w, 0.0, 50.0) for w in (scene.predicted, shown))
+    np.testing.assert_allclose(after - before, np.tile(-shift[:2], (len(before), 1)), atol=1e-9)
+
+
+def test_a_turned_plate_shows_the_wrench_turned_back():
+    true, values = moving().predicted, np.array([0.02, -0.03, 0.1])
+    back = Rotation.from_rotvec(values).inv()
+    moment = true[:, 3:] - np.cross(CENTRE, true[:, :3])
+    force = back.apply(true[:, :3])
+    shown = np.hstack([force, back.apply(moment) + np.cross(CENTRE, force)])
+    scene = replace(moving(), plates=(Plate("1", CORNERS, shown, SENSOR),))
+    change = PlateRotation().change(scene, "1", values)
+    np.testing.assert_allclose(change, shown - true, atol=1e-8)
+
+
+def test_an_unloaded_plate_is_no_candidate():
+    scene = moving()
+    idle = replace(scene.plates[1], wrench=np.zeros_like(scene.predicted))
+    alone = replace(scene, plates=(scene.plates[0], idle))
+    assert PlateTranslation().targets(alone) == ("1",)
+    assert set(PlateGain().targets(alone)) == {f"1 {c}" for c in CHANNELS}
+
+
+@pytest.mark.parametrize("tilt", [[0.02, 0.0], [-0.05, 0.1]])
+def test_a_tilted_lab_is_a_simulation_with_another_gravity(tilt):
+    scene = moving()
+    model = pinocchio_model(standing().person)
+    turn = Rotation.from_rotvec([*tilt, 0.0])
+    model.gravity = pin.Motion(turn.apply(model.gravity.linear), np.zeros(3))
+    other = predicted_wrench(model, scene.q, scene.v, scene.a, phi()[:, None], np.zeros(3))[..., 0]
+    change = GravityTilt().change(scene, "", np.array(tilt))
+    np.testing.assert_allclose(change, other - scene.predicted, atol=1e-7)
+    name, unit, angle = GravityTilt().reported(scene, "", np.array(tilt))[0]
+    assert (name, unit) == ("angle", "rad") and angle == pytest.approx(np.hypot(*tilt))
+
+
+@pytest.mark.parametrize("effect", [SyncOffset(), ClockDrift()])
+def test_forces_that_come_late(effect):
+    """The same person recorded by plates whose clock is another."""
+    swing = Swing(pinocchio_model(standing().person), standing().q, 3, 0.4)
+    times = np.arange(400) / RATE_HZ
+    size = {"sync_offset": 0.015, "clock_drift": 0.004}[effect.name]
+    late = np.full(400, size) if effect.name == "sync_offset" else size * times
+
+    def wrench_at(moments):
+        return scene_of(*(np.stack([f(t) for t in moments]) for f in (swing.q, swing.v, swing.a)))
+
+    scene = wrench_at(times)
+    change = effect.change(scene, "", np.array([size]))
+    expected = wrench_at(times - late).predicted - scene.predicted
+    assert rms(change - expected).max() < 1e-3 * rms(expected).max()
+    assert rms(expected).max() > 1.0
+
+
+def test_words_for_the_order_of_clocks():
+    assert SyncOffset().sentence("", np.array([0.01])).endswith("10.0 ms after the markers")
+    assert SyncOffset().sentence("", np.array([-0.01])).endswith("10.0 ms before the markers")
+    assert "1000 ppm slower" in ClockDrift().sentence("", np.array([1e-3]))
+
+
+def test_a_standing_person_weighs_what_the_scene_says():
+    scene = standing_still()
+    np.testing.assert_allclose(scene.predicted[5, 2], MASS_KG * 9.80665, rtol=1e-9)
+    np.testing.assert_allclose(scene.measured, scene.predicted, atol=1e-9)

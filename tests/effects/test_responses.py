@@ -1,0 +1,88 @@
+"""Linear answers of wrench and pose to small errors, against the exact ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+from moving_scene import derivatives, moving, rms, scene_of
+from standing_person import away, markers_of, standing
+
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.effects.marker_course import during, step
+from bsip_cli.motion.inverse_kinematics import solve_trial
+from bsip_cli.motion.jacobian import marker_residuals
+from bsip_cli.motion.pose_response import marker_trust, pose_response, pose_responses
+
+PERSON = standing().person
+
+
+def some_errors(k: int = 1) -> np.ndarray:
+    """(N, nv, k) slow courses of all coordinates, 1 mm or 1 mrad."""
+    times, rng = moving().times_s, np.random.default_rng(5)
+    pace, phase = rng.uniform(0.5, 2.0, (2, len(PERSON.skeleton.v_names), k))
+    return 1e-3 * np.sin(2 * np.pi * pace * times[:, None, None] + 7 * phase)
+
+
+def test_the_wrench_of_a_slightly_other_motion():
+    scene = scene_of(moving().q, *derivatives(moving().q))
+    errors, model = some_errors()[..., 0], pinocchio_model(PERSON)
+    moved = np.stack([pin.integrate(model, q, d) for q, d in zip(scene.q, errors, strict=True)])
+    exact = scene_of(moved, *derivatives(moved)).predicted - scene.predicted
+    linear = scene.response.of(errors[..., None])[..., 0]
+    assert (rms(linear - exact) < 0.02 * rms(exact)).all()
+
+
+def test_one_course_serves_every_onset():
+    scene, errors = moving(), some_errors(2)
+    course = step(scene.times_s, 2.5)
+    at_once = scene.response.of(course[0][:, None, None] * errors)
+    by_parts = during(course, scene.response.parts(errors))
+    assert np.abs(by_parts - at_once).max() < 0.06 * np.abs(at_once).max()
+
+
+def test_some_markers_are_all_markers_without_error():
+    q, chosen = moving().q[::50], [3, 20]
+    errors = np.zeros((len(q), len(PERSON.markers), 3, 2))
+    errors[:, chosen] = 1e-3 * np.random.default_rng(6).normal(size=(len(q), 2, 3, 2))
+    response = pose_responses(PERSON, q)
+    np.testing.assert_allclose(
+        response.of(errors[:, chosen], chosen), pose_response(PERSON, q, errors)
+    )
+    np.testing.assert_allclose(response.left(errors[:, chosen], chosen), response.left(errors))
+
+
+def test_a_marker_beyond_the_limit_pulls_as_little_as_in_the_robust_fit():
+    limit, m = 0.025, PERSON.markers.index("RKNEL")
+    q = moving().q[::40]
+    markers = markers_of(PERSON, q)
+    markers[:, m] += [0.03, 0.05, 0.0]
+    solved = solve_trial(
+        PERSON,
+        markers,
+        marker_sd_m=0.005,
+        robust_limit_m=limit,
+        posture_sd_rad=5.0,
+        iterations=60,
+    ).q
+    exact = np.stack([away(PERSON, a, b) for a, b in zip(q, solved, strict=True)])
+    residual = marker_residuals(PERSON, solved, markers)
+    trust = marker_trust(residual, limit)
+    assert trust[:, m].mean() < 0.6
+    errors = np.tile([0.03, 0.05, 0.0], (len(q), 1))[:, None, :, None]
+    linear = pose_responses(PERSON, solved, trust).of(errors, [m])[..., 0]
+    trusting = pose_responses(PERSON, solved).of(errors, [m])[..., 0]
+    off = np.sqrt(((linear - exact) ** 2).mean())
+    assert off < 0.15 * np.sqrt((exact**2).mean())
+    assert np.sqrt(((trusting - exact) ** 2).mean()) > 4 * off
+
+
+def test_a_missing_marker_pulls_nothing():
+    scene = moving()
+    residual = np.zeros((*scene.markers_m.shape,))
+    residual[:, 7] = np.nan
+    blind = replace(scene, residual_m=residual, robust_limit_m=0.025)
+    errors = np.ones((len(scene.q), 1, 3, 1))
+    assert not blind.pose_response.of(errors, [7]).any()
+    assert np.isfinite(blind.markers_m).all()

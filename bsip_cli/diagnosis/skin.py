@@ -25,7 +25,7 @@ def skin_draws(
     """
     features = joint_angles(scene.person.skeleton, scene.q)
     errors = _marker_errors(scene, features, marker_rms_m, count, rng)
-    return scene.response.of(pose_response(scene.person, scene.q, errors))
+    return scene.response.of(scene.pose_response.of(errors))
 
 
 def _marker_errors(scene, features, marker_rms_m, count, rng) -> np.ndarray:

@@ -13,7 +13,6 @@ import numpy as np
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.effects.scene import Scene
-from bsip_cli.motion.pose_response import pose_response
 
 
 def skin_draws(

@@ -193,7 +193,7 @@ def test_everybody_refused(make_cohort):
         refuse(cohort, person.id, "scale")
     outcome = cohort.perform("stats")
     assert (outcome.state, outcome.exit_code) == ("refused", 3)
-    assert "no participant has results of RM and OM" in outcome.sentences[0]
+    assert "no participant has results of RM and OM" in outcome.sentences[-1]
 
 
 def test_freshness_and_files(make_cohort):

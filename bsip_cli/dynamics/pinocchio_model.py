@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
-
-GRAVITY_M_S2 = 9.80665
 
 
 def pinocchio_model(person: Person) -> pin.Model:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import SYMMETRIC
-from bsip_cli.dynamics.pinocchio_model import GRAVITY_M_S2
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bsip_cli.dynamics.pinocchio_model import GRAVITY_M_S2
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.dynamics.segment_motion import UP, Point
 
 

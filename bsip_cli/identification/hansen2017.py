@@ -9,12 +9,10 @@ a clinic's trial is not. With everything excited this is the paper's method.
 
 from __future__ import annotations
 
-import clarabel
 import numpy as np
-from scipy import sparse
 
-from bsip_cli.errors import NumericalError
 from bsip_cli.identification.estimator import Estimate, Problem
+from bsip_cli.identification.positive_masses import smallest
 
 _SMALLEST_MASS = 0.05  # of the table's
 
@@ -55,25 +53,5 @@ def _masses(problem: Problem, z: np.ndarray) -> np.ndarray:
 def _with_positive_masses(problem: Problem, shown: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Smallest z with ``shown^T z = target`` and every mass above a part of the table's."""
     prior = problem.prior
-    size = len(prior.phi)
-    masses = prior.root[::10]
     slack = prior.phi[::10] * (1 - _SMALLEST_MASS)
-    matrix = sparse.csc_matrix(np.vstack([shown.T, -masses]))
-    cones = [clarabel.ZeroConeT(shown.shape[1]), clarabel.NonnegativeConeT(len(masses))]
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    solution = clarabel.DefaultSolver(
-        sparse.csc_matrix(np.eye(size)),
-        np.zeros(size),
-        matrix,
-        np.concatenate([target, slack]),
-        cones,
-        settings,
-    ).solve()
-    if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
-        raise NumericalError(
-            f"no inertial parameters with positive masses fit the data ({solution.status})",
-            expected="a motion and forces that belong together",
-            remedy="look at the residuals of the identification trial",
-        )
-    return np.array(solution.x)
+    return smallest(shown.T, target, -prior.root[::10], slack)

@@ -14,13 +14,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import clarabel
 import numpy as np
 from scipy import sparse
 
-from bsip_cli.errors import NumericalError
 from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.estimator import Estimate, Problem
+from bsip_cli.identification.positive_masses import smallest
 
 _SMALLEST_MASS = 0.05  # of the table's
 
@@ -92,23 +91,6 @@ def solve(programme: Programme) -> np.ndarray:
     # The relations are variables of their own: squared, their weights would cost half the digits.
     count = len(programme.targets)
     relations = sparse.hstack([sparse.csc_matrix(programme.relations), -sparse.eye_array(count)])
-    matrix = sparse.vstack(
-        [relations, sparse.hstack([bounds, sparse.csc_matrix((len(masses), count))])], format="csc"
-    )
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    solution = clarabel.DefaultSolver(
-        sparse.csc_matrix(sparse.eye_array(size + count)),
-        np.zeros(size + count),
-        sparse.csc_matrix(matrix),
-        np.concatenate([programme.targets, programme.table[masses] - programme.floor]),
-        [clarabel.ZeroConeT(count), clarabel.NonnegativeConeT(len(masses))],
-        settings,
-    ).solve()
-    if solution.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
-        raise NumericalError(
-            f"no inertial parameters with positive masses fit the data ({solution.status})",
-            expected="a motion and forces that belong together",
-            remedy="look at the residuals of the identification trial",
-        )
-    return np.array(solution.x)[:size]
+    limits = programme.table[masses] - programme.floor
+    bounds = sparse.hstack([bounds, sparse.csc_matrix((len(masses), count))])
+    return smallest(relations, programme.targets, bounds, limits)[:size]

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.analog import long_runs
-
-GRAVITY = 9.80665
 
 
 @dataclass(frozen=True)
@@ -41,9 +40,9 @@ def force_mismatch(
     if height is None:
         return np.zeros(len(trunk_markers_m), bool)
     acceleration = np.gradient(np.gradient(_low_pass(height, rate_hz, limits))) * rate_hz**2
-    needed = mass_kg * (GRAVITY + acceleration)
+    needed = mass_kg * (GRAVITY_M_S2 + acceleration)
     measured = _low_pass(total_force_z_N, rate_hz, limits)
-    weight = mass_kg * GRAVITY
+    weight = mass_kg * GRAVITY_M_S2
     allowed = limits.mismatch_share * (weight + np.abs(needed - weight))
     different = np.abs(measured - needed) > allowed
     return long_runs(different, max(2, round(limits.mismatch_s * rate_hz)))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
 from bsip_cli.report.words import trial_label
 
@@ -78,7 +79,7 @@ class ParticipantRecord:
         return float(self.facts["mass_kg"])
 
     def body_weight(self) -> float:
-        return self.mass_kg() * 9.80665
+        return self.mass_kg() * GRAVITY_M_S2
 
     def method(self, method: str) -> pd.DataFrame:
         """Rows of ``bsip`` of one method, in the skeleton's order of segments."""

@@ -19,7 +19,7 @@ from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.data_share import in_words
 from bsip_cli.identification.equations import Recording, accumulate, residual_series
 from bsip_cli.identification.estimator import Estimate, Problem
-from bsip_cli.identification.excitation import excitation
+from bsip_cli.identification.excitation import Excitation, excitation
 from bsip_cli.identification.movement_gain import advice
 from bsip_cli.identification.noise import even_noise, noise_of
 from bsip_cli.identification.prior import Prior, Spread, likeliest, prior_of
@@ -59,10 +59,10 @@ def run(unit: Unit) -> None:
         for name in unit.config.identify.estimators
     }
     methods = _methods(unit)
+    results = {name: readable(estimate, prior) for name, estimate in estimates.items()}
     tables = [regression.drop(columns="note")]
-    for name, estimate in estimates.items():
-        unit.warn(f"{unit.name}: {methods[name]} ({name}): {estimate.note}")
-        result = readable(estimate, prior)
+    for name, result in results.items():
+        unit.warn(f"{unit.name}: {methods[name]} ({name}): {estimates[name].note}")
         tables.append(
             bsip_table(methods[name], skeleton.segments, result.values, result.sd, result.share)
         )
@@ -76,9 +76,10 @@ def run(unit: Unit) -> None:
         },
     )
     unit.write("base-parameters", _base_table(skeleton, problem))
-    first = readable(next(iter(estimates.values())), prior)
-    unit.write("excitation", _excitation_table(person, problem, first.share))
-    unit.write("identification", _summary(unit, problem, estimates, methods, blocks))
+    found = excitation(problem)
+    share = next(iter(results.values())).share
+    unit.write("excitation", _excitation_table(person, problem, found, share))
+    unit.write("identification", _summary(problem, found, estimates, methods, blocks))
     unit.write("used-blocks", blocks)
 
 
@@ -226,9 +227,10 @@ def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
     ).sort_values("sigma_percent", kind="stable", ignore_index=True)
 
 
-def _excitation_table(person: Person, problem: Problem, share: np.ndarray) -> pd.DataFrame:
+def _excitation_table(
+    person: Person, problem: Problem, found: Excitation, share: np.ndarray
+) -> pd.DataFrame:
     """``share`` (n, 10) are OM's data shares."""
-    found = excitation(problem)
     names = person.skeleton.segments
     rows = [("condition_number", "", found.condition_number, "1", "", "")]
     rows += [
@@ -255,14 +257,13 @@ def _excitation_table(person: Person, problem: Problem, share: np.ndarray) -> pd
 
 
 def _summary(
-    unit: Unit,
     problem: Problem,
+    found: Excitation,
     estimates: dict[str, Estimate],
     methods: dict[str, str],
     blocks: pd.DataFrame,
 ) -> pd.DataFrame:
     names = [f"rms_{name}" for name in WRENCH]
-    condition = excitation(problem).condition_number
     rows = []
     for name, estimate in estimates.items():
         rows.append(
@@ -274,7 +275,7 @@ def _summary(
                 "duration_s": problem.equations.duration_s,
                 "effective_samples": float(problem.noise.effective.sum()),
                 "rank": problem.basis.rank,
-                "condition_number": condition,
+                "condition_number": found.condition_number,
                 **dict(zip(names, estimate.residual_rms(problem), strict=True)),
                 "note": estimate.note,
             }

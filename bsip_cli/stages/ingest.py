@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.markersets import MarkerSet, guess_marker_set, load_marker_set
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.contacts import ContactWindows, contact_windows, plate_loads
@@ -19,7 +20,6 @@ from bsip_cli.recordings.zero import plate_zero, subtract_zero
 from bsip_cli.stages.frames import WRENCH
 from bsip_cli.unit import Unit
 
-_GRAVITY_M_S2 = 9.80665
 _TRUNK = ("lower_torso", "upper_torso")
 
 
@@ -129,7 +129,7 @@ def _mass_kg(unit: Unit, wrench: FrameWrench) -> float:
         return unit.participant.mass_kg + unit.load_kg()
     vertical = wrench.total[:, 2]
     loaded = vertical[vertical > 100.0]
-    return float(np.median(loaded) / _GRAVITY_M_S2) if len(loaded) else 70.0
+    return float(np.median(loaded) / GRAVITY_M_S2) if len(loaded) else 70.0
 
 
 def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:

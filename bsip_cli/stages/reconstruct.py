@@ -7,12 +7,13 @@ from itertools import combinations
 import numpy as np
 import pandas as pd
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.dynamics.cop import anterior_and_right, centre_of_pressure
 from bsip_cli.dynamics.lowpass import lowpass_operator, stretches
-from bsip_cli.dynamics.pinocchio_model import GRAVITY_M_S2, pinocchio_model
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH, coordinates_from, person_from

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.body.names import in_words
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
@@ -19,7 +20,6 @@ from bsip_cli.stages.known_loads import load_words
 from bsip_cli.study import Trial
 from bsip_cli.unit import Unit
 
-_GRAVITY_M_S2 = 9.80665
 _QUIET_S = 1.0
 _FRAMES_PER_TRIAL = 400
 
@@ -181,7 +181,7 @@ def _plate_mass(unit: Unit, still: _Recorded, quiet: slice) -> float:
     force = wrench[WRENCH[2]].to_numpy()[valid & inside]
     if not len(force):
         return float("nan")
-    return float(force.mean() / _GRAVITY_M_S2) - unit.load_kg(still.trial)
+    return float(force.mean() / GRAVITY_M_S2) - unit.load_kg(still.trial)
 
 
 def _mass(unit: Unit, plate_mass: float, load: str) -> tuple[float, str]:

@@ -6,7 +6,8 @@ import pytest
 from standing_person import Swing, standing, tilted_person
 
 from bsip_cli.body.anthropometry import regress
-from bsip_cli.dynamics.pinocchio_model import GRAVITY_M_S2, pinocchio_model
+from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import (
     move_moments,
     predicted_wrench,

@@ -5,8 +5,9 @@ import pinocchio as pin
 import pytest
 from standing_person import Swing, standing
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.loads import PointMass, load_parameters
-from bsip_cli.dynamics.pinocchio_model import GRAVITY_M_S2, pinocchio_model
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
 
 

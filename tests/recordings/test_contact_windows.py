@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from bsip_cli.body.gravity import GRAVITY_M_S2 as GRAVITY
 from bsip_cli.recordings.contacts import PlateLoad, contact_windows
-from bsip_cli.recordings.force_balance import GRAVITY
 
 RATE_HZ = 100.0
 N = 300

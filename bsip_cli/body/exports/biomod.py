@@ -8,11 +8,11 @@ import numpy as np
 
 from bsip_cli.body.exports.identified import (
     BALL_AXES,
-    GRAVITY_M_S2,
     IdentifiedPerson,
     numbers,
     plain_names,
 )
+from bsip_cli.body.gravity import GRAVITY_M_S2
 
 _NOTES = (
     "SI units, Z up. Segment frames: origin at the joint to the parent, axes of the segment (X",

@@ -15,7 +15,6 @@ from bsip_cli.errors import BadDataError
 # Ball joints turn in this order where a format wants three angles: flexion about Z, then X, then Y
 # (ISB); the two other axes coincide only with the middle angle at 90 degrees.
 BALL_AXES = "zxy"
-GRAVITY_M_S2 = 9.80665
 
 
 @dataclass(frozen=True)

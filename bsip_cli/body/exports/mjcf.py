@@ -7,12 +7,12 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from bsip_cli.body.exports.identified import (
-    GRAVITY_M_S2,
     IdentifiedPerson,
     numbers,
     plain_names,
     xml_comment,
 )
+from bsip_cli.body.gravity import GRAVITY_M_S2
 
 _MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # the order of fullinertia
 _NOTES = (

@@ -7,12 +7,12 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from bsip_cli.body.exports.identified import (
-    GRAVITY_M_S2,
     IdentifiedPerson,
     numbers,
     plain_names,
     xml_comment,
 )
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import Inertia
 
 _JOINTS = {"free": "FreeJoint", "spherical": "BallJoint", "revolute": "PinJoint"}

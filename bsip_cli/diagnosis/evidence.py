@@ -60,33 +60,30 @@ def filter_of(
 class Evidence:
     """White residual (6 n,) of a null, and what turns signatures into the same coordinates."""
 
-    filter: Filter
     residual: np.ndarray
-    rms_before: np.ndarray
-    _spread: np.ndarray
-    _recursion: np.ndarray
-    _left: np.ndarray
-    _shrink: np.ndarray
+    whitening: Whitening
 
     def white(self, signatures: np.ndarray) -> np.ndarray:
         """(6 n, k) of world wrenches (N, 6, k)."""
-        return self._decorrelated(
-            _whitened(
-                self.filter(signatures) / self._spread[..., None], self._recursion, self.filter
-            )
-        )
+        return self.whitening.white(signatures)
 
-    def _decorrelated(self, columns: np.ndarray) -> np.ndarray:
-        inner = self._left.T @ columns
-        return columns - self._left @ (self._shrink[:, None] * inner)
 
-    @property
-    def samples(self) -> int:
-        return len(self.filter.frames)
+@dataclass(frozen=True)
+class Whitening:
+    """spread (n, 6) of the noise, recursion (6, p) of its autoregression, and of the whitened
+    nuisances N the left singular vectors (6 n, m) and by how much each is shrunk (m,)."""
 
-    def blocks(self, length: int) -> np.ndarray:
-        """(6 n,) number of the block of ``length`` samples that each entry belongs to."""
-        return np.repeat(np.arange(self.samples) // length, 6)
+    filter: Filter
+    spread: np.ndarray
+    recursion: np.ndarray
+    left: np.ndarray
+    shrink: np.ndarray
+
+    def white(self, wrenches: np.ndarray) -> np.ndarray:
+        """(6 n, k) of world wrenches (N, 6, k)."""
+        filtered = self.filter(wrenches) / self.spread[..., None]
+        columns = _innovations(filtered, self.recursion, self.filter)
+        return columns - self.left @ (self.shrink[:, None] * (self.left.T @ columns))
 
 
 def evidence_of(
@@ -94,38 +91,31 @@ def evidence_of(
 ) -> Evidence:
     """From the residual wrench (N, 6), nuisance wrenches (N, 6, m) of unit prior variance, and the
     noise level (N,) of the accelerations."""
-    left_over = filter_(residual[..., None])
-    columns = filter_(nuisances)
+    whitening = _whitening(filter_(residual[..., None]), filter_(nuisances), noise_level, filter_)
+    white = whitening.white(residual[..., None])[:, 0]
+    return Evidence(np.clip(white, -_CLIP, _CLIP), whitening)
+
+
+def _whitening(
+    left_over: np.ndarray, nuisances: np.ndarray, noise_level: np.ndarray, filter_: Filter
+) -> Whitening:
+    """Noise of what the nuisances leave of the residual (n, 6, 1), and they in its coordinates."""
     level = noise_level[filter_.frames]
     recursion = np.zeros((6, _ORDER))
     spread = _course(left_over[..., 0], level)
+    known = _innovations(nuisances / spread[..., None], recursion, filter_)
     for _ in range(_ROUNDS):
-        flat = _whitened(left_over / spread[..., None], recursion, filter_)
-        known = _whitened(columns / spread[..., None], recursion, filter_)
+        flat = _innovations(left_over / spread[..., None], recursion, filter_)
         inner = known.T @ known + np.eye(known.shape[1])
-        explained = columns @ np.linalg.solve(inner, known.T @ flat[:, 0])
+        explained = nuisances @ np.linalg.solve(inner, known.T @ flat[:, 0])
         remaining = left_over[..., 0] - explained
         spread = _course(remaining, level)
         recursion = np.stack([_recursion(x, filter_.spans) for x in (remaining / spread).T])
-        innovation = _whitened((remaining / spread)[..., None], recursion, filter_)
-        spread = spread * innovation.reshape(-1, 6).std(axis=0)
-    flat = _whitened(left_over / spread[..., None], recursion, filter_)
-    known = _whitened(columns / spread[..., None], recursion, filter_)
+        innovations = _innovations((remaining / spread)[..., None], recursion, filter_)
+        spread = spread * innovations.reshape(-1, 6).std(axis=0)
+        known = _innovations(nuisances / spread[..., None], recursion, filter_)
     left, sizes, _ = np.linalg.svd(known, full_matrices=False)
-    rms = np.sqrt((left_over[..., 0] ** 2).mean(axis=0))
-    empty = Evidence(
-        filter_, flat[:, 0], rms, spread, recursion, left, 1 - 1 / np.sqrt(1 + sizes**2)
-    )
-    white = empty._decorrelated(flat)[:, 0]
-    return Evidence(
-        filter_,
-        np.clip(white, -_CLIP, _CLIP),
-        rms,
-        spread,
-        recursion,
-        left,
-        empty._shrink,
-    )
+    return Whitening(filter_, spread, recursion, left, 1 - 1 / np.sqrt(1 + sizes**2))
 
 
 def _course(residual: np.ndarray, level: np.ndarray) -> np.ndarray:
@@ -145,7 +135,7 @@ def _recursion(series: np.ndarray, spans: tuple[tuple[int, int], ...]) -> np.nda
     return solve_toeplitz(lags[:-1], lags[1:])
 
 
-def _whitened(columns: np.ndarray, recursion: np.ndarray, filter_: Filter) -> np.ndarray:
+def _innovations(columns: np.ndarray, recursion: np.ndarray, filter_: Filter) -> np.ndarray:
     """(6 n, k) innovations of (n, 6, k); a span's first samples stay as they are."""
     out = columns.copy()
     for start, stop in filter_.spans:

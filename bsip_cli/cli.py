@@ -136,8 +136,22 @@ def _effect_options(command: Any) -> Any:
     type=click.FloatRange(5, 1200),
     help="Length of the identification sequence [s].",
 )
+@click.option(
+    "--task",
+    "tasks",
+    multiple=True,
+    metavar="TASK",
+    help="Only recordings of this task (may be repeated); the others stay what they would be.",
+)
+@click.option(
+    "--run",
+    default=1,
+    show_default=True,
+    type=click.IntRange(1),
+    help="Number of the recordings: the same people move once more.",
+)
 @_effect_options
-def simulate(study, preset, participants, seed, sequence_s, **effects):
+def simulate(study, preset, participants, seed, sequence_s, tasks, run, **effects):
     """Make a study of simulated people whose inertial parameters are known.
 
     With --effect, something is hidden in the recordings that a simulation would get wrong; the
@@ -145,7 +159,7 @@ def simulate(study, preset, participants, seed, sequence_s, **effects):
     """
     from bsip_cli.simulate.command import simulate_command
 
-    simulate_command(study, preset, participants, seed, sequence_s, **effects)
+    simulate_command(study, preset, participants, seed, sequence_s, tasks=tasks, run=run, **effects)
 
 
 @cli.command()

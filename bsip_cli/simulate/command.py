@@ -30,6 +30,8 @@ def simulate_command(
     sizes: Sequence[float] = (),
     targets: Sequence[str] = (),
     effect_tasks: Sequence[str] = (),
+    tasks: Sequence[str] = (),
+    run: int = 1,
 ) -> None:
     """Write a simulated study into a new or empty folder."""
     if study.exists() and any(study.iterdir()):
@@ -43,8 +45,10 @@ def simulate_command(
         options = replace(options, seed=seed)
     if sequence_s is not None:
         options = replace(options, durations_s={**options.durations_s, "sequence": sequence_s})
+    if tasks:
+        options = replace(options, tasks=tuple(tasks))
     asked = pair_up(effects, sizes, targets)
-    options = replace(options, effects=asked, effect_tasks=tuple(effect_tasks))
+    options = replace(options, run=run, effects=asked, effect_tasks=tuple(effect_tasks))
     simulate_study(study, options)
     click.echo(f"bsip simulate: {options.participants} people in {study}", err=True)
 

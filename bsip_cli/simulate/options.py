@@ -111,6 +111,7 @@ class StudyOptions:
     rates : by task name; "default" serves the others.
     ball_mass_kg : range from which the thrown ball's mass is drawn.
     sexes : one letter per participant, or empty to draw them alternately.
+    run : number of the recordings; each draws its own movement of the same person.
     effects : hidden in the recordings. effect_tasks : in these tasks only; empty: wherever
         each effect usually is.
     """
@@ -124,6 +125,7 @@ class StudyOptions:
     laboratory: Laboratory = field(default_factory=Laboratory)
     ball_mass_kg: tuple[float, float] = (0.15, 0.40)
     sexes: str = ""
+    run: int = 1
     effects: tuple[Asked, ...] = ()
     effect_tasks: tuple[str, ...] = ()
 

@@ -70,8 +70,9 @@ def generator(options: StudyOptions, number: int, use: int, task: str = "") -> n
 
 
 def seed_of(options: StudyOptions, number: int, use: int, task: str = "") -> list[int]:
-    """The seed sequence behind `generator`."""
-    return [options.seed, number, use, TASK_STREAMS.index(task)]
+    """The seed sequence behind `generator`; person and laboratory are the same in all runs."""
+    seed = [options.seed, number, use, TASK_STREAMS.index(task)]
+    return seed if options.run == 1 or use in (PERSON, LABORATORY) else [*seed, options.run]
 
 
 def participant_person(options: StudyOptions, number: int) -> Person:
@@ -94,7 +95,7 @@ def simulate_participant(folder: Path, options: StudyOptions, number: int) -> Pa
     (folder / name).mkdir(parents=True, exist_ok=True)
     trials = {}
     for task in options.tasks:
-        stem = f"{name}_task-{task}" + ("" if task == "static" else "_run-1")
+        stem = f"{name}_task-{task}" + ("" if task == "static" else f"_run-{options.run}")
         active = [e for e in effects if touches(e, task, options.effect_tasks)]
         trial = simulate_trial(
             person,

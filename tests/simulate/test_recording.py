@@ -126,6 +126,32 @@ def test_same_seed_same_bytes(tmp_path):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
 
 
+def test_another_run_is_another_movement_of_the_same_person(tmp_path):
+    tasks, seconds = ("static", "squat"), {"static": 0.5, "squat": 2.0}
+    options = StudyOptions(participants=1, tasks=tasks, durations_s=seconds)
+    simulate_study(tmp_path / "a", options)
+    simulate_study(tmp_path / "b", replace(options, tasks=("squat",)))
+    simulate_study(tmp_path / "c", replace(options, tasks=("squat",), run=2))
+    first, alone, again = (
+        tmp_path / study / "sub-01" / f"sub-01_task-squat_run-{run}.c3d"
+        for study, run in (("a", 1), ("b", 1), ("c", 2))
+    )
+    assert first.read_bytes() == alone.read_bytes()
+    assert first.read_bytes() != again.read_bytes()
+    people, tables = zip(
+        *(
+            (
+                json.loads((tmp_path / study / "truth" / "sub-01_truth.json").read_text()),
+                (tmp_path / study / "participants.tsv").read_text(),
+            )
+            for study in "abc"
+        ),
+        strict=True,
+    )
+    assert people[0]["person"] == people[1]["person"] == people[2]["person"]
+    assert len(set(tables)) == 1
+
+
 def test_study_layout_and_truth(tmp_path):
     options = StudyOptions(
         participants=2, tasks=("static", "throwing"), durations_s={"static": 0.5, "throwing": 1.6}

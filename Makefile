@@ -1,11 +1,13 @@
 # make sample   set up, run the whole pipeline on sample_data, print the tables
 # make test     set up, check the code's form, run all tests
+# make blind    hide effects in recordings and see whether `bsip diagnose` finds them (hours)
 # make cohort   simulate twelve people with 120 s sequences and run them
 PYTHON ?= python3
 JOBS ?= 2
+DRAWS ?= 10
 BIN := .venv/bin
 
-.PHONY: sample test cohort check clean
+.PHONY: sample test blind cohort check clean
 
 sample: .venv/ready
 	$(BIN)/bsip run sample_data --out out/sample --jobs $(JOBS)
@@ -13,6 +15,9 @@ sample: .venv/ready
 
 test: check
 	$(BIN)/pytest -n $(JOBS) --dist loadfile
+
+blind: .venv/ready
+	$(BIN)/python tests/blind/blind_long.py --jobs $(JOBS) --draws $(DRAWS)
 
 check: .venv/ready
 	$(BIN)/ruff check .

@@ -1,0 +1,219 @@
+"""What is hidden where: cases drawn from a seed, and the sessions that hold them.
+
+Only names, sizes and places of the simulator stand here. Sizes are in the effects' units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+SESSION = "session"  # the effect is in every recording of the person
+NOTHING = "none"
+SESSION_TASKS = ("static", "sequence", "squat", "hops", "stepon")
+HOST_TASKS = ("static", "sequence", "squat")
+TRIALS_PER_HOST = 5
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """One effect as `bsip simulate` takes it. target : as on the command line, - for drawn."""
+
+    effect: str
+    size: float
+    target: str = "-"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One question to the diagnosis.
+
+    kind : null, single, double or outside. place : SESSION, or the task of the one trial that
+    holds the effects.
+    """
+
+    name: str
+    kind: str
+    place: str
+    hidden: tuple[Hidden, ...] = ()
+
+
+@dataclass(frozen=True)
+class Session:
+    """One person and day: either one case in all recordings, or a case in each of some trials.
+
+    In the second, static, sequence and one squat are clean.
+    """
+
+    name: str
+    seed: int
+    sequence_s: float
+    cases: tuple[Case, ...]
+
+    @property
+    def whole(self) -> Case | None:
+        """The case that all recordings share, if there is one."""
+        return self.cases[0] if self.cases[0].place == SESSION else None
+
+
+@dataclass(frozen=True)
+class Range:
+    """Sizes that labs meet, where the effect may sit, and where it is hidden, in turn."""
+
+    least: float
+    most: float
+    targets: tuple[str, ...]
+    places: tuple[str, ...]
+    signed: bool = False
+
+
+HANDS = ("hand_l", "hand_r")
+BODY = (*HANDS, "forearm_l", "forearm_r", "upper_torso", "lower_torso", "thigh_l", "thigh_r")
+HEAVY = ("lower_torso", "upper_torso", "head", "thigh_l", "thigh_r", "shank_l", "shank_r")
+JOINTS = ("hip_l", "hip_r", "knee_l", "knee_r", "shoulder_l", "shoulder_r", "ankle_l", "elbow_r")
+MARKERS = ("RASIS", "LPSIS", "C7", "T10", "LAC", "RELB", "LKNEL", "RKNEM", "LMALL", "RMT2")
+PAIRS = ("RWRR+RWRU", "LWRR+LWRU", "RKNEL+RKNEM", "LMALL+LMALM", "RMALL+RMALM")
+
+CATALOGUE: dict[str, Range] = {
+    "sync_offset": Range(0.005, 0.02, ("-",), (SESSION, "squat", SESSION, "hops"), True),
+    "clock_drift": Range(2e-4, 5e-4, ("-",), (SESSION,), True),
+    "plate_translation": Range(0.01, 0.03, ("-",), (SESSION, "squat")),
+    "plate_rotation": Range(0.0175, 0.07, ("yaw",), (SESSION, "squat"), True),
+    "plate_gain": Range(0.02, 0.05, ("fz",), (SESSION, "stepon", SESSION, "hops"), True),
+    "plate_crosstalk": Range(0.01, 0.03, ("fz:fx", "fz:fy"), (SESSION, "squat"), True),
+    "plate_zero": Range(8.0, 25.0, ("fz", "fx", "fy"), (SESSION, "squat"), True),
+    "plate_drift": Range(1.0, 2.0, ("fz", "fx", "fy"), ("squat",), True),
+    "gravity_tilt": Range(0.009, 0.035, ("-",), (SESSION, "squat")),
+    "added_mass": Range(0.5, 1.5, BODY, ("squat", "hops", "stepon")),
+    "released_object": Range(0.3, 0.7, HANDS, ("squat",)),
+    "wobbling_mass": Range(3.0, 4.5, ("thigh_l", "thigh_r", "upper_torso"), ("hops", SESSION)),
+    "breathing": Range(0.05, 0.3, ("-",), (SESSION,)),
+    "unmeasured_contact": Range(20.0, 40.0, HANDS, ("squat", "stepon")),
+    "joint_centre": Range(0.015, 0.04, JOINTS, (SESSION,)),
+    "missing_joint": Range(0.2, 0.6, ("spine",), (SESSION, "squat")),
+    "marker_shift": Range(0.02, 0.04, MARKERS, ("squat", "stepon")),
+    "marker_swap": Range(0.5, 2.0, PAIRS, ("squat", "stepon")),
+    "over_smoothing": Range(2.0, 5.0, ("-",), (SESSION, "hops", SESSION, "squat")),
+    "segment_inertia": Range(0.3, 0.6, HEAVY, (SESSION,), True),
+}
+OUTSIDE: dict[str, Range] = {
+    "outside_belt_vibration": Range(15.0, 40.0, ("-",), (SESSION, "squat")),
+    "outside_plate_hysteresis": Range(5.0, 15.0, ("-",), (SESSION, "squat")),
+    "outside_plate_saturation": Range(0.03, 0.1, ("-",), (SESSION, "hops")),
+    "outside_repeated_frames": Range(0.1, 0.3, ("-",), (SESSION, "squat")),
+    "outside_elastic_tether": Range(50.0, 200.0, ("-",), (SESSION, "squat")),
+}
+# Two of these at once can be told apart in any trial that holds both.
+DOUBLES: tuple[tuple[str, str], ...] = (
+    ("sync_offset", "plate_translation"),
+    ("plate_rotation", "unmeasured_contact"),
+    ("sync_offset", "released_object"),
+    ("plate_crosstalk", "marker_shift"),
+    ("gravity_tilt", "sync_offset"),
+    ("plate_translation", "added_mass"),
+    ("over_smoothing", "plate_translation"),
+    ("plate_drift", "unmeasured_contact"),
+    ("sync_offset", "plate_rotation"),
+    ("missing_joint", "plate_translation"),
+)
+
+
+def draws(ranges: dict[str, Range], each: int, seed: int, kind: str) -> Iterator[Case]:
+    """``each`` cases of every effect, sizes spread evenly over its range."""
+    for number, (effect, allowed) in enumerate(ranges.items()):
+        rng = np.random.default_rng([seed, number, len(ranges)])
+        strata = rng.permutation(each)
+        for k in range(each):
+            place = allowed.places[k % len(allowed.places)]
+            share = (strata[k] + rng.uniform()) / each
+            yield Case(f"{effect}-{k + 1:02d}", kind, place, (one(effect, allowed, share, rng),))
+
+
+def one(effect: str, allowed: Range, share: float, rng: np.random.Generator) -> Hidden:
+    """An effect whose size is the part ``share`` of its range."""
+    size = allowed.least + share * (allowed.most - allowed.least)
+    sign = float(rng.choice([-1.0, 1.0])) if allowed.signed else 1.0
+    return Hidden(effect, float(f"{sign * size:.4g}"), str(rng.choice(allowed.targets)))
+
+
+def doubles(count: int, seed: int) -> Iterator[Case]:
+    """Two effects at once, in turn in a whole session and in a squat."""
+    rng = np.random.default_rng([seed, 2])
+    for k in range(count):
+        pair = DOUBLES[k % len(DOUBLES)]
+        place = "squat" if (k + k // len(DOUBLES)) % 2 else SESSION
+        hidden = tuple(one(name, CATALOGUE[name], rng.uniform(), rng) for name in pair)
+        yield Case(f"double-{k + 1:02d}", "double", place, hidden)
+
+
+def nulls(count: int) -> list[Case]:
+    return [Case(f"null-{k + 1:02d}", "null", SESSION) for k in range(count)]
+
+
+def sessions_of(cases: Sequence[Case], seed: int, sequence_s: float) -> list[Session]:
+    """Each case of a whole session with a person of its own, the others five to a person."""
+    rng = np.random.default_rng([seed, 3])
+    whole = [(case,) for case in cases if case.place == SESSION]
+    single = [case for case in cases if case.place != SESSION]
+    single = [single[k] for k in rng.permutation(len(single))]
+    starts = range(0, len(single), TRIALS_PER_HOST)
+    hosts = [tuple(single[k : k + TRIALS_PER_HOST]) for k in starts]
+    groups = whole + hosts
+    groups = [groups[k] for k in rng.permutation(len(groups))]
+    seeds = rng.choice(1_000_000, len(groups), replace=False)
+    return [
+        Session(f"session-{k + 1:03d}", int(seeds[k]), sequence_s, group)
+        for k, group in enumerate(groups)
+    ]
+
+
+def long_suite(each: int, null_count: int, others: int, seed: int) -> list[Session]:
+    """All of it: effects, nulls, doubles and what the catalogue lacks."""
+    cases = [
+        *draws(CATALOGUE, each, seed, "single"),
+        *nulls(null_count),
+        *doubles(others, seed),
+        *draws(OUTSIDE, -(-others // len(OUTSIDE)), seed, "outside"),
+    ]
+    return sessions_of(cases, seed, sequence_s=60.0)
+
+
+EASY_PLACES = {
+    "sync_offset": SESSION,
+    "plate_translation": SESSION,
+    "plate_rotation": "squat",
+    "plate_gain": "stepon",
+    "plate_crosstalk": "squat",
+    "plate_zero": "squat",
+    "gravity_tilt": "squat",
+    "added_mass": "squat",
+    "wobbling_mass": "hops",
+    "unmeasured_contact": "squat",
+    "missing_joint": "squat",
+    "marker_shift": "squat",
+    "marker_swap": "squat",
+    "over_smoothing": "squat",
+}
+
+
+def short_suite(seed: int) -> list[Session]:
+    """One easy case of every effect, three nulls, two doubles, two outside the catalogue."""
+    rng = np.random.default_rng([seed, 4])
+    easy = {"over_smoothing": 0.0}  # a lower cut-off takes more
+    cases = [
+        Case(
+            f"{name}-01",
+            "single",
+            EASY_PLACES.get(name, allowed.places[0]),
+            (one(name, allowed, easy.get(name, 1.0), rng),),
+        )
+        for name, allowed in CATALOGUE.items()
+    ]
+    for k, place in enumerate((SESSION, "squat")):
+        hidden = tuple(one(name, CATALOGUE[name], 1.0, rng) for name in DOUBLES[k])
+        cases.append(Case(f"double-{k + 1:02d}", "double", place, hidden))
+    for name in ("outside_belt_vibration", "outside_elastic_tether"):
+        cases.append(Case(f"{name}-01", "outside", "squat", (one(name, OUTSIDE[name], 1.0, rng),)))
+    return sessions_of([*cases, *nulls(3)], seed, sequence_s=30.0)

@@ -1,0 +1,125 @@
+"""The long blind suite: hide, diagnose, compare, and write the tables into the documentation.
+
+Run from the checkout (``make blind``). One result file per case; what is there is not done again,
+so an interrupted run goes on. Remove the folder of results to judge another version of bsip.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+from blind_batch import Batch, run_batch
+from blind_cases import Case, Session, long_suite
+from blind_running import ROOT, STAGES
+from blind_scoring import Score
+from blind_tables import document, scores_frame
+from tqdm import tqdm
+
+DOCUMENT = ROOT / "docs" / "blind_suite.md"
+BEGIN, END = "<!-- made by tests/blind/blind_long.py: begin -->", "<!-- end -->"
+BATCH = 8  # people of one study; an interruption loses at most their work
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    options = parsed(arguments)
+    sessions = long_suite(options.draws, options.nulls, options.others, options.seed)
+    settings = {name: getattr(options, name) for name in ("draws", "nulls", "others", "seed")}
+    keep_settings(options.results, settings)
+    stages = STAGES if options.without_extend else (*STAGES, "extend")
+    if not options.only_tables:
+        run_missing(sessions, options.results, stages, options.jobs, options.keep)
+    write_tables(options.results, settings, options.document)
+
+
+def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    add = parser.add_argument
+    add("--results", type=Path, default=ROOT / "out" / "blind", help="folder of results")
+    add("--document", type=Path, default=DOCUMENT, help="Markdown file that gets the tables")
+    add("--draws", type=int, default=10, help="cases per effect of the catalogue")
+    add("--nulls", type=int, default=40, help="people with nothing hidden")
+    add("--others", type=int, default=20, help="cases of two effects, and outside the catalogue")
+    add("--seed", type=int, default=2027, help="draws effects, sizes, places and people")
+    add("--jobs", type=int, default=2, help="processes at once")
+    add("--keep", action="store_true", help="keep recordings and artifacts")
+    add("--without-extend", action="store_true", help="no gains on held-out data")
+    add("--only-tables", action="store_true", help="write the tables of the results that exist")
+    return parser.parse_args(arguments)
+
+
+def keep_settings(results: Path, settings: dict[str, int]) -> None:
+    """Results of other settings belong to other cases of the same names."""
+    path = results / "settings.json"
+    if not path.exists():
+        write_atomically(path, json.dumps(settings))
+    elif json.loads(path.read_text()) != settings:
+        raise SystemExit(f"{results} holds results of {path.read_text()}; name another --results")
+
+
+def run_missing(
+    sessions: Sequence[Session], results: Path, stages: Sequence[str], jobs: int, keep: bool
+) -> None:
+    """Batches of sessions of which some case has no result yet."""
+    missing = [s for s in sessions if any(not path_of(results, c).exists() for c in s.cases)]
+    with tqdm(total=len(sessions), initial=len(sessions) - len(missing), unit="session") as bar:
+        for start in range(0, len(missing), BATCH):
+            batch = missing[start : start + BATCH]
+            folder = results / f"batch-{batch[0].name}"
+            shutil.rmtree(folder, ignore_errors=True)  # of a run that was interrupted
+            done = run_batch(batch, folder, stages, jobs)
+            for problem in done.problems:
+                tqdm.write(problem)
+            write_results(results, batch, done)
+            if not keep:
+                shutil.rmtree(folder)
+            bar.update(len(batch))
+
+
+def path_of(results: Path, case: Case | Score) -> Path:
+    name = case.name if isinstance(case, Case) else case.case
+    return results / "cases" / f"{name}.json"
+
+
+def write_results(results: Path, sessions: Sequence[Session], done: Batch) -> None:
+    """A file per case with its scores; a failed batch says in each which problems it had."""
+    trials = sum(len(session.cases) for session in sessions)
+    common = {
+        "cpu_s_recording": done.cpu_s[0] / trials,
+        "cpu_s_stages": done.cpu_s[1] / trials,
+        "problems": list(done.problems),
+    }
+    for case in dict.fromkeys(one.case for one in done.scores):
+        scores = [one for one in done.scores if one.case == case]
+        record = {"scores": [one.as_record() for one in scores], **common}
+        write_atomically(path_of(results, scores[0]), json.dumps(record, indent=1))
+
+
+def write_atomically(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    partial.write_text(text + "\n", encoding="utf-8")
+    partial.replace(path)
+
+
+def write_tables(results: Path, settings: dict[str, int], target: Path) -> None:
+    """Put the tables of all results between the marks of the document."""
+    records = [json.loads(path.read_text()) for path in sorted(results.glob("cases/*.json"))]
+    if not records:
+        raise SystemExit(f"no results in {results}")
+    scores = scores_frame([score for record in records for score in record["scores"]])
+    spent = sum(record["cpu_s_recording"] + record["cpu_s_stages"] for record in records)
+    asked = ", ".join(f"{name} {value}" for name, value in settings.items())
+    head = f"{len(records)} results ({asked}), {spent:.0f} CPU-s in all.\n\n"
+    before, rest = target.read_text(encoding="utf-8").split(BEGIN)
+    _, after = rest.split(END)
+    written = f"{before}{BEGIN}\n\n{head}{document(scores)}\n{END}{after}"
+    write_atomically(target, written.rstrip("\n"))
+
+
+if __name__ == "__main__":
+    main()

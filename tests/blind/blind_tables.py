@@ -1,0 +1,263 @@
+"""What all answers together say, as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+
+import numpy as np
+import pandas as pd
+from blind_cases import NOTHING
+from blind_scoring import (
+    FOUND,
+    MISSED,
+    RIGHT_CLASS,
+    RIGHT_NAME,
+    SILENT,
+    UNEXPLAINED,
+    VERDICTS,
+    WRONG_NAME,
+    Estimate,
+)
+
+Z95 = 1.96
+HIDDEN_KINDS = ("single", "double", "outside")
+ESTIMATED = [field.name for field in fields(Estimate)]
+
+
+def scores_frame(records: Sequence[dict]) -> pd.DataFrame:
+    """One row per hidden effect or null, as `Score.as_record` has them."""
+    return pd.DataFrame(list(records))
+
+
+def estimates_frame(scores: pd.DataFrame) -> pd.DataFrame:
+    """One row per estimated parameter of a found effect."""
+    rows = [
+        {"effect": score.effect, "kind": score.kind, "size": abs(score.size), **estimate}
+        for score in scores.itertuples()
+        for estimate in score.estimates
+    ]
+    columns = ["effect", "kind", "size", *ESTIMATED]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def verdicts(scores: pd.DataFrame) -> pd.DataFrame:
+    """How often each verdict, per hidden effect of the catalogue hidden alone."""
+    single = scores[scores["kind"] == "single"]
+    table = pd.crosstab(single["effect"], single["verdict"])
+    table = table.reindex(columns=[v for v in VERDICTS if v in table], fill_value=0)
+    groups = single.groupby("effect")
+    table.insert(0, "cases", groups.size())
+    table["target right"] = groups["target_right"].apply(_part_true)
+    table["wrong names beside"] = groups["wrong"].apply(lambda all_: sum(map(bool, all_)))
+    return _with_total(table)
+
+
+def elsewhere(scores: pd.DataFrame) -> pd.DataFrame:
+    """Found effects that are said to sit where they do not."""
+    wrong = scores[scores["target_right"].eq(False)]
+    said = wrong["targets"].apply(", ".join)
+    return pd.DataFrame({"effect": wrong["effect"], "hidden at": wrong["target"], "said at": said})
+
+
+def confusion(scores: pd.DataFrame) -> pd.DataFrame:
+    """Rows: what is hidden, alone; columns: what the answer is."""
+    alone = scores[scores["kind"].isin(["null", "single", "outside"])]
+    says = alone["says"].where(alone["says"] != "", "no answer")
+    return pd.crosstab(alone["effect"], says.rename("answer"))
+
+
+def detection(scores: pd.DataFrame, parts: int = 3) -> pd.DataFrame:
+    """Found (name or class) of all, in as many parts of the sizes with equal counts."""
+    single = scores[scores["kind"] == "single"]
+    rows = []
+    for effect, group in single.groupby("effect"):
+        ordered = group.assign(size=group["size"].abs()).sort_values("size")
+        for part in np.array_split(np.arange(len(ordered)), parts):
+            chosen = ordered.iloc[part]
+            if len(chosen):
+                found = chosen["verdict"].isin(FOUND)
+                least, most = chosen["size"].min(), chosen["size"].max()
+                sizes = f"{least:.3g} to {most:.3g} {chosen['unit'].iloc[0]}"
+                count = f"{found.sum()} of {len(chosen)}"
+                noticed = (~chosen["verdict"].isin([MISSED, SILENT])).sum()
+                rows.append(
+                    {
+                        "effect": effect,
+                        "size": sizes,
+                        "found": count,
+                        "noticed": f"{noticed} of {len(chosen)}",
+                    }
+                )
+    return pd.DataFrame(rows)
+
+
+def by_place(scores: pd.DataFrame) -> pd.DataFrame:
+    """Found of all, where the effect is in the whole session or in one trial of a kind."""
+    single = scores[scores["kind"] == "single"]
+    found = single.assign(found=single["verdict"].isin(FOUND))
+    counts = found.groupby(["effect", "place"])["found"].agg(["sum", "size"])
+    counts["text"] = counts["sum"].astype(str) + " of " + counts["size"].astype(str)
+    return counts["text"].unstack().fillna("")
+
+
+def false_alarms(scores: pd.DataFrame) -> pd.DataFrame:
+    """Recordings with nothing hidden, and in how many of them something is named."""
+    quiet = scores[scores["effect"] == NOTHING]
+    rows = []
+    for kind, group in quiet.groupby("kind"):
+        alarms = (group["verdict"] != RIGHT_NAME).sum()
+        low, high = wilson(int(alarms), len(group))
+        certain = (group["verdict"] == WRONG_NAME).sum()
+        what = sorted({wrong for case in group["wrong"] for wrong in case})
+        rows.append(
+            {
+                "nothing hidden in": "a whole session" if kind == "null" else "one trial",
+                "cases": len(group),
+                "alarms": alarms,
+                "of which named": certain,
+                "alarm rate": f"{alarms / len(group):.1%} ({low:.1%} to {high:.1%})",
+                "what": ", ".join(what),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def beyond(scores: pd.DataFrame) -> pd.DataFrame:
+    """What the catalogue lacks: `unexplained` is right, a name the worst answer."""
+    outside = scores[scores["kind"] == "outside"]
+    names = {RIGHT_NAME: UNEXPLAINED, MISSED: "none"}
+    table = pd.crosstab(outside["effect"], outside["verdict"].replace(names))
+    return _with_total(table)
+
+
+def pairs(scores: pd.DataFrame) -> pd.DataFrame:
+    """Two effects at once: how many of the two are found, and cases with a wrong name."""
+    double = scores[scores["kind"] == "double"]
+    cases = double.groupby("case")
+    found = cases["verdict"].apply(lambda v: int(v.isin(FOUND).sum()))
+    wrong = cases["wrong"].apply(lambda all_: bool(all_.iloc[0]))
+    effects = cases["effect"].apply(" and ".join)
+    table = pd.DataFrame({"hidden": effects, "found": found, "wrong": wrong})
+    groups = table.groupby("hidden")
+    return pd.DataFrame(
+        {
+            "cases": groups.size(),
+            "both": groups["found"].apply(lambda n: int((n == 2).sum())),
+            "one": groups["found"].apply(lambda n: int((n == 1).sum())),
+            "none": groups["found"].apply(lambda n: int((n == 0).sum())),
+            "a wrong name": groups["wrong"].sum(),
+        }
+    )
+
+
+def accuracy(estimates: pd.DataFrame) -> pd.DataFrame:
+    """Bias and spread of what is found beside its size, and how often the interval holds it."""
+    rows = []
+    for (effect, parameter), group in estimates.groupby(["effect", "parameter"], sort=False):
+        error = group["estimate"] - group["truth"]
+        stated = group.dropna(subset=["ci_low", "ci_high"])
+        inside = (stated["ci_low"] <= stated["truth"]) & (stated["truth"] <= stated["ci_high"])
+        rows.append(
+            {
+                "effect": effect,
+                "parameter": parameter,
+                "unit": group["unit"].iloc[0],
+                "found": len(group),
+                "median size": group["truth"].abs().median(),
+                "bias": error.mean(),
+                "spread": error.std(ddof=1) if len(error) > 1 else np.nan,
+                "median error": error.abs().median(),
+                "95 % CI holds it": f"{inside.sum()} of {len(stated)}",
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def coverage(estimates: pd.DataFrame) -> str:
+    """One sentence over all parameters with an interval."""
+    stated = estimates.dropna(subset=["ci_low", "ci_high"])
+    inside = (stated["ci_low"] <= stated["truth"]) & (stated["truth"] <= stated["ci_high"])
+    if stated.empty:
+        return "No estimate has an interval."
+    low, high = wilson(int(inside.sum()), len(stated))
+    return (
+        f"{inside.sum()} of {len(stated)} stated 95 % intervals hold the truth "
+        f"({inside.mean():.1%}; {low:.1%} to {high:.1%})."
+    )
+
+
+def gains(scores: pd.DataFrame) -> pd.DataFrame:
+    """Median share of the error that the found effects take away [%]."""
+    found = scores[scores["kind"].isin(HIDDEN_KINDS) & scores["verdict"].isin(FOUND)]
+    columns = ["gain_percent", "held_out_gain_percent"]
+    numbers = found[["effect", *columns]].astype(dict.fromkeys(columns, float))
+    table = numbers.groupby("effect")[columns].median()
+    table.columns = ["gain in the diagnosis [%]", "gain of `extend` [%]"]
+    table.insert(0, "found", numbers.groupby("effect").size())
+    return table
+
+
+def wilson(count: int, total: int) -> tuple[float, float]:
+    """95 % interval of a share (Wilson's score interval)."""
+    share, per = count / total, Z95**2 / total
+    middle = (share + per / 2) / (1 + per)
+    half = Z95 * np.sqrt(share * (1 - share) / total + per / (4 * total)) / (1 + per)
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def markdown(table: pd.DataFrame) -> str:
+    """A table with its index as the first column where that has a name."""
+    flat = table.reset_index() if table.index.name else table
+    head = [str(name) for name in flat.columns]
+    lines = ["| " + " | ".join(head) + " |", "| " + " | ".join("---" for _ in head) + " |"]
+    for row in flat.itertuples(index=False):
+        lines.append("| " + " | ".join(_cell(value) for value in row) + " |")
+    return "\n".join(lines)
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return "" if np.isnan(value) else f"{value:.3g}"
+    return str(value)
+
+
+def _part_true(values: pd.Series) -> str:
+    known = values.dropna()
+    return f"{int(known.sum())} of {len(known)}" if len(known) else ""
+
+
+def _with_total(table: pd.DataFrame) -> pd.DataFrame:
+    numbers = table.select_dtypes("number")
+    total = numbers.sum().reindex(table.columns).to_frame("all").T
+    total[numbers.columns] = total[numbers.columns].astype(int)
+    joined = pd.concat([table, total]).fillna("")
+    joined.index.name = "hidden"
+    return joined
+
+
+def document(scores: pd.DataFrame) -> str:
+    """All tables with their headings."""
+    estimates = estimates_frame(scores)
+    single = scores[scores["kind"] == "single"]
+    found = single["verdict"].isin(FOUND)
+    classes = (single["verdict"] == RIGHT_CLASS).sum()
+    lead = (
+        f"Of {len(single)} effects hidden alone {found.sum()} are found ({classes} of them as a "
+        f"class), {(single['verdict'] == WRONG_NAME).sum()} get a wrong name for certain. "
+        f"{coverage(estimates)}"
+    )
+    parts = [
+        ("Effects hidden alone", verdicts(scores)),
+        ("Right effect, wrong place", elsewhere(scores)),
+        ("False alarms", false_alarms(scores)),
+        ("Outside the catalogue", beyond(scores)),
+        ("Two at once", pairs(scores)),
+        ("What is taken for what", confusion(scores)),
+        ("Detection over size", detection(scores)),
+        ("Where it is hidden", by_place(scores)),
+        ("Estimates beside the truth", accuracy(estimates)),
+        ("Gain", gains(scores)),
+    ]
+    written = [f"### {title}\n\n{markdown(table)}" for title, table in parts if len(table)]
+    return "\n\n".join([lead, *written]) + "\n"

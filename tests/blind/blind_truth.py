@@ -1,0 +1,180 @@
+"""What the diagnosis should print for what the simulator hid: the one place that maps names.
+
+The simulator speaks of channels in the plate's own axes, its z into the floor, and of seconds as
+parts of a trial; the diagnosis of forces on the body, z up, and of the file's clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+PLATE = "1"  # the simulated lab has one
+# The simulated plate's axes turned about x until z points up.
+Z_UP = {"fx": 1.0, "fy": -1.0, "fz": -1.0, "mx": 1.0, "my": -1.0, "mz": -1.0}
+ASIDE = 0.15  # horizontal part of an unmeasured contact, of its vertical part
+IN_TRIAL = ("start", "end", "release_time", "from_time")  # times on one recording's clock
+Record = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Expected:
+    """target : as the diagnosis names it. values : parameters as it prints them, in SI units."""
+
+    effect: str
+    target: str
+    values: dict[str, float]
+
+    def of_the_session(self) -> dict[str, float]:
+        """The values that are no times in one recording."""
+        return {name: x for name, x in self.values.items() if name not in IN_TRIAL}
+
+    def same_target(self, other: str) -> bool:
+        """Whether another target means the same; a pair of markers in either order."""
+        return sorted(self.target.split("+")) == sorted(other.split("+"))
+
+
+def expected(record: Record, trial: Record) -> Expected:
+    """What should be printed for one effect of the truth in one trial of the truth."""
+    effect = record["effect"]
+    if effect.startswith("outside_"):
+        return Expected("unexplained", "", {})
+    target, values = MAPPINGS[effect](record, trial)
+    return Expected(effect, target, values)
+
+
+def _sized(name: str) -> Callable[[Record, Record], tuple[str, dict[str, float]]]:
+    """An effect without place whose size is the parameter."""
+    return lambda record, trial: ("", {name: record["size"]})
+
+
+def _channel(name: str, signed: bool) -> Callable[[Record, Record], tuple[str, dict[str, float]]]:
+    def mapped(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+        sign = Z_UP[record["channel"]] if signed else 1.0
+        return f"{PLATE} {record['channel']}", {name: sign * record["size"]}
+
+    return mapped
+
+
+def _crosstalk(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    source, sink = record["source"], record["to"]
+    sign = Z_UP[source] * Z_UP[sink]
+    return f"{PLATE} {source}>{sink}", {"coefficient": sign * record["size"]}
+
+
+def _vector(names: tuple[str, ...], field: str, place: Callable[[Record], str]) -> Any:
+    return lambda record, trial: (place(record), dict(zip(names, record[field], strict=True)))
+
+
+def _gravity(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    x, y, _ = record["turn_rad"]
+    return "", {"angle": float(np.hypot(x, y)), "angle_x": x, "angle_y": y}
+
+
+def _added(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    places = zip("xyz", record["position_m"], strict=True)
+    positions = {f"position_{axis}": value for axis, value in places}
+    return record["segment"], {"mass": record["size"], **positions}
+
+
+def _released(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    begin = trial["recorded_from_s"]
+    release = record["release_s"]
+    if release is None:
+        release = record["release_share"] * (trial["duration_s"] + begin)
+    return record["segment"], {"mass": record["size"], "release_time": release - begin}
+
+
+def _wobbling(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    values = {"mass": record["size"], "frequency": record["frequency_hz"]}
+    return record["segment"], {**values, "damping_ratio": record["damping_ratio"]}
+
+
+def _breathing(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    return "upper_torso", {"amplitude": record["size"], "frequency": record["frequency_hz"]}
+
+
+def _contact(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    """The horizontal part is drawn in the walkway's axes (X ahead, Y up, Z right)."""
+    begin = trial["recorded_from_s"]
+    length = trial["duration_s"] + begin
+    start, end = (share * length - begin for share in record["window_share"])
+    heading = record["heading_rad"]
+    walkway = np.array([ASIDE * np.cos(heading), 1.0, ASIDE * np.sin(heading)])
+    force = record["size"] * np.array(trial["walkway_to_lab"]["rotation"]) @ walkway
+    parts = {f"force_{axis}": float(x) for axis, x in zip("xyz", force, strict=True)}
+    size = float(np.linalg.norm(force))
+    return record["segment"], {"start": start, "end": end, "force": size, **parts}
+
+
+def _missing_joint(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    return "upper_torso", {"flexion": trial["missing_joint_range_rad"]}
+
+
+def _shifted_marker(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    """Its direction is drawn in the frame of neighbouring markers: only its length is known."""
+    start = record["from_s"]
+    if start is None:
+        start = record["from_share"] * trial["duration_s"]
+    return record["marker"], {"shift": record["size"], "from_time": start}
+
+
+def _swapped(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    start = record["start_s"]
+    if start is None:
+        start = record["start_share"] * (trial["duration_s"] - record["size"])
+    pair = f"{record['first']}+{record['second']}"
+    return pair, {"start": start, "end": start + record["size"]}
+
+
+def _plate(record: Record) -> str:
+    return PLATE
+
+
+MAPPINGS: dict[str, Callable[[Record, Record], tuple[str, dict[str, float]]]] = {
+    "sync_offset": _sized("delay"),
+    "clock_drift": _sized("rate_error"),
+    "plate_translation": _vector(("x", "y", "z"), "shift_m", _plate),
+    "plate_rotation": _vector(("tilt_x", "tilt_y", "yaw"), "turn_rad", _plate),
+    "plate_gain": _channel("gain", signed=False),
+    "plate_crosstalk": _crosstalk,
+    "plate_zero": _channel("offset", signed=True),
+    "plate_drift": _channel("drift", signed=True),
+    "gravity_tilt": _gravity,
+    "added_mass": _added,
+    "released_object": _released,
+    "wobbling_mass": _wobbling,
+    "breathing": _breathing,
+    "unmeasured_contact": _contact,
+    "joint_centre": _vector(("shift_x", "shift_y", "shift_z"), "shift_m", lambda r: r["joint"]),
+    "missing_joint": _missing_joint,
+    "marker_shift": _shifted_marker,
+    "marker_swap": _swapped,
+    "over_smoothing": _sized("cutoff"),
+    # What share of the error a segment's table values make is not known to the simulator.
+    "segment_inertia": lambda record, trial: (record["segment"], {}),
+}
+
+
+def equivalents(record: Record, tasks: set[str]) -> set[str]:
+    """Effects that nothing in these recordings tells from the hidden one (design, section 6).
+
+    tasks : of the recordings that hold it; where somebody hops or steps onto the plate, load and
+    offset differ.
+    """
+    effect, channel = record["effect"], record.get("channel")
+    if tasks & {"hops", "stepon"}:
+        return set()
+    vertical = {"plate_gain", "plate_zero", "added_mass"}
+    if effect == "added_mass" and record["segment"].startswith(("foot", "shank")):
+        return vertical - {effect}
+    if effect in ("plate_gain", "plate_zero") and channel == "fz":
+        return vertical - {effect}
+    level = {"gravity_tilt", "plate_rotation", "plate_zero"}
+    tilted = effect == "plate_rotation" and not record["turn_rad"][2]
+    if effect == "gravity_tilt" or tilted or (effect == "plate_zero" and channel in ("fx", "fy")):
+        return level - {effect}
+    return set()

@@ -121,6 +121,13 @@ class Reconstruct(Section):
     cop_min_force_percent_bw: float = Field(gt=0, lt=100)
 
 
+class Diagnosis(Section):
+    cutoff_hz: float = Field(gt=0)
+    skin_factor: float = Field(ge=0)
+    skin_draws: int = Field(ge=1)
+    marker_sd_m: float = Field(gt=0)
+
+
 class Stats(Section):
     alpha: float = Field(gt=0, lt=1)
     equivalence_percent: float = Field(gt=0)
@@ -141,6 +148,7 @@ class Config(Section):
     prior: Prior
     identify: Identify
     reconstruct: Reconstruct
+    diagnosis: Diagnosis
     stats: Stats
 
     def options(self, names: Iterable[str]) -> dict:

@@ -230,7 +230,9 @@ def _stage_parts(stage: Stage) -> list[str]:
     ]
     parts = [f"## Stage {stage.label}", stage.summary, "\n".join(facts)]
     for kind in stage.writes:
-        parts += _schema_parts(SCHEMAS[kind], _PLACES[SCHEMAS[kind].level].format(kind=kind))
+        parts += _schema_parts(
+            SCHEMAS[kind], _PLACES[SCHEMAS[kind].level].format(kind=SCHEMAS[kind].file_name)
+        )
     return parts
 
 

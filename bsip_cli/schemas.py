@@ -26,6 +26,11 @@ class Schema:
     version: int
     meaning: str
     columns: tuple[Column, ...]
+    file: str = ""  # how its file's name ends, where another level has the same
+
+    @property
+    def file_name(self) -> str:
+        return self.file or self.kind
 
     def column(self, name: str) -> Column | None:
         """The definition that a column of this name follows, or None."""
@@ -116,6 +121,23 @@ _COMPARISON = (
         "participants in whom the first, the second method is (significantly) better",
     ),
     _text("reason", "why the test is not possible, or what to mind"),
+)
+
+_DIAGNOSIS = (
+    Column("rank", "int", "1", "order of the candidates; an effect's parameters share one"),
+    _text("effect", "name in the catalogue, none or unexplained"),
+    _text("target", "segment, plate's channel, joint or marker; empty where there is no choice"),
+    _text("parameter", "name of the number"),
+    Column("estimate", "float", "as unit", "likeliest value"),
+    _text("unit", "of estimate and interval"),
+    *_floats("ci_low ci_high", "as unit", "95 % interval"),
+    Column("p_value", "float", "1", "chance brings as much among all candidates"),
+    Column("gain_percent", "float", "%", "squared white residual that goes on held-out data"),
+    *_floats("gain_ci_low gain_ci_high", "%", "95 % interval of the gain"),
+    _text("verdict", "named, ambiguous or rejected"),
+    _text("class_id", "causes that cannot be told apart here share it"),
+    _text("sentence", "for people"),
+    _text("trials", "recordings that show it"),
 )
 
 SCHEMAS = {
@@ -446,6 +468,35 @@ SCHEMAS = {
                 Column("n_effective", "float", "1", "independent samples"),
                 _text("data", "held_out, or identification where no other data are left"),
             ),
+        ),
+        Schema(
+            "overall-diagnosis",
+            "participant",
+            1,
+            "what the simulation gets wrong in all trials of a person",
+            _DIAGNOSIS,
+            "diagnosis",
+        ),
+        Schema(
+            "detection",
+            "participant",
+            1,
+            "how small each cause might have been and still been found in these recordings",
+            (
+                _text("effect", "name in the catalogue"),
+                _text("target", "where it would sit"),
+                _text("parameter", "name of the number"),
+                _text("unit", "of the limit"),
+                Column("limit", "float", "as unit", "size that is found in 95 of 100 recordings"),
+                _text("trials", "recordings that would show it"),
+            ),
+        ),
+        Schema(
+            "diagnosis",
+            "trial",
+            1,
+            "what the simulation gets wrong in this trial",
+            _DIAGNOSIS,
         ),
         Schema(
             "correlation-difference",

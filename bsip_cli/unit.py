@@ -46,14 +46,14 @@ class Unit:
         self, kind: str, trial: Trial | None = None, participant: Participant | None = None
     ) -> Path:
         """Final path of an artifact; trial and participant default to the unit's own."""
-        level = SCHEMAS[kind].level
+        level, name = SCHEMAS[kind].level, SCHEMAS[kind].file_name
         if level == "cohort":
-            return self.out / "group" / f"group_{kind}.parquet"
+            return self.out / "group" / f"group_{name}.parquet"
         participant = participant or self.participant
         assert participant is not None
         owner = trial or self.trial if level == "trial" else None
         stem = owner.stem if owner else participant.id
-        return self.out / participant.id / f"{stem}_{kind}.parquet"
+        return self.out / participant.id / f"{stem}_{name}.parquet"
 
     def refusal_path(self, stage: str | None = None, trial: Trial | None = None) -> Path:
         """Where a refusal of this unit (or of another stage or trial) is written down."""

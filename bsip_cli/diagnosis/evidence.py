@@ -10,7 +10,7 @@ white noise of variance 1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,14 +18,15 @@ from scipy import sparse
 from scipy.linalg import solve_toeplitz
 
 from bsip_cli.dynamics.lowpass import lowpass_operator
-from bsip_cli.dynamics.regressor import move_moments
+from bsip_cli.dynamics.regressor import skew
+from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.equations import ResidualSeries
 from bsip_cli.identification.noise import noise_of
 
+ENOUGH_HZ = 50.0
 _OVERSAMPLING = 2.5
 _ORDER = 4  # of the autoregression
 _ROUNDS = 3
-_CLIP = 4.0  # standard deviations: a contact's edge must not stand for a minute of movement
 
 
 @dataclass(frozen=True)
@@ -39,33 +40,21 @@ class Filter:
 
     def __call__(self, wrench: np.ndarray) -> np.ndarray:
         """(n, 6, k) of world wrenches (N, 6, k) about the origin: moments about the reference."""
-        columns = np.moveaxis(np.nan_to_num(wrench), 2, 0)
-        moved = np.stack([move_moments(one, self.reference_m) for one in columns], axis=-1)
-        flat = self.operator @ moved.reshape(len(moved), -1)
-        return flat.reshape(len(self.frames), 6, -1)
+        known = np.nan_to_num(wrench)
+        flat = self.operator @ known.reshape(len(known), -1)
+        filtered = flat.reshape(len(self.frames), 6, -1)
+        filtered[:, 3:] -= np.einsum("xy,nyk->nxk", skew(self.reference_m), filtered[:, :3])
+        return filtered
 
 
-def filter_of(
-    valid: np.ndarray, rate_hz: float, cutoff_hz: float, reference_m: np.ndarray
-) -> Filter:
-    """Low-pass and decimation inside the valid stretches."""
-    stride = max(1, int(rate_hz / (_OVERSAMPLING * cutoff_hz)))
-    operator, frames = lowpass_operator(valid, rate_hz, cutoff_hz, stride)
+def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
+    """Low-pass and decimation inside the valid stretches, moments about where the person stands."""
+    stride = max(1, int(scene.rate_hz / (_OVERSAMPLING * cutoff_hz)))
+    operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz, stride)
     cuts = np.flatnonzero(np.diff(frames) != stride) + 1
     edges = [0, *cuts.tolist(), len(frames)]
-    return Filter(operator, frames, tuple(pairwise(edges)), reference_m)
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """White residual (6 n,) of a null, and what turns signatures into the same coordinates."""
-
-    residual: np.ndarray
-    whitening: Whitening
-
-    def white(self, signatures: np.ndarray) -> np.ndarray:
-        """(6 n, k) of world wrenches (N, 6, k)."""
-        return self.whitening.white(signatures)
+    place = np.append(scene.q[scene.valid, :2].mean(axis=0), 0.0)
+    return Filter(operator, frames, tuple(pairwise(edges)), place)
 
 
 @dataclass(frozen=True)
@@ -81,26 +70,83 @@ class Whitening:
 
     def white(self, wrenches: np.ndarray) -> np.ndarray:
         """(6 n, k) of world wrenches (N, 6, k)."""
-        filtered = self.filter(wrenches) / self.spread[..., None]
-        columns = _innovations(filtered, self.recursion, self.filter)
+        return self.of_filtered(self.filter(wrenches))
+
+    def of_filtered(self, wrenches: np.ndarray) -> np.ndarray:
+        """(6 n, k) of wrenches (n, 6, k) that have passed the filter."""
+        columns = _innovations(wrenches / self.spread[..., None], self.recursion, self.filter)
         return columns - self.left @ (self.shrink[:, None] * (self.left.T @ columns))
 
 
-def evidence_of(
-    residual: np.ndarray, nuisances: np.ndarray, noise_level: np.ndarray, filter_: Filter
-) -> Evidence:
-    """From the residual wrench (N, 6), nuisance wrenches (N, 6, m) of unit prior variance, and the
-    noise level (N,) of the accelerations."""
-    whitening = _whitening(filter_(residual[..., None]), filter_(nuisances), noise_level, filter_)
-    white = whitening.white(residual[..., None])[:, 0]
-    return Evidence(np.clip(white, -_CLIP, _CLIP), whitening)
+@dataclass(frozen=True)
+class TrialEvidence:
+    """One trial in coordinates in which its own nuisances and its noise are white.
+
+    residual (6 n,) : measured wrench less that of the parameters before the data.
+    shared (6 n, p) : what the parameters' own uncertainty, of unit variance, does to it.
+    """
+
+    name: str
+    scene: Scene
+    whitening: Whitening
+    residual: np.ndarray
+    shared: np.ndarray
+
+    def white(self, wrenches: np.ndarray) -> np.ndarray:
+        """(6 n, k) of world wrenches (N, 6, k)."""
+        return self.whitening.white(wrenches)
+
+    def rows_s(self) -> np.ndarray:
+        """(6 n,) time of every row of the white vectors [s]."""
+        return np.repeat(self.scene.times_s[self.whitening.filter.frames], 6)
+
+
+def slow(scene: Scene) -> Scene:
+    """The trial at the rate at which nuisances and signatures, smooth as they are, are computed."""
+    return scene.every(max(1, int(scene.rate_hz / ENOUGH_HZ)))
+
+
+def trial_evidence(
+    name: str,
+    scene: Scene,
+    own: np.ndarray,
+    shared: np.ndarray,
+    noise_level: np.ndarray,
+    cutoff_hz: float,
+) -> TrialEvidence:
+    """Evidence of a trial in full, with nuisances of unit variance of the ``slow`` one.
+
+    own (N', 6, m), shared (N', 6, p) : nuisances that are the trial's own, and those that it
+    shares with other trials. noise_level (N,) : of the accelerations.
+    """
+    fewer = slow(scene)
+    stride = round(scene.rate_hz / fewer.rate_hz)
+    filter_ = filter_of(fewer, cutoff_hz)
+    residual = _residual(scene, filter_, stride, cutoff_hz)
+    level = noise_level[::stride][filter_.frames]
+    whitening = _whitening(residual, filter_(own), filter_(shared), level, filter_)
+    white = whitening.of_filtered(residual)[:, 0]
+    return TrialEvidence(name, fewer, whitening, white, whitening.white(shared))
+
+
+def _residual(scene: Scene, filter_: Filter, stride: int, cutoff_hz: float) -> np.ndarray:
+    """(n, 6, 1) measured less simulated wrench, low-passed at its full rate."""
+    operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz)
+    wanted = np.searchsorted(frames, filter_.frames * stride)
+    full = replace(filter_, operator=operator[wanted])
+    return full((scene.measured - scene.predicted)[..., None])
 
 
 def _whitening(
-    left_over: np.ndarray, nuisances: np.ndarray, noise_level: np.ndarray, filter_: Filter
+    left_over: np.ndarray,
+    own: np.ndarray,
+    shared: np.ndarray,
+    level: np.ndarray,
+    filter_: Filter,
 ) -> Whitening:
-    """Noise of what the nuisances leave of the residual (n, 6, 1), and they in its coordinates."""
-    level = noise_level[filter_.frames]
+    """Noise of what all nuisances leave of the residual (n, 6, 1), and its own (n, 6, m) in the
+    coordinates of that noise."""
+    nuisances = np.concatenate([own, shared], axis=2)
     recursion = np.zeros((6, _ORDER))
     spread = _course(left_over[..., 0], level)
     known = _innovations(nuisances / spread[..., None], recursion, filter_)
@@ -114,7 +160,7 @@ def _whitening(
         innovations = _innovations((remaining / spread)[..., None], recursion, filter_)
         spread = spread * innovations.reshape(-1, 6).std(axis=0)
         known = _innovations(nuisances / spread[..., None], recursion, filter_)
-    left, sizes, _ = np.linalg.svd(known, full_matrices=False)
+    left, sizes, _ = np.linalg.svd(known[:, : own.shape[2]], full_matrices=False)
     return Whitening(filter_, spread, recursion, left, 1 - 1 / np.sqrt(1 + sizes**2))
 
 

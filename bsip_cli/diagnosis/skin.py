@@ -14,6 +14,8 @@ from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.effects.scene import Scene
 
+SKIN_HZ = 8.0
+
 
 def skin_draws(
     scene: Scene, marker_rms_m: np.ndarray, count: int, rng: np.random.Generator
@@ -25,6 +27,23 @@ def skin_draws(
     features = joint_angles(scene.person.skeleton, scene.q)
     errors = _marker_errors(scene, features, marker_rms_m, count, rng)
     return scene.response.of(scene.pose_response.of(errors))
+
+
+def skin_inertia(scene: Scene) -> np.ndarray:
+    """(N, 6, s) changes of the wrench if the skin of each segment swings on, one by one.
+
+    Skin is held elastically: where its bone is accelerated by a it stays behind by -a / w^2, with
+    w the pace at which it swings by itself. So markers overshoot slightly wherever they turn back.
+    """
+    person, give = scene.person, (2 * np.pi * SKIN_HZ) ** -2
+    columns = []
+    for segment in range(len(person.skeleton.segments)):
+        markers = [m for m, on in enumerate(person.marker_segments) if on == segment]
+        if markers:
+            behind = -give * scene.motion.acceleration_m_s2[:, segment]
+            errors = np.broadcast_to(behind[:, None, :, None], (len(behind), len(markers), 3, 1))
+            columns.append(scene.pose_response.of(errors, markers))
+    return scene.response.of(np.concatenate(columns, axis=2))
 
 
 def _marker_errors(scene, features, marker_rms_m, count, rng) -> np.ndarray:
@@ -47,7 +66,7 @@ def beside(person: Person, segment: int) -> list[int]:
 
 
 def joint_angles(skeleton: Skeleton, q: np.ndarray) -> list[np.ndarray]:
-    """Per joint (N, 1 or 3) angles against their mean [rad]; nothing for the base."""
+    """Per joint (N, 1 or 3) angles from the neutral pose [rad]; nothing for the base."""
     angles = []
     for at, kind in zip(skeleton.q_starts, skeleton.joint_types, strict=True):
         if kind == "free":
@@ -58,5 +77,5 @@ def joint_angles(skeleton: Skeleton, q: np.ndarray) -> list[np.ndarray]:
             angle = 2 * x[:, :3]
         else:
             angle = q[:, at : at + 1]
-        angles.append(angle - angle.mean(axis=0))
+        angles.append(angle)
     return angles

@@ -21,6 +21,7 @@ class AddedMass(Effect):
 
     name = "added_mass"
     of_the_lab = False
+    of_the_person = True
     remedy = "weigh the person as recorded, and record once without the load"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 from typing import ClassVar
 
 import numpy as np
 
 from bsip_cli.effects.scene import Scene
+
+DISAGREEMENT = 0.02  # of the squared residuals of the markers
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,13 @@ class Effect(ABC):
 
     name: ClassVar[str]
     of_the_lab: ClassVar[bool]  # the same in every trial of a recording session
+    of_the_person: ClassVar[bool] = False  # the same in every trial of a person
     remedy: ClassVar[str]  # what would separate it from its rivals
+
+    @property
+    def lasts(self) -> bool:
+        """Whether trials can share it, with the same numbers."""
+        return self.of_the_lab or self.of_the_person
 
     @abstractmethod
     def targets(self, scene: Scene) -> tuple[str, ...]:
@@ -49,6 +59,10 @@ class Effect(ABC):
     @abstractmethod
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         """Its numbers, in the order in which ``change`` takes them."""
+
+    def scans(self, scene: Scene, target: str) -> Iterator[tuple[float, ...]]:
+        """Values to try of the parameters that have a scan; by default every combination."""
+        return product(*(p.scan for p in self.parameters(scene, target) if p.scan))
 
     @abstractmethod
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
@@ -77,6 +91,15 @@ class Effect(ABC):
         parameters = self.parameters(scene, target)
         return all(p.least <= x <= p.most for p, x in zip(parameters, values, strict=True))
 
+    def agrees(self, scene: Scene, target: str, values: np.ndarray) -> bool:
+        """Whether the residuals of the markers allow it: they do not grow by it."""
+        if scene.residual_m is None:
+            return True
+        change = self.marker_change(scene, target, values)
+        if change is None:
+            return True
+        return explained_share(scene.residual_m, change) > -DISAGREEMENT
+
     def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """(N, 6, k) derivative of ``change`` for the k parameters without a scan.
 
@@ -92,3 +115,11 @@ class Effect(ABC):
             ahead = self.change(scene, target, values + step)
             columns.append((ahead - self.change(scene, target, values - step)) / (2 * step[k]))
         return np.stack(columns, axis=-1)
+
+
+def explained_share(residual_m: np.ndarray, change_m: np.ndarray) -> float:
+    """Part of the markers' squared residuals (N, m, 3) that a change takes away."""
+    known = np.isfinite(residual_m).all(axis=2)
+    before = float((residual_m[known] ** 2).sum())
+    after = float(((residual_m - change_m)[known] ** 2).sum())
+    return 1 - after / max(before, 1e-12)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.effect import Effect, Parameter, explained_share
 from bsip_cli.effects.marker_course import during, step, wrench_parts
 from bsip_cli.effects.scene import Scene
 
 APART_S = 0.5
 BEFORE_S = 1.0
 ABSORBED = (0.0, 0.5)
+ASTRAY_M = 0.006  # a residual that lasts, or changes its level, by this much
+OWN_SHARE = 0.3  # of the marker's own squared residual that a shift must take away
 
 
 class MarkerShift(Effect):
@@ -26,7 +28,19 @@ class MarkerShift(Effect):
     remedy = "put the marker back to its place and record the trial again"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
-        return scene.person.markers
+        """Markers whose own residual asks for it."""
+        if scene.residual_m is None:
+            return scene.person.markers
+        residual = scene.residual_m
+        return scene.once(self.name, lambda: _suspects(scene, residual))
+
+    def agrees(self, scene: Scene, target: str, values: np.ndarray) -> bool:
+        """Whether the marker's own residual follows."""
+        if scene.residual_m is None:
+            return True
+        m = scene.person.markers.index(target)
+        change = self.marker_change(scene, target, values)[:, m : m + 1]
+        return explained_share(scene.residual_m[:, m : m + 1], change) > OWN_SHARE
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         first, last = float(scene.times_s[0]), float(scene.times_s[-1])
@@ -80,6 +94,23 @@ class MarkerShift(Effect):
         m = scene.person.markers.index(target)
         at = scene.once(("level", m), lambda: _level_change(residual[:, m], scene.rate_hz))
         return (throughout,) if at is None else (throughout, float(scene.times_s[at]))
+
+
+def _suspects(scene: Scene, residual_m: np.ndarray) -> tuple[str, ...]:
+    found = []
+    for m, name in enumerate(scene.person.markers):
+        own = residual_m[:, m]
+        if not np.isfinite(own).all(axis=1).any():
+            continue
+        lasting = float(np.linalg.norm(np.nanmean(own, axis=0)))
+        at = _level_change(own, scene.rate_hz)
+        jump = 0.0
+        if at is not None:
+            after, before = np.nanmean(own[at:], axis=0), np.nanmean(own[:at], axis=0)
+            jump = float(np.linalg.norm(after - before))
+        if max(lasting, jump) > ASTRAY_M:
+            found.append(name)
+    return tuple(found)
 
 
 def _course(scene: Scene, values: np.ndarray) -> np.ndarray:

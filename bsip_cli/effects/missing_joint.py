@@ -23,6 +23,7 @@ class MissingJoint(Effect):
 
     name = "missing_joint"
     of_the_lab = False
+    of_the_person = True
     remedy = "put markers on both sides of T12/L1 and bend the trunk"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

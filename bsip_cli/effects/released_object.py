@@ -8,7 +8,7 @@ from bsip_cli.body.names import in_words
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
-STEP_S = 0.25
+STEP_S = 0.5
 
 
 class ReleasedObject(Effect):

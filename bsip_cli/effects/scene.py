@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -88,6 +88,24 @@ class Scene:
     @property
     def mass_kg(self) -> float:
         return float(self.phi[::10].sum())
+
+    def every(self, stride: int) -> Scene:
+        """The same trial at a lower rate: every ``stride``-th frame."""
+        if stride == 1:
+            return self
+        part = slice(None, None, stride)
+        plates = tuple(replace(plate, wrench=plate.wrench[part]) for plate in self.plates)
+        residual = None if self.residual_m is None else self.residual_m[part]
+        return replace(
+            self,
+            times_s=self.times_s[part],
+            q=self.q[part],
+            v=self.v[part],
+            a=self.a[part],
+            plates=plates,
+            valid=self.valid[part],
+            residual_m=residual,
+        )
 
     @cached_property
     def model(self) -> pin.Model:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from bsip_cli.body.names import in_words
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
-WINDOWS_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
+WINDOWS_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
+MOST_WINDOWS = 30  # side by side; shorter contacts are found in part of a window, and refined
 
 
 class UnmeasuredContact(Effect):
@@ -25,13 +28,21 @@ class UnmeasuredContact(Effect):
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         start, end = float(scene.times_s[0]), float(scene.times_s[-1])
-        lengths = tuple(w for w in WINDOWS_S if w <= 0.8 * (end - start))
-        middles = tuple(float(t) for t in np.arange(start, end, 0.25))
+        fitting = [w for w in WINDOWS_S if w <= 0.8 * (end - start)]
+        lengths = tuple(w for w in fitting if (end - start) / w <= MOST_WINDOWS) or (fitting[-1],)
+        middles = tuple(float(t) for t in np.arange(start, end, min(lengths) / 2))
         return (
             *(Parameter(f"force_{axis}", "N", -800.0, 800.0, 30.0) for axis in "xyz"),
             Parameter("middle", "s", start, end, 0.25, middles),
             Parameter("length", "s", 0.2, end - start, 0.5, lengths),
         )
+
+    def scans(self, scene: Scene, target: str) -> Iterator[tuple[float, ...]]:
+        """Windows that overlap by half."""
+        *_, middle, length = self.parameters(scene, target)
+        for seconds in length.scan:
+            for at in np.arange(middle.least + seconds / 2, middle.most, seconds / 2):
+                yield float(at), seconds
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         force, middle, length = values[:3], values[3], values[4]

@@ -18,6 +18,7 @@ class WobblingMass(Effect):
 
     name = "wobbling_mass"
     of_the_lab = False
+    of_the_person = True
     remedy = "hop three times, or drop on the heels"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

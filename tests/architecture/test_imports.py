@@ -119,7 +119,13 @@ def test_the_fitted_side_does_not_know_the_simulator():
 
 def test_stages_do_not_know_each_other():
     """They meet in files; two reports share their writing of files."""
-    helpers = {"stages.frames", "stages.known_loads", "stages.report"}
+    helpers = {
+        "stages.diagnosis_rows",
+        "stages.frames",
+        "stages.known_loads",
+        "stages.report",
+        "stages.trial_scene",
+    }
     pairs = {
         (name, other)
         for name in modules()

@@ -1,0 +1,46 @@
+"""How small each cause might have been and still been seen in these very recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.diagnosis.explanation import NEGLIGIBLE
+from bsip_cli.diagnosis.patterns import UNEXPLAINED
+from bsip_cli.diagnosis.selection import Selection
+from bsip_cli.diagnosis.signatures import Place, Signatures
+
+_SURE = 1.645  # standard deviations: found in 95 of 100 recordings like these
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Size of one parameter, the effect's others free, that would have been found."""
+
+    place: Place
+    parameter: str
+    unit: str
+    size: float
+
+
+def limits_of(signatures: Signatures, selection: Selection) -> Iterator[Limit]:
+    """Per effect, target and parameter, in the trials together or alone."""
+    fit, least = selection.fit, selection.rounds[-1].limit
+    scores = zip(signatures.places, signatures.information(fit.tangent), strict=True)
+    found: dict[tuple, Limit] = {}
+    for place, information in scores:
+        effect = place.candidate.effect
+        if effect.name == UNEXPLAINED:
+            continue
+        scene = signatures.evidence.trials[place.trials[0]].scene
+        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(information, hermitian=True)), 0.0))
+        for parameter, sd in zip(place.candidate.free(scene), spread, strict=True):
+            needed = max(sd * (np.sqrt(2 * least) + _SURE), NEGLIGIBLE)
+            limit = Limit(place, parameter.name, parameter.unit, needed * parameter.typical)
+            key = (effect.name, place.candidate.target, place.trials, parameter.name)
+            # Of the moments, frequencies and windows, the one where it shows best.
+            if key not in found or limit.size < found[key].size:
+                found[key] = limit
+    yield from found.values()

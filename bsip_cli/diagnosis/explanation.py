@@ -1,0 +1,195 @@
+"""Effects with their numbers, fitted together to the evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from bsip_cli.diagnosis.signatures import Place
+from bsip_cli.diagnosis.together import Evidence, clipped
+from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.scene import Scene
+
+NEGLIGIBLE = 0.25  # of the typical size
+_STEPS = 4  # of Gauss and Newton: effects are nearly linear
+_DIFFERENCE = 0.1  # of the typical size: a moment in time moves by a part of a frame at least
+_SEARCH = 60  # evaluations for a moment, a frequency or a window
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """An effect in some trials, all of its parameters in the effect's order."""
+
+    place: Place
+    values: np.ndarray
+
+    def change(self, evidence: Evidence) -> np.ndarray:
+        """(R,) white change of the simulated wrench."""
+        parts = {}
+        for t in self.place.trials:
+            one = evidence.trials[t]
+            parts[t] = one.white(self.effect.change(one.scene, self.target, self.values)[..., None])
+        return evidence.white(parts)[:, 0]
+
+    def tangent(self, evidence: Evidence) -> np.ndarray:
+        """(R, k) white derivative by the free parameters, per typical size."""
+        parts = {}
+        for t in self.place.trials:
+            one = evidence.trials[t]
+            slope = self.effect.tangent(one.scene, self.target, self.values)
+            parts[t] = one.white(slope * self.typical(evidence))
+        return evidence.white(parts)
+
+    def full_tangent(self, evidence: Evidence) -> np.ndarray:
+        """(R, K) white derivative by all parameters, those with a scan too, per typical size."""
+        sizes = self.all_typical(evidence)
+        columns = []
+        for k, size in enumerate(sizes):
+            step = np.zeros(len(sizes))
+            step[k] = _DIFFERENCE * size
+            ahead = Explanation(self.place, self.values + step).change(evidence)
+            behind = Explanation(self.place, self.values - step).change(evidence)
+            columns.append((ahead - behind) / (2 * _DIFFERENCE))
+        return np.stack(columns, axis=1)
+
+    def all_typical(self, evidence: Evidence) -> np.ndarray:
+        """(K,) typical sizes of all parameters."""
+        return np.array([p.typical for p in self.parameters(evidence)])
+
+    def all_moved(self, evidence: Evidence, step: np.ndarray) -> Explanation:
+        """With all parameters changed by ``step`` (K,) typical sizes, within their bounds."""
+        bounds = np.array([(p.least, p.most) for p in self.parameters(evidence)])
+        values = self.values + step * self.all_typical(evidence)
+        return Explanation(self.place, np.clip(values, *bounds.T))
+
+    def reported(self, evidence: Evidence) -> tuple[tuple[str, str, float], ...]:
+        """Name, unit and value of what the diagnosis prints."""
+        return self.effect.reported(self.scene(evidence), self.target, self.values)
+
+    @property
+    def effect(self) -> Effect:
+        return self.place.candidate.effect
+
+    @property
+    def target(self) -> str:
+        return self.place.candidate.target
+
+    def typical(self, evidence: Evidence) -> np.ndarray:
+        """(k,) typical sizes of the free parameters."""
+        return np.array([p.typical for p in self.parameters(evidence) if not p.scan])
+
+    def moved_freely(self, evidence: Evidence, step: np.ndarray) -> Explanation:
+        """With the free parameters changed by ``step`` (k,) typical sizes."""
+        values = self.values.copy()
+        free = [not p.scan for p in self.parameters(evidence)]
+        values[free] += step * self.typical(evidence)
+        return Explanation(self.place, values)
+
+    def moved(self, evidence: Evidence, step: np.ndarray) -> Explanation:
+        """As ``moved_freely``, within the bounds."""
+        bounds = np.array([(p.least, p.most) for p in self.parameters(evidence)])
+        values = self.moved_freely(evidence, step).values
+        return Explanation(self.place, np.clip(values, *bounds.T))
+
+    def is_negligible(self, evidence: Evidence) -> bool:
+        """Whether it is too small to matter beside what labs meet."""
+        free = np.array([not p.scan for p in self.parameters(evidence)])
+        sizes = self.values[free] / self.typical(evidence)
+        return bool(np.linalg.norm(sizes) < NEGLIGIBLE)
+
+    def is_possible(self, evidence: Evidence) -> bool:
+        """Whether it can be true of a body or a lab."""
+        return self.effect.possible(self.scene(evidence), self.target, self.values)
+
+    def agrees_with_markers(self, evidence: Evidence) -> bool:
+        """Whether the markers of all of its trials allow it."""
+        scenes = (evidence.trials[t].scene for t in self.place.trials)
+        return all(self.effect.agrees(scene, self.target, self.values) for scene in scenes)
+
+    def scene(self, evidence: Evidence) -> Scene:
+        """One of its trials."""
+        return evidence.trials[self.place.trials[0]].scene
+
+    def parameters(self, evidence: Evidence) -> tuple[Parameter, ...]:
+        return self.effect.parameters(self.scene(evidence), self.target)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Explanations fitted together: white residual that they leave (R,), and the derivative (R, K)
+    of the change by all their free parameters, one after the other [typical]."""
+
+    explanations: tuple[Explanation, ...]
+    residual: np.ndarray
+    tangent: np.ndarray
+
+    def columns(self, number: int, evidence: Evidence) -> slice:
+        """Which columns of the tangent belong to an explanation."""
+        widths = [len(e.typical(evidence)) for e in self.explanations]
+        ends = np.cumsum([0, *widths])
+        return slice(int(ends[number]), int(ends[number + 1]))
+
+
+def fit_together(evidence: Evidence, explanations: tuple[Explanation, ...]) -> Fit:
+    """Free parameters of all explanations by Gauss and Newton."""
+    found = explanations
+    for _ in range(_STEPS):
+        residual, tangent = _linear(evidence, found)
+        step = np.linalg.lstsq(tangent, residual, rcond=None)[0] if found else np.zeros(0)
+        moved, start = [], 0
+        for one in found:
+            width = len(one.typical(evidence))
+            moved.append(one.moved(evidence, step[start : start + width]))
+            start += width
+        found = tuple(moved)
+        if np.abs(step).max(initial=0.0) < 1e-3:
+            break
+    return Fit(found, *_linear(evidence, found))
+
+
+def _linear(
+    evidence: Evidence, explanations: tuple[Explanation, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    residual = evidence.residual.copy()
+    for one in explanations:
+        residual -= one.change(evidence)
+    tangents = [np.zeros((len(residual), 0)), *(one.tangent(evidence) for one in explanations)]
+    return clipped(residual), np.concatenate(tangents, axis=1)
+
+
+def refined(evidence: Evidence, one: Explanation, others: Fit) -> Explanation:
+    """The explanation with its scanned parameters moved to where it explains most."""
+    parameters = one.parameters(evidence)
+    scanned = np.array([bool(p.scan) for p in parameters])
+    if not scanned.any():
+        return one
+    scale = np.array([p.typical for p in parameters])[scanned]
+    bounds = np.array([(p.least, p.most) for p in parameters])[scanned]
+    basis, _ = np.linalg.qr(others.tangent)
+    residual = others.residual - basis @ (basis.T @ others.residual)
+
+    def left(x: np.ndarray) -> float:
+        moved = _with(one, scanned, np.clip(one.values[scanned] + x * scale, *bounds.T))
+        null = Explanation(moved.place, np.where(scanned, moved.values, 0.0))
+        tangent = null.tangent(evidence)
+        tangent = tangent - basis @ (basis.T @ tangent)
+        size = np.linalg.lstsq(tangent, residual, rcond=None)[0]
+        return float(((residual - tangent @ size) ** 2).sum())
+
+    start = np.zeros(int(scanned.sum()))
+    simplex = np.vstack([start, np.eye(len(start))])
+    found = minimize(
+        left,
+        start,
+        method="Nelder-Mead",
+        options={"initial_simplex": simplex, "maxfev": _SEARCH, "xatol": 0.02, "fatol": 0.1},
+    )
+    return _with(one, scanned, np.clip(one.values[scanned] + found.x * scale, *bounds.T))
+
+
+def _with(one: Explanation, which: np.ndarray, values: np.ndarray) -> Explanation:
+    changed = one.values.copy()
+    changed[which] = values
+    return Explanation(one.place, changed)

@@ -1,0 +1,153 @@
+"""From what the selection kept to what is said: causes, classes of causes, or none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from bsip_cli.diagnosis.explanation import Explanation
+from bsip_cli.diagnosis.intervals import drawn_explanations
+from bsip_cli.diagnosis.rivals import rivals_of
+from bsip_cli.diagnosis.selection import Selection, Tried
+from bsip_cli.diagnosis.together import Evidence
+
+Verdict = Literal["named", "ambiguous", "rejected"]
+_Z95 = 1.959964
+
+
+@dataclass(frozen=True)
+class Number:
+    """A parameter as the diagnosis prints it; NaN where no interval was computed."""
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A candidate and what is made of it.
+
+    trials : their names. class_id : of causes that cannot be told apart; empty for a single one.
+    gain : percent of the squared white residual on data held out, and its interval.
+    """
+
+    effect: str
+    target: str
+    trials: tuple[str, ...]
+    verdict: Verdict
+    class_id: str
+    p_value: float
+    gain: tuple[float, float, float]
+    numbers: tuple[Number, ...]
+    sentence: str
+
+
+def findings_of(
+    evidence: Evidence, selection: Selection, rng: np.random.Generator
+) -> tuple[Finding, ...]:
+    """All candidates that were looked at in full: those kept first, with their rivals."""
+    kept = [(one, one.kept) for one in selection.rounds if one.kept is not None]
+    said = {_key(cause.explanation) for _, cause in kept}
+    findings = []
+    for number, (one, cause) in enumerate(kept):
+        rivals = []
+        for rival in rivals_of(evidence, one):
+            if _key(rival.explanation) not in said and not _same(rival, cause):
+                rivals.append(rival)
+                said.add(_key(rival.explanation))
+        verdict: Verdict = "ambiguous" if rivals else "named"
+        class_id = chr(ord("A") + number) if rivals else ""
+        remedy = cause.explanation.effect.remedy if rivals else ""
+        for tried in (cause, *rivals):
+            findings.append(_finding(evidence, tried, verdict, class_id, remedy, rng))
+    for one in selection.rounds:
+        for tried in one.tried:
+            if _key(tried.explanation) not in said:
+                said.add(_key(tried.explanation))
+                findings.append(_rejected(evidence, tried))
+    return tuple(findings)
+
+
+def _key(one: Explanation) -> tuple:
+    return one.effect.name, one.target, one.place.trials
+
+
+def _same(one: Tried, other: Tried) -> bool:
+    """The same cause, looked at in fewer or more trials."""
+    mine, theirs = one.explanation, other.explanation
+    shared = set(mine.place.trials) & set(theirs.place.trials)
+    return (mine.effect, mine.target) == (theirs.effect, theirs.target) and bool(shared)
+
+
+def _finding(
+    evidence: Evidence,
+    tried: Tried,
+    verdict: Verdict,
+    class_id: str,
+    remedy: str,
+    rng: np.random.Generator,
+) -> Finding:
+    one = tried.explanation
+    number = len(tried.fit.explanations) - 1
+    draws = drawn_explanations(evidence, tried.fit, number, rng)
+    numbers = _numbers(evidence, one, draws)
+    sentence = one.effect.sentence(one.target, one.values) + _interval_words(numbers)
+    if verdict == "ambiguous":
+        sentence += f"; other causes look alike here: to tell them apart, {remedy}"
+    return _with(evidence, tried, verdict, class_id, numbers, sentence)
+
+
+def _rejected(evidence: Evidence, tried: Tried) -> Finding:
+    one = tried.explanation
+    numbers = tuple(Number(n, u, x, np.nan, np.nan) for n, u, x in one.reported(evidence))
+    why = (
+        f"chance brings as much in {100 * tried.p_value:.0f} % of cases"
+        if tried.p_value > 0.05
+        else "another cause explains it better"
+        if tried.is_good
+        else "on data held out it does not help"
+    )
+    sentence = f"not so: {one.effect.sentence(one.target, one.values)} ({why})"
+    return _with(evidence, tried, "rejected", "", numbers, sentence)
+
+
+def _with(evidence, tried: Tried, verdict: Verdict, class_id: str, numbers, sentence) -> Finding:
+    one, gain = tried.explanation, tried.gain
+    half = _Z95 * gain.error_percent
+    trials = tuple(evidence.trials[t].name for t in one.place.trials)
+    return Finding(
+        one.effect.name,
+        one.target,
+        trials,
+        verdict,
+        class_id,
+        tried.p_value,
+        (gain.percent, gain.percent - half, gain.percent + half),
+        numbers,
+        sentence,
+    )
+
+
+def _numbers(evidence: Evidence, one: Explanation, draws: list[Explanation]) -> tuple[Number, ...]:
+    drawn = np.array([[x[2] for x in draw.reported(evidence)] for draw in draws])
+    low, high = np.percentile(drawn, [2.5, 97.5], axis=0)
+    reported = one.reported(evidence)
+    return tuple(
+        Number(n, u, x, min(float(a), x), max(float(b), x))
+        for (n, u, x), a, b in zip(reported, low, high, strict=True)
+    )
+
+
+def _interval_words(numbers: tuple[Number, ...]) -> str:
+    """Of the surest number, with the digits that its interval deserves."""
+    first = max(numbers, key=lambda x: abs(x.value) / max(x.high - x.low, 1e-12))
+    width = max(first.high - first.low, 1e-12)
+    digits = max(0, int(np.ceil(1 - np.log10(width))))
+    unit = "" if first.unit == "1" else f" {first.unit}"
+    low, high = (f"{x:.{digits}f}" for x in (first.low, first.high))
+    return f" ({first.name.replace('_', ' ')}: 95 % interval {low} to {high}{unit})"

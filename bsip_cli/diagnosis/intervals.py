@@ -1,0 +1,54 @@
+"""How well the numbers of an explanation are known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.diagnosis.explanation import Explanation, Fit
+from bsip_cli.diagnosis.together import Evidence
+
+DRAWS = 200
+BLOCK_S = 1.0
+
+
+def drawn_explanations(
+    evidence: Evidence, fit: Fit, number: int, rng: np.random.Generator
+) -> list[Explanation]:
+    """The explanation as it might as well be: DRAWS of all parameters of all explanations.
+
+    Stretches of time are drawn with replacement and everything is fitted anew; to that is added
+    what the nuisances leave open, which is the same in every stretch.
+    """
+    tangent = np.concatenate([one.full_tangent(evidence) for one in fit.explanations], axis=1)
+    widths = [len(one.values) for one in fit.explanations]
+    ends = np.cumsum([0, *widths])
+    mine = slice(int(ends[number]), int(ends[number + 1]))
+    steps = _bootstrap(evidence, fit.residual, tangent, rng)[:, mine]
+    covariance = np.linalg.pinv(tangent.T @ tangent, hermitian=True)[mine, mine]
+    steps = _at_least(steps - np.median(steps, axis=0), covariance)
+    one = fit.explanations[number]
+    return [one.all_moved(evidence, step) for step in steps]
+
+
+def _bootstrap(
+    evidence: Evidence, residual: np.ndarray, tangent: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """(DRAWS, K) steps of all parameters [typical]."""
+    blocks = evidence.blocks(BLOCK_S)
+    numbers = np.unique(blocks)
+    grams = np.stack([tangent[blocks == b].T @ tangent[blocks == b] for b in numbers])
+    rights = np.stack([tangent[blocks == b].T @ residual[blocks == b] for b in numbers])
+    ridge = 1e-6 * np.diag(np.diag(grams.sum(axis=0)) + 1e-12)
+    steps = []
+    for _ in range(DRAWS):
+        times = np.bincount(rng.integers(len(numbers), size=len(numbers)), minlength=len(numbers))
+        gram = np.einsum("b,bij->ij", times, grams) + ridge
+        steps.append(np.linalg.solve(gram, times @ rights))
+    return np.array(steps)
+
+
+def _at_least(steps: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Steps (DRAWS, k) whose spread is no smaller than that of a covariance (k, k)."""
+    known = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    drawn = np.maximum(steps.std(axis=0), 1e-12)
+    return steps * np.maximum(1.0, known / drawn)

@@ -1,0 +1,35 @@
+"""Causes that the recordings cannot tell apart."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.diagnosis.held_out import standard_error
+from bsip_cli.diagnosis.selection import Round, Tried
+from bsip_cli.diagnosis.together import Evidence
+
+ALIKE = 0.9  # part of a signature that another explains
+
+
+def rivals_of(evidence: Evidence, one: Round) -> tuple[Tried, ...]:
+    """What explains the same as the kept cause, or pays off as well on data it has not seen."""
+    kept = one.kept
+    if kept is None:
+        return ()
+    others = (t for t in one.tried if t is not kept and t.is_good)
+    return tuple(t for t in others if _is_rival(evidence, kept, t))
+
+
+def _is_rival(evidence: Evidence, kept: Tried, other: Tried) -> bool:
+    if _explained(evidence, kept, other) > ALIKE:
+        return True
+    apart = kept.gain.blocks - other.gain.blocks
+    return float(apart.sum()) < standard_error(apart)
+
+
+def _explained(evidence: Evidence, kept: Tried, other: Tried) -> float:
+    """Part of the kept cause's signature that the other's takes up."""
+    mine = kept.explanation.change(evidence)
+    theirs = other.explanation.tangent(evidence)
+    size = np.linalg.lstsq(theirs, mine, rcond=None)[0]
+    return float(1 - ((mine - theirs @ size) ** 2).sum() / max(float((mine**2).sum()), 1e-12))

@@ -1,0 +1,133 @@
+"""The white signatures of all candidates, computed once and scored against any residual.
+
+A candidate's score is what its best linear size takes off the squared white residual; under the
+null a chi-square with as many degrees of freedom as it has free parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice, pairwise
+
+import numpy as np
+from scipy.stats import chi2
+
+from bsip_cli.diagnosis.candidates import Candidate, candidates_of
+from bsip_cli.diagnosis.together import Evidence
+from bsip_cli.effects.effect import Effect
+
+_RIDGE = 1e-9
+_BATCH = 60  # candidates at a time
+
+
+@dataclass(frozen=True)
+class Place:
+    """A candidate in some of the trials, by their numbers."""
+
+    candidate: Candidate
+    trials: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class _Stored:
+    """Signatures in one trial: columns (6 n, K), in the shared space (p, K), each candidate's Gram
+    matrix (k, k), and which part of the columns is its."""
+
+    columns: np.ndarray
+    shared: np.ndarray
+    grams: dict[Candidate, np.ndarray]
+    parts: dict[Candidate, slice]
+
+
+@dataclass(frozen=True)
+class Signatures:
+    """All places of all effects: each trial alone, and all together where an effect lasts."""
+
+    evidence: Evidence
+    stored: tuple[_Stored, ...]
+    places: tuple[Place, ...]
+
+    def scores(
+        self, residuals: np.ndarray, known: np.ndarray
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
+        """-log p (K, f) of every place for residuals (R, f), and the likeliest sizes of the first
+        [typical]. What the columns ``known`` (R, q) can explain is taken off both."""
+        basis, _ = np.linalg.qr(known)
+        left = residuals - basis @ (basis.T @ residuals)
+        turned = self.evidence.turned(np.column_stack([left, basis])).astype(np.float32)
+        products = [
+            one.columns.T @ turned[self.evidence.rows(t)] for t, one in enumerate(self.stored)
+        ]
+        kept = 1 - (1 - self.evidence.shrink) ** 2
+        logs, sizes = np.empty((len(self.places), residuals.shape[1])), []
+        for k, place in enumerate(self.places):
+            gram, shared, product = self._sums(place, products)
+            inside = product[:, residuals.shape[1] :]
+            whole = gram - shared.T @ (kept[:, None] * shared) - inside @ inside.T
+            whole += _RIDGE * np.diag(np.diag(gram) + 1e-300)
+            right = product[:, : residuals.shape[1]]
+            size = np.linalg.solve(whole, right)
+            logs[k] = -chi2.logsf(np.einsum("kf,kf->f", right, size), len(gram))
+            sizes.append(size[:, 0])
+        return logs, sizes
+
+    def information(self, known: np.ndarray) -> list[np.ndarray]:
+        """(k, k) of every place, about its sizes [1/typical^2], beside the columns ``known``."""
+        basis, _ = np.linalg.qr(known)
+        turned = self.evidence.turned(basis).astype(np.float32)
+        products = [
+            one.columns.T @ turned[self.evidence.rows(t)] for t, one in enumerate(self.stored)
+        ]
+        return [self._whole(place, products) for place in self.places]
+
+    def _whole(self, place: Place, products: list[np.ndarray]) -> np.ndarray:
+        gram, shared, inside = self._sums(place, products)
+        kept = 1 - (1 - self.evidence.shrink) ** 2
+        return gram - shared.T @ (kept[:, None] * shared) - inside @ inside.T
+
+    def _sums(
+        self, place: Place, products: list[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Over the trials: Gram matrix, part in the shared space, products."""
+        parts = [(t, self.stored[t], self.stored[t].parts[place.candidate]) for t in place.trials]
+        gram = sum(one.grams[place.candidate] for _, one, _ in parts)
+        shared = sum(one.shared[:, part] for _, one, part in parts)
+        product = sum(products[t][part].astype(float) for t, _, part in parts)
+        return np.asarray(gram), np.asarray(shared), np.asarray(product)
+
+
+def signatures_of(evidence: Evidence, effects: Sequence[Effect]) -> Signatures:
+    """Compute the signatures of all candidates of these effects."""
+    stored = tuple(_stored(evidence, t, effects) for t in range(len(evidence.trials)))
+    return Signatures(evidence, stored, tuple(_places(stored)))
+
+
+def _stored(evidence: Evidence, trial: int, effects: Sequence[Effect]) -> _Stored:
+    one = evidence.trials[trial]
+    candidates = (c for effect in effects for c in candidates_of(effect, one.scene))
+    columns, grams, parts, end = [], {}, {}, 0
+    while batch := tuple(islice(candidates, _BATCH)):
+        signatures = [candidate.signature(one.scene) for candidate in batch]
+        white = one.white(np.concatenate(signatures, axis=2))
+        ends = end + np.cumsum([0, *(s.shape[2] for s in signatures)])
+        for candidate, (start, stop) in zip(batch, pairwise(ends), strict=True):
+            mine = white[:, start - end : stop - end]
+            if mine.any(axis=0).all():  # else it touches no valid frame
+                grams[candidate] = mine.T @ mine
+                parts[candidate] = slice(int(start), int(stop))
+        columns.append(white.astype(np.float32))
+        end = int(ends[-1])
+    together = np.concatenate(columns, axis=1)
+    left = evidence.left[evidence.rows(trial)].astype(np.float32)
+    return _Stored(together, (left.T @ together).astype(float), grams, parts)
+
+
+def _places(stored: tuple[_Stored, ...]) -> Iterator[Place]:
+    for t, one in enumerate(stored):
+        for candidate in one.parts:
+            yield Place(candidate, (t,))
+    for candidate in dict.fromkeys(c for one in stored for c in one.parts):
+        holding = tuple(t for t, one in enumerate(stored) if candidate in one.parts)
+        if candidate.effect.lasts and len(holding) > 1:
+            yield Place(candidate, holding)

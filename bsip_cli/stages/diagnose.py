@@ -1,0 +1,136 @@
+"""diagnose (participant): what the simulation gets wrong in all trials of one person."""
+
+from __future__ import annotations
+
+from zlib import crc32
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.artifacts import empty_table
+from bsip_cli.body.inertia import from_readable
+from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.diagnosis.detection import limits_of
+from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
+from bsip_cli.diagnosis.findings import Finding, findings_of
+from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, values_without
+from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
+from bsip_cli.diagnosis.patterns import PATTERNS
+from bsip_cli.diagnosis.selection import Selection, select
+from bsip_cli.diagnosis.signatures import Signatures, signatures_of
+from bsip_cli.diagnosis.together import Evidence, together
+from bsip_cli.effects.catalogue import CATALOGUE
+from bsip_cli.identification.prior import Prior, Spread, prior_of
+from bsip_cli.schemas import bsip_names
+from bsip_cli.stages.diagnosis_rows import rows_of
+from bsip_cli.stages.frames import acceleration_noise, person_from
+from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.study import Trial
+from bsip_cli.unit import Unit
+
+_SHORTEST_S = 2.0
+_ATTRIBUTED = "segment_inertia"  # not a cause beside the parameters: they are projected out
+
+
+def run(unit: Unit) -> None:
+    """Read motion, wrench, person and RM of all trials; write what is wrong, with its evidence."""
+    skeleton = load_skeleton(unit.config.skeleton)
+    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    rows = unit.read("regression")[list(bsip_names())].to_numpy()
+    spread = Spread(**unit.config.prior.model_dump())
+    prior = prior_of(tuple(from_readable(row) for row in rows), person, spread)
+    moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
+    looked_at = (_trial_evidence(unit, person, prior, trial) for trial in moving)
+    trials = tuple(one for one in looked_at if one is not None)
+    if not trials:
+        unit.warn(
+            f"{unit.name}: no trial has {_SHORTEST_S:g} s of motion with every contact on a "
+            "plate; nothing can be diagnosed"
+        )
+        unit.write("overall-diagnosis", rows_of((), ()))
+        unit.write("detection", empty_table("detection"))
+        return
+    rng = np.random.default_rng(crc32(unit.name.encode()))
+    evidence = together(trials)
+    effects = [effect for effect in CATALOGUE if effect.name != _ATTRIBUTED]
+    signatures = signatures_of(evidence, [*effects, *PATTERNS])
+    selection = select(signatures, rng)
+    findings = findings_of(evidence, selection, rng)
+    names = tuple(one.name for one in trials)
+    facts = _facts(evidence, selection, findings)
+    unit.write("overall-diagnosis", rows_of(findings, names), facts)
+    unit.write("detection", _detection(signatures, selection))
+    for sentence in _said(findings):
+        unit.warn(f"{unit.name}: {sentence}")
+
+
+def _trial_evidence(unit: Unit, person, prior: Prior, trial: Trial) -> TrialEvidence | None:
+    scene = scene_of(unit, person, prior.phi, trial)
+    if scene.valid.sum() < _SHORTEST_S * scene.rate_hz:
+        return None
+    options = unit.config.diagnosis
+    fewer = slow(scene)
+    rng = np.random.default_rng(crc32(trial.stem.encode()))
+    own = own_nuisances(fewer, options.skin_factor, options.skin_draws, rng)
+    shared = shared_nuisances(fewer, prior.root, options.marker_sd_m)
+    level = acceleration_noise(unit.read("kinematics", trial), person.skeleton)
+    return trial_evidence(trial.stem, scene, own, shared, level, options.cutoff_hz)
+
+
+def _facts(evidence: Evidence, selection: Selection, findings: tuple[Finding, ...]) -> dict:
+    """How large a score had to be in each round, what was reached, and the causes in full: their
+    values from all data and from each fold's training blocks, for ``extend``."""
+    rounds = [
+        {"limit": one.limit, "best": max((t.score for t in one.tried), default=0.0)}
+        for one in selection.rounds
+    ]
+    verdicts = {(one.effect, one.target, one.trials): one.verdict for one in findings}
+    causes = []
+    unseen = values_without(evidence, selection.fit)
+    for one, folds in zip(selection.fit.explanations, unseen, strict=True):
+        trials = tuple(evidence.trials[t].name for t in one.place.trials)
+        causes.append(
+            {
+                "effect": one.effect.name,
+                "target": one.target,
+                "trials": list(trials),
+                "verdict": verdicts[one.effect.name, one.target, trials],
+                "values": one.values.tolist(),
+                "folds": folds,
+            }
+        )
+    blocks = {
+        one.name: {
+            "first": evidence.first_block(t, BLOCK_S),
+            "start_s": float(one.rows_s()[0]),
+        }
+        for t, one in enumerate(evidence.trials)
+    }
+    return {
+        "trials": [one.name for one in evidence.trials],
+        "rounds": rounds,
+        "causes": causes,
+        "block_s": BLOCK_S,
+        "folds": FOLDS,
+        "blocks": blocks,
+    }
+
+
+def _detection(signatures: Signatures, selection: Selection) -> pd.DataFrame:
+    rows = [
+        {
+            "effect": limit.place.candidate.effect.name,
+            "target": limit.place.candidate.target,
+            "parameter": limit.parameter,
+            "unit": limit.unit,
+            "limit": limit.size,
+            "trials": ", ".join(signatures.evidence.trials[t].name for t in limit.place.trials),
+        }
+        for limit in limits_of(signatures, selection)
+    ]
+    return pd.DataFrame(rows)
+
+
+def _said(findings: tuple[Finding, ...]) -> list[str]:
+    found = [one for one in findings if one.verdict != "rejected"]
+    return [f"{one.verdict}: {one.effect}: {one.sentence}" for one in found]

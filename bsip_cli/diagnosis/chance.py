@@ -7,12 +7,18 @@ with no cause that lasts.
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
+from dataclasses import dataclass
 
+import numpy as np
+from scipy.stats import gumbel_r
+
+from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence
 
 FLIPS = 199
 BLOCK_S = 1.0
+_LEAST_SPREAD = 1.3  # of the logarithm of a p-value: what white noise has
 
 
 def flipped(evidence: Evidence, residual: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -22,6 +28,41 @@ def flipped(evidence: Evidence, residual: np.ndarray, rng: np.random.Generator) 
     return residual[:, None] * signs[blocks]
 
 
-def p_value(evidence: float, by_chance: np.ndarray) -> float:
-    """Family-wise, of a score beside the largest scores (FLIPS,) that chance brings."""
-    return float((1 + (by_chance >= evidence).sum()) / (1 + len(by_chance)))
+@dataclass(frozen=True)
+class Chance:
+    """Of the largest score by chance: a Gumbel distribution per group of places.
+
+    Every trial, and the trials together, are a group with a chance of its own, so that what is
+    still unexplained in one trial does not hide what another shows.
+    """
+
+    location: dict[tuple[int, ...], float]
+    scale: dict[tuple[int, ...], float]
+
+    def p_value(self, score: float, trials: tuple[int, ...]) -> float:
+        """Family-wise: chance brings as much somewhere."""
+        group = _group(trials)
+        own = gumbel_r.sf(score, self.location[group], self.scale[group])
+        return float(min(1.0, own * len(self.location)))
+
+    def limit(self, trials: tuple[int, ...], alpha: float) -> float:
+        """The score whose p-value is alpha."""
+        group = _group(trials)
+        part = alpha / len(self.location)
+        return float(gumbel_r.isf(part, self.location[group], self.scale[group]))
+
+
+def chance_of(scores: np.ndarray, places: Sequence[Place]) -> Chance:
+    """From the scores (K, FLIPS) of flipped residuals."""
+    groups = [_group(place.trials) for place in places]
+    location, scale = {}, {}
+    for group in dict.fromkeys(groups):
+        mine = np.array([one == group for one in groups])
+        largest = scores[mine].max(axis=0)
+        scale[group] = max(float(largest.std()), _LEAST_SPREAD) * np.sqrt(6) / np.pi
+        location[group] = float(largest.mean()) - np.euler_gamma * scale[group]
+    return Chance(location, scale)
+
+
+def _group(trials: tuple[int, ...]) -> tuple[int, ...]:
+    return trials if len(trials) == 1 else ()

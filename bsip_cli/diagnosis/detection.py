@@ -9,8 +9,8 @@ import numpy as np
 
 from bsip_cli.diagnosis.explanation import NEGLIGIBLE
 from bsip_cli.diagnosis.patterns import UNEXPLAINED
-from bsip_cli.diagnosis.selection import Selection
-from bsip_cli.diagnosis.signatures import Place, Signatures
+from bsip_cli.diagnosis.selection import ALPHA, Selection
+from bsip_cli.diagnosis.signatures import Place
 
 _SURE = 1.645  # standard deviations: found in 95 of 100 recordings like these
 
@@ -25,9 +25,12 @@ class Limit:
     size: float
 
 
-def limits_of(signatures: Signatures, selection: Selection) -> Iterator[Limit]:
+def limits_of(selection: Selection) -> Iterator[Limit]:
     """Per effect, target and parameter, in the trials together or alone."""
-    fit, least = selection.fit, selection.rounds[-1].limit
+    signatures = selection.signatures
+    fit, chance = selection.fit, selection.rounds[-1].chance
+    if chance is None:
+        return
     scores = zip(signatures.places, signatures.information(fit.tangent), strict=True)
     found: dict[tuple, Limit] = {}
     for place, information in scores:
@@ -37,6 +40,7 @@ def limits_of(signatures: Signatures, selection: Selection) -> Iterator[Limit]:
         scene = signatures.evidence.trials[place.trials[0]].scene
         spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(information, hermitian=True)), 0.0))
         for parameter, sd in zip(place.candidate.free(scene), spread, strict=True):
+            least = chance.limit(place.trials, ALPHA)
             needed = max(sd * (np.sqrt(2 * least) + _SURE), NEGLIGIBLE)
             limit = Limit(place, parameter.name, parameter.unit, needed * parameter.typical)
             key = (effect.name, place.candidate.target, place.trials, parameter.name)

@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 from scipy import sparse
 from scipy.linalg import solve_toeplitz
+from scipy.ndimage import median_filter
 
 from bsip_cli.dynamics.lowpass import lowpass_operator
 from bsip_cli.dynamics.regressor import skew
@@ -26,6 +27,7 @@ from bsip_cli.identification.noise import noise_of
 ENOUGH_HZ = 50.0
 _OVERSAMPLING = 2.5
 _ORDER = 4  # of the autoregression
+_SMOOTH_HZ = 0.75  # half-width of the median over the spectrum
 _ROUNDS = 3
 
 
@@ -37,6 +39,7 @@ class Filter:
     frames: np.ndarray
     spans: tuple[tuple[int, int], ...]
     reference_m: np.ndarray
+    rate_hz: float
 
     def __call__(self, wrench: np.ndarray) -> np.ndarray:
         """(n, 6, k) of world wrenches (N, 6, k) about the origin: moments about the reference."""
@@ -54,7 +57,7 @@ def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
     cuts = np.flatnonzero(np.diff(frames) != stride) + 1
     edges = [0, *cuts.tolist(), len(frames)]
     place = np.append(scene.q[scene.valid, :2].mean(axis=0), 0.0)
-    return Filter(operator, frames, tuple(pairwise(edges)), place)
+    return Filter(operator, frames, tuple(pairwise(edges)), place, scene.rate_hz / stride)
 
 
 @dataclass(frozen=True)
@@ -74,8 +77,24 @@ class Whitening:
 
     def of_filtered(self, wrenches: np.ndarray) -> np.ndarray:
         """(6 n, k) of wrenches (n, 6, k) that have passed the filter."""
-        columns = _innovations(wrenches / self.spread[..., None], self.recursion, self.filter)
-        return columns - self.left @ (self.shrink[:, None] * (self.left.T @ columns))
+        kind = wrenches.dtype
+        columns = _innovations(
+            wrenches / self.spread[..., None].astype(kind), self.recursion.astype(kind), self.filter
+        )
+        left, shrink = self.left.astype(kind), self.shrink.astype(kind)
+        return columns - left @ (shrink[:, None] * (left.T @ columns))
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """What has passed the filter: residual (n, 6), the trial's own nuisances (n, 6, m) and those it
+    shares (n, 6, p), noise level of the accelerations (n,)."""
+
+    filter: Filter
+    residual: np.ndarray
+    own: np.ndarray
+    shared: np.ndarray
+    level: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -88,9 +107,15 @@ class TrialEvidence:
 
     name: str
     scene: Scene
+    filtered: Filtered
     whitening: Whitening
     residual: np.ndarray
     shared: np.ndarray
+
+    def with_noise_beside(self, change: np.ndarray) -> TrialEvidence:
+        """The same trial; its noise is what remains beside a known change of the wrench (N, 6)."""
+        beside = self.filtered.filter(change[..., None])[..., 0]
+        return _evidence(self.name, self.scene, self.filtered, beside)
 
     def white(self, wrenches: np.ndarray) -> np.ndarray:
         """(6 n, k) of world wrenches (N, 6, k)."""
@@ -124,43 +149,45 @@ def trial_evidence(
     filter_ = filter_of(fewer, cutoff_hz)
     residual = _residual(scene, filter_, stride, cutoff_hz)
     level = noise_level[::stride][filter_.frames]
-    whitening = _whitening(residual, filter_(own), filter_(shared), level, filter_)
-    white = whitening.of_filtered(residual)[:, 0]
-    return TrialEvidence(name, fewer, whitening, white, whitening.white(shared))
+    filtered = Filtered(filter_, residual, filter_(own), filter_(shared), level)
+    return _evidence(name, fewer, filtered, np.zeros_like(residual))
+
+
+def _evidence(name: str, scene: Scene, filtered: Filtered, beside: np.ndarray) -> TrialEvidence:
+    whitening = _whitening(filtered, beside)
+    white = whitening.of_filtered(filtered.residual[..., None])[:, 0]
+    shared = whitening.of_filtered(filtered.shared)
+    return TrialEvidence(name, scene, filtered, whitening, white, shared)
 
 
 def _residual(scene: Scene, filter_: Filter, stride: int, cutoff_hz: float) -> np.ndarray:
-    """(n, 6, 1) measured less simulated wrench, low-passed at its full rate."""
+    """(n, 6) measured less simulated wrench, low-passed at its full rate."""
     operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz)
     wanted = np.searchsorted(frames, filter_.frames * stride)
     full = replace(filter_, operator=operator[wanted])
-    return full((scene.measured - scene.predicted)[..., None])
+    return full((scene.measured - scene.predicted)[..., None])[..., 0]
 
 
-def _whitening(
-    left_over: np.ndarray,
-    own: np.ndarray,
-    shared: np.ndarray,
-    level: np.ndarray,
-    filter_: Filter,
-) -> Whitening:
-    """Noise of what all nuisances leave of the residual (n, 6, 1), and its own (n, 6, m) in the
-    coordinates of that noise."""
-    nuisances = np.concatenate([own, shared], axis=2)
+def _whitening(filtered: Filtered, beside: np.ndarray) -> Whitening:
+    """Noise of what a known change (n, 6) and all nuisances leave of the residual, and the own
+    nuisances in the coordinates of that noise."""
+    filter_, level = filtered.filter, filtered.level
+    nuisances = np.concatenate([filtered.own, filtered.shared], axis=2)
+    left_over = filtered.residual - beside
     recursion = np.zeros((6, _ORDER))
-    spread = _course(left_over[..., 0], level)
+    spread = _course(left_over, level)
     known = _innovations(nuisances / spread[..., None], recursion, filter_)
     for _ in range(_ROUNDS):
-        flat = _innovations(left_over / spread[..., None], recursion, filter_)
+        flat = _innovations((left_over / spread)[..., None], recursion, filter_)
         inner = known.T @ known + np.eye(known.shape[1])
         explained = nuisances @ np.linalg.solve(inner, known.T @ flat[:, 0])
-        remaining = left_over[..., 0] - explained
+        remaining = left_over - explained
         spread = _course(remaining, level)
-        recursion = np.stack([_recursion(x, filter_.spans) for x in (remaining / spread).T])
+        recursion = np.stack([_recursion(x, filter_.rate_hz) for x in (remaining / spread).T])
         innovations = _innovations((remaining / spread)[..., None], recursion, filter_)
         spread = spread * innovations.reshape(-1, 6).std(axis=0)
         known = _innovations(nuisances / spread[..., None], recursion, filter_)
-    left, sizes, _ = np.linalg.svd(known[:, : own.shape[2]], full_matrices=False)
+    left, sizes, _ = np.linalg.svd(known[:, : filtered.own.shape[2]], full_matrices=False)
     return Whitening(filter_, spread, recursion, left, 1 - 1 / np.sqrt(1 + sizes**2))
 
 
@@ -170,13 +197,16 @@ def _course(residual: np.ndarray, level: np.ndarray) -> np.ndarray:
     return noise.rms / np.sqrt(noise.weights_at(level))
 
 
-def _recursion(series: np.ndarray, spans: tuple[tuple[int, int], ...]) -> np.ndarray:
-    """(_ORDER,) autoregression by Yule and Walker, within the spans."""
-    lags = np.zeros(_ORDER + 1)
-    for start, stop in spans:
-        part = series[start:stop]
-        for lag in range(min(_ORDER + 1, len(part))):
-            lags[lag] += part[lag:] @ part[: len(part) - lag]
+def _recursion(series: np.ndarray, rate_hz: float) -> np.ndarray:
+    """(_ORDER,) autoregression by Yule and Walker, of the smooth part of the spectrum.
+
+    A running median over frequencies leaves out lines: an offset or a swing at one frequency is no
+    noise, and must not be whitened away.
+    """
+    power = np.abs(np.fft.rfft(series, 2 * len(series))) ** 2
+    width = 2 * max(1, round(_SMOOTH_HZ * len(series) / rate_hz)) + 1
+    smooth = median_filter(power, size=width, mode="reflect")
+    lags = np.fft.irfft(smooth)[: _ORDER + 1]
     lags[0] *= 1 + 1e-6
     return solve_toeplitz(lags[:-1], lags[1:])
 

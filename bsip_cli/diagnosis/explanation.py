@@ -13,7 +13,7 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
 NEGLIGIBLE = 0.25  # of the typical size
-_STEPS = 4  # of Gauss and Newton: effects are nearly linear
+_STEPS = 20  # of Gauss and Newton: large effects come out of the clipping step by step
 _DIFFERENCE = 0.1  # of the typical size: a moment in time moves by a part of a frame at least
 _SEARCH = 60  # evaluations for a moment, a frequency or a window
 
@@ -25,12 +25,16 @@ class Explanation:
     place: Place
     values: np.ndarray
 
+    def wrench(self, scene: Scene) -> np.ndarray:
+        """(N, 6) change of a trial's simulated wrench."""
+        return self.effect.change(scene, self.target, self.values)
+
     def change(self, evidence: Evidence) -> np.ndarray:
         """(R,) white change of the simulated wrench."""
         parts = {}
         for t in self.place.trials:
             one = evidence.trials[t]
-            parts[t] = one.white(self.effect.change(one.scene, self.target, self.values)[..., None])
+            parts[t] = one.white(self.wrench(one.scene)[..., None])
         return evidence.white(parts)[:, 0]
 
     def tangent(self, evidence: Evidence) -> np.ndarray:

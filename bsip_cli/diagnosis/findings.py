@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from bsip_cli.diagnosis.explanation import Explanation
 from bsip_cli.diagnosis.intervals import drawn_explanations
 from bsip_cli.diagnosis.rivals import rivals_of
-from bsip_cli.diagnosis.selection import Selection, Tried
+from bsip_cli.diagnosis.selection import Round, Selection, Tried
 from bsip_cli.diagnosis.together import Evidence
 
 Verdict = Literal["named", "ambiguous", "rejected"]
@@ -47,30 +48,42 @@ class Finding:
     sentence: str
 
 
-def findings_of(
-    evidence: Evidence, selection: Selection, rng: np.random.Generator
-) -> tuple[Finding, ...]:
+def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding, ...]:
     """All candidates that were looked at in full: those kept first, with their rivals."""
-    kept = [(one, one.kept) for one in selection.rounds if one.kept is not None]
-    said = {_key(cause.explanation) for _, cause in kept}
+    evidence = selection.signatures.evidence
+    kept = list(_kept(evidence, selection))
+    said = {_key(cause.explanation) for _, cause, _ in kept}
     findings = []
-    for number, (one, cause) in enumerate(kept):
+    for letter, (one, cause, place) in enumerate(kept):
         rivals = []
-        for rival in rivals_of(evidence, one):
+        for rival in rivals_of(one):
             if _key(rival.explanation) not in said and not _same(rival, cause):
                 rivals.append(rival)
                 said.add(_key(rival.explanation))
         verdict: Verdict = "ambiguous" if rivals else "named"
-        class_id = chr(ord("A") + number) if rivals else ""
+        class_id = chr(ord("A") + letter) if rivals else ""
         remedy = cause.explanation.effect.remedy if rivals else ""
-        for tried in (cause, *rivals):
-            findings.append(_finding(evidence, tried, verdict, class_id, remedy, rng))
+        said_so = (verdict, class_id, remedy)
+        findings.append(_finding(evidence, cause, place, said_so, rng))
+        for rival in rivals:
+            findings.append(_finding(one.evidence, rival, -1, said_so, rng))
     for one in selection.rounds:
         for tried in one.tried:
             if _key(tried.explanation) not in said:
                 said.add(_key(tried.explanation))
                 findings.append(_rejected(evidence, tried))
     return tuple(findings)
+
+
+def _kept(evidence: Evidence, selection: Selection) -> Iterator[tuple[Round, Tried, int]]:
+    """Rounds and what they kept, with the numbers of the last fit; not what became negligible."""
+    number = 0
+    for one in selection.rounds:
+        if one.kept is not None:
+            last = selection.fit.explanations[number]
+            if not last.is_negligible(evidence):
+                yield one, replace(one.kept, explanation=last, fit=selection.fit), number
+            number += 1
 
 
 def _key(one: Explanation) -> tuple:
@@ -87,13 +100,13 @@ def _same(one: Tried, other: Tried) -> bool:
 def _finding(
     evidence: Evidence,
     tried: Tried,
-    verdict: Verdict,
-    class_id: str,
-    remedy: str,
+    place: int,
+    said_so: tuple[Verdict, str, str],
     rng: np.random.Generator,
 ) -> Finding:
     one = tried.explanation
-    number = len(tried.fit.explanations) - 1
+    verdict, class_id, remedy = said_so
+    number = place % len(tried.fit.explanations)
     draws = drawn_explanations(evidence, tried.fit, number, rng)
     numbers = _numbers(evidence, one, draws)
     sentence = one.effect.sentence(one.target, one.values) + _interval_words(numbers)

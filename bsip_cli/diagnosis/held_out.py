@@ -9,18 +9,22 @@ import numpy as np
 from bsip_cli.diagnosis.explanation import Fit
 from bsip_cli.diagnosis.together import Evidence
 
-BLOCK_S = 2.0
+BLOCK_S = 1.0
 FOLDS = 5
 
 
 @dataclass(frozen=True)
 class Gain:
-    """Squared white residual that goes, per block (b,), and the whole before [1].
+    """Squared white residual that goes, per block (b,), 0 in trials that are not concerned.
+
+    concerned : (b,) blocks of the trials that the explanation is about.
+    before : their squared white residual without it.
 
     percent : of the squared residual, and its standard error over the blocks.
     """
 
     blocks: np.ndarray
+    concerned: np.ndarray
     before: float
 
     @property
@@ -29,7 +33,7 @@ class Gain:
 
     @property
     def error_percent(self) -> float:
-        return 100 * standard_error(self.blocks) / self.before
+        return 100 * standard_error(self.blocks[self.concerned]) / self.before
 
     def is_real(self) -> bool:
         """Larger than its standard error."""
@@ -69,7 +73,8 @@ def gain_of(
         saved = before**2 - (after - tangent @ step) ** 2
         for k in np.flatnonzero(numbers % FOLDS == fold):
             gains[k] = saved[blocks == numbers[k]].sum()
-    return Gain(gains, float((before[there] ** 2).sum()))
+    concerned = np.isin(numbers, blocks[there])
+    return Gain(np.where(concerned, gains, 0.0), concerned, float((before[there] ** 2).sum()))
 
 
 def values_without(evidence: Evidence, fit: Fit) -> list[list[list[float]]]:

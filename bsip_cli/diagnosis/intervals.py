@@ -24,8 +24,9 @@ def drawn_explanations(
     ends = np.cumsum([0, *widths])
     mine = slice(int(ends[number]), int(ends[number + 1]))
     steps = _bootstrap(evidence, fit.residual, tangent, rng)[:, mine]
-    covariance = np.linalg.pinv(tangent.T @ tangent, hermitian=True)[mine, mine]
-    steps = _at_least(steps - np.median(steps, axis=0), covariance)
+    # What the data do not decide, a moment in a gap for instance, is known to its typical size.
+    covariance = np.linalg.inv(tangent.T @ tangent + np.eye(tangent.shape[1]))[mine, mine]
+    steps = _at_least(steps - np.median(steps, axis=0), covariance, rng)
     one = fit.explanations[number]
     return [one.all_moved(evidence, step) for step in steps]
 
@@ -47,8 +48,7 @@ def _bootstrap(
     return np.array(steps)
 
 
-def _at_least(steps: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+def _at_least(steps: np.ndarray, covariance: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Steps (DRAWS, k) whose spread is no smaller than that of a covariance (k, k)."""
-    known = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    drawn = np.maximum(steps.std(axis=0), 1e-12)
-    return steps * np.maximum(1.0, known / drawn)
+    missing = np.maximum(np.diag(covariance) - steps.var(axis=0), 0.0)
+    return steps + np.sqrt(missing) * rng.standard_normal(steps.shape)

@@ -11,19 +11,25 @@ from bsip_cli.diagnosis.together import Evidence
 ALIKE = 0.9  # part of a signature that another explains
 
 
-def rivals_of(evidence: Evidence, one: Round) -> tuple[Tried, ...]:
+def rivals_of(one: Round) -> tuple[Tried, ...]:
     """What explains the same as the kept cause, or pays off as well on data it has not seen."""
     kept = one.kept
     if kept is None:
         return ()
-    others = (t for t in one.tried if t is not kept and t.is_good)
-    return tuple(t for t in others if _is_rival(evidence, kept, t))
+    mine = set(kept.explanation.place.trials)
+    others = (
+        t
+        for t in one.tried
+        if t is not kept and t.is_good and mine & set(t.explanation.place.trials)
+    )
+    return tuple(t for t in others if _is_rival(one.evidence, kept, t))
 
 
 def _is_rival(evidence: Evidence, kept: Tried, other: Tried) -> bool:
     if _explained(evidence, kept, other) > ALIKE:
         return True
-    apart = kept.gain.blocks - other.gain.blocks
+    either = kept.gain.concerned | other.gain.concerned
+    apart = (kept.gain.blocks - other.gain.blocks)[either]
     return float(apart.sum()) < standard_error(apart)
 
 

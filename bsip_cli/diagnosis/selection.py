@@ -4,25 +4,26 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
-from bsip_cli.diagnosis.chance import flipped, p_value
+from bsip_cli.diagnosis.chance import Chance, chance_of, flipped
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together, refined
 from bsip_cli.diagnosis.held_out import Gain, gain_of
 from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.diagnosis.signatures import Place, Signatures
-from bsip_cli.diagnosis.together import Evidence
+from bsip_cli.diagnosis.together import Evidence, together
+from bsip_cli.statistics.chi_square import minus_log_p
 
 MOST = 3  # causes in one trial
 TRIES = 10  # candidates that are refitted in a round
 WORTH_A_TRY = 0.5  # of the best score
 ALPHA = 0.05
+SUPPORT = 8.0  # squared white residual that a trial must save to share a cause
 # A cause from the catalogue is named though a regularity without a name explains so much more.
-NAMED_AT = 0.8
-AGAIN = 2.0  # how much more an effect counts that another trial shows already
+NAMED_AT = 0.95
+AGAIN = 1.25  # how much more an effect counts that another trial shows already
 
 
 @dataclass(frozen=True)
@@ -45,60 +46,94 @@ class Tried:
 class Round:
     """One step: candidates in the order of what they explain, and the one that was kept."""
 
+    evidence: Evidence
     tried: tuple[Tried, ...]
     kept: Tried | None
-    limit: float
+    chance: Chance | None
 
 
 @dataclass(frozen=True)
 class Selection:
-    """All rounds, and everything kept fitted together."""
+    """All rounds, and everything kept fitted together, in the coordinates of the last noise."""
 
+    signatures: Signatures
     rounds: tuple[Round, ...]
     fit: Fit
 
 
 def select(signatures: Signatures, rng: np.random.Generator) -> Selection:
-    """Forward selection of up to three causes in each trial; after one without a name nothing
-    can be told."""
-    fit = fit_together(signatures.evidence, ())
+    """Forward selection of up to three causes in each trial; in a trial with one that has no name
+    nothing more can be told."""
+    found: tuple[Explanation, ...] = ()
     rounds: list[Round] = []
-    while open_trials := _open_trials(signatures.evidence, fit):
-        one = _round(signatures, fit, open_trials, rng)
+    while open_trials := _open_trials(signatures.evidence, found):
+        before = fit_together(signatures.evidence, found)
+        tried = _tried(signatures, before, open_trials)
+        if tried:
+            # A cause must not be taken for noise: what the best one leaves says what is noise.
+            best = max(tried, key=lambda one: one[2])[1]
+            signatures = signatures.on(_with_noise_beside(signatures.evidence, best))
+            before = fit_together(signatures.evidence, found)
+            tried = _tried(signatures, before, open_trials)
+        one = _round(signatures, before, tried, rng)
         rounds.append(one)
         if one.kept is None:
             break
-        fit = one.kept.fit
-        if one.kept.explanation.effect.name == UNEXPLAINED:
-            break
-    return Selection(tuple(rounds), fit)
+        found = one.kept.fit.explanations
+    last = fit_together(signatures.evidence, found)
+    if found:
+        signatures = signatures.on(_with_noise_beside(signatures.evidence, last))
+        last = fit_together(signatures.evidence, found)
+    return Selection(signatures, tuple(rounds), last)
 
 
-def _open_trials(evidence: Evidence, fit: Fit) -> set[int]:
+def _with_noise_beside(evidence: Evidence, fit: Fit) -> Evidence:
+    """The trials with the noise that a fit leaves."""
+    trials = []
+    for t, one in enumerate(evidence.trials):
+        changes = [e.wrench(one.scene) for e in fit.explanations if t in e.place.trials]
+        trials.append(one.with_noise_beside(sum(changes, np.zeros_like(one.scene.measured))))
+    return together(tuple(trials))
+
+
+def _open_trials(evidence: Evidence, found: tuple[Explanation, ...]) -> set[int]:
     """Trials that may have another cause."""
-    causes = Counter(t for one in fit.explanations for t in one.place.trials)
-    return {t for t in range(len(evidence.trials)) if causes[t] < MOST}
+    causes = Counter(t for one in found for t in one.place.trials)
+    unknown = {t for one in found if one.effect.name == UNEXPLAINED for t in one.place.trials}
+    return {t for t in range(len(evidence.trials)) if causes[t] < MOST} - unknown
+
+
+def _tried(
+    signatures: Signatures, before: Fit, open_trials: set[int]
+) -> list[tuple[Explanation, Fit, float]]:
+    """The best candidates, refitted in full: cause, fit with it, score."""
+    scores, sizes = signatures.scores(before.residual[:, None], before.tangent)
+    tried: list[tuple[Explanation, Fit, float]] = []
+    for k in _best_of_each(signatures, scores[:, 0], sizes, open_trials, before):
+        best_yet = max((t[2] for t in tried), default=0.0)
+        if len(tried) >= TRIES or scores[k, 0] < WORTH_A_TRY * best_yet:
+            break
+        one = _refitted(signatures, before, signatures.places[k], sizes[k], open_trials)
+        if one is not None:
+            tried.append(one)
+    return tried
 
 
 def _round(
-    signatures: Signatures, before: Fit, open_trials: set[int], rng: np.random.Generator
+    signatures: Signatures,
+    before: Fit,
+    tried: list[tuple[Explanation, Fit, float]],
+    rng: np.random.Generator,
 ) -> Round:
-    scores, sizes = signatures.scores(before.residual[:, None], before.tangent)
-    tried: list[tuple[Explanation, Fit, float]] = []
-    for k in _best_of_each(signatures, scores[:, 0], sizes, open_trials):
-        if len(tried) >= TRIES or (tried and scores[k, 0] < WORTH_A_TRY * tried[0][2]):
-            break
-        one = _refitted(signatures.evidence, before, signatures.places[k], sizes[k])
-        if one is not None:
-            tried.append(one)
     if not tried:
-        return Round((), None, np.inf)
+        return Round(signatures.evidence, (), None, None)
     best = max(tried, key=lambda t: t[2])
     courses = flipped(signatures.evidence, best[1].residual, rng)
-    chance = signatures.scores(courses, best[1].tangent)[0].max(axis=0)
+    scores, _ = signatures.scores(courses, best[1].tangent)
+    chance = chance_of(scores, signatures.places)
     judged = [_judged(signatures.evidence, before, *one, chance) for one in tried]
     judged.sort(key=lambda t: -t.score)
-    return Round(tuple(judged), _kept(judged, before), float(np.quantile(chance, 1 - ALPHA)))
+    return Round(signatures.evidence, tuple(judged), _kept(judged, before), chance)
 
 
 def _kept(judged: list[Tried], before: Fit) -> Tried | None:
@@ -139,19 +174,26 @@ def _with_recurrence(good: list[Tried], before: Fit) -> dict[int, float]:
 
 
 def _best_of_each(
-    signatures: Signatures, scores: np.ndarray, sizes: list[np.ndarray], open_trials: set[int]
+    signatures: Signatures,
+    scores: np.ndarray,
+    sizes: list[np.ndarray],
+    open_trials: set[int],
+    before: Fit,
 ) -> Iterator[int]:
-    """The best possible place of every effect and target, the best first.
+    """The best possible place of every effect and target, the best first; none that is known.
 
     An effect that does not last is another one in every trial.
     """
     seen = set()
+    known = {(e.effect, e.target, t) for e in before.explanations for t in e.place.trials}
     for k in np.argsort(-scores):
         place = signatures.places[k]
         if not open_trials.issuperset(place.trials):
             continue
-        effect = place.candidate.effect
-        key = (effect, place.candidate.target, () if effect.lasts else place.trials)
+        effect, target = place.candidate.effect, place.candidate.target
+        if any((effect, target, t) in known for t in place.trials):
+            continue
+        key = (effect, target, () if effect.lasts else place.trials)
         if key in seen:
             continue
         start = _start(signatures.evidence, place, sizes[k])
@@ -168,11 +210,21 @@ def _start(evidence: Evidence, place: Place, sizes: np.ndarray) -> Explanation:
 
 
 def _refitted(
-    evidence: Evidence, before: Fit, place: Place, sizes: np.ndarray
+    signatures: Signatures, before: Fit, place: Place, sizes: np.ndarray, open_trials: set[int]
 ) -> tuple[Explanation, Fit, float] | None:
-    """In full, beside the causes found before; nothing if it turns out impossible."""
+    """In full, beside the causes found before; nothing if it turns out impossible.
+
+    What lasts is tried in all trials too, and given up in those that do not support it.
+    """
+    evidence = signatures.evidence
     start = refined(evidence, _start(evidence, place, sizes), before)
-    fit = fit_together(evidence, (*before.explanations, start))
+    known = {t for e in before.explanations if _alike(e, start) for t in e.place.trials}
+    everywhere = signatures.trials_of(place.candidate) & open_trials - known
+    fits = [fit_together(evidence, (*before.explanations, start))]
+    if place.candidate.effect.lasts and everywhere > set(place.trials):
+        wider = replace(start, place=replace(place, trials=tuple(sorted(everywhere))))
+        fits.append(fit_together(evidence, (*before.explanations, wider)))
+    fit = min((_supported(evidence, before, one) for one in fits), key=_squares)
     found = fit.explanations[-1]
     if not found.is_possible(evidence) or found.is_negligible(evidence):
         return None
@@ -181,19 +233,38 @@ def _refitted(
     return found, fit, _score(before, fit, len(sizes))
 
 
+def _alike(one: Explanation, other: Explanation) -> bool:
+    return (one.effect, one.target) == (other.effect, other.target)
+
+
+def _squares(fit: Fit) -> float:
+    return float((fit.residual**2).sum())
+
+
+def _supported(evidence: Evidence, before: Fit, fit: Fit) -> Fit:
+    """The last cause in those of its trials only whose residual becomes smaller by it."""
+    one = fit.explanations[-1]
+    saved = before.residual**2 - fit.residual**2
+    trials = tuple(t for t in one.place.trials if saved[evidence.rows(t)].sum() > SUPPORT)
+    if not trials or trials == one.place.trials:
+        return fit
+    fewer = replace(one, place=replace(one.place, trials=trials))
+    return fit_together(evidence, (*fit.explanations[:-1], fewer))
+
+
 def _judged(
     evidence: Evidence,
     before: Fit,
     found: Explanation,
     fit: Fit,
     score: float,
-    chance: np.ndarray,
+    chance: Chance,
 ) -> Tried:
     gain = gain_of(evidence, found.place.trials, before.residual, fit.residual, fit.tangent)
-    return Tried(found, score, p_value(score, chance), gain, fit)
+    return Tried(found, score, chance.p_value(score, found.place.trials), gain, fit)
 
 
 def _score(before: Fit, after: Fit, free: int) -> float:
     """-log p of what the squared residual loses, by the chi-square of the free parameters."""
     lost = float((before.residual**2).sum() - (after.residual**2).sum())
-    return float(-chi2.logsf(max(lost, 0.0), free))
+    return float(minus_log_p(lost, free))

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 
 import numpy as np
-from scipy.stats import chi2
 
 from bsip_cli.diagnosis.candidates import Candidate, candidates_of
+from bsip_cli.diagnosis.evidence import TrialEvidence
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.effects.effect import Effect
+from bsip_cli.statistics.chi_square import minus_log_p
 
 _RIDGE = 1e-9
 _BATCH = 60  # candidates at a time
@@ -30,9 +31,17 @@ class Place:
 
 
 @dataclass(frozen=True)
+class _Filtered:
+    """Signatures in one trial (n, 6, K), and which part of them is a candidate's."""
+
+    columns: np.ndarray
+    parts: dict[Candidate, slice]
+
+
+@dataclass(frozen=True)
 class _Stored:
-    """Signatures in one trial: columns (6 n, K), in the shared space (p, K), each candidate's Gram
-    matrix (k, k), and which part of the columns is its."""
+    """The same, white: columns (6 n, K), in the shared space (p, K), and each candidate's Gram
+    matrix (k, k)."""
 
     columns: np.ndarray
     shared: np.ndarray
@@ -45,8 +54,17 @@ class Signatures:
     """All places of all effects: each trial alone, and all together where an effect lasts."""
 
     evidence: Evidence
+    filtered: tuple[_Filtered, ...]
     stored: tuple[_Stored, ...]
     places: tuple[Place, ...]
+
+    def on(self, evidence: Evidence) -> Signatures:
+        """The same in the coordinates of other noise."""
+        return _on(evidence, self.filtered)
+
+    def trials_of(self, candidate: Candidate) -> set[int]:
+        """In which trials a candidate is possible."""
+        return {t for t, one in enumerate(self.stored) if candidate in one.parts}
 
     def scores(
         self, residuals: np.ndarray, known: np.ndarray
@@ -68,7 +86,7 @@ class Signatures:
             whole += _RIDGE * np.diag(np.diag(gram) + 1e-300)
             right = product[:, : residuals.shape[1]]
             size = np.linalg.solve(whole, right)
-            logs[k] = -chi2.logsf(np.einsum("kf,kf->f", right, size), len(gram))
+            logs[k] = minus_log_p(np.einsum("kf,kf->f", right, size), len(gram))
             sizes.append(size[:, 0])
         return logs, sizes
 
@@ -99,28 +117,39 @@ class Signatures:
 
 def signatures_of(evidence: Evidence, effects: Sequence[Effect]) -> Signatures:
     """Compute the signatures of all candidates of these effects."""
-    stored = tuple(_stored(evidence, t, effects) for t in range(len(evidence.trials)))
-    return Signatures(evidence, stored, tuple(_places(stored)))
+    return _on(evidence, tuple(_filtered(one, effects) for one in evidence.trials))
 
 
-def _stored(evidence: Evidence, trial: int, effects: Sequence[Effect]) -> _Stored:
-    one = evidence.trials[trial]
+def _filtered(one: TrialEvidence, effects: Sequence[Effect]) -> _Filtered:
     candidates = (c for effect in effects for c in candidates_of(effect, one.scene))
-    columns, grams, parts, end = [], {}, {}, 0
+    columns, parts, end = [], {}, 0
     while batch := tuple(islice(candidates, _BATCH)):
         signatures = [candidate.signature(one.scene) for candidate in batch]
-        white = one.white(np.concatenate(signatures, axis=2))
+        filtered = one.filtered.filter(np.concatenate(signatures, axis=2))
         ends = end + np.cumsum([0, *(s.shape[2] for s in signatures)])
         for candidate, (start, stop) in zip(batch, pairwise(ends), strict=True):
-            mine = white[:, start - end : stop - end]
-            if mine.any(axis=0).all():  # else it touches no valid frame
-                grams[candidate] = mine.T @ mine
+            mine = filtered[..., start - end : stop - end]
+            if mine.any(axis=(0, 1)).all():  # else it touches no valid frame
                 parts[candidate] = slice(int(start), int(stop))
-        columns.append(white.astype(np.float32))
+        columns.append(filtered.astype(np.float32))
         end = int(ends[-1])
-    together = np.concatenate(columns, axis=1)
+    return _Filtered(np.concatenate(columns, axis=2), parts)
+
+
+def _on(evidence: Evidence, filtered: tuple[_Filtered, ...]) -> Signatures:
+    stored = tuple(_stored(evidence, t, one) for t, one in enumerate(filtered))
+    return Signatures(evidence, filtered, stored, tuple(_places(stored)))
+
+
+def _stored(evidence: Evidence, trial: int, filtered: _Filtered) -> _Stored:
+    columns = evidence.trials[trial].whitening.of_filtered(filtered.columns)
     left = evidence.left[evidence.rows(trial)].astype(np.float32)
-    return _Stored(together, (left.T @ together).astype(float), grams, parts)
+    shared = (left.T @ columns).astype(float)
+    grams = {}
+    for candidate, part in filtered.parts.items():
+        mine = columns[:, part].astype(float)
+        grams[candidate] = mine.T @ mine
+    return _Stored(columns, shared, grams, filtered.parts)
 
 
 def _places(stored: tuple[_Stored, ...]) -> Iterator[Place]:

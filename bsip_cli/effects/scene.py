@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
+from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
@@ -21,6 +22,7 @@ from bsip_cli.motion.inverse_kinematics import tree_of
 from bsip_cli.motion.jacobian import model_markers
 from bsip_cli.motion.pose_response import PoseResponse, marker_trust, pose_responses
 
+COURSE_HZ = 14.0
 TRUST_S = 0.05  # standard deviation of what smooths the markers' trust
 
 
@@ -123,14 +125,20 @@ class Scene:
         ]
 
     @cached_property
-    def predicted_course(self) -> CubicSpline:
-        """The simulated wrench between the frames too."""
-        return CubicSpline(self.times_s, self.predicted)
-
-    @cached_property
     def measured(self) -> np.ndarray:
         """(N, 6) sum of the plates; 0 where a plate has no reading."""
         return np.nan_to_num(sum((plate.wrench for plate in self.plates), np.zeros((1, 6))))
+
+    @cached_property
+    def measured_course(self) -> CubicSpline:
+        """The measured wrench between the frames too, without what is faster than movement.
+
+        A spline through noise is quieter between frames than on them, and would draw every delay
+        away from whole frames.
+        """
+        corner = min(COURSE_HZ, 0.3 * self.rate_hz)
+        sections = butter(4, corner, fs=self.rate_hz, output="sos")
+        return CubicSpline(self.times_s, sosfiltfilt(sections, self.measured, axis=0))
 
     @cached_property
     def motion(self) -> SegmentMotion:

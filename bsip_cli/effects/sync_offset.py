@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bsip_cli.effects.delayed import delayed
+from bsip_cli.effects.delayed import delay_change
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
@@ -22,7 +22,7 @@ class SyncOffset(Effect):
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         late = np.full(len(scene.times_s), values[0])
-        return delayed(scene, late) - scene.predicted
+        return delay_change(scene, late)
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         order = "after" if values[0] > 0 else "before"

@@ -32,7 +32,7 @@ class UnmeasuredContact(Effect):
         lengths = tuple(w for w in fitting if (end - start) / w <= MOST_WINDOWS) or (fitting[-1],)
         middles = tuple(float(t) for t in np.arange(start, end, min(lengths) / 2))
         return (
-            *(Parameter(f"force_{axis}", "N", -800.0, 800.0, 30.0) for axis in "xyz"),
+            *(Parameter(f"force_{axis}", "N", -800.0, 800.0, 40.0) for axis in "xyz"),
             Parameter("middle", "s", start, end, 0.25, middles),
             Parameter("length", "s", 0.2, end - start, 0.5, lengths),
         )

@@ -5,16 +5,21 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.names import in_words
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
+IMPACT = 1.8  # peak of the vertical force over body weight
 FREQUENCIES_HZ = (3.0, 4.0, 5.0, 6.5, 8.0, 10.0)
 DAMPING = (0.1, 0.2, 0.4)
 
 
 class WobblingMass(Effect):
-    """A mass on a spring and a damper at the segment's centre of mass, free in all directions."""
+    """A mass on a spring and a damper at the segment's centre of mass, free in all directions.
+
+    Looked for only where an impact sets it swinging: in slow movement it is a heavier segment.
+    """
 
     name = "wobbling_mass"
     of_the_lab = False
@@ -22,6 +27,9 @@ class WobblingMass(Effect):
     remedy = "hop three times, or drop on the heels"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
+        weight = scene.mass_kg * GRAVITY_M_S2
+        if not scene.valid.any() or scene.measured[scene.valid, 2].max() < IMPACT * weight:
+            return ()
         soft = ("lower_torso", "upper_torso", "thigh", "shank")
         return tuple(s for s in scene.person.skeleton.segments if s.startswith(soft))
 

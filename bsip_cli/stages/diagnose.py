@@ -17,8 +17,8 @@ from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, values_without
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.diagnosis.selection import Selection, select
-from bsip_cli.diagnosis.signatures import Signatures, signatures_of
-from bsip_cli.diagnosis.together import Evidence, together
+from bsip_cli.diagnosis.signatures import signatures_of
+from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.identification.prior import Prior, Spread, prior_of
 from bsip_cli.schemas import bsip_names
@@ -53,13 +53,12 @@ def run(unit: Unit) -> None:
     rng = np.random.default_rng(crc32(unit.name.encode()))
     evidence = together(trials)
     effects = [effect for effect in CATALOGUE if effect.name != _ATTRIBUTED]
-    signatures = signatures_of(evidence, [*effects, *PATTERNS])
-    selection = select(signatures, rng)
-    findings = findings_of(evidence, selection, rng)
+    selection = select(signatures_of(evidence, [*effects, *PATTERNS]), rng)
+    findings = findings_of(selection, rng)
     names = tuple(one.name for one in trials)
-    facts = _facts(evidence, selection, findings)
+    facts = _facts(selection, findings)
     unit.write("overall-diagnosis", rows_of(findings, names), facts)
-    unit.write("detection", _detection(signatures, selection))
+    unit.write("detection", _detection(selection))
     for sentence in _said(findings):
         unit.warn(f"{unit.name}: {sentence}")
 
@@ -77,11 +76,12 @@ def _trial_evidence(unit: Unit, person, prior: Prior, trial: Trial) -> TrialEvid
     return trial_evidence(trial.stem, scene, own, shared, level, options.cutoff_hz)
 
 
-def _facts(evidence: Evidence, selection: Selection, findings: tuple[Finding, ...]) -> dict:
+def _facts(selection: Selection, findings: tuple[Finding, ...]) -> dict:
     """How large a score had to be in each round, what was reached, and the causes in full: their
     values from all data and from each fold's training blocks, for ``extend``."""
+    evidence = selection.signatures.evidence
     rounds = [
-        {"limit": one.limit, "best": max((t.score for t in one.tried), default=0.0)}
+        {"best": max((t.score for t in one.tried), default=0.0), "kept": one.kept is not None}
         for one in selection.rounds
     ]
     verdicts = {(one.effect, one.target, one.trials): one.verdict for one in findings}
@@ -89,6 +89,8 @@ def _facts(evidence: Evidence, selection: Selection, findings: tuple[Finding, ..
     unseen = values_without(evidence, selection.fit)
     for one, folds in zip(selection.fit.explanations, unseen, strict=True):
         trials = tuple(evidence.trials[t].name for t in one.place.trials)
+        if (one.effect.name, one.target, trials) not in verdicts:
+            continue  # it became negligible beside later ones
         causes.append(
             {
                 "effect": one.effect.name,
@@ -116,7 +118,8 @@ def _facts(evidence: Evidence, selection: Selection, findings: tuple[Finding, ..
     }
 
 
-def _detection(signatures: Signatures, selection: Selection) -> pd.DataFrame:
+def _detection(selection: Selection) -> pd.DataFrame:
+    trials = selection.signatures.evidence.trials
     rows = [
         {
             "effect": limit.place.candidate.effect.name,
@@ -124,9 +127,9 @@ def _detection(signatures: Signatures, selection: Selection) -> pd.DataFrame:
             "parameter": limit.parameter,
             "unit": limit.unit,
             "limit": limit.size,
-            "trials": ", ".join(signatures.evidence.trials[t].name for t in limit.place.trials),
+            "trials": ", ".join(trials[t].name for t in limit.place.trials),
         }
-        for limit in limits_of(signatures, selection)
+        for limit in limits_of(selection)
     ]
     return pd.DataFrame(rows)
 

@@ -16,7 +16,9 @@ class Stage:
     ``reads`` and ``writes`` are kinds of artifacts. A trial stage that reads a participant's
     artifact gets its own participant's; a participant stage that reads a trial's gets those of
     all trials; a cohort stage reads everybody's. ``options`` are names of configuration entries:
-    only they enter the provenance. ``module`` holds a function ``run(unit)``.
+    only they enter the provenance. ``module`` holds a function ``run(unit)``. ``amends`` are kinds
+    of its own level that earlier stages write and to which it adds rows. ``part`` tells apart two
+    steps of one name and level.
     """
 
     name: str
@@ -26,10 +28,12 @@ class Stage:
     writes: tuple[str, ...]
     options: tuple[str, ...] = ()
     module: str = ""
+    amends: tuple[str, ...] = ()
+    part: str = ""
 
     @property
     def label(self) -> str:
-        return f"{self.name} ({self.level})"
+        return f"{self.name} ({', '.join(filter(None, (self.level, self.part)))})"
 
 
 STAGES = (
@@ -120,6 +124,57 @@ STAGES = (
         reads=("overall-diagnosis",),
         writes=("diagnosis",),
         module="bsip_cli.stages.diagnose_trial",
+    ),
+    Stage(
+        "extend",
+        "participant",
+        "The model extended by what the diagnosis named, and what that gains.",
+        reads=(
+            "overall-diagnosis",
+            "markers",
+            "kinematics",
+            "wrench",
+            "plates",
+            "skeleton",
+            "marker-positions",
+            "regression",
+            "bsip",
+            "used-blocks",
+        ),
+        writes=("extended-bsip", "bsip-change", "extended-skeleton"),
+        options=("skeleton", "loads", "ik", "prior", "identify"),
+        module="bsip_cli.stages.extend",
+    ),
+    Stage(
+        "extend",
+        "trial",
+        "The model extended by what the diagnosis named, and what that gains.",
+        reads=(
+            "overall-diagnosis",
+            "markers",
+            "kinematics",
+            "wrench",
+            "plates",
+            "skeleton",
+            "marker-positions",
+            "person",
+            "bsip",
+            "used-blocks",
+            "extended-bsip",
+        ),
+        writes=("gain", "corrected-wrench"),
+        options=("skeleton", "loads", "ik", "reconstruct"),
+        module="bsip_cli.stages.extend_trial",
+        amends=("reconstruction", "fit"),
+    ),
+    Stage(
+        "extend",
+        "participant",
+        "The model extended by what the diagnosis named, and what that gains.",
+        reads=("gain",),
+        writes=("overall-gain",),
+        module="bsip_cli.stages.extend_gain",
+        part="gain",
     ),
     Stage(
         "stats",

@@ -1,18 +1,31 @@
-"""What a clock that runs otherwise adds to the simulated wrench."""
+"""Clocks of cameras and plates that do not agree."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
+
 import numpy as np
 
+from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Scene
 
 
-def delay_change(scene: Scene, late_s: np.ndarray) -> np.ndarray:
-    """(N, 6) measured wrench less the same put right, where it comes ``late_s`` (N,) [s] late.
+class Delay(Effect):
+    """The forces come late against the markers."""
 
-    From the measured course: the simulated one holds the noise of the motion, whose derivative
-    would make every delay seem smaller than it is. The ends stay as they are.
-    """
-    times = scene.times_s
-    at = np.clip(times + late_s, times[0], times[-1])
-    return scene.measured_course(times) - scene.measured_course(at)
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        return ("",)
+
+    @abstractmethod
+    def late_s(self, scene: Scene, values: np.ndarray) -> np.ndarray:
+        """(N,) how late the forces of each frame were recorded [s]."""
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """The measured wrench less the same put right; the trial's ends stay as they are.
+
+        From the measured course: the simulated one holds the noise of the motion, whose derivative
+        would make every delay seem smaller than it is.
+        """
+        times = scene.times_s
+        at = np.clip(times + self.late_s(scene, values), times[0], times[-1])
+        return scene.measured_course(times) - scene.measured_course(at)

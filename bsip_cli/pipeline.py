@@ -15,8 +15,9 @@ class Stage:
 
     ``reads`` and ``writes`` are kinds of artifacts. A trial stage that reads a participant's
     artifact gets its own participant's; a participant stage that reads a trial's gets those of
-    all trials; a cohort stage reads everybody's. ``options`` are names of configuration entries:
-    only they enter the provenance. ``module`` holds a function ``run(unit)``.
+    all trials; a cohort stage reads everybody's. What is in ``reads_if_there`` counts as an input
+    where it exists, and is not missed where it does not. ``options`` are names of configuration
+    entries: only they enter the provenance. ``module`` holds a function ``run(unit)``.
     """
 
     name: str
@@ -26,10 +27,16 @@ class Stage:
     writes: tuple[str, ...]
     options: tuple[str, ...] = ()
     module: str = ""
+    reads_if_there: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
         return f"{self.name} ({self.level})"
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Every kind that it may read."""
+        return (*self.reads, *self.reads_if_there)
 
 
 STAGES = (
@@ -118,7 +125,17 @@ STAGES = (
         "trial",
         "What the simulation gets wrong: its cause, how large, how sure.",
         reads=("overall-diagnosis",),
-        writes=("diagnosis",),
+        reads_if_there=(
+            "kinematics",
+            "plates",
+            "skeleton",
+            "marker-positions",
+            "person",
+            "bsip",
+            "reconstruction",
+        ),
+        writes=("diagnosis", "attribution"),
+        options=("skeleton", "reconstruct"),
         module="bsip_cli.stages.diagnose_trial",
     ),
     Stage(
@@ -160,6 +177,7 @@ STAGES = (
             "fit",
             "posturography",
         ),
+        reads_if_there=("overall-diagnosis", "detection", "attribution"),
         writes=("report-files",),
         options=("skeleton", "loads", "roles"),
         module="bsip_cli.stages.report",

@@ -50,6 +50,7 @@ class TrialRecord:
     fit: pd.DataFrame | None
     posturography: pd.DataFrame | None
     marker_events: pd.DataFrame | None = None
+    attribution: pd.DataFrame | None = None
 
     @property
     def label(self) -> str:
@@ -59,7 +60,8 @@ class TrialRecord:
 @dataclass(frozen=True)
 class ParticipantRecord:
     """One participant; ``facts`` is the single row of the ``person`` artifact, ``loads`` the known
-    loads as (trial label, words)."""
+    loads as (trial label, words). ``diagnosis``, ``detection`` and ``gains`` (of a model extended by
+    what was found) are None where their stages have not run."""
 
     id: str
     facts: pd.Series
@@ -74,6 +76,9 @@ class ParticipantRecord:
     refusals: tuple[Refusal, ...]
     origins: tuple[Origin, ...]
     loads: tuple[tuple[str, str], ...] = ()
+    diagnosis: pd.DataFrame | None = None
+    detection: pd.DataFrame | None = None
+    gains: pd.DataFrame | None = None
 
     def mass_kg(self) -> float:
         return float(self.facts["mass_kg"])

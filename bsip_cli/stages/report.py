@@ -2,7 +2,8 @@
 
 Reads quality, contacts, skeleton, marker-positions, person, kinematics, marker-residuals,
 marker-events, bsip, base-parameters, excitation, identification, reconstruction, fit,
-posturography. Writes report-files.
+posturography; where they are there overall-diagnosis, detection, attribution, overall-gain. Writes
+report-files.
 """
 
 from __future__ import annotations
@@ -35,6 +36,12 @@ _TABLES = {  # field of a trial's record: kind of artifact
     "reconstruction": "reconstruction",
     "fit": "fit",
     "posturography": "posturography",
+    "attribution": "attribution",
+}
+_FOUND = {  # field of a participant's record: kind that is there only if its stage has run
+    "diagnosis": "overall-diagnosis",
+    "detection": "detection",
+    "gains": "overall-gain",
 }
 
 
@@ -99,6 +106,7 @@ def record_of(unit: Unit) -> ParticipantRecord:
         refusals=refusals_of(unit, unit.participant),
         origins=_origins(unit, usable),
         loads=_loads(unit),
+        **{name: unit.read(kind) for name, kind in _FOUND.items() if unit.has(kind)},
     )
 
 
@@ -138,9 +146,9 @@ def refusals_of(unit: Unit, participant: Participant) -> tuple[Refusal, ...]:
 def _origins(unit: Unit, usable: dict[str, set[Trial]]) -> tuple[Origin, ...]:
     assert unit.participant is not None
     origins = []
-    for kind in unit.stage.reads:
+    for kind in unit.stage.inputs:
         if SCHEMAS[kind].level == "participant":
-            origins.append(origin_of(unit.path(kind), ""))
+            origins += [origin_of(unit.path(kind), "")] if unit.has(kind) else []
         else:
             origins += [
                 origin_of(unit.path(kind, trial), trial_label(trial.stem))

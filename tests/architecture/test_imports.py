@@ -36,7 +36,7 @@ ALLOWED = {
     "identification": "body config dynamics errors statistics",
     "effects": "body dynamics errors motion",
     "diagnosis": "body dynamics effects errors identification motion statistics",
-    "report": "body dynamics errors motion schemas statistics",
+    "report": "body dynamics effects errors motion schemas statistics",
     "simulate": "body config errors",
     "stages": "artifacts body diagnosis dynamics effects errors identification motion pipeline "
     "provenance recordings report schemas statistics study unit",

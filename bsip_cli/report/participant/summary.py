@@ -6,6 +6,7 @@ import numpy as np
 
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Heading, Mark, Paragraph, Section
 from bsip_cli.report.gains import SAME_WITHIN, Gain, MeanGain, gains_of, mean_gains
+from bsip_cli.report.participant.diagnosis import verdict
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, messages
 from bsip_cli.report.words import (
     component_label,
@@ -23,6 +24,9 @@ _SEXES = {"M": "a man", "F": "a woman"}
 
 def section(record: ParticipantRecord) -> Section:
     blocks: list[Block] = [
+        Heading("Is anything wrong?"),
+        *verdict(record),
+        Heading("Who and what"),
         Paragraph(_who(record)),
         Paragraph(_trials(record)),
         Paragraph(_markers(record)),

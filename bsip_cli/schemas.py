@@ -504,7 +504,10 @@ SCHEMAS = {
             1,
             "how much of RM's error which parameters of which segment make",
             (
-                _text("component", "fx fy fz mx my mz cop_ap cop_ml"),
+                _text(
+                    "component",
+                    "fx fy fz mx my mz cop_ap cop_ml; moments about the mean measured COP",
+                ),
                 _text("segment", "segment of the skeleton; empty for what OM leaves too"),
                 _text("group", "mass, centre_of_mass, inertia; rest: what OM leaves too"),
                 Column(

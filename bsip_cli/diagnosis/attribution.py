@@ -16,6 +16,7 @@ import numpy as np
 from bsip_cli.body.inertia import SYMMETRIC, Inertia
 from bsip_cli.body.names import in_words
 from bsip_cli.dynamics.cop import anterior_and_right, centre_of_pressure
+from bsip_cli.dynamics.regressor import move_moments
 
 GROUPS = ("mass", "centre_of_mass", "inertia")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
@@ -77,7 +78,9 @@ def parameter_steps(rm: tuple[Inertia, ...], om: tuple[Inertia, ...]) -> np.ndar
 def attributions(
     measured: np.ndarray, rm: np.ndarray, steps: np.ndarray, judged: np.ndarray, ground: Ground
 ) -> tuple[Attribution, ...]:
-    """Who makes RM's error in every component.
+    """Who makes RM's error in every component; moments about the mean centre of pressure.
+
+    About the world's origin the weight of a segment would count by its distance from there.
 
     Parameters
     ----------
@@ -89,11 +92,21 @@ def attributions(
     -------
     One for each of `COMPONENTS` that has a frame to judge by.
     """
-    error = measured - rm
-    parts = {name: (error[:, k], steps[:, k]) for k, name in enumerate(COMPONENTS[:6])}
+    middle = _middle(measured, judged, ground)
+    error = move_moments(measured - rm, middle)
+    moved = steps.copy()
+    moved[:, 3:] -= np.cross(middle, steps[:, :3], axisb=1, axisc=1)
+    parts = {name: (error[:, k], moved[:, k]) for k, name in enumerate(COMPONENTS[:6])}
     parts |= _cop_parts(measured, rm, steps, ground)
     made = (_attribution(name, *part, judged) for name, part in parts.items())
     return tuple(one for one in made if one is not None)
+
+
+def _middle(measured: np.ndarray, judged: np.ndarray, ground: Ground) -> np.ndarray:
+    """(3,) mean measured centre of pressure; the world's origin where there is none."""
+    points = centre_of_pressure(measured[judged], ground.surface_height_m, ground.min_force_N)
+    known = points[np.isfinite(points).all(axis=1)]
+    return np.array([*known.mean(axis=0), ground.surface_height_m]) if len(known) else np.zeros(3)
 
 
 def _attribution(

@@ -23,7 +23,8 @@ from bsip_cli.report.words import component_label, count, listing, number, perce
 NOTHING = "none"
 UNNAMED = "unexplained"
 _INTERVAL = re.compile(r" \([^()]*: 95 % interval .*$")  # what follows it the report says itself
-_WHERE = ("start", "end", "from_time", "release_time")  # numbers that are no sizes
+_REASON = re.compile(r" \(([^()]*)\)$")  # why a candidate was rejected
+_NO_SIZES = ("start", "end", "from_time", "release_time", "frequency", "damping_ratio")
 _MOST_GAINS = 3
 _EXAMPLES = (  # effects whose limits are told in the sentence
     ("sync_offset", "", "a delay between forces and markers"),
@@ -84,16 +85,22 @@ class Candidate:
     def what(self) -> str:
         """Its sentence without interval, advice and reason."""
         text = re.sub(_INTERVAL, "", self.sentence).removeprefix("not so: ")
+        text = re.sub(_REASON, "", text) if self.verdict == "rejected" else text
         return f"{text[0].upper()}{text[1:]}"
 
     def surest(self) -> Number | None:
-        """Of the numbers that are a size, the one that is known best."""
-        sizes = [n for n in self.numbers if n.name not in _WHERE]
-        return max(sizes, key=Number.certainty, default=None)
+        """Of the numbers that are a size (if any are), the one that is known best."""
+        sizes = [n for n in self.numbers if n.name not in _NO_SIZES]
+        return max(sizes or self.numbers, key=Number.certainty, default=None)
 
     def where(self) -> str:
-        """``in hops (run 1) and squat (run 1)``."""
-        return f"in {listing([trial_label(stem) for stem in self.trials])}"
+        """``hops (run 1) and squat (run 1)``."""
+        return listing([trial_label(stem) for stem in self.trials])
+
+    def why_not(self) -> str:
+        """Why it was rejected; empty if it was not."""
+        found = re.search(_REASON, self.sentence) if self.verdict == "rejected" else None
+        return found[1] if found else ""
 
 
 def candidates_of(diagnosis: pd.DataFrame) -> tuple[Candidate, ...]:
@@ -103,9 +110,9 @@ def candidates_of(diagnosis: pd.DataFrame) -> tuple[Candidate, ...]:
     for _, group in rows.groupby("rank", sort=True):
         first = group.iloc[0]
         numbers = tuple(
-            Number(r.parameter, r.unit, r.estimate, r.ci_low, r.ci_high)
-            for r in group.itertuples()
-            if r.parameter
+            Number(r["parameter"], r["unit"], r["estimate"], r["ci_low"], r["ci_high"])
+            for r in group.to_dict("records")
+            if r["parameter"]
         )
         found.append(
             Candidate(
@@ -114,7 +121,11 @@ def candidates_of(diagnosis: pd.DataFrame) -> tuple[Candidate, ...]:
                 first["verdict"],
                 first["class_id"],
                 float(first["p_value"]),
-                tuple(float(first[c]) for c in ("gain_percent", "gain_ci_low", "gain_ci_high")),
+                (
+                    float(first["gain_percent"]),
+                    float(first["gain_ci_low"]),
+                    float(first["gain_ci_high"]),
+                ),
                 first["sentence"],
                 tuple(str(first["trials"]).split(", ")),
                 numbers,
@@ -154,7 +165,7 @@ def headline(diagnosis: pd.DataFrame) -> str:
 
 
 def cause_sentences(cause: Sequence[Candidate]) -> tuple[str, ...]:
-    """A cause, or a class of rivals: what, how large, how sure, where, and what it means."""
+    """A cause, or a class of rivals: what, how large, how sure, and where."""
     first = cause[0]
     if len(cause) > 1:
         what = "One of these, which these recordings cannot tell apart: " + "; or ".join(
@@ -164,13 +175,17 @@ def cause_sentences(cause: Sequence[Candidate]) -> tuple[str, ...]:
         what = f"Something is wrong that cannot be named. {first.what()}{_size(first)}"
     else:
         what = f"{first.what()}{_size(first)}"
-    said = [f"{what}.", f"Seen {first.where()}.", how_sure(first)]
+    said = [f"{what}.", f"Seen in {first.where()}.", how_sure(first)]
     if len(cause) > 1:
         said.append(f"To tell them apart: {_remedies(cause)}.")
-    words = EFFECT_WORDS.get(first.effect)
-    if words:
-        said.append(words.consequence)
     return tuple(said)
+
+
+def consequences(causes: Sequence[Sequence[Candidate]]) -> tuple[str, ...]:
+    """What the causes mean for the results, each once."""
+    effects = [one.effect for cause in causes for one in cause]
+    known = (EFFECT_WORDS[name].consequence for name in effects if name in EFFECT_WORDS)
+    return tuple(dict.fromkeys(known))
 
 
 def _named_twice(causes: Sequence[Sequence[Candidate]]) -> str:
@@ -206,7 +221,8 @@ def how_sure(one: Candidate) -> str:
         return f"{text}."
     return (
         f"{text}; taken into account, it removes {number(gain, 1)} % (95 % interval "
-        f"{number(low, 1)} to {number(high, 1)} %) of the squared residual in data held out."
+        f"{number(low, 1)} to {number(high, 1)} %) of the squared difference between measured and "
+        "simulated forces in data that it was not fitted to."
     )
 
 
@@ -220,10 +236,10 @@ def gain_sentence(gains: pd.DataFrame) -> str:
     if best.empty:
         return "" if whole.empty else "With it in the model no component follows better."
     parts = [
-        f"{component_label(r.component)} {number(r.rmse_before, 2)} → {number(r.rmse_after, 2)} "
-        f"{r.unit} ({number(r.gain_percent, 0)} % less, {number(r.ci_low, 0)} to "
-        f"{number(r.ci_high, 0)} %)"
-        for r in best.itertuples()
+        f"{component_label(r['component'])} {number(r['rmse_before'], 2)} → {number(r['rmse_after'], 2)} "
+        f"{r['unit']} ({number(r['gain_percent'], 0)} % less, {number(r['ci_low'], 0)} to "
+        f"{number(r['ci_high'], 0)} %)"
+        for r in best.to_dict("records")
     ]
     return f"With it in the model the error on data held out falls: {'; '.join(parts)}."
 
@@ -259,9 +275,16 @@ def limits_of(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[Limit, 
     rows = rows.sort_values(["together", "limit"], ascending=[False, True], kind="stable")
     rows = rows.drop_duplicates(["effect", "target", "parameter"]).sort_index()
     return tuple(
-        Limit(r.effect, r.target, r.parameter, r.unit, float(r.limit), int(r.together))
-        for r in rows.itertuples()
-        if (r.effect, r.target) not in found
+        Limit(
+            r["effect"],
+            r["target"],
+            r["parameter"],
+            r["unit"],
+            float(r["limit"]),
+            int(r["together"]),
+        )
+        for r in rows.to_dict("records")
+        if (r["effect"], r["target"]) not in found
     )
 
 
@@ -294,11 +317,11 @@ def looked_at(detection: pd.DataFrame) -> tuple[str, ...]:
 def verdict_words(
     diagnosis: pd.DataFrame, detection: pd.DataFrame, gains: pd.DataFrame | None
 ) -> tuple[str, ...]:
-    """The whole verdict, a paragraph each: headline, causes, what the model gains, limits."""
+    """The whole verdict, a paragraph each: headline, causes, what follows, gains, limits."""
     said = [headline(diagnosis)]
     causes = causes_of(candidates_of(diagnosis))
     said += [" ".join(cause_sentences(cause)) for cause in causes]
-    said += filter(None, [_named_twice(causes)])
+    said += [*filter(None, [_named_twice(causes)]), *consequences(causes)]
     if gains is not None and causes:
         said += filter(None, [gain_sentence(gains)])
     if not causes and not diagnosis.empty:

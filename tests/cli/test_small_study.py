@@ -39,7 +39,7 @@ OPTIONS = StudyOptions(
 )
 TRIALS = ("task-sequence_run-1", "task-squat_run-1", "task-static")
 GOLDEN = Path(__file__).with_name("files_of_a_run.txt")
-UNITS = 2 * (3 * 3 + 4) + 3  # 3 stages per trial, 4 per participant, 3 of the cohort
+UNITS = 2 * (4 * 3 + 5) + 3  # 4 stages per trial, 5 per participant, 3 of the cohort
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,12 @@ def test_every_artifact_says_what_made_it(first_run, stage):
     files |= {path.name: path for path in first_run.study.rglob("*.c3d")}
     facts = set() if stage.level == "cohort" else {"participant"}
     for kind in stage.writes:
-        written = [path for name, path in files.items() if name.endswith(f"_{kind}.parquet")]
+        written = [
+            path
+            for name, path in files.items()
+            if name.endswith(f"_{SCHEMAS[kind].file_name}.parquet")
+            and read_header(path)["kind"] == kind
+        ]
         assert len(written) == {"trial": 6, "participant": 2, "cohort": 1}[stage.level]
         for path in written:
             header = read_header(path, kind)
@@ -149,9 +154,17 @@ def test_every_artifact_says_what_made_it(first_run, stage):
             assert set(made_by["options"]) == set(stage.options) | facts
             hashes = {name: sha256(files[name]) for name in made_by["inputs"]}
             assert made_by["inputs"] == hashes
-            kinds = {Path(name).stem.split("_")[-1] for name in hashes}
+            kinds = {_kind_or_name(files[name]) for name in hashes}
             recording = {path.name.removesuffix(f"_{kind}.parquet").split("_")[-1]}
-            assert kinds == (set(stage.reads) or recording)
+            assert set(stage.reads) <= kinds
+            assert kinds == (set(stage.inputs) or recording)
+
+
+def _kind_or_name(path: Path) -> str:
+    """Of an artifact its kind, of a recording the end of its name."""
+    if path.suffix == ".parquet":
+        return read_header(path)["kind"]
+    return path.stem.split("_")[-1]
 
 
 def sha256(path: Path) -> str:
@@ -171,6 +184,7 @@ def test_show_prints_the_tables(first_run, bsip):
     assert answer.code == 0
     assert str(first_run.out / "sub-02" / "report.html") in answer.out
     assert answer.out.count("| ") > 20
+    assert "Is anything wrong: sub-01" in answer.out
 
 
 # --- what runs again ----------------------------------------------------------------------------

@@ -51,7 +51,7 @@ def candidate_gains(data: CandidateGains) -> Figure:
     axes.set_xlim(-edge, edge)
     axes.set_ylim(rows - 0.4, -0.6)
     axes.set_yticks(range(rows), data.labels)
-    axes.set_xlabel("squared residual that goes on held-out data [%], 95 % interval (right: helps)")
+    axes.set_xlabel("removed of the squared residual in data held out [%]")
     tidy(axes, grid="x")
     legend_above(axes)
     return figure

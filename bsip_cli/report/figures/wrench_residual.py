@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 from scipy.signal import welch
 
 from bsip_cli.report.figures.canvas import (
     BLUE,
-    GREEN,
     INK,
+    ORANGE,
     house_style,
     new_figure,
     runs,
@@ -24,7 +25,7 @@ from bsip_cli.report.figures.canvas import (
 _SEGMENT_S = 4.0  # of a spectrum: 0.25 Hz apart
 _SHORTEST_S = 1.0  # of a stretch that enters a spectrum
 _HIGHEST_HZ = 15.0
-_STYLES = ((BLUE, "-", 0.9), (GREEN, "--", 1.1))
+_STYLES = ((BLUE, "-", 0.7), (ORANGE, "--", 0.9))
 
 
 @dataclass(frozen=True)
@@ -53,15 +54,17 @@ def wrench_residual(data: WrenchResidual) -> Figure:
         for (method, values), style in zip(methods.items(), _STYLES, strict=False):
             _draw(left, right, data.time_s, values, method, style)
         left.axhline(0.0, color=INK, lw=0.6)
-        left.set_ylabel(f"{name}\n[{data.units[name]}]", fontsize=7.5)
+        left.set_title(f"{name} [{data.units[name]}]", fontsize=7.5, loc="left", pad=2)
+        right.set_title(f"[{data.units[name]} / √Hz]", fontsize=7.5, loc="left", pad=2)
         right.set_yscale("log")
-        tidy(left)
-        tidy(right)
+        right.yaxis.set_minor_formatter(NullFormatter())
+        for axes in (left, right):
+            tidy(axes)
+            axes.tick_params(labelsize=7)
     panels[-1, 0].set_xlabel("time [s]")
     panels[-1, 0].set_xlim(data.time_s[0], data.time_s[-1])
     panels[-1, 1].set_xlabel("frequency [Hz]")
     panels[-1, 1].set_xlim(0.0, _HIGHEST_HZ)
-    panels[0, 1].set_title("per square root of hertz", fontsize=8)
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=2, frameon=False, fontsize=8)
     return figure

@@ -73,10 +73,10 @@ def _sentences(pooled: pd.DataFrame) -> tuple[str, ...]:
     for component in _COPS:
         rows = pooled[(pooled["component"] == component) & (pooled["segment"] != "")]
         large = rows[rows["share_percent"] >= _WORTH_PERCENT]
-        for row in large.nlargest(_LARGEST, "share_percent").itertuples():
+        for row in large.nlargest(_LARGEST, "share_percent").to_dict("records"):
             said.append(
-                f"{number(row.share_percent, 0)} % of the squared error in "
-                f"{component_label(component)} comes from the {row.source}."
+                f"{number(row['share_percent'], 0)} % of the squared error in "
+                f"{component_label(component)} comes from the {row['source']}."
             )
     return tuple(said)
 
@@ -106,9 +106,9 @@ def _grid(pooled: pd.DataFrame) -> Grid:
         rows = pooled[pooled["component"] == component]
         of_segments = rows[rows["segment"] != ""].nlargest(_LARGEST, "share_percent")
         largest = [
-            f"{segment_label(r.segment)}: {r.group.replace('_', ' ')} "
-            f"{number(r.share_percent, 0)} %"
-            for r in of_segments.itertuples()
+            f"{segment_label(r['segment'])}: {r['group'].replace('_', ' ')} "
+            f"{number(r['share_percent'], 0)} %"
+            for r in of_segments.to_dict("records")
         ]
         rest = rows.loc[rows["group"] == "rest", "share_percent"]
         lines.append(
@@ -121,4 +121,9 @@ def _grid(pooled: pd.DataFrame) -> Grid:
             )
         )
     head = ("component", "largest shares of RM's squared error", "unit", "RMSE of RM", "rest [%]")
-    return Grid(head, tuple(lines), "The largest shares in every component", words=2)
+    return Grid(
+        head,
+        tuple(lines),
+        "The largest shares in every component (moments about the mean centre of pressure)",
+        words=2,
+    )

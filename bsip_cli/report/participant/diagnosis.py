@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pandas as pd
@@ -17,6 +17,7 @@ from bsip_cli.report.blocks import (
     Paragraph,
     Picture,
     Section,
+    Tone,
 )
 from bsip_cli.report.diagnosis import (
     Candidate,
@@ -68,7 +69,7 @@ def verdict(record: ParticipantRecord) -> list[Block]:
         return [Paragraph(NOT_RUN, "note")]
     said = verdict_words(record.diagnosis, record.detection, record.gains)
     found = bool(causes_of(candidates_of(record.diagnosis)))
-    tone = "warning" if found or record.diagnosis.empty else "good"
+    tone: Tone = "warning" if found or record.diagnosis.empty else "good"
     return [Paragraph(said[0], tone), *(Paragraph(text) for text in said[1:])]
 
 
@@ -122,23 +123,24 @@ def ranking(candidates: Sequence[Candidate]) -> list[Block]:
         )
         blocks.append(Picture(figure, caption, "Dots: gain of each cause.", "diagnosis_causes"))
     rows = tuple(_row(k, one) for k, one in enumerate(candidates, start=1))
-    head = ("", "cause", "verdict", "in words", "chance [%]", "gain [%]")
-    return [*blocks, Grid(head, rows, "Causes looked at", words=4)]
+    head = ("cause", "verdict", "in words", "in", "chance [%]", "gain [%]")
+    return [*blocks, Grid(head, rows, "Causes looked at, gain with 95 % interval", words=4)]
 
 
 def _numbered(k: int, one: Candidate) -> str:
-    return f"{k}  {one.label}"
+    return f"{k}. {one.label}"
 
 
 def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
     marks: dict[str, Mark] = {"named": "group", "ambiguous": "warning"}
     verdict = f"rival, class {one.class_id}" if one.verdict == "ambiguous" else one.verdict
     gain, low, high = one.gain
+    reason = one.why_not()
     return (
-        str(k),
-        one.label,
+        _numbered(k, one),
         Cell(verdict, marks.get(one.verdict, "")),
-        f"{one.what()}, {one.where()}",
+        f"{one.what()}; rejected: {reason}" if reason else one.what(),
+        one.where(),
         percent(one.p_value, 1),
         f"{number(gain, 1)} ({number(low, 1)} to {number(high, 1)})",
     )
@@ -153,14 +155,14 @@ def gain_blocks(gains: pd.DataFrame) -> list[Block]:
         return [Paragraph("No cause was added to the model, so nothing was gained.")]
     rows = tuple(
         (
-            component_label(r.component),
-            r.method,
-            r.unit,
-            number(r.rmse_before, 2),
-            Cell(number(r.rmse_after, 2), "better" if r.ci_low > 0 else ""),
-            f"{number(r.gain_percent, 0)} ({number(r.ci_low, 0)} to {number(r.ci_high, 0)})",
+            component_label(r["component"]),
+            r["method"],
+            r["unit"],
+            number(r["rmse_before"], 2),
+            Cell(number(r["rmse_after"], 2), "better" if r["ci_low"] > 0 else ""),
+            f"{number(r['gain_percent'], 0)} ({number(r['ci_low'], 0)} to {number(r['ci_high'], 0)})",
         )
-        for r in gains.itertuples()
+        for r in gains.to_dict("records")
     )
     held_out = listing([trial_label(s) for t in gains["data"].unique() for s in t.split(", ")])
     head = ("component", "method", "unit", "before", "after", "gain [%]")
@@ -205,18 +207,23 @@ def detection(limits: Sequence[Limit]) -> list[Block]:
             "segment's own uncertain parameters."
         )
         blocks.append(Picture(figure, caption, "Dots: least mass.", "diagnosis_masses"))
-    rows = tuple(_limit_row(x) for x in limits if x.effect in _WHOLE_LAB)
+    rows = tuple(row for effect in _WHOLE_LAB for row in _limit_rows(effect, limits))
     if rows:
-        head = ("cause", "where", "number", "found from", "recordings together")
+        head = ("cause", "found from", "where it shows best", "recordings")
         blocks.append(Grid(head, rows, "Least size that would be found", words=3))
     return blocks
 
 
-def _limit_row(limit: Limit) -> tuple[str, ...]:
-    return (
-        effect_title(limit.effect),
-        place_label(limit.effect, limit.target) or MISSING,
-        limit.parameter.replace("_", " "),
-        limit.in_words(),
-        str(limit.trials),
-    )
+def _limit_rows(effect: str, limits: Sequence[Limit]) -> Iterator[tuple[str, ...]]:
+    """A row per unit: the range over all places and directions."""
+    of_it = [x for x in limits if x.effect == effect]
+    for unit in dict.fromkeys(x.unit for x in of_it):
+        sizes = sorted((x for x in of_it if x.unit == unit), key=lambda x: x.size)
+        least, most = sizes[0], sizes[-1]
+        words = [least.in_words(), most.in_words()]
+        yield (
+            effect_title(effect),
+            words[0] if words[0] == words[1] else " to ".join(words),
+            place_label(effect, least.target) if len({x.target for x in sizes}) > 1 else MISSING,
+            "together" if least.trials > 1 else "the best alone",
+        )

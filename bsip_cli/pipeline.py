@@ -17,7 +17,9 @@ class Stage:
     artifact gets its own participant's; a participant stage that reads a trial's gets those of
     all trials; a cohort stage reads everybody's. What is in ``reads_if_there`` counts as an input
     where it exists, and is not missed where it does not. ``options`` are names of configuration
-    entries: only they enter the provenance. ``module`` holds a function ``run(unit)``.
+    entries: only they enter the provenance. ``module`` holds a function ``run(unit)``. ``amends``
+    are kinds of its own level that earlier stages write and to which it adds rows. ``part`` tells
+    apart two steps of one name and level.
     """
 
     name: str
@@ -28,10 +30,12 @@ class Stage:
     options: tuple[str, ...] = ()
     module: str = ""
     reads_if_there: tuple[str, ...] = ()
+    amends: tuple[str, ...] = ()
+    part: str = ""
 
     @property
     def label(self) -> str:
-        return f"{self.name} ({self.level})"
+        return f"{self.name} ({', '.join(filter(None, (self.level, self.part)))})"
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -127,16 +131,68 @@ STAGES = (
         reads=("overall-diagnosis",),
         reads_if_there=(
             "kinematics",
+            "wrench",
             "plates",
             "skeleton",
             "marker-positions",
             "person",
             "bsip",
-            "reconstruction",
+            "used-blocks",
         ),
         writes=("diagnosis", "attribution"),
-        options=("skeleton", "reconstruct"),
+        options=("skeleton", "loads", "reconstruct"),
         module="bsip_cli.stages.diagnose_trial",
+    ),
+    Stage(
+        "extend",
+        "participant",
+        "The model extended by what the diagnosis named, and what that gains.",
+        reads=(
+            "overall-diagnosis",
+            "markers",
+            "kinematics",
+            "wrench",
+            "plates",
+            "skeleton",
+            "marker-positions",
+            "regression",
+            "bsip",
+            "used-blocks",
+        ),
+        writes=("extended-bsip", "bsip-change", "extended-skeleton"),
+        options=("skeleton", "loads", "ik", "prior", "identify"),
+        module="bsip_cli.stages.extend",
+    ),
+    Stage(
+        "extend",
+        "trial",
+        "The model extended by what the diagnosis named, and what that gains.",
+        reads=(
+            "overall-diagnosis",
+            "markers",
+            "kinematics",
+            "wrench",
+            "plates",
+            "skeleton",
+            "marker-positions",
+            "person",
+            "bsip",
+            "used-blocks",
+            "extended-bsip",
+        ),
+        writes=("gain", "corrected-wrench"),
+        options=("skeleton", "loads", "ik", "reconstruct"),
+        module="bsip_cli.stages.extend_trial",
+        amends=("reconstruction", "fit"),
+    ),
+    Stage(
+        "extend",
+        "participant",
+        "The model extended by what the diagnosis named, and what that gains.",
+        reads=("gain",),
+        writes=("overall-gain",),
+        module="bsip_cli.stages.extend_gain",
+        part="gain",
     ),
     Stage(
         "stats",
@@ -177,7 +233,7 @@ STAGES = (
             "fit",
             "posturography",
         ),
-        reads_if_there=("overall-diagnosis", "detection", "attribution"),
+        reads_if_there=("overall-diagnosis", "detection", "attribution", "overall-gain"),
         writes=("report-files",),
         options=("skeleton", "loads", "roles"),
         module="bsip_cli.stages.report",

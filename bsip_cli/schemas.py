@@ -51,7 +51,7 @@ def _text(name: str, meaning: str) -> Column:
 
 
 _TIME = Column("time_s", "float", "s", "time from the start of the recording")
-_METHOD = _text("method", "measured, RM, OM or another estimator")
+_METHOD = _text("method", "measured, RM, OM, another estimator, or OM+<effect>: extended")
 _SEGMENT = _text("segment", "segment of the skeleton")
 _WRENCH = (
     *_floats("fx_N fy_N fz_N", "N", "ground force on the body", "world"),
@@ -121,6 +121,16 @@ _COMPARISON = (
         "participants in whom the first, the second method is (significantly) better",
     ),
     _text("reason", "why the test is not possible, or what to mind"),
+)
+
+_GAIN = (
+    _text("component", "fx fy fz mx my mz cop_ap cop_ml grf_vertical"),
+    _text("method", "the extended model that is compared with OM"),
+    *_floats("rmse_before rmse_after", "as unit", "of OM, and of the extended model"),
+    _text("unit", "N, N m or mm"),
+    Column("gain_percent", "float", "%", "by how much the second is smaller; negative: larger"),
+    *_floats("ci_low ci_high", "%", "95 % interval of the gain, from blocks of time"),
+    _text("data", "which trials and blocks were held out"),
 )
 
 _DIAGNOSIS = (
@@ -532,6 +542,78 @@ SCHEMAS = {
                 _text("source", "segment and group with their difference, in words"),
                 _text("sentence", "share and source in words"),
             ),
+        ),
+        Schema(
+            "extended-bsip",
+            "participant",
+            1,
+            "inertial parameters identified again, with the named causes in the model",
+            (
+                _text("method", "OM+<effect>; the last contains all causes"),
+                _SEGMENT,
+                *_bsip_columns(),
+            ),
+        ),
+        Schema(
+            "bsip-change",
+            "participant",
+            1,
+            "what the named causes had done to the identified parameters",
+            (
+                _text("method", "OM+<effect>, compared with OM"),
+                _SEGMENT,
+                Column("mass_change_kg", "float", "kg", "extended less OM"),
+                *_floats(
+                    "com_x_change_m com_y_change_m com_z_change_m",
+                    "m",
+                    "centre of mass, extended less OM",
+                    "segment",
+                ),
+                Column("com_change_m", "float", "m", "length of that shift"),
+                _text("largest", "mass, centre of mass or both: of all segments the most"),
+                _text("sentence", "for people"),
+            ),
+        ),
+        Schema(
+            "extended-skeleton",
+            "participant",
+            1,
+            "the torso in two parts where a second joint was named, else empty",
+            (
+                _text("segment", "part of the torso"),
+                _text("parent", "segment or part it hangs on"),
+                _text("joint", "name of the joint to the parent"),
+                *_floats("joint_x_m joint_y_m joint_z_m", "m", "joint centre", "parent"),
+                Column("length_m", "float", "m", "from this joint to the next"),
+                Column("mass_share", "float", "1", "part of the torso's mass"),
+                *_floats(
+                    "flexion_share lateral_share axial_share",
+                    "1",
+                    "part of the waist's rotation vector about Z, X, Y that happens at this joint",
+                ),
+            ),
+        ),
+        Schema(
+            "gain",
+            "trial",
+            1,
+            "what the extended model gains in this trial on data that did not size its causes",
+            _GAIN,
+        ),
+        Schema(
+            "corrected-wrench",
+            "trial",
+            1,
+            "ground wrench freed of the named errors of plates and clock; empty without any",
+            (_TIME, *_WRENCH, _VALID),
+        ),
+        Schema(
+            "overall-gain",
+            "participant",
+            1,
+            "what the extended model gains over all trials that the causes concern",
+            _GAIN,
+            "gain",
         ),
         Schema(
             "correlation-difference",

@@ -153,7 +153,7 @@ class Unit:
 
         A cohort stage judges itself what refusals leave of the cohort.
         """
-        return [kind for kind in self.stage.reads if not self._has(kind)]
+        return [k for k in (*self.stage.reads, *self.stage.amends) if not self._has(k)]
 
     def has(self, *kinds: str) -> bool:
         """Whether all these kinds, which the stage may read, are there and not refused."""
@@ -185,7 +185,16 @@ class Unit:
         if self.refusal_path().exists():
             return False
         wanted = self.provenance()
-        return all(self._is_current(kind, wanted) for kind in self.stage.writes)
+        return all(self._is_current(kind, wanted) for kind in self.stage.writes) and all(
+            self._is_amended(kind, wanted) for kind in self.stage.amends
+        )
+
+    def _is_amended(self, kind: str, amended_by: dict) -> bool:
+        try:
+            header = read_header(self.path(kind), kind)
+        except BadDataError:
+            return False
+        return header["provenance"].get("amended_by") == amended_by
 
     def _is_current(self, kind: str, made_by: dict) -> bool:
         path = self.path(kind)
@@ -219,6 +228,18 @@ class Unit:
         made_by = self.provenance()
         notes = {"made_by": made_by, "messages": list(self.messages), "facts": facts or {}}
         write_artifact(self.path(kind), kind, frame, notes)
+
+    def amend(self, kind: str, rows: pd.DataFrame) -> None:
+        """Put rows below those of the stage that made the artifact, instead of earlier ones.
+
+        What made the artifact stays what it was: its maker need not work again.
+        """
+        path = self.path(kind)
+        notes = read_header(path, kind)["provenance"]
+        made = read_artifact(path, kind).iloc[: notes.get("rows_made")]
+        notes |= {"amended_by": self.provenance(), "rows_made": len(made)}
+        whole = pd.concat([made, rows], ignore_index=True) if len(rows) else made
+        write_artifact(path, kind, whole, notes)
 
 
 def _recording_files(path: Path) -> list[Path]:

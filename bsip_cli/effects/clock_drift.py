@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from bsip_cli.effects.delayed import delayed
-from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.effect import Parameter
 from bsip_cli.effects.scene import Scene
 
 
-class ClockDrift(Effect):
+class ClockDrift(Delay):
     """The delay is zero where the trial begins and grows evenly."""
 
     name = "clock_drift"
     of_the_lab = True
     remedy = "hop at the beginning and at the end of a long recording"
 
-    def targets(self, scene: Scene) -> tuple[str, ...]:
-        return ("",)
-
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         return (Parameter("rate_error", "1", -0.02, 0.02, 3e-4),)
 
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        late = values[0] * (scene.times_s - scene.times_s[0])
-        return delayed(scene, late) - scene.predicted
+    def late_s(self, scene: Scene, values: np.ndarray) -> np.ndarray:
+        return values[0] * (scene.times_s - scene.times_s[0])
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         order = "slower" if values[0] > 0 else "faster"

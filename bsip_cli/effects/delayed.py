@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+
 import numpy as np
 
+from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Scene
 
 
-def delayed(scene: Scene, late_s: np.ndarray) -> np.ndarray:
-    """(N, 6) simulated wrench that comes ``late_s`` (N,) [s] late; its ends stay as they are."""
-    times = scene.times_s
-    at = np.clip(times - late_s, times[0], times[-1])
-    return scene.predicted_course(at)
+class Delay(Effect):
+    """The forces come late against the markers."""
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        return ("",)
+
+    @abstractmethod
+    def late_s(self, scene: Scene, values: np.ndarray) -> np.ndarray:
+        """(N,) how late the forces of each frame were recorded [s]."""
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """What the wrench of an earlier time has more; the trial's ends stay as they are."""
+        times = scene.times_s
+        at = np.clip(times - self.late_s(scene, values), times[0], times[-1])
+        return scene.predicted_course(at) - scene.predicted

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from bsip_cli.body.person import Person
 from bsip_cli.effects.displaced import displaced
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
@@ -12,6 +15,30 @@ from bsip_cli.effects.scene import Scene
 BELOW = 0.4  # of length and mass of the upper torso: up to T12/L1
 CHORD = 0.3  # share at which the change is exact; for others it is taken for linear
 AXES = {"flexion": 2, "lateral": 0, "axial": 1}
+
+
+@dataclass(frozen=True)
+class SplitTorso:
+    """The two parts of a torso that bends a second time.
+
+    Attributes
+    ----------
+    segment : that is split. joint_m : (3,) second joint from the first, segment axes.
+    below : part of length and mass below the second joint.
+    shares : per axis, in the order of ``AXES``, the part of the first joint's turn that happens at
+        the second.
+    """
+
+    segment: str
+    joint_m: np.ndarray
+    below: float
+    shares: tuple[float, ...]
+
+
+def split_torso(person: Person, target: str, values: np.ndarray) -> SplitTorso:
+    """The torso as the effect's values (3,) describe it."""
+    joint = _second_joint(person, person.skeleton.index(target))
+    return SplitTorso(target, joint, BELOW, tuple(float(x) for x in values))
 
 
 class MissingJoint(Effect):
@@ -78,15 +105,15 @@ def _shift_of(scene: Scene, i: int, place_m: np.ndarray) -> np.ndarray:
     return parent @ np.stack(columns, axis=2)
 
 
-def _second_joint(scene: Scene, i: int) -> np.ndarray:
+def _second_joint(person: Person, i: int) -> np.ndarray:
     """(3,) T12/L1 from the waist, on the line to the neck, torso axes [m]."""
-    return BELOW * scene.person.origin_in_joint_m[i]
+    return BELOW * person.origin_in_joint_m[i]
 
 
 def _errors(scene: Scene, target: str) -> np.ndarray:
     """(N, m', 3, 3) how markers of the torso and beyond lie off, per share and axis."""
     person, i = scene.person, scene.person.skeleton.index(target)
-    joint, places = _second_joint(scene, i), person.markers_in_joint_m()
+    joint, places = _second_joint(person, i), person.markers_in_joint_m()
     above = _shift_of(scene, i, joint)
     shifts = []
     for m in scene.markers_beyond(i):
@@ -98,7 +125,7 @@ def _errors(scene: Scene, target: str) -> np.ndarray:
 def _wrenches(scene: Scene, target: str) -> np.ndarray:
     """(N, 6, 3) change of the simulated wrench, per share and axis."""
     i = scene.person.skeleton.index(target)
-    joint = _second_joint(scene, i)
+    joint = _second_joint(scene.person, i)
     shift = _shift_of(scene, i, joint)
     moved = displaced(*scene.mass_beyond(i), shift, scene.rate_hz)
     # The part below is shifted by half as much on average.

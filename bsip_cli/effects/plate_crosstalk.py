@@ -14,6 +14,7 @@ class PlateCrosstalk(Effect):
 
     name = "plate_crosstalk"
     of_the_lab = True
+    of_the_plates = True
     remedy = "load the plate with a weight at several places"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

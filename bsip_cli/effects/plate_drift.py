@@ -14,6 +14,7 @@ class PlateDrift(Effect):
 
     name = "plate_drift"
     of_the_lab = False
+    of_the_plates = True
     remedy = "step off the plate at the beginning and at the end"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ class PlateGain(Effect):
 
     name = "plate_gain"
     of_the_lab = True
+    of_the_plates = True
     remedy = "weigh the person on a scale; lay a known weight on the plate"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

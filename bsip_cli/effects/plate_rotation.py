@@ -15,6 +15,7 @@ class PlateRotation(Effect):
 
     name = "plate_rotation"
     of_the_lab = True
+    of_the_plates = True
     remedy = "stand on the plate, push forwards and sideways, then turn by 90 degrees and repeat"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ class PlateTranslation(Effect):
 
     name = "plate_translation"
     of_the_lab = True
+    of_the_plates = True
     remedy = "stand on the plate with both feet, then turn by 90 degrees and stand again"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from bsip_cli.effects.scene import Scene
 class PlateZero(Effect):
     name = "plate_zero"
     of_the_lab = True
+    of_the_plates = True
     remedy = "step off the plate for five seconds"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

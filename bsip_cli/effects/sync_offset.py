@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from bsip_cli.effects.delayed import delayed
-from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.effect import Parameter
 from bsip_cli.effects.scene import Scene
 
 
-class SyncOffset(Effect):
+class SyncOffset(Delay):
     name = "sync_offset"
     of_the_lab = True
     remedy = "hop three times in view of cameras and plates"
 
-    def targets(self, scene: Scene) -> tuple[str, ...]:
-        return ("",)
-
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         return (Parameter("delay", "s", -0.5, 0.5, 0.01),)
 
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        late = np.full(len(scene.times_s), values[0])
-        return delayed(scene, late) - scene.predicted
+    def late_s(self, scene: Scene, values: np.ndarray) -> np.ndarray:
+        return np.full(len(scene.times_s), values[0])
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         order = "after" if values[0] > 0 else "before"

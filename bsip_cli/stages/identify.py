@@ -2,43 +2,34 @@
 
 from __future__ import annotations
 
-import importlib
-
 import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import empty_table
-from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
-from bsip_cli.dynamics.base_parameters import expressions, find_basis
-from bsip_cli.dynamics.lowpass import stretches
+from bsip_cli.dynamics.base_parameters import expressions
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.data_share import in_words
-from bsip_cli.identification.equations import Recording, accumulate, residual_series
+from bsip_cli.identification.equations import Recording
 from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.identification.excitation import Excitation, excitation
 from bsip_cli.identification.movement_gain import advice
-from bsip_cli.identification.noise import even_noise, noise_of
-from bsip_cli.identification.prior import Prior, Spread, likeliest, prior_of
 from bsip_cli.identification.uncertainty import readable
-from bsip_cli.schemas import bsip_names
-from bsip_cli.stages.frames import (
-    WRENCH,
-    acceleration_noise,
-    bsip_table,
-    coordinates_from,
-    person_from,
+from bsip_cli.stages.frames import WRENCH, bsip_table, person_from
+from bsip_cli.stages.identification_problem import (
+    duration_s,
+    estimate_by,
+    prior_from,
+    problem_of,
+    recordings_of,
+    usable_frames,
 )
-from bsip_cli.stages.known_loads import load_phi, load_words, loads_record
+from bsip_cli.stages.known_loads import load_words, loads_record
 from bsip_cli.study import Trial
 from bsip_cli.unit import Unit
 
-# Where the iteration of the weights begins: force plates and skin make errors of this size.
-_FIRST_NOISE = np.array([10.0, 10.0, 10.0, 5.0, 5.0, 5.0])
-_WEIGHT_ROUNDS = 3
 _SHORTEST_S = 0.5
 
 
@@ -47,16 +38,16 @@ def run(unit: Unit) -> None:
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     regression = unit.read("regression")
-    prior = _prior(unit, regression, person)
+    prior = prior_from(unit, regression, person)
     trials = _identification_trials(unit)
-    recordings, blocks = _recordings(unit, person, trials)
-    if _duration_s(recordings) < _SHORTEST_S:
+    recordings, blocks = recordings_of(unit, person, trials)
+    _tell_of_loads(unit, [trial for trial in trials if trial.stem in set(blocks["trial"])])
+    if duration_s(recordings) < _SHORTEST_S:
         _write_table_only(unit, regression, recordings)
         return
-    problem, reference = _problem(unit, person, prior, recordings)
+    problem, reference = problem_of(unit, person, prior, recordings)
     estimates: dict[str, Estimate] = {
-        str(name): importlib.import_module(f"bsip_cli.identification.{name}").estimate(problem)
-        for name in unit.config.identify.estimators
+        str(name): estimate_by(name, problem) for name in unit.config.identify.estimators
     }
     methods = _methods(unit)
     results = {name: readable(estimate, prior) for name, estimate in estimates.items()}
@@ -86,18 +77,12 @@ def run(unit: Unit) -> None:
 def _write_table_only(unit: Unit, regression: pd.DataFrame, recordings: list[Recording]) -> None:
     """Without forces that belong to the motion the table's values stand alone."""
     unit.warn(
-        f"{unit.name}: {_duration_s(recordings):.2f} s of motion with every contact on a plate, "
+        f"{unit.name}: {duration_s(recordings):.2f} s of motion with every contact on a plate, "
         f"needed are {_SHORTEST_S:g} s: nothing is identified, the table (RM) stands alone"
     )
     unit.write("bsip", regression.drop(columns="note"))
     for kind in ("base-parameters", "excitation", "identification", "used-blocks"):
         unit.write(kind, empty_table(kind))
-
-
-def _prior(unit: Unit, regression: pd.DataFrame, person: Person) -> Prior:
-    rows = regression[list(bsip_names())].to_numpy()
-    spread = Spread(**unit.config.prior.model_dump())
-    return prior_of(tuple(from_readable(row) for row in rows), person, spread)
 
 
 def _methods(unit: Unit) -> dict[str, str]:
@@ -109,18 +94,13 @@ def _methods(unit: Unit) -> dict[str, str]:
 # --- which data -------------------------------------------------------------------------------
 
 
-def _usable(unit: Unit, trial: Trial) -> np.ndarray:
-    kinematics = unit.read("kinematics", trial)
-    return kinematics["determined"].to_numpy() & unit.read("wrench", trial)["valid"].to_numpy()
-
-
 def _identification_trials(unit: Unit) -> list[Trial]:
     """The trials with the role; without one, the trial with most valid frames."""
     ready = unit.trials("kinematics", "wrench")
     named = [trial for trial in ready if trial.role == "sequence"]
     if named:
         return named
-    counts = {trial.stem: int(_usable(unit, trial).sum()) for trial in ready}
+    counts = {trial.stem: int(usable_frames(unit, trial).sum()) for trial in ready}
     moving = [t for t in ready if t.role != "static" and counts[t.stem] > 0] or list(ready)
     if not any(counts.values()):
         return []
@@ -134,81 +114,14 @@ def _identification_trials(unit: Unit) -> list[Trial]:
     return [chosen]
 
 
-def _recordings(
-    unit: Unit, person: Person, trials: list[Trial]
-) -> tuple[list[Recording], pd.DataFrame]:
-    """Motion and the wrench of the person alone, and the stretches that may identify."""
-    recordings, blocks = [], []
+def _tell_of_loads(unit: Unit, trials: list[Trial]) -> None:
     for trial in trials:
-        kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
-        times = kinematics["time_s"].to_numpy()
-        rate = 1.0 / float(np.median(np.diff(times)))
-        use = _usable(unit, trial) & ~_held_out(unit, times)
-        if not use.any():
-            unit.warn(
-                f"{unit.name}: {trial.stem} has no frame with all contacts on plates; left out"
-            )
-            continue
-        for start, stop in stretches(use):
-            blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})
-        motion = coordinates_from(kinematics, person.skeleton)
-        carried = _load_wrench(unit, person, trial, *motion)
-        measured = np.nan_to_num(wrench[WRENCH].to_numpy()) - carried
-        level = acceleration_noise(kinematics, person.skeleton)
-        recordings.append(Recording(*motion, measured, use, rate, level))
-    return recordings, pd.DataFrame(blocks, columns=["trial", "start_s", "end_s"])
-
-
-def _load_wrench(
-    unit: Unit, person: Person, trial: Trial, q: np.ndarray, v: np.ndarray, a: np.ndarray
-) -> np.ndarray:
-    """(N, 6) part of the ground wrench that a trial's known loads need."""
-    if not unit.loads(trial):
-        return np.zeros((len(q), 6))
-    known = load_words(unit, trial)
-    unit.warn(f"{unit.name}: taken off the forces of {trial.stem} as a known load: {known}")
-    phi = load_phi(unit, person, trial)[:, None]
-    return predicted_wrench(pinocchio_model(person), q, v, a, phi, np.zeros(3))[..., 0]
-
-
-def _duration_s(recordings: list[Recording]) -> float:
-    return sum(float(r.use.sum()) / r.rate_hz for r in recordings)
-
-
-def _held_out(unit: Unit, times: np.ndarray) -> np.ndarray:
-    """(N,) frames of the blocks that are kept out, spread evenly over the trial."""
-    options = unit.config.identify
-    block = ((times - times[0]) // options.block_s).astype(int)
-    share = options.hold_out_fraction
-    return np.floor((block + 1) * share + 1e-9) > np.floor(block * share + 1e-9)
+        known = load_words(unit, trial)
+        if known:
+            unit.warn(f"{unit.name}: taken off the forces of {trial.stem} as a known load: {known}")
 
 
 # --- the estimate -----------------------------------------------------------------------------
-
-
-def _problem(
-    unit: Unit, person: Person, prior: Prior, recordings: list[Recording]
-) -> tuple[Problem, np.ndarray]:
-    """Equations about the middle of the motion, weighted by what the fit leaves."""
-    model = pinocchio_model(person)
-    basis = find_basis(model)
-    reference = np.mean(
-        [np.append(r.q[r.use, :2].mean(axis=0), 0.0) for r in recordings if r.use.any()], axis=0
-    )
-    options = unit.config.identify
-    cutoff = options.cutoff_hz
-    judgement = (
-        options.trust_ratio,
-        options.sigma_percent_limit,
-        options.spread_weight,
-    )
-    equations = accumulate(model, recordings, cutoff, reference)
-    noise = even_noise(_FIRST_NOISE, equations.samples)
-    for _ in range(_WEIGHT_ROUNDS):
-        likely = likeliest(prior, *equations.weighted(noise.weights()))
-        noise = noise_of(residual_series(model, recordings, cutoff, reference, likely))
-        equations = accumulate(model, recordings, cutoff, reference, noise.weights_at)
-    return Problem(equations, noise, prior, basis, *judgement), reference
 
 
 def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:

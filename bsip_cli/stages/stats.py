@@ -14,7 +14,7 @@ from typing import Any
 import pandas as pd
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.pipeline import STAGES
+from bsip_cli.pipeline import STAGES, producer
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.statistics.cohort import DATA_SHARE, Criteria, compare
 from bsip_cli.statistics.cohort_correlations import CorrelationRun, PersonTest, person_tests
@@ -128,7 +128,8 @@ def _in_words(numbers: tuple[int, ...]) -> str:
 def _refused(unit: Unit, participant: Participant) -> str:
     """The stage whose refusal makes all of a participant's results stale, or nothing."""
     folder = unit.path("bsip", participant=participant).parent
-    before = [s.name for s in STAGES[: STAGES.index(unit.stage)] if s.level == "participant"]
+    last = max(STAGES.index(producer(kind)) for kind in unit.stage.reads)
+    before = [stage.name for stage in STAGES[:last] if stage.level == "participant"]
     names = [s for s in before if (folder / f"{participant.id}_refusal-{s}.parquet").exists()]
     return names[0] if names else ""
 

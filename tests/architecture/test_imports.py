@@ -122,8 +122,12 @@ def test_stages_do_not_know_each_other():
     """They meet in files; two reports share their writing of files."""
     helpers = {
         "stages.diagnosis_rows",
+        "stages.found_causes",
         "stages.frames",
+        "stages.gain_rows",
+        "stages.identification_problem",
         "stages.known_loads",
+        "stages.reconstructed",
         "stages.report",
         "stages.trial_scene",
     }

@@ -68,6 +68,20 @@ def test_writes_what_it_declares(stage):
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=LABELS)
+def test_amends_what_it_declares(stage):
+    """Not what it reads, lest it change its own input; at its own level, after the maker."""
+    assert kinds(tree_of(stage), "amend") == set(stage.amends)
+    assert set(stage.amends).isdisjoint({*stage.reads, *stage.writes})
+    assert {SCHEMAS[kind].level for kind in stage.amends} <= {stage.level}
+    before = STAGES[: STAGES.index(stage)]
+    assert {kind for kind in stage.amends if producer(kind) not in before} == set()
+
+
+def test_steps_have_labels_of_their_own():
+    assert len(set(LABELS)) == len(LABELS)
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=LABELS)
 def test_reads_only_what_an_earlier_stage_writes(stage):
     before = STAGES[: STAGES.index(stage)]
     assert {kind for kind in stage.inputs if producer(kind) not in before} == set()

@@ -39,7 +39,7 @@ OPTIONS = StudyOptions(
 )
 TRIALS = ("task-sequence_run-1", "task-squat_run-1", "task-static")
 GOLDEN = Path(__file__).with_name("files_of_a_run.txt")
-UNITS = 2 * (4 * 3 + 5) + 3  # 4 stages per trial, 5 per participant, 3 of the cohort
+UNITS = 2 * (3 * 5 + 7) + 3  # 5 stages per trial, 7 per participant, 3 of the cohort
 
 
 @dataclass(frozen=True)
@@ -76,20 +76,26 @@ class Run:
         return perform(Unit(first, study, self.out, config, study.participants[0]))
 
 
+def kind_of(name: str) -> str:
+    """Of an artifact's file: a trial's and a participant's may end alike."""
+    ending, of_a_trial = Path(name).stem.split("_")[-1], "_task-" in name
+    fitting = (kind for kind, schema in SCHEMAS.items() if schema.file_name == ending)
+    return next((k for k in fitting if (SCHEMAS[k].level == "trial") == of_a_trial), ending)
+
+
 def stages_of(names: set[str]) -> set[str]:
     """Which stages wrote these artifacts."""
-    kinds = {Path(name).stem.split("_")[-1] for name in names if name.endswith(".parquet")}
-    return {producer(kind).label for kind in kinds}
+    return {producer(kind_of(name)).label for name in names if name.endswith(".parquet")}
 
 
 def owners_of(names: set[str], stage: str) -> set[str]:
     """Trials, participants or group of a stage's artifacts among these names."""
     kinds = [kind for each in STAGES if each.name == stage for kind in each.writes]
     return {
-        Path(name).stem.removesuffix(f"_{kind}")
+        Path(name).stem.removesuffix(f"_{SCHEMAS[kind].file_name}")
         for name in names
         for kind in kinds
-        if name.endswith(f"_{kind}.parquet")
+        if name.endswith(".parquet") and kind_of(name) == kind
     }
 
 
@@ -138,12 +144,8 @@ def test_every_artifact_says_what_made_it(first_run, stage):
     files |= {path.name: path for path in first_run.study.rglob("*.c3d")}
     facts = set() if stage.level == "cohort" else {"participant"}
     for kind in stage.writes:
-        written = [
-            path
-            for name, path in files.items()
-            if name.endswith(f"_{SCHEMAS[kind].file_name}.parquet")
-            and read_header(path)["kind"] == kind
-        ]
+        artifacts = {name: path for name, path in files.items() if name.endswith(".parquet")}
+        written = [path for name, path in artifacts.items() if kind_of(name) == kind]
         assert len(written) == {"trial": 6, "participant": 2, "cohort": 1}[stage.level]
         for path in written:
             header = read_header(path, kind)
@@ -154,17 +156,10 @@ def test_every_artifact_says_what_made_it(first_run, stage):
             assert set(made_by["options"]) == set(stage.options) | facts
             hashes = {name: sha256(files[name]) for name in made_by["inputs"]}
             assert made_by["inputs"] == hashes
-            kinds = {_kind_or_name(files[name]) for name in hashes}
+            kinds = {kind_of(name) for name in hashes}
             recording = {path.name.removesuffix(f"_{kind}.parquet").split("_")[-1]}
             assert set(stage.reads) <= kinds
             assert kinds == (set(stage.inputs) or recording)
-
-
-def _kind_or_name(path: Path) -> str:
-    """Of an artifact its kind, of a recording the end of its name."""
-    if path.suffix == ".parquet":
-        return read_header(path)["kind"]
-    return path.stem.split("_")[-1]
 
 
 def sha256(path: Path) -> str:
@@ -229,9 +224,14 @@ def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
     times = run.times()
     chosen = ("--participant", "sub-01", "--config", own)
     answer = bsip("run", run.study, "--out", run.out, *chosen)
-    assert answer.summary.startswith("bsip run: 4 done, 9 up to date;")
+    assert answer.summary.startswith("bsip run: 8 done, 14 up to date;")
     rewritten = run.rewritten(times)
-    assert stages_of(rewritten) == {"reconstruct (trial)", "report (participant)"}
+    assert stages_of(rewritten) == {
+        "reconstruct (trial)",
+        "extend (trial)",
+        "extend (participant, gain)",
+        "report (participant)",
+    }
     assert all("sub-01" in name for name in rewritten)
     made_by = read_header(run.path("fit", f"sub-01_{TRIALS[0]}"))["provenance"]["made_by"]
     assert made_by["options"]["reconstruct"]["cop_min_force_percent_bw"] == 31.0
@@ -356,7 +356,7 @@ def test_corrupt_recording_and_its_return(run, bsip, first_run):
     assert sentence.startswith(f"ingest: {recording}: ")
     assert "; expected " in sentence
     assert ". To mend it: " in sentence
-    assert " 1 refused, 2 without input;" in answer.summary
+    assert " 1 refused, 4 without input;" in answer.summary
     rewritten = run.rewritten(times)
     assert not any(
         "sub-02" in name or "squat" in name for name in rewritten if "refusal" not in name
@@ -407,6 +407,18 @@ def test_refusal_makes_the_cohort_look_again(run):
     assert Unit(stats, study, run.out, config).is_fresh()
     shutil.copy(run.path("person"), run.path("refusal-scale", "sub-02"))
     assert not Unit(stats, study, run.out, config).is_fresh()
+
+
+@pytest.mark.parametrize(("stage", "counts"), [("scale", False), ("extend", True)])
+def test_who_counts_in_the_tables_after_a_refusal(run, stage, counts):
+    """What comes after the numbers that are compared takes nobody away."""
+    study, _ = load_study(run.study, load_config([]).roles.model_dump())
+    config = load_config([run.study / "study.toml"])
+    shutil.copy(run.path("person"), run.path(f"refusal-{stage}", "sub-02"))
+    stats = next(each for each in STAGES if each.name == "stats")
+    assert perform(Unit(stats, study, run.out, config)).state == "done"
+    people = set(read_artifact(run.path("values", "group"), "values")["participant"])
+    assert ("sub-02" in people) == counts
 
 
 def test_report_follows_what_was_refused(run):
@@ -485,5 +497,5 @@ def test_exchanged_labels_are_put_right_before_the_poses(run):
 
 def test_every_schema_is_exercised(first_run):
     """Nothing above would notice a kind that no run writes."""
-    kinds = {Path(name).stem.split("_")[-1] for name in first_run.files() if "parquet" in name}
+    kinds = {kind_of(name) for name in first_run.files() if "parquet" in name}
     assert kinds == set(SCHEMAS) - {"refusal"}

@@ -1,0 +1,68 @@
+"""A cause that the diagnosis keeps, with its sizes from all data and from each fold's others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.scene import Scene
+
+
+@dataclass(frozen=True)
+class Cause:
+    """An effect at a place, in some trials.
+
+    Attributes
+    ----------
+    trials : stems of the trials that it concerns.
+    values : (k,) all parameters, in the effect's order, from all data.
+    folds : (f, k) the same, estimated without the blocks of each fold.
+    """
+
+    effect: Effect
+    target: str
+    trials: tuple[str, ...]
+    values: np.ndarray
+    folds: np.ndarray
+
+    def change(self, scene: Scene) -> np.ndarray:
+        """(N, 6) what it adds to the simulated wrench, about the world's origin [N, N m]."""
+        return self.effect.change(scene, self.target, self.values)
+
+    def unseen_change(self, scene: Scene, fold: np.ndarray) -> np.ndarray:
+        """(N, 6) the same, every frame with the sizes that its fold (N,) did not help to find."""
+        change = np.empty((len(fold), 6))
+        for number in np.unique(fold):
+            frames = fold == number
+            change[frames] = self.effect.change(scene, self.target, self.folds[number])[frames]
+        return change
+
+
+def method_of(causes: Iterable[Cause]) -> str:
+    """``OM+sync_offset+breathing``: the identified model, extended by these."""
+    return "+".join(["OM", *(cause.effect.name for cause in causes)])
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """The stretches of a trial that the diagnosis held out together.
+
+    first : number of the first, counted through all trials. start_s : where it begins.
+    """
+
+    first: int
+    start_s: float
+    block_s: float
+    folds: int
+
+    def of(self, times_s: np.ndarray) -> np.ndarray:
+        """(N,) number of the block of each time; what lies before the first belongs to it."""
+        later = np.maximum(times_s - self.start_s, 0.0)
+        return self.first + (later / self.block_s).astype(int)
+
+    def fold_of(self, times_s: np.ndarray) -> np.ndarray:
+        """(N,) fold of each time."""
+        return self.of(times_s) % self.folds

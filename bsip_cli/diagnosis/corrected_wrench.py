@@ -1,0 +1,57 @@
+"""The ground wrench as plates without error, on the cameras' clock, would have measured it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from bsip_cli.diagnosis.cause import Cause
+from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.scene import Scene
+
+_ROUNDS = 2  # a clock's rate is wrong by 2 % at most: each round leaves 2 % of the error
+
+
+def is_of_the_forces(cause: Cause) -> bool:
+    """Whether the measured forces are wrong, and can be put right."""
+    return cause.effect.of_the_plates or isinstance(cause.effect, Delay)
+
+
+def corrected_wrench(
+    scene: Scene, measured: np.ndarray, causes: Sequence[Cause]
+) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 6) wrench about the world's origin, and (N,) frames in which it is valid.
+
+    What the plates add is taken off first, as they recorded it; then the forces are moved to the
+    frames to which they belong.
+    """
+    wrench, valid = measured.copy(), scene.valid.copy()
+    for cause in causes:
+        if cause.effect.of_the_plates:
+            wrench -= cause.change(scene)
+    late_s = np.zeros(len(scene.times_s))
+    for cause in causes:
+        if isinstance(cause.effect, Delay):
+            late_s += cause.effect.late_s(scene, cause.values)
+    if late_s.any():
+        wrench, valid = _earlier(wrench, valid, scene.times_s, late_s)
+    return wrench, valid
+
+
+def _earlier(
+    wrench: np.ndarray, valid: np.ndarray, times_s: np.ndarray, late_s: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """What belongs to each frame but was recorded late; valid where its four neighbours are.
+
+    late_s : (N,) how late each frame was recorded, so a frame's forces are where t - late = frame.
+    """
+    at = times_s + late_s
+    for _ in range(_ROUNDS):
+        at = times_s + np.interp(at, times_s, late_s)
+    inside = np.clip(at, times_s[0], times_s[-1])
+    moved = CubicSpline(times_s, np.nan_to_num(wrench))(inside)
+    next_ = np.clip(np.searchsorted(times_s, inside), 1, len(times_s) - 1)
+    around = np.clip(next_[:, None] + np.arange(-2, 2), 0, len(times_s) - 1)
+    return moved, valid[around].all(axis=1) & (at == inside)

@@ -1,0 +1,172 @@
+"""extend (participant): the parameters identified again with the named causes in the model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.artifacts import empty_table
+from bsip_cli.body.person import Person
+from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.diagnosis.cause import Cause, method_of
+from bsip_cli.effects.missing_joint import AXES, MissingJoint, split_torso
+from bsip_cli.identification.uncertainty import readable
+from bsip_cli.report.words import listing, segment_label
+from bsip_cli.stages.found_causes import causes_of
+from bsip_cli.stages.frames import bsip_table, person_from
+from bsip_cli.stages.identification_problem import (
+    estimate_by,
+    prior_from,
+    problem_of,
+    recordings_of,
+)
+from bsip_cli.stages.reconstructed import parameters_of
+from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.study import Trial
+from bsip_cli.unit import Unit
+
+_COM = ["com_x_m", "com_y_m", "com_z_m"]
+_COM_CHANGE = ["com_x_change_m", "com_y_change_m", "com_z_change_m"]
+
+
+def run(unit: Unit) -> None:
+    """Read the diagnosis and what identified OM; write the extended model's parameters."""
+    skeleton = load_skeleton(unit.config.skeleton)
+    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    causes = causes_of(unit)
+    unit.write("extended-skeleton", _skeleton_rows(person, causes))
+    bsip, trials = unit.read("bsip"), _identifying(unit)
+    if causes and not trials:
+        unit.warn(f"{unit.name}: nothing was identified, so there is no OM to extend")
+    if not causes or not trials:
+        unit.write("extended-bsip", empty_table("extended-bsip"))
+        unit.write("bsip-change", empty_table("bsip-change"))
+        return
+    extended = _extended(unit, person, bsip, causes, trials)
+    changes = _changes(bsip, extended)
+    unit.write("extended-bsip", extended)
+    unit.write("bsip-change", changes)
+    for method in dict.fromkeys(changes["method"]):
+        unit.warn(f"{unit.name}: {_said(method, changes[changes['method'] == method])}")
+
+
+def _identifying(unit: Unit) -> list[Trial]:
+    """The trials that identified OM."""
+    stems = set(unit.read("used-blocks")["trial"])
+    return [trial for trial in unit.trials("kinematics", "wrench") if trial.stem in stems]
+
+
+# --- parameters -------------------------------------------------------------------------------
+
+
+def _extended(
+    unit: Unit, person: Person, bsip: pd.DataFrame, causes: tuple[Cause, ...], trials: list[Trial]
+) -> pd.DataFrame:
+    """Rows of ``bsip`` per number of causes in the model."""
+    methods, parameters = parameters_of(bsip, person)
+    phi = parameters[:, methods.index("OM")]
+    concerned = {stem for cause in causes for stem in cause.trials}
+    scenes = {t.stem: scene_of(unit, person, phi, t) for t in trials if t.stem in concerned}
+    rows = bsip[bsip["method"] == "OM"]
+    changes: dict[str, np.ndarray] = {}
+    tables = []
+    for k, cause in enumerate(causes):
+        touched = [stem for stem in cause.trials if stem in scenes]
+        for stem in touched:
+            changes[stem] = changes.get(stem, 0.0) + cause.change(scenes[stem])
+        if touched:
+            rows = _identified(unit, person, trials, changes)
+        tables.append(rows.assign(method=method_of(causes[: k + 1])))
+    return pd.concat(tables, ignore_index=True)
+
+
+def _identified(
+    unit: Unit, person: Person, trials: list[Trial], changes: dict[str, np.ndarray]
+) -> pd.DataFrame:
+    """OM's estimate after ``changes`` are taken off the measured wrench."""
+    prior = prior_from(unit, unit.read("regression"), person)
+    recordings, _ = recordings_of(unit, person, trials, changes)
+    problem, _ = problem_of(unit, person, prior, recordings)
+    found = readable(estimate_by(unit.config.identify.estimators[0], problem), prior)
+    return bsip_table("OM", person.skeleton.segments, found.values, found.sd, found.share)
+
+
+# --- what the causes had done -----------------------------------------------------------------
+
+
+def _changes(bsip: pd.DataFrame, extended: pd.DataFrame) -> pd.DataFrame:
+    before = bsip[bsip["method"] == "OM"].set_index("segment")
+    tables = [
+        _change(before, extended[extended["method"] == method].set_index("segment"), method)
+        for method in dict.fromkeys(extended["method"])
+    ]
+    return pd.concat(tables, ignore_index=True)
+
+
+def _change(before: pd.DataFrame, after: pd.DataFrame, method: str) -> pd.DataFrame:
+    before = before.loc[after.index]
+    mass = (after["mass_kg"] - before["mass_kg"]).to_numpy()
+    shift = (after[_COM] - before[_COM]).to_numpy()
+    length = np.linalg.norm(shift, axis=1)
+    table = pd.DataFrame({"method": method, "segment": list(after.index), "mass_change_kg": mass})
+    table[_COM_CHANGE] = shift
+    table["com_change_m"] = length
+    table["largest"] = _largest(mass, length)
+    table["sentence"] = [
+        f"{segment_label(segment)}: mass {m:+.3f} kg, centre of mass moved by {1000 * x:.1f} mm"
+        for segment, m, x in zip(after.index, mass, length, strict=True)
+    ]
+    return table
+
+
+def _largest(mass: np.ndarray, length: np.ndarray) -> list[str]:
+    """Which segments change most; none where nothing changes."""
+    words: list[list[str]] = [[] for _ in mass]
+    for name, sizes in (("mass", np.abs(mass)), ("centre of mass", length)):
+        if sizes.max() > 0:
+            words[int(sizes.argmax())].append(name)
+    return [" and ".join(found) for found in words]
+
+
+def _said(method: str, rows: pd.DataFrame) -> str:
+    largest = rows.loc[rows["largest"] != "", "sentence"]
+    what = listing(list(largest), "") or "OM's parameters, no cause concerns what identified them"
+    return f"{method} against OM: {what}"
+
+
+# --- skeleton ---------------------------------------------------------------------------------
+
+
+def _skeleton_rows(person: Person, causes: tuple[Cause, ...]) -> pd.DataFrame:
+    """The two parts of the torso, if its second joint was named."""
+    for cause in causes:
+        if isinstance(cause.effect, MissingJoint):
+            return _torso_rows(person, cause)
+    return empty_table("extended-skeleton")
+
+
+def _torso_rows(person: Person, cause: Cause) -> pd.DataFrame:
+    split = split_torso(person, cause.target, cause.values)
+    skeleton, i = person.skeleton, person.skeleton.index(split.segment)
+    below, above = f"{split.segment}_below", f"{split.segment}_above"
+    whole = person.origin_in_joint_m[i]
+    shares = np.array(split.shares)
+    parent = skeleton.segments[skeleton.parents[i]]
+    parts = (
+        (below, parent, skeleton.joints[i], person.joint_in_parent_m[i], split.below, 1 - shares),
+        (above, below, "T12/L1", split.joint_m, 1 - split.below, shares),
+    )
+    return pd.DataFrame(
+        [
+            {
+                "segment": segment,
+                "parent": hangs_on,
+                "joint": joint,
+                **dict(zip(("joint_x_m", "joint_y_m", "joint_z_m"), place, strict=True)),
+                "length_m": part * float(np.linalg.norm(whole)),
+                "mass_share": part,
+                **{f"{axis}_share": x for axis, x in zip(AXES, turned, strict=True)},
+            }
+            for segment, hangs_on, joint, place, part, turned in parts
+        ]
+    )

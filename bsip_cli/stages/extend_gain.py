@@ -1,0 +1,55 @@
+"""extend (participant, gain): what the extended model gains over all trials that it concerns."""
+
+from __future__ import annotations
+
+from zlib import crc32
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.artifacts import empty_table
+from bsip_cli.diagnosis.error_gain import BlockErrors, pooled
+from bsip_cli.stages.gain_rows import gain_rows
+from bsip_cli.unit import Unit
+
+
+def run(unit: Unit) -> None:
+    """Read the trials' gains with their sums per block; write the person's."""
+    facts = {trial.stem: unit.facts("gain", trial) for trial in unit.trials("gain")}
+    concerned = {stem: one for stem, one in facts.items() if one}
+    if not concerned:
+        unit.write("overall-gain", empty_table("overall-gain"))
+        return
+    components = next(iter(concerned.values()))["blocks"]
+    errors = {
+        component: pooled([_errors(one["blocks"][component]) for one in concerned.values()])
+        for component in components
+    }
+    methods = dict.fromkeys(one["method"] for one in concerned.values())
+    seed = crc32(unit.name.encode())
+    rows = gain_rows(errors, ", ".join(methods), _data(concerned), seed)
+    unit.write("overall-gain", rows)
+    unit.warn(f"{unit.name}: {_said(', '.join(methods), rows)}")
+
+
+def _errors(sums: dict[str, list[float]]) -> BlockErrors:
+    return BlockErrors(**{name: np.array(values) for name, values in sums.items()})
+
+
+def _said(methods: str, rows: pd.DataFrame) -> str:
+    sure = [
+        f"{row['component']} {row['gain_percent']:+.1f} % "
+        f"({row['ci_low']:+.1f} to {row['ci_high']:+.1f})"
+        for row in rows[rows["ci_low"] > 0].to_dict("records")
+    ]
+    found = f"lowers the error: {', '.join(sure)}" if sure else "lowers no error for sure"
+    return f"{methods} {found}"
+
+
+def _data(concerned: dict[str, dict]) -> str:
+    """``held_out: a, b; identification: c``."""
+    kinds = dict.fromkeys(one["data"] for one in concerned.values())
+    return "; ".join(
+        f"{kind}: {', '.join(stem for stem, one in concerned.items() if one['data'] == kind)}"
+        for kind in kinds
+    )

@@ -1,0 +1,147 @@
+"""extend (trial): the extended model beside RM and OM, and its gain on data not used to size it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from zlib import crc32
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.artifacts import empty_table
+from bsip_cli.body.person import Person
+from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.diagnosis.cause import Blocks, Cause, method_of
+from bsip_cli.diagnosis.corrected_wrench import corrected_wrench, is_of_the_forces
+from bsip_cli.diagnosis.error_gain import BlockErrors, block_errors
+from bsip_cli.effects.scene import Scene
+from bsip_cli.stages.found_causes import blocks_of, causes_of
+from bsip_cli.stages.frames import WRENCH, person_from
+from bsip_cli.stages.gain_rows import gain_rows
+from bsip_cli.stages.known_loads import load_phi
+from bsip_cli.stages.reconstructed import (
+    MEASURED,
+    Judgement,
+    Signals,
+    Wrenches,
+    fit_rows,
+    judgement_of,
+    parameters_of,
+    reconstruction_rows,
+    scale_of,
+)
+from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.unit import Unit
+
+
+def run(unit: Unit) -> None:
+    """Read the causes, motion, wrench and parameters; write the gain, amend the comparison."""
+    assert unit.trial is not None
+    causes, extended = causes_of(unit), unit.read("extended-bsip")
+    own = [k for k, cause in enumerate(causes) if unit.trial.stem in cause.trials]
+    if not own or extended.empty:
+        _nothing(unit)
+        return
+    skeleton = load_skeleton(unit.config.skeleton)
+    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    measured = unit.read("wrench")
+    judgement = judgement_of(unit, unit.read("kinematics"), measured)
+    blocks = blocks_of(unit, unit.trial.stem)
+    scene, parameters = _scene(unit, person, extended)
+    fold = blocks.fold_of(judgement.times_s)
+    raw: Wrenches = {MEASURED: measured[WRENCH].to_numpy(), "OM": scene.predicted}
+    for place, k in enumerate(own):
+        among = [causes[j] for j in own[: place + 1]]
+        body = replace(scene, phi=parameters[method_of(causes[: k + 1])])
+        raw[method_of(among)] = body.predicted + sum(c.unseen_change(body, fold) for c in among)
+    wrenches = {name: judgement.filtered(wrench) for name, wrench in raw.items()}
+    signals = {name: judgement.signals(wrench) for name, wrench in wrenches.items()}
+    _amend(unit, judgement, wrenches, signals)
+    last = list(signals)[-1]
+    errors = _errors(judgement, signals, last, blocks)
+    unit.write(
+        "gain",
+        gain_rows(errors, last, _held_out(unit, judgement), crc32(unit.name.encode())),
+        facts=_facts(errors, last, judgement),
+    )
+    unit.write("corrected-wrench", _corrected(body, measured, [causes[k] for k in own]))
+
+
+def _nothing(unit: Unit) -> None:
+    """No cause concerns the trial: RM and OM stand alone."""
+    for kind in ("gain", "corrected-wrench"):
+        unit.write(kind, empty_table(kind))
+    for kind in ("reconstruction", "fit"):
+        unit.amend(kind, empty_table(kind))
+
+
+def _scene(
+    unit: Unit, person: Person, extended: pd.DataFrame
+) -> tuple[Scene, dict[str, np.ndarray]]:
+    """The trial with OM's parameters; those (10 n,) of each extended model, loads included."""
+    methods, phi = parameters_of(unit.read("bsip"), person)
+    names, steps = parameters_of(extended, person)
+    steps = steps + load_phi(unit, person)[:, None]
+    scene = scene_of(unit, person, phi[:, methods.index("OM")])
+    return scene, dict(zip(names, steps.T, strict=True))
+
+
+def _amend(unit: Unit, judgement: Judgement, wrenches: Wrenches, signals: Signals) -> None:
+    ours = [name for name in signals if name.startswith("OM+")]
+    rows = reconstruction_rows(
+        judgement, {name: wrenches[name] for name in ours}, {name: signals[name] for name in ours}
+    )
+    unit.amend("reconstruction", rows)
+    compared = {name: signals[name] for name in (MEASURED, *ours)}
+    unit.amend("fit", fit_rows(judgement, compared))
+
+
+# --- gain -------------------------------------------------------------------------------------
+
+
+def _errors(
+    judgement: Judgement, signals: Signals, method: str, blocks: Blocks
+) -> dict[str, BlockErrors]:
+    """Per component, in the units that people read."""
+    judged = judgement.judged
+    numbers = blocks.of(judgement.times_s)[judged]
+    errors = {}
+    for component in signals[MEASURED]:
+        scale, _ = scale_of(component)
+        measured, before, after = (
+            scale * signals[name][component][judged] for name in (MEASURED, "OM", method)
+        )
+        errors[component] = block_errors(measured, before, after, numbers)
+    return errors
+
+
+def _held_out(unit: Unit, judgement: Judgement) -> str:
+    facts = unit.facts("overall-diagnosis")
+    sizes = (
+        f"blocks of {facts['block_s']:g} s, in {facts['folds']} folds, each judged with the sizes "
+        "of the causes that the other folds gave"
+    )
+    identified = "held out of" if judgement.data == "held_out" else "used in"
+    return f"{judgement.data}: {sizes}; the trial was {identified} the identification"
+
+
+def _facts(errors: dict[str, BlockErrors], method: str, judgement: Judgement) -> dict:
+    """The sums per block, for the gain over all trials."""
+    sums = {
+        component: {name: values.tolist() for name, values in asdict(one).items()}
+        for component, one in errors.items()
+    }
+    return {"method": method, "data": judgement.data, "blocks": sums}
+
+
+# --- forces without their errors --------------------------------------------------------------
+
+
+def _corrected(scene: Scene, measured: pd.DataFrame, causes: list[Cause]) -> pd.DataFrame:
+    if not any(is_of_the_forces(cause) for cause in causes):
+        return empty_table("corrected-wrench")
+    of_the_plates = replace(scene, valid=measured["valid"].to_numpy())
+    wrench, valid = corrected_wrench(of_the_plates, measured[WRENCH].to_numpy(), causes)
+    table = pd.DataFrame(wrench, columns=WRENCH)
+    table.insert(0, "time_s", scene.times_s)
+    return table.assign(valid=valid)

@@ -1,0 +1,128 @@
+"""The identification's recordings and equations, for every stage that identifies."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.body.inertia import from_readable
+from bsip_cli.body.person import Person
+from bsip_cli.dynamics.base_parameters import find_basis
+from bsip_cli.dynamics.lowpass import stretches
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.regressor import predicted_wrench
+from bsip_cli.identification.equations import Recording, accumulate, residual_series
+from bsip_cli.identification.estimator import Estimate, Problem
+from bsip_cli.identification.noise import even_noise, noise_of
+from bsip_cli.identification.prior import Prior, Spread, likeliest, prior_of
+from bsip_cli.schemas import bsip_names
+from bsip_cli.stages.frames import WRENCH, acceleration_noise, coordinates_from
+from bsip_cli.stages.known_loads import load_phi
+from bsip_cli.study import Trial
+from bsip_cli.unit import Unit
+
+# Where the iteration of the weights begins: force plates and skin make errors of this size.
+_FIRST_NOISE = np.array([10.0, 10.0, 10.0, 5.0, 5.0, 5.0])
+_WEIGHT_ROUNDS = 3
+
+
+def prior_from(unit: Unit, regression: pd.DataFrame, person: Person) -> Prior:
+    """What is known of a person before the data, from the rows of ``regression``."""
+    rows = regression[list(bsip_names())].to_numpy()
+    spread = Spread(**unit.config.prior.model_dump())
+    return prior_of(tuple(from_readable(row) for row in rows), person, spread)
+
+
+def usable_frames(unit: Unit, trial: Trial) -> np.ndarray:
+    """(N,) frames whose pose is determined and whose contacts are all measured."""
+    kinematics = unit.read("kinematics", trial)
+    return kinematics["determined"].to_numpy() & unit.read("wrench", trial)["valid"].to_numpy()
+
+
+def recordings_of(
+    unit: Unit,
+    person: Person,
+    trials: Iterable[Trial],
+    changes: Mapping[str, np.ndarray] | None = None,
+) -> tuple[list[Recording], pd.DataFrame]:
+    """Motion and the wrench of the person alone, and the stretches that may identify.
+
+    changes : of a trial's stem, the part (N, 6) of its measured wrench that is not the person's.
+    """
+    recordings, blocks = [], []
+    for trial in trials:
+        kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
+        times = kinematics["time_s"].to_numpy()
+        rate = 1.0 / float(np.median(np.diff(times)))
+        use = usable_frames(unit, trial) & ~_held_out(unit, times)
+        if not use.any():
+            unit.warn(
+                f"{unit.name}: {trial.stem} has no frame with all contacts on plates; left out"
+            )
+            continue
+        for start, stop in stretches(use):
+            blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})
+        motion = coordinates_from(kinematics, person.skeleton)
+        carried = _load_wrench(unit, person, trial, *motion)
+        measured = np.nan_to_num(wrench[WRENCH].to_numpy()) - carried
+        if changes and trial.stem in changes:
+            measured = measured - changes[trial.stem]
+        level = acceleration_noise(kinematics, person.skeleton)
+        recordings.append(Recording(*motion, measured, use, rate, level))
+    return recordings, pd.DataFrame(blocks, columns=["trial", "start_s", "end_s"])
+
+
+def _load_wrench(
+    unit: Unit, person: Person, trial: Trial, q: np.ndarray, v: np.ndarray, a: np.ndarray
+) -> np.ndarray:
+    """(N, 6) part of the ground wrench that a trial's known loads need."""
+    if not unit.loads(trial):
+        return np.zeros((len(q), 6))
+    phi = load_phi(unit, person, trial)[:, None]
+    return predicted_wrench(pinocchio_model(person), q, v, a, phi, np.zeros(3))[..., 0]
+
+
+def duration_s(recordings: list[Recording]) -> float:
+    """Time that may identify [s]."""
+    return sum(float(r.use.sum()) / r.rate_hz for r in recordings)
+
+
+def _held_out(unit: Unit, times: np.ndarray) -> np.ndarray:
+    """(N,) frames of the blocks that are kept out, spread evenly over the trial."""
+    options = unit.config.identify
+    block = ((times - times[0]) // options.block_s).astype(int)
+    share = options.hold_out_fraction
+    return np.floor((block + 1) * share + 1e-9) > np.floor(block * share + 1e-9)
+
+
+def estimate_by(estimator: str, problem: Problem) -> Estimate:
+    """What the estimator of this name makes of the problem."""
+    return importlib.import_module(f"bsip_cli.identification.{estimator}").estimate(problem)
+
+
+def problem_of(
+    unit: Unit, person: Person, prior: Prior, recordings: list[Recording]
+) -> tuple[Problem, np.ndarray]:
+    """Equations about the middle of the motion, weighted by what the fit leaves."""
+    model = pinocchio_model(person)
+    basis = find_basis(model)
+    reference = np.mean(
+        [np.append(r.q[r.use, :2].mean(axis=0), 0.0) for r in recordings if r.use.any()], axis=0
+    )
+    options = unit.config.identify
+    cutoff = options.cutoff_hz
+    judgement = (
+        options.trust_ratio,
+        options.sigma_percent_limit,
+        options.spread_weight,
+    )
+    equations = accumulate(model, recordings, cutoff, reference)
+    noise = even_noise(_FIRST_NOISE, equations.samples)
+    for _ in range(_WEIGHT_ROUNDS):
+        likely = likeliest(prior, *equations.weighted(noise.weights()))
+        noise = noise_of(residual_series(model, recordings, cutoff, reference, likely))
+        equations = accumulate(model, recordings, cutoff, reference, noise.weights_at)
+    return Problem(equations, noise, prior, basis, *judgement), reference

@@ -1,0 +1,186 @@
+"""What reconstruct and extend share: a trial's wrenches filtered, judged and tabulated alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy import sparse
+
+from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.body.inertia import from_readable
+from bsip_cli.body.person import Person
+from bsip_cli.dynamics.cop import anterior_and_right, centre_of_pressure
+from bsip_cli.dynamics.lowpass import lowpass_operator, stretches
+from bsip_cli.schemas import bsip_names
+from bsip_cli.stages.frames import WRENCH
+from bsip_cli.statistics.fit_measures import fit_measures
+from bsip_cli.unit import Unit
+
+MEASURED = "measured"
+_COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
+_SHORTEST_HELD_OUT_S = 0.5
+
+Wrenches = dict[str, np.ndarray]  # method: (N, 6) about the world's origin [N, N m]
+Signals = dict[str, dict[str, np.ndarray]]  # method: component: (N,) [N, N m, m]
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """By what a trial's wrenches are compared.
+
+    Attributes
+    ----------
+    times_s : (N,). valid : (N,) frames with every contact on a plate and a determined pose.
+    used : (N,) frames that helped to identify. judged : (N,) frames that count.
+    data : held_out, or identification where no other data are left.
+    operator, frames : low-pass inside the valid stretches, and the frame of each output.
+    """
+
+    times_s: np.ndarray
+    valid: np.ndarray
+    used: np.ndarray
+    judged: np.ndarray
+    data: str
+    operator: sparse.csr_array
+    frames: np.ndarray
+    surface_height_m: float
+    anterior: np.ndarray
+    body_weight_N: float
+    min_force_N: float
+
+    def filtered(self, wrench: np.ndarray) -> np.ndarray:
+        """(N, 6) low-passed inside the valid stretches, as it was outside."""
+        smooth = wrench.copy()
+        smooth[self.frames] = self.operator @ np.nan_to_num(wrench)
+        return smooth
+
+    def signals(self, wrench: np.ndarray) -> dict[str, np.ndarray]:
+        """All judged components (N,) of a wrench [N, N m, m]."""
+        signals = dict(zip(_COMPONENTS, wrench.T, strict=True))
+        cop = centre_of_pressure(wrench, self.surface_height_m, self.min_force_N)
+        signals["cop_ap"], signals["cop_ml"] = anterior_and_right(cop, self.anterior)
+        signals["grf_vertical"] = signals["fz"]
+        return signals
+
+
+def judgement_of(unit: Unit, kinematics: pd.DataFrame, measured: pd.DataFrame) -> Judgement:
+    """From the trial's ``kinematics`` and ``wrench``, its plates, the person and used-blocks."""
+    facts, options = unit.read("person").iloc[0], unit.config.reconstruct
+    times = kinematics["time_s"].to_numpy()
+    valid = measured["valid"].to_numpy() & kinematics["determined"].to_numpy()
+    used = _used(unit, times)
+    judged, data = _judged(valid, used, times)
+    rate = 1.0 / float(np.median(np.diff(times)))
+    operator, frames = lowpass_operator(valid, rate, options.cutoff_hz)
+    weight = facts["mass_kg"] * GRAVITY_M_S2
+    return Judgement(
+        times,
+        valid,
+        used,
+        judged,
+        data,
+        operator,
+        frames,
+        _surface_height(unit),
+        facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float),
+        weight,
+        options.cop_min_force_percent_bw / 100 * weight,
+    )
+
+
+def parameters_of(bsip: pd.DataFrame, person: Person) -> tuple[list[str], np.ndarray]:
+    """Methods and their parameters (10 n, k) about the joint centres."""
+    methods = list(dict.fromkeys(bsip["method"]))
+    columns = []
+    for method in methods:
+        rows = bsip[bsip["method"] == method].set_index("segment")
+        rows = rows.loc[list(person.skeleton.segments), list(bsip_names())].to_numpy()
+        columns.append(
+            np.concatenate(
+                [
+                    from_readable(row).moved(-origin).phi()
+                    for row, origin in zip(rows, person.origin_in_joint_m, strict=True)
+                ]
+            )
+        )
+    return methods, np.stack(columns, axis=1)
+
+
+def _surface_height(unit: Unit) -> float:
+    """Height of the plates' surface [m]; the floor where no outline is known."""
+    corners = unit.read("plates")["z_m"].to_numpy()
+    return float(corners.mean()) if len(corners) else 0.0
+
+
+def _used(unit: Unit, times: np.ndarray) -> np.ndarray:
+    """(N,) frames that helped to identify the parameters."""
+    blocks = unit.read("used-blocks")
+    used = np.zeros(len(times), dtype=bool)
+    assert unit.trial is not None
+    for row in blocks[blocks["trial"] == unit.trial.stem].itertuples():
+        used |= (times >= row.start_s) & (times <= row.end_s)
+    return used
+
+
+def _judged(valid: np.ndarray, used: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, str]:
+    """Frames to judge by: those not used to identify, or all where none are left."""
+    fresh = valid & ~used
+    if used.any() and fresh.sum() * float(np.median(np.diff(times))) < _SHORTEST_HELD_OUT_S:
+        return valid, "identification"
+    return fresh, "held_out"
+
+
+# --- tables ---------------------------------------------------------------------------------
+
+
+def reconstruction_rows(judgement: Judgement, wrenches: Wrenches, signals: Signals) -> pd.DataFrame:
+    """Rows of ``reconstruction``, method by method."""
+    parts = []
+    for name, wrench in wrenches.items():
+        part = pd.DataFrame(wrench, columns=WRENCH)
+        part.insert(0, "time_s", judgement.times_s)
+        part.insert(1, "method", name)
+        part["cop_ap_m"], part["cop_ml_m"] = signals[name]["cop_ap"], signals[name]["cop_ml"]
+        part["valid"], part["used"] = judgement.valid, judgement.used
+        parts.append(part)
+    return pd.concat(parts, ignore_index=True)
+
+
+def scale_of(component: str) -> tuple[float, str]:
+    """Factor and unit in which people read a component's error."""
+    if component.startswith("cop"):
+        return 1000.0, "mm"
+    return 1.0, "N m" if component.startswith("m") else "N"
+
+
+def fit_rows(judgement: Judgement, signals: Signals) -> pd.DataFrame:
+    """Rows of ``fit``: every method of ``signals`` against the measured one."""
+    rows, spans = [], stretches(judgement.judged)
+    for method, computed in signals.items():
+        if method == "measured":
+            continue
+        for component, values in computed.items():
+            scale, unit = scale_of(component)
+            weight = judgement.body_weight_N if unit == "N" else None
+            fit = fit_measures(
+                signals["measured"][component] * scale, values * scale, spans, weight
+            )
+            rows.append(
+                {
+                    "method": method,
+                    "component": component,
+                    "rmse": fit.rmse,
+                    "unit": unit,
+                    "rmse_percent_bw": fit.rmse_percent_bw,
+                    "pearson_r": fit.pearson_r,
+                    "schwer_m": fit.schwer_m,
+                    "schwer_p": fit.schwer_p,
+                    "schwer_c": fit.schwer_c,
+                    "n": fit.n,
+                    "n_effective": fit.n_effective,
+                    "data": judgement.data,
+                }
+            )
+    return pd.DataFrame(rows)

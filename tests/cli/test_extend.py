@@ -1,0 +1,267 @@
+"""The extended model of a simulated study whose forces come late, and of one without a cause."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from bsip_cli.artifacts import read_artifact, read_header, write_artifact
+from bsip_cli.config import load_config
+from bsip_cli.pipeline import STAGES
+from bsip_cli.runner import Outcome, perform
+from bsip_cli.schemas import SCHEMAS
+from bsip_cli.simulate.options import Asked, Rates, StudyOptions
+from bsip_cli.simulate.study import simulate_study
+from bsip_cli.study import load_study
+from bsip_cli.unit import Unit
+
+pytestmark = pytest.mark.slow
+
+NULL = StudyOptions(
+    participants=1,
+    seed=3,
+    sexes="M",
+    tasks=("static", "sequence", "squat"),
+    durations_s={"static": 1.0, "sequence": 10.0, "squat": 6.0},
+    rates={"default": Rates(marker_hz=50, analog_hz=250)},
+)
+LATE = replace(NULL, effects=(Asked("sync_offset", 0.02),))
+SEQUENCE, SQUAT, STATIC = (
+    f"sub-01_task-{name}" for name in ("sequence_run-1", "squat_run-1", "static")
+)
+UNITS = 1 + 3 + 1
+EXTEND = [stage.label for stage in STAGES if stage.name == "extend"]
+
+
+@dataclass(frozen=True)
+class Run:
+    study: Path
+    out: Path
+
+    def path(self, kind: str, owner: str = "sub-01") -> Path:
+        return self.out / "sub-01" / f"{owner}_{SCHEMAS[kind].file_name}.parquet"
+
+    def read(self, kind: str, owner: str = "sub-01") -> pd.DataFrame:
+        return read_artifact(self.path(kind, owner), kind)
+
+    def content(self) -> dict[str, bytes]:
+        return {path.name: path.read_bytes() for path in self.out.rglob("*.parquet")}
+
+    def perform(self, label: str, stem: str = "") -> Outcome:
+        config = load_config([self.study / "study.toml"])
+        study, _ = load_study(self.study, config.roles.model_dump())
+        person = study.participants[0]
+        trial = next((trial for trial in person.trials if trial.stem == stem), None)
+        stage = next(each for each in STAGES if each.label == label)
+        return perform(Unit(stage, study, self.out, config, person, trial))
+
+
+def run_of(options: StudyOptions, folder: Path, bsip) -> Run:
+    run = Run(folder / "study", folder / "out")
+    simulate_study(run.study, options)
+    answer = bsip("run", run.study, "--out", run.out)
+    assert answer.code == 0, answer.err
+    return run
+
+
+@pytest.fixture(scope="module")
+def late_run(tmp_path_factory, bsip) -> Run:
+    return run_of(LATE, tmp_path_factory.mktemp("late"), bsip)
+
+
+@pytest.fixture(scope="module")
+def null_run(tmp_path_factory, bsip) -> Run:
+    return run_of(NULL, tmp_path_factory.mktemp("null"), bsip)
+
+
+@pytest.fixture
+def run(late_run, tmp_path) -> Run:
+    """A copy to change."""
+    shutil.copytree(late_run.study, tmp_path / "study")
+    shutil.copytree(late_run.out, tmp_path / "out")
+    return Run(tmp_path / "study", tmp_path / "out")
+
+
+def extended(frame: pd.DataFrame) -> list[str]:
+    return [name for name in dict.fromkeys(frame["method"]) if name.startswith("OM+")]
+
+
+# --- what is gained -----------------------------------------------------------------------------
+
+
+def test_the_extended_model_stands_beside_om(late_run):
+    methods = extended(late_run.read("extended-bsip"))
+    assert methods[0] == "OM+sync_offset"
+    for stem in (SEQUENCE, SQUAT):
+        for kind in ("fit", "reconstruction"):
+            table = late_run.read(kind, stem)
+            assert extended(table) == methods
+            assert {"RM", "OM"} < set(table["method"])
+        rows = late_run.read("reconstruction", stem)
+        assert rows["method"].value_counts().nunique() == 1
+    assert extended(late_run.read("fit", STATIC)) == []
+
+
+def test_held_out_error_is_smaller_for_sure(late_run):
+    gain = late_run.read("gain", SQUAT).set_index("component")
+    assert set(gain.index) == set(late_run.read("fit", SQUAT)["component"])
+    for component in ("fz", "grf_vertical", "mx", "my"):
+        row = gain.loc[component]
+        assert 0 < row["ci_low"] < row["gain_percent"] < row["ci_high"]
+        assert row["rmse_after"] < row["rmse_before"]
+    assert gain["data"].str.startswith("held_out: ").all()
+    own = late_run.read("gain", SEQUENCE)
+    assert own["data"].str.startswith("identification: ").all()
+    whole = late_run.read("overall-gain").set_index("component")
+    assert whole.loc["fz", "ci_low"] > 0
+    assert whole["data"].eq(f"identification: {SEQUENCE}; held_out: {SQUAT}").all()
+
+
+def test_gain_and_fit_agree(late_run):
+    gain = late_run.read("gain", SQUAT).set_index("component")
+    fit = late_run.read("fit", SQUAT).set_index(["method", "component"])["rmse"]
+    after = gain["method"].iloc[0]
+    for component, row in gain.iterrows():
+        assert row["rmse_before"] == pytest.approx(fit["OM", component])
+        assert row["rmse_after"] == pytest.approx(fit[after, component])
+
+
+def test_forces_are_moved_back_in_time(late_run):
+    """To what the measured force is some frames later."""
+    corrected = late_run.read("corrected-wrench", SQUAT)
+    measured = late_run.read("wrench", SQUAT)
+    kept = corrected["valid"].to_numpy()
+    moved = (corrected["fz_N"] - measured["fz_N"])[kept]
+    rate = measured["fz_N"].diff()[kept] * 50.0
+    slope = float((moved * rate).sum() / (rate**2).sum())
+    assert 0.005 < slope < 0.03
+    assert late_run.read("corrected-wrench", STATIC).empty
+
+
+def test_what_the_delay_had_done_to_the_body(late_run):
+    bsip = late_run.read("bsip").query("method == 'OM'").set_index("segment")
+    again = late_run.read("extended-bsip")
+    first = again[again["method"] == "OM+sync_offset"].set_index("segment")
+    change = late_run.read("bsip-change").query("method == 'OM+sync_offset'")
+    change = change.set_index("segment")
+    difference = first["mass_kg"] - bsip["mass_kg"]
+    assert change["mass_change_kg"].to_dict() == pytest.approx(difference.to_dict())
+    assert difference.abs().max() > 0
+    named = change.index[change["largest"].str.contains("mass and|^mass")]
+    assert list(named) == [difference.abs().idxmax()]
+    assert late_run.read("extended-skeleton").empty
+
+
+# --- what runs again ----------------------------------------------------------------------------
+
+
+def test_second_run_does_nothing(run, bsip):
+    content = run.content()
+    answer = bsip("run", run.study, "--out", run.out)
+    assert " done" not in answer.summary
+    answer = bsip("extend", run.study, "--out", run.out)
+    assert answer.summary.startswith(f"bsip extend: {UNITS} up to date;")
+    assert run.content() == content
+
+
+def test_reconstruct_stays_fresh_and_is_noticed(run, bsip):
+    content = run.content()
+    assert run.perform("reconstruct (trial)", SQUAT).state == "fresh"
+    header = read_header(run.path("fit", SQUAT), "fit")["provenance"]
+    assert (header["made_by"]["stage"], header["amended_by"]["stage"]) == ("reconstruct", "extend")
+    assert bsip("reconstruct", run.study, "--out", run.out, "--force").code == 0
+    assert extended(run.read("fit", SQUAT)) == []
+    answer = bsip("extend", run.study, "--out", run.out)
+    assert answer.summary.startswith("bsip extend: 3 done, 2 up to date;")
+    assert run.content() == content
+
+
+def test_forced_again_with_the_same_result(run, bsip):
+    content = run.content()
+    answer = bsip("extend", run.study, "--out", run.out, "--force")
+    assert answer.summary.startswith(f"bsip extend: {UNITS} done;")
+    assert run.content() == content
+
+
+def test_without_what_it_amends_it_waits(run):
+    run.path("fit", SQUAT).unlink()
+    outcome = run.perform("extend (trial)", SQUAT)
+    assert outcome.state == "waiting"
+    assert "run `bsip reconstruct` first" in outcome.sentences[0]
+
+
+# --- other causes -------------------------------------------------------------------------------
+
+
+def diagnose_instead(run: Run, *causes: dict) -> None:
+    """As if the diagnosis had named these."""
+    path = run.path("overall-diagnosis")
+    notes = read_header(path)["provenance"]
+    notes["facts"]["causes"] = list(causes)
+    write_artifact(path, "overall-diagnosis", run.read("overall-diagnosis"), notes)
+    states = [run.perform(EXTEND[0]).state]
+    states += [run.perform(EXTEND[1], stem).state for stem in (SEQUENCE, SQUAT, STATIC)]
+    states += [run.perform(EXTEND[2]).state]
+    assert states == ["done"] * UNITS
+
+
+def cause(effect: str, target: str, values: list[float], *trials: str) -> dict:
+    return {
+        "effect": effect,
+        "target": target,
+        "trials": list(trials),
+        "verdict": "named",
+        "values": values,
+        "folds": [values] * 5,
+    }
+
+
+def test_a_cause_of_one_held_out_trial_leaves_the_parameters(run):
+    diagnose_instead(run, cause("plate_zero", "1 fz", [300.0], SQUAT))
+    om = run.read("bsip").query("method == 'OM'").drop(columns="method")
+    again = run.read("extended-bsip").drop(columns="method")
+    pd.testing.assert_frame_equal(again, om.reset_index(drop=True))
+    assert (run.read("bsip-change")["largest"] == "").all()
+    assert extended(run.read("fit", SQUAT)) == ["OM+plate_zero"]
+    assert extended(run.read("fit", SEQUENCE)) == []
+    gain = run.read("gain", SQUAT).set_index("component")
+    assert gain.loc["fz", "gain_percent"] < -100  # nobody had added 300 N
+    assert run.read("gain", SEQUENCE).empty
+    corrected, measured = run.read("corrected-wrench", SQUAT), run.read("wrench", SQUAT)
+    assert (measured["fz_N"] - corrected["fz_N"]).to_numpy() == pytest.approx(300.0)
+
+
+def test_causes_are_added_in_their_order(run):
+    first = cause("missing_joint", "upper_torso", [0.2, 0.1, 0.3], SEQUENCE, SQUAT)
+    diagnose_instead(run, first, cause("plate_gain", "1 fx", [0.01], SQUAT))
+    both = ["OM+missing_joint", "OM+missing_joint+plate_gain"]
+    assert extended(run.read("extended-bsip")) == both
+    assert extended(run.read("fit", SEQUENCE)) == both[:1]
+    assert extended(run.read("fit", SQUAT)) == both
+    below, above = run.read("extended-skeleton").to_dict("records")
+    assert above["parent"] == below["segment"] == "upper_torso_below"
+    assert below["mass_share"] + above["mass_share"] == pytest.approx(1.0)
+    assert [above[f"{axis}_share"] for axis in ("flexion", "lateral", "axial")] == [0.2, 0.1, 0.3]
+    assert below["flexion_share"] == pytest.approx(0.8)
+
+
+def test_what_is_unexplained_extends_nothing(run):
+    diagnose_instead(run, cause("unexplained", "z by x", [1.0], SQUAT))
+    assert run.read("extended-bsip").empty
+    assert extended(run.read("fit", SQUAT)) == []
+
+
+# --- nothing wrong ------------------------------------------------------------------------------
+
+
+def test_without_a_cause_nothing_is_added(null_run):
+    for kind in ("extended-bsip", "bsip-change", "extended-skeleton", "overall-gain"):
+        assert null_run.read(kind).empty
+    for stem in (SEQUENCE, SQUAT, STATIC):
+        assert null_run.read("gain", stem).empty
+        assert set(null_run.read("fit", stem)["method"]) == {"RM", "OM"}
+        assert set(null_run.read("reconstruction", stem)["method"]) == {"measured", "RM", "OM"}

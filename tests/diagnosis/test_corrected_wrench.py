@@ -1,0 +1,83 @@
+"""Forces spoilt by a plate and a late clock, and put right again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from moving_scene import moving
+
+from bsip_cli.diagnosis.cause import Cause
+from bsip_cli.diagnosis.corrected_wrench import corrected_wrench, is_of_the_forces
+from bsip_cli.effects.added_mass import AddedMass
+from bsip_cli.effects.clock_drift import ClockDrift
+from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.plate_zero import PlateZero
+from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.sync_offset import SyncOffset
+
+
+def cause_of(effect: Effect, target: str, *values: float) -> Cause:
+    return Cause(effect, target, ("a",), np.array(values), np.array([values] * 5))
+
+
+OFFSET = cause_of(PlateZero(), "1 fz", 30.0)
+LATE = cause_of(SyncOffset(), "", 0.034)
+SLOW = cause_of(ClockDrift(), "", 0.004)
+
+
+def largest(wrench: np.ndarray) -> np.ndarray:
+    """(6,)."""
+    return np.abs(wrench).max(axis=0)
+
+
+def late(scene: Scene, *causes: Cause) -> np.ndarray:
+    """(N, 6) true wrench as it is recorded late."""
+    late_s = np.zeros(len(scene.times_s))
+    for cause in causes:
+        assert isinstance(cause.effect, Delay)
+        late_s += cause.effect.late_s(scene, cause.values)
+    return scene.predicted_course(scene.times_s - late_s)
+
+
+def test_a_plate_is_put_right_exactly():
+    scene = moving()
+    measured = scene.predicted + OFFSET.change(scene)
+    wrench, valid = corrected_wrench(scene, measured, [OFFSET])
+    assert wrench == pytest.approx(scene.predicted, abs=1e-9)
+    assert valid.all()
+
+
+@pytest.mark.parametrize("causes", [(LATE,), (SLOW,), (LATE, SLOW), (OFFSET, LATE)])
+def test_a_late_clock_is_put_right(causes):
+    scene = moving()
+    clocks = [cause for cause in causes if cause is not OFFSET]
+    measured = late(scene, *clocks)
+    if OFFSET in causes:
+        measured = measured + OFFSET.change(scene)
+    wrench, valid = corrected_wrench(scene, measured, causes)
+    left, before = (largest((x - scene.predicted)[valid]) for x in (wrench, measured))
+    assert (left < 5e-3 * before).all()
+    assert 0.95 < valid.mean() < 1  # what was recorded after the end is not there
+
+
+def test_frames_beside_a_gap_are_not_valid_after_the_shift():
+    scene = moving()
+    valid = np.ones(len(scene.times_s), dtype=bool)
+    valid[300:320] = False
+    measured = np.where(valid[:, None], late(scene, LATE), 0.0)
+    wrench, kept = corrected_wrench(replace(scene, valid=valid), measured, [LATE])
+    moved = round(0.034 * scene.rate_hz)
+    assert not kept[300 - moved : 318 - moved].any()
+    assert kept[200:290].all()
+    left, before = (largest((x - scene.predicted)[210:280]) for x in (wrench, measured))
+    assert (left < 5e-3 * before).all()
+
+
+def test_only_forces_are_put_right():
+    """What a person carries is truly on the plate."""
+    carried = cause_of(AddedMass(), "hand_r", 1.0, 0.0, 0.0, 0.0)
+    assert not is_of_the_forces(carried)
+    assert all(is_of_the_forces(cause) for cause in (OFFSET, LATE, SLOW))

@@ -10,7 +10,7 @@ from bsip_cli.report.diagnosis import verdict_words
 from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.schemas import SCHEMAS
 
-_KINDS = ("overall-diagnosis", "detection")
+_KINDS, _GAIN = ("overall-diagnosis", "detection"), "overall-gain"
 
 
 def shown(out: Path) -> Iterator[str]:
@@ -39,4 +39,7 @@ def _path(folder: Path, kind: str) -> Path:
 
 def _verdict(folder: Path) -> tuple[str, ...]:
     diagnosis, detection = (read_artifact(_path(folder, kind), kind) for kind in _KINDS)
-    return verdict_words(diagnosis, detection, None)
+    gain = _path(folder, _GAIN)
+    return verdict_words(
+        diagnosis, detection, read_artifact(gain, _GAIN) if gain.exists() else None
+    )

@@ -227,21 +227,29 @@ def how_sure(one: Candidate) -> str:
 
 
 def gain_sentence(gains: pd.DataFrame) -> str:
-    """What the cause does to the result: the components that improve most on data held out.
+    """What the causes do to the result: the components that improve most, and those that lose.
 
-    ``gains`` is a ``gain`` table; empty text where it has no number.
+    ``gains`` is a ``gain`` table; empty text where it has no number. The vertical force, which it
+    has twice, counts once.
     """
-    whole = gains[np.isfinite(gains["gain_percent"])]
+    whole = gains[np.isfinite(gains["gain_percent"]) & (gains["component"] != "fz")]
     best = whole[whole["gain_percent"] > 0].nlargest(_MOST_GAINS, "gain_percent")
     if best.empty:
-        return "" if whole.empty else "With it in the model no component follows better."
+        return (
+            "" if whole.empty else "With what was found in the model, no component follows better."
+        )
     parts = [
         f"{component_label(r['component'])} {number(r['rmse_before'], 2)} → {number(r['rmse_after'], 2)} "
         f"{r['unit']} ({number(r['gain_percent'], 0)} % less, {number(r['ci_low'], 0)} to "
         f"{number(r['ci_high'], 0)} %)"
         for r in best.to_dict("records")
     ]
-    return f"With it in the model the error on data held out falls: {'; '.join(parts)}."
+    worse = [component_label(c) for c in whole.loc[whole["ci_high"] < 0, "component"]]
+    rises = f" It rises in {listing(worse)}." if worse else ""
+    return (
+        "With what was found in the model, the error on data that did not size it falls: "
+        f"{'; '.join(parts)}.{rises}"
+    )
 
 
 # --- limits -----------------------------------------------------------------------------------

@@ -113,6 +113,16 @@ def messages(origins: Iterable[Origin]) -> tuple[tuple[str, str, str], ...]:
     )
 
 
+EXTENDED = "OM+causes"  # how reports call OM with every named cause in the model
+
+
+def with_all_causes(table: pd.DataFrame) -> pd.DataFrame:
+    """Of the methods OM+<effect>... the last, which contains all causes, as `EXTENDED`."""
+    names = [name for name in table["method"].unique() if name.startswith("OM+")]
+    kept = table[~table["method"].isin(names[:-1])]
+    return kept.assign(method=kept["method"].replace(names[-1:], EXTENDED)) if names else kept
+
+
 def signals_of(reconstruction: pd.DataFrame, column: str) -> dict[str, np.ndarray]:
     """Label of the method -> values over time; ``measured`` first, all on its clock."""
     methods = sorted(reconstruction["method"].unique(), key=_rank)

@@ -19,7 +19,13 @@ from bsip_cli.report.blocks import Document
 from bsip_cli.report.figures.canvas import to_png
 from bsip_cli.report.page import render
 from bsip_cli.report.participant.document import participant_document
-from bsip_cli.report.records import Origin, ParticipantRecord, Refusal, TrialRecord
+from bsip_cli.report.records import (
+    Origin,
+    ParticipantRecord,
+    Refusal,
+    TrialRecord,
+    with_all_causes,
+)
 from bsip_cli.report.words import ROLES, trial_label
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.frames import person_from
@@ -41,7 +47,6 @@ _TABLES = {  # field of a trial's record: kind of artifact
 _FOUND = {  # field of a participant's record: kind that is there only if its stage has run
     "diagnosis": "overall-diagnosis",
     "detection": "detection",
-    "gains": "overall-gain",
 }
 
 
@@ -106,6 +111,7 @@ def record_of(unit: Unit) -> ParticipantRecord:
         refusals=refusals_of(unit, unit.participant),
         origins=_origins(unit, usable),
         loads=_loads(unit),
+        gains=with_all_causes(unit.read("overall-gain")) if unit.has("overall-gain") else None,
         **{name: unit.read(kind) for name, kind in _FOUND.items() if unit.has(kind)},
     )
 
@@ -126,6 +132,9 @@ def _trial_record(unit: Unit, trial: Trial, usable: dict[str, set[Trial]]) -> Tr
         name: unit.read(kind, trial) if trial in usable[kind] else None
         for name, kind in _TABLES.items()
     }
+    for name in ("reconstruction", "fit"):
+        table = tables[name]
+        tables[name] = with_all_causes(table) if table is not None else None
     return TrialRecord(trial.stem, trial.task, trial.role, **tables)
 
 

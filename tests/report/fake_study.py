@@ -574,7 +574,7 @@ def gains() -> pd.DataFrame:
         "ci_high",
     ]
     frame = pd.DataFrame(rows, columns=columns)
-    return frame.assign(method="OM+plate_rotation", data="sub-01_task-basketball_run-1")
+    return frame.assign(method="OM+plate_rotation", data="held_out: sub-01_task-basketball_run-1")
 
 
 def empty(kind: str) -> pd.DataFrame:

@@ -22,6 +22,7 @@ from bsip_cli.report.figures.wrench_residual import amplitude_spectrum
 from bsip_cli.report.participant.attribution import pooled_shares
 from bsip_cli.report.participant.diagnosis import gain_blocks
 from bsip_cli.report.participant.residual import phases_of, residuals_of
+from bsip_cli.report.records import EXTENDED, with_all_causes
 
 TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]
 
@@ -125,10 +126,11 @@ def test_units_that_people_read():
 def test_gains_lead_with_what_improves():
     text = gain_sentence(gains())
     assert "COP, anterior-posterior 12.00 → 6.00 mm (50 % less, 40 to 60 %)" in text
-    assert "force, lab Z" not in text
-    assert gain_sentence(gains()[1:]) == "With it in the model no component follows better."
+    worse = gains().assign(component=["cop_ap", "mz"], ci_high=[60.0, -1.0])
+    assert gain_sentence(worse).endswith("It rises in moment, lab Z (up).")
+    assert gain_sentence(worse[1:]).endswith("in the model, no component follows better.")
     (grid,) = gain_blocks(gains())
-    assert "basketball (run 1)" in grid.caption
+    assert "held out: basketball (run 1)" in grid.caption
     assert [row[4].mark for row in grid.cells()] == ["better", ""]
 
 
@@ -155,12 +157,18 @@ def test_residuals_are_measured_less_simulated_before_and_after():
         pd.DataFrame({"time_s": [0.0, 0.1], "method": name, "valid": [True, False]}).assign(
             **dict.fromkeys(columns, value)
         )
-        for name, value in (("measured", 1.0), ("RM", 5.0), ("OM", 0.4), ("OM+sync_offset", 0.9))
+        for name, value in (
+            ("measured", 1.0),
+            ("RM", 5.0),
+            ("OM", 0.4),
+            ("OM+sync_offset", 0.5),
+            ("OM+sync_offset+breathing", 0.9),
+        )
     ]
-    found = residuals_of(pd.concat(frames), "cop_ap")
-    assert list(found) == ["OM", "OM+sync_offset"]
+    found = residuals_of(with_all_causes(pd.concat(frames)), "cop_ap")
+    assert list(found) == ["OM", EXTENDED]
     np.testing.assert_allclose(found["OM"], [600.0, np.nan])
-    np.testing.assert_allclose(found["OM+sync_offset"], [100.0, np.nan])
+    np.testing.assert_allclose(found[EXTENDED], [100.0, np.nan])
 
 
 def test_spectrum_peaks_at_the_pace_and_leaves_gaps_out():

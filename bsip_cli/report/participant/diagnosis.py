@@ -36,11 +36,10 @@ from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.words import (
     MISSING,
     component_label,
-    listing,
+    labelled,
     number,
     percent,
     segment_label,
-    trial_label,
 )
 
 NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
@@ -150,7 +149,7 @@ def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
 
 
 def gain_blocks(gains: pd.DataFrame) -> list[Block]:
-    """A ``gain`` table: errors before and after the cause is in the model, on data held out."""
+    """A ``gain`` table: errors before and after the causes are in the model."""
     if gains.empty:
         return [Paragraph("No cause was added to the model, so nothing was gained.")]
     rows = tuple(
@@ -164,13 +163,13 @@ def gain_blocks(gains: pd.DataFrame) -> list[Block]:
         )
         for r in gains.to_dict("records")
     )
-    held_out = listing([trial_label(s) for t in gains["data"].unique() for s in t.split(", ")])
+    data = "; ".join(labelled(text).replace("_", " ") for text in gains["data"].unique())
     head = ("component", "method", "unit", "before", "after", "gain [%]")
     return [
         Grid(
             head,
             rows,
-            f"Error (RMSE) without and with the cause in the model, on data held out: {held_out}",
+            f"Error (RMSE) without and with the causes in the model; data — {data}",
             words=3,
             groups=(("", 3), ("RMSE", 2), ("", 1)),
         )

@@ -10,10 +10,17 @@ import pandas as pd
 from bsip_cli.report.blocks import Block, Cell, Grid, Heading, Paragraph, Picture
 from bsip_cli.report.diagnosis import candidates_of, causes_of, looked_at
 from bsip_cli.report.figures.wrench_residual import WrenchResidual, wrench_residual
-from bsip_cli.report.records import ParticipantRecord, TrialRecord, clock_of, flags_of, signals_of
+from bsip_cli.report.records import (
+    EXTENDED,
+    ParticipantRecord,
+    TrialRecord,
+    clock_of,
+    flags_of,
+    signals_of,
+)
 from bsip_cli.report.words import component_label, listing, number
 
-BEFORE, EXTENDED = "OM", "OM+"
+BEFORE = "OM"
 _COLUMNS = {
     "fx": ("fx_N", "N", 1.0),
     "fy": ("fy_N", "N", 1.0),
@@ -64,10 +71,10 @@ def residuals_of(frame: pd.DataFrame, component: str) -> dict[str, np.ndarray]:
     """
     column, _, scale = _COLUMNS[component]
     signals, valid = signals_of(frame, column), flags_of(frame, "valid")
-    names = [BEFORE, *(name for name in signals if name.startswith(EXTENDED))]
     return {
         name: np.where(valid, scale * (signals["measured"] - signals[name]), np.nan)
-        for name in names
+        for name in (BEFORE, EXTENDED)
+        if name in signals
     }
 
 
@@ -76,9 +83,9 @@ def _curves(trial: TrialRecord) -> Picture:
     assert frame is not None
     residuals = {component_label(c): residuals_of(frame, c) for c in _COLUMNS}
     units = {component_label(c): unit for c, (_, unit, _) in _COLUMNS.items()}
-    after = [name for name in next(iter(residuals.values())) if name != BEFORE]
     figure = wrench_residual(WrenchResidual(clock_of(frame), residuals, units))
-    what = f"with OM (before) and with {listing(after[:1])} (after)" if after else "with OM"
+    is_extended = EXTENDED in set(frame["method"])
+    what = f"with OM (before) and with {EXTENDED} (after)" if is_extended else "with OM"
     caption = (
         f"{trial.label}: measured less simulated {what}, over time (left) and as an amplitude "
         "spectrum (right). Noise is a flat, structureless band; slow waves, steps or a peak at the "

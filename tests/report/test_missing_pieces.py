@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fake_study import EVIL, empty, gains
+from fake_study import EVIL, Artifacts, empty, gains
 
 from bsip_cli.report.blocks import Bullets, Document, Grid, Paragraph, Picture
 from bsip_cli.report.participant.document import participant_document
@@ -168,3 +168,19 @@ def test_a_recording_without_left_and_right(record):
     text = words_of(participant_document(replace(record, skeleton=one_side)))
     assert "has no pairs of segments" in text
     assert "held at the neutral pose" in text
+
+
+def test_a_report_comes_without_a_diagnosis_and_anew_with_one(reports, tmp_path):
+    """What a stage reads where it is there is not missed, and counts once it is."""
+    person = reports.study.participants[0]
+    made = Artifacts(tmp_path, person).write_all()
+    diagnosis = made.path("overall-diagnosis")
+    later = diagnosis.rename(tmp_path / "later.parquet")
+    own = replace(reports, out=tmp_path)
+    own.run("report", person)
+    assert "bsip diagnose" in own.html("sub-01")
+    assert own.unit("report", person).is_fresh()
+    later.rename(diagnosis)
+    assert not own.unit("report", person).is_fresh()
+    own.run("report", person)
+    assert "Plate 1 is turned" in own.html("sub-01")

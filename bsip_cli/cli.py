@@ -232,13 +232,12 @@ def export(study, out, chosen, method, formats, model_file, model_bodies, repair
 @cli.command()
 @click.argument("out", type=click.Path(path_type=Path))
 def show(out):
-    """Print the tables of a finished run and where its reports lie."""
-    from bsip_cli.report.tables.build import show as tables_of
+    """Print the tables of a finished run, what is wrong in its recordings, and where its reports
+    lie."""
+    from bsip_cli.show import shown
 
-    click.echo(tables_of(out))
-    for report in (out / "group" / "report.html", *sorted(out.glob("sub-*/report.html"))):
-        if report.exists():
-            click.echo(f"report: {report}")
+    for part in shown(out):
+        click.echo(part)
 
 
 @cli.command()

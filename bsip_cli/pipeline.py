@@ -15,10 +15,11 @@ class Stage:
 
     ``reads`` and ``writes`` are kinds of artifacts. A trial stage that reads a participant's
     artifact gets its own participant's; a participant stage that reads a trial's gets those of
-    all trials; a cohort stage reads everybody's. ``options`` are names of configuration entries:
-    only they enter the provenance. ``module`` holds a function ``run(unit)``. ``amends`` are kinds
-    of its own level that earlier stages write and to which it adds rows. ``part`` tells apart two
-    steps of one name and level.
+    all trials; a cohort stage reads everybody's. What is in ``reads_if_there`` counts as an input
+    where it exists, and is not missed where it does not. ``options`` are names of configuration
+    entries: only they enter the provenance. ``module`` holds a function ``run(unit)``. ``amends``
+    are kinds of its own level that earlier stages write and to which it adds rows. ``part`` tells
+    apart two steps of one name and level.
     """
 
     name: str
@@ -28,12 +29,18 @@ class Stage:
     writes: tuple[str, ...]
     options: tuple[str, ...] = ()
     module: str = ""
+    reads_if_there: tuple[str, ...] = ()
     amends: tuple[str, ...] = ()
     part: str = ""
 
     @property
     def label(self) -> str:
         return f"{self.name} ({', '.join(filter(None, (self.level, self.part)))})"
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Every kind that it may read."""
+        return (*self.reads, *self.reads_if_there)
 
 
 STAGES = (
@@ -122,7 +129,18 @@ STAGES = (
         "trial",
         "What the simulation gets wrong: its cause, how large, how sure.",
         reads=("overall-diagnosis",),
-        writes=("diagnosis",),
+        reads_if_there=(
+            "kinematics",
+            "wrench",
+            "plates",
+            "skeleton",
+            "marker-positions",
+            "person",
+            "bsip",
+            "used-blocks",
+        ),
+        writes=("diagnosis", "attribution"),
+        options=("skeleton", "loads", "reconstruct"),
         module="bsip_cli.stages.diagnose_trial",
     ),
     Stage(
@@ -215,6 +233,7 @@ STAGES = (
             "fit",
             "posturography",
         ),
+        reads_if_there=("overall-diagnosis", "detection", "attribution", "overall-gain"),
         writes=("report-files",),
         options=("skeleton", "loads", "roles"),
         module="bsip_cli.stages.report",

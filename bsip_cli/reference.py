@@ -223,8 +223,10 @@ def artifacts_page() -> str:
 
 def _stage_parts(stage: Stage) -> list[str]:
     reads = [f"[{kind}](#{kind}) ({producer(kind).name})" for kind in stage.reads]
+    more = [f"[{kind}](#{kind}) ({producer(kind).name})" for kind in stage.reads_if_there]
     facts = [
         f"- reads: {', '.join(reads) or 'the recording'}",
+        *([f"- reads where they are there: {', '.join(more)}"] if more else []),
         f"- writes: {', '.join(f'[{kind}](#{kind})' for kind in stage.writes)}",
         f"- options: {_code(stage.options)}",
     ]

@@ -111,10 +111,10 @@ class Unit:
 
     def inputs(self) -> dict[str, Path]:
         """Name and path of every file the unit reads; those a refusal left out are not in it."""
-        files = {path.name: path for kind in self.stage.reads for path in self._standing(kind)}
+        files = {path.name: path for kind in self.stage.inputs for path in self._standing(kind)}
         if self.trial is None:
             files |= {path.name: path for path in self._refused_before()}
-        elif not self.stage.reads:
+        elif not self.stage.inputs:
             files |= {path.name: path for path in _recording_files(self.trial.path)}
         for name in ("marker_set", "skeleton"):
             own = Path(getattr(self.config, name))
@@ -154,6 +154,10 @@ class Unit:
         A cohort stage judges itself what refusals leave of the cohort.
         """
         return [k for k in (*self.stage.reads, *self.stage.amends) if not self._has(k)]
+
+    def has(self, *kinds: str) -> bool:
+        """Whether all these kinds, which the stage may read, are there and not refused."""
+        return all(kind in self.stage.inputs and self._has(kind) for kind in kinds)
 
     def _has(self, kind: str) -> bool:
         if self.participant is None and SCHEMAS[kind].level != "cohort":

@@ -50,6 +50,7 @@ class TrialRecord:
     fit: pd.DataFrame | None
     posturography: pd.DataFrame | None
     marker_events: pd.DataFrame | None = None
+    attribution: pd.DataFrame | None = None
 
     @property
     def label(self) -> str:
@@ -59,7 +60,8 @@ class TrialRecord:
 @dataclass(frozen=True)
 class ParticipantRecord:
     """One participant; ``facts`` is the single row of the ``person`` artifact, ``loads`` the known
-    loads as (trial label, words)."""
+    loads as (trial label, words). ``diagnosis``, ``detection`` and ``gains`` (of a model extended by
+    what was found) are None where their stages have not run."""
 
     id: str
     facts: pd.Series
@@ -74,6 +76,9 @@ class ParticipantRecord:
     refusals: tuple[Refusal, ...]
     origins: tuple[Origin, ...]
     loads: tuple[tuple[str, str], ...] = ()
+    diagnosis: pd.DataFrame | None = None
+    detection: pd.DataFrame | None = None
+    gains: pd.DataFrame | None = None
 
     def mass_kg(self) -> float:
         return float(self.facts["mass_kg"])
@@ -106,6 +111,16 @@ def messages(origins: Iterable[Origin]) -> tuple[tuple[str, str, str], ...]:
             (origin.stage, origin.unit, text) for origin in origins for text in origin.messages
         )
     )
+
+
+EXTENDED = "OM+causes"  # how reports call OM with every named cause in the model
+
+
+def with_all_causes(table: pd.DataFrame) -> pd.DataFrame:
+    """Of the methods OM+<effect>... the last, which contains all causes, as `EXTENDED`."""
+    names = [name for name in table["method"].unique() if name.startswith("OM+")]
+    kept = table[~table["method"].isin(names[:-1])]
+    return kept.assign(method=kept["method"].replace(names[-1:], EXTENDED)) if names else kept
 
 
 def signals_of(reconstruction: pd.DataFrame, column: str) -> dict[str, np.ndarray]:

@@ -9,7 +9,12 @@ from collections.abc import Sequence
 from bsip_cli.body.names import in_words
 
 MISSING = "–"
-METHODS = {"measured": "measured", "RM": "RM (table)", "OM": "OM (identified)"}
+METHODS = {
+    "measured": "measured",
+    "RM": "RM (table)",
+    "OM": "OM (identified)",
+    "OM+causes": "OM with the causes found",
+}
 COMPONENTS = {
     "cop_ap": "COP, anterior-posterior",
     "cop_ml": "COP, medio-lateral",
@@ -85,6 +90,11 @@ def trial_label(stem: str) -> str:
     if match is None:
         return stem
     return f"{match['task']} (run {match['run']})" if match["run"] else match["task"]
+
+
+def labelled(text: str) -> str:
+    """A text with the stems of recordings in it as their labels."""
+    return re.sub(_STEM, lambda found: trial_label(found[0]), text)
 
 
 def segment_label(segment: str) -> str:

@@ -2,7 +2,8 @@
 
 Reads quality, contacts, skeleton, marker-positions, person, kinematics, marker-residuals,
 marker-events, bsip, base-parameters, excitation, identification, reconstruction, fit,
-posturography. Writes report-files.
+posturography; where they are there overall-diagnosis, detection, attribution, overall-gain. Writes
+report-files.
 """
 
 from __future__ import annotations
@@ -18,7 +19,13 @@ from bsip_cli.report.blocks import Document
 from bsip_cli.report.figures.canvas import to_png
 from bsip_cli.report.page import render
 from bsip_cli.report.participant.document import participant_document
-from bsip_cli.report.records import Origin, ParticipantRecord, Refusal, TrialRecord
+from bsip_cli.report.records import (
+    Origin,
+    ParticipantRecord,
+    Refusal,
+    TrialRecord,
+    with_all_causes,
+)
 from bsip_cli.report.words import ROLES, trial_label
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.frames import person_from
@@ -35,6 +42,11 @@ _TABLES = {  # field of a trial's record: kind of artifact
     "reconstruction": "reconstruction",
     "fit": "fit",
     "posturography": "posturography",
+    "attribution": "attribution",
+}
+_FOUND = {  # field of a participant's record: kind that is there only if its stage has run
+    "diagnosis": "overall-diagnosis",
+    "detection": "detection",
 }
 
 
@@ -99,6 +111,8 @@ def record_of(unit: Unit) -> ParticipantRecord:
         refusals=refusals_of(unit, unit.participant),
         origins=_origins(unit, usable),
         loads=_loads(unit),
+        gains=with_all_causes(unit.read("overall-gain")) if unit.has("overall-gain") else None,
+        **{name: unit.read(kind) for name, kind in _FOUND.items() if unit.has(kind)},
     )
 
 
@@ -118,6 +132,9 @@ def _trial_record(unit: Unit, trial: Trial, usable: dict[str, set[Trial]]) -> Tr
         name: unit.read(kind, trial) if trial in usable[kind] else None
         for name, kind in _TABLES.items()
     }
+    for name in ("reconstruction", "fit"):
+        table = tables[name]
+        tables[name] = with_all_causes(table) if table is not None else None
     return TrialRecord(trial.stem, trial.task, trial.role, **tables)
 
 
@@ -138,9 +155,9 @@ def refusals_of(unit: Unit, participant: Participant) -> tuple[Refusal, ...]:
 def _origins(unit: Unit, usable: dict[str, set[Trial]]) -> tuple[Origin, ...]:
     assert unit.participant is not None
     origins = []
-    for kind in unit.stage.reads:
+    for kind in unit.stage.inputs:
         if SCHEMAS[kind].level == "participant":
-            origins.append(origin_of(unit.path(kind), ""))
+            origins += [origin_of(unit.path(kind), "")] if unit.has(kind) else []
         else:
             origins += [
                 origin_of(unit.path(kind, trial), trial_label(trial.stem))

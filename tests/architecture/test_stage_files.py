@@ -59,7 +59,7 @@ def test_declares_every_option_it_looks_up(stage):
 
 @pytest.mark.parametrize("stage", STAGES, ids=LABELS)
 def test_declares_every_kind_it_reads(stage):
-    assert kinds(tree_of(stage), "read", "facts", "trials") <= set(stage.reads)
+    assert kinds(tree_of(stage), "read", "facts", "trials", "has") <= set(stage.inputs)
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=LABELS)
@@ -84,7 +84,7 @@ def test_steps_have_labels_of_their_own():
 @pytest.mark.parametrize("stage", STAGES, ids=LABELS)
 def test_reads_only_what_an_earlier_stage_writes(stage):
     before = STAGES[: STAGES.index(stage)]
-    assert {kind for kind in stage.reads if producer(kind) not in before} == set()
+    assert {kind for kind in stage.inputs if producer(kind) not in before} == set()
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=LABELS)

@@ -158,7 +158,8 @@ def test_every_artifact_says_what_made_it(first_run, stage):
             assert made_by["inputs"] == hashes
             kinds = {kind_of(name) for name in hashes}
             recording = {path.name.removesuffix(f"_{kind}.parquet").split("_")[-1]}
-            assert kinds == (set(stage.reads) or recording)
+            assert set(stage.reads) <= kinds
+            assert kinds == (set(stage.inputs) or recording)
 
 
 def sha256(path: Path) -> str:
@@ -178,6 +179,7 @@ def test_show_prints_the_tables(first_run, bsip):
     assert answer.code == 0
     assert str(first_run.out / "sub-02" / "report.html") in answer.out
     assert answer.out.count("| ") > 20
+    assert "Is anything wrong: sub-01" in answer.out
 
 
 # --- what runs again ----------------------------------------------------------------------------
@@ -222,10 +224,11 @@ def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
     times = run.times()
     chosen = ("--participant", "sub-01", "--config", own)
     answer = bsip("run", run.study, "--out", run.out, *chosen)
-    assert answer.summary.startswith("bsip run: 8 done, 14 up to date;")
+    assert answer.summary.startswith("bsip run: 11 done, 11 up to date;")
     rewritten = run.rewritten(times)
     assert stages_of(rewritten) == {
         "reconstruct (trial)",
+        "diagnose (trial)",
         "extend (trial)",
         "extend (participant, gain)",
         "report (participant)",

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fake_study import EVIL, empty
+from fake_study import EVIL, Artifacts, empty, gains
 
 from bsip_cli.report.blocks import Bullets, Document, Grid, Paragraph, Picture
 from bsip_cli.report.participant.document import participant_document
@@ -66,7 +66,14 @@ def test_no_trial_served(record):
     assert "No trial has a centre of pressure" in text
     assert "no contacts are known" in text
     assert "The pose was not computed in static." in text
-    assert [p.name for p in document.pictures()] == ["masses", "centres_of_mass"]
+    names = [p.name for p in document.pictures()]
+    assert names == [
+        "diagnosis_causes",
+        "diagnosis_masses",
+        "attribution",
+        "masses",
+        "centres_of_mass",
+    ]
 
 
 def test_nothing_on_the_plates(record):
@@ -103,11 +110,28 @@ def test_empty_tables(record):
         "fit": "fit",
         "reconstruction": "reconstruction",
         "posturography": "posturography",
+        "attribution": "attribution",
     }
+    changed = replace(
+        changed,
+        diagnosis=empty("overall-diagnosis"),
+        detection=empty("detection"),
+        gains=gains()[:0],
+    )
     document = participant_document(with_trials(changed, **{k: empty(v) for k, v in kinds.items()}))
     text = words_of(document)
     assert "No base parameters were written." in text
     assert "The excitation was not computed." in text
+    assert "nobody can say" in text
+    assert "The limits of detection are not known." in text
+    assert "RM's errors were not attributed" in text
+
+
+def test_stages_that_have_not_run(record):
+    without = replace(record, diagnosis=None, detection=None, gains=None)
+    text = words_of(participant_document(with_trials(without, attribution=None)))
+    assert text.count("run `bsip diagnose`") == 2  # in the summary and in section 2
+    assert "RM's errors were not attributed" in text
 
 
 def test_frames_without_a_pose(record):
@@ -135,7 +159,7 @@ def test_unknown_shares_spreads_and_masses(record):
 def test_refusals_lead_the_warnings(record):
     refusal = Refusal("walking (run 1)", "ingest", f"no force plates in {EVIL}")
     text = words_of(participant_document(replace(record, refusals=(refusal,))))
-    assert text.count("no force plates") == 2  # in the summary and in section 7
+    assert text.count("no force plates") == 2  # in the summary and in section 8
 
 
 def test_a_recording_without_left_and_right(record):
@@ -144,3 +168,19 @@ def test_a_recording_without_left_and_right(record):
     text = words_of(participant_document(replace(record, skeleton=one_side)))
     assert "has no pairs of segments" in text
     assert "held at the neutral pose" in text
+
+
+def test_a_report_comes_without_a_diagnosis_and_anew_with_one(reports, tmp_path):
+    """What a stage reads where it is there is not missed, and counts once it is."""
+    person = reports.study.participants[0]
+    made = Artifacts(tmp_path, person).write_all()
+    diagnosis = made.path("overall-diagnosis")
+    later = diagnosis.rename(tmp_path / "later.parquet")
+    own = replace(reports, out=tmp_path)
+    own.run("report", person)
+    assert "bsip diagnose" in own.html("sub-01")
+    assert own.unit("report", person).is_fresh()
+    later.rename(diagnosis)
+    assert not own.unit("report", person).is_fresh()
+    own.run("report", person)
+    assert "Plate 1 is turned" in own.html("sub-01")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bsip_cli.report.blocks import Document
 from bsip_cli.report.participant import (
+    diagnosis,
     forces,
     limits,
     measured,
@@ -16,6 +17,7 @@ from bsip_cli.report.records import ParticipantRecord
 
 SECTIONS = (
     summary.section,
+    diagnosis.section,
     measured.section,
     motion.section,
     skeleton.section,

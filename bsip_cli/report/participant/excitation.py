@@ -1,4 +1,4 @@
-"""Section 5, second half: what the movement showed, what to record next, base parameters."""
+"""Section 6, second half: what the movement showed, what to record next, base parameters."""
 
 from __future__ import annotations
 

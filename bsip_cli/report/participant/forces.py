@@ -1,4 +1,4 @@
-"""Section 6: how well the forces follow from the motion with either set of parameters."""
+"""Section 7: how well the forces follow from the motion with either set of parameters."""
 
 from __future__ import annotations
 

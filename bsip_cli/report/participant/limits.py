@@ -1,4 +1,4 @@
-"""Section 7: what cannot be known, what went wrong, and with which options and versions."""
+"""Section 8: what cannot be known, what went wrong, and with which options and versions."""
 
 from __future__ import annotations
 

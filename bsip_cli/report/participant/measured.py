@@ -1,4 +1,4 @@
-"""Section 2: what the recordings hold."""
+"""Section 3: what the recordings hold."""
 
 from __future__ import annotations
 

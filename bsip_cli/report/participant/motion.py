@@ -1,4 +1,4 @@
-"""Section 3: the motion as the model sees it, and how far its markers lie from the real ones."""
+"""Section 4: the motion as the model sees it, and how far its markers lie from the real ones."""
 
 from __future__ import annotations
 

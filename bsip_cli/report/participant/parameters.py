@@ -1,4 +1,4 @@
-"""Section 5: the inertial parameters, and how much of each the data decided."""
+"""Section 6: the inertial parameters, and how much of each the data decided."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Section 4: the person's segments and joints."""
+"""Section 5: the person's segments and joints."""
 
 from __future__ import annotations
 

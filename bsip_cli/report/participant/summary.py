@@ -6,6 +6,7 @@ import numpy as np
 
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Heading, Mark, Paragraph, Section
 from bsip_cli.report.gains import SAME_WITHIN, Gain, MeanGain, gains_of, mean_gains
+from bsip_cli.report.participant.diagnosis import verdict
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, messages
 from bsip_cli.report.words import (
     component_label,
@@ -23,6 +24,9 @@ _SEXES = {"M": "a man", "F": "a woman"}
 
 def section(record: ParticipantRecord) -> Section:
     blocks: list[Block] = [
+        Heading("Is anything wrong?"),
+        *verdict(record),
+        Heading("Who and what"),
         Paragraph(_who(record)),
         Paragraph(_trials(record)),
         Paragraph(_markers(record)),
@@ -243,7 +247,7 @@ def _warnings(record: ParticipantRecord) -> list[Block]:
     blocks: list[Block] = [Bullets(tuple(strongest[:_STRONGEST]), "warning")]
     if len(strongest) > _STRONGEST:
         more = count(len(strongest) - _STRONGEST, "more warning")
-        blocks.append(Paragraph(f"{more} in sections 2 and 7.", "note"))
+        blocks.append(Paragraph(f"{more} in sections 3 and 8.", "note"))
     return blocks
 
 
@@ -264,7 +268,7 @@ def _undecided(record: ParticipantRecord) -> list[str]:
         return []
     return [
         f"Weighted by mass, the data decided only {percent(weighted)} % of the segment masses; "
-        "the rest comes from the table (section 5)."
+        "the rest comes from the table (section 6)."
     ]
 
 
@@ -282,7 +286,7 @@ def _quality(record: ParticipantRecord, level: str) -> list[str]:
 
 def _finding(check: str, action: str, trials: dict[str, set[str]]) -> str:
     told = set().union(*trials.values())
-    what = told.pop() if len(told) == 1 else f"{count(len(told), 'finding')}, see section 2"
+    what = told.pop() if len(told) == 1 else f"{count(len(told), 'finding')}, see section 3"
     return f"{check} in {listing(list(trials))}: {what}{f' ({action})' if action else ''}"
 
 

@@ -1,0 +1,115 @@
+"""What people should know of each cause that the diagnosis may name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bsip_cli.body.names import SEGMENTS
+from bsip_cli.report.words import number, segment_label
+
+_FORCES = (
+    "The measured forces are not the true ones, and everything identified from them inherits the "
+    "error: put it right in the lab or in the file, and run again."
+)
+_MOTION = (
+    "The motion is not the true one, and the simulated forces with it: put the markers right, and "
+    "run again."
+)
+_PERSON = (
+    "The recordings need not be wrong: the model lacks something that this person has, and "
+    "squeezes it into the inertial parameters of some segment."
+)
+_LOAD = (
+    "What is not stated as a load ends up in the masses of the body: state it in study.toml "
+    "([[loads]]) or leave it out of the recording, and run again."
+)
+_CONTACT = (
+    "The plates do not carry all of the ground force: leave these frames out, or record without "
+    "anything in reach."
+)
+
+
+@dataclass(frozen=True)
+class EffectWords:
+    """``title``: the cause in general; ``consequence``: what it means for the results."""
+
+    title: str
+    consequence: str
+
+
+EFFECT_WORDS = {
+    "sync_offset": EffectWords("forces and markers out of step", _FORCES),
+    "clock_drift": EffectWords("clocks of forces and markers run apart", _FORCES),
+    "plate_translation": EffectWords("force plate not where the file says", _FORCES),
+    "plate_rotation": EffectWords("force plate turned or tilted", _FORCES),
+    "plate_gain": EffectWords("wrong gain of a plate's channel", _FORCES),
+    "plate_crosstalk": EffectWords("one channel of a plate leaks into another", _FORCES),
+    "plate_zero": EffectWords("constant offset of a plate's channel", _FORCES),
+    "plate_drift": EffectWords("drift of a plate's channel", _FORCES),
+    "gravity_tilt": EffectWords("the lab's vertical is not vertical", _FORCES),
+    "added_mass": EffectWords("mass that the model does not know", _LOAD),
+    "released_object": EffectWords("object held and let go", _LOAD),
+    "wobbling_mass": EffectWords("soft tissue that swings", _PERSON),
+    "breathing": EffectWords("breathing", _PERSON),
+    "unmeasured_contact": EffectWords("contact beside the plates", _CONTACT),
+    "joint_centre": EffectWords("joint centre in the wrong place", _PERSON),
+    "missing_joint": EffectWords("trunk bends where the model is stiff", _PERSON),
+    "marker_shift": EffectWords("marker not in its place", _MOTION),
+    "marker_swap": EffectWords("two markers exchanged", _MOTION),
+    "over_smoothing": EffectWords("markers smoothed too much", _MOTION),
+    "segment_inertia": EffectWords("other inertial parameters of a segment", _PERSON),
+    "unexplained": EffectWords(
+        "something without a name",
+        "Neither the forces nor the identified parameters should be trusted further than the "
+        "residual below says.",
+    ),
+}
+
+
+def effect_title(effect: str) -> str:
+    words = EFFECT_WORDS.get(effect)
+    return words.title if words else effect.replace("_", " ")
+
+
+def place_label(effect: str, target: str) -> str:
+    """``plate 1, fx into fy`` or ``left hand`` of an effect's target; empty for none."""
+    if effect.startswith("plate_"):
+        name, _, channel = target.rpartition(" ") if " " in target else (target, "", "")
+        channel = channel.replace(">", " into ")
+        return f"plate {name}, {channel}" if channel else f"plate {name}"
+    if effect.startswith("marker_"):
+        return f"marker {target}" if "+" not in target else f"markers {target}"
+    if effect == "joint_centre" or target in SEGMENTS:
+        return segment_label(target)
+    return target
+
+
+_SCALES = {"rad": (57.29577951308232, "°"), "m": (1000.0, "mm")}
+_PLAIN_NUMBERS = ("damping_ratio",)
+
+
+def readable_unit(parameter: str, unit: str) -> tuple[float, str]:
+    """Factor and unit in which people read a parameter."""
+    if parameter == "delay":
+        return 1000.0, "ms"
+    if parameter == "rate_error":
+        return 1e6, "ppm"
+    if unit == "1":
+        return (1.0, "") if parameter in _PLAIN_NUMBERS else (100.0, "%")
+    return _SCALES.get(unit, (1.0, unit))
+
+
+def size_words(parameter: str, unit: str, size: float) -> str:
+    """``2.5 ms`` with two digits that count."""
+    factor, readable = readable_unit(parameter, unit)
+    value = factor * size
+    space = "" if readable == "°" else " "
+    return f"{number(value, digits_of(value))}{space}{readable}".strip()
+
+
+def digits_of(width: float) -> int:
+    """Decimals that leave two digits of a number of this size."""
+    if not abs(width) > 0:
+        return 1
+    exponent = int(f"{abs(width):e}".split("e")[1])
+    return max(0, 1 - exponent)

@@ -1,0 +1,84 @@
+"""What each candidate cause explains of data that it was not fitted to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bsip_cli.report.figures.canvas import (
+    BLUE,
+    INK,
+    ORANGE,
+    SOFT,
+    house_style,
+    legend_above,
+    new_figure,
+    tidy,
+)
+
+_LEAST, _ROOM = 5.0, 1.25
+_STYLES = {  # verdict: colour, marker, filled, what the legend says
+    "named": (BLUE, "o", True, "named"),
+    "ambiguous": (ORANGE, "D", True, "one of several rivals"),
+    "rejected": (SOFT, "s", False, "rejected"),
+}
+
+
+@dataclass(frozen=True)
+class CandidateGains:
+    """All of the same length, best first; gains and intervals [% of the squared residual]."""
+
+    labels: tuple[str, ...]
+    verdicts: tuple[str, ...]
+    gain: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+@house_style()
+def candidate_gains(data: CandidateGains) -> Figure:
+    """A row per candidate; what runs out of the axis ends in an arrow at its edge."""
+    rows = len(data.labels)
+    figure = new_figure(22.0 + 6.5 * rows)
+    axes = figure.add_subplot()
+    edge = _edge(data)
+    for row in range(rows):
+        _draw(axes, data, row, edge)
+    axes.axvline(0.0, color=INK, lw=0.9)
+    axes.set_xlim(-edge, edge)
+    axes.set_ylim(rows - 0.4, -0.6)
+    axes.set_yticks(range(rows), data.labels)
+    axes.set_xlabel("removed of the squared residual in data held out [%]")
+    tidy(axes, grid="x")
+    legend_above(axes)
+    return figure
+
+
+def _edge(data: CandidateGains) -> float:
+    """Of the axis: all gains above zero fit, and the intervals of what was named."""
+    kept = np.array([verdict != "rejected" for verdict in data.verdicts])
+    sizes = np.concatenate([data.gain, np.where(kept, data.high, np.nan)])
+    return _ROOM * max(_LEAST, float(np.nanmax(sizes, initial=_LEAST)))
+
+
+def _draw(axes: Axes, data: CandidateGains, row: int, edge: float) -> None:
+    colour, marker, filled, label = _STYLES[data.verdicts[row]]
+    low, high = np.clip([data.low[row], data.high[row]], -edge, edge)
+    axes.plot([low, high], [row, row], color=colour, lw=1.4)
+    for end, sign in ((data.low[row], -1.0), (data.high[row], 1.0)):
+        if sign * end > edge:
+            axes.plot(sign * edge, row, marker="<" if sign < 0 else ">", color=colour, ms=5)
+    if abs(data.gain[row]) <= edge:
+        axes.plot(
+            data.gain[row],
+            row,
+            marker=marker,
+            ls="none",
+            ms=5.5,
+            color=colour,
+            mfc=colour if filled else "white",
+            label=label,
+        )

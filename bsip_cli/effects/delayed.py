@@ -28,4 +28,4 @@ class Delay(Effect):
         """
         times = scene.times_s
         at = np.clip(times + self.late_s(scene, values), times[0], times[-1])
-        return scene.measured_course(times) - scene.measured_course(at)
+        return scene.measured - scene.measured_course(at)

@@ -88,9 +88,10 @@ class Effect(ABC):
         return tuple((p.name, p.unit, float(x)) for p, x in zip(parameters, values, strict=True))
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        """Whether the values can be true of a body or a lab."""
+        """Whether the values can be true of a body or a lab; at a bound they would go beyond it."""
         parameters = self.parameters(scene, target)
-        return all(p.least <= x <= p.most for p, x in zip(parameters, values, strict=True))
+        bounded = zip(parameters, values, strict=True)
+        return all(p.least <= x <= p.most and (p.scan or x < p.most) for p, x in bounded)
 
     def agrees(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Whether the residuals of the markers allow it: they do not grow by it."""

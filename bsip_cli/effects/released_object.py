@@ -9,6 +9,7 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
 STEP_S = 0.5
+SEEN_S = 1.0  # on either side of the release
 
 
 class ReleasedObject(Effect):
@@ -35,6 +36,12 @@ class ReleasedObject(Effect):
         held = np.clip((release - scene.times_s) * scene.rate_hz + 0.5, 0.0, 1.0)
         carried = scene.once((self.name, target), lambda: _carried(scene, target))
         return mass * held[:, None] * carried
+
+    def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
+        """Seen with the object and without it."""
+        before = scene.times_s < values[1]
+        seconds = [float((part & scene.valid).sum()) / scene.rate_hz for part in (before, ~before)]
+        return super().possible(scene, target, values) and min(seconds) >= SEEN_S
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         return f"the {in_words(target)} holds {values[0]:.2f} kg and lets go at {values[1]:.2f} s"

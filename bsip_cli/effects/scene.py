@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import resample
 
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
@@ -22,7 +22,7 @@ from bsip_cli.motion.inverse_kinematics import tree_of
 from bsip_cli.motion.jacobian import model_markers
 from bsip_cli.motion.pose_response import PoseResponse, marker_trust, pose_responses
 
-COURSE_HZ = 14.0
+FINER = 4  # samples per frame of the wrench between frames
 TRUST_S = 0.05  # standard deviation of what smooths the markers' trust
 
 
@@ -131,14 +131,18 @@ class Scene:
 
     @cached_property
     def measured_course(self) -> CubicSpline:
-        """The measured wrench between the frames too, without what is faster than movement.
+        """The measured wrench between the frames too.
 
-        A spline through noise is quieter between frames than on them, and would draw every delay
-        away from whole frames.
+        Fourier's interpolation first: a spline through few samples is quieter between them than on
+        them, which would draw every delay away from whole frames.
         """
-        corner = min(COURSE_HZ, 0.3 * self.rate_hz)
-        sections = butter(4, corner, fs=self.rate_hz, output="sos")
-        return CubicSpline(self.times_s, sosfiltfilt(sections, self.measured, axis=0))
+        count = len(self.times_s)
+        pad = min(count - 1, round(self.rate_hz))
+        padded = np.pad(self.measured, ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")
+        fine = resample(padded, FINER * len(padded), axis=0)
+        step = 1 / (FINER * self.rate_hz)
+        times = self.times_s[0] + step * (np.arange(len(fine)) - FINER * pad)
+        return CubicSpline(times, fine)
 
     @cached_property
     def motion(self) -> SegmentMotion:

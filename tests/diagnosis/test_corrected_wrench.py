@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from moving_scene import moving
+from scipy.interpolate import CubicSpline
 
 from bsip_cli.diagnosis.cause import Cause
 from bsip_cli.diagnosis.corrected_wrench import corrected_wrench, is_of_the_forces
@@ -39,7 +40,7 @@ def late(scene: Scene, *causes: Cause) -> np.ndarray:
     for cause in causes:
         assert isinstance(cause.effect, Delay)
         late_s += cause.effect.late_s(scene, cause.values)
-    return scene.predicted_course(scene.times_s - late_s)
+    return CubicSpline(scene.times_s, scene.predicted)(scene.times_s - late_s)
 
 
 def test_a_plate_is_put_right_exactly():

@@ -80,6 +80,10 @@ class Explanation:
     def target(self) -> str:
         return self.place.candidate.target
 
+    def is_free(self, evidence: Evidence) -> np.ndarray:
+        """(K,) True for the parameters without a scan."""
+        return np.array([not p.scan for p in self.parameters(evidence)])
+
     def typical(self, evidence: Evidence) -> np.ndarray:
         """(k,) typical sizes of the free parameters."""
         return np.array([p.typical for p in self.parameters(evidence) if not p.scan])
@@ -87,8 +91,7 @@ class Explanation:
     def moved_freely(self, evidence: Evidence, step: np.ndarray) -> Explanation:
         """With the free parameters changed by ``step`` (k,) typical sizes."""
         values = self.values.copy()
-        free = [not p.scan for p in self.parameters(evidence)]
-        values[free] += step * self.typical(evidence)
+        values[self.is_free(evidence)] += step * self.typical(evidence)
         return Explanation(self.place, values)
 
     def moved(self, evidence: Evidence, step: np.ndarray) -> Explanation:
@@ -99,8 +102,7 @@ class Explanation:
 
     def is_negligible(self, evidence: Evidence) -> bool:
         """Whether it is too small to matter beside what labs meet."""
-        free = np.array([not p.scan for p in self.parameters(evidence)])
-        sizes = self.values[free] / self.typical(evidence)
+        sizes = self.values[self.is_free(evidence)] / self.typical(evidence)
         return bool(np.linalg.norm(sizes) < NEGLIGIBLE)
 
     def is_possible(self, evidence: Evidence) -> bool:

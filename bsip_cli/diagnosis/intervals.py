@@ -9,6 +9,7 @@ from bsip_cli.diagnosis.together import Evidence
 
 DRAWS = 200
 BLOCK_S = 1.0
+SCALE_ERROR = 0.025  # of every size: the simulated motion is neither free of noise nor unsmoothed
 
 
 def drawn_explanations(
@@ -26,8 +27,10 @@ def drawn_explanations(
     steps = _bootstrap(evidence, fit.residual, tangent, rng)[:, mine]
     # What the data do not decide, a moment in a gap for instance, is known to its typical size.
     covariance = np.linalg.inv(tangent.T @ tangent + np.eye(tangent.shape[1]))[mine, mine]
-    steps = _at_least(steps - np.median(steps, axis=0), covariance, rng)
     one = fit.explanations[number]
+    scale = SCALE_ERROR * one.values / one.all_typical(evidence) * one.is_free(evidence)
+    covariance = covariance + np.diag(scale**2)
+    steps = _at_least(steps - np.median(steps, axis=0), covariance, rng)
     return [one.all_moved(evidence, step) for step in steps]
 
 

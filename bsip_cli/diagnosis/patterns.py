@@ -10,6 +10,7 @@ from abc import abstractmethod
 
 import numpy as np
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.plate_frame import CHANNELS
 from bsip_cli.effects.scene import Scene
@@ -62,7 +63,8 @@ class Tone(Pattern):
 
 
 class Curve(Pattern):
-    """Forces that are not in proportion: a part that grows with the square of the vertical one."""
+    """Forces that are not in proportion: a part that grows with the square of the vertical one, as
+    far as that moves; what stays is an offset."""
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
         return CHANNELS
@@ -72,8 +74,10 @@ class Curve(Pattern):
         return (Parameter("curvature", unit, -1e3, 1e3, size),)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        load = scene.measured[:, 2] / (scene.mass_kg * 9.81)
-        return _in_channel(scene, target, values[0] * (load**2 - load))
+        load = scene.measured[:, 2] / (scene.mass_kg * GRAVITY_M_S2)
+        apart = load - load[scene.valid].mean()
+        bend = apart**2 - (apart[scene.valid] ** 2).mean()
+        return _in_channel(scene, target, values[0] * bend)
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
         return f"the square of the vertical force, in {target}"

@@ -12,6 +12,7 @@ import numpy as np
 
 from bsip_cli.effects.scene import Scene
 
+NEAR = 0.01  # of the typical size: so near to a bound counts as at it
 DISAGREEMENT = 0.02  # of the squared residuals of the markers
 
 
@@ -91,7 +92,10 @@ class Effect(ABC):
         """Whether the values can be true of a body or a lab; at a bound they would go beyond it."""
         parameters = self.parameters(scene, target)
         bounded = zip(parameters, values, strict=True)
-        return all(p.least <= x <= p.most and (p.scan or x < p.most) for p, x in bounded)
+        return all(
+            p.least <= x <= p.most and (p.scan or x < p.most - NEAR * p.typical)
+            for p, x in bounded
+        )
 
     def agrees(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Whether the residuals of the markers allow it: they do not grow by it."""

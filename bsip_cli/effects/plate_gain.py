@@ -21,7 +21,7 @@ class PlateGain(Effect):
         return tuple(f"{p} {c}" for p in loaded_plates(scene) for c in CHANNELS)
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        return (Parameter("gain", "1", -0.3, 0.3, 0.03),)
+        return (Parameter("gain", "1", -0.15, 0.15, 0.03),)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         name, channel = target.rsplit(" ", 1)

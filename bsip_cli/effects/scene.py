@@ -70,6 +70,8 @@ class Scene:
     residual_m : (N, m, 3) markers less the model's, in the axes of their segments [m], NaN where
         missing; None if they are not known.
     robust_limit_m : residual beyond which a marker's pull on the pose fades.
+    wrench : (N, 6) measured, all contacts together, about the world's origin; the plates' sum if
+        not given.
     """
 
     times_s: np.ndarray
@@ -82,6 +84,7 @@ class Scene:
     valid: np.ndarray
     residual_m: np.ndarray | None = None
     robust_limit_m: float = np.inf
+    wrench: np.ndarray | None = None
 
     @property
     def rate_hz(self) -> float:
@@ -107,6 +110,7 @@ class Scene:
             plates=plates,
             valid=self.valid[part],
             residual_m=residual,
+            wrench=None if self.wrench is None else self.wrench[part],
         )
 
     @cached_property
@@ -126,7 +130,9 @@ class Scene:
 
     @cached_property
     def measured(self) -> np.ndarray:
-        """(N, 6) sum of the plates; 0 where a plate has no reading."""
+        """(N, 6) of all contacts together; 0 where there is no reading."""
+        if self.wrench is not None:
+            return np.nan_to_num(self.wrench)
         return np.nan_to_num(sum((plate.wrench for plate in self.plates), np.zeros((1, 6))))
 
     @cached_property

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 
 from bsip_cli.body.person import Person
 from bsip_cli.effects.scene import Plate, Scene
@@ -14,6 +15,9 @@ from bsip_cli.stages.known_loads import load_phi
 from bsip_cli.study import Trial
 from bsip_cli.unit import Unit
 
+_LOADED_N = 20.0
+_HALF_M = 0.3  # of a plate whose outline no file tells
+
 
 def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = None) -> Scene:
     """Motion, plates and marker residuals of a trial; phi (10 n,) of the person alone.
@@ -21,15 +25,7 @@ def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = 
     Known loads are part of what is simulated.
     """
     kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
-    corners = unit.read("plates", trial)
-    plates = tuple(
-        Plate(
-            str(number),
-            rows.sort_values("corner")[["x_m", "y_m", "z_m"]].to_numpy(),
-            wrench[[f"plate{number}_{name}" for name in WRENCH]].to_numpy(),
-        )
-        for number, rows in corners.groupby("plate")
-    )
+    plates = _plates(unit.read("plates", trial), wrench)
     _, labels, positions = markers_from(unit.read("markers", trial))
     markers = ordered_markers(labels, positions, person.markers)
     q, v, a = coordinates_from(kinematics, person.skeleton)
@@ -44,5 +40,30 @@ def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = 
         plates,
         valid,
         robust_limit_m=unit.config.ik.robust_limit_m,
+        wrench=wrench[WRENCH].to_numpy(),
     )
     return replace(scene, residual_m=marker_residuals(person, q, markers))
+
+
+def _plates(corners: pd.DataFrame, wrench: pd.DataFrame) -> tuple[Plate, ...]:
+    """Every plate that has a reading; where a file tells no place, about its mean load."""
+    names = [c.removesuffix("_fx_N") for c in map(str, wrench) if c.endswith("_fx_N")]
+    found = []
+    for name in names:
+        number = name.removeprefix("plate")
+        reading = wrench[[f"{name}_{c}" for c in WRENCH]].to_numpy()
+        rows = corners[corners["plate"].astype(str) == number].sort_values("corner")
+        place = rows[["x_m", "y_m", "z_m"]].to_numpy() if len(rows) else _about_load(reading)
+        if place is not None:
+            found.append(Plate(number, place, reading))
+    return tuple(found)
+
+
+def _about_load(reading: np.ndarray) -> np.ndarray | None:
+    """(4, 3) corners of a square in the lab's axes about the mean centre of pressure."""
+    loaded = np.nan_to_num(reading[:, 2]) > _LOADED_N
+    if not loaded.any():
+        return None
+    force, moment = reading[loaded, :3].mean(axis=0), reading[loaded, 3:].mean(axis=0)
+    middle = np.array([-moment[1] / force[2], moment[0] / force[2], 0.0])
+    return middle + _HALF_M * np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])

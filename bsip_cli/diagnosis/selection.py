@@ -22,6 +22,8 @@ WORTH_A_TRY = 0.5  # of the best score
 ALPHA = 0.05
 SUPPORT = 8.0  # squared white residual that a trial must save to share a cause
 # A cause from the catalogue is named though a regularity without a name explains so much more.
+CONTENDERS = 3  # candidates that are given a noise of their own
+CONTENDS = 0.6  # of the best score
 NAMED_AT = 0.95
 AGAIN = 1.25  # how much more an effect counts that another trial shows already
 
@@ -61,18 +63,19 @@ class Selection:
     fit: Fit
 
 
-def select(signatures: Signatures, rng: np.random.Generator) -> Selection:
+def select(
+    signatures: Signatures, rng: np.random.Generator, first: Round | None = None
+) -> Selection:
     """Forward selection of up to three causes in each trial; in a trial with one that has no name
-    nothing more can be told."""
-    found: tuple[Explanation, ...] = ()
-    rounds: list[Round] = []
+    nothing more can be told. ``first`` is known beforehand."""
+    rounds = [first] if first is not None and first.kept is not None else []
+    found: tuple[Explanation, ...] = tuple(r.kept.explanation for r in rounds if r.kept)
     while open_trials := _open_trials(signatures.evidence, found):
         before = fit_together(signatures.evidence, found)
         tried = _tried(signatures, before, open_trials)
         if tried:
             # A cause must not be taken for noise: what the best one leaves says what is noise.
-            best = max(tried, key=lambda one: one[2])[1]
-            signatures = signatures.on(_with_noise_beside(signatures.evidence, best))
+            signatures = signatures.on(_likeliest_noise(signatures.evidence, tried))
             before = fit_together(signatures.evidence, found)
             tried = _tried(signatures, before, open_trials)
         one = _round(signatures, before, tried, rng)
@@ -85,6 +88,24 @@ def select(signatures: Signatures, rng: np.random.Generator) -> Selection:
         signatures = signatures.on(_with_noise_beside(signatures.evidence, last))
         last = fit_together(signatures.evidence, found)
     return Selection(signatures, tuple(rounds), last)
+
+
+def _likeliest_noise(evidence: Evidence, tried: list[tuple[Explanation, Fit, float]]) -> Evidence:
+    """The noise beside the candidate that, with its own noise, is the likeliest.
+
+    Scores alone judge all candidates by a noise that holds the true one.
+    """
+    best = max(score for _, _, score in tried)
+    near = sorted(tried, key=lambda one: -one[2])[:CONTENDERS]
+    fits = [fit for _, fit, score in near if score >= CONTENDS * best]
+    noises = [_with_noise_beside(evidence, fit) for fit in fits]
+    if len(noises) == 1:
+        return noises[0]
+    likelihoods = [
+        noise.log_likelihood(fit_together(noise, fit.explanations).residual)
+        for noise, fit in zip(noises, fits, strict=True)
+    ]
+    return noises[int(np.argmax(likelihoods))]
 
 
 def _with_noise_beside(evidence: Evidence, fit: Fit) -> Evidence:
@@ -230,7 +251,7 @@ def _refitted(
         return None
     if not found.agrees_with_markers(evidence):
         return None
-    return found, fit, _score(before, fit, len(sizes))
+    return found, fit, score_of(before, fit, len(sizes))
 
 
 def _alike(one: Explanation, other: Explanation) -> bool:
@@ -264,7 +285,7 @@ def _judged(
     return Tried(found, score, chance.p_value(score, found.place.trials), gain, fit)
 
 
-def _score(before: Fit, after: Fit, free: int) -> float:
+def score_of(before: Fit, after: Fit, free: int) -> float:
     """-log p of what the squared residual loses, by the chi-square of the free parameters."""
     lost = float((before.residual**2).sum() - (after.residual**2).sum())
     return float(minus_log_p(lost, free))

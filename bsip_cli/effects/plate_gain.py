@@ -10,7 +10,7 @@ from bsip_cli.effects.scene import Scene
 
 
 class PlateGain(Effect):
-    """One channel, in the plate's own axes about its centre, shows 1 + gain times the truth."""
+    """One force channel, in the plate's own axes, shows 1 + gain times the truth."""
 
     name = "plate_gain"
     of_the_lab = True
@@ -18,7 +18,7 @@ class PlateGain(Effect):
     remedy = "weigh the person on a scale; lay a known weight on the plate"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
-        return tuple(f"{p} {c}" for p in loaded_plates(scene) for c in CHANNELS)
+        return tuple(f"{p} {c}" for p in loaded_plates(scene) for c in CHANNELS[:3])
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         return (Parameter("gain", "1", -0.15, 0.15, 0.03),)

@@ -16,6 +16,7 @@ from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, values_without
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.patterns import PATTERNS
+from bsip_cli.diagnosis.scale_mass import weight_round
 from bsip_cli.diagnosis.selection import Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.diagnosis.together import together
@@ -53,7 +54,10 @@ def run(unit: Unit) -> None:
     rng = np.random.default_rng(crc32(unit.name.encode()))
     evidence = together(trials)
     effects = [effect for effect in CATALOGUE if effect.name != _ATTRIBUTED]
-    selection = select(signatures_of(evidence, [*effects, *PATTERNS]), rng)
+    assert unit.participant is not None
+    stated = unit.participant.mass_kg is not None
+    first = weight_round(evidence) if stated else None
+    selection = select(signatures_of(evidence, [*effects, *PATTERNS]), rng, first)
     findings = findings_of(selection, rng)
     names = tuple(one.name for one in trials)
     facts = _facts(selection, findings)

@@ -91,7 +91,7 @@ class Effect(ABC):
         """Whether the values can be true of a body or a lab; at a bound they would go beyond it."""
         parameters = self.parameters(scene, target)
         bounded = zip(parameters, values, strict=True)
-        return all(p.least <= x <= p.most and (p.scan or x < p.most) for p, x in bounded)
+        return all(p.least <= x <= p.most if p.scan else p.least < x < p.most for p, x in bounded)
 
     def agrees(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Whether the residuals of the markers allow it: they do not grow by it."""

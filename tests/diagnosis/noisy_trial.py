@@ -11,7 +11,10 @@ import numpy as np
 from moving_scene import moving, scene_of
 from scipy.interpolate import CubicSpline
 
+from bsip_cli.diagnosis.candidates import Candidate
 from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
+from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together
+from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Scene
@@ -22,9 +25,9 @@ SEGMENTS = ("upper_torso", "thigh_r", "thigh_l")
 MASS_SD_KG = 0.5
 
 
-def part_of_moving(first_s: float, duration_s: float) -> Scene:
+def part_of_moving(first_s: float, duration_s: float, amplitude: float = 0.4) -> Scene:
     """A stretch of one long movement, as a trial of its own."""
-    whole = moving(first_s + duration_s)
+    whole = moving(first_s + duration_s, amplitude)
     part = slice(round(first_s * whole.rate_hz), None)
     return scene_of(whole.q[part], whole.v[part], whole.a[part])
 
@@ -65,6 +68,27 @@ def evidence_of(name: str, scene: Scene) -> TrialEvidence:
 def all_of(*scenes: Scene) -> Evidence:
     """The evidence of trials a, b, ..."""
     return together(tuple(evidence_of(n, s) for n, s in zip("abcdef", scenes, strict=False)))
+
+
+def fitted(evidence: Evidence, *explanations: Explanation, rounds: int = 3) -> tuple[Evidence, Fit]:
+    """Explanations, the noise estimated anew beside them, as the selection does."""
+    fit = fit_together(evidence, explanations)
+    for _ in range(rounds - 1):
+        trials = []
+        for t, one in enumerate(evidence.trials):
+            mine = (e.wrench(one.scene) for e in fit.explanations if t in e.place.trials)
+            trials.append(one.with_noise_beside(sum(mine, np.zeros_like(one.scene.measured))))
+        evidence = together(tuple(trials))
+        fit = fit_together(evidence, fit.explanations)
+    return evidence, fit
+
+
+def null(
+    effect: Effect, target: str, scanned: tuple[float, ...] = (), trials: tuple[int, ...] = (0,)
+) -> Explanation:
+    """An effect with one free parameter, which is zero."""
+    place = Place(Candidate(effect, target, scanned), trials)
+    return Explanation(place, np.array([0.0, *scanned]))
 
 
 def _own(scene: Scene) -> np.ndarray:

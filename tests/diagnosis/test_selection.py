@@ -98,7 +98,7 @@ def test_every_round_says_what_was_tried():
         assert scores == sorted(scores, reverse=True)
     first, second = (one.kept for one in rounds[:2])
     assert len(first.fit.explanations) == 1 and len(second.fit.explanations) == 2
-    assert late_with_offset().fit.residual.std() == pytest.approx(1.0, abs=0.05)
+    assert late_with_offset().fit.residual.std() == pytest.approx(1.0, abs=0.1)
 
 
 def test_what_lasts_is_one_cause_of_both_trials():
@@ -111,9 +111,9 @@ def test_what_lasts_is_one_cause_of_both_trials():
 def test_a_fault_of_one_trial_is_not_put_on_the_other():
     first, second = part_of_moving(0, 8), part_of_moving(8, 8)
     zero = EFFECTS["plate_zero"]
-    spoilt = noisy(with_effect(second, zero, "2 fy", OFFSET_N), 8)
+    spoilt = noisy(with_effect(second, zero, "2 fx", OFFSET_N), 8)
     (one,) = said_of(selection_of(noisy(first, 7), spoilt))
-    assert (one.effect, one.target, one.trials) == ("plate_zero", "2 fy", ("b",))
+    assert (one.effect, one.target, one.trials) == ("plate_zero", "2 fx", ("b",))
 
 
 @pytest.mark.parametrize("hertz", [3.0, 5.0])
@@ -133,22 +133,24 @@ def test_a_swing_that_no_effect_knows_has_no_name(hertz):
 
 
 @cache
-def carried() -> Selection:
-    """What a kilogram on the upper torso does, a kilogram of its own does too."""
-    effects = [EFFECTS["added_mass"], EFFECTS["plate_zero"], EFFECTS["plate_gain"]]
-    scene = with_effect(part_of_moving(0, 12, 0.01), EFFECTS["plate_zero"], "1 fz", 15.0)
-    return select(signatures_of(all_of(noisy(scene, 9)), effects), np.random.default_rng(0))
+def alike() -> Selection:
+    """The centres of the plates lie side by side: a force along y is the same on either."""
+    scene = with_effect(part_of_moving(0, 12), EFFECTS["plate_zero"], "2 fy", OFFSET_N)
+    return selection_of(noisy(scene, 9))
 
 
 def test_causes_that_look_alike_share_a_class():
-    """A person who hardly moves: an offset, a gain and a load weigh the same."""
-    found = said_of(carried())
-    assert len(found) > 1
+    found = said_of(alike())
+    assert {(one.effect, one.target) for one in found} == {
+        ("plate_zero", "1 fy"),
+        ("plate_zero", "2 fy"),
+    }
     assert {one.verdict for one in found} == {"ambiguous"}
     assert {one.class_id for one in found} == {"A"}
-    assert "plate_zero" in {one.effect for one in found}
-    assert len({one.effect for one in found}) > 1
-    assert all("to tell them apart" in one.sentence for one in found)
+    assert all("to tell them apart, step off the plate" in one.sentence for one in found)
+    for one in found:
+        offset = number_of(one, "offset")
+        assert offset.low < OFFSET_N < offset.high
 
 
 def rows(selection: Selection):
@@ -157,8 +159,8 @@ def rows(selection: Selection):
 
 
 def test_the_rows_of_a_class():
-    table = rows(carried())
-    assert list(table["class_id"].unique())[0] == "A"
+    table = rows(alike())
+    assert (table["class_id"][:2] == "A").all() and table["rank"][:2].tolist() == [1, 2]
     assert (table["effect"] != "none").all()
     said = table[table["verdict"] == "ambiguous"]
     assert (said["ci_low"] <= said["estimate"]).all() and (

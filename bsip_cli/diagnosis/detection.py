@@ -29,8 +29,6 @@ def limits_of(selection: Selection) -> Iterator[Limit]:
     """Per effect, target and parameter, in the trials together or alone."""
     signatures = selection.signatures
     fit, chance = selection.fit, selection.rounds[-1].chance
-    if chance is None:
-        return
     scores = zip(signatures.places, signatures.information(fit.tangent), strict=True)
     found: dict[tuple, Limit] = {}
     for place, information in scores:

@@ -19,7 +19,6 @@ from scipy.linalg import solve_toeplitz
 from scipy.ndimage import median_filter
 
 from bsip_cli.dynamics.lowpass import lowpass_operator
-from bsip_cli.dynamics.regressor import skew
 from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.equations import ResidualSeries
 from bsip_cli.identification.noise import noise_of
@@ -46,7 +45,7 @@ class Filter:
         known = np.nan_to_num(wrench)
         flat = self.operator @ known.reshape(len(known), -1)
         filtered = flat.reshape(len(self.frames), 6, -1)
-        filtered[:, 3:] -= np.einsum("xy,nyk->nxk", skew(self.reference_m), filtered[:, :3])
+        filtered[:, 3:] -= np.cross(self.reference_m, filtered[:, :3], axisb=1, axisc=1)
         return filtered
 
 

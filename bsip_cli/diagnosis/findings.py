@@ -76,12 +76,15 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
 
 
 def _kept(evidence: Evidence, selection: Selection) -> Iterator[tuple[Round, Tried, int]]:
-    """Rounds and what they kept, with the numbers of the last fit; not what became negligible."""
+    """Rounds and what they kept, with the numbers of the last fit.
+
+    Not what became negligible beside later ones, or was pushed to a bound.
+    """
     number = 0
     for one in selection.rounds:
         if one.kept is not None:
             last = selection.fit.explanations[number]
-            if not last.is_negligible(evidence):
+            if last.is_possible(evidence) and not last.is_negligible(evidence):
                 yield one, replace(one.kept, explanation=last, fit=selection.fit), number
             number += 1
 

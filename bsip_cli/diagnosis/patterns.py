@@ -74,7 +74,7 @@ class Curve(Pattern):
         return (Parameter("curvature", unit, -1e3, 1e3, size),)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        load = scene.measured[:, 2] / (scene.mass_kg * GRAVITY_M_S2)
+        load = scene.predicted[:, 2] / (scene.mass_kg * GRAVITY_M_S2)
         apart = load - load[scene.valid].mean()
         bend = apart**2 - (apart[scene.valid] ** 2).mean()
         return _in_channel(scene, target, values[0] * bend)

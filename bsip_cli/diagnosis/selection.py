@@ -51,7 +51,7 @@ class Round:
     evidence: Evidence
     tried: tuple[Tried, ...]
     kept: Tried | None
-    chance: Chance | None
+    chance: Chance
 
 
 @dataclass(frozen=True)
@@ -146,11 +146,9 @@ def _round(
     tried: list[tuple[Explanation, Fit, float]],
     rng: np.random.Generator,
 ) -> Round:
-    if not tried:
-        return Round(signatures.evidence, (), None, None)
-    best = max(tried, key=lambda t: t[2])
-    courses = flipped(signatures.evidence, best[1].residual, rng)
-    scores, _ = signatures.scores(courses, best[1].tangent)
+    best = max(tried, key=lambda t: t[2])[1] if tried else before
+    courses = flipped(signatures.evidence, best.residual, rng)
+    scores, _ = signatures.scores(courses, best.tangent)
     chance = chance_of(scores, signatures.places)
     judged = [_judged(signatures.evidence, before, *one, chance) for one in tried]
     judged.sort(key=lambda t: -t.score)

@@ -51,7 +51,8 @@ class AddedMass(Effect):
         return (("mass", "kg", float(values[0])), *positions)
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        return values[0] > 0 and bool(np.linalg.norm(values[1:]) <= REACH_M * values[0])
+        within = super().possible(scene, target, values)
+        return within and bool(np.linalg.norm(values[1:]) <= REACH_M * values[0])
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         return f"{values[0]:.2f} kg more than the model knows move with the {in_words(target)}"

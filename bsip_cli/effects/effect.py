@@ -93,7 +93,10 @@ class Effect(ABC):
         parameters = self.parameters(scene, target)
         bounded = zip(parameters, values, strict=True)
         return all(
-            p.least <= x <= p.most and (p.scan or x < p.most - NEAR * p.typical) for p, x in bounded
+            p.least <= x <= p.most
+            if p.scan
+            else p.least + NEAR * p.typical < x < p.most - NEAR * p.typical
+            for p, x in bounded
         )
 
     def agrees(self, scene: Scene, target: str, values: np.ndarray) -> bool:

@@ -54,7 +54,7 @@ class MarkerSwap(Effect):
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Labels are exchanged or not: half of it is something else."""
-        return bool(0.5 <= values[0] <= 1.5 and values[1] < values[2])
+        return bool(0.5 <= values[0] < 1.5 and values[1] < values[2])
 
     def reported(
         self, scene: Scene, target: str, values: np.ndarray

@@ -140,12 +140,16 @@ class Scene:
         """The measured wrench between the frames too.
 
         Fourier's interpolation first: a spline through few samples is quieter between them than on
-        them, which would draw every delay away from whole frames.
+        them, which would draw every delay away from whole frames. It takes the course for a period:
+        without the line from one end to the other, it would ring where they meet.
         """
         count = len(self.times_s)
         pad = min(count - 1, round(self.rate_hz))
         padded = np.pad(self.measured, ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")
-        fine = resample(padded, FINER * len(padded), axis=0)
+        slope = (padded[-1] - padded[0]) / (len(padded) - 1)
+        level = padded - np.arange(len(padded))[:, None] * slope
+        fine = resample(level, FINER * len(level), axis=0)
+        fine += np.arange(len(fine))[:, None] * slope / FINER
         step = 1 / (FINER * self.rate_hz)
         times = self.times_s[0] + step * (np.arange(len(fine)) - FINER * pad)
         return CubicSpline(times, fine)

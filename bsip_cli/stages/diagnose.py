@@ -94,7 +94,7 @@ def _facts(selection: Selection, findings: tuple[Finding, ...]) -> dict:
     for one, folds in zip(selection.fit.explanations, unseen, strict=True):
         trials = tuple(evidence.trials[t].name for t in one.place.trials)
         if (one.effect.name, one.target, trials) not in verdicts:
-            continue  # it became negligible beside later ones
+            continue  # it became negligible or impossible beside later ones
         causes.append(
             {
                 "effect": one.effect.name,

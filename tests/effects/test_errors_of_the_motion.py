@@ -137,6 +137,23 @@ def test_swapped_markers():
     np.testing.assert_allclose(moved[:, pair], seen.residual_m[inside][:, pair], atol=0.01)
 
 
+def test_only_a_marker_whose_own_residual_asks_for_it_has_shifted():
+    """By a residual that lasts or jumps; what comes and goes is none. And the shift must fit it."""
+    scene, names = moving(), PERSON.markers
+    residual = np.zeros_like(scene.markers_m)
+    jumping, lasting, shaking = (names.index(name) for name in ("RELB", "LASIS", "FHEAD"))
+    residual[300:, jumping, 1] = 0.012
+    residual[:, lasting, 0] = 0.008
+    residual[:, shaking, 2] = 0.02 * np.sin(2 * np.pi * 3.0 * scene.times_s)
+    effect, seen = MarkerShift(), replace(scene, residual_m=residual)
+    assert set(effect.targets(seen)) == {"RELB", "LASIS"}
+    assert set(effect.targets(scene)) == set(names)
+    fitting, contrary = (np.array([0.0, y, 0.0, 3.0, 0.0]) for y in (0.015, -0.015))
+    assert effect.agrees(seen, "RELB", fitting)
+    assert not effect.agrees(seen, "RELB", contrary)
+    assert not effect.agrees(seen, "FHEAD", fitting)
+
+
 @pytest.mark.parametrize("joint", ["hip_r", "knee_l", "shoulder_l", "waist"])
 def test_a_wrong_joint_centre(joint):
     true, shift = true_scene(), np.array([0.01, -0.008, 0.012])

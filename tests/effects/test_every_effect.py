@@ -10,6 +10,7 @@ from standing_person import standing
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.wobbling_mass import WobblingMass
 from bsip_cli.motion.jacobian import marker_residuals
 
 VOCABULARY = [
@@ -39,13 +40,22 @@ EVERY = [pytest.param(effect, id=effect.name) for effect in CATALOGUE]
 
 
 def scene_with_swapped_markers() -> Scene:
-    """Residuals as exchanged labels leave them if the pose does not follow."""
-    scene, names = moving(), standing().person.markers
+    """Residuals as exchanged labels leave them if the pose does not follow; and an impact."""
+    scene, names = landing(), standing().person.markers
     seen = scene.markers_m.copy()
     a, b = names.index("RKNEM"), names.index("LKNEM")
     seen[200:320, [a, b]] = seen[200:320, [b, a]]
     residual = marker_residuals(scene.person, scene.q, seen)
     return replace(scene, residual_m=residual, robust_limit_m=0.025)
+
+
+def landing() -> Scene:
+    """The moving person, on the first of whose plates twice the body weight lands for a moment."""
+    scene = moving()
+    first, *others = scene.plates
+    push = 2 * scene.predicted[:, 2].mean() * np.exp(-0.5 * ((scene.times_s - 2.5) / 0.1) ** 2)
+    shown = first.wrench + push[:, None] * [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    return replace(scene, plates=(replace(first, wrench=shown), *others))
 
 
 @pytest.fixture(scope="module")
@@ -143,3 +153,38 @@ def test_beyond_the_bounds_nothing_is_possible(effect, scene):
     target = effect.targets(scene)[0]
     far = [2 * p.most + 1 for p in effect.parameters(scene, target)]
     assert not effect.possible(scene, target, np.array(far))
+
+
+@pytest.mark.parametrize("effect", [e for e in CATALOGUE if e.name != "segment_inertia"])
+def test_at_a_bound_it_would_go_beyond(effect, scene):
+    """On either side: what a fit has clipped is no estimate. A segment's bounds are a body's."""
+    target = effect.targets(scene)[0]
+    for k, p in enumerate(effect.parameters(scene, target)):
+        for bound in () if p.scan else (p.least, p.most):
+            values = values_of(effect, scene, target, 0.01)
+            values[k] = bound
+            assert not effect.possible(scene, target, values)
+
+
+def test_what_can_last():
+    """Faults of the lab and facts of the person are the same in all trials; an event is not."""
+    assert all(effect.lasts == (effect.of_the_lab or effect.of_the_person) for effect in CATALOGUE)
+    lasting = {name for name, effect in EFFECTS.items() if effect.lasts}
+    assert {"sync_offset", "plate_gain", "added_mass", "joint_centre"} <= lasting
+    assert lasting.isdisjoint({"released_object", "unmeasured_contact", "marker_shift"})
+
+
+@pytest.mark.parametrize("effect", EVERY)
+def test_scans_are_values_of_the_scanned_parameters(effect, scene):
+    for target in some(effect, scene):
+        scanned = [p for p in effect.parameters(scene, target) if p.scan]
+        for values in effect.scans(scene, target):
+            assert len(values) == len(scanned)
+            assert all(p.least <= x <= p.most for p, x in zip(scanned, values, strict=True))
+
+
+def test_soft_tissue_is_looked_for_only_after_an_impact(scene):
+    assert WobblingMass().targets(moving()) == ()
+    assert "thigh_l" in WobblingMass().targets(scene)
+    unseen = replace(scene, valid=np.abs(scene.times_s - 2.5) > 0.5)
+    assert WobblingMass().targets(unseen) == ()

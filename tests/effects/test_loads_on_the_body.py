@@ -96,6 +96,23 @@ def test_a_contact_takes_its_force_off_the_plates():
     assert reported[:3] == [("start", 2.0), ("end", 4.0), ("force", pytest.approx(size))]
 
 
+def test_an_object_is_seen_with_and_without():
+    effect, scene = ReleasedObject(), moving()
+    assert effect.possible(scene, "hand_r", np.array([1.5, 3.0]))
+    for moment in (0.8, 5.2):
+        assert not effect.possible(scene, "hand_r", np.array([1.5, moment]))
+    blind = replace(scene, valid=TIMES < 3.5)  # of which half a second without the object
+    assert not effect.possible(blind, "hand_r", np.array([1.5, 3.0]))
+
+
+def test_a_contact_lasts():
+    effect, scene = UnmeasuredContact(), moving()
+    long, short = np.array([0, 0, 50.0, 3.0, 1.0]), np.array([0, 0, 50.0, 3.0, 0.5])
+    assert effect.possible(scene, "hand_l", long)
+    assert not effect.possible(scene, "hand_l", short)
+    assert not effect.possible(replace(scene, valid=TIMES < 3.0), "hand_l", long)
+
+
 @pytest.mark.parametrize(("frequency", "damping"), [(3.0, 0.1), (6.5, 0.3)])
 def test_a_wobbling_mass_is_an_oscillator_on_a_moving_ground(frequency, damping):
     scene, pace = moving(), 2 * np.pi * frequency

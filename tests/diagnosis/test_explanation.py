@@ -1,0 +1,78 @@
+"""Effects fitted to the evidence: sizes by steps, moments by search."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from noisy_trial import all_of, fitted, late, noisy, null, part_of_moving, with_effect
+
+from bsip_cli.diagnosis.candidates import candidates_of
+from bsip_cli.diagnosis.explanation import fit_together, refined
+from bsip_cli.diagnosis.intervals import drawn_explanations
+from bsip_cli.effects.catalogue import EFFECTS
+
+
+def test_a_release_is_found_between_the_moments_that_are_tried():
+    effect, moment = EFFECTS["released_object"], 6.27
+    scene = noisy(with_effect(part_of_moving(0, 12), effect, "hand_r", 1.2, moment), 3)
+    evidence = all_of(scene)
+    tried = [c.scanned[0] for c in candidates_of(effect, scene) if c.target == "hand_r"]
+    nearest = min(tried, key=lambda t: abs(t - moment))
+    assert abs(nearest - moment) > 0.1
+    start = null(effect, "hand_r", (nearest,))
+    found = refined(evidence, start, fit_together(evidence, ()))
+    assert found.values[1] == pytest.approx(moment, abs=0.03)
+    assert found.place == start.place
+    fit = fit_together(evidence, (found,))
+    mass, at = fit.explanations[0].values
+    assert mass == pytest.approx(1.2, abs=0.05) and at == found.values[1]
+    coarse = fit_together(evidence, (start,))
+    assert (fit.residual**2).sum() < (coarse.residual**2).sum() - 10
+
+
+def test_without_a_scan_there_is_nothing_to_refine():
+    evidence = all_of(noisy(part_of_moving(0, 6), 1))
+    one = null(EFFECTS["sync_offset"], "")
+    assert refined(evidence, one, fit_together(evidence, ())) is one
+
+
+@pytest.mark.parametrize("delay", [0.004, 0.06])
+def test_a_delay_comes_out_of_the_noise_round_by_round(delay):
+    """At first much of it is taken for noise, and of a large one most is clipped."""
+    evidence = all_of(noisy(late(part_of_moving(0, 12), delay), 4))
+    one = null(EFFECTS["sync_offset"], "")
+    first, last = (fitted(evidence, one, rounds=k)[1].explanations[0].values[0] for k in (1, 4))
+    assert 0.3 * delay < first < 0.98 * delay
+    assert last == pytest.approx(delay, abs=1e-4)
+
+
+def test_two_causes_are_told_apart():
+    zero = EFFECTS["plate_zero"]
+    scene = with_effect(late(part_of_moving(0, 12), 0.008), zero, "2 fy", -6.0)
+    causes = null(EFFECTS["sync_offset"], ""), null(zero, "2 fy")
+    evidence, fit = fitted(all_of(noisy(scene, 5)), *causes)
+    delay, offset = (one.values[0] for one in fit.explanations)
+    assert delay == pytest.approx(0.008, abs=4e-4)
+    assert offset == pytest.approx(-6.0, abs=0.5)
+    assert fit.columns(0, evidence) == slice(0, 1) and fit.columns(1, evidence) == slice(1, 2)
+
+
+def test_values_stay_within_their_bounds():
+    evidence = all_of(noisy(part_of_moving(0, 6), 1))
+    one = null(EFFECTS["released_object"], "hand_r", (3.0,))
+    assert one.moved(evidence, np.array([-3.0])).values.tolist() == [0.0, 3.0]
+    assert not one.moved_freely(evidence, np.array([-3.0])).is_possible(evidence)
+    assert one.is_negligible(evidence)
+    assert one.all_moved(evidence, np.array([2.0, 100.0])).values[1] == pytest.approx(5.99)
+
+
+def test_intervals_hold_the_truth_and_shrink_with_time():
+    widths = []
+    for seconds in (5, 24):
+        evidence = all_of(noisy(late(part_of_moving(0, seconds), 0.01), 6))
+        evidence, fit = fitted(evidence, null(EFFECTS["sync_offset"], ""))
+        draws = drawn_explanations(evidence, fit, 0, np.random.default_rng(1))
+        delays = [one.values[0] for one in draws]
+        assert min(delays) < 0.01 < max(delays)
+        widths.append(np.std(delays))
+    assert widths[1] < 0.75 * widths[0]

@@ -1,0 +1,251 @@
+"""From a recording to what is said of it: causes found, sized, and told from one another."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
+
+from bsip_cli.diagnosis.detection import Limit, limits_of
+from bsip_cli.diagnosis.explanation import NEGLIGIBLE
+from bsip_cli.diagnosis.findings import Finding, findings_of
+from bsip_cli.diagnosis.patterns import PATTERNS
+from bsip_cli.diagnosis.selection import Selection, select
+from bsip_cli.diagnosis.signatures import signatures_of
+from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.scene import Scene
+from bsip_cli.stages.diagnosis_rows import rows_of
+
+NAMES = (
+    "sync_offset",
+    "clock_drift",
+    "plate_gain",
+    "plate_zero",
+    "plate_drift",
+    "gravity_tilt",
+    "added_mass",
+    "released_object",
+)
+OFFSET_N, DELAY_S = 8.0, 0.010
+
+
+def selection_of(*scenes: Scene) -> Selection:
+    effects = [*(EFFECTS[name] for name in NAMES), *PATTERNS]
+    return select(signatures_of(all_of(*scenes), effects), np.random.default_rng(0))
+
+
+def said_of(selection: Selection) -> list[Finding]:
+    """What is not rejected."""
+    findings = findings_of(selection, np.random.default_rng(1))
+    return [one for one in findings if one.verdict != "rejected"]
+
+
+def number_of(finding: Finding, name: str):
+    return next(one for one in finding.numbers if one.name == name)
+
+
+@cache
+def late_with_offset() -> Selection:
+    scene = late(part_of_moving(0, 12), DELAY_S)
+    return selection_of(noisy(with_effect(scene, EFFECTS["plate_zero"], "1 fx", OFFSET_N), 4))
+
+
+@cache
+def null(seconds: float = 12) -> Selection:
+    return selection_of(noisy(part_of_moving(0, seconds), 2))
+
+
+def test_in_white_noise_nothing_is_found():
+    found = [said_of(selection_of(noisy(part_of_moving(0, 8), seed))) for seed in range(10, 16)]
+    assert sum(bool(one) for one in found) <= 1
+
+
+def test_a_delay_is_found_with_its_size():
+    (one,) = said_of(selection_of(noisy(late(part_of_moving(0, 12), DELAY_S), 3)))
+    assert (one.effect, one.trials, one.verdict, one.class_id) == (
+        "sync_offset",
+        ("a",),
+        "named",
+        "",
+    )
+    delay = number_of(one, "delay")
+    assert delay.low < DELAY_S < delay.high
+    assert 0 < delay.high - delay.low < 5e-4
+    assert one.p_value < 0.01
+    gain, low, high = one.gain
+    assert 0 < low < gain < high
+    assert "10.0 ms after the markers" in one.sentence and "95 % interval" in one.sentence
+
+
+def test_a_second_cause_in_the_same_trial_is_found_too():
+    found = {one.effect: one for one in said_of(late_with_offset())}
+    assert set(found) == {"sync_offset", "plate_zero"}
+    delay, offset = (
+        number_of(found[name], part).value
+        for name, part in (("sync_offset", "delay"), ("plate_zero", "offset"))
+    )
+    assert delay == pytest.approx(DELAY_S, abs=2e-4)
+    assert found["plate_zero"].target == "1 fx"
+    assert offset == pytest.approx(OFFSET_N, abs=0.5)
+
+
+def test_every_round_says_what_was_tried():
+    rounds = late_with_offset().rounds
+    assert [one.kept is not None for one in rounds] == [True, True, False]
+    for one in rounds:
+        scores = [tried.score for tried in one.tried]
+        assert scores == sorted(scores, reverse=True)
+    first, second = (one.kept for one in rounds[:2])
+    assert len(first.fit.explanations) == 1 and len(second.fit.explanations) == 2
+    assert late_with_offset().fit.residual.std() == pytest.approx(1.0, abs=0.1)
+
+
+def test_what_lasts_is_one_cause_of_both_trials():
+    first, second = part_of_moving(0, 8), part_of_moving(8, 8)
+    (one,) = said_of(selection_of(noisy(late(first, 0.008), 5), noisy(late(second, 0.008), 6)))
+    assert one.effect == "sync_offset" and one.trials == ("a", "b")
+    assert number_of(one, "delay").value == pytest.approx(0.008, abs=2e-4)
+
+
+def test_a_fault_of_one_trial_is_not_put_on_the_other():
+    first, second = part_of_moving(0, 8), part_of_moving(8, 8)
+    zero = EFFECTS["plate_zero"]
+    spoilt = noisy(with_effect(second, zero, "2 fx", OFFSET_N), 8)
+    (one,) = said_of(selection_of(noisy(first, 7), spoilt))
+    assert (one.effect, one.target, one.trials) == ("plate_zero", "2 fx", ("b",))
+
+
+@pytest.mark.parametrize("hertz", [3.0, 5.0])
+def test_a_swing_that_no_effect_knows_has_no_name(hertz):
+    scene = part_of_moving(0, 12)
+    swing = 8.0 * np.sin(2 * np.pi * hertz * scene.times_s)[:, None] * np.eye(6)[2]
+    (one,) = said_of(selection_of(noisy(shown(scene, swing), 6)))
+    assert (one.effect, one.target) == ("unexplained", "fz")
+    frequency = number_of(one, "frequency")
+    assert frequency.value == pytest.approx(hertz, abs=0.01)
+    size = np.hypot(number_of(one, "cosine").value, number_of(one, "sine").value)
+    assert size == pytest.approx(8.0, abs=1.0)
+    assert "no name" in one.sentence and f"{hertz:.2f} Hz" in one.sentence
+
+
+# --- causes that look alike, and the rows of the artifact ---------------------------------------
+
+
+@cache
+def alike() -> Selection:
+    """The centres of the plates lie side by side: a force along y is the same on either."""
+    scene = with_effect(part_of_moving(0, 12), EFFECTS["plate_zero"], "2 fy", OFFSET_N)
+    return selection_of(noisy(scene, 9))
+
+
+def test_causes_that_look_alike_share_a_class():
+    found = said_of(alike())
+    assert {(one.effect, one.target) for one in found} == {
+        ("plate_zero", "1 fy"),
+        ("plate_zero", "2 fy"),
+    }
+    assert {one.verdict for one in found} == {"ambiguous"}
+    assert {one.class_id for one in found} == {"A"}
+    assert all("to tell them apart, step off the plate" in one.sentence for one in found)
+    for one in found:
+        offset = number_of(one, "offset")
+        assert offset.low < OFFSET_N < offset.high
+
+
+def rows(selection: Selection):
+    findings = findings_of(selection, np.random.default_rng(1))
+    return rows_of(findings, tuple(one.name for one in selection.signatures.evidence.trials))
+
+
+def test_the_rows_of_a_class():
+    table = rows(alike())
+    assert (table["class_id"][:2] == "A").all() and table["rank"][:2].tolist() == [1, 2]
+    assert (table["effect"] != "none").all()
+    said = table[table["verdict"] == "ambiguous"]
+    assert (said["ci_low"] <= said["estimate"]).all() and (
+        said["estimate"] <= said["ci_high"]
+    ).all()
+    assert (table.loc[table["verdict"] == "rejected", "class_id"] == "").all()
+
+
+def test_the_row_of_nothing():
+    table = rows(null())
+    first = table.iloc[0]
+    assert (first["rank"], first["effect"], first["verdict"]) == (1, "none", "named")
+    assert first["trials"] == "a" and np.isnan(first["estimate"])
+    assert (table["verdict"][1:] == "rejected").all()
+    assert (table["rank"][1:] > 1).all()
+
+
+def test_a_named_cause_needs_no_row_of_nothing():
+    table = rows(late_with_offset())
+    assert table.iloc[0]["effect"] == "sync_offset" and table.iloc[0]["rank"] == 1
+    rejected = table[table["verdict"] == "rejected"]
+    assert rejected["sentence"].str.startswith("not so: ").all()
+
+
+# --- detection limits ---------------------------------------------------------------------------
+
+
+def limits(selection: Selection) -> dict[tuple[str, str, str], Limit]:
+    return {
+        (one.place.candidate.effect.name, one.place.candidate.target, one.parameter): one
+        for one in limits_of(selection)
+    }
+
+
+def in_typical_sizes(selection: Selection) -> dict[tuple[str, str, str], float]:
+    scene = selection.signatures.evidence.trials[0].scene
+    sizes = {}
+    for key, limit in limits(selection).items():
+        typical = {p.name: p.typical for p in limit.place.candidate.free(scene)}
+        sizes[key] = limit.size / typical[limit.parameter]
+    return sizes
+
+
+def test_longer_recordings_show_smaller_causes():
+    """Down to what is too small to matter; least where the parameters do much the same."""
+    short, long = (
+        in_typical_sizes(selection_of(noisy(late(part_of_moving(0, seconds), DELAY_S), 3)))
+        for seconds in (6, 24)
+    )
+    assert short.keys() == long.keys()
+    assert "unexplained" not in {name for name, *_ in short}
+    assert min(long.values()) == NEGLIGIBLE
+    above = [key for key, size in short.items() if size > 2 * NEGLIGIBLE]
+    ratios = [long[key] / short[key] for key in above]
+    assert len(above) > 5
+    assert 0.2 < np.median(ratios) < 0.85 and min(ratios) < 0.75
+    assert max(ratios) < 1
+
+
+def test_limits_are_told_though_nothing_was_worth_a_try():
+    selection = selection_of(noisy(part_of_moving(0, 8), 11))
+    assert [one.tried for one in selection.rounds] == [()]
+    assert len(limits(selection)) > 50
+
+
+def test_what_later_causes_push_to_a_bound_is_not_said():
+    """Values that are no longer possible beside the others are no finding."""
+    selection = late_with_offset()
+    first, second = selection.fit.explanations
+    beyond = replace(second, values=np.array([200.0]))
+    pushed = replace(selection, fit=replace(selection.fit, explanations=(first, beyond)))
+    assert [one.effect for one in said_of(pushed)] == [first.effect.name]
+
+
+def test_what_is_well_above_its_limit_is_found():
+    """And the limit is no guess: a cause of a fifth of it is not."""
+    limit = limits(late_with_offset())["plate_zero", "1 fy", "offset"]
+    assert limit.unit == "N"
+    zero = EFFECTS["plate_zero"]
+
+    def found(times: float) -> list[tuple[str, str]]:
+        scene = with_effect(part_of_moving(0, 12), zero, "1 fy", times * limit.size)
+        return [(one.effect, one.target) for one in said_of(selection_of(noisy(scene, 12)))]
+
+    assert ("plate_zero", "1 fy") in found(1.5)
+    assert found(0.2) == []

@@ -28,7 +28,11 @@ class Limit:
 def limits_of(selection: Selection) -> Iterator[Limit]:
     """Per effect, target and parameter, in the trials together or alone."""
     signatures = selection.signatures
-    fit, chance = selection.fit, selection.rounds[-1].chance
+    fit = selection.fit
+    chances = [one.chance for one in selection.rounds if one.chance is not None]
+    if not chances:
+        return
+    last = chances[-1]
     scores = zip(signatures.places, signatures.information(fit.tangent), strict=True)
     found: dict[tuple, Limit] = {}
     for place, information in scores:
@@ -38,7 +42,7 @@ def limits_of(selection: Selection) -> Iterator[Limit]:
         scene = signatures.evidence.trials[place.trials[0]].scene
         spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(information, hermitian=True)), 0.0))
         for parameter, sd in zip(place.candidate.free(scene), spread, strict=True):
-            least = chance.limit(place.trials, ALPHA)
+            least = last.limit(place.trials, ALPHA)
             needed = max(sd * (np.sqrt(2 * least) + _SURE), NEGLIGIBLE)
             limit = Limit(place, parameter.name, parameter.unit, needed * parameter.typical)
             key = (effect.name, place.candidate.target, place.trials, parameter.name)

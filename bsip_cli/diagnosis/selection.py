@@ -51,7 +51,7 @@ class Round:
     evidence: Evidence
     tried: tuple[Tried, ...]
     kept: Tried | None
-    chance: Chance
+    chance: Chance | None  # None where the evidence is not the wrench's
 
 
 @dataclass(frozen=True)

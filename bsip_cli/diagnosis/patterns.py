@@ -16,7 +16,7 @@ from bsip_cli.effects.plate_frame import CHANNELS
 from bsip_cli.effects.scene import Scene
 
 UNEXPLAINED = "unexplained"
-_SIZE_N, _SIZE_NM = 20.0, 10.0
+_SIZE_N, _SIZE_NM = 40.0, 20.0
 
 
 class Pattern(Effect):

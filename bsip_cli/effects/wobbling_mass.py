@@ -11,7 +11,7 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
 IMPACT = 1.8  # peak of the vertical force over body weight
-FREQUENCIES_HZ = (3.0, 4.0, 5.0, 6.5, 8.0, 10.0)
+FREQUENCIES_HZ = (2.5, 3.0, 3.5, 4.0, 5.0, 6.5)
 DAMPING = (0.1, 0.2, 0.4)
 
 
@@ -37,8 +37,8 @@ class WobblingMass(Effect):
         i = scene.person.skeleton.index(target)
         most = max(0.8 * float(scene.phi[10 * i]), 0.1)
         return (
-            Parameter("mass", "kg", 0.0, most, 1.0),
-            Parameter("frequency", "Hz", 2.0, 20.0, 1.0, FREQUENCIES_HZ),
+            Parameter("mass", "kg", 0.0, most, 4.0),
+            Parameter("frequency", "Hz", 2.0, 8.0, 1.0, FREQUENCIES_HZ),
             Parameter("damping_ratio", "1", 0.02, 1.0, 0.1, DAMPING),
         )
 

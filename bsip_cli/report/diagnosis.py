@@ -32,6 +32,7 @@ _EXAMPLES = (  # effects whose limits are told in the sentence
     ("plate_gain", "fz", "a vertical gain wrong"),
     ("added_mass", "hand_l", "a mass on the left hand"),
 )
+LEAST_TOLD = 1e-3  # p-values below are not told in digits
 
 
 @dataclass(frozen=True)
@@ -216,7 +217,8 @@ def _remedies(cause: Sequence[Candidate]) -> str:
 def how_sure(one: Candidate) -> str:
     """Against chance, and on data that were not used to size it."""
     gain, low, high = one.gain
-    text = f"Chance alone would bring as much in {percent(one.p_value, 1)} % of cases"
+    chance = percent(one.p_value, 1) if one.p_value >= LEAST_TOLD else "fewer than 0.1"
+    text = f"Chance alone would bring as much in {chance} % of cases"
     if not np.isfinite(gain):
         return f"{text}."
     return (

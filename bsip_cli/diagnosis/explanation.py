@@ -64,9 +64,7 @@ class Explanation:
 
     def all_moved(self, evidence: Evidence, step: np.ndarray) -> Explanation:
         """With all parameters changed by ``step`` (K,) typical sizes, within their bounds."""
-        bounds = np.array([(p.least, p.most) for p in self.parameters(evidence)])
-        values = self.values + step * self.all_typical(evidence)
-        return Explanation(self.place, np.clip(values, *bounds.T))
+        return self._within(evidence, self.values + step * self.all_typical(evidence))
 
     def reported(self, evidence: Evidence) -> tuple[tuple[str, str, float], ...]:
         """Name, unit and value of what the diagnosis prints."""
@@ -86,7 +84,7 @@ class Explanation:
 
     def typical(self, evidence: Evidence) -> np.ndarray:
         """(k,) typical sizes of the free parameters."""
-        return np.array([p.typical for p in self.parameters(evidence) if not p.scan])
+        return self.all_typical(evidence)[self.is_free(evidence)]
 
     def moved_freely(self, evidence: Evidence, step: np.ndarray) -> Explanation:
         """With the free parameters changed by ``step`` (k,) typical sizes."""
@@ -96,8 +94,11 @@ class Explanation:
 
     def moved(self, evidence: Evidence, step: np.ndarray) -> Explanation:
         """As ``moved_freely``, within the bounds."""
+        return self._within(evidence, self.moved_freely(evidence, step).values)
+
+    def _within(self, evidence: Evidence, values: np.ndarray) -> Explanation:
+        """With values (K,) cut to the bounds."""
         bounds = np.array([(p.least, p.most) for p in self.parameters(evidence)])
-        values = self.moved_freely(evidence, step).values
         return Explanation(self.place, np.clip(values, *bounds.T))
 
     def is_negligible(self, evidence: Evidence) -> bool:
@@ -144,12 +145,10 @@ def fit_together(evidence: Evidence, explanations: tuple[Explanation, ...]) -> F
     for _ in range(_STEPS):
         residual, tangent = _linear(evidence, found)
         step = np.linalg.lstsq(tangent, residual, rcond=None)[0] if found else np.zeros(0)
-        moved, start = [], 0
-        for one in found:
-            width = len(one.typical(evidence))
-            moved.append(one.moved(evidence, step[start : start + width]))
-            start += width
-        found = tuple(moved)
+        now = Fit(found, residual, tangent)
+        found = tuple(
+            one.moved(evidence, step[now.columns(k, evidence)]) for k, one in enumerate(found)
+        )
         if np.abs(step).max(initial=0.0) < 1e-3:
             break
     return Fit(found, *_linear(evidence, found))
@@ -167,12 +166,11 @@ def _linear(
 
 def refined(evidence: Evidence, one: Explanation, others: Fit) -> Explanation:
     """The explanation with its scanned parameters moved to where it explains most."""
-    parameters = one.parameters(evidence)
-    scanned = np.array([bool(p.scan) for p in parameters])
+    scanned = ~one.is_free(evidence)
     if not scanned.any():
         return one
-    scale = np.array([p.typical for p in parameters])[scanned]
-    bounds = np.array([(p.least, p.most) for p in parameters])[scanned]
+    scale = one.all_typical(evidence)[scanned]
+    bounds = np.array([(p.least, p.most) for p in one.parameters(evidence) if p.scan])
     basis, _ = np.linalg.qr(others.tangent)
     residual = others.residual - basis @ (basis.T @ others.residual)
 

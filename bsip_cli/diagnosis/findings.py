@@ -11,7 +11,7 @@ import numpy as np
 from bsip_cli.diagnosis.explanation import Explanation
 from bsip_cli.diagnosis.intervals import drawn_explanations
 from bsip_cli.diagnosis.rivals import rivals_of
-from bsip_cli.diagnosis.selection import Round, Selection, Tried
+from bsip_cli.diagnosis.selection import ALPHA, Round, Selection, Tried
 from bsip_cli.diagnosis.together import Evidence
 
 Verdict = Literal["named", "ambiguous", "rejected"]
@@ -123,7 +123,7 @@ def _rejected(evidence: Evidence, tried: Tried) -> Finding:
     numbers = tuple(Number(n, u, x, np.nan, np.nan) for n, u, x in one.reported(evidence))
     why = (
         f"chance brings as much in {100 * tried.p_value:.0f} % of cases"
-        if tried.p_value > 0.05
+        if tried.p_value > ALPHA
         else "another cause explains it better"
         if tried.is_good
         else "on data held out it does not help"

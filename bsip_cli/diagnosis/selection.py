@@ -21,9 +21,9 @@ TRIES = 10  # candidates that are refitted in a round
 WORTH_A_TRY = 0.5  # of the best score
 ALPHA = 0.05
 SUPPORT = 8.0  # squared white residual that a trial must save to share a cause
-# A cause from the catalogue is named though a regularity without a name explains so much more.
 CONTENDERS = 3  # candidates that are given a noise of their own
 CONTENDS = 0.6  # of the best score
+# A cause from the catalogue is named though a regularity without a name explains a bit more.
 NAMED_AT = 0.95
 AGAIN = 1.25  # how much more an effect counts that another trial shows already
 

@@ -73,18 +73,14 @@ class Signatures:
         [typical]. What the columns ``known`` (R, q) can explain is taken off both."""
         basis, _ = np.linalg.qr(known)
         left = residuals - basis @ (basis.T @ residuals)
-        turned = self.evidence.turned(np.column_stack([left, basis])).astype(np.float32)
-        products = [
-            one.columns.T @ turned[self.evidence.rows(t)] for t, one in enumerate(self.stored)
-        ]
-        kept = 1 - (1 - self.evidence.shrink) ** 2
-        logs, sizes = np.empty((len(self.places), residuals.shape[1])), []
+        products = self._products(np.column_stack([left, basis]))
+        count = residuals.shape[1]
+        logs, sizes = np.empty((len(self.places), count)), []
         for k, place in enumerate(self.places):
             gram, shared, product = self._sums(place, products)
-            inside = product[:, residuals.shape[1] :]
-            whole = gram - shared.T @ (kept[:, None] * shared) - inside @ inside.T
+            right = product[:, :count]
+            whole = self._whole(gram, shared, product[:, count:])
             whole += _RIDGE * np.diag(np.diag(gram) + 1e-300)
-            right = product[:, : residuals.shape[1]]
             size = np.linalg.solve(whole, right)
             logs[k] = minus_log_p(np.einsum("kf,kf->f", right, size), len(gram))
             sizes.append(size[:, 0])
@@ -93,14 +89,16 @@ class Signatures:
     def information(self, known: np.ndarray) -> list[np.ndarray]:
         """(k, k) of every place, about its sizes [1/typical^2], beside the columns ``known``."""
         basis, _ = np.linalg.qr(known)
-        turned = self.evidence.turned(basis).astype(np.float32)
-        products = [
-            one.columns.T @ turned[self.evidence.rows(t)] for t, one in enumerate(self.stored)
-        ]
-        return [self._whole(place, products) for place in self.places]
+        products = self._products(basis)
+        return [self._whole(*self._sums(place, products)) for place in self.places]
 
-    def _whole(self, place: Place, products: list[np.ndarray]) -> np.ndarray:
-        gram, shared, inside = self._sums(place, products)
+    def _products(self, courses: np.ndarray) -> list[np.ndarray]:
+        """Per trial (K, f) of all signatures with courses (R, f)."""
+        turned = self.evidence.turned(courses).astype(np.float32)
+        return [one.columns.T @ turned[self.evidence.rows(t)] for t, one in enumerate(self.stored)]
+
+    def _whole(self, gram: np.ndarray, shared: np.ndarray, inside: np.ndarray) -> np.ndarray:
+        """(k, k) information: the Gram matrix less what parameters and known columns take."""
         kept = 1 - (1 - self.evidence.shrink) ** 2
         return gram - shared.T @ (kept[:, None] * shared) - inside @ inside.T
 

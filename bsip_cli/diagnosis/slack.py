@@ -6,32 +6,28 @@ import numpy as np
 
 from bsip_cli.diagnosis.candidates import Candidate, candidates_of
 from bsip_cli.effects.catalogue import CATALOGUE
+from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.gravity_tilt import GravityTilt
 from bsip_cli.effects.scene import Scene
 
 SHARE = 0.02  # of the size that labs meet
 HORIZONTAL = 0.7  # the same for the gain of horizontal forces
-INSTRUMENTS = (
-    "sync_offset",
-    "clock_drift",
-    "plate_translation",
-    "plate_rotation",
-    "plate_gain",
-    "plate_crosstalk",
-    "plate_zero",
-    "plate_drift",
-    "gravity_tilt",
-)
 
 
 def slack(scene: Scene) -> np.ndarray:
     """(N, 6, k) change of the wrench for one standard deviation of each small imperfection."""
-    instruments = [effect for effect in CATALOGUE if effect.name in INSTRUMENTS]
+    instruments = [effect for effect in CATALOGUE if _is_of_instruments(effect)]
     columns = [
         _share(c) * c.signature(scene)
         for effect in instruments
         for c in candidates_of(effect, scene)
     ]
     return np.concatenate(columns, axis=2)
+
+
+def _is_of_instruments(effect: Effect) -> bool:
+    return effect.of_the_plates or isinstance(effect, (Delay, GravityTilt))
 
 
 def _share(candidate: Candidate) -> float:

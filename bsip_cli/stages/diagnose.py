@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import empty_table
-from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.detection import limits_of
 from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
@@ -21,10 +20,10 @@ from bsip_cli.diagnosis.selection import Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.catalogue import CATALOGUE
-from bsip_cli.identification.prior import Prior, Spread, prior_of
-from bsip_cli.schemas import bsip_names
+from bsip_cli.identification.prior import Prior
 from bsip_cli.stages.diagnosis_rows import rows_of
 from bsip_cli.stages.frames import acceleration_noise, person_from
+from bsip_cli.stages.identification_problem import prior_from
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study import Trial
 from bsip_cli.unit import Unit
@@ -37,9 +36,7 @@ def run(unit: Unit) -> None:
     """Read motion, wrench, person and RM of all trials; write what is wrong, with its evidence."""
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    rows = unit.read("regression")[list(bsip_names())].to_numpy()
-    spread = Spread(**unit.config.prior.model_dump())
-    prior = prior_of(tuple(from_readable(row) for row in rows), person, spread)
+    prior = prior_from(unit, unit.read("regression"), person)
     moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
     looked_at = (_trial_evidence(unit, person, prior, trial) for trial in moving)
     trials = tuple(one for one in looked_at if one is not None)

@@ -50,6 +50,23 @@ class _Stored:
 
 
 @dataclass(frozen=True)
+class _Batch:
+    """Places (n,) with as many free parameters k: their numbers, information (n, k, k) beside what
+    the trials share, and per trial which signatures are theirs (n, k), -1 for none."""
+
+    numbers: np.ndarray
+    information: np.ndarray
+    columns: tuple[np.ndarray, ...]
+
+    def sums(self, products: Sequence[np.ndarray]) -> np.ndarray:
+        """(n, k, f) over the trials of products (K + 1, f), whose last row is zero."""
+        return sum(
+            (one[columns] for one, columns in zip(products, self.columns, strict=True)),
+            np.zeros(()),
+        )
+
+
+@dataclass(frozen=True)
 class Signatures:
     """All places of all effects: each trial alone, and all together where an effect lasts."""
 
@@ -57,6 +74,7 @@ class Signatures:
     filtered: tuple[_Filtered, ...]
     stored: tuple[_Stored, ...]
     places: tuple[Place, ...]
+    batches: tuple[_Batch, ...]
 
     def on(self, evidence: Evidence) -> Signatures:
         """The same in the coordinates of other noise."""
@@ -75,42 +93,40 @@ class Signatures:
         left = residuals - basis @ (basis.T @ residuals)
         products = self._products(np.column_stack([left, basis]))
         count = residuals.shape[1]
-        logs, sizes = np.empty((len(self.places), count)), []
-        for k, place in enumerate(self.places):
-            gram, shared, product = self._sums(place, products)
-            right = product[:, :count]
-            whole = self._whole(gram, shared, product[:, count:])
-            whole += _RIDGE * np.diag(np.diag(gram) + 1e-300)
-            size = np.linalg.solve(whole, right)
-            logs[k] = minus_log_p(np.einsum("kf,kf->f", right, size), len(gram))
-            sizes.append(size[:, 0])
+        logs = np.empty((len(self.places), count))
+        sizes = [np.zeros(0)] * len(self.places)
+        for batch in self.batches:
+            sums = batch.sums(products)
+            right, inside = sums[..., :count], sums[..., count:]
+            whole = batch.information - inside @ inside.swapaxes(1, 2)
+            whole += _RIDGE * _diagonal(batch.information)
+            likeliest = np.linalg.solve(whole, right)
+            lost = np.einsum("nkf,nkf->nf", right, likeliest)
+            logs[batch.numbers] = minus_log_p(lost, right.shape[1])
+            for k, size in zip(batch.numbers, likeliest[..., 0], strict=True):
+                sizes[k] = size
         return logs, sizes
 
     def information(self, known: np.ndarray) -> list[np.ndarray]:
         """(k, k) of every place, about its sizes [1/typical^2], beside the columns ``known``."""
         basis, _ = np.linalg.qr(known)
         products = self._products(basis)
-        return [self._whole(*self._sums(place, products)) for place in self.places]
+        found = [np.zeros((0, 0))] * len(self.places)
+        for batch in self.batches:
+            inside = batch.sums(products)
+            whole = batch.information - inside @ inside.swapaxes(1, 2)
+            for k, one in zip(batch.numbers, whole, strict=True):
+                found[k] = one
+        return found
 
     def _products(self, courses: np.ndarray) -> list[np.ndarray]:
-        """Per trial (K, f) of all signatures with courses (R, f)."""
+        """Per trial (K + 1, f) of all signatures, and of none, with courses (R, f)."""
         turned = self.evidence.turned(courses).astype(np.float32)
-        return [one.columns.T @ turned[self.evidence.rows(t)] for t, one in enumerate(self.stored)]
-
-    def _whole(self, gram: np.ndarray, shared: np.ndarray, inside: np.ndarray) -> np.ndarray:
-        """(k, k) information: the Gram matrix less what parameters and known columns take."""
-        kept = 1 - (1 - self.evidence.shrink) ** 2
-        return gram - shared.T @ (kept[:, None] * shared) - inside @ inside.T
-
-    def _sums(
-        self, place: Place, products: list[np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Over the trials: Gram matrix, part in the shared space, products."""
-        parts = [(t, self.stored[t], self.stored[t].parts[place.candidate]) for t in place.trials]
-        gram = sum(one.grams[place.candidate] for _, one, _ in parts)
-        shared = sum(one.shared[:, part] for _, one, part in parts)
-        product = sum(products[t][part].astype(float) for t, _, part in parts)
-        return np.asarray(gram), np.asarray(shared), np.asarray(product)
+        none = np.zeros((1, courses.shape[1]))
+        return [
+            np.concatenate([one.columns.T @ turned[self.evidence.rows(t)], none])
+            for t, one in enumerate(self.stored)
+        ]
 
 
 def signatures_of(evidence: Evidence, effects: Sequence[Effect]) -> Signatures:
@@ -136,7 +152,8 @@ def _filtered(one: TrialEvidence, effects: Sequence[Effect]) -> _Filtered:
 
 def _on(evidence: Evidence, filtered: tuple[_Filtered, ...]) -> Signatures:
     stored = tuple(_stored(evidence, t, one) for t, one in enumerate(filtered))
-    return Signatures(evidence, filtered, stored, tuple(_places(stored)))
+    places = tuple(_places(stored))
+    return Signatures(evidence, filtered, stored, places, tuple(_batches(evidence, stored, places)))
 
 
 def _stored(evidence: Evidence, trial: int, filtered: _Filtered) -> _Stored:
@@ -158,3 +175,42 @@ def _places(stored: tuple[_Stored, ...]) -> Iterator[Place]:
         holding = tuple(t for t, one in enumerate(stored) if candidate in one.parts)
         if candidate.effect.lasts and len(holding) > 1:
             yield Place(candidate, holding)
+
+
+def _batches(
+    evidence: Evidence, stored: tuple[_Stored, ...], places: Sequence[Place]
+) -> Iterator[_Batch]:
+    numbers: dict[int, list[int]] = {}
+    for number, place in enumerate(places):
+        part = stored[place.trials[0]].parts[place.candidate]
+        numbers.setdefault(part.stop - part.start, []).append(number)
+    for width, mine in numbers.items():
+        members = [places[k] for k in mine]
+        columns = tuple(_columns_of(t, one, members, width) for t, one in enumerate(stored))
+        information = np.stack([_information(evidence, stored, place) for place in members])
+        yield _Batch(np.array(mine), information, columns)
+
+
+def _columns_of(trial: int, one: _Stored, members: Sequence[Place], width: int) -> np.ndarray:
+    """(n, k) which of a trial's signatures belong to places, -1 for none."""
+    columns = np.full((len(members), width), -1)
+    for k, place in enumerate(members):
+        if trial in place.trials:
+            part = one.parts[place.candidate]
+            columns[k] = np.arange(part.start, part.stop)
+    return columns
+
+
+def _information(evidence: Evidence, stored: tuple[_Stored, ...], place: Place) -> np.ndarray:
+    """(k, k) Gram matrix less what the trials' shared parameters take."""
+    parts = [(stored[t], stored[t].parts[place.candidate]) for t in place.trials]
+    gram = np.sum([one.grams[place.candidate] for one, _ in parts], axis=0)
+    shared = np.sum([one.shared[:, part] for one, part in parts], axis=0)
+    kept = 1 - (1 - evidence.shrink) ** 2
+    return gram - shared.T @ (kept[:, None] * shared)
+
+
+def _diagonal(matrices: np.ndarray) -> np.ndarray:
+    """(n, k, k) with nothing but the diagonals of (n, k, k), and never quite zero."""
+    size = matrices.shape[1]
+    return np.eye(size) * (np.einsum("nkk->nk", matrices) + 1e-300)[:, None, :]

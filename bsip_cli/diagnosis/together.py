@@ -15,6 +15,7 @@ import numpy as np
 from bsip_cli.diagnosis.evidence import TrialEvidence
 
 _CLIP = 4.0  # standard deviations: a contact's edge must not stand for a minute of movement
+_MATTERS = 1e-3  # by which a direction is shrunk, at least
 
 
 @dataclass(frozen=True)
@@ -44,11 +45,11 @@ class Evidence:
 
     def white(self, parts: dict[int, np.ndarray]) -> np.ndarray:
         """(R, k) of signatures that are white in their own trials: trial to (6 n, k)."""
-        width = next(iter(parts.values())).shape[1]
-        columns = np.zeros((len(self.residual), width))
+        inside = sum(self.left[self.rows(trial)].T @ part for trial, part in parts.items())
+        columns = -self.left @ (self.shrink[:, None] * inside)
         for trial, part in parts.items():
-            columns[self.rows(trial)] = part
-        return self.turned(columns)
+            columns[self.rows(trial)] += part
+        return columns
 
     def log_likelihood(self, residual: np.ndarray) -> float:
         """Of all trials' measurements, but for a constant, for what a fit leaves (R,)."""
@@ -78,6 +79,8 @@ def together(trials: tuple[TrialEvidence, ...]) -> Evidence:
     shared = np.concatenate([one.shared for one in trials])
     left, sizes, _ = np.linalg.svd(shared, full_matrices=False)
     shrink = 1 - 1 / np.sqrt(1 + sizes**2)
+    matter = shrink > _MATTERS
+    left, shrink = left[:, matter], shrink[matter]
     residual = np.concatenate([one.residual for one in trials])
     residual = residual - left @ (shrink * (left.T @ residual))
     return Evidence(trials, left, shrink, residual)

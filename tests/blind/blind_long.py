@@ -1,21 +1,21 @@
 """The long blind suite: hide, diagnose, compare, and write the tables into the documentation.
 
 Run from the checkout (``make blind``). One result file per case; what is there is not done again,
-so an interrupted run goes on. Remove the folder of results to judge another version of bsip.
+so an interrupted run goes on. To judge another version of bsip remove the folder of results; with
+recordings that were kept (``--keep``), its ``cases`` alone.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import os
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
 from blind_batch import Batch, run_batch
 from blind_cases import Case, Session, long_suite
-from blind_running import ROOT, STAGES
+from blind_running import ROOT, STAGES, write_atomically
 from blind_scoring import Score
 from blind_tables import document, scores_frame
 from tqdm import tqdm
@@ -70,7 +70,6 @@ def run_missing(
         for start in range(0, len(missing), BATCH):
             batch = missing[start : start + BATCH]
             folder = results / f"batch-{batch[0].name}"
-            shutil.rmtree(folder, ignore_errors=True)  # of a run that was interrupted
             done = run_batch(batch, folder, stages, jobs)
             for problem in done.problems:
                 tqdm.write(problem)
@@ -97,13 +96,6 @@ def write_results(results: Path, sessions: Sequence[Session], done: Batch) -> No
         scores = [one for one in done.scores if one.case == case]
         record = {"scores": [one.as_record() for one in scores], **common}
         write_atomically(path_of(results, scores[0]), json.dumps(record, indent=1))
-
-
-def write_atomically(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
-    partial.write_text(text + "\n", encoding="utf-8")
-    partial.replace(path)
 
 
 def write_tables(results: Path, settings: dict[str, int], target: Path) -> None:

@@ -13,14 +13,15 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from blind_cases import HOST_TASKS, SESSION_TASKS, Case, Session
+from blind_cases import HOST_TASKS, SESSION_TASKS, Case, Hidden, Session
 
 ROOT = Path(__file__).parents[2]
 STAGES = ("ingest", "scale", "ik", "regress", "identify", "diagnose")
 DONE, BUG, REFUSED_SOME, NUMERICAL = 0, 1, 3, 4  # exit codes after which others may be done
+PEOPLE = 6  # that are tried until one can move as planned
 SIMULATED = "sub-01"  # as `bsip simulate` calls its only person
 
 
@@ -34,9 +35,20 @@ class Recorded:
     stems: tuple[str, ...]
     truth: dict
 
+    @classmethod
+    def from_record(cls, record: dict) -> Recorded:
+        """Out of what ``dataclasses.asdict`` made of it."""
+        case = dict(record["case"])
+        case["hidden"] = tuple(Hidden(**one) for one in case["hidden"])
+        return cls(**{**record, "case": Case(**case), "stems": tuple(record["stems"])})
+
 
 class CommandError(RuntimeError):
-    """A command of bsip that did not end as it should, with what it said."""
+    """A command of bsip that did not end as it should: what it said, and its exit code."""
+
+    def __init__(self, said: str, code: int) -> None:
+        super().__init__(said)
+        self.code = code
 
 
 def bsip(*arguments: str, allowed: Sequence[int] = (DONE,)) -> str:
@@ -56,7 +68,7 @@ def bsip(*arguments: str, allowed: Sequence[int] = (DONE,)) -> str:
     )
     said = f"bsip {' '.join(arguments)}: exit {done.returncode}\n{done.stderr}"
     if done.returncode not in allowed:
-        raise CommandError(said)
+        raise CommandError(said, done.returncode)
     return "" if done.returncode == DONE else said
 
 
@@ -74,10 +86,25 @@ def record_study(sessions: Sequence[Session], folder: Path, jobs: int) -> list[R
 
 
 def record_session(session: Session, name: str, folder: Path) -> tuple[str, list[Recorded]]:
-    """One person's recordings; returns the line of participants.tsv and the cases."""
+    """One person's recordings; returns the line of participants.tsv and the cases.
+
+    A person who cannot move as planned with the effect gives way to another.
+    """
+    people = [replace(session, seed=session.seed + 1_000_000 * k) for k in range(PEOPLE)]
+    for person in people[:-1]:
+        try:
+            return _record_person(person, name, folder)
+        except CommandError as error:
+            if error.code != NUMERICAL:
+                raise
+    return _record_person(people[-1], name, folder)
+
+
+def _record_person(session: Session, name: str, folder: Path) -> tuple[str, list[Recorded]]:
     scratch, place = folder / "scratch" / name, folder / "study" / name
     shutil.rmtree(scratch, ignore_errors=True)  # of a run that was interrupted
-    place.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(place, ignore_errors=True)
+    place.mkdir(parents=True)
     whole = session.whole
     base = simulate(scratch / "base", session, whole, SESSION_TASKS if whole else HOST_TASKS)
     shutil.copyfile(base / "study.toml", folder / "study" / "study.toml")
@@ -150,3 +177,10 @@ def cpu_seconds() -> float:
     """CPU time of all ended processes that this one started."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
+
+
+def write_atomically(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    partial.write_text(text + "\n", encoding="utf-8")
+    partial.replace(path)

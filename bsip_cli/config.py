@@ -126,6 +126,7 @@ class Diagnosis(Section):
     skin_factor: float = Field(ge=0)
     skin_draws: int = Field(ge=1)
     marker_sd_m: float = Field(gt=0)
+    stated_mass_sd_percent: float = Field(gt=0)
 
 
 class Stats(Section):

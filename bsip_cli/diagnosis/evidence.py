@@ -28,6 +28,7 @@ _OVERSAMPLING = 2.5
 _ORDER = 4  # of the autoregression
 _SMOOTH_HZ = 0.75  # half-width of the median over the spectrum
 _ROUNDS = 3
+_FLOOR = 0.1  # of the noise's power, taken for white
 
 
 @dataclass(frozen=True)
@@ -112,9 +113,8 @@ class TrialEvidence:
     shared: np.ndarray
 
     def with_noise_beside(self, change: np.ndarray) -> TrialEvidence:
-        """The same trial; its noise is what remains beside a known change of the wrench (N, 6)."""
-        beside = self.filtered.filter(change[..., None])[..., 0]
-        return _evidence(self.name, self.scene, self.filtered, beside)
+        """The same trial; its noise is what remains beside a known, filtered change (n, 6)."""
+        return _evidence(self.name, self.scene, self.filtered, change)
 
     def white(self, wrenches: np.ndarray) -> np.ndarray:
         """(6 n, k) of world wrenches (N, 6, k)."""
@@ -200,13 +200,14 @@ def _recursion(series: np.ndarray, rate_hz: float) -> np.ndarray:
     """(_ORDER,) autoregression by Yule and Walker, of the smooth part of the spectrum.
 
     A running median over frequencies leaves out lines: an offset or a swing at one frequency is no
-    noise, and must not be whitened away.
+    noise, and must not be whitened away. The floor keeps broader ones: without it the slow course
+    of a hand that leans on something would pass for noise.
     """
     power = np.abs(np.fft.rfft(series, 2 * len(series))) ** 2
     width = 2 * max(1, round(_SMOOTH_HZ * len(series) / rate_hz)) + 1
     smooth = median_filter(power, size=width, mode="reflect")
     lags = np.fft.irfft(smooth)[: _ORDER + 1]
-    lags[0] *= 1 + 1e-6
+    lags[0] *= 1 + _FLOOR
     return solve_toeplitz(lags[:-1], lags[1:])
 
 

@@ -15,7 +15,7 @@ from bsip_cli.effects.scene import Scene
 NEGLIGIBLE = 0.25  # of the typical size
 _STEPS = 20  # of Gauss and Newton: large effects come out of the clipping step by step
 _DIFFERENCE = 0.1  # of the typical size: a moment in time moves by a part of a frame at least
-_SEARCH = 60  # evaluations for a moment, a frequency or a window
+_SEARCH = 80  # evaluations for a moment, a frequency or a window
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ def refined(evidence: Evidence, one: Explanation, others: Fit) -> Explanation:
     scanned = ~one.is_free(evidence)
     if not scanned.any():
         return one
-    scale = one.all_typical(evidence)[scanned]
+    scale = one.effect.spacing(one.scene(evidence), one.target, one.values)
     bounds = np.array([(p.least, p.most) for p in one.parameters(evidence) if p.scan])
     basis, _ = np.linalg.qr(others.tangent)
     residual = others.residual - basis @ (basis.T @ others.residual)

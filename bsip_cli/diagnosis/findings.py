@@ -124,6 +124,8 @@ def _rejected(evidence: Evidence, tried: Tried) -> Finding:
     why = (
         f"chance brings as much in {100 * tried.p_value:.0f} % of cases"
         if tried.p_value > ALPHA
+        else "it is no more than what a larger cause leaves behind"
+        if tried.is_leftover
         else "another cause explains it better"
         if tried.is_good
         else "on data held out it does not help"

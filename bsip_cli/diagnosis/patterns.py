@@ -50,7 +50,7 @@ class Tone(Pattern):
         return (
             Parameter("cosine", unit, -1e3, 1e3, size),
             Parameter("sine", unit, -1e3, 1e3, size),
-            Parameter("frequency", "Hz", 0.0, scene.rate_hz, 0.3 / duration, paces),
+            Parameter("frequency", "Hz", 0.5 * slowest, fastest, 0.3 / duration, paces),
         )
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:

@@ -1,11 +1,12 @@
-"""What every lab does a little wrong: too small to name, and not to be taken for something else."""
+"""What every lab and every smoothing does a little wrong: too small to name, and not to be taken
+for something else."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from bsip_cli.diagnosis.candidates import Candidate, candidates_of
-from bsip_cli.effects.catalogue import CATALOGUE
+from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.gravity_tilt import GravityTilt
@@ -13,6 +14,7 @@ from bsip_cli.effects.scene import Scene
 
 SHARE = 0.02  # of the size that labs meet
 HORIZONTAL = 0.7  # the same for the gain of horizontal forces
+SMOOTHED = 0.1  # of what a low-pass at any cut-off takes: the spline of `ik` takes a part too
 
 
 def slack(scene: Scene) -> np.ndarray:
@@ -20,7 +22,7 @@ def slack(scene: Scene) -> np.ndarray:
     instruments = [effect for effect in CATALOGUE if _is_of_instruments(effect)]
     columns = [
         _share(c) * c.signature(scene)
-        for effect in instruments
+        for effect in (*instruments, EFFECTS["over_smoothing"])
         for c in candidates_of(effect, scene)
     ]
     return np.concatenate(columns, axis=2)
@@ -32,5 +34,7 @@ def _is_of_instruments(effect: Effect) -> bool:
 
 def _share(candidate: Candidate) -> float:
     """Horizontal forces are all motion, so what the motion's amplitude errs by is their gain."""
+    if candidate.effect.name == "over_smoothing":
+        return SMOOTHED
     horizontal = candidate.target.endswith((" fx", " fy"))
     return HORIZONTAL if candidate.effect.name == "plate_gain" and horizontal else SHARE

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import empty_table
+from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.detection import limits_of
 from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
@@ -36,7 +37,9 @@ def run(unit: Unit) -> None:
     """Read motion, wrench, person and RM of all trials; write what is wrong, with its evidence."""
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    prior = prior_from(unit, unit.read("regression"), person)
+    assert unit.participant is not None
+    stated = unit.participant.mass_kg is not None
+    prior = _prior(unit, person, stated)
     moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
     looked_at = (_trial_evidence(unit, person, prior, trial) for trial in moving)
     trials = tuple(one for one in looked_at if one is not None)
@@ -51,8 +54,6 @@ def run(unit: Unit) -> None:
     rng = np.random.default_rng(crc32(unit.name.encode()))
     evidence = together(trials)
     effects = [effect for effect in CATALOGUE if effect.name != _ATTRIBUTED]
-    assert unit.participant is not None
-    stated = unit.participant.mass_kg is not None
     first = weight_round(evidence) if stated else None
     selection = select(signatures_of(evidence, [*effects, *PATTERNS]), rng, first)
     findings = findings_of(selection, rng)
@@ -62,6 +63,12 @@ def run(unit: Unit) -> None:
     unit.write("detection", _detection(selection))
     for sentence in _said(findings):
         unit.warn(f"{unit.name}: {sentence}")
+
+
+def _prior(unit: Unit, person: Person, stated: bool) -> Prior:
+    """Of the parameters; the plates' gain shows against a mass that a scale has told."""
+    known = {"total_mass_sd_percent": unit.config.diagnosis.stated_mass_sd_percent}
+    return prior_from(unit, unit.read("regression"), person, **(known if stated else {}))
 
 
 def _trial_evidence(unit: Unit, person, prior: Prior, trial: Trial) -> TrialEvidence | None:

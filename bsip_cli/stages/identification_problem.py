@@ -29,10 +29,13 @@ _FIRST_NOISE = np.array([10.0, 10.0, 10.0, 5.0, 5.0, 5.0])
 _WEIGHT_ROUNDS = 3
 
 
-def prior_from(unit: Unit, regression: pd.DataFrame, person: Person) -> Prior:
-    """What is known of a person before the data, from the rows of ``regression``."""
+def prior_from(unit: Unit, regression: pd.DataFrame, person: Person, **other: float) -> Prior:
+    """What is known of a person before the data, from the rows of ``regression``.
+
+    other : standard deviations that stand for the configured ones.
+    """
     rows = regression[list(bsip_names())].to_numpy()
-    spread = Spread(**unit.config.prior.model_dump())
+    spread = Spread(**{**unit.config.prior.model_dump(), **other})
     return prior_of(tuple(from_readable(row) for row in rows), person, spread)
 
 

@@ -16,25 +16,31 @@ from bsip_cli.diagnosis.together import together
 
 MOST = 3  # candidates in one trial
 SURE = 20.0  # -log p of a candidate that is taken off
-PASSES = 2  # with the noise of the first, others may be likelier
+# While causes are looked for, this part of the noise's power counts as white: else the slow course
+# of a hand that leans on something would pass for noise.
+LOOKING = 0.1
 
 
 def with_likely_noise(signatures: Signatures, before: Fit) -> tuple[Signatures, Fit]:
     """Signatures and fit in the coordinates of the noise beside a fit and the likeliest else."""
-    for _ in range(PASSES):
-        signatures = _with_noise_beside(signatures, before, _likely_changes(signatures, before))
-        before = fit_together(signatures.evidence, before.explanations)
-    return signatures, before
+    none = _nothing(signatures)
+    looking, beside = _with_noise(signatures, before, none, floor=LOOKING)
+    return _with_noise(signatures, before, _likely_changes(looking, beside))
 
 
 def with_noise_beside(signatures: Signatures, fit: Fit) -> tuple[Signatures, Fit]:
     """The same beside a fit alone."""
-    none = [np.zeros_like(one.filtered.residual) for one in signatures.evidence.trials]
-    signatures = _with_noise_beside(signatures, fit, none)
-    return signatures, fit_together(signatures.evidence, fit.explanations)
+    return _with_noise(signatures, fit, _nothing(signatures))
 
 
-def _with_noise_beside(signatures: Signatures, fit: Fit, more: list[np.ndarray]) -> Signatures:
+def _nothing(signatures: Signatures) -> list[np.ndarray]:
+    return [np.zeros_like(one.filtered.residual) for one in signatures.evidence.trials]
+
+
+def _with_noise(
+    signatures: Signatures, fit: Fit, more: list[np.ndarray], **floor: float
+) -> tuple[Signatures, Fit]:
+    """Coordinates of the noise beside a fit and more changes (n, 6), filtered, of each trial."""
     trials = []
     for t, one in enumerate(signatures.evidence.trials):
         change = np.zeros_like(one.scene.measured)
@@ -42,8 +48,9 @@ def _with_noise_beside(signatures: Signatures, fit: Fit, more: list[np.ndarray])
             if t in explanation.place.trials:
                 change = change + explanation.wrench(one.scene)
         beside = one.filtered.filter(change[..., None])[..., 0] + more[t]
-        trials.append(one.with_noise_beside(beside))
-    return signatures.on(together(tuple(trials)))
+        trials.append(one.with_noise_beside(beside, **floor))
+    signatures = signatures.on(together(tuple(trials)))
+    return signatures, fit_together(signatures.evidence, fit.explanations)
 
 
 def likely_columns(signatures: Signatures, fit: Fit) -> np.ndarray:

@@ -14,7 +14,8 @@ from bsip_cli.effects.scene import Scene
 
 SHARE = 0.02  # of the size that labs meet
 HORIZONTAL = 0.7  # the same for the gain of horizontal forces
-SMOOTHED = 0.1  # of what a low-pass at any cut-off takes: the spline of `ik` takes a part too
+# The spline of `ik` takes as much as a low-pass at this cut-off, with a softer edge.
+SPLINE_HZ, EDGE = 11.0, 3
 
 
 def slack(scene: Scene) -> np.ndarray:
@@ -35,6 +36,6 @@ def _is_of_instruments(effect: Effect) -> bool:
 def _share(candidate: Candidate) -> float:
     """Horizontal forces are all motion, so what the motion's amplitude errs by is their gain."""
     if candidate.effect.name == "over_smoothing":
-        return SMOOTHED
+        return (candidate.scanned[0] / SPLINE_HZ) ** EDGE
     horizontal = candidate.target.endswith((" fx", " fy"))
     return HORIZONTAL if candidate.effect.name == "plate_gain" and horizontal else SHARE

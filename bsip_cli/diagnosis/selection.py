@@ -25,7 +25,7 @@ SUPPORT = 8.0  # squared white residual that a trial must save to share a cause
 # A cause from the catalogue is named though a regularity without a name explains a bit more.
 NAMED_AT = 0.95
 # What a large cause leaves behind, since no model of it is exact, is no other cause.
-LEFTOVER = 0.02  # of the squared residual that earlier causes took from the same trials
+LEFTOVER = 0.005  # of the squared residual that earlier causes took from the same trials
 AGAIN = 1.25  # how much more an effect counts that another trial shows already
 
 

@@ -92,6 +92,19 @@ def test_a_second_cause_in_the_same_trial_is_found_too():
     assert offset == pytest.approx(OFFSET_N, abs=0.5)
 
 
+def test_what_a_large_cause_leaves_behind_is_no_other_cause():
+    """No linear course of a delay of 30 ms is quite that of the delay."""
+    scene = with_effect(late(part_of_moving(0, 12), 0.030), EFFECTS["plate_zero"], "1 fx", 2.0)
+    selection = selection_of(noisy(scene, 4))
+    (one,) = said_of(selection)
+    assert one.effect == "sync_offset"
+    rare = [t for r in selection.rounds for t in r.tried if t.p_value <= 0.05]
+    left = [t for t in rare if t.is_leftover]
+    assert left and not any(t.is_good for t in left)
+    rejected = findings_of(selection, np.random.default_rng(1))
+    assert any("what a larger cause leaves behind" in one.sentence for one in rejected)
+
+
 def test_every_round_says_what_was_tried():
     rounds = late_with_offset().rounds
     assert [one.kept is not None for one in rounds] == [True, True, False]

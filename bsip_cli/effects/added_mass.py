@@ -41,10 +41,12 @@ class AddedMass(Effect):
     def reported(
         self, scene: Scene, target: str, values: np.ndarray
     ) -> tuple[tuple[str, str, float], ...]:
-        """Mass and its position in the segment's axes, from the segment's origin."""
-        if values[0] == 0:
-            return (("mass", "kg", 0.0),)
-        place = scene.centre_of(target) + values[1:] / values[0]
+        """Mass and its position in the segment's axes, from the segment's origin.
+
+        No mass counts as one at the segment's centre.
+        """
+        offset = values[1:] / values[0] if values[0] else np.zeros(3)
+        place = scene.centre_of(target) + offset
         positions = (
             (f"position_{axis}", "m", float(x)) for axis, x in zip("xyz", place, strict=True)
         )

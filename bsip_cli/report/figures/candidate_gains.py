@@ -44,34 +44,38 @@ def candidate_gains(data: CandidateGains) -> Figure:
     rows = len(data.labels)
     figure = new_figure(22.0 + 6.5 * rows)
     axes = figure.add_subplot()
-    edge = _edge(data)
+    low, high = _edges(data)
     for row in range(rows):
-        _draw(axes, data, row, edge)
+        _draw(axes, data, row, low, high)
     axes.axvline(0.0, color=INK, lw=0.9)
-    axes.set_xlim(-edge, edge)
+    axes.set_xlim(low, high)
     axes.set_ylim(rows - 0.4, -0.6)
     axes.set_yticks(range(rows), data.labels)
-    axes.set_xlabel("removed of the squared residual in data held out [%]")
+    axes.set_xlabel("part of the squared difference removed in unseen data [%]")
     tidy(axes, grid="x")
     legend_above(axes)
     return figure
 
 
-def _edge(data: CandidateGains) -> float:
-    """Of the axis: all gains above zero fit, and the intervals of what was named."""
+def _edges(data: CandidateGains) -> tuple[float, float]:
+    """Of the axis: all gains above zero fit, and the intervals of what was kept; to the left at most
+    as far as to the right."""
     kept = np.array([verdict != "rejected" for verdict in data.verdicts])
-    sizes = np.concatenate([data.gain, np.where(kept, data.high, np.nan)])
-    return _ROOM * max(_LEAST, float(np.nanmax(sizes, initial=_LEAST)))
+    highs = np.concatenate([data.gain, np.where(kept, data.high, np.nan)])
+    high = _ROOM * max(_LEAST, float(np.nanmax(highs, initial=_LEAST)))
+    low = _ROOM * min(-_LEAST, float(np.nanmin(data.low, initial=-_LEAST)))
+    return max(low, -high), high
 
 
-def _draw(axes: Axes, data: CandidateGains, row: int, edge: float) -> None:
+def _draw(axes: Axes, data: CandidateGains, row: int, left: float, right: float) -> None:
     colour, marker, filled, label = _STYLES[data.verdicts[row]]
-    low, high = np.clip([data.low[row], data.high[row]], -edge, edge)
+    low, high = np.clip([data.low[row], data.high[row]], left, right)
     axes.plot([low, high], [row, row], color=colour, lw=1.4)
-    for end, sign in ((data.low[row], -1.0), (data.high[row], 1.0)):
-        if sign * end > edge:
-            axes.plot(sign * edge, row, marker="<" if sign < 0 else ">", color=colour, ms=5)
-    if abs(data.gain[row]) <= edge:
+    if data.low[row] < left:
+        axes.plot(left, row, marker="<", color=colour, ms=5)
+    if data.high[row] > right:
+        axes.plot(right, row, marker=">", color=colour, ms=5)
+    if left <= data.gain[row] <= right:
         axes.plot(
             data.gain[row],
             row,

@@ -1,0 +1,36 @@
+"""Sizes of causes that laboratories meet, to read a limit of detection by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Usual:
+    """From ``least`` to ``most``, in ``unit``, of the parameters named (the same for all)."""
+
+    parameters: tuple[str, ...]
+    unit: str
+    least: float
+    most: float
+
+
+USUAL: dict[str, Usual] = {
+    "sync_offset": Usual(("delay",), "s", 0.005, 0.02),
+    "clock_drift": Usual(("rate_error",), "1", 2e-4, 5e-4),
+    "plate_translation": Usual(("x", "y"), "m", 0.01, 0.03),
+    "plate_rotation": Usual(("tilt_x", "tilt_y", "yaw"), "rad", 0.0175, 0.07),
+    "plate_gain": Usual(("gain",), "1", 0.02, 0.05),
+    "plate_crosstalk": Usual(("coefficient",), "1", 0.01, 0.03),
+    "plate_zero": Usual(("offset",), "N", 8.0, 25.0),
+    "plate_drift": Usual(("drift",), "N/s", 0.3, 2.0),  # 10 to 20 N over 10 to 30 s
+    "gravity_tilt": Usual(("angle_x", "angle_y"), "rad", 0.009, 0.035),
+    "added_mass": Usual(("mass",), "kg", 0.5, 1.5),
+    "released_object": Usual(("mass",), "kg", 0.3, 0.7),
+    "wobbling_mass": Usual(("mass",), "kg", 3.0, 4.5),
+    "breathing": Usual(("cosine", "sine"), "kg m", 0.05, 0.3),
+    "unmeasured_contact": Usual(("force_x", "force_y", "force_z"), "N", 20.0, 40.0),
+    "joint_centre": Usual(("shift_x", "shift_y", "shift_z"), "m", 0.015, 0.04),
+    "missing_joint": Usual(("flexion", "lateral", "axial"), "1", 0.2, 0.6),
+    "marker_shift": Usual(("x", "y", "z", "shift_x", "shift_y", "shift_z"), "m", 0.02, 0.04),
+}

@@ -12,7 +12,7 @@ import pandas as pd
 from bsip_cli.artifacts import read_artifact
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
-from bsip_cli.report.verdict import Verdict, verdict_of
+from bsip_cli.report.verdict import Verdict, put_right_sentence, verdict_of
 from bsip_cli.report.words import printable
 from bsip_cli.schemas import SCHEMAS
 
@@ -35,19 +35,21 @@ def shown(out: Path) -> Iterator[str]:
         if diagnosis is not None and detection is not None:
             gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
             found = verdict_of(diagnosis, detection, gains, changes)
-            yield verdict_text(folder.name, found, get_terminal_size().columns)
+            right = put_right_sentence(_marker_events(folder))
+            yield verdict_text(folder.name, found, right, get_terminal_size().columns)
     for report in (out / "group" / "report.html", *sorted(out.glob("sub-*/report.html"))):
         if report.exists():
             yield f"report: {report}"
 
 
-def verdict_text(name: str, found: Verdict, columns: int) -> str:
-    """A diagnosis for a terminal of so many columns: causes numbered, lines broken."""
+def verdict_text(name: str, found: Verdict, right: tuple[str, ...], columns: int) -> str:
+    """A diagnosis for a terminal of so many columns: causes numbered, lines broken; ``right`` says
+    what was put right before."""
     width = max(40, min(columns, _WIDEST))
     lines = [f"\n## Is anything wrong: {printable(name)}", _wrapped(found.headline, width)]
     for number, cause in enumerate(found.causes, start=1):
         lines.append(_wrapped(cause, width, f"{number:2d}. "))
-    rest = (*found.results, *found.advice, found.limits)
+    rest = (*right, *found.results, *found.advice, found.limits)
     lines += [_wrapped(text, width, "  - ") for text in rest if text]
     return "\n".join(lines)
 
@@ -66,6 +68,13 @@ def _wrapped(text: str, width: int, first: str = "") -> str:
 def _table(folder: Path, kind: str) -> pd.DataFrame | None:
     path = folder / f"{folder.name}_{SCHEMAS[kind].file_name}.parquet"
     return read_artifact(path, kind) if path.exists() else None
+
+
+def _marker_events(folder: Path) -> list[tuple[str, pd.DataFrame]]:
+    """Stems of the trials and what was found of their markers."""
+    ending = f"_{SCHEMAS['marker-events'].file_name}.parquet"
+    paths = sorted(folder.glob(f"{folder.name}_task-*{ending}"))
+    return [(p.name.removesuffix(ending), read_artifact(p, "marker-events")) for p in paths]
 
 
 def _extended(folder: Path, kind: str) -> pd.DataFrame | None:

@@ -79,6 +79,12 @@ class Candidate:
             where = unnamed_label(self.numbers[0].name, where)
         return effect_title(self.effect) + (f": {where}" if where else "")
 
+    @property
+    def answer(self) -> str:
+        """The verdict, but ``unnamed`` for something that was found and has no name."""
+        unnamed = self.verdict == "named" and self.effect == UNNAMED
+        return "unnamed" if unnamed else self.verdict
+
     def what(self) -> str:
         """Its sentence without interval, advice and reason."""
         text = re.sub(_INTERVAL, "", self.sentence).removeprefix("not so: ")

@@ -13,6 +13,7 @@ from bsip_cli.report.effect_words import EFFECT_WORDS
 from bsip_cli.report.limits import limits_of, limits_sentence, looked_at
 from bsip_cli.report.separating import separating_recording
 from bsip_cli.report.words import (
+    capital,
     component_label,
     count,
     listing,
@@ -109,7 +110,7 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     first = cause[0]
     where, sure = where_seen(first.trials, everywhere), how_sure(first)
     if len(cause) == 1:
-        return f"{_capital(first.told())}, {where}. {sure}"
+        return f"{capital(first.told())}, {where}. {sure}"
     rivals = "; ".join(f"({chr(ord('a') + k)}) {one.told()}" for k, one in enumerate(cause))
     apart = separating_recording([(one.effect, one.target) for one in cause])
     return (
@@ -141,10 +142,6 @@ def how_sure(one: Candidate) -> str:
         f"{level} ({chance}): explains {share} % ({least} to {most} %) of the difference in seconds "
         "it was not fitted to."
     )
-
-
-def _capital(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}"
 
 
 # --- what it does -----------------------------------------------------------------------------
@@ -191,8 +188,7 @@ def change_sentence(changes: pd.DataFrame) -> str:
     """What the causes do to the person's parameters; ``changes`` is a ``bsip-change`` table."""
     if changes.empty:
         return ""
-    millimetres = 1000.0 * changes["com_change_m"]
-    worth = changes[(changes["mass_change_kg"].abs() >= _WORTH_KG) | (millimetres >= _WORTH_MM)]
+    worth = worth_telling(changes)
     if worth.empty:
         return (
             "What it does to the body's parameters: next to nothing; no segment changes by "
@@ -206,7 +202,26 @@ def change_sentence(changes: pd.DataFrame) -> str:
         f"moves by {number(1000 * r['com_change_m'], 0)} mm"
         for r in rows.to_dict("records")
     ]
-    return f"What it does to the body's parameters, most of all: {'; '.join(parts)}."
+    return (
+        "What it does to the body's parameters: with what was found in the model, most of all "
+        f"{'; '.join(parts)}."
+    )
+
+
+def worth_telling(changes: pd.DataFrame) -> pd.DataFrame:
+    """Rows of ``bsip-change`` that are large enough to matter."""
+    millimetres = 1000.0 * changes["com_change_m"]
+    return changes[(changes["mass_change_kg"].abs() >= _WORTH_KG) | (millimetres >= _WORTH_MM)]
+
+
+def put_right_sentence(events: Sequence[tuple[str, pd.DataFrame]]) -> tuple[str, ...]:
+    """What ``ik`` has put right, from (stem, ``marker-events``); nothing where there was nothing."""
+    said = [
+        f"in {trial_label(stem)} {text.removesuffix('; put right')}"
+        for stem, table in events
+        for text in table.loc[table["put_right"].astype(bool), "sentence"]
+    ]
+    return (f"Put right already, before the search for causes: {'; '.join(said)}.",) if said else ()
 
 
 def consequences(causes: Sequence[Sequence[Candidate]]) -> tuple[str, ...]:

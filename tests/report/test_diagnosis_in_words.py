@@ -14,7 +14,7 @@ from bsip_cli.report.limits import limits_of, limits_sentence
 from bsip_cli.report.movement_phases import PHASES, motion_of, phases_of
 from bsip_cli.report.participant import detection as limits_section
 from bsip_cli.report.participant.attribution import pooled_shares
-from bsip_cli.report.participant.diagnosis import gain_blocks
+from bsip_cli.report.participant.diagnosis import gain_blocks, ranking
 from bsip_cli.report.participant.residual import residuals_of
 from bsip_cli.report.records import EXTENDED, with_all_causes
 from bsip_cli.report.separating import separating_recording
@@ -143,6 +143,12 @@ def test_a_regularity_without_a_name_has_a_label(found):
     assert candidates_of(swing)[0].label == "something without a name: swing, force x"
 
 
+def test_a_marker_of_any_name_is_drawn_as_it_is(found):
+    foreign = found.assign(effect="marker_shift", target="$\\frac{$")
+    picture = ranking(candidates_of(foreign))[0]
+    assert b"<svg" in picture.svg
+
+
 # --- limits -------------------------------------------------------------------------------------
 
 
@@ -180,7 +186,7 @@ def test_limits_stand_beside_sizes_that_labs_meet(found):
     *_, limits, masses, grid = limits_section.blocks(detection(TRIALS), nothing)
     assert (limits.name, masses.name) == ("diagnosis_limits", "diagnosis_masses")
     rows = {row[0].text: [cell.text for cell in row[1:]] for row in grid.cells()}
-    assert rows["forces and markers out of step"] == ["2.5 ms", "22 ms", "–", "5.0 to 20 ms"]
+    assert rows["forces and markers out of step"] == ["2.5 ms", "22 ms", "–", "5 to 20 ms"]
     assert rows["force plate not where the file says"][0] == "4.0 to 6.0 mm"
     assert set(USUAL) <= set(EFFECTS)
 
@@ -201,8 +207,8 @@ def test_gains_lead_with_what_improves():
     worse = gains().assign(component=["cop_ap", "mz"], ci_high=[60.0, -1.0])
     assert gain_sentence(worse).endswith("It rises in moment, lab Z (up).")
     assert gain_sentence(worse[1:]).endswith("in the model, no component follows better.")
-    (grid,) = gain_blocks(gains())
-    assert "over basketball (run 1) (that identified no parameter)" in grid.caption
+    where, grid = gain_blocks(gains())
+    assert where.text.endswith("in basketball (run 1) (that identified no parameter).")
     assert [row[3].mark for row in grid.cells()] == ["better", ""]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,16 +13,19 @@ from bsip_cli.report.figures.canvas import (
     BLUE,
     INK,
     ORANGE,
+    PURPLE,
     SOFT,
     house_style,
-    legend_above,
+    literal,
     new_figure,
     tidy,
 )
 
-_LEAST, _ROOM = 5.0, 1.25
+_LEAST, _ROOM = 5.0, 1.15
+_LABEL_WIDTH = 40  # letters in a line
 _STYLES = {  # verdict: colour, marker, filled, what the legend says
     "named": (BLUE, "o", True, "named"),
+    "unnamed": (PURPLE, "^", True, "without a name"),
     "ambiguous": (ORANGE, "D", True, "one of several rivals"),
     "rejected": (SOFT, "s", False, "rejected"),
 }
@@ -42,7 +46,8 @@ class CandidateGains:
 def candidate_gains(data: CandidateGains) -> Figure:
     """A row per candidate; what runs out of the axis ends in an arrow at its edge."""
     rows = len(data.labels)
-    figure = new_figure(22.0 + 6.5 * rows)
+    labels = [fill(literal(label), _LABEL_WIDTH) for label in data.labels]
+    figure = new_figure(22.0 + 6.5 * rows + 1.5 * sum("\n" in label for label in labels))
     axes = figure.add_subplot()
     low, high = _edges(data)
     for row in range(rows):
@@ -50,10 +55,18 @@ def candidate_gains(data: CandidateGains) -> Figure:
     axes.axvline(0.0, color=INK, lw=0.9)
     axes.set_xlim(low, high)
     axes.set_ylim(rows - 0.4, -0.6)
-    axes.set_yticks(range(rows), data.labels)
-    axes.set_xlabel("part of the squared difference removed in unseen data [%]")
+    axes.set_yticks(range(rows), labels)
+    axes.set_xlabel("removed in unseen seconds [%]")
     tidy(axes, grid="x")
-    legend_above(axes)
+    handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    figure.legend(
+        handles.values(),
+        handles.keys(),
+        loc="outside upper left",
+        ncols=len(_STYLES),
+        frameon=False,
+        fontsize=8,
+    )
     return figure
 
 

@@ -54,6 +54,6 @@ def _panel(axes: Axes, methods: Mapping[str, np.ndarray]) -> None:
         axes.hlines(rows, values[0], values[1], color=SOFT, lw=1.0)
     for (label, rms), (marker, face, edge) in zip(methods.items(), _STYLES, strict=False):
         axes.plot(rms, rows, ls="none", marker=marker, ms=5, mfc=face, mec=edge, label=label)
-    axes.set_xlim(left=0.0)
+    axes.set_xlim(0.0, 1.06 * float(np.nanmax(values, initial=0.0)) or 1.0)
     tidy(axes, grid="x")
     axes.tick_params(labelsize=7.5)

@@ -9,11 +9,11 @@ import pandas as pd
 
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.report.blocks import Block, Grid, Paragraph, Picture
-from bsip_cli.report.effect_words import EFFECT_WORDS, effect_title, place_label, size_words
+from bsip_cli.report.effect_words import effect_title, place_label, size_words
 from bsip_cli.report.figures.detection_limits import DetectionLimits, detection_limits
 from bsip_cli.report.figures.mass_limits import MassLimits, mass_limits
 from bsip_cli.report.limits import Limit, limits_of, limits_sentence
-from bsip_cli.report.usual_sizes import USUAL
+from bsip_cli.report.usual_sizes import USUAL, usual_words
 from bsip_cli.report.words import MISSING, segment_label
 
 _FAR = 20.0  # times the largest usual size: not seen at all
@@ -31,12 +31,13 @@ def blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
         Paragraph(
             "Each limit is the size that would be found in 95 of 100 recordings like these, while "
             "the inertial parameters and the cause's other numbers stay free. Smaller errors may be "
-            "there. Causes that were found have no limit.",
+            "there. Causes that were found have no limit; exchanged labels and smoothed markers have "
+            "none in a unit that could be told.",
             "note",
         )
     )
     said += [*_usual_figure(together), *_mass_figure(together, alone)]
-    rows = tuple(row for effect in EFFECT_WORDS for row in _rows(effect, together, alone))
+    rows = tuple(row for effect in USUAL for row in _rows(effect, together, alone))
     head = ("cause", "in all recordings", "in one alone", "shows best at", "usual in labs")
     caption = "Least size that would be found, from the best place or direction to the worst"
     return [*said, Grid(head, rows, caption, words=5)]
@@ -98,7 +99,7 @@ def _rows(
     """A row per unit: the range over all places and directions."""
     lasting = [x for x in together if x.effect == effect and x.trials > 1]
     single = [x for x in alone if x.effect == effect]
-    usual = USUAL.get(effect)
+    usual = USUAL[effect]
     for unit in dict.fromkeys(x.unit for x in (*lasting, *single)):
         columns = [
             [x for x in limits if x.unit == unit and _counts(x)] for limits in (lasting, single)
@@ -110,9 +111,7 @@ def _rows(
             effect_title(effect),
             *(_range(effect, limits) for limits in columns),
             place_label(effect, best.target) or MISSING,
-            _between(best.parameter, unit, usual.least, usual.most)
-            if usual and usual.unit == unit
-            else MISSING,
+            usual_words(effect) if usual.unit == unit else MISSING,
         )
 
 
@@ -123,8 +122,7 @@ def _usual(effect: str, limits: Sequence[Limit]) -> list[Limit]:
 
 def _counts(limit: Limit) -> bool:
     """Not a number that only goes with the effect's size."""
-    usual = USUAL.get(limit.effect)
-    return usual is None or limit.parameter in usual.parameters
+    return limit.parameter in USUAL[limit.effect].parameters
 
 
 def _range(effect: str, limits: Sequence[Limit]) -> str:
@@ -132,8 +130,8 @@ def _range(effect: str, limits: Sequence[Limit]) -> str:
     if not limits:
         return MISSING
     best, worst = (end(limits, key=lambda x: x.size) for end in (min, max))
-    usual = USUAL.get(effect)
-    if usual and usual.unit == best.unit and worst.size > _FAR * usual.most:
+    usual = USUAL[effect]
+    if usual.unit == best.unit and worst.size > _FAR * usual.most:
         return f"from {best.in_words()}, or not at all"
     return _between(best.parameter, best.unit, best.size, worst.size)
 

@@ -23,8 +23,15 @@ from bsip_cli.report.candidates import Candidate, candidates_of
 from bsip_cli.report.figures.candidate_gains import CandidateGains, candidate_gains
 from bsip_cli.report.participant import attribution, detection, residual
 from bsip_cli.report.records import ParticipantRecord
-from bsip_cli.report.verdict import LEAST_TOLD, verdict_of
+from bsip_cli.report.verdict import (
+    LEAST_TOLD,
+    change_sentence,
+    put_right_sentence,
+    verdict_of,
+    worth_telling,
+)
 from bsip_cli.report.words import (
+    capital,
     component_label,
     labelled,
     number,
@@ -46,8 +53,14 @@ def verdict(record: ParticipantRecord) -> list[Block]:
     blocks: list[Block] = [Paragraph(said.headline, tone)]
     if said.causes:
         blocks.append(Numbered(said.causes))
-    rest = (*said.results, *said.advice, said.limits)
+    rest = (*put_right(record), *said.results, *said.advice, said.limits)
     return [*blocks, *(Paragraph(text) for text in rest if text)]
+
+
+def put_right(record: ParticipantRecord) -> tuple[str, ...]:
+    """What of the markers was wrong and is no longer, before anything was diagnosed."""
+    tables = [(trial.stem, trial.marker_events) for trial in record.trials]
+    return put_right_sentence([(stem, t) for stem, t in tables if t is not None])
 
 
 def section(record: ParticipantRecord) -> Section:
@@ -93,7 +106,7 @@ def ranking(candidates: Sequence[Candidate]) -> list[Block]:
         figure = candidate_gains(
             CandidateGains(
                 tuple(_numbered(k, one) for k, one in enumerate(known, start=1)),
-                tuple(one.verdict for one in known),
+                tuple(one.answer for one in known),
                 gain,
                 low,
                 high,
@@ -122,13 +135,14 @@ def _numbered(k: int, one: Candidate) -> str:
 
 def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
     marks: dict[str, Mark] = {"named": "group", "ambiguous": "warning"}
-    verdict = f"rival in class {one.class_id}" if one.verdict == "ambiguous" else one.verdict
+    answers = {"ambiguous": f"rival in class {one.class_id}", "unnamed": "found, without a name"}
+    verdict = answers.get(one.answer, one.answer)
     gain, low, high = one.gain
     reason = one.why_not()
     return (
         _numbered(k, one),
         Cell(verdict, marks.get(one.verdict, "")),
-        f"{one.what()}; rejected: {reason}" if reason else one.told(),
+        capital(f"{one.what()}; rejected: {reason}" if reason else one.told()),
         one.where(),
         percent(one.p_value, 1) if one.p_value >= LEAST_TOLD else "< 0.1",
         f"{number(gain, 1)} ({number(low, 1)} to {number(high, 1)})",
@@ -153,14 +167,14 @@ def gain_blocks(gains: pd.DataFrame) -> list[Block]:
         for r in gains.to_dict("records")
     )
     return [
+        Paragraph(_data_words(gains)),
         Grid(
             ("component", "unit", "before", "after", "less by [%]"),
             rows,
-            "Error (RMSE) of OM without and with the causes in the model, with 95 % interval; "
-            f"✓ marks a sure gain. {_data_words(gains)}",
+            "Error of OM before and after the causes are in the model; ✓ marks a sure gain",
             words=2,
-            groups=(("", 2), ("RMSE", 2), ("", 1)),
-        )
+            groups=(("", 2), ("RMSE", 2), ("95 % interval", 1)),
+        ),
     ]
 
 
@@ -172,12 +186,18 @@ def _data_words(gains: pd.DataFrame) -> str:
     }
     parts = [text.partition(": ") for data in gains["data"].unique() for text in data.split("; ")]
     said = [f"{labelled(stems)} ({kinds.get(kind, kind)})" for kind, _, stems in parts]
-    return f"Every second with sizes of the causes found without it, over {'; '.join(dict.fromkeys(said))}"
+    return (
+        "Every second was judged with sizes of the causes that were found without it, in "
+        f"{'; '.join(dict.fromkeys(said))}."
+    )
 
 
 def change_blocks(record: ParticipantRecord) -> list[Block]:
     """Masses and centres of mass before and after the causes are in the model."""
     assert record.changes is not None
+    worth = worth_telling(record.changes)
+    if worth.empty:
+        return [Paragraph(change_sentence(record.changes))]
     before = record.method("OM")
     rows = tuple(
         (
@@ -187,14 +207,15 @@ def change_blocks(record: ParticipantRecord) -> list[Block]:
             signed(r["mass_change_kg"], 3),
             number(1000 * r["com_change_m"], 1),
         )
-        for r in record.changes.to_dict("records")
+        for r in worth.to_dict("records")
     )
     head = ("segment", "OM", "with the causes", "change", "centre of mass moves [mm]")
     return [
         Grid(
             head,
             rows,
-            "The identified parameters without and with the causes in the model",
+            "The identified parameters without and with the causes in the model, segments that "
+            "change",
             groups=(("", 1), ("mass [kg]", 3), ("", 1)),
         )
     ]

@@ -11,6 +11,7 @@ from bsip_cli.report.records import ParticipantRecord, TrialRecord, messages
 from bsip_cli.report.words import (
     component_label,
     count,
+    labelled,
     listing,
     number,
     percent,
@@ -292,4 +293,4 @@ def _finding(check: str, action: str, trials: dict[str, set[str]]) -> str:
 
 def _messages(record: ParticipantRecord) -> list[str]:
     """What later stages warned of; ingest's findings stand for themselves."""
-    return [text for stage, _, text in messages(record.origins) if stage != "ingest"]
+    return [labelled(text) for stage, _, text in messages(record.origins) if stage != "ingest"]

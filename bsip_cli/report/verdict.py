@@ -123,7 +123,9 @@ def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
     """``in all 4 recordings`` or ``only in squat (run 3)``; ``everywhere``: those looked at."""
     names = [trial_label(stem) for stem in trials]
     if len(everywhere) > 1 and set(trials) >= set(everywhere):
-        return f"in all {len(everywhere)} recordings"
+        return (
+            "in both recordings" if len(everywhere) == 2 else f"in all {len(everywhere)} recordings"
+        )
     return f"{'only ' if len(everywhere) > len(trials) else ''}in {listing(names)}"
 
 
@@ -228,9 +230,9 @@ def consequences(causes: Sequence[Sequence[Candidate]]) -> tuple[str, ...]:
     """What the causes mean for the reader, each once and with the numbers of its causes."""
     numbers: dict[str, list[int]] = {}
     for k, cause in enumerate(causes, start=1):
-        for words in dict.fromkeys(EFFECT_WORDS.get(one.effect) for one in cause):
-            if words is not None:
-                numbers.setdefault(words.consequence, []).append(k)
+        known = (EFFECT_WORDS[one.effect] for one in cause if one.effect in EFFECT_WORDS)
+        for text in dict.fromkeys(words.consequence for words in known):
+            numbers.setdefault(text, []).append(k)
     if len(causes) == 1:
         return tuple(numbers)
     return tuple(

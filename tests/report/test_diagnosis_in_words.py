@@ -45,10 +45,12 @@ def test_the_verdict_says_what_how_large_how_sure_and_where(found):
     )
     assert (
         "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
-        "all 2 recordings. Likely (chance 0.5 %): explains 8.0 % (4.0 to 12.0 %)" in text
+        "both recordings. Likely (chance 0.5 %): explains 8.0 % (4.0 to 12.0 %)" in text
     )
     assert text.count(EFFECT_WORDS["plate_rotation"].consequence) == 1  # plate_zero's is the same
     assert f"Causes 1 and 2: {EFFECT_WORDS['plate_rotation'].consequence}" in text
+    rivals = found.replace({"effect": {"added_mass": "plate_gain"}})
+    assert "Causes 1 and 2: The measured forces" in text_of(rivals, detection(TRIALS))
 
 
 def test_a_gain_that_may_be_none_is_weak(found):

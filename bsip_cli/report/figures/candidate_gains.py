@@ -47,7 +47,8 @@ def candidate_gains(data: CandidateGains) -> Figure:
     """A row per candidate; what runs out of the axis ends in an arrow at its edge."""
     rows = len(data.labels)
     labels = [fill(literal(label), _LABEL_WIDTH) for label in data.labels]
-    figure = new_figure(22.0 + 6.5 * rows + 1.5 * sum("\n" in label for label in labels))
+    lines = max((label.count("\n") + 1 for label in labels), default=1)
+    figure = new_figure(22.0 + rows * max(6.5, 3.5 * lines))
     axes = figure.add_subplot()
     low, high = _edges(data)
     for row in range(rows):

@@ -80,7 +80,7 @@ def section(record: ParticipantRecord) -> Section:
             Heading("The causes looked at"),
             *ranking(candidates_of(record.diagnosis)),
         ]
-        if record.gains is not None:
+        if record.gains is not None and len(record.gains):
             blocks += [Heading("What the forces gain"), *gain_blocks(record.gains)]
         if record.changes is not None and len(record.changes):
             blocks += [Heading("What the body's parameters become"), *change_blocks(record)]
@@ -153,9 +153,7 @@ def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
 
 
 def gain_blocks(gains: pd.DataFrame) -> list[Block]:
-    """A ``gain`` table: errors before and after the causes are in the model."""
-    if gains.empty:
-        return [Paragraph("No cause was added to the model, so nothing was gained.")]
+    """A ``gain`` table with rows: errors before and after the causes are in the model."""
     rows = tuple(
         (
             component_label(r["component"]),

@@ -288,7 +288,7 @@ def _quality(record: ParticipantRecord, level: str) -> list[str]:
 def _finding(check: str, action: str, trials: dict[str, set[str]]) -> str:
     told = set().union(*trials.values())
     what = told.pop() if len(told) == 1 else f"{count(len(told), 'finding')}, see section 3"
-    return f"{check} in {listing(list(trials))}: {what}{f' ({action})' if action else ''}"
+    return f"{check.replace('_', ' ')} in {listing(list(trials))}: {what}{f' ({action})' if action else ''}"
 
 
 def _messages(record: ParticipantRecord) -> list[str]:

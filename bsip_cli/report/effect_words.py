@@ -118,7 +118,9 @@ def unnamed_label(number_name: str, where: str) -> str:
     if kind is None:
         return where
     force, by, place = where.partition(" by ")
-    return f"{kind}, {force.upper()} with place {place.upper()}" if by else f"{kind}, {where}"
+    return (
+        f"{kind} along {force.upper()}, growing along {place.upper()}" if by else f"{kind}, {where}"
+    )
 
 
 # Numbers that an effect is about. Where none stands here, all are parts of one size.

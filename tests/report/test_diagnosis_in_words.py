@@ -139,7 +139,7 @@ def test_a_regularity_without_a_name_has_a_label(found):
     )
     assert (
         candidates_of(spring)[0].label
-        == "something without a name: pull on the pelvis, Y with place Z"
+        == "something without a name: pull on the pelvis along Y, growing along Z"
     )
     swing = spring.assign(target="fx", parameter="amplitude")
     assert candidates_of(swing)[0].label == "something without a name: swing, force x"

@@ -57,7 +57,7 @@ class AddedMass(Effect):
         return within and bool(np.linalg.norm(values[1:]) <= REACH_M * values[0])
 
     def sentence(self, target: str, values: np.ndarray) -> str:
-        return f"{values[0]:.2f} kg more than the model knows move with the {in_words(target)}"
+        return f"{values[0]:.2f} kg that the model does not know move with the {in_words(target)}"
 
 
 def _wrenches(scene: Scene, target: str) -> np.ndarray:

@@ -60,6 +60,6 @@ class Breathing(Effect):
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         return (
-            f"{np.hypot(values[0], values[1]):.3f} kg m of the trunk move with the breath, "
-            f"{values[2]:.2f} times per second"
+            f"breathing moves the trunk {values[2]:.2f} times per second (mass times amplitude "
+            f"{np.hypot(values[0], values[1]):.3f} kg m)"
         )

@@ -22,6 +22,7 @@ from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.identification.prior import Prior
+from bsip_cli.report.verdict import verdict_of
 from bsip_cli.stages.diagnosis_rows import rows_of
 from bsip_cli.stages.frames import acceleration_noise, person_from
 from bsip_cli.stages.identification_problem import prior_from
@@ -59,10 +60,13 @@ def run(unit: Unit) -> None:
     findings = findings_of(selection, rng)
     names = tuple(one.name for one in trials)
     facts = _facts(selection, findings)
-    unit.write("overall-diagnosis", rows_of(findings, names), facts)
-    unit.write("detection", _detection(selection))
-    for sentence in _said(findings):
-        unit.warn(f"{unit.name}: {sentence}")
+    diagnosis, limits = rows_of(findings, names), _detection(selection)
+    unit.write("overall-diagnosis", diagnosis, facts)
+    unit.write("detection", limits)
+    said = verdict_of(diagnosis, limits)
+    for sentence in (said.headline, *said.causes, said.limits):
+        if sentence:
+            unit.warn(f"{unit.name}: {sentence}")
 
 
 def _prior(unit: Unit, person: Person, stated: bool) -> Prior:
@@ -140,8 +144,3 @@ def _detection(selection: Selection) -> pd.DataFrame:
         for limit in limits_of(selection)
     ]
     return pd.DataFrame(rows)
-
-
-def _said(findings: tuple[Finding, ...]) -> list[str]:
-    found = [one for one in findings if one.verdict != "rejected"]
-    return [f"{one.verdict}: {one.effect}: {one.sentence}" for one in found]

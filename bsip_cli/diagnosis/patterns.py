@@ -9,6 +9,8 @@ from __future__ import annotations
 from abc import abstractmethod
 
 import numpy as np
+from scipy.ndimage import median_filter
+from scipy.signal import find_peaks
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.effects.channel_words import OF_THE_LAB, unit_of
@@ -18,6 +20,7 @@ from bsip_cli.effects.scene import Scene
 
 UNEXPLAINED = "unexplained"
 _SIZE_N, _SIZE_NM = 40.0, 20.0
+_LINE, _AROUND_HZ, _MOST_LINES = 30.0, 0.75, 3  # of noise one in 10^9 frequencies is as high
 _ALONG = {"x": "along the lab's X axis", "y": "along the lab's Y axis", "z": "up and down"}
 
 
@@ -47,7 +50,8 @@ class Tone(Pattern):
         duration = max(float(np.ptp(scene.times_s)), 2.0)
         slowest, fastest = 2.0 / duration, 0.16 * scene.rate_hz
         count = min(60, int((fastest - slowest) * duration))
-        paces = tuple(float(f) for f in np.linspace(slowest, fastest, count))
+        regular = np.linspace(slowest, fastest, count)
+        paces = tuple(float(f) for f in (*regular, *_lines_hz(scene, target, slowest, fastest)))
         return (
             Parameter("cosine", unit, -1e3, 1e3, size),
             Parameter("sine", unit, -1e3, 1e3, size),
@@ -68,6 +72,30 @@ class Tone(Pattern):
     ) -> tuple[tuple[str, str, float], ...]:
         amplitude = float(np.hypot(values[0], values[1]))
         return ("amplitude", unit_of(target), amplitude), ("frequency", "Hz", float(values[2]))
+
+
+def _lines_hz(scene: Scene, channel: str, slowest: float, fastest: float) -> np.ndarray:
+    """(k,) frequencies at which a channel's residual stands far out of its spectrum.
+
+    In a long trial a swing at one frequency would fall between the regular ones.
+    """
+    key = (UNEXPLAINED, channel)
+    return scene.once(key, lambda: _computed_lines_hz(scene, channel, slowest, fastest))
+
+
+def _computed_lines_hz(scene: Scene, channel: str, slowest: float, fastest: float) -> np.ndarray:
+    residual = (scene.measured - scene.predicted)[:, CHANNELS.index(channel)]
+    course = np.where(scene.valid, np.nan_to_num(residual), 0.0)
+    course = np.where(scene.valid, course - course[scene.valid].mean(), 0.0)
+    count = 2 * len(course)
+    power = np.abs(np.fft.rfft(course * np.hanning(len(course)), count)) ** 2
+    hertz = np.fft.rfftfreq(count, 1 / scene.rate_hz)
+    around = 2 * round(_AROUND_HZ * count / scene.rate_hz) + 1
+    height = power / np.maximum(median_filter(power, around, mode="nearest"), 1e-12)
+    peaks, found = find_peaks(height, height=_LINE)
+    peaks = peaks[np.argsort(-found["peak_heights"])][:_MOST_LINES]
+    inside = (hertz[peaks] > slowest) & (hertz[peaks] < fastest)
+    return hertz[peaks][inside]
 
 
 class Curve(Pattern):

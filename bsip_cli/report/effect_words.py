@@ -76,11 +76,14 @@ def place_label(effect: str, target: str) -> str:
     if effect.startswith("plate_"):
         name, _, channel = target.rpartition(" ") if " " in target else (target, "", "")
         channel = channel.replace(">", " into ")
-        return f"plate {name}, {channel}" if channel else f"plate {name}"
+        where = "all plates" if name == "all" else f"plate {name}"
+        return f"{where}, {channel}" if channel else where
     if effect.startswith("marker_"):
         return f"marker {target}" if "+" not in target else f"markers {target}"
     if effect == "joint_centre" or target in SEGMENTS:
         return segment_label(target)
+    if effect == "unmeasured_contact":
+        return " and ".join(segment_label(name) for name in target.split("+"))
     return target
 
 

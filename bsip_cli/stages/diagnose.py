@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import empty_table
+from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.detection import limits_of
 from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
@@ -16,8 +17,10 @@ from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, values_without
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.diagnosis.scale_mass import weight_round
-from bsip_cli.diagnosis.selection import Selection, select
+from bsip_cli.diagnosis.selection import Round, Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
+from bsip_cli.diagnosis.stated_mass import standing_share, stated_mass_findings
+from bsip_cli.diagnosis.support import support_of
 from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.identification.prior import Prior
@@ -38,15 +41,21 @@ def run(unit: Unit) -> None:
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     prior = prior_from(unit, unit.read("regression"), person)
     moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
-    looked_at = (_trial_evidence(unit, person, prior, trial) for trial in moving)
-    trials = tuple(one for one in looked_at if one is not None)
+    looked_at = [_looked_at(unit, person, prior, trial) for trial in moving]
+    trials = tuple(one for one in looked_at if isinstance(one, TrialEvidence))
+    held = tuple(one for one in looked_at if isinstance(one, Finding))
+    standing = _standing(unit, person, prior)
     if not trials:
-        unit.warn(
-            f"{unit.name}: no trial has {_SHORTEST_S:g} s of motion with every contact on a "
-            "plate; nothing can be diagnosed"
-        )
-        unit.write("overall-diagnosis", rows_of((), ()))
+        if not held:
+            unit.warn(
+                f"{unit.name}: no trial has {_SHORTEST_S:g} s of motion with every contact on a "
+                "plate; no movement can be diagnosed"
+            )
+        told = (*held, *standing)
+        names = _trials_of(told)
+        unit.write("overall-diagnosis", rows_of(told, names), {"trials": list(names)})
         unit.write("detection", empty_table("detection"))
+        _tell(unit, told)
         return
     rng = np.random.default_rng(crc32(unit.name.encode()))
     evidence = together(trials)
@@ -58,16 +67,24 @@ def run(unit: Unit) -> None:
     findings = findings_of(selection, rng)
     names = tuple(one.name for one in trials)
     facts = _facts(selection, findings)
+    told = held if _is_told(first, findings) else (*held, *standing)
+    facts["trials"] += _trials_of(told)
+    findings = (*told, *findings)
     unit.write("overall-diagnosis", rows_of(findings, names), facts)
     unit.write("detection", _detection(selection))
-    for sentence in _said(findings):
-        unit.warn(f"{unit.name}: {sentence}")
+    _tell(unit, findings)
 
 
-def _trial_evidence(unit: Unit, person, prior: Prior, trial: Trial) -> TrialEvidence | None:
+def _looked_at(
+    unit: Unit, person: Person, prior: Prior, trial: Trial
+) -> TrialEvidence | Finding | None:
+    """A trial's evidence, or what the hands hold on to in it; None if the trial is too short."""
     scene = scene_of(unit, person, prior.phi, trial)
     if scene.valid.sum() < _SHORTEST_S * scene.rate_hz:
         return None
+    held = support_of(scene)
+    if held is not None:
+        return held.finding(trial.stem)
     options = unit.config.diagnosis
     fewer = slow(scene)
     rng = np.random.default_rng(crc32(trial.stem.encode()))
@@ -75,6 +92,33 @@ def _trial_evidence(unit: Unit, person, prior: Prior, trial: Trial) -> TrialEvid
     shared = shared_nuisances(fewer, prior.root, options.marker_sd_m)
     level = acceleration_noise(unit.read("kinematics", trial), person.skeleton)
     return trial_evidence(trial.stem, scene, own, shared, level, options.cutoff_hz)
+
+
+def _standing(unit: Unit, person: Person, prior: Prior) -> tuple[Finding, ...]:
+    """What the static trial says of the stated mass; nothing without such a trial or mass."""
+    assert unit.participant is not None
+    static = [t for t in unit.trials("kinematics", "wrench") if t.role == "static"]
+    if unit.participant.mass_kg is None or not static:
+        return ()
+    scene = scene_of(unit, person, prior.phi, static[0])
+    if not scene.valid.any():
+        return ()
+    return stated_mass_findings(standing_share(scene), scene.mass_kg, static[0].stem)
+
+
+def _is_told(first: Round | None, findings: tuple[Finding, ...]) -> bool:
+    """Whether what the scale said before the search still stands after it."""
+    if first is None or first.kept is None:
+        return False
+    known = first.kept.explanation
+    return any(
+        one.verdict != "rejected" and (one.effect, one.target) == (known.effect.name, known.target)
+        for one in findings
+    )
+
+
+def _trials_of(findings: tuple[Finding, ...]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(trial for one in findings for trial in one.trials))
 
 
 def _facts(selection: Selection, findings: tuple[Finding, ...]) -> dict:
@@ -135,6 +179,7 @@ def _detection(selection: Selection) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _said(findings: tuple[Finding, ...]) -> list[str]:
-    found = [one for one in findings if one.verdict != "rejected"]
-    return [f"{one.verdict}: {one.effect}: {one.sentence}" for one in found]
+def _tell(unit: Unit, findings: tuple[Finding, ...]) -> None:
+    for one in findings:
+        if one.verdict != "rejected":
+            unit.warn(f"{unit.name}: {one.verdict}: {one.effect}: {one.sentence}")

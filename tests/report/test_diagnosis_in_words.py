@@ -118,6 +118,8 @@ def test_units_that_people_read():
     assert place_label("plate_crosstalk", "1 fx>fy") == "plate 1, fx into fy"
     assert place_label("added_mass", "hand_l") == "left hand"
     assert place_label("sync_offset", "") == ""
+    assert place_label("unmeasured_contact", "hand_l+hand_r") == "left hand and right hand"
+    assert place_label("plate_gain", "all fz") == "all plates, fz"
 
 
 # --- gains --------------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ CLASS = "W"  # of the weight; those found in the motion are A, B, C
 REMEDY = (
     "weigh the person as recorded, put a known weight on each plate, and read them with nobody on"
 )
+LOADED = 0.05  # of body weight: a plate that carries less is not stood upon
 _UNKNOWN = (np.nan, np.nan, np.nan)
 _Z95 = 1.959964
 
@@ -31,10 +32,21 @@ def standing_share(scene: Scene) -> float:
     return float(apart.mean()) / (scene.mass_kg * GRAVITY_M_S2)
 
 
-def stated_mass_findings(share: float, mass_kg: float, trial: str) -> tuple[Finding, ...]:
+def loaded_channel(scene: Scene) -> str:
+    """The vertical channel of the plate that carries the person; of ``all`` where several do."""
+    least = LOADED * scene.mass_kg * GRAVITY_M_S2
+    loads = {one.name: np.nan_to_num(one.wrench[scene.valid, 2]).mean() for one in scene.plates}
+    loaded = [name for name, load in loads.items() if load > least]
+    return f"{loaded[0] if len(loaded) == 1 else 'all'} fz"
+
+
+def stated_mass_findings(
+    share: float, mass_kg: float, channel: str, trial: str
+) -> tuple[Finding, ...]:
     """The class of causes if the plates differ from the stated mass by more than NOTICED.
 
-    share : of the stated mass, from ``standing_share``. trial : the name of the one who stands.
+    share : of the stated mass, from ``standing_share``. channel : from ``loaded_channel``.
+    trial : the name of the recording.
     """
     if abs(share) < NOTICED:
         return ()
@@ -56,7 +68,7 @@ def stated_mass_findings(share: float, mass_kg: float, trial: str) -> tuple[Find
     return tuple(
         Finding(
             effect,
-            "" if effect == AddedMass.name else "all fz",
+            "" if effect == AddedMass.name else channel,
             (trial,),
             "ambiguous",
             CLASS,

@@ -17,9 +17,13 @@ from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, values_without
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.diagnosis.scale_mass import weight_round
-from bsip_cli.diagnosis.selection import Round, Selection, select
+from bsip_cli.diagnosis.selection import Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
-from bsip_cli.diagnosis.stated_mass import standing_share, stated_mass_findings
+from bsip_cli.diagnosis.stated_mass import (
+    loaded_channel,
+    standing_share,
+    stated_mass_findings,
+)
 from bsip_cli.diagnosis.support import support_of
 from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.catalogue import CATALOGUE
@@ -60,14 +64,12 @@ def run(unit: Unit) -> None:
     rng = np.random.default_rng(crc32(unit.name.encode()))
     evidence = together(trials)
     effects = [effect for effect in CATALOGUE if effect.name != _ATTRIBUTED]
-    assert unit.participant is not None
-    stated = unit.participant.mass_kg is not None
-    first = weight_round(evidence) if stated else None
+    first = weight_round(evidence) if _only_motion_weighs(unit) else None
     selection = select(signatures_of(evidence, [*effects, *PATTERNS]), rng, first)
     findings = findings_of(selection, rng)
     names = tuple(one.name for one in trials)
     facts = _facts(selection, findings)
-    told = held if _is_told(first, findings) else (*held, *standing)
+    told = (*held, *standing)
     facts["trials"] += _trials_of(told)
     findings = (*told, *findings)
     unit.write("overall-diagnosis", rows_of(findings, names), facts)
@@ -94,6 +96,13 @@ def _looked_at(
     return trial_evidence(trial.stem, scene, own, shared, level, options.cutoff_hz)
 
 
+def _only_motion_weighs(unit: Unit) -> bool:
+    """Whether the stated mass can be compared with moving trials only."""
+    assert unit.participant is not None
+    static = [t for t in unit.trials("kinematics", "wrench") if t.role == "static"]
+    return unit.participant.mass_kg is not None and not static
+
+
 def _standing(unit: Unit, person: Person, prior: Prior) -> tuple[Finding, ...]:
     """What the static trial says of the stated mass; nothing without such a trial or mass."""
     assert unit.participant is not None
@@ -103,18 +112,8 @@ def _standing(unit: Unit, person: Person, prior: Prior) -> tuple[Finding, ...]:
     scene = scene_of(unit, person, prior.phi, static[0])
     if not scene.valid.any():
         return ()
-    return stated_mass_findings(standing_share(scene), scene.mass_kg, static[0].stem)
-
-
-def _is_told(first: Round | None, findings: tuple[Finding, ...]) -> bool:
-    """Whether what the scale said before the search still stands after it."""
-    if first is None or first.kept is None:
-        return False
-    known = first.kept.explanation
-    return any(
-        one.verdict != "rejected" and (one.effect, one.target) == (known.effect.name, known.target)
-        for one in findings
-    )
+    share, channel = standing_share(scene), loaded_channel(scene)
+    return stated_mass_findings(share, scene.mass_kg, channel, static[0].stem)
 
 
 def _trials_of(findings: tuple[Finding, ...]) -> tuple[str, ...]:

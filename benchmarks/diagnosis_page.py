@@ -56,7 +56,7 @@ def _as_they_are(plain: Mapping[str, Answer]) -> str:
                         _size(one),
                         ", ".join(one.trials),
                         _chance(one.p_value),
-                        f"{one.gain_percent:.1f}",
+                        "" if np.isnan(one.gain_percent) else f"{one.gain_percent:.1f}",
                         "" if k else _all_gains(answer),
                     ]
                 )
@@ -79,8 +79,7 @@ def _called(one: Found) -> str:
 def _size(one: Found) -> str:
     parts = []
     for name, (value, low, high) in one.values.items():
-        digits = 3 if abs(value) < 10 else 1
-        interval = "" if np.isnan(low) else f" ({low:.{digits}g} to {high:.{digits}g})"
+        interval = "" if np.isnan(low) or low == high else f" ({low:.3g} to {high:.3g})"
         parts.append(f"{name} {value:.3g}{interval}")
     return "; ".join(parts)
 

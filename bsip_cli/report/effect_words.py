@@ -94,6 +94,8 @@ def place_label(effect: str, target: str) -> str:
         return f"markers {first} and {second}" if second else f"marker {target}"
     if effect == "joint_centre" or target in SEGMENTS:
         return segment_label(target)
+    if effect == "unmeasured_contact":
+        return " and ".join(segment_label(name) for name in target.split("+"))
     return _CHANNELS.get(target, target)
 
 
@@ -101,7 +103,8 @@ def _plate_label(target: str) -> str:
     """Of ``1 fx>fy``, ``1 fz`` or ``1``."""
     name, _, channels = target.rpartition(" ") if " " in target else (target, "", "")
     words = " into ".join(_CHANNELS.get(channel, channel) for channel in channels.split(">"))
-    return f"plate {name}, {words}" if words else f"plate {name}"
+    where = "all plates" if name == "all" else f"plate {name}"
+    return f"{where}, {words}" if words else where
 
 
 _UNNAMED = {  # first number of a regularity without a name: what it is

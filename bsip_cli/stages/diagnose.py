@@ -19,6 +19,12 @@ from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.diagnosis.scale_mass import weight_round
 from bsip_cli.diagnosis.selection import Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
+from bsip_cli.diagnosis.stated_mass import (
+    loaded_channel,
+    standing_share,
+    stated_mass_findings,
+)
+from bsip_cli.diagnosis.support import support_of
 from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.identification.prior import Prior
@@ -42,25 +48,40 @@ def run(unit: Unit) -> None:
     stated = unit.participant.mass_kg is not None
     prior = _prior(unit, person, stated)
     moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
-    looked_at = (_trial_evidence(unit, person, prior, trial) for trial in moving)
-    trials = tuple(one for one in looked_at if one is not None)
-    if not trials:
+    looked_at = [_looked_at(unit, person, prior, trial) for trial in moving]
+    trials = tuple(one for one in looked_at if isinstance(one, TrialEvidence))
+    held = tuple(one for one in looked_at if isinstance(one, Finding))
+    told = (*held, *_standing(unit, person, prior))
+    if trials:
+        _write(unit, *_asked(unit, trials, told))
+        return
+    if not held:
         unit.warn(
             f"{unit.name}: no trial has {_SHORTEST_S:g} s of motion with every contact on a "
-            "plate; nothing can be diagnosed"
+            "plate; no movement can be diagnosed"
         )
-        unit.write("overall-diagnosis", rows_of((), ()))
-        unit.write("detection", empty_table("detection"))
-        return
+    names = _trials_of(told)
+    _write(unit, rows_of(told, tuple(names)), empty_table("detection"), {"trials": names})
+
+
+def _asked(
+    unit: Unit, trials: tuple[TrialEvidence, ...], told: tuple[Finding, ...]
+) -> tuple[pd.DataFrame, pd.DataFrame, dict]:
+    """Diagnosis, detection limits and facts, of the moving trials and of what is told already."""
     rng = np.random.default_rng(crc32(unit.name.encode()))
     evidence = together(trials)
     effects = [effect for effect in CATALOGUE if effect.name != _ATTRIBUTED]
-    first = weight_round(evidence) if stated else None
+    first = weight_round(evidence) if _only_motion_weighs(unit) else None
     selection = select(signatures_of(evidence, [*effects, *PATTERNS]), rng, first)
     findings = findings_of(selection, rng)
-    names = tuple(one.name for one in trials)
     facts = _facts(selection, findings)
-    diagnosis, limits = rows_of(findings, names), _detection(selection)
+    facts["trials"] += _trials_of(told)
+    rows = rows_of((*told, *findings), tuple(one.name for one in trials))
+    return rows, _detection(selection), facts
+
+
+def _write(unit: Unit, diagnosis: pd.DataFrame, limits: pd.DataFrame, facts: dict) -> None:
+    """Both artifacts, and in words what they say."""
     unit.write("overall-diagnosis", diagnosis, facts)
     unit.write("detection", limits)
     said = verdict_of(diagnosis, limits)
@@ -75,10 +96,16 @@ def _prior(unit: Unit, person: Person, stated: bool) -> Prior:
     return prior_from(unit, unit.read("regression"), person, **(known if stated else {}))
 
 
-def _trial_evidence(unit: Unit, person, prior: Prior, trial: Trial) -> TrialEvidence | None:
+def _looked_at(
+    unit: Unit, person: Person, prior: Prior, trial: Trial
+) -> TrialEvidence | Finding | None:
+    """A trial's evidence, or what the hands hold on to in it; None if the trial is too short."""
     scene = scene_of(unit, person, prior.phi, trial)
     if scene.valid.sum() < _SHORTEST_S * scene.rate_hz:
         return None
+    held = support_of(scene)
+    if held is not None:
+        return held.finding(trial.stem)
     options = unit.config.diagnosis
     fewer = slow(scene)
     rng = np.random.default_rng(crc32(trial.stem.encode()))
@@ -86,6 +113,30 @@ def _trial_evidence(unit: Unit, person, prior: Prior, trial: Trial) -> TrialEvid
     shared = shared_nuisances(fewer, prior.root, options.marker_sd_m)
     level = acceleration_noise(unit.read("kinematics", trial), person.skeleton)
     return trial_evidence(trial.stem, scene, own, shared, level, options.cutoff_hz)
+
+
+def _only_motion_weighs(unit: Unit) -> bool:
+    """Whether the stated mass can be compared with moving trials only."""
+    assert unit.participant is not None
+    static = [t for t in unit.trials("kinematics", "wrench") if t.role == "static"]
+    return unit.participant.mass_kg is not None and not static
+
+
+def _standing(unit: Unit, person: Person, prior: Prior) -> tuple[Finding, ...]:
+    """What the static trial says of the stated mass; nothing without such a trial or mass."""
+    assert unit.participant is not None
+    static = [t for t in unit.trials("kinematics", "wrench") if t.role == "static"]
+    if unit.participant.mass_kg is None or not static:
+        return ()
+    scene = scene_of(unit, person, prior.phi, static[0])
+    if not scene.valid.any():
+        return ()
+    share, channel = standing_share(scene), loaded_channel(scene)
+    return stated_mass_findings(share, scene.mass_kg, channel, static[0].stem)
+
+
+def _trials_of(findings: tuple[Finding, ...]) -> list[str]:
+    return list(dict.fromkeys(trial for one in findings for trial in one.trials))
 
 
 def _facts(selection: Selection, findings: tuple[Finding, ...]) -> dict:

@@ -181,6 +181,8 @@ def test_units_that_people_read():
     assert place_label("marker_swap", "A+B") == "markers A and B"
     assert place_label("added_mass", "hand_l") == "left hand"
     assert place_label("sync_offset", "") == ""
+    assert place_label("unmeasured_contact", "hand_l+hand_r") == "left hand and right hand"
+    assert place_label("plate_gain", "all fz") == "all plates, vertical force"
 
 
 def test_limits_stand_beside_sizes_that_labs_meet(found):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bsip_cli.diagnosis.explanation import Fit, fit_together
+from bsip_cli.diagnosis.explanation import Fit, changes_of, fit_together
 from bsip_cli.diagnosis.signatures import Signatures
 from bsip_cli.diagnosis.together import together
 
@@ -41,13 +41,10 @@ def _with_noise(
     signatures: Signatures, fit: Fit, more: list[np.ndarray], **floor: float
 ) -> tuple[Signatures, Fit]:
     """Coordinates of the noise beside a fit and more changes (n, 6), filtered, of each trial."""
+    changes = changes_of(signatures.evidence, fit.explanations)
     trials = []
-    for t, one in enumerate(signatures.evidence.trials):
-        change = np.zeros_like(one.scene.measured)
-        for explanation in fit.explanations:
-            if t in explanation.place.trials:
-                change = change + explanation.wrench(one.scene)
-        beside = one.filtered.filter(change[..., None])[..., 0] + more[t]
+    for one, change, other in zip(signatures.evidence.trials, changes, more, strict=True):
+        beside = one.filtered.filter(change[..., None])[..., 0] + other
         trials.append(one.with_noise_beside(beside, **floor))
     signatures = signatures.on(together(tuple(trials)))
     return signatures, fit_together(signatures.evidence, fit.explanations)

@@ -16,6 +16,7 @@ SHARE = 0.02  # of the size that labs meet
 HORIZONTAL = 0.7  # the same for the gain of horizontal forces
 # The spline of `ik` takes as much as a low-pass at this cut-off, with a softer edge.
 SPLINE_HZ, EDGE = 11.0, 3
+BLUR_S = 0.015  # standard deviation of a Gaussian that the one passed and the other did not
 
 
 def slack(scene: Scene) -> np.ndarray:
@@ -26,7 +27,21 @@ def slack(scene: Scene) -> np.ndarray:
         for effect in (*instruments, EFFECTS["over_smoothing"])
         for c in candidates_of(effect, scene)
     ]
-    return np.concatenate(columns, axis=2)
+    return np.concatenate([*columns, _blurred(scene)], axis=2)
+
+
+def _blurred(scene: Scene) -> np.ndarray:
+    """(N, 6, 6) each component as if simulated motion and measured force were not equally sharp.
+
+    Without it two opposite delays, or a delay and a clock, make up for what the motion lacks.
+    """
+    place = np.append(scene.q[scene.valid, :2].mean(axis=0), 0.0)
+    course = scene.predicted.copy()
+    course[:, 3:] -= np.cross(place, course[:, :3])  # where the person stands moments are small
+    bent = np.gradient(np.gradient(course, axis=0), axis=0) * scene.rate_hz**2
+    columns = 0.5 * BLUR_S**2 * bent[..., None] * np.eye(6)
+    columns[:, 3:] += np.cross(place, columns[:, :3], axisb=1, axisc=1)
+    return columns
 
 
 def _is_of_instruments(effect: Effect) -> bool:

@@ -8,7 +8,7 @@ import pandas as pd
 from bsip_cli.artifacts import empty_table
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.diagnosis.cause import Cause, method_of
+from bsip_cli.diagnosis.cause import Cause, change_by, method_of
 from bsip_cli.effects.missing_joint import AXES, MissingJoint, split_torso
 from bsip_cli.identification.uncertainty import readable
 from bsip_cli.report.records import with_all_causes
@@ -74,7 +74,8 @@ def _extended(
     for k, cause in enumerate(causes):
         touched = [stem for stem in cause.trials if stem in scenes]
         for stem in touched:
-            changes[stem] = changes.get(stem, 0.0) + cause.change(scenes[stem])
+            known = [one for one in causes[: k + 1] if stem in one.trials]
+            changes[stem] = change_by(known, scenes[stem])
         if touched:
             rows = _identified(unit, person, trials, changes)
         tables.append(rows.assign(method=method_of(causes[: k + 1])))

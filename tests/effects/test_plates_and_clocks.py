@@ -16,6 +16,7 @@ from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.effects.clock_drift import ClockDrift
 from bsip_cli.effects.gravity_tilt import GravityTilt
+from bsip_cli.effects.joint_change import joint_change
 from bsip_cli.effects.plate_crosstalk import PlateCrosstalk
 from bsip_cli.effects.plate_drift import PlateDrift
 from bsip_cli.effects.plate_gain import PlateGain
@@ -190,3 +191,19 @@ def test_a_standing_person_weighs_what_the_scene_says():
     scene = standing_still()
     np.testing.assert_allclose(scene.predicted[5, 2], MASS_KG * 9.80665, rtol=1e-9)
     np.testing.assert_allclose(scene.measured, scene.predicted, atol=1e-9)
+
+
+# --- several at once ----------------------------------------------------------------------------
+
+
+def test_delays_are_one_delay_and_the_rest_adds_up():
+    scene = moving()
+    late, early = np.array([0.03]), np.array([-0.03])
+    both = [(SyncOffset(), "", late), (SyncOffset(), "", early)]
+    assert not joint_change(scene, both).any()
+    added = SyncOffset().change(scene, "", late) + SyncOffset().change(scene, "", early)
+    assert np.abs(added[20:-20]).max() > 1.0
+    offset = (PlateZero(), "1 fz", np.array([10.0]))
+    together = joint_change(scene, [both[0], offset])
+    parts = SyncOffset().change(scene, "", late) + PlateZero().change(scene, *offset[1:])
+    np.testing.assert_allclose(together, parts, atol=1e-9)

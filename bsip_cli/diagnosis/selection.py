@@ -20,7 +20,7 @@ from bsip_cli.statistics.chi_square import minus_log_p
 MOST = 3  # causes in one trial
 TRIES = 10  # candidates that are refitted in a round
 WORTH_A_TRY = 0.5  # of the best score
-ALPHA = 0.05
+ALPHA = 0.01  # in every round; with the chance's own errors one null in twenty has an alarm
 SUPPORT = 8.0  # squared white residual that a trial must save to share a cause
 # A cause from the catalogue is named though a regularity without a name explains a bit more.
 NAMED_AT = 0.95

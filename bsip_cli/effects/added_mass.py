@@ -9,6 +9,7 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
 REACH_M = 0.6
+LEAST_KG = 0.2  # less is what the segment itself may differ by
 
 
 class AddedMass(Effect):
@@ -53,8 +54,8 @@ class AddedMass(Effect):
         return (("mass", "kg", float(values[0])), *positions)
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        within = super().possible(scene, target, values)
-        return within and bool(np.linalg.norm(values[1:]) <= REACH_M * values[0])
+        within = super().possible(scene, target, values) and values[0] >= LEAST_KG
+        return bool(within and np.linalg.norm(values[1:]) <= REACH_M * values[0])
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         return f"{values[0]:.2f} kg that the model does not know move with the {in_words(target)}"

@@ -30,6 +30,9 @@ def put_right(scene: Scene, late_s: np.ndarray) -> np.ndarray:
     From the measured course: the simulated one holds the noise of the motion, whose derivative
     would make every delay seem smaller than it is.
     """
-    times = scene.times_s
-    at = np.clip(times + late_s, times[0], times[-1])
-    return scene.measured - scene.measured_course(at)
+    return scene.measured - scene.measured_course(right_times_s(scene, late_s))
+
+
+def right_times_s(scene: Scene, late_s: np.ndarray) -> np.ndarray:
+    """(N,) when the forces that belong to each frame were recorded, inside the trial."""
+    return np.clip(scene.times_s + late_s, scene.times_s[0], scene.times_s[-1])

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from moving_scene import MASS_KG, RATE_HZ, moving, phi, rms, scene_of, standing_still
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 from standing_person import Swing, standing
 
@@ -207,3 +208,15 @@ def test_delays_are_one_delay_and_the_rest_adds_up():
     together = joint_change(scene, [both[0], offset])
     parts = SyncOffset().change(scene, "", late) + PlateZero().change(scene, *offset[1:])
     np.testing.assert_allclose(together, parts, atol=1e-9)
+
+
+def test_what_plates_do_wrong_comes_as_late_as_their_forces():
+    scene, shift = moving(), (PlateTranslation(), "1", np.array([0.02, 0.0, 0.0]))
+    late_s = 0.02
+    delay = (SyncOffset(), "", np.array([late_s]))
+    together = joint_change(scene, [delay, shift])
+    wrong = PlateTranslation().change(scene, *shift[1:])
+    later = CubicSpline(scene.times_s, wrong)(np.minimum(scene.times_s + late_s, scene.times_s[-1]))
+    expected = SyncOffset().change(scene, *delay[1:]) + later
+    np.testing.assert_allclose(together, expected, atol=1e-9)
+    assert np.abs(later - wrong).max() > 0.1

@@ -62,9 +62,11 @@ class Ingest(Section):
     mass_tolerance_percent: float = Field(gt=0)
     zero_unloaded_plates: bool
     plates: tuple[int, ...]
+    prefixes: dict[str, str]
 
 
 class Scale(Section):
+    may_be_held: tuple[Literal["head", "upper_torso", "upper_arm", "forearm", "hand"], ...]
     joint_centre_sd_m: float = Field(gt=0)
     length_sd: float = Field(gt=0)
     marker_sd_m: float = Field(gt=0)

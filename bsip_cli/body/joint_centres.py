@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsip_cli.body.names import in_words
+from bsip_cli.body.stand_ins import whole_arm, with_trunk
 from bsip_cli.errors import BadDataError
 
 # Fractions of the distance between the ASIS, from their middle; X anterior, Y up, Z right.
@@ -46,7 +47,7 @@ class JointCentres:
 
 
 def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: float) -> JointCentres:
-    """Joint centres of the whole body.
+    """Joint centres of the whole body; trunk and arms may lack landmarks, pelvis and legs not.
 
     Raises
     ------
@@ -54,11 +55,13 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
         Landmarks without which there is no skeleton are missing: all are named.
     """
     _require(landmarks)
-    notes: list[str] = []
     axes, middle, width = _pelvis(landmarks)
     _require_sides(landmarks, axes[:, 2])
+    waist = middle + width * (axes @ _LJC[sex])
+    completed = with_trunk(landmarks, waist, axes, sex, stature_m)
+    landmarks, notes = completed.landmarks, list(completed.notes)
     centres = {
-        "waist": middle + width * (axes @ _LJC[sex]),
+        "waist": waist,
         "hip_r": middle + width * (axes @ _HJC[sex]),
         "hip_l": middle + width * (axes @ (_HJC[sex] * np.array([1.0, 1.0, -1.0]))),
     }
@@ -71,7 +74,10 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
     for side in "lr":
         outward = right if side == "r" else -right
         centres[f"shoulder_{side}"] = landmarks[f"acromion_{side}"] + down
-        _arm(landmarks, centres, hinges, ends, side, outward, stature_m, notes)
+        shoulder, below = centres[f"shoulder_{side}"], unit(waist - centres["neck"])
+        arm = whole_arm(landmarks, shoulder, below, side, sex, stature_m)
+        notes += arm.notes
+        _arm(landmarks, arm, centres, hinges, ends, side, outward, stature_m, notes)
         outward = axes[:, 2] if side == "r" else -axes[:, 2]
         _leg(landmarks, centres, hinges, ends, side, outward, stature_m, notes)
     return JointCentres(centres, axes, hinges, ends, tuple(notes))
@@ -80,18 +86,9 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
 _REQUIRED = (
     "asis_l",
     "asis_r",
-    "c7",
     *(
         f"{name}_{side}"
-        for name in (
-            "acromion",
-            "elbow_lateral",
-            "styloid_radial",
-            "styloid_ulnar",
-            "knee_lateral",
-            "malleolus_lateral",
-            "calcaneus",
-        )
+        for name in ("knee_lateral", "malleolus_lateral", "calcaneus")
         for side in "lr"
     ),
 )
@@ -119,7 +116,8 @@ def _require_sides(landmarks: Mapping[str, np.ndarray], right: np.ndarray) -> No
     swapped = [
         in_words(name)
         for name in ("acromion", "knee_lateral", "malleolus_lateral", "calcaneus")
-        if (landmarks[f"{name}_r"] - landmarks[f"{name}_l"]) @ right < 0
+        if {f"{name}_r", f"{name}_l"} <= landmarks.keys()
+        and (landmarks[f"{name}_r"] - landmarks[f"{name}_l"]) @ right < 0
     ]
     if swapped:
         raise BadDataError(
@@ -151,13 +149,14 @@ def _thorax(landmarks, pelvis, waist, stature_m, notes):
     return _THORAX_WIDTH * stature_m, _turned(forward, right, _THORAX_SLOPE), right
 
 
-def _arm(landmarks, centres, hinges, ends, side, outward, stature_m, notes):
-    shoulder, lateral = centres[f"shoulder_{side}"], landmarks[f"elbow_lateral_{side}"]
-    wrist = 0.5 * (landmarks[f"styloid_radial_{side}"] + landmarks[f"styloid_ulnar_{side}"])
+def _arm(landmarks, arm, centres, hinges, ends, side, outward, stature_m, notes):
+    shoulder, lateral, wrist = centres[f"shoulder_{side}"], arm.lateral, arm.wrist
     long_axis = unit(shoulder - lateral)
     medial = landmarks.get(f"elbow_medial_{side}")
     if medial is not None:
         elbow, across = 0.5 * (lateral + medial), lateral - medial
+    elif f"elbow_lateral_{side}" not in landmarks:
+        elbow, across = lateral, outward
     else:
         notes.append(_lateral_only(f"elbow_{side}"))
         across = _across_bent_elbow(long_axis, lateral - wrist, outward)

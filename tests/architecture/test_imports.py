@@ -21,8 +21,8 @@ ALLOWED = {
     "pipeline": "schemas",
     "unit": "artifacts config errors pipeline provenance schemas study",
     "runner": "artifacts config errors pipeline study unit",
-    "check_loads": "body config errors study",
-    "session": "body check_loads config errors pipeline runner study",
+    "check_study": "body config errors study",
+    "session": "body check_study config errors pipeline runner study",
     "__main__": "cli",
     "export": "__init__ artifacts body errors pipeline provenance runner schemas session stages "
     "unit",
@@ -51,7 +51,7 @@ ONLY = {
     "cli": {"simulate": {"simulate.command"}},
     "export": {"stages": {"stages.frames"}},
     "session": {"body": {"body.markersets", "body.skeleton"}},
-    "check_loads": {"body": {"body.skeleton"}},
+    "check_study": {"body": {"body.skeleton"}},
 }
 
 

@@ -8,7 +8,7 @@ the ISB pelvis frame (Dumas and Wojtusch 2018), since the pubis is not marked; t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,15 +94,21 @@ _REQUIRED = (
 )
 
 
-def _require(landmarks: Mapping[str, np.ndarray]) -> None:
-    missing = [name for name in _REQUIRED if name not in landmarks]
+def missing_landmarks(known: Collection[str]) -> list[str]:
+    """What has no landmark among the known ones and no skeleton can do without, in words."""
+    missing = [name for name in _REQUIRED if name not in known]
     missing += [
-        f"a metatarsal of the {in_words(f'foot_{s}')}"
-        for s in "lr"
-        if _mean(landmarks, _toes(s)) is None
+        f"a metatarsal of the {in_words(f'foot_{side}')}"
+        for side in "lr"
+        if not any(name in known for name in _toes(side))
     ]
-    if _mean(landmarks, ("psis_l", "psis_r", "sacrum")) is None:
+    if not any(name in known for name in ("psis_l", "psis_r", "sacrum")):
         missing.append("psis_l and psis_r, or sacrum")
+    return missing
+
+
+def _require(landmarks: Mapping[str, np.ndarray]) -> None:
+    missing = missing_landmarks(landmarks.keys())
     if missing:
         raise BadDataError(
             f"no marker for {', '.join(missing)}",

@@ -59,6 +59,7 @@ class Load(Section):
 
 class Ingest(Section):
     max_gap_s: float = Field(ge=0)
+    max_rigid_gap_s: float = Field(ge=0)
     mass_tolerance_percent: float = Field(gt=0)
     zero_unloaded_plates: bool
     plates: tuple[int, ...]

@@ -112,8 +112,13 @@ def _fill(unit, recording, marker_set, names, index) -> FilledMarkers:
     groups: dict[str, list[int]] = {}
     for k, name in enumerate(names):
         groups.setdefault(segment[name], []).append(k)
+    options = unit.config.ingest
     return fill_gaps(
-        positions, recording.marker_rate_hz, list(groups.values()), unit.config.ingest.max_gap_s
+        positions,
+        recording.marker_rate_hz,
+        list(groups.values()),
+        options.max_gap_s,
+        options.max_rigid_gap_s,
     )
 
 
@@ -150,8 +155,12 @@ def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:
     for k, name in enumerate(names):
         closed, left = int(filled.filled[:, k].sum()), int(is_open[:, k].sum())
         if closed or left:
+            rigid = int(filled.rigid[:, k].sum())
             found = f"{closed + left} of {len(is_open)} frames missing"
-            action = f"{closed} filled, {left} left open"
+            action = (
+                f"{rigid} filled by the segment's other markers, {closed - rigid} by a spline, "
+                f"{left} left open"
+            )
             findings.append(Finding("marker_gaps", name, found, "every frame", action, "info"))
     return findings
 

@@ -60,11 +60,9 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
     waist = middle + width * (axes @ _LJC[sex])
     completed = with_trunk(landmarks, waist, axes, sex, stature_m)
     landmarks, notes = completed.landmarks, list(completed.notes)
-    centres = {
-        "waist": waist,
-        "hip_r": middle + width * (axes @ _HJC[sex]),
-        "hip_l": middle + width * (axes @ (_HJC[sex] * np.array([1.0, 1.0, -1.0]))),
-    }
+    hips = hip_centres(landmarks, sex)
+    assert hips is not None
+    centres = {"waist": waist, "hip_r": hips["r"], "hip_l": hips["l"]}
     width, line, right = _thorax(landmarks, axes, centres["waist"], stature_m, notes)
     part, angle = _CJC[sex]
     centres["neck"] = landmarks["c7"] + part * width * _turned(line, right, angle)
@@ -81,6 +79,18 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
         outward = axes[:, 2] if side == "r" else -axes[:, 2]
         _leg(landmarks, centres, hinges, ends, side, outward, stature_m, notes)
     return JointCentres(centres, axes, hinges, ends, tuple(notes))
+
+
+def hip_centres(landmarks: Mapping[str, np.ndarray], sex: str) -> dict[str, np.ndarray] | None:
+    """Hip joint centres (3,) [m] by side, from the pelvis alone; None without its landmarks."""
+    behind = _mean(landmarks, ("psis_l", "psis_r", "sacrum"))
+    if behind is None or not {"asis_l", "asis_r"} <= landmarks.keys():
+        return None
+    axes, middle, width = _pelvis(landmarks)
+    return {
+        side: middle + width * (axes @ (_HJC[sex] * np.array([1.0, 1.0, sign])))
+        for side, sign in (("r", 1.0), ("l", -1.0))
+    }
 
 
 _REQUIRED = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from bsip_cli.body.markersets import MarkerSet
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.errors import BadDataError
+from bsip_cli.motion.functional_legs import functional_landmarks
 
 Frame = tuple[np.ndarray, np.ndarray]  # origin (3,) and axes (3, 3) with X, Y, Z as columns
 
@@ -35,6 +36,7 @@ def calibrate(
     positions: Mapping[str, np.ndarray],
     sex: str,
     height_m: float | None,
+    trials: Sequence[Mapping[str, np.ndarray]] = (),
 ) -> Calibration:
     """Build the skeleton from marker positions in one standing pose.
 
@@ -43,6 +45,8 @@ def calibrate(
     positions : label to (3,) world position [m], Z up; only markers that are visible.
     sex : M or F, for the joint-centre regressions.
     height_m : stature, or None to estimate it from the long segments.
+    trials : of each trial, label to (N, 3) positions [m]: knees and ankles without markers are
+        found from their movement there.
 
     Raises
     ------
@@ -50,6 +54,8 @@ def calibrate(
         Landmarks are missing (all are named).
     """
     landmarks = _landmarks(marker_set, positions)
+    moved = functional_landmarks(marker_set, landmarks, positions, trials, sex)
+    landmarks |= moved.landmarks
     guess = height_m or _rough_stature(landmarks)
     centres = joint_centres(landmarks, sex, guess)
     lengths = _lengths(centres)
@@ -57,7 +63,9 @@ def calibrate(
     frames = _frames(skeleton, centres, landmarks)
     person = _person(skeleton, marker_set, positions, centres, frames, sex, stature, landmarks)
     forward = centres.pelvis_axes[:, 0] * np.array([1.0, 1.0, 0.0])
-    return Calibration(person, _pose(person, frames), unit(forward), stature, centres.notes)
+    return Calibration(
+        person, _pose(person, frames), unit(forward), stature, (*moved.notes, *centres.notes)
+    )
 
 
 def _landmarks(marker_set: MarkerSet, positions: Mapping[str, np.ndarray]) -> dict:

@@ -53,6 +53,7 @@ def run(unit: Unit) -> None:
         _mean_positions(still, quiet),
         unit.participant.sex,
         unit.participant.height_m,
+        [dict(zip(one.labels, one.positions.swapaxes(0, 1), strict=True)) for one in recorded],
     )
     _require_markers(unit, marker_set, calibration.person)
     for note in calibration.notes:

@@ -123,7 +123,8 @@ def _require(landmarks: Mapping[str, np.ndarray]) -> None:
         raise BadDataError(
             f"no marker for {', '.join(missing)}",
             expected="at least one frame of the calibrating trial in which they are visible",
-            remedy="name the markers that serve in a marker set, or calibrate with another trial",
+            remedy="name the markers that serve in a marker set (`bsip markers FILE` shows what "
+            "the labels are taken for), or calibrate with another trial",
         )
 
 

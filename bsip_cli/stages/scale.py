@@ -23,6 +23,7 @@ from bsip_cli.study import Trial
 from bsip_cli.unit import Unit
 
 _QUIET_S = 1.0
+_NEARLY_ALL = 0.95  # of the markers that the best second shows
 _FRAMES_PER_TRIAL = 400
 
 
@@ -141,16 +142,22 @@ def _quietest(one: _Recorded) -> slice:
 
 
 def _unrest(one: _Recorded) -> tuple[float, slice]:
-    """Mean marker speed [m/s] in the quietest second, and that second."""
+    """Mean marker speed [m/s] in the quietest second, and that second.
+
+    Among the seconds that show nearly as many markers as the best: people walk in and out.
+    """
     step = float(np.median(np.diff(one.times))) if len(one.times) > 1 else 1.0
     width = min(max(2, round(_QUIET_S / step)), len(one.times))
     if width < 3:
         return np.inf, slice(0, len(one.times))
     speed = np.linalg.norm(np.diff(one.positions, axis=0), axis=2) / step
     seen = np.isfinite(speed)
-    mean = np.where(seen, speed, 0.0).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
-    mean[~seen.any(axis=1)] = np.inf
-    windows = np.convolve(mean, np.ones(width - 1) / (width - 1), mode="valid")
+    count = seen.sum(axis=1)
+    mean = np.where(seen, speed, 0.0).sum(axis=1) / np.maximum(count, 1)
+    mean[count == 0] = np.inf
+    whole = np.ones(width - 1) / (width - 1)
+    windows, shown = np.convolve(mean, whole, mode="valid"), np.convolve(count, whole, mode="valid")
+    windows[shown < _NEARLY_ALL * shown.max()] = np.inf
     start = int(np.argmin(windows))
     return float(windows[start]), slice(start, start + width)
 

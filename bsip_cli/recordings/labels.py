@@ -147,7 +147,7 @@ def _match(unique: Mapping[str, int], wanted: Mapping[str, Sequence[str]]) -> di
     index: dict[str, int] = {}
     taken: set[int] = set()
     levels = [_same, _folded, _joined]
-    if unique and max(map(len, unique)) <= _CUT:
+    if _are_cut(unique):
         levels.append(_cut)
     for spelling in levels:
         known = _by_spelling(unique, spelling)
@@ -188,12 +188,18 @@ def _cut(name: str) -> str:
     return name.casefold()[:_CUT]
 
 
+def _are_cut(bare: Collection[str]) -> bool:
+    """Most have the length that old formats cut to; descriptions may have restored the others."""
+    return bool(bare) and 2 * sum(len(label) == _CUT for label in bare) > len(bare)
+
+
 def _spelt(
     names: Sequence[str], wanted: Mapping[str, Sequence[str]], bare: Sequence[str]
 ) -> list[str]:
-    """Those of the names that stand among bare labels, case aside."""
-    folded = {b.casefold() for b in bare}
-    return [n for n in names if any(s.casefold() in folded for s in (n, *wanted[n]))]
+    """Those of the names that bare labels may mean, case aside, and cut where labels are."""
+    spelling = _cut if _are_cut(bare) else _folded
+    spelt = {spelling(b) for b in bare}
+    return [n for n in names if any(spelling(s) in spelt for s in (n, *wanted[n]))]
 
 
 def _ambiguous(shared: Sequence[str], wanted: int) -> BadDataError:

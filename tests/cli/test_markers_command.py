@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from bsip_cli.body.markersets import load_marker_set
@@ -169,3 +171,34 @@ def test_exit_codes(bsip, here):
     assert refused.code == 3 and "the file is empty" in refused.err and refused.out == ""
     gone = bsip("markers", here / "nowhere.c3d")
     assert gone.code == 3 and "Traceback" not in gone.err
+
+
+def test_two_people_of_one_recording_in_a_study(bsip, here):
+    both = [f"{name}:{label}" for name in ("Anna", "Ben") for label in HANSEN]
+    source = recording(here, both)
+    for person in ("sub-01", "sub-02"):
+        folder = here / "study" / person
+        folder.mkdir(parents=True)
+        (folder / f"{person}_task-static.trc").write_bytes(source.read_bytes())
+    (here / "study" / "participants.tsv").write_text(
+        "participant_id\tsex\tmass_kg\theight_m\nsub-01\tF\t60\tn/a\nsub-02\tM\t70\tn/a\n"
+    )
+    refused = bsip("ingest", here / "study", "--out", here / "out")
+    assert refused.code == 3 and "2 people in one file: 'Anna:'" in refused.err
+    options = here / "study" / "study.toml"
+    options.write_text('[ingest]\nprefixes = { sub-01 = "Anna:", sub-03 = "Ben:" }\n')
+    unknown = bsip("ingest", here / "study", "--out", here / "out")
+    assert (
+        unknown.code == 2
+        and "ingest.prefixes: there is no sub-03 (did you mean sub-0" in unknown.err
+    )
+    options.write_text('[ingest]\nprefixes = { sub-01 = "Anna:", sub-02 = "Ben" }\n')
+    assert bsip("ingest", here / "study", "--out", here / "out").code == 0
+    first_y = {}
+    for person in ("sub-01", "sub-02"):
+        table = pd.read_parquet(here / "out" / person / f"{person}_task-static_markers.parquet")
+        first_y[person] = table.loc[0, ["x_m", "y_m", "z_m"]].to_numpy(dtype=float)
+        assert list(table["marker"][:3]) == HANSEN[:3]
+    assert np.linalg.norm(first_y["sub-02"] - first_y["sub-01"]) == pytest.approx(
+        len(HANSEN) * np.sqrt(3) * 1e-3
+    )

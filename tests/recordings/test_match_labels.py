@@ -47,9 +47,9 @@ def test_spellings_that_fall_together_match_nothing():
 
 def test_labels_cut_to_four_characters():
     wanted = {"FHEAD": [], "RKNEL": [], "RKNEM": [], "LHAND": []}
-    match = match_labels(["FHEA", "RKNE", "LHAN"], wanted)
+    match = match_labels(["FHEA", "RKNE", "LHAN", "a longer label"], wanted)
     assert match.index == {"FHEAD": 0, "LHAND": 2}  # RKNE may be either
-    whole = match_labels(["FHEA", "LHAN", "a longer label"], wanted)
+    whole = match_labels(["FHEA", "LHAN", "a longer label", "another"], wanted)
     assert whole.index == {}
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from bsip_cli.body.joint_centres import missing_landmarks
 from bsip_cli.body.markersets import Marker, MarkerSet, load_marker_set
-from bsip_cli.body.names import in_words
+from bsip_cli.body.names import in_words, without_side
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.config import load_config
 from bsip_cli.errors import UsageError
@@ -72,7 +72,8 @@ def _compared(request: Request, recording: Recording, chosen: MarkerSet) -> bool
     words = {k: _meaning(_bare(recording.labels[k]), marker) for k, marker in there.items()}
     _say([*_prefix(match), "", "labels:", *_label_rows(recording, words, "not in the set")])
     skeleton = load_skeleton(load_config([]).skeleton)
-    unmarked = _unmarked(skeleton, {marker.segment for marker in there.values()})
+    informed = skeleton.informed({marker.segment for marker in there.values()})
+    unmarked = [s for s, known in zip(skeleton.segments, informed, strict=True) if not known]
     _say(["", "segments:", *_segment_rows(chosen, match, skeleton, unmarked)])
     needed = missing_landmarks({marker.landmark for marker in there.values()})
     if needed:
@@ -157,17 +158,8 @@ def _place(segment: str, landmark: str) -> str:
     return f"{in_words(segment)}, {in_words(landmark) if landmark else 'tracks only'}"
 
 
-def _unmarked(skeleton: Skeleton, marked: Collection[str]) -> list[str]:
-    """Segments without markers on them or beyond them."""
-    informed = [segment in marked for segment in skeleton.segments]
-    for i in range(len(informed) - 1, 0, -1):
-        informed[skeleton.parents[i]] |= informed[i]
-    return [s for s, known in zip(skeleton.segments, informed, strict=True) if not known]
-
-
 def _may_be_held(segment: str) -> bool:
-    kind = segment.removesuffix("_l").removesuffix("_r")
-    return kind in load_config([]).scale.may_be_held
+    return without_side(segment) in load_config([]).scale.may_be_held
 
 
 def _segment_rows(

@@ -210,17 +210,8 @@ def _person(skeleton, marker_set, positions, centres, frames, sex, stature, land
         index,
         local,
         np.array([m.weight for m in present]),
-        ~_informed(skeleton, index),
+        ~np.array(skeleton.informed({m.segment for m in present})),
     )
-
-
-def _informed(skeleton: Skeleton, marker_segments: np.ndarray) -> np.ndarray:
-    """(n,) segments on which, or beyond which, there is a marker."""
-    informed = np.zeros(len(skeleton.segments), dtype=bool)
-    informed[marker_segments] = True
-    for i in range(len(informed) - 1, 0, -1):
-        informed[skeleton.parents[i]] |= informed[i]
-    return informed
 
 
 def _tilt(axis: np.ndarray) -> float:

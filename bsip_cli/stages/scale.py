@@ -10,7 +10,7 @@ import pandas as pd
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
-from bsip_cli.body.names import in_words
+from bsip_cli.body.names import in_words, without_side
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError
@@ -92,7 +92,7 @@ def _require_markers(unit: Unit, marker_set: MarkerSet, person: Person) -> None:
     lost = [
         name
         for name, held in zip(person.skeleton.segments, person.held, strict=True)
-        if held and name.removesuffix("_l").removesuffix("_r") not in allowed
+        if held and without_side(name) not in allowed
     ]
     if not lost:
         return
@@ -101,7 +101,7 @@ def _require_markers(unit: Unit, marker_set: MarkerSet, person: Person) -> None:
         f"no markers on the {', '.join(map(in_words, lost))}",
         expected="; ".join(serve),
         remedy="record these, or let the segment be held at the neutral pose: study.toml [scale] "
-        f"may_be_held = {json.dumps([*allowed, *lost])}",
+        f"may_be_held = {json.dumps([*allowed, *dict.fromkeys(map(without_side, lost))])}",
     )
 
 

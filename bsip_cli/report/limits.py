@@ -45,7 +45,7 @@ def limits_of(
     """
     causes = causes_of(candidates_of(diagnosis))
     found = {(one.effect, one.target) for cause in causes for one in cause}
-    rows = detection[np.isfinite(detection["limit"])]
+    rows = detection[np.isfinite(detection["limit"].astype(float))]
     rows = rows.assign(together=rows["trials"].str.count(",") + 1)
     rows = rows[rows["together"] == 1] if alone else rows
     rows = rows.sort_values(["together", "limit"], ascending=[False, True], kind="stable")

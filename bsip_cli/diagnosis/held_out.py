@@ -11,6 +11,7 @@ from bsip_cli.diagnosis.together import Evidence
 
 BLOCK_S = 1.0
 FOLDS = 5
+_Z95 = 1.959964
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,10 @@ class Gain:
     def is_real(self) -> bool:
         """Larger than its standard error."""
         return self.percent > self.error_percent
+
+    def is_sure(self) -> bool:
+        """Its 95 % interval lies above zero."""
+        return self.percent > _Z95 * self.error_percent
 
 
 def standard_error(blocks: np.ndarray) -> float:

@@ -20,6 +20,7 @@ from bsip_cli.effects.scene import Scene
 
 UNEXPLAINED = "unexplained"
 _SIZE_N, _SIZE_NM = 40.0, 20.0
+_FASTEST_HZ = 8.0  # beyond it the low-pass leaves nothing but its own edge
 _LINE, _AROUND_HZ, _MOST_LINES = 30.0, 0.75, 3  # of noise one in 10^9 frequencies is as high
 _ALONG = {"x": "along the lab's X axis", "y": "along the lab's Y axis", "z": "up and down"}
 
@@ -48,7 +49,7 @@ class Tone(Pattern):
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         size, unit = _SIZE_N if target.startswith("f") else _SIZE_NM, unit_of(target)
         duration = max(float(np.ptp(scene.times_s)), 2.0)
-        slowest, fastest = 2.0 / duration, 0.16 * scene.rate_hz
+        slowest, fastest = 2.0 / duration, min(_FASTEST_HZ, 0.16 * scene.rate_hz)
         count = min(60, int((fastest - slowest) * duration))
         regular = np.linspace(slowest, fastest, count)
         paces = tuple(float(f) for f in (*regular, *_lines_hz(scene, target, slowest, fastest)))

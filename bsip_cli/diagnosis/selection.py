@@ -43,8 +43,11 @@ class Tried:
     @property
     def is_good(self) -> bool:
         """Rarer by chance than ALPHA, better on what it has not seen, and not what is left over of
-        a larger cause."""
-        return self.p_value <= ALPHA and self.gain.is_real() and not self.is_leftover
+        a larger cause. What has no name must be better for sure."""
+        if self.p_value > ALPHA or self.is_leftover:
+            return False
+        unnamed = self.explanation.effect.name == UNEXPLAINED
+        return self.gain.is_sure() if unnamed else self.gain.is_real()
 
 
 @dataclass(frozen=True)

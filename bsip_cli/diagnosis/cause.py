@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsip_cli.effects.effect import Effect
-from bsip_cli.effects.joint_change import joint_change
+from bsip_cli.effects.joint_change import Sized, joint_change, joint_delay_s
 from bsip_cli.effects.scene import Scene
 
 
@@ -32,7 +32,16 @@ class Cause:
 
 def change_by(causes: Sequence[Cause], scene: Scene) -> np.ndarray:
     """(N, 6) what causes add to the simulated wrench, about the world's origin [N, N m]."""
-    return joint_change(scene, [(c.effect, c.target, c.values) for c in causes])
+    return joint_change(scene, _sized(causes))
+
+
+def delay_by(causes: Sequence[Cause], scene: Scene) -> np.ndarray:
+    """(N,) how late causes make the forces of each frame [s]."""
+    return joint_delay_s(scene, _sized(causes))
+
+
+def _sized(causes: Sequence[Cause]) -> list[Sized]:
+    return [(c.effect, c.target, c.values) for c in causes]
 
 
 def unseen_change_by(causes: Sequence[Cause], scene: Scene, fold: np.ndarray) -> np.ndarray:

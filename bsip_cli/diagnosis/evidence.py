@@ -19,7 +19,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.ndimage import median_filter
 
 from bsip_cli.dynamics.lowpass import lowpass_operator
-from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.scene import Scene, standing_place_m
 from bsip_cli.identification.equations import ResidualSeries
 from bsip_cli.identification.noise import noise_of
 
@@ -56,8 +56,8 @@ def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
     operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz, stride)
     cuts = np.flatnonzero(np.diff(frames) != stride) + 1
     edges = [0, *cuts.tolist(), len(frames)]
-    place = np.append(scene.q[scene.valid, :2].mean(axis=0), 0.0)
-    return Filter(operator, frames, tuple(pairwise(edges)), place, scene.rate_hz / stride)
+    place, rate_hz = standing_place_m(scene), scene.rate_hz / stride
+    return Filter(operator, frames, tuple(pairwise(edges)), place, rate_hz)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ from bsip_cli.diagnosis.selection import ALPHA, Round, Selection, Tried
 from bsip_cli.diagnosis.together import Evidence
 
 Verdict = Literal["named", "ambiguous", "rejected"]
-_Z95 = 1.959964
 
 
 @dataclass(frozen=True)
@@ -135,8 +134,7 @@ def _rejected(evidence: Evidence, tried: Tried) -> Finding:
 
 
 def _with(evidence, tried: Tried, verdict: Verdict, class_id: str, numbers, sentence) -> Finding:
-    one, gain = tried.explanation, tried.gain
-    half = _Z95 * gain.error_percent
+    one = tried.explanation
     trials = tuple(evidence.trials[t].name for t in one.place.trials)
     return Finding(
         one.effect.name,
@@ -145,7 +143,7 @@ def _with(evidence, tried: Tried, verdict: Verdict, class_id: str, numbers, sent
         verdict,
         class_id,
         tried.p_value,
-        (gain.percent, gain.percent - half, gain.percent + half),
+        tried.gain.interval(),
         numbers,
         sentence,
     )

@@ -11,7 +11,7 @@ from bsip_cli.diagnosis.together import Evidence
 
 BLOCK_S = 1.0
 FOLDS = 5
-_Z95 = 1.959964
+Z95 = 1.959964  # of the normal distribution
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,12 @@ class Gain:
 
     def is_sure(self) -> bool:
         """Its 95 % interval lies above zero."""
-        return self.percent > _Z95 * self.error_percent
+        return self.interval()[1] > 0
+
+    def interval(self) -> tuple[float, float, float]:
+        """Percent, and its 95 % interval."""
+        half = Z95 * self.error_percent
+        return self.percent, self.percent - half, self.percent + half
 
 
 def standard_error(blocks: np.ndarray) -> float:

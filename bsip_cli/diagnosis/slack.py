@@ -10,7 +10,7 @@ from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.gravity_tilt import GravityTilt
-from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.scene import Scene, standing_place_m
 
 SHARE = 0.02  # of the size that labs meet
 HORIZONTAL = 0.7  # the same for the gain of horizontal forces
@@ -35,9 +35,9 @@ def _blurred(scene: Scene) -> np.ndarray:
 
     Without it two opposite delays, or a delay and a clock, make up for what the motion lacks.
     """
-    place = np.append(scene.q[scene.valid, :2].mean(axis=0), 0.0)
+    place = standing_place_m(scene)
     course = scene.predicted.copy()
-    course[:, 3:] -= np.cross(place, course[:, :3])  # where the person stands moments are small
+    course[:, 3:] -= np.cross(place, course[:, :3])
     bent = np.gradient(np.gradient(course, axis=0), axis=0) * scene.rate_hz**2
     columns = 0.5 * BLUR_S**2 * bent[..., None] * np.eye(6)
     columns[:, 3:] += np.cross(place, columns[:, :3], axisb=1, axisc=1)

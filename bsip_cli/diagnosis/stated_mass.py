@@ -11,6 +11,7 @@ from scipy.stats import norm
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.findings import Finding, Number
+from bsip_cli.diagnosis.held_out import Z95
 from bsip_cli.diagnosis.scale_mass import NOTICED, TRUSTED
 from bsip_cli.effects.added_mass import AddedMass
 from bsip_cli.effects.plate_gain import PlateGain
@@ -23,13 +24,6 @@ REMEDY = (
 )
 LOADED = 0.05  # of body weight: a plate that carries less is not stood upon
 _UNKNOWN = (np.nan, np.nan, np.nan)
-_Z95 = 1.959964
-
-
-def standing_share(scene: Scene) -> float:
-    """Mean vertical force beyond the simulated one, part of body weight."""
-    apart = (scene.measured - scene.predicted)[scene.valid, 2]
-    return float(apart.mean()) / (scene.mass_kg * GRAVITY_M_S2)
 
 
 def loaded_channel(scene: Scene) -> str:
@@ -45,7 +39,7 @@ def stated_mass_findings(
 ) -> tuple[Finding, ...]:
     """The class of causes if the plates differ from the stated mass by more than NOTICED.
 
-    share : of the stated mass, from ``standing_share``. channel : from ``loaded_channel``.
+    share : of the stated mass, from ``weight_share``. channel : from ``loaded_channel``.
     trial : the name of the recording.
     """
     if abs(share) < NOTICED:
@@ -74,7 +68,7 @@ def stated_mass_findings(
             CLASS,
             p_value,
             _UNKNOWN,
-            (Number(name, unit, x, x - _Z95 * sd, x + _Z95 * sd),),
+            (Number(name, unit, x, x - Z95 * sd, x + Z95 * sd),),
             f"{told}: {why}, or the stated mass is wrong; to tell them apart, {REMEDY}",
         )
         for effect, name, unit, x, sd, why in causes

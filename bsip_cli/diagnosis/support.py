@@ -18,7 +18,7 @@ from scipy.stats import chi2
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.names import in_words
 from bsip_cli.diagnosis.findings import Finding, Number
-from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, Gain
+from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, Z95, Gain
 from bsip_cli.effects.scene import Scene
 from bsip_cli.effects.unmeasured_contact import UnmeasuredContact
 from bsip_cli.statistics.effective_samples import effective_samples
@@ -29,7 +29,6 @@ STILLER = 3.0  # times that the trunk moves further than such a hand
 UNBALANCED = 0.01  # of body weight: missing mean horizontal force
 LIGHTER = 0.02  # of body weight: missing mean vertical force
 SURE = 4.0  # standard errors
-_Z95 = 1.959964
 
 
 @dataclass(frozen=True)
@@ -54,8 +53,6 @@ class Support:
     def finding(self, trial: str) -> Finding:
         """As the diagnosis prints it."""
         p_value = float(chi2.sf(((self.force_N / self.error_N) ** 2).sum(), 3))
-        half = _Z95 * self.gain.error_percent
-        percent = self.gain.percent
         return Finding(
             UnmeasuredContact.name,
             "+".join(self.hands),
@@ -63,7 +60,7 @@ class Support:
             "named",
             "",
             p_value,
-            (percent, percent - half, percent + half),
+            self.gain.interval(),
             self._numbers(),
             self._sentence(),
         )
@@ -77,7 +74,7 @@ class Support:
         times = (("start", self.start_s), ("end", self.end_s))
         return (
             *(Number(name, "s", at, at, at) for name, at in times),
-            *(Number(name, "N", x, x - _Z95 * e, x + _Z95 * e) for name, x, e in rows),
+            *(Number(name, "N", x, x - Z95 * e, x + Z95 * e) for name, x, e in rows),
         )
 
     def _sentence(self) -> str:

@@ -21,12 +21,14 @@ def joint_change(scene: Scene, effects: Iterable[Sized]) -> np.ndarray:
     would sharpen the forces, and so make up for what a smoothed motion lacks. And what the plates
     do wrong comes as late as their forces do.
     """
+    effects = tuple(effects)
+    late_s = joint_delay_s(scene, effects)
     of_the_plates = np.zeros((len(scene.times_s), 6))
-    others, late_s = of_the_plates.copy(), np.zeros(len(scene.times_s))
+    others = of_the_plates.copy()
     for effect, target, values in effects:
         if isinstance(effect, Delay):
-            late_s += effect.late_s(scene, values)
-        elif effect.of_the_plates:
+            continue
+        if effect.of_the_plates:
             of_the_plates += effect.change(scene, target, values)
         else:
             others += effect.change(scene, target, values)
@@ -35,3 +37,12 @@ def joint_change(scene: Scene, effects: Iterable[Sized]) -> np.ndarray:
     if of_the_plates.any():
         of_the_plates = CubicSpline(scene.times_s, of_the_plates)(right_times_s(scene, late_s))
     return of_the_plates + others + put_right(scene, late_s)
+
+
+def joint_delay_s(scene: Scene, effects: Iterable[Sized]) -> np.ndarray:
+    """(N,) how late the forces of each frame were recorded, by all delays among the effects [s]."""
+    late_s = np.zeros(len(scene.times_s))
+    for effect, _, values in effects:
+        if isinstance(effect, Delay):
+            late_s += effect.late_s(scene, values)
+    return late_s

@@ -16,14 +16,10 @@ from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, values_without
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.patterns import PATTERNS
-from bsip_cli.diagnosis.scale_mass import weight_round
+from bsip_cli.diagnosis.scale_mass import weight_round, weight_share
 from bsip_cli.diagnosis.selection import Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
-from bsip_cli.diagnosis.stated_mass import (
-    loaded_channel,
-    standing_share,
-    stated_mass_findings,
-)
+from bsip_cli.diagnosis.stated_mass import loaded_channel, stated_mass_findings
 from bsip_cli.diagnosis.support import support_of
 from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.catalogue import CATALOGUE
@@ -44,9 +40,7 @@ def run(unit: Unit) -> None:
     """Read motion, wrench, person and RM of all trials; write what is wrong, with its evidence."""
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    assert unit.participant is not None
-    stated = unit.participant.mass_kg is not None
-    prior = _prior(unit, person, stated)
+    prior = _prior(unit, person)
     moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
     looked_at = [_looked_at(unit, person, prior, trial) for trial in moving]
     trials = tuple(one for one in looked_at if isinstance(one, TrialEvidence))
@@ -90,10 +84,10 @@ def _write(unit: Unit, diagnosis: pd.DataFrame, limits: pd.DataFrame, facts: dic
             unit.warn(f"{unit.name}: {sentence}")
 
 
-def _prior(unit: Unit, person: Person, stated: bool) -> Prior:
+def _prior(unit: Unit, person: Person) -> Prior:
     """Of the parameters; the plates' gain shows against a mass that a scale has told."""
     known = {"total_mass_sd_percent": unit.config.diagnosis.stated_mass_sd_percent}
-    return prior_from(unit, unit.read("regression"), person, **(known if stated else {}))
+    return prior_from(unit, unit.read("regression"), person, **(known if _is_weighed(unit) else {}))
 
 
 def _looked_at(
@@ -117,21 +111,27 @@ def _looked_at(
 
 def _only_motion_weighs(unit: Unit) -> bool:
     """Whether the stated mass can be compared with moving trials only."""
+    return _is_weighed(unit) and not _static(unit)
+
+
+def _is_weighed(unit: Unit) -> bool:
     assert unit.participant is not None
-    static = [t for t in unit.trials("kinematics", "wrench") if t.role == "static"]
-    return unit.participant.mass_kg is not None and not static
+    return unit.participant.mass_kg is not None
+
+
+def _static(unit: Unit) -> list[Trial]:
+    return [t for t in unit.trials("kinematics", "wrench") if t.role == "static"]
 
 
 def _standing(unit: Unit, person: Person, prior: Prior) -> tuple[Finding, ...]:
     """What the static trial says of the stated mass; nothing without such a trial or mass."""
-    assert unit.participant is not None
-    static = [t for t in unit.trials("kinematics", "wrench") if t.role == "static"]
-    if unit.participant.mass_kg is None or not static:
+    static = _static(unit)
+    if not _is_weighed(unit) or not static:
         return ()
     scene = scene_of(unit, person, prior.phi, static[0])
     if not scene.valid.any():
         return ()
-    share, channel = standing_share(scene), loaded_channel(scene)
+    share, channel = weight_share(scene), loaded_channel(scene)
     return stated_mass_findings(share, scene.mass_kg, channel, static[0].stem)
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from moving_scene import MASS_KG, standing_still
 
+from bsip_cli.diagnosis.scale_mass import weight_share
 from bsip_cli.diagnosis.stated_mass import (
     CLASS,
     loaded_channel,
-    standing_share,
     stated_mass_findings,
 )
 
@@ -20,7 +20,7 @@ from bsip_cli.diagnosis.stated_mass import (
 def test_plates_that_read_otherwise_make_a_class(share):
     scene = standing_still()
     scene = replace(scene, wrench=(1 + share) * scene.predicted)
-    found = stated_mass_findings(standing_share(scene), scene.mass_kg, "all fz", "standing")
+    found = stated_mass_findings(weight_share(scene), scene.mass_kg, "all fz", "standing")
     sizes = {one.effect: one.numbers[0].value for one in found}
     assert abs(sizes["plate_gain"] - share) < 1e-9
     assert abs(sizes["plate_zero"] - share * MASS_KG * 9.81) < 0.05
@@ -36,7 +36,7 @@ def test_plates_that_read_otherwise_make_a_class(share):
 def test_plates_that_agree_say_nothing():
     scene = standing_still()
     scene = replace(scene, wrench=1.01 * scene.predicted)
-    share = standing_share(scene)
+    share = weight_share(scene)
     assert stated_mass_findings(share, scene.mass_kg, "all fz", "standing") == ()
 
 

@@ -28,8 +28,9 @@ def drawn_explanations(
     # What the data do not decide, a moment in a gap for instance, is known to its typical size.
     covariance = np.linalg.inv(tangent.T @ tangent + np.eye(tangent.shape[1]))[mine, mine]
     one = fit.explanations[number]
-    scale = SCALE_ERROR * one.values / one.all_typical(evidence) * one.is_free(evidence)
-    covariance = covariance + np.diag(scale**2)
+    scale = SCALE_ERROR * one.values * one.is_free(evidence)
+    simple = np.array([p.known_to for p in one.parameters(evidence)])
+    covariance = covariance + np.diag((scale**2 + simple**2) / one.all_typical(evidence) ** 2)
     steps = _at_least(steps - np.median(steps, axis=0), covariance, rng)
     return [one.all_moved(evidence, step) for step in steps]
 

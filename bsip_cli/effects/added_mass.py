@@ -10,6 +10,7 @@ from bsip_cli.effects.scene import Scene
 
 REACH_M = 0.6
 LEAST_KG = 0.2  # less is what the segment itself may differ by
+MOMENT_KG_M = 0.02  # a few centimetres: the segment's own frame is known to no less
 
 
 class AddedMass(Effect):
@@ -31,7 +32,9 @@ class AddedMass(Effect):
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         most = 20.0
         moments = (
-            Parameter(f"moment_{axis}", "kg m", -REACH_M * most, REACH_M * most, 0.1)
+            Parameter(
+                f"moment_{axis}", "kg m", -REACH_M * most, REACH_M * most, 0.1, known_to=MOMENT_KG_M
+            )
             for axis in "xyz"
         )
         return (Parameter("mass", "kg", 0.0, most, 0.5), *moments)

@@ -27,6 +27,8 @@ class Parameter:
     typical : a size that labs meet: the unit of steps and the spread before the data.
     scan : values to try where the derivative at the null says nothing (a frequency, a moment in
         time); empty for a parameter that is zero where the effect is absent.
+    known_to : standard deviation that no recording betters, since the truth is less simple than
+        the effect's model: nobody leans on a rail along a ramp.
     """
 
     name: str
@@ -35,6 +37,7 @@ class Parameter:
     most: float
     typical: float
     scan: tuple[float, ...] = ()
+    known_to: float = 0.0
 
 
 class Effect(ABC):

@@ -68,9 +68,13 @@ class MarkerShift(Effect):
     def reported(
         self, scene: Scene, target: str, values: np.ndarray
     ) -> tuple[tuple[str, str, float], ...]:
-        """A slip before the trial counts from its first frame."""
-        shift = tuple((f"shift_{c}", "m", float(x)) for c, x in zip("xyz", values, strict=False))
-        return (*shift, ("from_time", "s", max(float(values[3]), float(scene.times_s[0]))))
+        """The slip's length and parts; one before the trial counts from its first frame."""
+        parts = tuple((f"shift_{c}", "m", float(x)) for c, x in zip("xyz", values, strict=False))
+        return (
+            ("shift", "m", float(np.linalg.norm(values[:3]))),
+            *parts,
+            ("from_time", "s", max(float(values[3]), float(scene.times_s[0]))),
+        )
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         since = f"from {values[3]:.1f} s on" if values[3] > 0 else "throughout"

@@ -8,6 +8,9 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.plate_frame import loaded_plates, plate_of
 from bsip_cli.effects.scene import Scene
 
+# Feet deform where they press, and the height shows only where forces point sideways.
+KNOWN_TO_M = (0.0003, 0.0003, 0.002)
+
 
 class PlateTranslation(Effect):
     """The plate truly lies at its stated place plus the shift: the measured moment lacks
@@ -22,7 +25,10 @@ class PlateTranslation(Effect):
         return loaded_plates(scene)
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        return tuple(Parameter(axis, "m", -0.3, 0.3, 0.02) for axis in "xyz")
+        return tuple(
+            Parameter(axis, "m", -0.3, 0.3, 0.02, known_to=known)
+            for axis, known in zip("xyz", KNOWN_TO_M, strict=True)
+        )
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         force = np.nan_to_num(plate_of(scene, target).wrench[:, :3])

@@ -8,6 +8,8 @@ from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.effect import Parameter
 from bsip_cli.effects.scene import Scene
 
+KNOWN_TO_S = 0.0002  # filters of plates and cameras delay a little too
+
 
 class SyncOffset(Delay):
     name = "sync_offset"
@@ -15,7 +17,7 @@ class SyncOffset(Delay):
     remedy = "hop three times in view of cameras and plates"
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        return (Parameter("delay", "s", -0.5, 0.5, 0.01),)
+        return (Parameter("delay", "s", -0.5, 0.5, 0.01, known_to=KNOWN_TO_S),)
 
     def late_s(self, scene: Scene, values: np.ndarray) -> np.ndarray:
         return np.full(len(scene.times_s), values[0])

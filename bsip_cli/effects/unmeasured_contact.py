@@ -13,6 +13,7 @@ from bsip_cli.effects.scene import Scene
 WINDOWS_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 SHORTEST_S = 0.7
 RAMP_S = 0.3  # in which a person leans on something, or lets go
+EDGE_S = 0.05  # to which it is known when that begins and ends: nobody does it along a ramp
 MOST_WINDOWS = 30  # side by side; shorter contacts are found in part of a window, and refined
 
 
@@ -35,8 +36,8 @@ class UnmeasuredContact(Effect):
         middles = tuple(float(t) for t in np.arange(start, end, min(lengths) / 2))
         return (
             *(Parameter(f"force_{axis}", "N", -800.0, 800.0, 40.0) for axis in "xyz"),
-            Parameter("middle", "s", start, end, 0.25, middles),
-            Parameter("length", "s", 0.2, end - start, 0.5, lengths),
+            Parameter("middle", "s", start, end, 0.25, middles, known_to=EDGE_S / np.sqrt(2)),
+            Parameter("length", "s", 0.2, end - start, 0.5, lengths, known_to=EDGE_S * np.sqrt(2)),
         )
 
     def scans(self, scene: Scene, target: str) -> Iterator[tuple[float, ...]]:

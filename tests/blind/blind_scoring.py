@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 from blind_cases import NOTHING, SESSION
 from blind_running import Recorded
@@ -271,7 +270,7 @@ def _estimates(answer: Answer, sought: Expected) -> list[Estimate]:
         (answer.rows["effect"] == sought.effect) & (answer.rows["verdict"] != "rejected")
     ]
     rows = rows[[sought.same_target(target) for target in rows["target"]]]
-    rows = pd.concat([rows, _derived(rows)]).drop_duplicates("parameter").set_index("parameter")
+    rows = rows.drop_duplicates("parameter").set_index("parameter")
     values = sought.of_the_session() if answer.source == PERSON else sought.values
     return [
         Estimate(name, str(row.unit), truth, *map(float, (row.estimate, row.ci_low, row.ci_high)))
@@ -279,17 +278,6 @@ def _estimates(answer: Answer, sought: Expected) -> list[Estimate]:
         if name in rows.index
         for row in [rows.loc[name]]
     ]
-
-
-def _derived(rows: pd.DataFrame) -> pd.DataFrame:
-    """A shift's length, where its parts are printed."""
-    parts = rows[rows["parameter"].isin([f"shift_{axis}" for axis in "xyz"])]
-    if len(parts) != 3:
-        return parts.iloc[:0]
-    one = parts.iloc[:1].copy()
-    one["parameter"], one["estimate"] = "shift", float(np.linalg.norm(parts["estimate"]))
-    one[["ci_low", "ci_high"]] = np.nan
-    return one
 
 
 def _gain(answer: Answer | None, effect: str) -> float | None:

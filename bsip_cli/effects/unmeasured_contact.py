@@ -10,7 +10,7 @@ from bsip_cli.body.names import in_words
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
-WINDOWS_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
+WINDOWS_S = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0, 64.0)
 SHORTEST_S = 0.7
 RAMP_S = 0.3  # in which a person leans on something, or lets go
 EDGE_S = 0.05  # to which it is known when that begins and ends: nobody does it along a ramp

@@ -42,12 +42,9 @@ class Tried:
 
     @property
     def is_good(self) -> bool:
-        """Rarer by chance than ALPHA, better on what it has not seen, and not what is left over of
-        a larger cause. What has no name must be better for sure."""
-        if self.p_value > ALPHA or self.is_leftover:
-            return False
-        unnamed = self.explanation.effect.name == UNEXPLAINED
-        return self.gain.is_sure() if unnamed else self.gain.is_real()
+        """Rarer by chance than ALPHA, better for sure on what it has not seen, and not what is
+        left over of a larger cause."""
+        return self.p_value <= ALPHA and self.gain.is_sure() and not self.is_leftover
 
 
 @dataclass(frozen=True)

@@ -76,8 +76,7 @@ def select(
     while open_trials := _open_trials(signatures.evidence, found):
         before = fit_together(signatures.evidence, found)
         signatures, before = with_likely_noise(signatures, before)
-        tried = _tried(signatures, before, open_trials)
-        one = _round(signatures, before, tried, rng)
+        one = _round(signatures, before, open_trials, rng)
         rounds.append(one)
         if one.kept is None:
             break
@@ -93,6 +92,22 @@ def _open_trials(evidence: Evidence, found: tuple[Explanation, ...]) -> set[int]
     causes = Counter(t for one in found for t in one.place.trials)
     unknown = {t for one in found if one.effect.name == UNEXPLAINED for t in one.place.trials}
     return {t for t in range(len(evidence.trials)) if causes[t] < MOST} - unknown
+
+
+def _round(
+    signatures: Signatures, before: Fit, open_trials: set[int], rng: np.random.Generator
+) -> Round:
+    """Where the best is no cause, though chance hardly brings it, the other trials are asked."""
+    evidence = signatures.evidence
+    tried = _tried(signatures, before, open_trials)
+    chance = _chance(signatures, max(tried, key=lambda t: t[2])[1] if tried else before, rng)
+    judged = [_judged(evidence, before, *one, chance) for one in tried]
+    while _kept(judged, before) is None and (in_vain := _in_vain(judged) & open_trials):
+        open_trials = open_trials - in_vain
+        more = _tried(signatures, before, open_trials)
+        judged += [_judged(evidence, before, *one, chance) for one in more]
+    judged.sort(key=lambda t: -t.score)
+    return Round(evidence, tuple(judged), _kept(judged, before), chance)
 
 
 def _tried(
@@ -111,20 +126,18 @@ def _tried(
     return tried
 
 
-def _round(
-    signatures: Signatures,
-    before: Fit,
-    tried: list[tuple[Explanation, Fit, float]],
-    rng: np.random.Generator,
-) -> Round:
-    best = max(tried, key=lambda t: t[2])[1] if tried else before
+def _chance(signatures: Signatures, best: Fit, rng: np.random.Generator) -> Chance:
+    """What chance makes of what remains beside the best candidate, and all that is likely."""
     known = np.column_stack([best.tangent, likely_columns(signatures, best)])
     left = best.residual - known @ np.linalg.lstsq(known, best.residual, rcond=None)[0]
     scores, _ = signatures.scores(flipped(signatures.evidence, left, rng), known)
-    chance = chance_of(scores, signatures.places)
-    judged = [_judged(signatures.evidence, before, *one, chance) for one in tried]
-    judged.sort(key=lambda t: -t.score)
-    return Round(signatures.evidence, tuple(judged), _kept(judged, before), chance)
+    return chance_of(scores, signatures.places)
+
+
+def _in_vain(judged: list[Tried]) -> set[int]:
+    """Trials, each alone, of what chance hardly ever brings and yet is no cause."""
+    rare = [one.explanation.place.trials for one in judged if one.p_value <= ALPHA]
+    return {t for trials in rare if len(trials) == 1 for t in trials}
 
 
 def _kept(judged: list[Tried], before: Fit) -> Tried | None:

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
 
+from bsip_cli.diagnosis import selection
 from bsip_cli.diagnosis.detection import Limit, limits_of
 from bsip_cli.diagnosis.explanation import NEGLIGIBLE
 from bsip_cli.diagnosis.findings import Finding, findings_of
+from bsip_cli.diagnosis.held_out import gain_of
 from bsip_cli.diagnosis.patterns import PATTERNS
-from bsip_cli.diagnosis.selection import Selection, select
+from bsip_cli.diagnosis.selection import ALPHA, Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
@@ -129,6 +131,23 @@ def test_a_fault_of_one_trial_is_not_put_on_the_other():
     spoilt = noisy(with_effect(second, zero, "2 fx", OFFSET_N), 8)
     (one,) = said_of(selection_of(noisy(first, 7), spoilt))
     assert (one.effect, one.target, one.trials) == ("plate_zero", "2 fx", ("b",))
+
+
+def test_what_turns_out_to_be_no_cause_does_not_hide_another_trial(monkeypatch):
+    """The delay, which makes far higher scores, is let pay off nowhere: the offset is found."""
+
+    def gain_but_in_b(evidence, trials, *others):
+        gain = gain_of(evidence, trials, *others)
+        return replace(gain, blocks=-gain.blocks) if 1 in trials else gain
+
+    monkeypatch.setattr(selection, "gain_of", gain_but_in_b)
+    offset = with_effect(part_of_moving(0, 8), EFFECTS["plate_zero"], "1 fx", OFFSET_N)
+    delay = late(part_of_moving(8, 8), DELAY_S)
+    chosen = selection_of(noisy(offset, 0), noisy(delay, 1))
+    first = chosen.rounds[0]
+    assert first.tried[0].explanation.place.trials == (1,) and first.tried[0].p_value <= ALPHA
+    assert first.kept.score < selection.WORTH_A_TRY * first.tried[0].score
+    assert [(one.effect, one.trials) for one in said_of(chosen)] == [("plate_zero", ("a",))]
 
 
 @pytest.mark.parametrize("hertz", [3.0, 5.0])

@@ -36,6 +36,10 @@ class Gain:
     def error_percent(self) -> float:
         return 100 * standard_error(self.blocks[self.concerned]) / self.before
 
+    def is_real(self) -> bool:
+        """Larger than its standard error."""
+        return self.percent > self.error_percent
+
     def is_sure(self) -> bool:
         """Its 95 % interval lies above zero."""
         return self.interval()[1] > 0

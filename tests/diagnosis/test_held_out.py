@@ -37,7 +37,7 @@ def test_a_real_cause_gains_in_its_trial():
     gain = gain_of(evidence(), (0,), before.residual, fit().residual, fit().tangent)
     rows = evidence().rows(0)
     apparent = 1 - (fit().residual[rows] ** 2).sum() / (before.residual[rows] ** 2).sum()
-    assert gain.is_sure()
+    assert gain.is_real()
     assert gain.percent > 20
     assert gain.percent == pytest.approx(100 * apparent, abs=1.0)
     assert 0 < gain.error_percent < gain.percent
@@ -59,7 +59,7 @@ def test_chance_courses_lose():
         apparent.append(100 * (1 - (after**2).sum() / (before**2).sum()))
     assert min(apparent) > 0
     assert np.mean([gain.percent for gain in gains]) < 0
-    assert np.mean([gain.is_sure() for gain in gains]) < 0.15
+    assert np.mean([gain.is_real() for gain in gains]) < 0.15
 
 
 def test_each_fold_has_values_of_its_own():
@@ -84,4 +84,4 @@ def test_a_cause_of_the_first_trial_does_not_help_the_second():
     left = evidence().residual - everywhere.change(evidence())
     wrong = Fit((everywhere,), left, everywhere.tangent(evidence()))
     gain = gain_of(evidence(), (1,), before.residual, wrong.residual, wrong.tangent)
-    assert gain.percent < 0 and not gain.is_sure()
+    assert gain.percent < 0 and not gain.is_real()

@@ -9,6 +9,7 @@ from bsip_cli.diagnosis.together import Evidence
 
 DRAWS = 200
 BLOCK_S = 1.0
+DIFFERENCE = 1e-3  # of the typical size
 SCALE_ERROR = 0.025  # of every size: the simulated motion is neither free of noise nor unsmoothed
 
 
@@ -20,19 +21,57 @@ def drawn_explanations(
     Stretches of time are drawn with replacement and everything is fitted anew; to that is added
     what the nuisances leave open, which is the same in every stretch.
     """
-    tangent = np.concatenate([one.full_tangent(evidence) for one in fit.explanations], axis=1)
-    widths = [len(one.values) for one in fit.explanations]
-    ends = np.cumsum([0, *widths])
-    mine = slice(int(ends[number]), int(ends[number + 1]))
+    tangent, mine = _tangent(evidence, fit), _columns(fit, number)
     steps = _bootstrap(evidence, fit.residual, tangent, rng)[:, mine]
-    # What the data do not decide, a moment in a gap for instance, is known to its typical size.
-    covariance = np.linalg.inv(tangent.T @ tangent + np.eye(tangent.shape[1]))[mine, mine]
+    covariance = _covariance(tangent)[mine, mine]
     one = fit.explanations[number]
     scale = SCALE_ERROR * one.values * one.is_free(evidence)
     simple = np.array([p.known_to for p in one.parameters(evidence)])
     covariance = covariance + np.diag((scale**2 + simple**2) / one.all_typical(evidence) ** 2)
     steps = _at_least(steps - np.median(steps, axis=0), covariance, rng)
     return [one.all_moved(evidence, step) for step in steps]
+
+
+def bounds(evidence: Evidence, fit: Fit, number: int) -> dict[str, float]:
+    """Standard deviation that no unbiased estimate betters, of all that an explanation reports.
+
+    The bound of Cramer and Rao in these recordings, their noise taken as known.
+    """
+    mine = _columns(fit, number)
+    covariance = _covariance(_tangent(evidence, fit))[mine, mine]
+    one = fit.explanations[number]
+    slope = np.stack(
+        [_reported(evidence, one, step) for step in DIFFERENCE * np.eye(len(one.values))], axis=1
+    )
+    spread = np.sqrt(np.einsum("ij,jk,ik->i", slope, covariance, slope))
+    names = [name for name, *_ in one.reported(evidence)]
+    return dict(zip(names, spread.tolist(), strict=True))
+
+
+def _reported(evidence: Evidence, one: Explanation, step: np.ndarray) -> np.ndarray:
+    """(r,) derivative of the reported numbers along a small step of all parameters [typical]."""
+    ahead, behind = (
+        np.array([x for *_, x in one.all_moved(evidence, sign * step).reported(evidence)])
+        for sign in (1, -1)
+    )
+    return (ahead - behind) / (2 * np.abs(step).sum())
+
+
+def _tangent(evidence: Evidence, fit: Fit) -> np.ndarray:
+    """(R, K) of all parameters of all explanations."""
+    return np.concatenate([one.full_tangent(evidence) for one in fit.explanations], axis=1)
+
+
+def _columns(fit: Fit, number: int) -> slice:
+    """Which of them are an explanation's."""
+    ends = np.cumsum([0, *(len(one.values) for one in fit.explanations)])
+    return slice(int(ends[number]), int(ends[number + 1]))
+
+
+def _covariance(tangent: np.ndarray) -> np.ndarray:
+    """(K, K) of all parameters [typical]; what the data do not decide, a moment in a gap for
+    instance, is known to its typical size."""
+    return np.linalg.inv(tangent.T @ tangent + np.eye(tangent.shape[1]))
 
 
 def _bootstrap(

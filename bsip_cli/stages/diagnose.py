@@ -14,6 +14,7 @@ from bsip_cli.diagnosis.detection import limits_of
 from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, values_without
+from bsip_cli.diagnosis.intervals import bounds
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.diagnosis.scale_mass import weight_round, weight_share
@@ -141,7 +142,8 @@ def _trials_of(findings: tuple[Finding, ...]) -> list[str]:
 
 def _facts(selection: Selection, findings: tuple[Finding, ...]) -> dict:
     """How large a score had to be in each round, what was reached, and the causes in full: their
-    values from all data and from each fold's training blocks, for ``extend``."""
+    values from all data and from each fold's training blocks, for ``extend``, and the bound of
+    Cramer and Rao on what is reported."""
     evidence = selection.signatures.evidence
     rounds = [
         {"best": max((t.score for t in one.tried), default=0.0), "kept": one.kept is not None}
@@ -150,7 +152,7 @@ def _facts(selection: Selection, findings: tuple[Finding, ...]) -> dict:
     verdicts = {(one.effect, one.target, one.trials): one.verdict for one in findings}
     causes = []
     unseen = values_without(evidence, selection.fit)
-    for one, folds in zip(selection.fit.explanations, unseen, strict=True):
+    for number, (one, folds) in enumerate(zip(selection.fit.explanations, unseen, strict=True)):
         trials = tuple(evidence.trials[t].name for t in one.place.trials)
         if (one.effect.name, one.target, trials) not in verdicts:
             continue  # it became negligible or impossible beside later ones
@@ -162,6 +164,7 @@ def _facts(selection: Selection, findings: tuple[Finding, ...]) -> dict:
                 "verdict": verdicts[one.effect.name, one.target, trials],
                 "values": one.values.tolist(),
                 "folds": folds,
+                "bounds": bounds(evidence, selection.fit, number),
             }
         )
     blocks = {

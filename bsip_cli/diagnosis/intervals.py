@@ -35,7 +35,7 @@ def drawn_explanations(
 def bounds(evidence: Evidence, fit: Fit, number: int) -> dict[str, float]:
     """Standard deviation that no unbiased estimate betters, of all that an explanation reports.
 
-    The bound of Cramer and Rao in these recordings, their noise taken as known.
+    The bound of Cramér and Rao in these recordings, their noise taken as known.
     """
     mine = _columns(fit, number)
     covariance = _covariance(_tangent(evidence, fit))[mine, mine]

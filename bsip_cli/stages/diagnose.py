@@ -143,7 +143,7 @@ def _trials_of(findings: tuple[Finding, ...]) -> list[str]:
 def _facts(selection: Selection, findings: tuple[Finding, ...]) -> dict:
     """How large a score had to be in each round, what was reached, and the causes in full: their
     values from all data and from each fold's training blocks, for ``extend``, and the bound of
-    Cramer and Rao on what is reported."""
+    Cramér and Rao on what is reported."""
     evidence = selection.signatures.evidence
     rounds = [
         {"best": max((t.score for t in one.tried), default=0.0), "kept": one.kept is not None}

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import pandas as pd
+import pyarrow.parquet as pq
 from blind_cases import NOTHING, SESSION
 from blind_running import Recorded
 from blind_truth import Expected, Record, equivalents, expected
@@ -80,7 +82,10 @@ def answers_of(out: Path, recorded: Recorded) -> list[Answer]:
 
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter of a hidden effect as found. Interval NaN where none is stated."""
+    """One parameter of a hidden effect as found. Interval NaN where none is stated.
+
+    bound : the least standard deviation in that recording (Cramér and Rao), None where unknown.
+    """
 
     parameter: str
     unit: str
@@ -88,6 +93,7 @@ class Estimate:
     estimate: float
     ci_low: float
     ci_high: float
+    bound: float | None
 
 
 @dataclass(frozen=True)
@@ -198,7 +204,7 @@ def _score_of(
         target_right=bool(right) if found and aim.effect != UNEXPLAINED else None,
         targets=sorted(set().union(*(a.about(aim.effect) for a in found))),
         wrong=wrong,
-        estimates=_estimates(best, sought[best.source]) if best else [],
+        estimates=_estimates(out, recorded, best, sought[best.source]) if best else [],
         gain_percent=_gain(best, aim.effect),
         held_out_gain_percent=_held_out_gain(out, recorded, best),
     )
@@ -265,19 +271,39 @@ def _where(answer: Answer) -> str:
     return answer.source.partition("_")[2] or answer.source
 
 
-def _estimates(answer: Answer, sought: Expected) -> list[Estimate]:
+def _estimates(out: Path, recorded: Recorded, answer: Answer, sought: Expected) -> list[Estimate]:
     rows = answer.rows[
         (answer.rows["effect"] == sought.effect) & (answer.rows["verdict"] != "rejected")
     ]
     rows = rows[[sought.same_target(target) for target in rows["target"]]]
     rows = rows.drop_duplicates("parameter").set_index("parameter")
     values = sought.of_the_session() if answer.source == PERSON else sought.values
+    bounds = _bounds(out / recorded.participant, answer, sought)
     return [
-        Estimate(name, str(row.unit), truth, *map(float, (row.estimate, row.ci_low, row.ci_high)))
+        Estimate(
+            name,
+            str(row.unit),
+            truth,
+            *map(float, (row.estimate, row.ci_low, row.ci_high)),
+            bounds.get(name),
+        )
         for name, truth in values.items()
         if name in rows.index
         for row in [rows.loc[name]]
     ]
+
+
+def _bounds(folder: Path, answer: Answer, sought: Expected) -> dict[str, float]:
+    """Of the cause as kept, per parameter; nothing of a rival that was not kept itself."""
+    path = folder / f"{folder.name}_diagnosis.parquet"
+    if not path.is_file():
+        return {}
+    header = json.loads(pq.read_schema(path).metadata[b"bsip"])
+    for cause in header["provenance"]["facts"].get("causes", []):
+        there = answer.source == PERSON or answer.source in cause["trials"]
+        if there and cause["effect"] == sought.effect and sought.same_target(cause["target"]):
+            return cause["bounds"]
+    return {}
 
 
 def _gain(answer: Answer | None, effect: str) -> float | None:

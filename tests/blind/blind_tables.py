@@ -19,6 +19,7 @@ from blind_scoring import (
     WRONG_NAME,
     Estimate,
 )
+from scipy.stats import norm
 
 Z95 = 1.96
 HIDDEN_KINDS = ("single", "double", "outside")
@@ -168,10 +169,18 @@ def accuracy(estimates: pd.DataFrame) -> pd.DataFrame:
                 "bias": error.mean(),
                 "spread": error.std(ddof=1) if len(error) > 1 else np.nan,
                 "median error": error.abs().median(),
+                "errors / bound": _beside_bound(error, group["bound"]),
                 "95 % CI holds it": f"{inside.sum()} of {len(stated)}",
             }
         )
     return pd.DataFrame(rows)
+
+
+def _beside_bound(error: pd.Series, bound: pd.Series) -> float:
+    """Median error, each in units of its own bound of Cramér and Rao, beside a normal one's."""
+    known = bound.astype(float) > 0
+    ratio = error[known].abs() / bound[known].astype(float)
+    return float(ratio.median() / norm.ppf(0.75)) if known.any() else np.nan
 
 
 def coverage(estimates: pd.DataFrame) -> str:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from blind_cases import SESSION, Case, Hidden
 from blind_running import Recorded
@@ -24,6 +28,7 @@ from blind_scoring import (
     score_of_clean_trial,
 )
 from blind_tables import (
+    accuracy,
     document,
     elsewhere,
     estimates_frame,
@@ -51,10 +56,13 @@ def row(effect: str, verdict: str = "named", **fields) -> dict:
     return {**numbers, **texts, "rank": 1, "effect": effect, "verdict": verdict, **fields}
 
 
-def diagnosis(folder: Path, stem: str, *rows: dict, kind: str = "diagnosis") -> None:
+def diagnosis(folder: Path, stem: str, *rows: dict, causes: Sequence[dict] = ()) -> None:
     place = folder / "sub-01"
     place.mkdir(parents=True, exist_ok=True)
-    pd.DataFrame(list(rows))[list(COLUMNS)].to_parquet(place / f"{stem}_{kind}.parquet")
+    table = pa.Table.from_pandas(pd.DataFrame(list(rows))[list(COLUMNS)])
+    header = json.dumps({"provenance": {"facts": {"causes": list(causes)}}})
+    written = table.replace_schema_metadata({**table.schema.metadata, "bsip": header})
+    pq.write_table(written, place / f"{stem}_diagnosis.parquet")
 
 
 def hidden(*records: dict, place: str = "squat", stems: tuple[str, ...] = (SQUAT,)) -> Recorded:
@@ -174,6 +182,22 @@ def test_a_session_is_found_by_the_person_or_by_any_trial(tmp_path):
     assert only(score(tmp_path, whole)).estimates[0].estimate == 0.0101
 
 
+def test_errors_are_told_in_units_of_the_bound_of_their_recording(tmp_path):
+    """That of the cause as kept, which stands with the person."""
+    causes = [
+        {"effect": name, "target": "", "trials": [SQUAT], "bounds": {"delay": bound}}
+        for name, bound in (("clock_drift", 1.0), ("sync_offset", 0.0005))
+    ]
+    diagnosis(tmp_path, "sub-01", row("none"), causes=causes)
+    diagnosis(tmp_path, SQUAT, row("sync_offset", parameter="delay", estimate=0.0101))
+    found = only(score(tmp_path, hidden(DELAY)))
+    assert found.estimates[0].bound == 0.0005
+    table = accuracy(estimates_frame(scores_frame([found.as_record()])))
+    assert table["errors / bound"][0] == pytest.approx(0.2 / 0.6745, rel=1e-3)
+    diagnosis(tmp_path, "sub-01", row("none"), causes=causes[:1])
+    assert only(score(tmp_path, hidden(DELAY))).estimates[0].bound is None
+
+
 def test_the_person_has_no_say_about_an_effect_of_one_trial(tmp_path):
     diagnosis(tmp_path, "sub-01", row("sync_offset"))
     diagnosis(tmp_path, SQUAT, row("none"))
@@ -289,7 +313,7 @@ def test_all_tables_of_a_mixed_bag(tmp_path):
     assert "Of 2 effects hidden alone 1 are found (0 of them as a class), 1 get a wrong" in text
     assert "0 of 2 stated 95 % intervals hold the truth (0.0%" in text
     assert "| sync_offset | 0.01 to 0.01 s | 1 of 1 | 1 of 1 |" in text
-    assert "| sync_offset | delay | s | 2 | 0.01 | 0.002 | 0 | 0.002 | 0 of 2 |" in text
+    assert "| sync_offset | delay | s | 2 | 0.01 | 0.002 | 0 | 0.002 |  | 0 of 2 |" in text
     assert "| one trial |" not in text and "100.0% (20.7% to 100.0%)" in text
     assert "| outside_elastic_tether | 1 |" in text
 

@@ -77,12 +77,15 @@ class Whitening:
 
     def of_filtered(self, wrenches: np.ndarray) -> np.ndarray:
         """(6 n, k) of wrenches (n, 6, k) that have passed the filter."""
-        kind = wrenches.dtype
-        columns = _innovations(
-            wrenches / self.spread[..., None].astype(kind), self.recursion.astype(kind), self.filter
-        )
+        columns, kind = self.innovations(wrenches), wrenches.dtype
         left, shrink = self.left.astype(kind), self.shrink.astype(kind)
         return columns - left @ (shrink[:, None] * (left.T @ columns))
+
+    def innovations(self, wrenches: np.ndarray) -> np.ndarray:
+        """(6 n, k) of filtered wrenches (n, 6, k): the noise alone is white, nuisances stay."""
+        kind = wrenches.dtype
+        spread, recursion = self.spread[..., None].astype(kind), self.recursion.astype(kind)
+        return _innovations(wrenches / spread, recursion, self.filter)
 
 
 @dataclass(frozen=True)

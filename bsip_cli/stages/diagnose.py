@@ -35,17 +35,15 @@ from bsip_cli.unit import Unit
 
 _SHORTEST_S = 2.0
 _ATTRIBUTED = "segment_inertia"  # not a cause beside the parameters: they are projected out
+ASKED = (*(effect for effect in CATALOGUE if effect.name != _ATTRIBUTED), *PATTERNS)
 
 
 def run(unit: Unit) -> None:
     """Read motion, wrench, person and RM of all trials; write what is wrong, with its evidence."""
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    prior = _prior(unit, person)
-    moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
-    looked_at = [_looked_at(unit, person, prior, trial) for trial in moving]
-    trials = tuple(one for one in looked_at if isinstance(one, TrialEvidence))
-    held = tuple(one for one in looked_at if isinstance(one, Finding))
+    prior = prior_of(unit, person)
+    trials, held = moving_trials(unit, person, prior)
     told = (*held, *_standing(unit, person, prior))
     if trials:
         _write(unit, *_asked(unit, trials, told))
@@ -65,9 +63,8 @@ def _asked(
     """Diagnosis, detection limits and facts, of the moving trials and of what is told already."""
     rng = np.random.default_rng(crc32(unit.name.encode()))
     evidence = together(trials)
-    effects = [effect for effect in CATALOGUE if effect.name != _ATTRIBUTED]
     first = weight_round(evidence) if _only_motion_weighs(unit) else None
-    selection = select(signatures_of(evidence, [*effects, *PATTERNS]), rng, first)
+    selection = select(signatures_of(evidence, ASKED), rng, first)
     findings = findings_of(selection, rng)
     facts = _facts(selection, findings)
     facts["trials"] += _trials_of(told)
@@ -85,7 +82,17 @@ def _write(unit: Unit, diagnosis: pd.DataFrame, limits: pd.DataFrame, facts: dic
             unit.warn(f"{unit.name}: {sentence}")
 
 
-def _prior(unit: Unit, person: Person) -> Prior:
+def moving_trials(
+    unit: Unit, person: Person, prior: Prior
+) -> tuple[tuple[TrialEvidence, ...], tuple[Finding, ...]]:
+    """The evidence of trials that move, and what the hands hold on to in others."""
+    moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
+    looked_at = [_looked_at(unit, person, prior, trial) for trial in moving]
+    trials = tuple(one for one in looked_at if isinstance(one, TrialEvidence))
+    return trials, tuple(one for one in looked_at if isinstance(one, Finding))
+
+
+def prior_of(unit: Unit, person: Person) -> Prior:
     """Of the parameters; the plates' gain shows against a mass that a scale has told."""
     known = {"total_mass_sd_percent": unit.config.diagnosis.stated_mass_sd_percent}
     return prior_from(unit, unit.read("regression"), person, **(known if _is_weighed(unit) else {}))

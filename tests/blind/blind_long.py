@@ -17,11 +17,11 @@ from blind_batch import Batch, run_batch
 from blind_cases import Case, Session, long_suite
 from blind_running import ROOT, STAGES, write_atomically
 from blind_scoring import Score
-from blind_tables import document, scores_frame
+from blind_tables import between_marks, document, scores_frame
 from tqdm import tqdm
 
 DOCUMENT = ROOT / "docs" / "blind_suite.md"
-BEGIN, END = "<!-- made by tests/blind/blind_long.py: begin -->", "<!-- end -->"
+MARK = "tests/blind/blind_long.py"
 BATCH = 8  # people of one study; an interruption loses at most their work
 
 
@@ -30,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sessions = long_suite(options.draws, options.nulls, options.others, options.seed)
     settings = {name: getattr(options, name) for name in ("draws", "nulls", "others", "seed")}
     keep_settings(options.results, settings)
-    stages = STAGES if options.without_extend else (*STAGES, "extend")
+    stages = STAGES if options.without_extend else (*STAGES, "reconstruct", "extend")
     if not options.only_tables:
         run_missing(sessions, options.results, stages, options.jobs, options.keep)
     write_tables(options.results, settings, options.document)
@@ -107,10 +107,7 @@ def write_tables(results: Path, settings: dict[str, int], target: Path) -> None:
     spent = sum(record["cpu_s_recording"] + record["cpu_s_stages"] for record in records)
     asked = ", ".join(f"{name} {value}" for name, value in settings.items())
     head = f"{len(records)} results ({asked}), {spent:.0f} CPU-s in all.\n\n"
-    before, rest = target.read_text(encoding="utf-8").split(BEGIN)
-    _, after = rest.split(END)
-    written = f"{before}{BEGIN}\n\n{head}{document(scores)}\n{END}{after}"
-    write_atomically(target, written.rstrip("\n"))
+    between_marks(target, MARK, head + document(scores))
 
 
 if __name__ == "__main__":

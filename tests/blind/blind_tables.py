@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from blind_cases import NOTHING
+from blind_running import write_atomically
 from blind_scoring import (
     FOUND,
     MISSED,
@@ -270,3 +272,12 @@ def document(scores: pd.DataFrame) -> str:
     ]
     written = [f"### {title}\n\n{markdown(table)}" for title, table in parts if len(table)]
     return "\n\n".join([lead, *written]) + "\n"
+
+
+def between_marks(target: Path, maker: str, text: str) -> None:
+    """Put what a script has made between its marks in a document."""
+    begin, end = f"<!-- made by {maker}: begin -->", f"<!-- made by {maker}: end -->"
+    before, rest = target.read_text(encoding="utf-8").split(begin)
+    _, after = rest.split(end)
+    written = f"{before}{begin}\n\n{text.strip()}\n\n{end}{after}"
+    write_atomically(target, written.rstrip("\n"))

@@ -19,6 +19,7 @@ from bsip_cli.statistics.chi_square import minus_log_p
 
 MOST = 3  # causes in one trial
 TRIES = 10  # candidates that are refitted in a round
+SHOWN = 5  # that are looked at even where nothing stands out
 WORTH_A_TRY = 0.5  # of the best score
 ALPHA = 0.01  # in every round; with the chance's own errors one null in twenty has an alarm
 BEYOND_DOUBT = 1e-6  # so rare by chance that a gain above its standard error is enough
@@ -104,28 +105,35 @@ def _round(
 ) -> Round:
     """Where the best is no cause, though chance hardly brings it, the other trials are asked."""
     evidence = signatures.evidence
-    tried = _tried(signatures, before, open_trials)
+    rough = _chance(signatures, before, rng)
+    tried = _tried(signatures, before, open_trials, rough)
     chance = _chance(signatures, max(tried, key=lambda t: t[2])[1] if tried else before, rng)
     judged = [_judged(evidence, before, *one, chance) for one in tried]
     while _kept(judged, before) is None and (in_vain := _in_vain(judged) & open_trials):
         open_trials = open_trials - in_vain
-        more = _tried(signatures, before, open_trials)
+        more = _tried(signatures, before, open_trials, rough)
         judged += [_judged(evidence, before, *one, chance) for one in more]
     judged.sort(key=lambda t: -t.score)
     return Round(evidence, tuple(judged), _kept(judged, before), chance)
 
 
 def _tried(
-    signatures: Signatures, before: Fit, open_trials: set[int]
+    signatures: Signatures, before: Fit, open_trials: set[int], rough: Chance
 ) -> list[tuple[Explanation, Fit, float]]:
-    """The best candidates, refitted in full: cause, fit with it, score."""
+    """The best candidates, refitted in full: cause, fit with it, score.
+
+    A few of them whatever they are; more only where chance may be left behind.
+    """
     scores, sizes = signatures.scores(before.residual[:, None], before.tangent)
     tried: list[tuple[Explanation, Fit, float]] = []
-    for k in _best_of_each(signatures, scores[:, 0], sizes, open_trials, before):
+    ranked = _best_of_each(signatures, scores[:, 0], sizes, open_trials, before)
+    for asked, k in enumerate(ranked):
+        place, score = signatures.places[k], scores[k, 0]
         best_yet = max((t[2] for t in tried), default=0.0)
-        if len(tried) >= TRIES or scores[k, 0] < WORTH_A_TRY * best_yet:
+        hopeless = score < WORTH_A_TRY * max(best_yet, rough.limit(place.trials, ALPHA))
+        if len(tried) >= TRIES or (hopeless and asked >= SHOWN):
             break
-        one = _refitted(signatures, before, signatures.places[k], sizes[k], open_trials)
+        one = _refitted(signatures, before, place, sizes[k], open_trials)
         if one is not None:
             tried.append(one)
     return tried

@@ -76,17 +76,15 @@ class SegmentMotion:
 def segment_motion(model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> SegmentMotion:
     """Forward kinematics of q (N, nq), v and a (N, nv)."""
     data, n = model.createData(), model.njoints - 1
-    rotation = np.empty((len(q), n, 3, 3))
-    vectors = np.empty((4, len(q), n, 3))
-    world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    rotation, position = np.empty((len(q), n, 3, 3)), np.empty((len(q), n, 3))
+    velocity, spatial = np.empty((2, len(q), n, 6))  # in the axes of the segment
     for k in range(len(q)):
         pin.forwardKinematics(model, data, q[k], v[k], a[k])
         for i in range(n):
-            velocity = pin.getVelocity(model, data, i + 1, world)
-            spatial = pin.getAcceleration(model, data, i + 1, world)
-            rotation[k, i] = data.oMi[i + 1].rotation
-            vectors[0, k, i] = data.oMi[i + 1].translation
-            vectors[1, k, i] = spatial.linear + np.cross(velocity.angular, velocity.linear)
-            vectors[2, k, i] = velocity.angular
-            vectors[3, k, i] = spatial.angular
-    return SegmentMotion(rotation, *vectors)
+            place = data.oMi[i + 1]
+            rotation[k, i], position[k, i] = place.rotation, place.translation
+            velocity[k, i], spatial[k, i] = data.v[i + 1].vector, data.a[i + 1].vector
+    turning = velocity[..., 3:]
+    acceleration = spatial[..., :3] + np.cross(turning, velocity[..., :3])
+    inside = np.stack([acceleration, turning, spatial[..., 3:]])
+    return SegmentMotion(rotation, position, *np.einsum("fnij,vfnj->vfni", rotation, inside))

@@ -105,11 +105,11 @@ def _looked_at(
     scene = scene_of(unit, person, prior.phi, trial)
     if scene.valid.sum() < _SHORTEST_S * scene.rate_hz:
         return None
-    held = support_of(scene)
+    fewer = slow(scene)
+    held = support_of(fewer)
     if held is not None:
         return held.finding(trial.stem)
     options = unit.config.diagnosis
-    fewer = slow(scene)
     rng = np.random.default_rng(crc32(trial.stem.encode()))
     own = own_nuisances(fewer, options.skin_factor, options.skin_draws, rng)
     shared = shared_nuisances(fewer, prior.root, options.marker_sd_m)

@@ -100,8 +100,7 @@ def _computed_lines_hz(scene: Scene, channel: str, slowest: float, fastest: floa
 
 
 class Curve(Pattern):
-    """Forces that are not in proportion: a part that grows with the square of the vertical one, as
-    far as that moves; what stays is an offset."""
+    """Forces that are not in proportion: a part that grows with the square of the vertical one."""
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
         return CHANNELS
@@ -112,14 +111,12 @@ class Curve(Pattern):
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         load = scene.predicted[:, 2] / (scene.mass_kg * GRAVITY_M_S2)
-        apart = load - load[scene.valid].mean()
-        bend = apart**2 - (apart[scene.valid] ** 2).mean()
-        return _in_channel(scene, target, values[0] * bend)
+        return _in_channel(scene, target, values[0] * load**2)
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
         return (
             f"a part of {OF_THE_LAB[target]} that grows with the square of the load "
-            f"({values[0]:+.1f} {unit_of(target)} at one body weight above the mean)"
+            f"({values[0]:+.1f} {unit_of(target)} at body weight)"
         )
 
 

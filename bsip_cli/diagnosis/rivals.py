@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.diagnosis.held_out import standard_error
+from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.diagnosis.selection import Round, Tried
 from bsip_cli.diagnosis.together import Evidence
 
@@ -12,7 +13,10 @@ ALIKE = 0.9  # part of a signature that another explains
 
 
 def rivals_of(one: Round) -> tuple[Tried, ...]:
-    """What explains the same as the kept cause, or pays off as well on data it has not seen."""
+    """What explains the same as the kept cause, or pays off as well on data it has not seen.
+
+    Only causes that have a name: another regularity would not say more.
+    """
     kept = one.kept
     if kept is None:
         return ()
@@ -20,7 +24,10 @@ def rivals_of(one: Round) -> tuple[Tried, ...]:
     others = (
         t
         for t in one.tried
-        if t is not kept and t.is_good and mine & set(t.explanation.place.trials)
+        if t is not kept
+        and t.is_good
+        and t.explanation.effect.name != UNEXPLAINED
+        and mine & set(t.explanation.place.trials)
     )
     return tuple(t for t in others if _is_rival(one.evidence, kept, t))
 

@@ -17,13 +17,12 @@ from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence
 
 FLIPS = 199
-BLOCK_S = 1.0
 _LEAST_SPREAD = 1.3  # of the logarithm of a p-value: what white noise has
 
 
 def flipped(evidence: Evidence, residual: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """(R, FLIPS) of a residual (R,)."""
-    blocks = evidence.blocks(BLOCK_S)
+    blocks = evidence.blocks()
     signs = rng.choice([-1.0, 1.0], size=(blocks.max() + 1, FLIPS))
     return residual[:, None] * signs[blocks]
 

@@ -9,7 +9,6 @@ import numpy as np
 from bsip_cli.diagnosis.explanation import Fit
 from bsip_cli.diagnosis.together import Evidence
 
-BLOCK_S = 1.0
 FOLDS = 5
 Z95 = 1.959964  # of the normal distribution
 
@@ -70,7 +69,7 @@ def gain_of(
     before, after : (R,) residual without the explanation, and with its likeliest sizes.
     tangent : (R, k) of everything that is estimated anew.
     """
-    blocks = evidence.blocks(BLOCK_S)
+    blocks = evidence.blocks()
     there = np.concatenate(
         [np.full(len(one.residual), t in trials) for t, one in enumerate(evidence.trials)]
     )
@@ -89,7 +88,7 @@ def gain_of(
 
 def values_without(evidence: Evidence, fit: Fit) -> list[list[list[float]]]:
     """Per explanation and fold, all its parameters as estimated without the fold's blocks."""
-    fold = evidence.blocks(BLOCK_S) % FOLDS
+    fold = evidence.blocks() % FOLDS
     kept: list[list[list[float]]] = [[] for _ in fit.explanations]
     for number in range(FOLDS):
         train = fold != number

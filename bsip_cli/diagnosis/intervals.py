@@ -8,7 +8,6 @@ from bsip_cli.diagnosis.explanation import Explanation, Fit
 from bsip_cli.diagnosis.together import Evidence
 
 DRAWS = 200
-BLOCK_S = 1.0
 DIFFERENCE = 1e-3  # of the typical size
 SCALE_ERROR = 0.025  # of every size: the simulated motion is neither free of noise nor unsmoothed
 
@@ -78,7 +77,7 @@ def _bootstrap(
     evidence: Evidence, residual: np.ndarray, tangent: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
     """(DRAWS, K) steps of all parameters [typical]."""
-    blocks = evidence.blocks(BLOCK_S)
+    blocks = evidence.blocks()
     numbers = np.unique(blocks)
     grams = np.stack([tangent[blocks == b].T @ tangent[blocks == b] for b in numbers])
     rights = np.stack([tangent[blocks == b].T @ residual[blocks == b] for b in numbers])

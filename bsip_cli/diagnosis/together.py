@@ -14,6 +14,7 @@ import numpy as np
 
 from bsip_cli.diagnosis.evidence import TrialEvidence
 
+BLOCK_S = 1.0  # stretches of time that stand for independent ones
 _CLIP = 4.0  # standard deviations: a contact's edge must not stand for a minute of movement
 _MATTERS = 1e-3  # by which a direction is shrunk, at least
 
@@ -59,16 +60,17 @@ class Evidence:
             terms.append(float(np.log1p(-whitening.shrink).sum() - np.log(whitening.spread).sum()))
         return sum(terms)
 
-    def first_block(self, trial: int, seconds: float) -> int:
+    def first_block(self, trial: int) -> int:
         """The number of a trial's first stretch in ``blocks``."""
-        return int(self.blocks(seconds)[self.rows(trial)].min())
+        return int(self.blocks()[self.rows(trial)].min())
 
-    def blocks(self, seconds: float) -> np.ndarray:
-        """(R,) number of the stretch of time that a row belongs to, counted through all trials."""
+    def blocks(self) -> np.ndarray:
+        """(R,) number of the stretch of BLOCK_S that a row belongs to, counted through all
+        trials."""
         numbers, first = [], 0
         for one in self.trials:
             at = one.rows_s()
-            number = ((at - at[0]) / seconds).astype(int)
+            number = ((at - at[0]) / BLOCK_S).astype(int)
             numbers.append(first + number)
             first += int(number.max()) + 1
         return np.concatenate(numbers)

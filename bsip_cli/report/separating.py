@@ -61,7 +61,13 @@ def separating_recording(rivals: Sequence[tuple[str, str]]) -> str:
     for pair in combinations(effects, 2):
         known = _APART.get(frozenset(pair))
         advice += [known] if known else [_own(effect) for effect in pair]
-    return "; ".join(dict.fromkeys(advice)) or _UNKNOWN
+    return "; ".join(_without_beginnings(advice)) or _UNKNOWN
+
+
+def _without_beginnings(advice: list[str]) -> list[str]:
+    """Each once, and none that another says with more words."""
+    each = list(dict.fromkeys(advice))
+    return [one for one in each if not any(o != one and o.startswith(one) for o in each)]
 
 
 def _count(effect: str, rivals: Sequence[tuple[str, str]]) -> int:

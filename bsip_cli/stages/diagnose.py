@@ -13,7 +13,7 @@ from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.detection import limits_of
 from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
 from bsip_cli.diagnosis.findings import Finding, findings_of
-from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, values_without
+from bsip_cli.diagnosis.held_out import FOLDS, values_without
 from bsip_cli.diagnosis.intervals import bounds
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.patterns import PATTERNS
@@ -22,7 +22,7 @@ from bsip_cli.diagnosis.selection import Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.diagnosis.stated_mass import loaded_channel, stated_mass_findings
 from bsip_cli.diagnosis.support import support_of
-from bsip_cli.diagnosis.together import together
+from bsip_cli.diagnosis.together import BLOCK_S, together
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.identification.prior import Prior
 from bsip_cli.report.verdict import verdict_of
@@ -176,7 +176,7 @@ def _facts(selection: Selection, findings: tuple[Finding, ...]) -> dict:
         )
     blocks = {
         one.name: {
-            "first": evidence.first_block(t, BLOCK_S),
+            "first": evidence.first_block(t),
             "start_s": float(one.rows_s()[0]),
         }
         for t, one in enumerate(evidence.trials)

@@ -75,7 +75,7 @@ def test_flips_turn_whole_stretches():
     turned = flipped(found.evidence, residual, np.random.default_rng(1))
     np.testing.assert_array_equal(np.abs(turned), np.abs(residual)[:, None] + 0 * turned)
     signs = np.sign(turned / residual[:, None])
-    blocks = found.evidence.blocks(1.0)
+    blocks = found.evidence.blocks()
     for block in (0, 7, blocks.max()):
         assert (np.ptp(signs[blocks == block], axis=0) == 0).all()
     assert 0.4 < (signs[blocks == 3][0] > 0).mean() < 0.6

@@ -41,7 +41,7 @@ def test_a_real_cause_gains_in_its_trial():
     assert gain.percent > 20
     assert gain.percent == pytest.approx(100 * apparent, abs=1.0)
     assert 0 < gain.error_percent < gain.percent
-    blocks = evidence().blocks(1.0)
+    blocks = evidence().blocks()
     assert gain.concerned.sum() == len(np.unique(blocks[rows]))
     assert not gain.blocks[~gain.concerned].any()
 
@@ -68,7 +68,7 @@ def test_each_fold_has_values_of_its_own():
     values = np.array(folds)[:, 0]
     assert len(values) == FOLDS == len(set(values))
     assert values == pytest.approx(np.full(FOLDS, DELAY_S), abs=5e-4)
-    fold = evidence().blocks(1.0) % FOLDS
+    fold = evidence().blocks() % FOLDS
     for number, value in enumerate(values):
         train = fold != number
         column, left = fit().tangent[train, 0], fit().residual[train]

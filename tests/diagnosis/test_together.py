@@ -32,12 +32,12 @@ def test_rows_follow_one_another():
 
 def test_blocks_are_counted_through_all_trials():
     evidence = trials()
-    blocks = evidence.blocks(1.0)
+    blocks = evidence.blocks()
     assert (np.diff(blocks) >= 0).all() and set(np.diff(blocks)) == {0, 1}
-    assert blocks[evidence.rows(0)].max() + 1 == evidence.first_block(1, 1.0)
+    assert blocks[evidence.rows(0)].max() + 1 == evidence.first_block(1)
     for t, one in enumerate(evidence.trials):
         at = one.rows_s()
-        assert blocks[evidence.rows(t)].max() - evidence.first_block(t, 1.0) == int(at[-1] - at[0])
+        assert blocks[evidence.rows(t)].max() - evidence.first_block(t) == int(at[-1] - at[0])
 
 
 def test_the_same_nuisance_in_both_trials_goes():

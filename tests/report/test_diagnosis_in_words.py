@@ -80,6 +80,8 @@ def test_what_tells_rivals_apart_depends_on_all_of_them():
     unknown = [("sync_offset", ""), ("over_smoothing", "")]
     both = f"{EFFECTS['sync_offset'].remedy}; {EFFECTS['over_smoothing'].remedy}"
     assert separating_recording(unknown) == both
+    steps = separating_recording([(f"plate_{x}", "1 fz") for x in ("gain", "zero", "drift")])
+    assert steps.count("step off the plate for five seconds") == 1
     assert "plates, cables" in separating_recording([("sync_offset", ""), (UNNAMED, "fx")])
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.body.rigid_motion import rigid_motion
+
 _LEAST_FRAMES = 20
 
 
@@ -77,16 +79,3 @@ def functional_joint(
         float(np.arccos(np.clip(cosine, -1.0, 1.0)).max()),
         float(np.sqrt((left**2).sum(axis=1).mean())),
     )
-
-
-def rigid_motion(reference: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rotations (N, 3, 3) and shifts (N, 3) that bring reference (k, 3) onto frames (N, k, 3).
-
-    Least squares (Kabsch).
-    """
-    a, b = reference.mean(axis=0), frames.mean(axis=1)
-    covariance = np.einsum("ki,nkj->nij", reference - a, frames - b[:, None])
-    u, _, vt = np.linalg.svd(covariance)
-    vt[:, 2] *= np.linalg.det(u @ vt)[:, None]
-    turn = np.einsum("nji,nkj->nik", vt, u)
-    return turn, b - turn @ a

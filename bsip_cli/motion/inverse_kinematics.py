@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.person import Person
+from bsip_cli.body.rigid_motion import rigid_motion
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion import kernel
 
@@ -223,7 +224,7 @@ def place_base(person: Person, markers_m: np.ndarray, q: np.ndarray) -> np.ndarr
     chosen = seen & (person.marker_segments == 0)
     if chosen.sum() < 3:
         chosen = seen
-    turn, shift = _rigid_fit(model[chosen], markers_m[chosen])
+    (turn,), (shift,) = rigid_motion(model[chosen], markers_m[chosen][None])
     placed = q.copy()
     placed[:3] = turn @ q[:3] + shift
     placed[3:7] = Rotation.from_matrix(turn @ R[0, 0]).as_quat()
@@ -246,12 +247,3 @@ def _markers(person: Person, R: np.ndarray, p: np.ndarray) -> np.ndarray:
     """(m, 3) world positions of the markers in one frame."""
     segments = person.marker_segments
     return p[segments] + np.einsum("mij,mj->mi", R[segments], person.markers_in_joint_m())
-
-
-def _rigid_fit(points: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation and shift that bring points to targets (Kabsch)."""
-    a, b = points.mean(axis=0), targets.mean(axis=0)
-    u, _, vt = np.linalg.svd((points - a).T @ (targets - b))
-    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T))])
-    turn = vt.T @ flip @ u.T
-    return turn, b - turn @ a

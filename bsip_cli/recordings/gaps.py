@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from bsip_cli.body.rigid_motion import rigid_motion
 from bsip_cli.recordings.analog import runs
 
 _LEAST_OTHERS = 3
@@ -99,18 +100,9 @@ def _is_rigid(cluster: np.ndarray) -> bool:
 
 
 def _carried(cluster: np.ndarray, anchor: int, position: np.ndarray) -> np.ndarray:
-    """The position at the anchor frame moved along with the cluster (n, k, 3), (n, 3).
-
-    Kabsch's rotation from the anchor frame to each frame.
-    """
-    centres = cluster.mean(axis=1)
-    local = cluster - centres[:, None]
-    covariance = np.einsum("ki,nkj->nij", local[anchor], local)
-    u, _, vt = np.linalg.svd(covariance)
-    mirror = np.linalg.det(u @ vt)
-    vt[:, 2] *= mirror[:, None]
-    rotation = np.einsum("nji,nkj->nik", vt, u)  # V U^T
-    return centres + rotation @ (position - centres[anchor])
+    """(n, 3) the position at the anchor frame moved along with the cluster (n, k, 3)."""
+    turn, shift = rigid_motion(cluster[anchor], cluster)
+    return turn @ position + shift
 
 
 def _by_spline(track: np.ndarray, measured: np.ndarray, start: int, stop: int) -> np.ndarray:

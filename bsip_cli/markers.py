@@ -71,14 +71,16 @@ def _compared(request: Request, recording: Recording, chosen: MarkerSet) -> bool
     there = {match.index[m.label]: m for m in chosen.markers if m.label in match.index}
     words = {k: _meaning(_bare(recording.labels[k]), marker) for k, marker in there.items()}
     _say([*_prefix(match), "", "labels:", *_label_rows(recording, words, "not in the set")])
-    skeleton = load_skeleton(load_config([]).skeleton)
+    config = load_config([])
+    skeleton = load_skeleton(config.skeleton)
     informed = skeleton.informed({marker.segment for marker in there.values()})
     unmarked = [s for s, known in zip(skeleton.segments, informed, strict=True) if not known]
-    _say(["", "segments:", *_segment_rows(chosen, match, skeleton, unmarked)])
+    held = {s for s in unmarked if without_side(s) in config.scale.may_be_held}
+    _say(["", "segments:", *_segment_rows(chosen, match, skeleton, unmarked, held)])
     needed = missing_landmarks({marker.landmark for marker in there.values()})
     if needed:
         _say(["", f"a skeleton cannot be built without: {', '.join(needed)}"])
-    return not needed and all(_may_be_held(segment) for segment in unmarked)
+    return not needed and held.issuperset(unmarked)
 
 
 def _say(lines: Sequence[str]) -> None:
@@ -158,12 +160,12 @@ def _place(segment: str, landmark: str) -> str:
     return f"{in_words(segment)}, {in_words(landmark) if landmark else 'tracks only'}"
 
 
-def _may_be_held(segment: str) -> bool:
-    return without_side(segment) in load_config([]).scale.may_be_held
-
-
 def _segment_rows(
-    marker_set: MarkerSet, match: LabelMatch, skeleton: Skeleton, unmarked: Collection[str]
+    marker_set: MarkerSet,
+    match: LabelMatch,
+    skeleton: Skeleton,
+    unmarked: Collection[str],
+    held: Collection[str],
 ) -> Iterator[str]:
     """A line per segment: how many of its markers are there, which are not, what that means."""
     width = max(len(in_words(segment)) for segment in skeleton.segments)
@@ -174,13 +176,11 @@ def _segment_rows(
         text = f"  {in_words(segment):<{width}}  {count:2d} markers"
         if gone:
             text += f"; missing: {', '.join(gone)}"
-        yield text + (_consequence(segment) if segment in unmarked else "")
-
-
-def _consequence(segment: str) -> str:
-    if _may_be_held(segment):
-        return "; its joint is held at the neutral pose, with the table's inertia"
-    return "; refused, unless scale.may_be_held in study.toml names it"
+        if segment in held:
+            text += "; its joint is held at the neutral pose, with the table's inertia"
+        elif segment in unmarked:
+            text += "; refused, unless scale.may_be_held in study.toml names it"
+        yield text
 
 
 # --- a first set --------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ import numpy as np
 
 from bsip_cli.diagnosis.explanation import NEGLIGIBLE
 from bsip_cli.diagnosis.patterns import UNEXPLAINED
-from bsip_cli.diagnosis.selection import ALPHA, Selection
+from bsip_cli.diagnosis.selection import ALPHA, WORTH, Selection
 from bsip_cli.diagnosis.signatures import Place
 
 _SURE = 1.645  # standard deviations: found in 95 of 100 recordings like these
@@ -41,8 +41,9 @@ def limits_of(selection: Selection) -> Iterator[Limit]:
             continue
         scene = signatures.evidence.trials[place.trials[0]].scene
         spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(information, hermitian=True)), 0.0))
+        rows = sum(len(signatures.evidence.trials[t].residual) for t in place.trials)
+        least = max(last.limit(place.trials, ALPHA), WORTH * rows / 2)
         for parameter, sd in zip(place.candidate.free(scene), spread, strict=True):
-            least = last.limit(place.trials, ALPHA)
             needed = max(sd * (np.sqrt(2 * least) + _SURE), NEGLIGIBLE)
             limit = Limit(place, parameter.name, parameter.unit, needed * parameter.typical)
             key = (effect.name, place.candidate.target, place.trials, parameter.name)

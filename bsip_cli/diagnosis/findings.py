@@ -127,7 +127,7 @@ def _rejected(evidence: Evidence, tried: Tried) -> Finding:
         if tried.is_leftover
         else "another cause explains it better"
         if tried.is_good
-        else "on data held out it does not help"
+        else "on data held out it does not help, or hardly"
     )
     sentence = f"not so: {one.effect.sentence(one.target, one.values)} ({why})"
     return _with(evidence, tried, "rejected", "", numbers, sentence)

@@ -23,6 +23,7 @@ SHOWN = 5  # that are looked at even where nothing stands out
 WORTH_A_TRY = 0.5  # of the best score
 ALPHA = 0.01  # in every round; with the chance's own errors one null in twenty has an alarm
 BEYOND_DOUBT = 1e-6  # so rare by chance that a gain above its standard error is enough
+WORTH = 0.01  # of the squared residual of its trials: what takes less changes no result
 SUPPORT = 8.0  # squared white residual that a trial must save to share a cause
 # A cause from the catalogue is named though a regularity without a name explains a bit more.
 NAMED_AT = 0.95
@@ -44,9 +45,10 @@ class Tried:
 
     @property
     def is_good(self) -> bool:
-        """Rarer by chance than ALPHA, better on what it has not seen, and not what is left over of
-        a larger cause. What has no name, or is not far beyond chance, must be better for sure."""
-        if self.p_value > ALPHA or self.is_leftover:
+        """Rarer by chance than ALPHA, better on what it has not seen, worth a name, and not what
+        is left over of a larger cause. What has no name, or is not far beyond chance, must be
+        better for sure."""
+        if self.p_value > ALPHA or self.is_leftover or self.gain.percent < 100 * WORTH:
             return False
         unnamed = self.explanation.effect.name == UNEXPLAINED
         doubtful = unnamed or self.p_value > BEYOND_DOUBT

@@ -1,100 +1,148 @@
-"""A walk over a C3D file's parameter records before ezc3d follows them.
-
-ezc3d reads the length of a description as a signed byte: one of more than 127 characters,
-or a torn chain of records, makes it fill gigabytes of memory before it gives up.
-"""
+"""The parameter section of a C3D file: groups of named texts and arrays of numbers."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from bsip_cli.errors import BadDataError
+from bsip_cli.recordings.c3d_numbers import floats, integers
 
 _BLOCK = 512
-_LONGEST = 127
-_TEXT = -1
-_NUMBERS = ("USED", "RATE", "SCALE", "FRAMES", "GEN_SCALE", "OFFSET", "DATA_START")
-_TYPES = (_TEXT, 1, 2, 4)  # characters, bytes, integers, floats: the size of one in bytes
+_TEXT, _BYTE, _INTEGER, _FLOAT = -1, 1, 2, 4  # the size of one is the absolute value
+_MOST_RECORDS = 20_000
+
+Value = tuple[str, ...] | np.ndarray
+Group = Mapping[str, Value]
+Parameters = Mapping[str, Group]
 
 
-def check_parameters(path: Path, data_start_block: int) -> None:
-    """Refuse a file whose parameter records cannot be followed to their end."""
-    fault = find_fault(path.read_bytes()[: _reach(data_start_block)])
-    if fault:
+class _BrokenError(Exception):
+    """Where the chain of records cannot be followed; turned into a BadDataError."""
+
+
+def read_parameters(path: Path, content: bytes, processor: int) -> Parameters:
+    """All groups by name in capitals; ``content`` is the file up to its data.
+
+    Numbers come as arrays whose last axis counts plates or channels, as the format stores
+    them (first index fastest); texts without the blanks that fill them up.
+    """
+    try:
+        return _groups(content, processor)
+    except _BrokenError as fault:
         raise BadDataError(
             f"its parameter section is broken: {fault}",
             expected="a standard C3D file",
             remedy="export the trial again",
             file=path,
-        )
+        ) from fault
 
 
-def find_fault(content: bytes) -> str:
-    """What is wrong with the parameter records, or nothing."""
-    groups: dict[int, str] = {}
-    texts: list[tuple[int, str]] = []
+def numbers(group: Group, name: str) -> np.ndarray:
+    """A numeric parameter with its continuations (SCALE, SCALE2, ...); empty if there is none."""
+    parts = [part for part in _continued(group, name) if isinstance(part, np.ndarray)]
+    if len(parts) == 1:
+        return parts[0].astype(float)
+    return np.concatenate([np.zeros(0), *(np.ravel(part) for part in parts)])
+
+
+def texts(group: Group, name: str) -> list[str]:
+    """A text parameter with its continuations (LABELS, LABELS2, ...); empty if there is none."""
+    parts = [part for part in _continued(group, name) if isinstance(part, tuple)]
+    return [text for part in parts for text in part]
+
+
+def number(group: Group, name: str) -> float:
+    """The first number of a parameter, NaN if there is none."""
+    values = np.ravel(numbers(group, name))
+    return float(values[0]) if len(values) else float("nan")
+
+
+def _continued(group: Group, name: str) -> list[Value]:
+    parts = [group[name]] if name in group else []
+    more = 2
+    while parts and f"{name}{more}" in group:
+        parts.append(group[f"{name}{more}"])
+        more += 1
+    return parts
+
+
+def _groups(content: bytes, processor: int) -> dict[str, dict[str, Value]]:
+    names: dict[int, str] = {}
+    found: list[tuple[int, str, Value]] = []
     position = (content[0] - 1) * _BLOCK + 4
-    while True:
+    for _ in range(_MOST_RECORDS):
         if not 0 <= position < len(content) - 2:
-            return "its records run into the data"
+            raise _BrokenError("its records run into the data")
         length = abs(_signed(content[position]))
         if length == 0:
-            return _text_fault(groups, texts)
+            break
+        group = _signed(content[position + 1])
         after_name = position + 2 + length
         name = _name(content, position + 2, after_name)
-        if not name:
-            return f"the record at byte {position} has no readable name"
-        group = _signed(content[position + 1])
-        if fault := _record_fault(content, group, after_name + 2):
-            return f"{name} {fault}"
         if group < 0:
-            groups[-group] = name
-        elif _signed(content[after_name + 2]) == _TEXT:
-            texts.append((group, name))
-        step = int.from_bytes(content[after_name : after_name + 2], "little")
+            names[-group] = name
+        elif group > 0:
+            found.append((group, name, _value(content, after_name + 2, name, processor)))
+        else:
+            raise _BrokenError(f"{name} belongs to no group")
+        step = int(integers(content[after_name : after_name + 2], processor)[0]) & 0xFFFF
         if step == 0:
-            return _text_fault(groups, texts)
+            break
         position = after_name + step
+    result: dict[str, dict[str, Value]] = {name: {} for name in names.values()}
+    for group, name, value in found:
+        if group in names:
+            result[names[group]][name] = value
+    return result
 
 
 def _name(content: bytes, start: int, stop: int) -> str:
-    """The name of a record; empty if it is cut off or no text."""
     name = content[start:stop]
-    readable = len(content) >= stop + 4 and all(32 <= byte < 127 for byte in name)
-    return name.decode("ascii").upper() if readable else ""
+    if len(content) < stop + 4 or not all(32 <= byte < 127 for byte in name):
+        raise _BrokenError(f"the record at byte {start - 2} has no readable name")
+    return name.decode("ascii").strip().upper()
 
 
-def _text_fault(groups: dict[int, str], texts: list[tuple[int, str]]) -> str:
-    """ezc3d takes these for numbers without looking, and crashes."""
-    for group, name in texts:
-        if groups.get(group) in ("POINT", "ANALOG") and name in _NUMBERS:
-            return f"{groups[group]}:{name} is text"
-    return ""
-
-
-def _record_fault(content: bytes, group: int, at: int) -> str:
-    """The fault of one group (negative id) or parameter, whose body starts at a byte."""
-    if group < 0:
-        return "" if content[at] <= _LONGEST else f"has a description of {content[at]} characters"
-    if group == 0:
-        return "belongs to no group"
+def _value(content: bytes, at: int, name: str, processor: int) -> Value:
+    """One parameter's value, whose type is at a byte."""
     kind, rank = _signed(content[at]), content[at + 1]
-    dimensions = content[at + 2 : at + 2 + rank]
-    if kind not in _TYPES or rank > 7:
-        return f"has type {kind} and {rank} dimensions"
-    end = at + 2 + rank + abs(kind) * math.prod(dimensions)
-    if end >= len(content):
-        return f"claims {abs(kind) * math.prod(dimensions)} bytes, more than there are"
-    if content[end] > _LONGEST:
-        return f"has a description of {content[end]} characters, ezc3d reads {_LONGEST}"
-    return ""
+    if kind not in (_TEXT, _BYTE, _INTEGER, _FLOAT) or rank > 7:
+        raise _BrokenError(f"{name} has type {kind} and {rank} dimensions")
+    shape = tuple(content[at + 2 : at + 2 + rank])
+    start = at + 2 + rank
+    size = abs(kind) * math.prod(shape)
+    raw = content[start : start + size]
+    if len(raw) < size or len(shape) < rank:
+        raise _BrokenError(f"{name} claims {size} bytes, more than there are")
+    if kind == _TEXT:
+        return _split_text(raw, shape)
+    values = {
+        _BYTE: lambda: np.frombuffer(raw, np.uint8).astype(np.int16),
+        _INTEGER: lambda: integers(raw, processor),
+        _FLOAT: lambda: floats(raw, processor),
+    }[kind]()
+    return values.reshape(shape or (1,), order="F")
+
+
+def _split_text(raw: bytes, shape: tuple[int, ...]) -> tuple[str, ...]:
+    """Texts of equal length, the first dimension, one after the other."""
+    length = shape[0] if shape else 1
+    if length == 0:
+        return ("",) * math.prod(shape[1:])
+    cells = (raw[i : i + length] for i in range(0, len(raw), length))
+    return tuple(_decoded(cell).replace("\0", " ").strip() for cell in cells)
+
+
+def _decoded(cell: bytes) -> str:
+    try:
+        return cell.decode("utf-8")
+    except UnicodeDecodeError:
+        return cell.decode("latin-1")
 
 
 def _signed(byte: int) -> int:
     return byte - 256 if byte > 127 else byte
-
-
-def _reach(data_start_block: int) -> int | None:
-    """Bytes up to the data; None where the header does not say."""
-    return (data_start_block - 1) * _BLOCK if data_start_block > 2 else None

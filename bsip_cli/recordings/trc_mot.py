@@ -12,7 +12,7 @@ from bsip_cli.recordings import world
 from bsip_cli.recordings.assemble import why_no_forces
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
-from bsip_cli.recordings.plate_checks import LOADED_N
+from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.timebase import even_grid, onto_grid
 from bsip_cli.recordings.trc import Trc, read_trc
 

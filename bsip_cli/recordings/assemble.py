@@ -59,7 +59,8 @@ def why_no_forces(plates: Sequence[Plate]) -> str:
         return "every force plate was left out"
     if not any(plate.usable.any() for plate in plates):
         return "the force plates have no usable sample"
-    largest = max(np.max(p.force_N[p.usable, 2], initial=0.0) for p in plates)
+    total = np.sum([np.where(p.usable, p.force_N[:, 2], 0.0) for p in plates], axis=0)
+    largest = np.max(total, initial=0.0)
     if largest < LOADED_N:
         return f"the force plates were never loaded (at most {largest:.0f} N)"
     return ""
@@ -101,6 +102,8 @@ def _sample_findings(source: PlateSource) -> list[Finding]:
             ("nan", "are not a number", samples.not_a_number),
             ("clipped", "lie at the converter's limit", samples.clipped),
             ("stuck", "do not answer to the load", samples.stuck),
+            ("lost", "are zero in all channels amid load", samples.lost),
+            ("spike", "leave their neighbours and come back at once", samples.spikes),
         )
         if mask.any()
     ]

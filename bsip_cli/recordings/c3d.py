@@ -17,6 +17,7 @@ from bsip_cli.recordings.c3d_points import Points, read_points
 from bsip_cli.recordings.cop_near_feet import Scene
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.plates import local_wrench
+from bsip_cli.recordings.scene_size import settle_unit
 from bsip_cli.recordings.units import length_in_m
 
 
@@ -36,24 +37,11 @@ def read_c3d(path: Path) -> Recording:
 
 
 def _length_unit(content: Content) -> tuple[float, list[Finding]]:
-    """Size of the unit of points; guessed from the size of the scene if it is misspelt."""
+    """Size of the unit of points in metres."""
     stated = "".join(texts(content.group("POINT"), "UNITS")[:1])
-    size = length_in_m(stated)
-    exact = stated.lower() in ("m", "mm", "cm")
-    if size is None:
-        seen = np.abs(content.positions[content.is_valid])
-        size = 1e-3 if len(seen) and np.nanmedian(seen) > 5.0 else 1.0
-    if exact:
-        return size, []
-    finding = Finding(
-        check="unit",
-        subject="points",
-        found=f"POINT:UNITS '{stated}'",
-        expected="m or mm",
-        action=f"read lengths in {'m' if size == 1.0 else 'mm' if size == 1e-3 else 'cm'}",
-        level="corrected",
-    )
-    return size, [finding]
+    known = content.is_valid & (content.positions != 0).any(axis=-1)
+    seen = np.where(known[..., None], content.positions, np.nan)
+    return settle_unit(seen, stated, length_in_m(stated), "POINT:UNITS")
 
 
 def _up(content: Content, points: Points, surfaces: Sequence[np.ndarray]) -> world.Up:

@@ -89,7 +89,7 @@ def settle_layout(
         chosen = fitting[1]
     findings = [] if stated == other else [_disagreement(stated, other, chosen)]
     wanted = stated if chosen is fitting[0] and _fits(stated, available) else other
-    return chosen, findings + _missing_end(wanted, chosen)
+    return chosen, findings + _missing_end(wanted, chosen) + _odd_length(chosen, file_size)
 
 
 def _by_header(header: Header, parameters: Parameters, start: int, available: int) -> Layout:
@@ -172,6 +172,23 @@ def _missing_end(wanted: Layout, chosen: Layout) -> list[Finding]:
             found=f"the file ends {missing} frames early",
             expected=f"{wanted.n_frames} frames",
             action=f"read {chosen.n_frames}",
+            level="warning",
+        )
+    ]
+
+
+def _odd_length(layout: Layout, file_size: int) -> list[Finding]:
+    """A file ends with its data or fills its last block: else bytes came in or went."""
+    rest = file_size - layout.start - layout.n_bytes
+    if rest == 0 or (file_size % BLOCK == 0 and rest <= BLOCK):
+        return []
+    return [
+        Finding(
+            check="layout",
+            subject="",
+            found=f"{rest} bytes follow the data that the header counts",
+            expected=f"none, or as many as fill the last {BLOCK} bytes",
+            action="read the data where the header says",
             level="warning",
         )
     ]

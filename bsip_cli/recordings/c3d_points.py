@@ -13,6 +13,7 @@ from bsip_cli.recordings.c3d_content import Content
 from bsip_cli.recordings.c3d_parameters import Group, texts
 from bsip_cli.recordings.labels import is_unlabelled
 from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.scene_size import without_absurd
 
 _OUTPUT_GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _OUTPUT_NAMES = re.compile(
@@ -37,6 +38,7 @@ def read_points(content: Content, unit_m: float) -> Points:
     positions[invalid | ~content.is_valid] = np.nan
     group = content.group("POINT")
     labels, findings = _labels(group, positions)
+    findings += without_absurd(positions)
     outputs = _model_outputs(group, labels)
     kept = [i for i, label in enumerate(labels) if i not in outputs and not is_unlabelled(label)]
     if len(kept) < len(labels):

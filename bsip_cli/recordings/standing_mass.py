@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +13,13 @@ from bsip_cli.recordings.analog import runs
 from bsip_cli.recordings.force_balance import trunk_velocity_m_s
 from bsip_cli.recordings.model import Finding
 
-_STILL_S = 0.5
-_STILL_SHARE = 0.02  # of the weight: departure of the force from its mean
-_LEAST_STILL_S = 1.0
+_NOISE_S = 0.1  # shorter changes of the force are noise
+_STILL_SHARE = 0.03  # of the mean force: departure within a still stretch
+_LEAST_STILL_S = 0.8
 _LEAST_MOVING_S = 2.0
 _LEAST_N = 100.0
-_VELOCITY_ERROR_M_S = 0.2
+_STILL_ERROR_M_S = 0.1  # standing still, as far as the force tells
+_MOVING_ERROR_M_S = 0.2  # the trunk stands for the centre of mass
 _PERCENT = 100.0
 
 
@@ -31,10 +33,9 @@ class PlateMass:
 
     @property
     def uncertainty_percent(self) -> float:
-        """In movement the trunk's velocity stands for the centre of mass's."""
-        if self.is_still:
-            return 0.0
-        return _PERCENT * _VELOCITY_ERROR_M_S / (GRAVITY_M_S2 * self.seconds)
+        """By the change of the centre of mass's velocity that nobody sees."""
+        error_m_s = _STILL_ERROR_M_S if self.is_still else _MOVING_ERROR_M_S
+        return _PERCENT * error_m_s / (GRAVITY_M_S2 * self.seconds)
 
     def words(self) -> str:
         how = "quiet standing" if self.is_still else "movement (balance of momentum)"
@@ -46,14 +47,17 @@ def plate_mass(
 ) -> PlateMass | None:
     """Mass from the vertical force (n_frames,) where ``valid`` (n_frames,) bool.
 
-    In quiet standing the mean force over g. Else, over the longest valid stretch, the mean
-    force over g plus the mean acceleration of the trunk (n_frames, k, 3). None without either.
+    In quiet standing the mean force over g. Over the longest valid stretch the mean force over
+    g plus the mean acceleration of the trunk (n_frames, k, 3). The surer of the two; None
+    without either.
     """
-    still = _still(force_z_N, valid, rate_hz)
+    still = still_frames(force_z_N, valid, rate_hz)
+    found = [_by_momentum(force_z_N, valid, trunk_markers_m, rate_hz)]
     if still.any():
         mass_kg = float(force_z_N[still].mean()) / GRAVITY_M_S2
-        return PlateMass(mass_kg, still.sum() / rate_hz, True)
-    return _by_momentum(force_z_N, valid, trunk_markers_m, rate_hz)
+        found.append(PlateMass(mass_kg, still.sum() / rate_hz, True))
+    known = [one for one in found if one is not None]
+    return min(known, key=lambda one: one.uncertainty_percent, default=None)
 
 
 def about_mass(
@@ -71,19 +75,41 @@ def about_mass(
     return _finding(carried, expected, action, "warning" if bad else "info")
 
 
-def _still(force_z_N: np.ndarray, valid: np.ndarray, rate_hz: float) -> np.ndarray:
-    """Frames of stretches in which the force hardly leaves its own mean, (n_frames,) bool."""
-    width = max(2, round(_STILL_S * rate_hz))
-    mean = uniform_filter1d(force_z_N, width)
-    calm = valid & (force_z_N > _LEAST_N) & (np.abs(force_z_N - mean) < _STILL_SHARE * mean)
+def still_frames(force_z_N: np.ndarray, valid: np.ndarray, rate_hz: float) -> np.ndarray:
+    """The longest valid stretch in which the force stays near its own mean, (n_frames,) bool.
+
+    None if that is shorter than 0.8 s.
+    """
+    smooth = uniform_filter1d(force_z_N, max(1, round(_NOISE_S * rate_hz)))
     still = np.zeros(len(valid), bool)
-    for start, stop in runs(calm):
-        part = force_z_N[start:stop]
-        if (stop - start) / rate_hz >= _LEAST_STILL_S and np.ptp(part) < 4 * _STILL_SHARE * mean[
-            start
-        ]:
-            still[start:stop] = True
+    for start, stop in runs(valid & (smooth > _LEAST_N)):
+        first, last = _calmest(smooth[start:stop])
+        if last - first > max(still.sum(), _LEAST_STILL_S * rate_hz - 1):
+            still[:] = False
+            still[start + first : start + last] = True
     return still
+
+
+def _calmest(force_N: np.ndarray) -> tuple[int, int]:
+    """Start and stop of the longest stretch whose range is twice the allowed departure."""
+    best, start = (0, 0), 0
+    lows: deque[int] = deque()
+    highs: deque[int] = deque()
+    for stop, value in enumerate(force_N):
+        while lows and force_N[lows[-1]] >= value:
+            lows.pop()
+        while highs and force_N[highs[-1]] <= value:
+            highs.pop()
+        lows.append(stop)
+        highs.append(stop)
+        while force_N[highs[0]] - force_N[lows[0]] > 2 * _STILL_SHARE * force_N[highs[0]]:
+            start += 1
+            for queue in (lows, highs):
+                if queue[0] < start:
+                    queue.popleft()
+        if stop + 1 - start > best[1] - best[0]:
+            best = (start, stop + 1)
+    return best
 
 
 def _by_momentum(

@@ -49,6 +49,11 @@ def numbers(group: Group, name: str) -> np.ndarray:
     return np.concatenate([np.zeros(0), *(np.ravel(part) for part in parts)])
 
 
+def whole_numbers(group: Group, name: str) -> np.ndarray:
+    """A numeric parameter as integers, also where it is stored as floats; NaN counts as 0."""
+    return np.clip(np.nan_to_num(numbers(group, name)), -1e9, 1e9).astype(int)
+
+
 def texts(group: Group, name: str) -> list[str]:
     """A text parameter with its continuations (LABELS, LABELS2, ...); empty if there is none."""
     parts = [part for part in _continued(group, name) if isinstance(part, tuple)]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsip_cli.recordings.c3d_content import Content
-from bsip_cli.recordings.c3d_parameters import Group, number, numbers, texts
+from bsip_cli.recordings.c3d_parameters import Group, number, numbers, texts, whole_numbers
 from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.plates import N_CHANNELS, PlateDescription, corners_are_plausible
 from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
@@ -24,10 +24,16 @@ class PlateChannels:
 
 
 _MOST_PLATES = 64
+_VOLTS = {"V", "v", "Volts", "volts", "mV"}
 
 
 class _UnusablePlateError(Exception):
-    """Why one plate cannot be used; turned into a Finding."""
+    """Why one plate cannot be used, and what was expected; turned into a Finding."""
+
+    def __init__(self, found: str, expected: str) -> None:
+        super().__init__(found)
+        self.found = found
+        self.expected = expected
 
 
 def read_plates(
@@ -41,10 +47,13 @@ def read_plates(
     plates, findings = [], []
     for index in range(_n_plates(group)):
         try:
-            plates.append(_read_plate(content, length_unit_m, index))
+            plate, about_units = _read_plate(content, length_unit_m, index)
+            plates.append(plate)
+            findings += about_units
         except _UnusablePlateError as reason:
+            action = "left the plate out; export the trial with its force plates set up"
             findings.append(
-                Finding("plate", str(index + 1), str(reason), "", "left the plate out", "excluded")
+                Finding("plate", str(index + 1), reason.found, reason.expected, action, "excluded")
             )
     return plates, findings
 
@@ -65,19 +74,26 @@ def _n_plates(group: Group) -> int:
     return int(min(max(used, 0), _MOST_PLATES)) if np.isfinite(used) else 0
 
 
-def _read_plate(content: Content, length_unit_m: float, index: int) -> PlateChannels:
+def _read_plate(
+    content: Content, length_unit_m: float, index: int
+) -> tuple[PlateChannels, list[Finding]]:
     group = content.group("FORCE_PLATFORM")
     kind = _kind(group, index)
     corners = _slab(group, "CORNERS", index, (3, 4)).T * length_unit_m
     if not corners_are_plausible(corners):
-        raise _UnusablePlateError(f"corners that are no plate: {_sides(corners)}")
+        raise _UnusablePlateError(
+            f"corners that are no plate: {_sides(corners)}", "a rectangle of 0.1 to 5 m"
+        )
     origin = _slab(group, "ORIGIN", index, (3,)) * length_unit_m
     if kind == 3 and not origin[:2].all():
-        raise _UnusablePlateError("a type 3 plate whose ORIGIN lacks the distances of the sensors")
+        raise _UnusablePlateError(
+            "a type 3 plate whose ORIGIN lacks the distances of the sensors",
+            "the half distances a and b of the sensors",
+        )
     rows = _channel_rows(group, kind, index, len(content.analog))
     raw = content.analog[rows].T
     scales = content.analog_scales[rows]
-    return PlateChannels(
+    plate = PlateChannels(
         plate=PlateDescription(
             str(index + 1), kind, corners, origin, _cop_polynomial(group, kind, index)
         ),
@@ -85,16 +101,15 @@ def _read_plate(content: Content, length_unit_m: float, index: int) -> PlateChan
         counts=raw / np.where(scales == 0, 1.0, scales),
         baseline=_baseline(group, content.samples_per_frame, len(raw)),
     )
+    return plate, _about_units(content, kind, index, rows)
 
 
 def _kind(group: Group, index: int) -> int:
-    kinds = np.ravel(numbers(group, "TYPE"))
+    kinds = np.ravel(whole_numbers(group, "TYPE"))
     if index >= len(kinds):
-        raise _UnusablePlateError("no FORCE_PLATFORM:TYPE")
-    if int(kinds[index]) not in N_CHANNELS:
-        raise _UnusablePlateError(
-            f"force platform type {int(kinds[index])}, types 1 to 4 can be read"
-        )
+        raise _UnusablePlateError("no FORCE_PLATFORM:TYPE", "a type for each plate")
+    if kinds[index] not in N_CHANNELS:
+        raise _UnusablePlateError(f"force platform type {kinds[index]}", "types 1 to 4")
     return int(kinds[index])
 
 
@@ -103,23 +118,25 @@ def _slab(group: Group, name: str, index: int, shape: tuple[int, ...]) -> np.nda
     flat = np.ravel(numbers(group, name), order="F")
     size = int(np.prod(shape))
     if len(flat) < size * (index + 1):
-        raise _UnusablePlateError(f"FORCE_PLATFORM:{name} has no entry for it")
+        raise _UnusablePlateError(
+            f"FORCE_PLATFORM:{name} has no entry for it", f"{size} numbers for each plate"
+        )
     return flat[size * index : size * (index + 1)].reshape(shape, order="F")
 
 
 def _channel_rows(group: Group, kind: int, index: int, n_analog: int) -> np.ndarray:
-    table = np.atleast_1d(numbers(group, "CHANNEL"))
+    table = np.atleast_1d(whole_numbers(group, "CHANNEL"))
     table = table[:, None] if table.ndim == 1 else table
     wanted = N_CHANNELS[kind]
-    if table.shape[0] < wanted or table.shape[1] <= index:
+    if table.ndim != 2 or table.shape[0] < wanted or table.shape[1] <= index:
         raise _UnusablePlateError(
-            f"{table.shape[0]} channels listed for it, a type {kind} plate has {wanted}"
+            f"{table.shape[0]} channels listed for it", f"{wanted} channels of a type {kind} plate"
         )
-    rows = table[:wanted, index].astype(int) - 1
+    rows = table[:wanted, index] - 1
     if rows.min() < 0 or rows.max() >= n_analog:
+        claimed = rows.max() + 1 if rows.max() >= n_analog else 0
         raise _UnusablePlateError(
-            f"it claims analog channel {rows.max() + 1 if rows.max() >= n_analog else 0}, "
-            f"the file holds {n_analog}"
+            f"it claims analog channel {claimed}", f"one of the file's {n_analog}"
         )
     return rows
 
@@ -137,6 +154,30 @@ def _in_si(
         return raw @ matrix.T * np.repeat([1.0, length_unit_m], 3)
     units = _units(content.group("ANALOG"), rows)
     return raw * np.array([_size(unit, kind, i, length_unit_m) for i, unit in enumerate(units)])
+
+
+def _about_units(content: Content, kind: int, index: int, rows: np.ndarray) -> list[Finding]:
+    """A line for units that are no mechanical ones: volts may be scaled forces, a misprint not."""
+    if kind == 4 and _cal_matrix(content.group("FORCE_PLATFORM"), index) is not None:
+        return []
+    odd = {
+        unit
+        for unit in _units(content.group("ANALOG"), rows)
+        if unit and force_in_N(unit) is None and moment_in_Nm(unit) is None
+        if length_in_m(unit) is None
+    }
+    if not odd:
+        return []
+    return [
+        Finding(
+            check="unit",
+            subject=str(index + 1),
+            found=f"channels in {', '.join(sorted(repr(unit) for unit in odd))}",
+            expected="N and N mm or N m, or a calibration matrix",
+            action="took the scaled numbers as N, and as N times the unit of length",
+            level="info" if odd <= _VOLTS else "warning",
+        )
+    ]
 
 
 def _size(unit: str, kind: int, position: int, length_unit_m: float) -> float:
@@ -170,10 +211,10 @@ def _cop_polynomial(group: Group, kind: int, index: int) -> np.ndarray | None:
 
 def _baseline(group: Group, samples_per_frame: int, n_samples: int) -> slice | None:
     """FORCE_PLATFORM:ZERO counts frames from 1; (1, 0) and (0, x) mean none."""
-    zero = np.ravel(numbers(group, "ZERO"))
+    zero = np.ravel(whole_numbers(group, "ZERO"))
     if len(zero) < 2 or zero[0] < 1 or zero[1] <= zero[0]:
         return None
-    start, stop = int(zero[0] - 1) * samples_per_frame, int(zero[1]) * samples_per_frame
+    start, stop = (int(zero[0]) - 1) * samples_per_frame, int(zero[1]) * samples_per_frame
     return slice(start, stop) if stop <= n_samples else None
 
 

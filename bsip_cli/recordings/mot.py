@@ -16,6 +16,9 @@ _COLUMN = re.compile(
     r"^(?P<before>.*?)(?P<what>force|torque|moment|grf|grm|cop)(?P<between>.*?)"
     r"(?P<kind>[vpmtf]?)_?(?P<axis>[xyz])$"
 )
+_SHORT = re.compile(  # F1_x, P1_x, M1_x and FP1_Fx, FP1_Px, FP1_Mx
+    r"^(?:(?P<kind1>[fpmt])(?P<id1>\d+)|fp(?P<id2>\d+)_(?P<kind2>[fpmt]))_?(?P<axis>[xyz])$"
+)
 _ROWS = re.compile(r"^(?:nrows\s*=|datarows)\s*(\d{1,12})$", re.IGNORECASE)
 _KINDS = {"v": "force", "f": "force", "p": "point", "m": "torque", "t": "torque"}
 _BARE = {
@@ -57,6 +60,8 @@ def read_mot(path: Path) -> Mot:
             remedy="export the forces again",
             file=path,
         )
+    if "," in body[0]:
+        body = [line.replace(",", " ") for line in body]
     names = body[0].split()
     if names[0].lower() != "time":
         raise BadDataError(
@@ -124,6 +129,9 @@ def _forces(names: list[str], table: np.ndarray, path: Path) -> tuple[GroundForc
 
 def _meaning(name: str) -> tuple[str, str, str] | None:
     """A column's plate, kind and axis: '1_ground_force_px' is ('1', 'point', 'x')."""
+    if short := _SHORT.match(name.lower()):
+        kind = _KINDS[short["kind1"] or short["kind2"]]
+        return short["id1"] or short["id2"], kind, short["axis"]
     match = _COLUMN.match(name.lower())
     if match is None:
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from bsip_cli.recordings.scene_size import settle_unit, without_absurd
 from bsip_cli.recordings.units import length_in_m
 
 _MISSING = {"", "nan", "na", "n/a", "none"}
+_HEADER = re.compile(r"^\s*frame\s*#", re.IGNORECASE)
 _LARGEST_TEXT = 2**30  # bytes
 
 
@@ -36,7 +38,7 @@ class _Table:
 def read_trc(path: Path) -> Trc:
     """Read a TRC file; the labels' line may have empty columns."""
     lines = read_lines(path)
-    header_at = next((i for i, line in enumerate(lines) if line.startswith("Frame#")), None)
+    header_at = next((i for i, line in enumerate(lines) if _HEADER.match(line)), None)
     if header_at is None or header_at < 1:
         raise BadDataError(
             "no line that begins with 'Frame#'",
@@ -45,7 +47,7 @@ def read_trc(path: Path) -> Trc:
             file=path,
         )
     fields = _header_fields(lines[:header_at])
-    labels = tuple(name.strip() for name in lines[header_at].split("\t")[2:] if name.strip())
+    labels = _labels(lines[header_at])
     table = _table(lines[header_at + 2 :], labels, path)
     raw = table.values[:, 2:].reshape(len(table.values), len(labels), 3)
     raw[(raw == 0).all(axis=-1)] = np.nan
@@ -104,6 +106,13 @@ def row_counts(what: str, stated: float, found: int) -> list[Finding]:
             level="warning",
         )
     ]
+
+
+def _labels(line: str) -> tuple[str, ...]:
+    """Names behind 'Frame#' and 'Time', apart by tabs, or by blanks in a line without tabs."""
+    if "\t" in line:
+        return tuple(name.strip() for name in line.split("\t")[2:] if name.strip())
+    return tuple(_HEADER.sub("", line).split()[1:])
 
 
 def _header_fields(lines: list[str]) -> dict[str, str]:

@@ -58,8 +58,11 @@ def read_content(path: Path) -> Content:
     rate_hz, about_rate = _rate(path, header, parameters, layout)
     scale, about_scale = _point_scale(header, parameters)
     frames = _frames(raw, layout, header.processor)
-    positions = frames[:, : 4 * layout.n_points].reshape(layout.n_frames, layout.n_points, 4)
-    analog = frames[:, 4 * layout.n_points :].reshape(layout.n_samples, layout.n_channels).T
+    if header.is_full:
+        frames = _without_padding(frames)
+    positions = frames[:, : 4 * layout.n_points].reshape(len(frames), layout.n_points, 4)
+    n_samples = len(frames) * layout.samples_per_frame
+    analog = frames[:, 4 * layout.n_points :].reshape(n_samples, layout.n_channels).T
     factor = 1.0 if layout.is_float else abs(scale)
     scales = _analog_scales(parameters.get("ANALOG", {}), layout.n_channels)
     return Content(
@@ -95,6 +98,15 @@ def _frames(raw: bytes, layout: Layout, processor: int) -> np.ndarray:
     data = raw[layout.start : layout.start + layout.n_bytes]
     words = floats(data, processor) if layout.is_float else integers(data, processor).astype(float)
     return words.reshape(layout.n_frames, layout.words_per_frame)
+
+
+def _without_padding(frames: np.ndarray) -> np.ndarray:
+    """Without the frames of zeros that only fill the last block of the file."""
+    most = min(BLOCK // (2 * frames.shape[1]), len(frames) - 1)
+    n = len(frames)
+    while n > len(frames) - most and not frames[n - 1].any():
+        n -= 1
+    return frames[:n]
 
 
 def _roughness(raw: bytes, processor: int, layout: Layout) -> float:

@@ -28,10 +28,6 @@ class Layout:
     start: int  # byte
 
     @property
-    def n_samples(self) -> int:
-        return self.n_frames * self.samples_per_frame
-
-    @property
     def words_per_frame(self) -> int:
         return 4 * self.n_points + self.n_channels * self.samples_per_frame
 
@@ -43,10 +39,19 @@ class Layout:
     def n_bytes(self) -> int:
         return self.n_frames * self.bytes_per_frame
 
+    def room(self, file_size: int) -> int:
+        """Bytes from the first frame to the end of the file."""
+        return max(file_size - self.start, 0)
+
+    def ends_with(self, file_size: int) -> bool:
+        """The file ends with the data or fills its last block behind them."""
+        rest = file_size - self.start - self.n_bytes
+        return rest == 0 or (file_size % BLOCK == 0 and 0 < rest <= BLOCK)
+
     def describe(self) -> str:
         return (
             f"{self.n_points} points, {self.n_channels} channels of {self.samples_per_frame} "
-            f"samples, {self.n_frames} frames"
+            f"samples, {self.n_frames} frames from byte {self.start}"
         )
 
 
@@ -60,39 +65,45 @@ def settle_layout(
     """The layout of the data, and a finding where header and parameters disagree.
 
     A layout that wants more bytes than the file holds is out (a last partial block is
-    forgiven); of two that fit, the one whose ``roughness`` is clearly smaller.
+    forgiven); one that ends with the file goes first; of two such, the one whose
+    ``roughness`` is clearly smaller.
     """
-    start = (max(header.data_start_block, 1) - 1) * BLOCK
-    available = max(file_size - start, 0)
-    stated = _by_header(header, parameters, start, available)
+    stated = _by_header(header, parameters, file_size)
     other = _by_parameters(stated, parameters)
-    if stated.n_frames < 1 or stated.words_per_frame < 1:
+    if stated.n_frames < 1 or stated.words_per_frame < 1 or stated.start < BLOCK:
         stated = other
+    fitting = [layout for layout in dict.fromkeys((stated, other)) if _fits(layout, file_size)]
+    if not fitting:
+        raise _refusal(path, stated, file_size)
+    exact = [layout for layout in fitting if layout.ends_with(file_size)]
+    fitting = exact or fitting
+    wanted = fitting[0]
+    if len(fitting) == 2:
+        rough = [roughness(_cut(layout, file_size)) for layout in fitting]
+        wanted = fitting[1] if rough[1] < _SMOOTHER * rough[0] else fitting[0]
+    chosen = _cut(wanted, file_size)
+    findings = [] if stated == other else [_disagreement(stated, other, chosen)]
+    return chosen, findings + _missing_end(wanted, chosen) + _odd_length(chosen, file_size)
+
+
+def _refusal(path: Path, stated: Layout, file_size: int) -> BadDataError:
     if stated.words_per_frame < 1:
-        raise BadDataError(
+        return BadDataError(
             "it holds no points and no analog samples",
             expected="markers",
             remedy="export the trial with its markers",
             file=path,
         )
-    fitting = [_cut(layout, available) for layout in (stated, other) if _fits(layout, available)]
-    if not fitting:
-        raise BadDataError(
-            f"the header promises {stated.n_bytes} bytes of data ({stated.n_points} points, "
-            f"{stated.n_frames} frames) and the file holds {available}",
-            expected="a complete file",
-            remedy="copy or export the trial again",
-            file=path,
-        )
-    chosen = fitting[0]
-    if len(fitting) == 2 and roughness(fitting[1]) < _SMOOTHER * roughness(fitting[0]):
-        chosen = fitting[1]
-    findings = [] if stated == other else [_disagreement(stated, other, chosen)]
-    wanted = stated if chosen is fitting[0] and _fits(stated, available) else other
-    return chosen, findings + _missing_end(wanted, chosen) + _odd_length(chosen, file_size)
+    return BadDataError(
+        f"the header promises {stated.n_bytes} bytes of data ({stated.n_points} points, "
+        f"{stated.n_frames} frames) and the file holds {stated.room(file_size)}",
+        expected="a complete file",
+        remedy="copy or export the trial again",
+        file=path,
+    )
 
 
-def _by_header(header: Header, parameters: Parameters, start: int, available: int) -> Layout:
+def _by_header(header: Header, parameters: Parameters, file_size: int) -> Layout:
     samples = max(header.samples_per_frame, 1)
     layout = Layout(
         n_points=header.n_points,
@@ -100,10 +111,10 @@ def _by_header(header: Header, parameters: Parameters, start: int, available: in
         samples_per_frame=samples,
         n_frames=header.n_frames,
         is_float=header.scale < 0,
-        start=start,
+        start=(max(header.data_start_block, 1) - 1) * BLOCK,
     )
     if header.is_full or header.n_frames < 1:
-        in_file = available // max(layout.bytes_per_frame, 1)
+        in_file = layout.room(file_size) // max(layout.bytes_per_frame, 1)
         return replace(layout, n_frames=_many_frames(parameters) or in_file)
     return layout
 
@@ -133,7 +144,7 @@ def _by_parameters(stated: Layout, parameters: Parameters) -> Layout:
     """What the groups POINT and ANALOG say, the header's where they say nothing."""
     point, analog = parameters.get("POINT", {}), parameters.get("ANALOG", {})
     n_points, n_frames = _count(point, "USED"), _count(point, "FRAMES")
-    n_channels = _count(analog, "USED")
+    n_channels, block = _count(analog, "USED"), _count(point, "DATA_START")
     if n_frames == 0xFFFF or (n_frames is not None and n_frames == stated.n_frames & 0xFFFF):
         n_frames = None  # the count that does not fit
     return replace(
@@ -141,6 +152,7 @@ def _by_parameters(stated: Layout, parameters: Parameters) -> Layout:
         n_points=stated.n_points if n_points is None else n_points,
         n_channels=stated.n_channels if n_channels is None else n_channels,
         n_frames=n_frames or stated.n_frames,
+        start=(block - 1) * BLOCK if block is not None and block > 1 else stated.start,
     )
 
 
@@ -152,13 +164,14 @@ def _count(group, name: str) -> int | None:
     return int(value) & 0xFFFF if value < 0 else int(value)
 
 
-def _fits(layout: Layout, available: int) -> bool:
+def _fits(layout: Layout, file_size: int) -> bool:
     whole = layout.n_frames > 0 and layout.words_per_frame > 0
-    return whole and layout.n_bytes <= available + BLOCK
+    return whole and 0 < layout.n_bytes <= layout.room(file_size) + BLOCK
 
 
-def _cut(layout: Layout, available: int) -> Layout:
-    return replace(layout, n_frames=min(layout.n_frames, available // layout.bytes_per_frame))
+def _cut(layout: Layout, file_size: int) -> Layout:
+    in_file = layout.room(file_size) // layout.bytes_per_frame
+    return replace(layout, n_frames=min(layout.n_frames, in_file))
 
 
 def _missing_end(wanted: Layout, chosen: Layout) -> list[Finding]:
@@ -178,10 +191,10 @@ def _missing_end(wanted: Layout, chosen: Layout) -> list[Finding]:
 
 
 def _odd_length(layout: Layout, file_size: int) -> list[Finding]:
-    """A file ends with its data or fills its last block: else bytes came in or went."""
-    rest = file_size - layout.start - layout.n_bytes
-    if rest == 0 or (file_size % BLOCK == 0 and rest <= BLOCK):
+    """Where a file does not end with its data, bytes came in or went."""
+    if layout.ends_with(file_size):
         return []
+    rest = file_size - layout.start - layout.n_bytes
     return [
         Finding(
             check="layout",

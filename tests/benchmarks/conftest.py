@@ -1,4 +1,4 @@
-"""The benchmarks' modules are scripts: their folder is on the path, and the writers of recordings."""
+"""The benchmarks' modules are scripts: their folder is on the path, and that of the writers."""
 
 import sys
 from pathlib import Path

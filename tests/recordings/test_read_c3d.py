@@ -129,6 +129,25 @@ def test_rate_of_the_plates_that_is_no_multiple(tmp_path):
     assert _levels(recording, "rate") == ["corrected"]
 
 
+def test_more_frames_than_the_header_can_count(tmp_path):
+    n = 66_000
+    markers = np.tile(np.arange(1, 5)[:, None] * 0.3 + 1, (n, 1, 3))
+    markers[:, 0, 0] += np.arange(n) * 1e-5
+    recording = read_recording(write_c3d(tmp_path / "a.c3d", markers, list("ABCD")))
+    assert recording.n_frames == n
+    np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)
+
+
+def test_data_elsewhere_than_the_header_says(tmp_path):
+    content = bytearray(_write(tmp_path / "a.c3d", _spec()).read_bytes())
+    content[16] += 1
+    path = tmp_path / "b.c3d"
+    path.write_bytes(content)
+    recording = read_recording(path)
+    _check_wrench(recording)
+    assert _levels(recording, "layout") == ["warning"]
+
+
 def test_a_header_that_promises_the_world_takes_no_memory(tmp_path):
     content = bytearray(_write(tmp_path / "a.c3d", _spec()).read_bytes())
     content[2:4] = content[8:10] = b"\xff\x7f"  # 32767 points, and frames

@@ -36,6 +36,8 @@ class Usage:
     cpu_s: float
     peak_mb: float
     stdout: str
+    stderr: str = ""
+    code: int = 0
 
 
 def cpu_seconds(work: Callable[[], object]) -> float:
@@ -79,7 +81,7 @@ def run_child(
     code, cpu_s, peak_mb = json.loads(last)
     if not 0 <= code <= allowed:
         raise RuntimeError(f"{' '.join(arguments)} ended with {code}\n{done.stderr}")
-    return Usage(cpu_s, peak_mb, "\n".join(printed))
+    return Usage(cpu_s, peak_mb, "\n".join(printed), done.stderr, code)
 
 
 def markdown(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

@@ -242,10 +242,10 @@ RMSE in N, N m and mm. `held out`: data that did not identify OM.
 
 {forces}
 
-What is odd in them, and not the inertial parameters' fault: the one-leg trials of `biobuddy_ech`
-read 4 kg less than its static one (a hand on a support, or the plates), so OM, identified from
-them, misses the static weight; the plates of `opencap_subject4` read 4 % under the stated mass in
-all trials but walking.
+What is odd in them, and not the inertial parameters' fault: in the one-leg trials of `biobuddy_ech`
+both hands hold a rail that bears 4 kg (see the [diagnosis](diagnosis_of_recordings.md)), so OM,
+identified from them, misses the static weight; the plates of `opencap_subject4` read 4 % under the
+stated mass in all trials but walking.
 
 ## Every recording
 

@@ -230,6 +230,41 @@ def export(study, out, chosen, method, formats, model_file, model_bodies, repair
 
 
 @cli.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "--marker-set",
+    default="auto",
+    show_default=True,
+    metavar="NAME",
+    help="Compare with this shipped set, or with a .toml file; auto guesses.",
+)
+@click.option(
+    "--prefix",
+    default="",
+    metavar="Subject:",
+    help="Whose markers count, where the file holds several people.",
+)
+@click.option(
+    "--write",
+    type=click.Path(path_type=Path),
+    help="Write a first marker set of the file's labels here, also where a set fits.",
+)
+def markers(file, marker_set, prefix, write):
+    """Print a recording's labels, the marker set they fit, and what is missing on which segment.
+
+    FILE is a C3D or TRC file. Where no shipped set fits, a first one is written to
+    FILE_markers.toml in the current folder (or to --write), to be corrected.
+
+    Exit codes: 0 the set has all that a skeleton needs; 2 usage, an unknown set, or the file to be
+    written is there; 3 the recording cannot be read, no set fits, or markers are missing that a
+    skeleton cannot do without.
+    """
+    from bsip_cli.markers import Request, markers_command
+
+    sys.exit(markers_command(Request(file, marker_set, prefix, write)))
+
+
+@cli.command()
 @click.argument("out", type=click.Path(path_type=Path))
 def show(out):
     """Print the tables of a finished run, what is wrong in its recordings, and where its reports

@@ -59,12 +59,15 @@ class Load(Section):
 
 class Ingest(Section):
     max_gap_s: float = Field(ge=0)
+    max_rigid_gap_s: float = Field(ge=0)
     mass_tolerance_percent: float = Field(gt=0)
     zero_unloaded_plates: bool
     plates: tuple[int, ...]
+    prefixes: dict[str, str]
 
 
 class Scale(Section):
+    may_be_held: tuple[Literal["head", "upper_torso", "upper_arm", "forearm", "hand"], ...]
     joint_centre_sd_m: float = Field(gt=0)
     length_sd: float = Field(gt=0)
     marker_sd_m: float = Field(gt=0)
@@ -126,6 +129,7 @@ class Diagnosis(Section):
     skin_factor: float = Field(ge=0)
     skin_draws: int = Field(ge=1)
     marker_sd_m: float = Field(gt=0)
+    stated_mass_sd_percent: float = Field(gt=0)
 
 
 class Stats(Section):

@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.check_loads import check_segments, check_trials
+from bsip_cli.check_study import check_prefixes, check_segments, check_trials
 from bsip_cli.config import Config, load_config, with_estimators
 from bsip_cli.errors import UsageError
 from bsip_cli.pipeline import stages_named
@@ -85,6 +85,7 @@ def open_study(
     study, refusals = load_study(root, config.roles.model_dump())
     if not refusals:  # else a load may belong to who or what was refused
         check_trials(config.loads, study)
+        check_prefixes(config.ingest.prefixes, study)
     participants = _choose(study, chosen)
     _check_out(out)
     return OpenedStudy(study, config, participants, tuple(refusal_sentence(refusals)))

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from shutil import get_terminal_size
+from textwrap import fill
+
+import pandas as pd
 
 from bsip_cli.artifacts import read_artifact
-from bsip_cli.report.diagnosis import verdict_words
+from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
+from bsip_cli.report.verdict import Verdict, put_right_sentence, verdict_of
+from bsip_cli.report.words import printable
 from bsip_cli.schemas import SCHEMAS
 
-_KINDS, _GAIN = ("overall-diagnosis", "detection"), "overall-gain"
+_WIDEST = 100  # letters in a line
 
 
 def shown(out: Path) -> Iterator[str]:
@@ -25,21 +31,52 @@ def shown(out: Path) -> Iterator[str]:
     """
     yield tables_of(out)
     for folder in sorted(path for path in out.glob("sub-*") if path.is_dir()):
-        diagnosis, detection = (_path(folder, kind) for kind in _KINDS)
-        if diagnosis.exists() and detection.exists():
-            yield "\n".join([f"## Is anything wrong: {folder.name}", *_verdict(folder)])
+        diagnosis, detection = (_table(folder, kind) for kind in ("overall-diagnosis", "detection"))
+        if diagnosis is not None and detection is not None:
+            gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
+            found = verdict_of(diagnosis, detection, gains, changes)
+            right = put_right_sentence(_marker_events(folder))
+            yield verdict_text(folder.name, found, right, get_terminal_size().columns)
     for report in (out / "group" / "report.html", *sorted(out.glob("sub-*/report.html"))):
         if report.exists():
             yield f"report: {report}"
 
 
-def _path(folder: Path, kind: str) -> Path:
-    return folder / f"{folder.name}_{SCHEMAS[kind].file_name}.parquet"
+def verdict_text(name: str, found: Verdict, right: tuple[str, ...], columns: int) -> str:
+    """A diagnosis for a terminal of so many columns: causes numbered, lines broken; ``right`` says
+    what was put right before."""
+    width = max(40, min(columns, _WIDEST))
+    lines = [f"\n## Is anything wrong: {printable(name)}", _wrapped(found.headline, width)]
+    for number, cause in enumerate(found.causes, start=1):
+        lines.append(_wrapped(cause, width, f"{number:2d}. "))
+    rest = (*right, *found.results, *found.advice, found.limits)
+    lines += [_wrapped(text, width, "  - ") for text in rest if text]
+    return "\n".join(lines)
 
 
-def _verdict(folder: Path) -> tuple[str, ...]:
-    diagnosis, detection = (read_artifact(_path(folder, kind), kind) for kind in _KINDS)
-    gain = _path(folder, _GAIN)
-    return verdict_words(
-        diagnosis, detection, read_artifact(gain, _GAIN) if gain.exists() else None
+def _wrapped(text: str, width: int, first: str = "") -> str:
+    return fill(
+        printable(text),
+        width,
+        initial_indent=first,
+        subsequent_indent=" " * len(first),
+        break_long_words=False,
+        break_on_hyphens=False,
     )
+
+
+def _table(folder: Path, kind: str) -> pd.DataFrame | None:
+    path = folder / f"{folder.name}_{SCHEMAS[kind].file_name}.parquet"
+    return read_artifact(path, kind) if path.exists() else None
+
+
+def _marker_events(folder: Path) -> list[tuple[str, pd.DataFrame]]:
+    """Stems of the trials and what was found of their markers."""
+    ending = f"_{SCHEMAS['marker-events'].file_name}.parquet"
+    paths = sorted(folder.glob(f"{folder.name}_task-*{ending}"))
+    return [(p.name.removesuffix(ending), read_artifact(p, "marker-events")) for p in paths]
+
+
+def _extended(folder: Path, kind: str) -> pd.DataFrame | None:
+    table = _table(folder, kind)
+    return None if table is None else with_all_causes(table)

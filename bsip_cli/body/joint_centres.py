@@ -8,12 +8,13 @@ the ISB pelvis frame (Dumas and Wojtusch 2018), since the pubis is not marked; t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from bsip_cli.body.names import in_words
+from bsip_cli.body.stand_ins import whole_arm, with_trunk
 from bsip_cli.errors import BadDataError
 
 # Fractions of the distance between the ASIS, from their middle; X anterior, Y up, Z right.
@@ -46,7 +47,7 @@ class JointCentres:
 
 
 def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: float) -> JointCentres:
-    """Joint centres of the whole body.
+    """Joint centres of the whole body; trunk and arms may lack landmarks, pelvis and legs not.
 
     Raises
     ------
@@ -54,14 +55,14 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
         Landmarks without which there is no skeleton are missing: all are named.
     """
     _require(landmarks)
-    notes: list[str] = []
     axes, middle, width = _pelvis(landmarks)
     _require_sides(landmarks, axes[:, 2])
-    centres = {
-        "waist": middle + width * (axes @ _LJC[sex]),
-        "hip_r": middle + width * (axes @ _HJC[sex]),
-        "hip_l": middle + width * (axes @ (_HJC[sex] * np.array([1.0, 1.0, -1.0]))),
-    }
+    waist = middle + width * (axes @ _LJC[sex])
+    completed = with_trunk(landmarks, waist, axes, sex, stature_m)
+    landmarks, notes = completed.landmarks, list(completed.notes)
+    hips = hip_centres(landmarks, sex)
+    assert hips is not None
+    centres = {"waist": waist, "hip_r": hips["r"], "hip_l": hips["l"]}
     width, line, right = _thorax(landmarks, axes, centres["waist"], stature_m, notes)
     part, angle = _CJC[sex]
     centres["neck"] = landmarks["c7"] + part * width * _turned(line, right, angle)
@@ -71,46 +72,59 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
     for side in "lr":
         outward = right if side == "r" else -right
         centres[f"shoulder_{side}"] = landmarks[f"acromion_{side}"] + down
-        _arm(landmarks, centres, hinges, ends, side, outward, stature_m, notes)
+        shoulder, below = centres[f"shoulder_{side}"], unit(waist - centres["neck"])
+        arm = whole_arm(landmarks, shoulder, below, side, sex, stature_m)
+        notes += arm.notes
+        _arm(landmarks, arm, centres, hinges, ends, side, outward, stature_m, notes)
         outward = axes[:, 2] if side == "r" else -axes[:, 2]
         _leg(landmarks, centres, hinges, ends, side, outward, stature_m, notes)
     return JointCentres(centres, axes, hinges, ends, tuple(notes))
 
 
+def hip_centres(landmarks: Mapping[str, np.ndarray], sex: str) -> dict[str, np.ndarray] | None:
+    """Hip joint centres (3,) [m] by side, from the pelvis alone; None without its landmarks."""
+    behind = _mean(landmarks, ("psis_l", "psis_r", "sacrum"))
+    if behind is None or not {"asis_l", "asis_r"} <= landmarks.keys():
+        return None
+    axes, middle, width = _pelvis(landmarks)
+    return {
+        side: middle + width * (axes @ (_HJC[sex] * np.array([1.0, 1.0, sign])))
+        for side, sign in (("r", 1.0), ("l", -1.0))
+    }
+
+
 _REQUIRED = (
     "asis_l",
     "asis_r",
-    "c7",
     *(
         f"{name}_{side}"
-        for name in (
-            "acromion",
-            "elbow_lateral",
-            "styloid_radial",
-            "styloid_ulnar",
-            "knee_lateral",
-            "malleolus_lateral",
-            "calcaneus",
-        )
+        for name in ("knee_lateral", "malleolus_lateral", "calcaneus")
         for side in "lr"
     ),
 )
 
 
-def _require(landmarks: Mapping[str, np.ndarray]) -> None:
-    missing = [name for name in _REQUIRED if name not in landmarks]
+def missing_landmarks(known: Collection[str]) -> list[str]:
+    """What has no landmark among the known ones and no skeleton can do without, in words."""
+    missing = [name for name in _REQUIRED if name not in known]
     missing += [
-        f"a metatarsal of the {in_words(f'foot_{s}')}"
-        for s in "lr"
-        if _mean(landmarks, _toes(s)) is None
+        f"a metatarsal of the {in_words(f'foot_{side}')}"
+        for side in "lr"
+        if not any(name in known for name in _toes(side))
     ]
-    if _mean(landmarks, ("psis_l", "psis_r", "sacrum")) is None:
+    if not any(name in known for name in ("psis_l", "psis_r", "sacrum")):
         missing.append("psis_l and psis_r, or sacrum")
+    return missing
+
+
+def _require(landmarks: Mapping[str, np.ndarray]) -> None:
+    missing = missing_landmarks(landmarks.keys())
     if missing:
         raise BadDataError(
             f"no marker for {', '.join(missing)}",
             expected="at least one frame of the calibrating trial in which they are visible",
-            remedy="name the markers that serve in a marker set, or calibrate with another trial",
+            remedy="name the markers that serve in a marker set (`bsip markers FILE` shows what "
+            "the labels are taken for), or calibrate with another trial",
         )
 
 
@@ -119,7 +133,8 @@ def _require_sides(landmarks: Mapping[str, np.ndarray], right: np.ndarray) -> No
     swapped = [
         in_words(name)
         for name in ("acromion", "knee_lateral", "malleolus_lateral", "calcaneus")
-        if (landmarks[f"{name}_r"] - landmarks[f"{name}_l"]) @ right < 0
+        if {f"{name}_r", f"{name}_l"} <= landmarks.keys()
+        and (landmarks[f"{name}_r"] - landmarks[f"{name}_l"]) @ right < 0
     ]
     if swapped:
         raise BadDataError(
@@ -151,13 +166,14 @@ def _thorax(landmarks, pelvis, waist, stature_m, notes):
     return _THORAX_WIDTH * stature_m, _turned(forward, right, _THORAX_SLOPE), right
 
 
-def _arm(landmarks, centres, hinges, ends, side, outward, stature_m, notes):
-    shoulder, lateral = centres[f"shoulder_{side}"], landmarks[f"elbow_lateral_{side}"]
-    wrist = 0.5 * (landmarks[f"styloid_radial_{side}"] + landmarks[f"styloid_ulnar_{side}"])
+def _arm(landmarks, arm, centres, hinges, ends, side, outward, stature_m, notes):
+    shoulder, lateral, wrist = centres[f"shoulder_{side}"], arm.lateral, arm.wrist
     long_axis = unit(shoulder - lateral)
     medial = landmarks.get(f"elbow_medial_{side}")
     if medial is not None:
         elbow, across = 0.5 * (lateral + medial), lateral - medial
+    elif f"elbow_lateral_{side}" not in landmarks:
+        elbow, across = lateral, outward
     else:
         notes.append(_lateral_only(f"elbow_{side}"))
         across = _across_bent_elbow(long_axis, lateral - wrist, outward)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.config import shipped
-from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.errors import UsageError
 
 _SIDED = {
     "forehead",
@@ -23,6 +23,7 @@ _SIDED = {
     "elbow_medial",
     "styloid_radial",
     "styloid_ulnar",
+    "wrist",
     "metacarpal_2",
     "metacarpal_3",
     "metacarpal_5",
@@ -39,7 +40,7 @@ LANDMARKS = frozenset(
     {"vertex", "sellion", "forehead", "occiput", "c7", "t10", "suprasternale", "xiphoid", "sacrum"}
     | {f"{name}_{side}" for name in _SIDED for side in "lr"}
 )
-_TABLES = {"description", "segments", "weights", "aliases", "optional"}
+_TABLES = {"description", "also_called", "segments", "weights", "aliases", "optional"}
 
 
 @dataclass(frozen=True)
@@ -64,16 +65,20 @@ class MarkerSet:
         """Label and its aliases, for matching a file's labels."""
         return {marker.label: marker.aliases for marker in self.markers}
 
+    def optional(self) -> frozenset[str]:
+        """Labels that a recording may lack without a word."""
+        return frozenset(marker.label for marker in self.markers if marker.optional)
+
 
 def load_marker_set(name: str) -> MarkerSet:
-    """Read a marker set: the name of a shipped one, or a path to a TOML file.
+    """Read a marker set: the name of a shipped one, now or formerly, or a path to a TOML file.
 
     Raises
     ------
     UsageError
         There is no such file, or it names unknown segments or landmarks: all faults at once.
     """
-    file = Path(name) if name.endswith(".toml") else shipped("markersets", f"{name}.toml")
+    file = Path(name) if name.endswith(".toml") else _shipped_file(name)
     try:
         data = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError:
@@ -104,39 +109,19 @@ def load_marker_set(name: str) -> MarkerSet:
     return MarkerSet(file.stem, str(data.get("description", file.stem)), markers)
 
 
+def _shipped_file(name: str) -> Path:
+    """The file of this name, or the one that is also called so."""
+    file = shipped("markersets", f"{name}.toml")
+    others = () if file.exists() else shipped("markersets").glob("*.toml")
+    for other in others:
+        if name in tomllib.loads(other.read_text(encoding="utf-8")).get("also_called", ()):
+            return other
+    return file
+
+
 def shipped_names() -> tuple[str, ...]:
     """Names of the marker sets that ship with bsip."""
     return tuple(sorted(path.stem for path in shipped("markersets").glob("*.toml")))
-
-
-def guess_marker_set(labels: Collection[str]) -> MarkerSet:
-    """The shipped set of which most markers are there; labels may carry a ``Subject:`` prefix.
-
-    Raises
-    ------
-    BadDataError
-        No set has half of its markers among the labels.
-    """
-    plain = {label.rsplit(":", 1)[-1].strip().upper() for label in labels}
-
-    def share(marker_set: MarkerSet) -> float:
-        hits = [
-            bool(plain & {name.upper() for name in (marker.label, *marker.aliases)})
-            for marker in marker_set.markers
-            if not marker.optional
-        ]
-        return sum(hits) / len(hits)
-
-    best = max((load_marker_set(name) for name in shipped_names()), key=share)
-    if share(best) < 0.5:
-        raise BadDataError(
-            f"no known marker set fits: {best.name} comes nearest with {share(best):.0%} of its "
-            f"markers; labels are {', '.join(sorted(labels)[:12])} ...",
-            expected="one of " + ", ".join(shipped_names()),
-            remedy="write a marker set (see configs/markersets) and name it in study.toml: "
-            'marker_set = "my_set.toml"',
-        )
-    return best
 
 
 def _faults(data: dict) -> list[str]:
@@ -164,6 +149,8 @@ def _faults(data: dict) -> list[str]:
 def _option_faults(data: dict, labels: list[str]) -> list[str]:
     weights, aliases = data.get("weights", {}), data.get("aliases", {})
     optional = data.get("optional", {})
+    if not _are_words(data.get("also_called", [])):
+        return ['also_called: expected a list like ["other_name"]']
     tables = {"weights": weights, "aliases": aliases, "optional": optional}
     faults = [f"{k}: expected a table" for k, v in tables.items() if not isinstance(v, dict)]
     if faults:

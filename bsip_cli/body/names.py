@@ -35,6 +35,11 @@ def the_joint(name: str) -> str:
     return "the whole body" if name == "root" else f"the {in_words(name)}"
 
 
+def without_side(name: str) -> str:
+    """The kind of segment: upper_arm for upper_arm_l; what has no side, itself."""
+    return name[:-2] if name[-2:] in _SIDES else name
+
+
 def mirrored(name: str) -> str:
     """The same on the other side: upper_arm_r for upper_arm_l; what has no side, itself."""
     other = {"_l": "_r", "_r": "_l"}.get(name[-2:])

@@ -8,6 +8,9 @@ import numpy as np
 
 from bsip_cli.body.skeleton import Skeleton
 
+# A marker trusted to 5 mm leaves the turn about an axis so near uncertain by a quarter radian.
+_LEVER_M = 0.02
+
 
 @dataclass(frozen=True)
 class Person:
@@ -39,6 +42,22 @@ class Person:
     marker_positions_m: np.ndarray
     marker_weights: np.ndarray
     held: np.ndarray
+
+    def without_data(self) -> np.ndarray:
+        """(n,) segments whose motion no markers show.
+
+        Held ones, and ends of limbs on spherical joints whose markers lie on a line through the
+        joint, as a hand with the styloids only: how it bends cannot be told.
+        """
+        lost = np.array(self.held, dtype=bool)
+        in_joint = self.markers_in_joint_m()
+        for i in set(range(len(lost))) - set(self.skeleton.parents):
+            own = in_joint[self.marker_segments == i]
+            if self.skeleton.joint_types[i] == "spherical" and len(own):
+                _, _, axes = np.linalg.svd(own)
+                beside = own - np.outer(own @ axes[0], axes[0])
+                lost[i] |= np.linalg.norm(beside, axis=1).max() < _LEVER_M
+        return lost
 
     def joint_positions_m(self) -> np.ndarray:
         """(n, 3) joint centres as seen from the parent's *joint*, parent axes."""

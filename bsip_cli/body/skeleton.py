@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -49,6 +50,13 @@ class Skeleton:
     def side(self, segment: str) -> str:
         """``l``, ``r`` or an empty string."""
         return segment[-1] if segment.endswith(("_l", "_r")) else ""
+
+    def informed(self, marked: Collection[str]) -> tuple[bool, ...]:
+        """Whether each segment is a marked one or has one beyond it."""
+        known = [segment in marked for segment in self.segments]
+        for i in range(len(known) - 1, 0, -1):
+            known[self.parents[i]] |= known[i]
+        return tuple(known)
 
     @cached_property
     def q_names(self) -> tuple[str, ...]:

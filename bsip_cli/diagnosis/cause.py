@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.joint_change import Sized, joint_change, joint_delay_s
 from bsip_cli.effects.scene import Scene
 
 
@@ -28,17 +29,29 @@ class Cause:
     values: np.ndarray
     folds: np.ndarray
 
-    def change(self, scene: Scene) -> np.ndarray:
-        """(N, 6) what it adds to the simulated wrench, about the world's origin [N, N m]."""
-        return self.effect.change(scene, self.target, self.values)
 
-    def unseen_change(self, scene: Scene, fold: np.ndarray) -> np.ndarray:
-        """(N, 6) the same, every frame with the sizes that its fold (N,) did not help to find."""
-        change = np.empty((len(fold), 6))
-        for number in np.unique(fold):
-            frames = fold == number
-            change[frames] = self.effect.change(scene, self.target, self.folds[number])[frames]
-        return change
+def change_by(causes: Sequence[Cause], scene: Scene) -> np.ndarray:
+    """(N, 6) what causes add to the simulated wrench, about the world's origin [N, N m]."""
+    return joint_change(scene, _sized(causes))
+
+
+def delay_by(causes: Sequence[Cause], scene: Scene) -> np.ndarray:
+    """(N,) how late causes make the forces of each frame [s]."""
+    return joint_delay_s(scene, _sized(causes))
+
+
+def _sized(causes: Sequence[Cause]) -> list[Sized]:
+    return [(c.effect, c.target, c.values) for c in causes]
+
+
+def unseen_change_by(causes: Sequence[Cause], scene: Scene, fold: np.ndarray) -> np.ndarray:
+    """(N, 6) the same, every frame with the sizes that its fold (N,) did not help to find."""
+    change = np.empty((len(fold), 6))
+    for number in np.unique(fold):
+        frames = fold == number
+        sized = [(c.effect, c.target, c.folds[number]) for c in causes]
+        change[frames] = joint_change(scene, sized)[frames]
+    return change
 
 
 def method_of(causes: Iterable[Cause]) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from bsip_cli.diagnosis.cause import Cause
+from bsip_cli.diagnosis.cause import Cause, change_by, delay_by
 from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.scene import Scene
 
@@ -28,13 +28,8 @@ def corrected_wrench(
     frames to which they belong.
     """
     wrench, valid = measured.copy(), scene.valid.copy()
-    for cause in causes:
-        if cause.effect.of_the_plates:
-            wrench -= cause.change(scene)
-    late_s = np.zeros(len(scene.times_s))
-    for cause in causes:
-        if isinstance(cause.effect, Delay):
-            late_s += cause.effect.late_s(scene, cause.values)
+    wrench -= change_by([cause for cause in causes if cause.effect.of_the_plates], scene)
+    late_s = delay_by(causes, scene)
     if late_s.any():
         wrench, valid = _earlier(wrench, valid, scene.times_s, late_s)
     return wrench, valid

@@ -19,7 +19,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.ndimage import median_filter
 
 from bsip_cli.dynamics.lowpass import lowpass_operator
-from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.scene import Scene, standing_place_m
 from bsip_cli.identification.equations import ResidualSeries
 from bsip_cli.identification.noise import noise_of
 
@@ -28,6 +28,7 @@ _OVERSAMPLING = 2.5
 _ORDER = 4  # of the autoregression
 _SMOOTH_HZ = 0.75  # half-width of the median over the spectrum
 _ROUNDS = 3
+_FLOOR = 1e-6  # of the noise's power, taken for white
 
 
 @dataclass(frozen=True)
@@ -55,8 +56,8 @@ def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
     operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz, stride)
     cuts = np.flatnonzero(np.diff(frames) != stride) + 1
     edges = [0, *cuts.tolist(), len(frames)]
-    place = np.append(scene.q[scene.valid, :2].mean(axis=0), 0.0)
-    return Filter(operator, frames, tuple(pairwise(edges)), place, scene.rate_hz / stride)
+    place, rate_hz = standing_place_m(scene), scene.rate_hz / stride
+    return Filter(operator, frames, tuple(pairwise(edges)), place, rate_hz)
 
 
 @dataclass(frozen=True)
@@ -111,10 +112,12 @@ class TrialEvidence:
     residual: np.ndarray
     shared: np.ndarray
 
-    def with_noise_beside(self, change: np.ndarray) -> TrialEvidence:
-        """The same trial; its noise is what remains beside a known change of the wrench (N, 6)."""
-        beside = self.filtered.filter(change[..., None])[..., 0]
-        return _evidence(self.name, self.scene, self.filtered, beside)
+    def with_noise_beside(self, change: np.ndarray, floor: float = _FLOOR) -> TrialEvidence:
+        """The same trial; its noise is what remains beside a known, filtered change (n, 6).
+
+        floor : part of the noise's power that is white whatever the residual says.
+        """
+        return _evidence(self.name, self.scene, self.filtered, change, floor)
 
     def white(self, wrenches: np.ndarray) -> np.ndarray:
         """(6 n, k) of world wrenches (N, 6, k)."""
@@ -152,8 +155,10 @@ def trial_evidence(
     return _evidence(name, fewer, filtered, np.zeros_like(residual))
 
 
-def _evidence(name: str, scene: Scene, filtered: Filtered, beside: np.ndarray) -> TrialEvidence:
-    whitening = _whitening(filtered, beside)
+def _evidence(
+    name: str, scene: Scene, filtered: Filtered, beside: np.ndarray, floor: float = _FLOOR
+) -> TrialEvidence:
+    whitening = _whitening(filtered, beside, floor)
     white = whitening.of_filtered(filtered.residual[..., None])[:, 0]
     shared = whitening.of_filtered(filtered.shared)
     return TrialEvidence(name, scene, filtered, whitening, white, shared)
@@ -167,7 +172,7 @@ def _residual(scene: Scene, filter_: Filter, stride: int, cutoff_hz: float) -> n
     return full((scene.measured - scene.predicted)[..., None])[..., 0]
 
 
-def _whitening(filtered: Filtered, beside: np.ndarray) -> Whitening:
+def _whitening(filtered: Filtered, beside: np.ndarray, floor: float) -> Whitening:
     """Noise of what a known change (n, 6) and all nuisances leave of the residual, and the own
     nuisances in the coordinates of that noise."""
     filter_, level = filtered.filter, filtered.level
@@ -182,7 +187,8 @@ def _whitening(filtered: Filtered, beside: np.ndarray) -> Whitening:
         explained = nuisances @ np.linalg.solve(inner, known.T @ flat[:, 0])
         remaining = left_over - explained
         spread = _course(remaining, level)
-        recursion = np.stack([_recursion(x, filter_.rate_hz) for x in (remaining / spread).T])
+        series = (remaining / spread).T
+        recursion = np.stack([_recursion(x, filter_.rate_hz, floor) for x in series])
         innovations = _innovations((remaining / spread)[..., None], recursion, filter_)
         spread = spread * innovations.reshape(-1, 6).std(axis=0)
         known = _innovations(nuisances / spread[..., None], recursion, filter_)
@@ -196,7 +202,7 @@ def _course(residual: np.ndarray, level: np.ndarray) -> np.ndarray:
     return noise.rms / np.sqrt(noise.weights_at(level))
 
 
-def _recursion(series: np.ndarray, rate_hz: float) -> np.ndarray:
+def _recursion(series: np.ndarray, rate_hz: float, floor: float) -> np.ndarray:
     """(_ORDER,) autoregression by Yule and Walker, of the smooth part of the spectrum.
 
     A running median over frequencies leaves out lines: an offset or a swing at one frequency is no
@@ -206,7 +212,7 @@ def _recursion(series: np.ndarray, rate_hz: float) -> np.ndarray:
     width = 2 * max(1, round(_SMOOTH_HZ * len(series) / rate_hz)) + 1
     smooth = median_filter(power, size=width, mode="reflect")
     lags = np.fft.irfft(smooth)[: _ORDER + 1]
-    lags[0] *= 1 + 1e-6
+    lags[0] *= 1 + floor
     return solve_toeplitz(lags[:-1], lags[1:])
 
 

@@ -10,12 +10,13 @@ from scipy.optimize import minimize
 from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence, clipped
 from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.joint_change import joint_change
 from bsip_cli.effects.scene import Scene
 
 NEGLIGIBLE = 0.25  # of the typical size
 _STEPS = 20  # of Gauss and Newton: large effects come out of the clipping step by step
 _DIFFERENCE = 0.1  # of the typical size: a moment in time moves by a part of a frame at least
-_SEARCH = 60  # evaluations for a moment, a frequency or a window
+_SEARCH = 80  # evaluations for a moment, a frequency or a window
 
 
 @dataclass(frozen=True)
@@ -154,12 +155,25 @@ def fit_together(evidence: Evidence, explanations: tuple[Explanation, ...]) -> F
     return Fit(found, *_linear(evidence, found))
 
 
+def changes_of(evidence: Evidence, explanations: tuple[Explanation, ...]) -> list[np.ndarray]:
+    """(N, 6) of each trial: what all explanations change together."""
+    return [
+        joint_change(
+            one.scene, [(e.effect, e.target, e.values) for e in explanations if t in e.place.trials]
+        )
+        for t, one in enumerate(evidence.trials)
+    ]
+
+
 def _linear(
     evidence: Evidence, explanations: tuple[Explanation, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
-    residual = evidence.residual.copy()
-    for one in explanations:
-        residual -= one.change(evidence)
+    residual = evidence.residual
+    if explanations:
+        changes = enumerate(changes_of(evidence, explanations))
+        touched = {t for e in explanations for t in e.place.trials}
+        parts = {t: evidence.trials[t].white(x[..., None]) for t, x in changes if t in touched}
+        residual = residual - evidence.white(parts)[:, 0]
     tangents = [np.zeros((len(residual), 0)), *(one.tangent(evidence) for one in explanations)]
     return clipped(residual), np.concatenate(tangents, axis=1)
 
@@ -169,7 +183,7 @@ def refined(evidence: Evidence, one: Explanation, others: Fit) -> Explanation:
     scanned = ~one.is_free(evidence)
     if not scanned.any():
         return one
-    scale = one.all_typical(evidence)[scanned]
+    scale = one.effect.spacing(one.scene(evidence), one.target, one.values)
     bounds = np.array([(p.least, p.most) for p in one.parameters(evidence) if p.scan])
     basis, _ = np.linalg.qr(others.tangent)
     residual = others.residual - basis @ (basis.T @ others.residual)

@@ -15,7 +15,6 @@ from bsip_cli.diagnosis.selection import ALPHA, Round, Selection, Tried
 from bsip_cli.diagnosis.together import Evidence
 
 Verdict = Literal["named", "ambiguous", "rejected"]
-_Z95 = 1.959964
 
 
 @dataclass(frozen=True)
@@ -124,6 +123,8 @@ def _rejected(evidence: Evidence, tried: Tried) -> Finding:
     why = (
         f"chance brings as much in {100 * tried.p_value:.0f} % of cases"
         if tried.p_value > ALPHA
+        else "it is no more than what a larger cause leaves behind"
+        if tried.is_leftover
         else "another cause explains it better"
         if tried.is_good
         else "on data held out it does not help"
@@ -133,8 +134,7 @@ def _rejected(evidence: Evidence, tried: Tried) -> Finding:
 
 
 def _with(evidence, tried: Tried, verdict: Verdict, class_id: str, numbers, sentence) -> Finding:
-    one, gain = tried.explanation, tried.gain
-    half = _Z95 * gain.error_percent
+    one = tried.explanation
     trials = tuple(evidence.trials[t].name for t in one.place.trials)
     return Finding(
         one.effect.name,
@@ -143,7 +143,7 @@ def _with(evidence, tried: Tried, verdict: Verdict, class_id: str, numbers, sent
         verdict,
         class_id,
         tried.p_value,
-        (gain.percent, gain.percent - half, gain.percent + half),
+        tried.gain.interval(),
         numbers,
         sentence,
     )

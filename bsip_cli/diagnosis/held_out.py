@@ -11,6 +11,7 @@ from bsip_cli.diagnosis.together import Evidence
 
 BLOCK_S = 1.0
 FOLDS = 5
+Z95 = 1.959964  # of the normal distribution
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,15 @@ class Gain:
     def is_real(self) -> bool:
         """Larger than its standard error."""
         return self.percent > self.error_percent
+
+    def is_sure(self) -> bool:
+        """Its 95 % interval lies above zero."""
+        return self.interval()[1] > 0
+
+    def interval(self) -> tuple[float, float, float]:
+        """Percent, and its 95 % interval."""
+        half = Z95 * self.error_percent
+        return self.percent, self.percent - half, self.percent + half
 
 
 def standard_error(blocks: np.ndarray) -> float:

@@ -9,14 +9,20 @@ from __future__ import annotations
 from abc import abstractmethod
 
 import numpy as np
+from scipy.ndimage import median_filter
+from scipy.signal import find_peaks
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.effects.channel_words import OF_THE_LAB, unit_of
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.plate_frame import CHANNELS
 from bsip_cli.effects.scene import Scene
 
 UNEXPLAINED = "unexplained"
 _SIZE_N, _SIZE_NM = 40.0, 20.0
+_FASTEST_HZ = 8.0  # beyond it the low-pass leaves nothing but its own edge
+_LINE, _AROUND_HZ, _MOST_LINES = 30.0, 0.75, 3  # of noise one in 10^9 frequencies is as high
+_ALONG = {"x": "along the lab's X axis", "y": "along the lab's Y axis", "z": "up and down"}
 
 
 class Pattern(Effect):
@@ -28,11 +34,10 @@ class Pattern(Effect):
 
     @abstractmethod
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
-        """With what, for a sentence."""
+        """With what, and how large it is, for a sentence."""
 
     def sentence(self, target: str, values: np.ndarray) -> str:
-        along = self.goes_along_with(target, values)
-        return f"something is wrong that has no name here; it goes along with {along}"
+        return f"something without a name goes along with {self.goes_along_with(target, values)}"
 
 
 class Tone(Pattern):
@@ -42,15 +47,16 @@ class Tone(Pattern):
         return CHANNELS
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        size, unit = (_SIZE_N, "N") if target.startswith("f") else (_SIZE_NM, "N m")
+        size, unit = _SIZE_N if target.startswith("f") else _SIZE_NM, unit_of(target)
         duration = max(float(np.ptp(scene.times_s)), 2.0)
-        slowest, fastest = 2.0 / duration, 0.16 * scene.rate_hz
+        slowest, fastest = 2.0 / duration, min(_FASTEST_HZ, 0.16 * scene.rate_hz)
         count = min(60, int((fastest - slowest) * duration))
-        paces = tuple(float(f) for f in np.linspace(slowest, fastest, count))
+        regular = np.linspace(slowest, fastest, count)
+        paces = tuple(float(f) for f in (*regular, *_lines_hz(scene, target, slowest, fastest)))
         return (
             Parameter("cosine", unit, -1e3, 1e3, size),
             Parameter("sine", unit, -1e3, 1e3, size),
-            Parameter("frequency", "Hz", 0.0, scene.rate_hz, 0.3 / duration, paces),
+            Parameter("frequency", "Hz", 0.5 * slowest, fastest, 0.3 / duration, paces),
         )
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
@@ -59,7 +65,38 @@ class Tone(Pattern):
         return _in_channel(scene, target, wave)
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
-        return f"a swing of {target} at {values[2]:.2f} Hz"
+        size = f"{np.hypot(values[0], values[1]):.1f} {unit_of(target)}"
+        return f"a swing of {OF_THE_LAB[target]} by {size}, {values[2]:.2f} times per second"
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        amplitude = float(np.hypot(values[0], values[1]))
+        return ("amplitude", unit_of(target), amplitude), ("frequency", "Hz", float(values[2]))
+
+
+def _lines_hz(scene: Scene, channel: str, slowest: float, fastest: float) -> np.ndarray:
+    """(k,) frequencies at which a channel's residual stands far out of its spectrum.
+
+    In a long trial a swing at one frequency would fall between the regular ones.
+    """
+    key = (UNEXPLAINED, channel)
+    return scene.once(key, lambda: _computed_lines_hz(scene, channel, slowest, fastest))
+
+
+def _computed_lines_hz(scene: Scene, channel: str, slowest: float, fastest: float) -> np.ndarray:
+    residual = (scene.measured - scene.predicted)[:, CHANNELS.index(channel)]
+    course = np.where(scene.valid, np.nan_to_num(residual), 0.0)
+    course = np.where(scene.valid, course - course[scene.valid].mean(), 0.0)
+    count = 2 * len(course)
+    power = np.abs(np.fft.rfft(course * np.hanning(len(course)), count)) ** 2
+    hertz = np.fft.rfftfreq(count, 1 / scene.rate_hz)
+    around = 2 * round(_AROUND_HZ * count / scene.rate_hz) + 1
+    height = power / np.maximum(median_filter(power, around, mode="nearest"), 1e-12)
+    peaks, found = find_peaks(height, height=_LINE)
+    peaks = peaks[np.argsort(-found["peak_heights"])][:_MOST_LINES]
+    inside = (hertz[peaks] > slowest) & (hertz[peaks] < fastest)
+    return hertz[peaks][inside]
 
 
 class Curve(Pattern):
@@ -70,7 +107,7 @@ class Curve(Pattern):
         return CHANNELS
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        size, unit = (_SIZE_N, "N") if target.startswith("f") else (_SIZE_NM, "N m")
+        size, unit = _SIZE_N if target.startswith("f") else _SIZE_NM, unit_of(target)
         return (Parameter("curvature", unit, -1e3, 1e3, size),)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
@@ -80,7 +117,10 @@ class Curve(Pattern):
         return _in_channel(scene, target, values[0] * bend)
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
-        return f"the square of the vertical force, in {target}"
+        return (
+            f"a part of {OF_THE_LAB[target]} that grows with the square of the load "
+            f"({values[0]:+.1f} {unit_of(target)} at one body weight above the mean)"
+        )
 
 
 class Play(Pattern):
@@ -90,7 +130,7 @@ class Play(Pattern):
         return CHANNELS
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        size, unit = (_SIZE_N, "N") if target.startswith("f") else (_SIZE_NM, "N m")
+        size, unit = _SIZE_N if target.startswith("f") else _SIZE_NM, unit_of(target)
         return (Parameter("play", unit, -1e3, 1e3, size),)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
@@ -100,7 +140,11 @@ class Play(Pattern):
         return _in_channel(scene, target, values[0] * np.tanh(2 * speed / max(typical, 1e-9)))
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
-        return f"the direction in which {target} changes"
+        order = "with" if values[0] > 0 else "against"
+        return (
+            f"an error of {OF_THE_LAB[target]} by up to {abs(values[0]):.1f} {unit_of(target)} "
+            f"{order} the direction in which it is changing, as of play or friction"
+        )
 
 
 class Spring(Pattern):
@@ -121,7 +165,11 @@ class Spring(Pattern):
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
         force, place = target.split(" by ")
-        return f"the pelvis' place along {place}, as a force along {force} that acts there"
+        size = f"{abs(values[0]):.0f} N per metre that the pelvis moves {_ALONG[place]}"
+        if force == place:
+            order = "back to its mean place" if values[0] > 0 else "away from its mean place"
+            return f"a pull on the pelvis {order}, as of an elastic or a rope: {size}"
+        return f"a force on the pelvis {_ALONG[force]}: {size}"
 
 
 PATTERNS: tuple[Pattern, ...] = (Tone(), Curve(), Play(), Spring())

@@ -18,6 +18,7 @@ from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.effects.plate_gain import PlateGain
 from bsip_cli.effects.plate_zero import PlateZero
+from bsip_cli.effects.scene import Scene
 
 TRUSTED = 0.008  # standard deviation of a stated mass, relative: clothes, shoes, a meal
 NOTICED = 0.02  # part of the mass from which on it is told
@@ -25,12 +26,13 @@ NOTICED = 0.02  # part of the mass from which on it is told
 
 def mass_difference(evidence: Evidence) -> np.ndarray:
     """(trials,) mean vertical force against the simulated one, part of body weight."""
-    found = []
-    for one in evidence.trials:
-        scene = one.scene
-        apart = (scene.measured - scene.predicted)[scene.valid, 2]
-        found.append(float(apart.mean()) / (scene.mass_kg * GRAVITY_M_S2))
-    return np.array(found)
+    return np.array([weight_share(one.scene) for one in evidence.trials])
+
+
+def weight_share(scene: Scene) -> float:
+    """Mean vertical force beyond the simulated one, part of body weight."""
+    apart = (scene.measured - scene.predicted)[scene.valid, 2]
+    return float(apart.mean()) / (scene.mass_kg * GRAVITY_M_S2)
 
 
 def weight_round(evidence: Evidence) -> Round | None:
@@ -71,4 +73,6 @@ def _tried(
     found = Explanation(place, np.array([size]))
     fit = fit_together(evidence, (found,))
     gain = gain_of(evidence, trials, before.residual, fit.residual, fit.tangent)
-    return Tried(fit.explanations[0], score_of(before, fit, 1), p_value, gain, fit)
+    return Tried(
+        fit.explanations[0], score_of(before, fit, 1), p_value, gain, fit, is_leftover=False
+    )

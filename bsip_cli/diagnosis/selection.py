@@ -11,20 +11,21 @@ import numpy as np
 from bsip_cli.diagnosis.chance import Chance, chance_of, flipped
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together, refined
 from bsip_cli.diagnosis.held_out import Gain, gain_of
+from bsip_cli.diagnosis.likely_noise import likely_columns, with_likely_noise, with_noise_beside
 from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.diagnosis.signatures import Place, Signatures
-from bsip_cli.diagnosis.together import Evidence, together
+from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.statistics.chi_square import minus_log_p
 
 MOST = 3  # causes in one trial
 TRIES = 10  # candidates that are refitted in a round
 WORTH_A_TRY = 0.5  # of the best score
-ALPHA = 0.05
+ALPHA = 0.01  # in every round; with the chance's own errors one null in twenty has an alarm
 SUPPORT = 8.0  # squared white residual that a trial must save to share a cause
-CONTENDERS = 3  # candidates that are given a noise of their own
-CONTENDS = 0.6  # of the best score
 # A cause from the catalogue is named though a regularity without a name explains a bit more.
 NAMED_AT = 0.95
+# What a large cause leaves behind, since no model of it is exact, is no other cause.
+LEFTOVER = 0.005  # of the squared residual that earlier causes took from the same trials
 AGAIN = 1.25  # how much more an effect counts that another trial shows already
 
 
@@ -37,11 +38,16 @@ class Tried:
     p_value: float
     gain: Gain
     fit: Fit
+    is_leftover: bool
 
     @property
     def is_good(self) -> bool:
-        """Rarer by chance than ALPHA, and better on what it has not seen."""
-        return self.p_value <= ALPHA and self.gain.is_real()
+        """Rarer by chance than ALPHA, better on what it has not seen, and not what is left over of
+        a larger cause. What has no name must be better for sure."""
+        if self.p_value > ALPHA or self.is_leftover:
+            return False
+        unnamed = self.explanation.effect.name == UNEXPLAINED
+        return self.gain.is_sure() if unnamed else self.gain.is_real()
 
 
 @dataclass(frozen=True)
@@ -72,12 +78,8 @@ def select(
     found: tuple[Explanation, ...] = tuple(r.kept.explanation for r in rounds if r.kept)
     while open_trials := _open_trials(signatures.evidence, found):
         before = fit_together(signatures.evidence, found)
+        signatures, before = with_likely_noise(signatures, before)
         tried = _tried(signatures, before, open_trials)
-        if tried:
-            # A cause must not be taken for noise: what the best one leaves says what is noise.
-            signatures = signatures.on(_likeliest_noise(signatures.evidence, tried))
-            before = fit_together(signatures.evidence, found)
-            tried = _tried(signatures, before, open_trials)
         one = _round(signatures, before, tried, rng)
         rounds.append(one)
         if one.kept is None:
@@ -85,36 +87,8 @@ def select(
         found = one.kept.fit.explanations
     last = fit_together(signatures.evidence, found)
     if found:
-        signatures = signatures.on(_with_noise_beside(signatures.evidence, last))
-        last = fit_together(signatures.evidence, found)
+        signatures, last = with_noise_beside(signatures, last)
     return Selection(signatures, tuple(rounds), last)
-
-
-def _likeliest_noise(evidence: Evidence, tried: list[tuple[Explanation, Fit, float]]) -> Evidence:
-    """The noise beside the candidate that, with its own noise, is the likeliest.
-
-    Scores alone judge all candidates by a noise that holds the true one.
-    """
-    best = max(score for _, _, score in tried)
-    near = sorted(tried, key=lambda one: -one[2])[:CONTENDERS]
-    fits = [fit for _, fit, score in near if score >= CONTENDS * best]
-    noises = [_with_noise_beside(evidence, fit) for fit in fits]
-    if len(noises) == 1:
-        return noises[0]
-    likelihoods = [
-        noise.log_likelihood(fit_together(noise, fit.explanations).residual)
-        for noise, fit in zip(noises, fits, strict=True)
-    ]
-    return noises[int(np.argmax(likelihoods))]
-
-
-def _with_noise_beside(evidence: Evidence, fit: Fit) -> Evidence:
-    """The trials with the noise that a fit leaves."""
-    trials = []
-    for t, one in enumerate(evidence.trials):
-        changes = [e.wrench(one.scene) for e in fit.explanations if t in e.place.trials]
-        trials.append(one.with_noise_beside(sum(changes, np.zeros_like(one.scene.measured))))
-    return together(tuple(trials))
 
 
 def _open_trials(evidence: Evidence, found: tuple[Explanation, ...]) -> set[int]:
@@ -147,8 +121,9 @@ def _round(
     rng: np.random.Generator,
 ) -> Round:
     best = max(tried, key=lambda t: t[2])[1] if tried else before
-    courses = flipped(signatures.evidence, best.residual, rng)
-    scores, _ = signatures.scores(courses, best.tangent)
+    known = np.column_stack([best.tangent, likely_columns(signatures, best)])
+    left = best.residual - known @ np.linalg.lstsq(known, best.residual, rcond=None)[0]
+    scores, _ = signatures.scores(flipped(signatures.evidence, left, rng), known)
     chance = chance_of(scores, signatures.places)
     judged = [_judged(signatures.evidence, before, *one, chance) for one in tried]
     judged.sort(key=lambda t: -t.score)
@@ -279,8 +254,20 @@ def _judged(
     score: float,
     chance: Chance,
 ) -> Tried:
-    gain = gain_of(evidence, found.place.trials, before.residual, fit.residual, fit.tangent)
-    return Tried(found, score, chance.p_value(score, found.place.trials), gain, fit)
+    trials = found.place.trials
+    gain = gain_of(evidence, trials, before.residual, fit.residual, fit.tangent)
+    leftover = _is_leftover(evidence, trials, before.residual, fit.residual)
+    return Tried(found, score, chance.p_value(score, trials), gain, fit, leftover)
+
+
+def _is_leftover(
+    evidence: Evidence, trials: tuple[int, ...], before: np.ndarray, after: np.ndarray
+) -> bool:
+    rows = np.concatenate([np.arange(len(before))[evidence.rows(t)] for t in trials])
+    nothing, without, beside = (
+        float((residual[rows] ** 2).sum()) for residual in (evidence.residual, before, after)
+    )
+    return without - beside < LEFTOVER * (nothing - without)
 
 
 def score_of(before: Fit, after: Fit, free: int) -> float:

@@ -1,18 +1,22 @@
-"""What every lab does a little wrong: too small to name, and not to be taken for something else."""
+"""What every lab and every smoothing does a little wrong: too small to name, and not to be taken
+for something else."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from bsip_cli.diagnosis.candidates import Candidate, candidates_of
-from bsip_cli.effects.catalogue import CATALOGUE
+from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.gravity_tilt import GravityTilt
-from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.scene import Scene, standing_place_m
 
 SHARE = 0.02  # of the size that labs meet
 HORIZONTAL = 0.7  # the same for the gain of horizontal forces
+# The spline of `ik` takes as much as a low-pass at this cut-off, with a softer edge.
+SPLINE_HZ, EDGE = 11.0, 3
+BLUR_S = 0.015  # standard deviation of a Gaussian that the one passed and the other did not
 
 
 def slack(scene: Scene) -> np.ndarray:
@@ -20,10 +24,24 @@ def slack(scene: Scene) -> np.ndarray:
     instruments = [effect for effect in CATALOGUE if _is_of_instruments(effect)]
     columns = [
         _share(c) * c.signature(scene)
-        for effect in instruments
+        for effect in (*instruments, EFFECTS["over_smoothing"])
         for c in candidates_of(effect, scene)
     ]
-    return np.concatenate(columns, axis=2)
+    return np.concatenate([*columns, _blurred(scene)], axis=2)
+
+
+def _blurred(scene: Scene) -> np.ndarray:
+    """(N, 6, 6) each component as if simulated motion and measured force were not equally sharp.
+
+    Without it two opposite delays, or a delay and a clock, make up for what the motion lacks.
+    """
+    place = standing_place_m(scene)
+    course = scene.predicted.copy()
+    course[:, 3:] -= np.cross(place, course[:, :3])
+    bent = np.gradient(np.gradient(course, axis=0), axis=0) * scene.rate_hz**2
+    columns = 0.5 * BLUR_S**2 * bent[..., None] * np.eye(6)
+    columns[:, 3:] += np.cross(place, columns[:, :3], axisb=1, axisc=1)
+    return columns
 
 
 def _is_of_instruments(effect: Effect) -> bool:
@@ -32,5 +50,7 @@ def _is_of_instruments(effect: Effect) -> bool:
 
 def _share(candidate: Candidate) -> float:
     """Horizontal forces are all motion, so what the motion's amplitude errs by is their gain."""
+    if candidate.effect.name == "over_smoothing":
+        return (candidate.scanned[0] / SPLINE_HZ) ** EDGE
     horizontal = candidate.target.endswith((" fx", " fy"))
     return HORIZONTAL if candidate.effect.name == "plate_gain" and horizontal else SHARE

@@ -34,10 +34,16 @@ class Basis:
         return len(self.independent)
 
 
-def find_basis(model: pin.Model) -> Basis:
-    """Basis of a model's inertial parameters, from its geometry alone."""
+def find_basis(model: pin.Model, known: np.ndarray | None = None) -> Basis:
+    """Basis of a model's inertial parameters, from its geometry alone.
+
+    known : (10 n,) parameters that are known and so in no combination; None for none.
+    """
     stacked = random_regressor(model, _STATES).reshape(-1, 10 * (model.njoints - 1))
+    if known is not None:
+        stacked = stacked * ~known
     scale = np.linalg.norm(stacked, axis=0)
+    scale[scale == 0] = 1.0
     triangle = np.asarray(np.linalg.qr(stacked / scale, mode="r"))
     independent, dependent = _split(triangle)
     beta = np.linalg.lstsq(triangle[:, independent], triangle[:, dependent], rcond=None)[0]

@@ -9,6 +9,7 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
 REACH_M = 0.6
+LEAST_KG = 0.2  # less is what the segment itself may differ by
 
 
 class AddedMass(Effect):
@@ -41,21 +42,23 @@ class AddedMass(Effect):
     def reported(
         self, scene: Scene, target: str, values: np.ndarray
     ) -> tuple[tuple[str, str, float], ...]:
-        """Mass and its position in the segment's axes, from the segment's origin."""
-        if values[0] == 0:
-            return (("mass", "kg", 0.0),)
-        place = scene.centre_of(target) + values[1:] / values[0]
+        """Mass and its position in the segment's axes, from the segment's origin.
+
+        No mass counts as one at the segment's centre.
+        """
+        offset = values[1:] / values[0] if values[0] else np.zeros(3)
+        place = scene.centre_of(target) + offset
         positions = (
             (f"position_{axis}", "m", float(x)) for axis, x in zip("xyz", place, strict=True)
         )
         return (("mass", "kg", float(values[0])), *positions)
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        within = super().possible(scene, target, values)
-        return within and bool(np.linalg.norm(values[1:]) <= REACH_M * values[0])
+        within = super().possible(scene, target, values) and values[0] >= LEAST_KG
+        return bool(within and np.linalg.norm(values[1:]) <= REACH_M * values[0])
 
     def sentence(self, target: str, values: np.ndarray) -> str:
-        return f"{values[0]:.2f} kg more than the model knows move with the {in_words(target)}"
+        return f"{values[0]:.2f} kg that the model does not know move with the {in_words(target)}"
 
 
 def _wrenches(scene: Scene, target: str) -> np.ndarray:

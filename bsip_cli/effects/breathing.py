@@ -10,6 +10,7 @@ from bsip_cli.effects.scene import Scene
 SLOWEST_HZ, FASTEST_HZ = 0.12, 0.6
 # The breastbone moves ahead and up; torso axes.
 OUTWARD = np.array([0.8, 0.6, 0.0])
+LEAST_BREATHS = 3
 
 
 class Breathing(Effect):
@@ -20,15 +21,15 @@ class Breathing(Effect):
     remedy = "hold the breath for ten seconds"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
-        return ("upper_torso",)
+        return ("upper_torso",) if _slowest_hz(scene) < FASTEST_HZ else ()
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         apart = 0.5 / max(float(np.ptp(scene.times_s)), 1.0)
-        paces = tuple(float(f) for f in np.arange(SLOWEST_HZ, FASTEST_HZ, apart))
+        paces = tuple(float(f) for f in np.arange(_slowest_hz(scene), FASTEST_HZ, apart))
         return (
             Parameter("cosine", "kg m", -1.0, 1.0, 0.05),
             Parameter("sine", "kg m", -1.0, 1.0, 0.05),
-            Parameter("frequency", "Hz", 0.1, 0.7, apart, paces),
+            Parameter("frequency", "Hz", _slowest_hz(scene), 0.7, apart, paces),
         )
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
@@ -60,6 +61,11 @@ class Breathing(Effect):
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         return (
-            f"{np.hypot(values[0], values[1]):.3f} kg m of the trunk move with the breath, "
-            f"{values[2]:.2f} times per second"
+            f"breathing moves the trunk {values[2]:.2f} times per second (mass times amplitude "
+            f"{np.hypot(values[0], values[1]):.3f} kg m)"
         )
+
+
+def _slowest_hz(scene: Scene) -> float:
+    """A few breaths are needed to tell them from any other slow course."""
+    return max(SLOWEST_HZ, LEAST_BREATHS / max(float(np.ptp(scene.times_s)), 1.0))

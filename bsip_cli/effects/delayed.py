@@ -21,11 +21,18 @@ class Delay(Effect):
         """(N,) how late the forces of each frame were recorded [s]."""
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        """The measured wrench less the same put right; the trial's ends stay as they are.
+        return put_right(scene, self.late_s(scene, values))
 
-        From the measured course: the simulated one holds the noise of the motion, whose derivative
-        would make every delay seem smaller than it is.
-        """
-        times = scene.times_s
-        at = np.clip(times + self.late_s(scene, values), times[0], times[-1])
-        return scene.measured - scene.measured_course(at)
+
+def put_right(scene: Scene, late_s: np.ndarray) -> np.ndarray:
+    """(N, 6) the measured wrench less the same put right by (N,) seconds; the trial's ends stay.
+
+    From the measured course: the simulated one holds the noise of the motion, whose derivative
+    would make every delay seem smaller than it is.
+    """
+    return scene.measured - scene.measured_course(right_times_s(scene, late_s))
+
+
+def right_times_s(scene: Scene, late_s: np.ndarray) -> np.ndarray:
+    """(N,) when the forces that belong to each frame were recorded, inside the trial."""
+    return np.clip(scene.times_s + late_s, scene.times_s[0], scene.times_s[-1])

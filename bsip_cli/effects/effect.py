@@ -66,6 +66,10 @@ class Effect(ABC):
         """Values to try of the parameters that have a scan; by default every combination."""
         return product(*(p.scan for p in self.parameters(scene, target) if p.scan))
 
+    def spacing(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """(s,) how far around scanned values a finer search looks; by default typical sizes."""
+        return np.array([p.typical for p in self.parameters(scene, target) if p.scan])
+
     @abstractmethod
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """(N, 6) what it adds to the simulated wrench, about the world's origin [N, N m]."""

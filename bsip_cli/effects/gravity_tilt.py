@@ -40,4 +40,4 @@ class GravityTilt(Effect):
         return (("angle", "rad", float(np.hypot(*values))), *parts)
 
     def sentence(self, target: str, values: np.ndarray) -> str:
-        return f"the lab's vertical is off by {np.degrees(np.hypot(*values)):.2f} degrees"
+        return f"the lab's Z axis is {np.degrees(np.hypot(*values)):.2f} degrees off the vertical"

@@ -15,6 +15,8 @@ from bsip_cli.effects.scene import Scene
 BELOW = 0.4  # of length and mass of the upper torso: up to T12/L1
 CHORD = 0.3  # share at which the change is exact; for others it is taken for linear
 AXES = {"flexion": 2, "lateral": 0, "axial": 1}
+_WORTH_A_WORD = 0.05
+_MOVEMENTS = {"flexion": "bending forwards", "lateral": "bending sideways", "axial": "turning"}
 
 
 @dataclass(frozen=True)
@@ -78,11 +80,10 @@ class MissingJoint(Effect):
         return tuple((axis, "rad", float(x)) for axis, x in zip(AXES, ranges, strict=True))
 
     def sentence(self, target: str, values: np.ndarray) -> str:
-        parts = ", ".join(
-            f"{100 * share:.0f} % of its {axis} bend"
-            for axis, share in zip(AXES, values, strict=True)
-        )
-        return f"the trunk bends a second time between waist and neck ({parts})"
+        shares = dict(zip(AXES, values.tolist(), strict=True))
+        told = {axis: x for axis, x in shares.items() if abs(x) >= _WORTH_A_WORD} or shares
+        parts = ", ".join(f"{100 * x:.0f} % of its {_MOVEMENTS[axis]}" for axis, x in told.items())
+        return f"the trunk moves at a second joint between waist and neck ({parts})"
 
 
 def _turn(scene: Scene, i: int) -> np.ndarray:

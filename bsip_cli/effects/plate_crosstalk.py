@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bsip_cli.effects.channel_words import OF_A_PLATE
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.plate_frame import CHANNELS, in_plate, in_world, loaded_plates, plate_of
 from bsip_cli.effects.scene import Scene
@@ -36,4 +37,7 @@ class PlateCrosstalk(Effect):
     def sentence(self, target: str, values: np.ndarray) -> str:
         name, pair = target.rsplit(" ", 1)
         source, sink = pair.split(">")
-        return f"{100 * values[0]:+.1f} % of channel {source} of plate {name} leaks into {sink}"
+        return (
+            f"{100 * values[0]:+.1f} % of {OF_A_PLATE[source]} of plate {name} leaks into "
+            f"{OF_A_PLATE[sink]}"
+        )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bsip_cli.effects.channel_words import OF_A_PLATE, unit_of
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.plate_frame import CHANNELS, in_world, loaded_plates, plate_of
 from bsip_cli.effects.scene import Scene
@@ -34,5 +35,7 @@ class PlateDrift(Effect):
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         name, channel = target.rsplit(" ", 1)
-        unit = "N" if channel.startswith("f") else "N m"
-        return f"channel {channel} of plate {name} drifts by {values[0]:+.2f} {unit} per second"
+        return (
+            f"plate {name} reads {OF_A_PLATE[channel]} with a drift of {values[0]:+.2f} "
+            f"{unit_of(channel)} per second"
+        )

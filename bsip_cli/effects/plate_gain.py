@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bsip_cli.effects.channel_words import OF_A_PLATE
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.plate_frame import CHANNELS, in_plate, in_world, loaded_plates, plate_of
 from bsip_cli.effects.scene import Scene
@@ -34,8 +35,5 @@ class PlateGain(Effect):
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         name, channel = target.rsplit(" ", 1)
-        order = "more" if values[0] > 0 else "less"
-        return (
-            f"channel {channel} of plate {name} shows {100 * abs(values[0]):.1f} % {order} than "
-            "the truth"
-        )
+        order = "large" if values[0] > 0 else "small"
+        return f"plate {name} reads {OF_A_PLATE[channel]} {100 * abs(values[0]):.1f} % too {order}"

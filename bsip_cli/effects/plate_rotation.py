@@ -9,6 +9,8 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.plate_frame import loaded_plates, plate_of
 from bsip_cli.effects.scene import Scene
 
+_SMALL_DEG = 0.1  # not worth a word
+
 
 class PlateRotation(Effect):
     """The plate is truly turned about its centre: measured are the true vectors turned back."""
@@ -35,7 +37,10 @@ class PlateRotation(Effect):
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         x, y, yaw = np.degrees(values)
-        return (
-            f"plate {target} is turned by {yaw:+.1f} degrees about the vertical and tilted by "
-            f"{np.hypot(x, y):.1f} degrees"
-        )
+        turned = f"turned by {yaw:+.1f} degrees about the vertical"
+        tilted = f"tilted by {np.hypot(x, y):.1f} degrees"
+        if np.hypot(x, y) < _SMALL_DEG:
+            return f"plate {target} is {turned}"
+        if abs(yaw) < _SMALL_DEG:
+            return f"plate {target} is {tilted}"
+        return f"plate {target} is {turned} and {tilted}"

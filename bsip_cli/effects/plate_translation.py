@@ -31,6 +31,6 @@ class PlateTranslation(Effect):
     def sentence(self, target: str, values: np.ndarray) -> str:
         x, y, z = 1000 * values
         return (
-            f"plate {target} lies {np.linalg.norm(1000 * values[:2]):.0f} mm (x {x:+.0f}, "
-            f"y {y:+.0f}, height {z:+.0f}) from where the file says"
+            f"plate {target} lies {np.hypot(x, y):.0f} mm sideways from where the file says (lab "
+            f"X {x:+.0f} mm, Y {y:+.0f} mm, height {z:+.0f} mm)"
         )

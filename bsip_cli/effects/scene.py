@@ -255,3 +255,8 @@ class Scene:
                 total += own * np.stack([point.position_m, point.acceleration_m_s2])
                 mass += own
         return mass, Point(*(total / mass))
+
+
+def standing_place_m(scene: Scene) -> np.ndarray:
+    """(3,) where the person stands on the ground: moments about it are small."""
+    return np.append(scene.q[scene.valid, :2].mean(axis=0), 0.0)

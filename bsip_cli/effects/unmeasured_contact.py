@@ -12,12 +12,13 @@ from bsip_cli.effects.scene import Scene
 
 WINDOWS_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 SHORTEST_S = 0.7
+RAMP_S = 0.3  # in which a person leans on something, or lets go
 MOST_WINDOWS = 30  # side by side; shorter contacts are found in part of a window, and refined
 
 
 class UnmeasuredContact(Effect):
-    """A constant force on the segment's centre of mass during a window; the plates carry as much
-    less. The point where it truly acts is not estimated."""
+    """A force on the segment's centre of mass during a window, in which it grows and fades; the
+    plates carry as much less. The point where it truly acts is not estimated."""
 
     name = "unmeasured_contact"
     of_the_lab = False
@@ -45,10 +46,15 @@ class UnmeasuredContact(Effect):
             for at in np.arange(middle.least + seconds / 2, middle.most, seconds / 2):
                 yield float(at), seconds
 
+    def spacing(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """The true window may be half as long again on either side."""
+        return np.array([values[4] / 2, values[4]])
+
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         force, middle, length = values[:3], values[3], values[4]
+        ramp = min(RAMP_S, length / 2)
         inside = length / 2 - np.abs(scene.times_s - middle)
-        touching = np.clip(inside * scene.rate_hz + 0.5, 0.0, 1.0)
+        touching = np.clip(inside / ramp, 0.0, 1.0) / (1 - ramp / length)  # 1 on average
         missing = -touching[:, None] * force
         point = scene.once((self.name, target), lambda: _contact_m(scene, target))
         return np.hstack([missing, np.cross(point, missing)])

@@ -49,8 +49,8 @@ class WobblingMass(Effect):
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         return (
-            f"{values[0]:.1f} kg of the {in_words(target)} swing against the bone at "
-            f"{values[1]:.1f} Hz (damping ratio {values[2]:.2f})"
+            f"{values[0]:.1f} kg of soft tissue of the {in_words(target)} swing against the bone, "
+            f"{values[1]:.1f} times per second (damping ratio {values[2]:.2f})"
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -57,6 +57,22 @@ class NormalEquations:
         return (
             np.einsum("c,cij->ij", weights, self.information),
             np.einsum("c,ci->i", weights, self.right),
+        )
+
+    def with_known(self, phi: np.ndarray, known: np.ndarray) -> NormalEquations:
+        """The equations of the other parameters, once some (P,) have the values in ``phi`` (P,).
+
+        The known ones' wrench is taken off the measured one; nothing more is said about them.
+        """
+        part = np.where(known, phi, 0.0)
+        moved = self.information @ part
+        squares = self.squares - 2 * self.right @ part + moved @ part
+        free = ~known
+        return replace(
+            self,
+            information=self.information * np.outer(free, free),
+            right=(self.right - moved) * free,
+            squares=squares,
         )
 
     def residual_rms(self, phi: np.ndarray) -> np.ndarray:

@@ -87,6 +87,7 @@ def _information(
     reference = np.append(q[:, :2].mean(axis=0), 0.0)
     q, v, a = (rows[::_STRIDE] for rows in (q, v, a))
     regressor = wrench_regressor(model, model.createData(), q, v, a, reference)
+    regressor = regressor * ~problem.prior.fixed_parameters()
     noise = problem.noise
     independent = noise.effective * DURATION_S / problem.equations.duration_s
     rows = regressor * (np.sqrt(independent / len(q)) / noise.rms / problem.trust_ratio)[:, None]

@@ -33,6 +33,8 @@ class Prior:
     readable_sd : (n, 10) the same spread for mass, centre of mass and tensor.
     spread_sd : (n, 10) spread of each on its own, before the masses' sum is known to
         total_mass_sd_kg.
+    fixed : (n,) segments whose motion no markers show: they keep the table's values, and the scale
+        tells about the others.
     """
 
     inertias: tuple[Inertia, ...]
@@ -42,6 +44,11 @@ class Prior:
     readable_sd: np.ndarray
     spread_sd: np.ndarray
     total_mass_sd_kg: float
+    fixed: np.ndarray
+
+    def fixed_parameters(self) -> np.ndarray:
+        """(10 n,) which parameters keep the table's values."""
+        return np.repeat(self.fixed, 10)
 
 
 def prior_of(inertias: tuple[Inertia, ...], person: Person, spread: Spread) -> Prior:
@@ -56,12 +63,13 @@ def prior_of(inertias: tuple[Inertia, ...], person: Person, spread: Spread) -> P
         spread_sd[i] = _readable_sd(inertia, spread)
         root[block, block] = np.linalg.solve(readable_jacobian(phi[block]), np.diag(spread_sd[i]))
     total_mass_sd_kg = spread.total_mass_sd_percent / 100 * float(phi[::10].sum())
-    root = _with_total_mass(root, total_mass_sd_kg)
+    fixed = person.without_data()
+    root = _with_total_mass(root, total_mass_sd_kg, ~fixed)
     readable_sd = np.empty((n, 10))
     for i in range(n):
         block = slice(10 * i, 10 * i + 10)
         readable_sd[i] = np.linalg.norm(readable_jacobian(phi[block]) @ root[block], axis=1)
-    return Prior(inertias, origins, phi, root, readable_sd, spread_sd, total_mass_sd_kg)
+    return Prior(inertias, origins, phi, root, readable_sd, spread_sd, total_mass_sd_kg, fixed)
 
 
 def likeliest(prior: Prior, information: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -74,9 +82,9 @@ def likeliest(prior: Prior, information: np.ndarray, right: np.ndarray) -> np.nd
     return prior.phi + prior.root @ np.linalg.solve(scaled, slope)
 
 
-def _with_total_mass(root: np.ndarray, sd_kg: float) -> np.ndarray:
-    """The root of the covariance once the sum of the masses is known to ``sd_kg``."""
-    total = root[::10].sum(axis=0)
+def _with_total_mass(root: np.ndarray, sd_kg: float, free: np.ndarray) -> np.ndarray:
+    """The root of the covariance once the sum of the free (n,) masses is known to ``sd_kg``."""
+    total = root[::10][free].sum(axis=0)
     variance = total @ total
     shrink = 1.0 - sd_kg / np.sqrt(variance + sd_kg**2)
     return root - shrink * np.outer(root @ total, total) / variance

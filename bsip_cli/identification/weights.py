@@ -116,7 +116,7 @@ def _spread(prior: Prior, segments: tuple[int, ...], members: tuple[int, ...]) -
 
 def _total_mass(prior: Prior) -> np.ndarray:
     masses = np.zeros(prior.phi.size)
-    masses[::10] = 1 / prior.total_mass_sd_kg
+    masses[::10] = np.where(prior.fixed, 0.0, 1 / prior.total_mass_sd_kg)
     return np.outer(masses, masses)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from bsip_cli.body.markersets import MarkerSet
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.errors import BadDataError
+from bsip_cli.motion.functional_legs import functional_landmarks
 
 Frame = tuple[np.ndarray, np.ndarray]  # origin (3,) and axes (3, 3) with X, Y, Z as columns
 
@@ -35,6 +36,7 @@ def calibrate(
     positions: Mapping[str, np.ndarray],
     sex: str,
     height_m: float | None,
+    trials: Sequence[Mapping[str, np.ndarray]] = (),
 ) -> Calibration:
     """Build the skeleton from marker positions in one standing pose.
 
@@ -43,6 +45,8 @@ def calibrate(
     positions : label to (3,) world position [m], Z up; only markers that are visible.
     sex : M or F, for the joint-centre regressions.
     height_m : stature, or None to estimate it from the long segments.
+    trials : of each trial, label to (N, 3) positions [m]: knees and ankles without markers are
+        found from their movement there.
 
     Raises
     ------
@@ -50,6 +54,8 @@ def calibrate(
         Landmarks are missing (all are named).
     """
     landmarks = _landmarks(marker_set, positions)
+    moved = functional_landmarks(marker_set, landmarks, positions, trials, sex)
+    landmarks |= moved.landmarks
     guess = height_m or _rough_stature(landmarks)
     centres = joint_centres(landmarks, sex, guess)
     lengths = _lengths(centres)
@@ -57,7 +63,9 @@ def calibrate(
     frames = _frames(skeleton, centres, landmarks)
     person = _person(skeleton, marker_set, positions, centres, frames, sex, stature, landmarks)
     forward = centres.pelvis_axes[:, 0] * np.array([1.0, 1.0, 0.0])
-    return Calibration(person, _pose(person, frames), unit(forward), stature, centres.notes)
+    return Calibration(
+        person, _pose(person, frames), unit(forward), stature, (*moved.notes, *centres.notes)
+    )
 
 
 def _landmarks(marker_set: MarkerSet, positions: Mapping[str, np.ndarray]) -> dict:
@@ -68,13 +76,20 @@ def _landmarks(marker_set: MarkerSet, positions: Mapping[str, np.ndarray]) -> di
     return {name: np.mean(found, axis=0) for name, found in gathered.items()}
 
 
+# Heights above the heel marker, as parts of the stature: C7, the acromia, the ASIS.
+_HEIGHTS = (("c7", 0.84), ("acromion_l", 0.82), ("asis_l", 0.54))
+
+
 def _rough_stature(landmarks: Mapping[str, np.ndarray]) -> float:
-    needed = [landmarks[name][2] for name in ("c7", "calcaneus_l") if name in landmarks]
-    if len(needed) < 2:
-        raise BadDataError("no marker for c7 or calcaneus_l", expected="both in the static trial")
-    return (
-        needed[0] - needed[1]
-    ) / 0.84  # C7 stands at 0.85 of the stature, the heel marker at 0.01
+    """Stature from the height of the highest known landmark over the heel; upright standing."""
+    for name, part in _HEIGHTS:
+        if name in landmarks and "calcaneus_l" in landmarks:
+            return float(landmarks[name][2] - landmarks["calcaneus_l"][2]) / part
+    raise BadDataError(
+        "no marker for calcaneus_l, or none for c7, acromion_l and asis_l",
+        expected="the heel and one of these in the static trial",
+        remedy="state height_m in participants.tsv, or name these markers in a marker set",
+    )
 
 
 def _lengths(centres: JointCentres) -> dict[str, float]:
@@ -110,8 +125,7 @@ def _frames(
         frames[f"forearm_{s}"] = (p[f"elbow_{s}"], _y_first(fore, elbow))
         frames[f"thigh_{s}"] = (p[f"hip_{s}"], _y_first(thigh, knee))
         frames[f"shank_{s}"] = (p[f"knee_{s}"], _y_first(shank, knee))
-        radial, ulnar = landmarks[f"styloid_radial_{s}"], landmarks[f"styloid_ulnar_{s}"]
-        across = radial - ulnar if s == "r" else ulnar - radial
+        across = _across_the_wrist(landmarks, s, elbow)
         end = centres.ends.get(f"hand_{s}")
         along = fore if end is None else p[f"wrist_{s}"] - end
         frames[f"hand_{s}"] = (p[f"wrist_{s}"], _y_first(along, across))
@@ -120,8 +134,19 @@ def _frames(
     return {name: frames[name] for name in skeleton.segments}
 
 
+def _across_the_wrist(
+    landmarks: Mapping[str, np.ndarray], side: str, elbow: np.ndarray
+) -> np.ndarray:
+    """To the person's right between the styloids; as the elbow's hinge where they are not there."""
+    names = (f"styloid_radial_{side}", f"styloid_ulnar_{side}")
+    if not all(name in landmarks for name in names):
+        return elbow
+    radial, ulnar = (landmarks[name] for name in names)
+    return radial - ulnar if side == "r" else ulnar - radial
+
+
 def _torso_right(landmarks, centres, up):
-    if "suprasternale" in landmarks:
+    if "suprasternale" in landmarks and "c7" in landmarks:
         return np.cross(landmarks["suprasternale"] - landmarks["c7"], up)
     return centres["shoulder_r"] - centres["shoulder_l"]
 
@@ -185,17 +210,8 @@ def _person(skeleton, marker_set, positions, centres, frames, sex, stature, land
         index,
         local,
         np.array([m.weight for m in present]),
-        ~_informed(skeleton, index),
+        ~np.array(skeleton.informed({m.segment for m in present})),
     )
-
-
-def _informed(skeleton: Skeleton, marker_segments: np.ndarray) -> np.ndarray:
-    """(n,) segments on which, or beyond which, there is a marker."""
-    informed = np.zeros(len(skeleton.segments), dtype=bool)
-    informed[marker_segments] = True
-    for i in range(len(informed) - 1, 0, -1):
-        informed[skeleton.parents[i]] |= informed[i]
-    return informed
 
 
 def _tilt(axis: np.ndarray) -> float:

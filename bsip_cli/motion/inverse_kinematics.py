@@ -122,6 +122,28 @@ def solve_poses(
     """
     if markers_m.shape[0] == 0 or not np.isfinite(markers_m).any():
         raise BadDataError("no marker is visible in any frame", expected="tracked markers")
+    return _solved(
+        person,
+        markers_m,
+        q_first,
+        marker_sd_m=marker_sd_m,
+        robust_limit_m=robust_limit_m,
+        posture_sd_rad=posture_sd_rad,
+        iterations=iterations,
+    )
+
+
+def _solved(
+    person: Person,
+    markers_m: np.ndarray,
+    q_first: np.ndarray,
+    *,
+    marker_sd_m: float,
+    robust_limit_m: float,
+    posture_sd_rad: float | np.ndarray,
+    iterations: int,
+) -> Poses:
+    """As :func:`solve_poses`, for frames of which some or all may show nothing."""
     tree = tree_of(person)
     count, markers = markers_m.shape[:2]
     q, residual = np.empty((count, tree.nq)), np.empty((count, markers))
@@ -148,10 +170,10 @@ def solve_trial(person: Person, markers_m: np.ndarray, **options) -> Poses:
     if not seen.any():
         return solve_poses(person, markers_m, neutral(person), **options)
     start = first_pose(person, markers_m[first], **options)
-    after = solve_poses(person, markers_m[first:], start, **options)
+    after = _solved(person, markers_m[first:], start, **options)
     if first == 0:
         return after
-    before = solve_poses(person, markers_m[first - 1 :: -1], after.q[0], **options)
+    before = _solved(person, markers_m[first - 1 :: -1], after.q[0], **options)
     return Poses(
         *(
             np.concatenate([getattr(before, name)[::-1], getattr(after, name)])

@@ -1,4 +1,4 @@
-"""Short gaps in marker trajectories: from the rigid segment, else by a spline."""
+"""Gaps in marker trajectories: from the rigid segment, short ones else by a spline."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from bsip_cli.recordings.analog import runs
 _LEAST_OTHERS = 3
 _THIN_M = 0.005  # a cluster narrower than this across its long axis has no orientation
 _LOOSE_M = 0.01  # a cluster that changes shape by more is not rigid
+_ROUNDING_S = 1e-9
 _SUPPORT = 8  # frames used on each side by the spline
 
 
@@ -24,24 +25,33 @@ class FilledMarkers:
 
 
 def fill_gaps(
-    markers_m: np.ndarray, rate_hz: float, segments: Sequence[Sequence[int]], max_gap_s: float
+    markers_m: np.ndarray,
+    rate_hz: float,
+    segments: Sequence[Sequence[int]],
+    max_gap_s: float,
+    max_rigid_gap_s: float,
 ) -> FilledMarkers:
-    """Fill gaps of at most max_gap_s that have measured frames on both sides.
+    """Fill short gaps that have measured frames on both sides, and mark what was filled.
 
-    ``segments`` lists the columns of markers that move as one rigid body. Only measured
-    positions are used to fill; longer gaps and the ends stay NaN.
+    By the other markers of the segment, where three of them are seen throughout a gap of at most
+    ``max_rigid_gap_s``; else by a spline, up to ``max_gap_s``. ``segments`` lists the columns of
+    markers that move as one rigid body. Only measured positions are used to fill; longer gaps and
+    the ends stay NaN.
     """
     measured = np.isfinite(markers_m).all(axis=-1)
     result = np.where(measured[..., None], markers_m, np.nan)
     rigid = np.zeros_like(measured)
     for marker in range(markers_m.shape[1]):
         mates = _mates(marker, segments)
-        for start, stop in _inner_gaps(measured[:, marker], max_gap_s * rate_hz):
-            patch = _from_segment(markers_m, measured, marker, mates, start, stop)
-            rigid[start:stop, marker] = patch is not None
-            if patch is None:
+        for start, stop in _inner_gaps(measured[:, marker]):
+            patch, length_s = None, (stop - start) / rate_hz - _ROUNDING_S
+            if length_s <= max_rigid_gap_s:
+                patch = _from_segment(markers_m, measured, marker, mates, start, stop)
+                rigid[start:stop, marker] = patch is not None
+            if patch is None and length_s <= max_gap_s:
                 patch = _by_spline(markers_m[:, marker], measured[:, marker], start, stop)
-            result[start:stop, marker] = patch
+            if patch is not None:
+                result[start:stop, marker] = patch
     filled = ~measured & np.isfinite(result).all(axis=-1)
     return FilledMarkers(result, filled, rigid)
 
@@ -52,14 +62,10 @@ def _mates(marker: int, segments: Sequence[Sequence[int]]) -> list[int]:
     return max(own, key=len, default=[])
 
 
-def _inner_gaps(measured: np.ndarray, longest: float) -> list[tuple[int, int]]:
-    """Start and stop (exclusive) of the gaps to fill."""
+def _inner_gaps(measured: np.ndarray) -> list[tuple[int, int]]:
+    """Start and stop (exclusive) of the gaps with measured frames on both sides."""
     n = len(measured)
-    return [
-        (int(start), int(stop))
-        for start, stop in runs(~measured)
-        if start > 0 and stop < n and stop - start <= longest + 1e-9
-    ]
+    return [(int(start), int(stop)) for start, stop in runs(~measured) if start > 0 and stop < n]
 
 
 def _from_segment(

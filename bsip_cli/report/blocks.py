@@ -35,6 +35,14 @@ class Bullets:
 
 
 @dataclass(frozen=True)
+class Numbered:
+    """A list whose items other texts refer to by their number."""
+
+    kind: ClassVar[str] = "numbered"
+    items: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Cell:
     """One cell: its text, how it is set off, and where it leads (a relative link) if anywhere."""
 
@@ -90,7 +98,7 @@ class Picture:
         return to_svg(self.figure)
 
 
-Block = Paragraph | Heading | Bullets | Grid | Picture
+Block = Paragraph | Heading | Bullets | Numbered | Grid | Picture
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,8 @@ _CONTACT = (
 
 @dataclass(frozen=True)
 class EffectWords:
-    """``title``: the cause in general; ``consequence``: what it means for the results."""
+    """``title``: the cause in general; ``consequence``: what it means for the results, and what to
+    do."""
 
     title: str
     consequence: str
@@ -60,8 +61,8 @@ EFFECT_WORDS = {
     "segment_inertia": EffectWords("other inertial parameters of a segment", _PERSON),
     "unexplained": EffectWords(
         "something without a name",
-        "Neither the forces nor the identified parameters should be trusted further than the "
-        "residual below says.",
+        "Neither the forces nor the identified parameters should be trusted further than section 2 "
+        "of the report says: look there at when, and how fast, the difference comes and goes.",
     ),
 }
 
@@ -71,17 +72,96 @@ def effect_title(effect: str) -> str:
     return words.title if words else effect.replace("_", " ")
 
 
+_CHANNELS = {
+    "fx": "force x",
+    "fy": "force y",
+    "fz": "vertical force",
+    "mx": "moment x",
+    "my": "moment y",
+    "mz": "moment about the vertical",
+}
+_ONE_PLACE = ("breathing", "missing_joint")  # where they sit is no news
+
+
 def place_label(effect: str, target: str) -> str:
-    """``plate 1, fx into fy`` or ``left hand`` of an effect's target; empty for none."""
+    """``plate 1, force x into force y`` or ``left hand`` of an effect's target; empty for none."""
+    if effect in _ONE_PLACE:
+        return ""
     if effect.startswith("plate_"):
-        name, _, channel = target.rpartition(" ") if " " in target else (target, "", "")
-        channel = channel.replace(">", " into ")
-        return f"plate {name}, {channel}" if channel else f"plate {name}"
+        return _plate_label(target)
     if effect.startswith("marker_"):
-        return f"marker {target}" if "+" not in target else f"markers {target}"
+        first, _, second = target.partition("+")
+        return f"markers {first} and {second}" if second else f"marker {target}"
     if effect == "joint_centre" or target in SEGMENTS:
         return segment_label(target)
-    return target
+    if effect == "unmeasured_contact":
+        return " and ".join(segment_label(name) for name in target.split("+"))
+    return _CHANNELS.get(target, target)
+
+
+def _plate_label(target: str) -> str:
+    """Of ``1 fx>fy``, ``1 fz`` or ``1``."""
+    name, _, channels = target.rpartition(" ") if " " in target else (target, "", "")
+    words = " into ".join(_CHANNELS.get(channel, channel) for channel in channels.split(">"))
+    where = "all plates" if name == "all" else f"plate {name}"
+    return f"{where}, {words}" if words else where
+
+
+_UNNAMED = {  # first number of a regularity without a name: what it is
+    "amplitude": "swing",
+    "curvature": "square of the load",
+    "play": "play or friction",
+    "stiffness": "pull on the pelvis",
+}
+
+
+def unnamed_label(number_name: str, where: str) -> str:
+    """``swing, force x``; of a pull, ``y by z`` is the force's axis and the place's."""
+    kind = _UNNAMED.get(number_name)
+    if kind is None:
+        return where
+    force, by, place = where.partition(" by ")
+    return (
+        f"{kind} along {force.upper()}, growing along {place.upper()}" if by else f"{kind}, {where}"
+    )
+
+
+# Numbers that an effect is about. Where none stands here, all are parts of one size.
+MAIN_NUMBERS = {
+    "added_mass": ("mass",),
+    "released_object": ("mass",),
+    "wobbling_mass": ("mass",),
+    "breathing": ("amplitude",),
+    "gravity_tilt": ("angle",),
+    "unmeasured_contact": ("force",),
+    "plate_translation": ("x", "y"),
+    "unexplained": ("amplitude", "stiffness", "curvature", "play"),
+}
+_PARTS = {  # of a size with several parts: which one the interval is of
+    "x": "along the lab's X axis",
+    "y": "along the lab's Y axis",
+    "z": "height",
+    "shift_x": "along the segment's x axis",
+    "shift_y": "along the segment's y axis",
+    "shift_z": "along the segment's z axis",
+    "yaw": "about the vertical",
+    "tilt_x": "tilt about the lab's X axis",
+    "tilt_y": "tilt about the lab's Y axis",
+    "flexion": "bending forwards there",
+    "lateral": "bending sideways there",
+    "axial": "turning there",
+    "force": "force",
+    "mass": "mass",
+    "amplitude": "mass times amplitude",
+}
+_TOLD = ("added_mass", "released_object", "plate_gain")  # their sentence has one such number only
+
+
+def parameter_label(effect: str, parameter: str) -> str:
+    """What an interval is of, where the sentence leaves that open; else empty."""
+    if effect in _TOLD or effect == "unexplained":
+        return ""
+    return _PARTS.get(parameter, "")
 
 
 _SCALES = {"rad": (57.29577951308232, "°"), "m": (1000.0, "mm")}

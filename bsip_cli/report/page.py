@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from bsip_cli.report.blocks import Document
 
-_BEFORE_UNIT = re.compile(r"(?<=[\d)]) (?=(?:mm|kg|m|s|N)\b|%)|(?<=N) (?=m\b)|(?<=%) (?=BW)")
+_BEFORE_UNIT = re.compile(r"(?<=[\d)]) (?=(?:mm|ms|kg|m|s|N|Hz)\b|%)|(?<=N) (?=m\b)|(?<=%) (?=BW)")
 _TEMPLATES = Path(__file__).parent / "templates"
 
 

@@ -60,8 +60,8 @@ class TrialRecord:
 @dataclass(frozen=True)
 class ParticipantRecord:
     """One participant; ``facts`` is the single row of the ``person`` artifact, ``loads`` the known
-    loads as (trial label, words). ``diagnosis``, ``detection`` and ``gains`` (of a model extended by
-    what was found) are None where their stages have not run."""
+    loads as (trial label, words). ``diagnosis``, ``detection``, ``gains`` and ``changes`` (of a model
+    extended by what was found) are None where their stages have not run."""
 
     id: str
     facts: pd.Series
@@ -79,6 +79,7 @@ class ParticipantRecord:
     diagnosis: pd.DataFrame | None = None
     detection: pd.DataFrame | None = None
     gains: pd.DataFrame | None = None
+    changes: pd.DataFrame | None = None
 
     def mass_kg(self) -> float:
         return float(self.facts["mass_kg"])

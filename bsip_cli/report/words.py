@@ -97,6 +97,16 @@ def labelled(text: str) -> str:
     return re.sub(_STEM, lambda found: trial_label(found[0]), text)
 
 
+def capital(text: str) -> str:
+    """A text as the beginning of a sentence."""
+    return f"{text[:1].upper()}{text[1:]}"
+
+
+def printable(text: str) -> str:
+    """A text from files as a terminal may have it: what is no letter, digit or sign becomes ``?``."""
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
 def segment_label(segment: str) -> str:
     """``left upper arm`` for upper_arm_l."""
     return in_words(segment)

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import empty_table
+from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.detection import limits_of
 from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
@@ -15,12 +16,15 @@ from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, values_without
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.patterns import PATTERNS
-from bsip_cli.diagnosis.scale_mass import weight_round
+from bsip_cli.diagnosis.scale_mass import weight_round, weight_share
 from bsip_cli.diagnosis.selection import Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
+from bsip_cli.diagnosis.stated_mass import loaded_channel, stated_mass_findings
+from bsip_cli.diagnosis.support import support_of
 from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.identification.prior import Prior
+from bsip_cli.report.verdict import verdict_of
 from bsip_cli.stages.diagnosis_rows import rows_of
 from bsip_cli.stages.frames import acceleration_noise, person_from
 from bsip_cli.stages.identification_problem import prior_from
@@ -36,38 +40,66 @@ def run(unit: Unit) -> None:
     """Read motion, wrench, person and RM of all trials; write what is wrong, with its evidence."""
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    prior = prior_from(unit, unit.read("regression"), person)
+    prior = _prior(unit, person)
     moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
-    looked_at = (_trial_evidence(unit, person, prior, trial) for trial in moving)
-    trials = tuple(one for one in looked_at if one is not None)
-    if not trials:
+    looked_at = [_looked_at(unit, person, prior, trial) for trial in moving]
+    trials = tuple(one for one in looked_at if isinstance(one, TrialEvidence))
+    held = tuple(one for one in looked_at if isinstance(one, Finding))
+    told = (*held, *_standing(unit, person, prior))
+    if trials:
+        _write(unit, *_asked(unit, trials, told))
+        return
+    if not held:
         unit.warn(
             f"{unit.name}: no trial has {_SHORTEST_S:g} s of motion with every contact on a "
-            "plate; nothing can be diagnosed"
+            "plate; no movement can be diagnosed"
         )
-        unit.write("overall-diagnosis", rows_of((), ()))
-        unit.write("detection", empty_table("detection"))
-        return
+    names = _trials_of(told)
+    _write(unit, rows_of(told, tuple(names)), empty_table("detection"), {"trials": names})
+
+
+def _asked(
+    unit: Unit, trials: tuple[TrialEvidence, ...], told: tuple[Finding, ...]
+) -> tuple[pd.DataFrame, pd.DataFrame, dict]:
+    """Diagnosis, detection limits and facts, of the moving trials and of what is told already."""
     rng = np.random.default_rng(crc32(unit.name.encode()))
     evidence = together(trials)
     effects = [effect for effect in CATALOGUE if effect.name != _ATTRIBUTED]
-    assert unit.participant is not None
-    stated = unit.participant.mass_kg is not None
-    first = weight_round(evidence) if stated else None
+    first = weight_round(evidence) if _only_motion_weighs(unit) else None
     selection = select(signatures_of(evidence, [*effects, *PATTERNS]), rng, first)
     findings = findings_of(selection, rng)
-    names = tuple(one.name for one in trials)
     facts = _facts(selection, findings)
-    unit.write("overall-diagnosis", rows_of(findings, names), facts)
-    unit.write("detection", _detection(selection))
-    for sentence in _said(findings):
-        unit.warn(f"{unit.name}: {sentence}")
+    facts["trials"] += _trials_of(told)
+    rows = rows_of((*told, *findings), tuple(one.name for one in trials))
+    return rows, _detection(selection), facts
 
 
-def _trial_evidence(unit: Unit, person, prior: Prior, trial: Trial) -> TrialEvidence | None:
+def _write(unit: Unit, diagnosis: pd.DataFrame, limits: pd.DataFrame, facts: dict) -> None:
+    """Both artifacts, and in words what they say."""
+    unit.write("overall-diagnosis", diagnosis, facts)
+    unit.write("detection", limits)
+    said = verdict_of(diagnosis, limits)
+    for sentence in (said.headline, *said.causes, said.limits):
+        if sentence:
+            unit.warn(f"{unit.name}: {sentence}")
+
+
+def _prior(unit: Unit, person: Person) -> Prior:
+    """Of the parameters; the plates' gain shows against a mass that a scale has told."""
+    known = {"total_mass_sd_percent": unit.config.diagnosis.stated_mass_sd_percent}
+    return prior_from(unit, unit.read("regression"), person, **(known if _is_weighed(unit) else {}))
+
+
+def _looked_at(
+    unit: Unit, person: Person, prior: Prior, trial: Trial
+) -> TrialEvidence | Finding | None:
+    """A trial's evidence, or what the hands hold on to in it; None if the trial is too short."""
     scene = scene_of(unit, person, prior.phi, trial)
     if scene.valid.sum() < _SHORTEST_S * scene.rate_hz:
         return None
+    held = support_of(scene)
+    if held is not None:
+        return held.finding(trial.stem)
     options = unit.config.diagnosis
     fewer = slow(scene)
     rng = np.random.default_rng(crc32(trial.stem.encode()))
@@ -75,6 +107,36 @@ def _trial_evidence(unit: Unit, person, prior: Prior, trial: Trial) -> TrialEvid
     shared = shared_nuisances(fewer, prior.root, options.marker_sd_m)
     level = acceleration_noise(unit.read("kinematics", trial), person.skeleton)
     return trial_evidence(trial.stem, scene, own, shared, level, options.cutoff_hz)
+
+
+def _only_motion_weighs(unit: Unit) -> bool:
+    """Whether the stated mass can be compared with moving trials only."""
+    return _is_weighed(unit) and not _static(unit)
+
+
+def _is_weighed(unit: Unit) -> bool:
+    assert unit.participant is not None
+    return unit.participant.mass_kg is not None
+
+
+def _static(unit: Unit) -> list[Trial]:
+    return [t for t in unit.trials("kinematics", "wrench") if t.role == "static"]
+
+
+def _standing(unit: Unit, person: Person, prior: Prior) -> tuple[Finding, ...]:
+    """What the static trial says of the stated mass; nothing without such a trial or mass."""
+    static = _static(unit)
+    if not _is_weighed(unit) or not static:
+        return ()
+    scene = scene_of(unit, person, prior.phi, static[0])
+    if not scene.valid.any():
+        return ()
+    share, channel = weight_share(scene), loaded_channel(scene)
+    return stated_mass_findings(share, scene.mass_kg, channel, static[0].stem)
+
+
+def _trials_of(findings: tuple[Finding, ...]) -> list[str]:
+    return list(dict.fromkeys(trial for one in findings for trial in one.trials))
 
 
 def _facts(selection: Selection, findings: tuple[Finding, ...]) -> dict:
@@ -133,8 +195,3 @@ def _detection(selection: Selection) -> pd.DataFrame:
         for limit in limits_of(selection)
     ]
     return pd.DataFrame(rows)
-
-
-def _said(findings: tuple[Finding, ...]) -> list[str]:
-    found = [one for one in findings if one.verdict != "rejected"]
-    return [f"{one.verdict}: {one.effect}: {one.sentence}" for one in found]

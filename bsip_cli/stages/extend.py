@@ -8,10 +8,12 @@ import pandas as pd
 from bsip_cli.artifacts import empty_table
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.diagnosis.cause import Cause, method_of
+from bsip_cli.diagnosis.cause import Cause, change_by, method_of
 from bsip_cli.effects.missing_joint import AXES, MissingJoint, split_torso
 from bsip_cli.identification.uncertainty import readable
-from bsip_cli.report.words import listing, segment_label
+from bsip_cli.report.records import with_all_causes
+from bsip_cli.report.verdict import change_sentence
+from bsip_cli.report.words import segment_label
 from bsip_cli.stages.found_causes import causes_of
 from bsip_cli.stages.frames import bsip_table, person_from
 from bsip_cli.stages.identification_problem import (
@@ -46,8 +48,7 @@ def run(unit: Unit) -> None:
     changes = _changes(bsip, extended)
     unit.write("extended-bsip", extended)
     unit.write("bsip-change", changes)
-    for method in dict.fromkeys(changes["method"]):
-        unit.warn(f"{unit.name}: {_said(method, changes[changes['method'] == method])}")
+    unit.warn(f"{unit.name}: {change_sentence(with_all_causes(changes))}")
 
 
 def _identifying(unit: Unit) -> list[Trial]:
@@ -73,7 +74,8 @@ def _extended(
     for k, cause in enumerate(causes):
         touched = [stem for stem in cause.trials if stem in scenes]
         for stem in touched:
-            changes[stem] = changes.get(stem, 0.0) + cause.change(scenes[stem])
+            known = [one for one in causes[: k + 1] if stem in one.trials]
+            changes[stem] = change_by(known, scenes[stem])
         if touched:
             rows = _identified(unit, person, trials, changes)
         tables.append(rows.assign(method=method_of(causes[: k + 1])))
@@ -126,12 +128,6 @@ def _largest(mass: np.ndarray, length: np.ndarray) -> list[str]:
         if sizes.max() > 0:
             words[int(sizes.argmax())].append(name)
     return [" and ".join(found) for found in words]
-
-
-def _said(method: str, rows: pd.DataFrame) -> str:
-    largest = rows.loc[rows["largest"] != "", "sentence"]
-    what = listing(list(largest), "") or "OM's parameters, no cause concerns what identified them"
-    return f"{method} against OM: {what}"
 
 
 # --- skeleton ---------------------------------------------------------------------------------

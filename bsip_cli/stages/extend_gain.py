@@ -5,10 +5,10 @@ from __future__ import annotations
 from zlib import crc32
 
 import numpy as np
-import pandas as pd
 
 from bsip_cli.artifacts import empty_table
 from bsip_cli.diagnosis.error_gain import BlockErrors, pooled
+from bsip_cli.report.verdict import gain_sentence
 from bsip_cli.stages.gain_rows import gain_rows
 from bsip_cli.unit import Unit
 
@@ -29,21 +29,11 @@ def run(unit: Unit) -> None:
     seed = crc32(unit.name.encode())
     rows = gain_rows(errors, ", ".join(methods), _data(concerned), seed)
     unit.write("overall-gain", rows)
-    unit.warn(f"{unit.name}: {_said(', '.join(methods), rows)}")
+    unit.warn(f"{unit.name}: {gain_sentence(rows) or 'no error could be compared'}")
 
 
 def _errors(sums: dict[str, list[float]]) -> BlockErrors:
     return BlockErrors(**{name: np.array(values) for name, values in sums.items()})
-
-
-def _said(methods: str, rows: pd.DataFrame) -> str:
-    sure = [
-        f"{row['component']} {row['gain_percent']:+.1f} % "
-        f"({row['ci_low']:+.1f} to {row['ci_high']:+.1f})"
-        for row in rows[rows["ci_low"] > 0].to_dict("records")
-    ]
-    found = f"lowers the error: {', '.join(sure)}" if sure else "lowers no error for sure"
-    return f"{methods} {found}"
 
 
 def _data(concerned: dict[str, dict]) -> str:

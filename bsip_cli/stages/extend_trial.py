@@ -11,7 +11,7 @@ import pandas as pd
 from bsip_cli.artifacts import empty_table
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.diagnosis.cause import Blocks, Cause, method_of
+from bsip_cli.diagnosis.cause import Blocks, Cause, method_of, unseen_change_by
 from bsip_cli.diagnosis.corrected_wrench import corrected_wrench, is_of_the_forces
 from bsip_cli.diagnosis.error_gain import BlockErrors, block_errors
 from bsip_cli.effects.scene import Scene
@@ -53,7 +53,7 @@ def run(unit: Unit) -> None:
     for place, k in enumerate(own):
         among = [causes[j] for j in own[: place + 1]]
         body = replace(scene, phi=parameters[method_of(causes[: k + 1])])
-        raw[method_of(among)] = body.predicted + sum(c.unseen_change(body, fold) for c in among)
+        raw[method_of(among)] = body.predicted + unseen_change_by(among, body, fold)
     wrenches = {name: judgement.filtered(wrench) for name, wrench in raw.items()}
     signals = {name: judgement.signals(wrench) for name, wrench in wrenches.items()}
     _amend(unit, judgement, wrenches, signals)

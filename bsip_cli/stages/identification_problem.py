@@ -29,10 +29,13 @@ _FIRST_NOISE = np.array([10.0, 10.0, 10.0, 5.0, 5.0, 5.0])
 _WEIGHT_ROUNDS = 3
 
 
-def prior_from(unit: Unit, regression: pd.DataFrame, person: Person) -> Prior:
-    """What is known of a person before the data, from the rows of ``regression``."""
+def prior_from(unit: Unit, regression: pd.DataFrame, person: Person, **other: float) -> Prior:
+    """What is known of a person before the data, from the rows of ``regression``.
+
+    other : standard deviations that stand for the configured ones.
+    """
     rows = regression[list(bsip_names())].to_numpy()
-    spread = Spread(**unit.config.prior.model_dump())
+    spread = Spread(**{**unit.config.prior.model_dump(), **other})
     return prior_of(tuple(from_readable(row) for row in rows), person, spread)
 
 
@@ -106,9 +109,13 @@ def estimate_by(estimator: str, problem: Problem) -> Estimate:
 def problem_of(
     unit: Unit, person: Person, prior: Prior, recordings: list[Recording]
 ) -> tuple[Problem, np.ndarray]:
-    """Equations about the middle of the motion, weighted by what the fit leaves."""
+    """Equations about the middle of the motion, weighted by what the fit leaves.
+
+    Segments that no markers show enter with the table's values.
+    """
     model = pinocchio_model(person)
-    basis = find_basis(model)
+    known = prior.fixed_parameters()
+    basis = find_basis(model, known)
     reference = np.mean(
         [np.append(r.q[r.use, :2].mean(axis=0), 0.0) for r in recordings if r.use.any()], axis=0
     )
@@ -119,10 +126,11 @@ def problem_of(
         options.sigma_percent_limit,
         options.spread_weight,
     )
-    equations = accumulate(model, recordings, cutoff, reference)
+    equations = accumulate(model, recordings, cutoff, reference).with_known(prior.phi, known)
     noise = even_noise(_FIRST_NOISE, equations.samples)
     for _ in range(_WEIGHT_ROUNDS):
         likely = likeliest(prior, *equations.weighted(noise.weights()))
         noise = noise_of(residual_series(model, recordings, cutoff, reference, likely))
         equations = accumulate(model, recordings, cutoff, reference, noise.weights_at)
+        equations = equations.with_known(prior.phi, known)
     return Problem(equations, noise, prior, basis, *judgement), reference

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import empty_table
+from bsip_cli.body.names import in_words as segment_in_words
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.dynamics.base_parameters import expressions
@@ -45,6 +46,7 @@ def run(unit: Unit) -> None:
     if duration_s(recordings) < _SHORTEST_S:
         _write_table_only(unit, regression, recordings)
         return
+    _tell_of_fixed(unit, person)
     problem, reference = problem_of(unit, person, prior, recordings)
     estimates: dict[str, Estimate] = {
         str(name): estimate_by(name, problem) for name in unit.config.identify.estimators
@@ -121,6 +123,16 @@ def _tell_of_loads(unit: Unit, trials: list[Trial]) -> None:
             unit.warn(f"{unit.name}: taken off the forces of {trial.stem} as a known load: {known}")
 
 
+def _tell_of_fixed(unit: Unit, person: Person) -> None:
+    fixed = np.flatnonzero(person.without_data())
+    if len(fixed):
+        names = ", ".join(segment_in_words(person.skeleton.segments[i]) for i in fixed)
+        unit.warn(
+            f"{unit.name}: no data for {names}: no markers show how they move, OM keeps the "
+            "table's values (RM) there"
+        )
+
+
 # --- the estimate -----------------------------------------------------------------------------
 
 
@@ -145,6 +157,10 @@ def _excitation_table(
 ) -> pd.DataFrame:
     """``share`` (n, 10) are OM's data shares."""
     names = person.skeleton.segments
+    words = [
+        "no markers, no data: the table's values" if fixed else in_words(own)
+        for fixed, own in zip(problem.prior.fixed, share, strict=True)
+    ]
     rows = [("condition_number", "", found.condition_number, "1", "", "")]
     rows += [
         ("singular_value", str(k + 1), value, "1", "", "")
@@ -154,7 +170,7 @@ def _excitation_table(
         rows += [
             ("segment", name, found.segment_share[k], "1", name, ""),
             ("combinations", name, float(found.combinations[k]), "1", name, ""),
-            ("data_share", name, share[k].mean(), "1", name, in_words(share[k])),
+            ("data_share", name, share[k].mean(), "1", name, words[k]),
         ]
     helpful = advice(problem, person, pinocchio_model(person))
     for quantity, gains in (("movement", helpful.alone), ("next", helpful.together)):

@@ -69,7 +69,9 @@ def _solved(unit: Unit, person: Person, markers: np.ndarray) -> tuple[Poses, np.
     options = unit.config.ik
     fixed = options.model_dump(include={"marker_sd_m", "robust_limit_m", "iterations"})
     poses = solve_trial(person, markers, posture_sd_rad=options.posture_sd_rad, **fixed)
-    decided = np.median(poses.coordinate_sd, axis=0) < options.undetermined_sd_rad
+    count = np.isfinite(poses.residual_m).sum(axis=1)
+    shown = count >= 0.5 * count.max()  # people walk in and out
+    decided = np.median(poses.coordinate_sd[shown], axis=0) < options.undetermined_sd_rad
     decided[:3] = True  # the base's position is in metres
     if not decided.all():
         sd = np.where(decided, options.posture_sd_rad, options.held_sd_rad)
@@ -80,7 +82,7 @@ def _solved(unit: Unit, person: Person, markers: np.ndarray) -> tuple[Poses, np.
 def _determined(
     unit: Unit, person: Person, poses: Poses, decided: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Joints (N, joints) whose angles the markers decide in a frame as they do in most frames.
+    """Joints (N, joints) whose angles the markers decide in a frame as they do in most others.
 
     A joint beyond an undecided one is undecided too. Also the largest standard deviation (N,) of
     an angle that most frames decide. The user is told what markers do not decide.

@@ -8,12 +8,13 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.body.markersets import MarkerSet, guess_marker_set, load_marker_set
+from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.contacts import ContactWindows, contact_windows, plate_loads
 from bsip_cli.recordings.free_plates import nobody_near
 from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps
 from bsip_cli.recordings.labels import match_labels
+from bsip_cli.recordings.marker_guess import guess_marker_set
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
@@ -30,7 +31,13 @@ def run(unit: Unit) -> None:
     assert unit.trial is not None
     recording = _chosen_plates(unit, read_recording(unit.trial.path))
     marker_set = _marker_set(unit, recording)
-    match = match_labels(recording.labels, marker_set.wanted())
+    match = match_labels(
+        recording.labels,
+        marker_set.wanted(),
+        optional=marker_set.optional(),
+        seen=np.isfinite(recording.markers_m[..., 0]).any(axis=0),
+        prefix=_prefix(unit),
+    )
     names = [marker.label for marker in marker_set.markers if marker.label in match.index]
     _require(unit, names)
     findings = [*recording.findings, *match.findings]
@@ -81,6 +88,11 @@ def _without_zero(recording: Recording) -> tuple[Recording, list[Finding]]:
     return replace(recording, plates=tuple(plate for plate, _ in done)), [f for _, f in done]
 
 
+def _prefix(unit: Unit) -> str:
+    assert unit.participant is not None
+    return unit.config.ingest.prefixes.get(unit.participant.id, "")
+
+
 def _marker_set(unit: Unit, recording: Recording) -> MarkerSet:
     if unit.config.marker_set != "auto":
         return load_marker_set(unit.config.marker_set)
@@ -107,8 +119,13 @@ def _fill(unit, recording, marker_set, names, index) -> FilledMarkers:
     groups: dict[str, list[int]] = {}
     for k, name in enumerate(names):
         groups.setdefault(segment[name], []).append(k)
+    options = unit.config.ingest
     return fill_gaps(
-        positions, recording.marker_rate_hz, list(groups.values()), unit.config.ingest.max_gap_s
+        positions,
+        recording.marker_rate_hz,
+        list(groups.values()),
+        options.max_gap_s,
+        options.max_rigid_gap_s,
     )
 
 
@@ -167,8 +184,12 @@ def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:
     for k, name in enumerate(names):
         closed, left = int(filled.filled[:, k].sum()), int(is_open[:, k].sum())
         if closed or left:
+            rigid = int(filled.rigid[:, k].sum())
             found = f"{closed + left} of {len(is_open)} frames missing"
-            action = f"{closed} filled, {left} left open"
+            action = (
+                f"{rigid} filled by the segment's other markers, {closed - rigid} by a spline, "
+                f"{left} left open"
+            )
             findings.append(Finding("marker_gaps", name, found, "every frame", action, "info"))
     return findings
 

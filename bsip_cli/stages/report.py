@@ -2,8 +2,8 @@
 
 Reads quality, contacts, skeleton, marker-positions, person, kinematics, marker-residuals,
 marker-events, bsip, base-parameters, excitation, identification, reconstruction, fit,
-posturography; where they are there overall-diagnosis, detection, attribution, overall-gain. Writes
-report-files.
+posturography; where they are there overall-diagnosis, detection, attribution, overall-gain,
+bsip-change. Writes report-files.
 """
 
 from __future__ import annotations
@@ -111,9 +111,15 @@ def record_of(unit: Unit) -> ParticipantRecord:
         refusals=refusals_of(unit, unit.participant),
         origins=_origins(unit, usable),
         loads=_loads(unit),
-        gains=with_all_causes(unit.read("overall-gain")) if unit.has("overall-gain") else None,
+        gains=_extended(unit, "overall-gain"),
+        changes=_extended(unit, "bsip-change"),
         **{name: unit.read(kind) for name, kind in _FOUND.items() if unit.has(kind)},
     )
+
+
+def _extended(unit: Unit, kind: str) -> pd.DataFrame | None:
+    """A table of ``extend`` with all causes in the model; None where it has not run."""
+    return with_all_causes(unit.read(kind)) if unit.has(kind) else None
 
 
 def _loads(unit: Unit) -> tuple[tuple[str, str], ...]:

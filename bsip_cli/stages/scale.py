@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,8 @@ import pandas as pd
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
-from bsip_cli.body.names import in_words
+from bsip_cli.body.names import in_words, without_side
+from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.calibration import Calibration, calibrate
@@ -21,6 +23,7 @@ from bsip_cli.study import Trial
 from bsip_cli.unit import Unit
 
 _QUIET_S = 1.0
+_NEARLY_ALL = 0.95  # of the markers that the best second shows
 _FRAMES_PER_TRIAL = 400
 
 
@@ -51,13 +54,15 @@ def run(unit: Unit) -> None:
         _mean_positions(still, quiet),
         unit.participant.sex,
         unit.participant.height_m,
+        [dict(zip(one.labels, one.positions.swapaxes(0, 1), strict=True)) for one in recorded],
     )
+    _require_markers(unit, marker_set, calibration.person)
     for note in calibration.notes:
         unit.warn(f"{unit.name}: {note}")
     fit = _refine(unit, calibration, recorded, still, quiet)
     plate_mass = _plate_mass(unit, still, quiet)
     mass, source = _mass(unit, plate_mass, load_words(unit, still.trial))
-    _warn_missing(unit, skeleton, marker_set, fit)
+    _warn_missing(unit, marker_set, fit.person)
     unit.write("skeleton", _skeleton_table(skeleton, calibration, fit))
     unit.write("marker-positions", _marker_table(skeleton, calibration, fit))
     unit.write(
@@ -79,6 +84,29 @@ def run(unit: Unit) -> None:
         ),
         facts={"marker_set": marker_set.name, "rms_before_m": fit.rms_before_m},
     )
+
+
+def _require_markers(unit: Unit, marker_set: MarkerSet, person: Person) -> None:
+    """Every segment has markers on it or beyond it, or may be held."""
+    allowed = unit.config.scale.may_be_held
+    lost = [
+        name
+        for name, held in zip(person.skeleton.segments, person.held, strict=True)
+        if held and without_side(name) not in allowed
+    ]
+    if not lost:
+        return
+    serve = [f"{_would_do(marker_set, name) or 'some'} on the {in_words(name)}" for name in lost]
+    raise BadDataError(
+        f"no markers on the {', '.join(map(in_words, lost))}",
+        expected="; ".join(serve),
+        remedy="record these, or let the segment be held at the neutral pose: study.toml [scale] "
+        f"may_be_held = {json.dumps([*allowed, *dict.fromkeys(map(without_side, lost))])}",
+    )
+
+
+def _would_do(marker_set: MarkerSet, segment: str) -> str:
+    return ", ".join(m.label for m in marker_set.markers if m.segment == segment)
 
 
 def _marker_set_name(unit: Unit, trial: Trial) -> str:
@@ -114,16 +142,22 @@ def _quietest(one: _Recorded) -> slice:
 
 
 def _unrest(one: _Recorded) -> tuple[float, slice]:
-    """Mean marker speed [m/s] in the quietest second, and that second."""
+    """Mean marker speed [m/s] in the quietest second, and that second.
+
+    Among the seconds that show nearly as many markers as the best: people walk in and out.
+    """
     step = float(np.median(np.diff(one.times))) if len(one.times) > 1 else 1.0
     width = min(max(2, round(_QUIET_S / step)), len(one.times))
     if width < 3:
         return np.inf, slice(0, len(one.times))
     speed = np.linalg.norm(np.diff(one.positions, axis=0), axis=2) / step
     seen = np.isfinite(speed)
-    mean = np.where(seen, speed, 0.0).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
-    mean[~seen.any(axis=1)] = np.inf
-    windows = np.convolve(mean, np.ones(width - 1) / (width - 1), mode="valid")
+    count = seen.sum(axis=1)
+    mean = np.where(seen, speed, 0.0).sum(axis=1) / np.maximum(count, 1)
+    mean[count == 0] = np.inf
+    whole = np.ones(width - 1) / (width - 1)
+    windows, shown = np.convolve(mean, whole, mode="valid"), np.convolve(count, whole, mode="valid")
+    windows[shown < _NEARLY_ALL * shown.max()] = np.inf
     start = int(np.argmin(windows))
     return float(windows[start]), slice(start, start + width)
 
@@ -164,7 +198,7 @@ def _refine(
         person,
         all_markers[chosen],
         all_poses[chosen],
-        ScalingOptions(**options.model_dump(exclude={"frames"})),
+        ScalingOptions(**options.model_dump(exclude={"frames", "may_be_held"})),
         ik,
     )
 
@@ -212,14 +246,16 @@ def _mass(unit: Unit, plate_mass: float, load: str) -> tuple[float, str]:
 # --- what is written --------------------------------------------------------------------------
 
 
-def _warn_missing(unit: Unit, skeleton: Skeleton, marker_set: MarkerSet, fit: Refinement) -> None:
-    for segment, held in zip(skeleton.segments, fit.person.held, strict=True):
-        if held:
-            known = [m.label for m in marker_set.markers if m.segment == segment]
-            serve = f"; {', '.join(known)} would do" if known else ""
-            unit.warn(
-                f"{unit.name}: no markers on the {in_words(segment)}, its joint is held{serve}"
-            )
+def _warn_missing(unit: Unit, marker_set: MarkerSet, person: Person) -> None:
+    skeleton = person.skeleton
+    for i in np.flatnonzero(person.held):
+        segment, parent = skeleton.segments[i], skeleton.segments[skeleton.parents[i]]
+        known = _would_do(marker_set, segment)
+        serve = f"; {known} would do" if known else ""
+        unit.warn(
+            f"{unit.name}: no markers on the {in_words(segment)}: its joint is held at the neutral "
+            f"pose, in line with the {in_words(parent)}{serve}"
+        )
 
 
 def _skeleton_table(skeleton: Skeleton, calibration: Calibration, fit: Refinement) -> pd.DataFrame:

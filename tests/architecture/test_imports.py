@@ -21,18 +21,19 @@ ALLOWED = {
     "pipeline": "schemas",
     "unit": "artifacts config errors pipeline provenance schemas study",
     "runner": "artifacts config errors pipeline study unit",
-    "check_loads": "body config errors study",
-    "session": "body check_loads config errors pipeline runner study",
+    "check_study": "body config errors study",
+    "session": "body check_study config errors pipeline runner study",
     "__main__": "cli",
     "export": "__init__ artifacts body errors pipeline provenance runner schemas session stages "
     "unit",
     "show": "artifacts errors report schemas",
-    "cli": "__init__ errors export pipeline provenance session show simulate",
+    "markers": "body config errors recordings",
+    "cli": "__init__ errors export markers pipeline provenance session show simulate",
     "reference": "cli config pipeline schemas",
     "body": "config errors",
     "dynamics": "body errors",
     "motion": "body dynamics errors",
-    "recordings": "body errors",
+    "recordings": "body config errors",
     "statistics": "errors",
     "identification": "body config dynamics errors statistics",
     "effects": "body dynamics errors motion",
@@ -51,7 +52,7 @@ ONLY = {
     "cli": {"simulate": {"simulate.command"}},
     "export": {"stages": {"stages.frames"}},
     "session": {"body": {"body.markersets", "body.skeleton"}},
-    "check_loads": {"body": {"body.skeleton"}},
+    "check_study": {"body": {"body.skeleton"}},
 }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bsip_cli.body.names import SEGMENTS, in_words, mirrored, the_joint
+from bsip_cli.body.names import SEGMENTS, in_words, mirrored, the_joint, without_side
 
 
 @pytest.mark.parametrize(
@@ -30,3 +30,12 @@ def test_every_segment_has_its_mirror():
     assert {mirrored(name) for name in SEGMENTS} == set(SEGMENTS)
     assert all(mirrored(mirrored(name)) == name for name in SEGMENTS)
     assert [mirrored(name) for name in ("hand_l", "foot_r", "head")] == ["hand_r", "foot_l", "head"]
+
+
+def test_the_kind_of_a_segment():
+    assert [without_side(name) for name in ("hand_l", "upper_arm_r", "head", "upper_torso")] == [
+        "hand",
+        "upper_arm",
+        "head",
+        "upper_torso",
+    ]

@@ -17,7 +17,8 @@ OPTIONS = {f"{o.section}.{o.name}".lstrip("."): o for o in option_texts()}
 def flat(values: dict, prefix: str = "") -> dict:
     found = {}
     for name, value in values.items():
-        found |= flat(value, f"{name}.") if isinstance(value, dict) else {f"{prefix}{name}": value}
+        inner = isinstance(value, dict) and value  # an empty table is an option of its own
+        found |= flat(value, f"{name}.") if inner else {f"{prefix}{name}": value}
     return found
 
 

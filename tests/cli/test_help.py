@@ -25,11 +25,18 @@ HEAVY = [
     "statsmodels",
 ]
 STAGE_COMMANDS = [*dict.fromkeys(stage.name for stage in STAGES), "run"]
-OTHER_COMMANDS = ["simulate", "inject", "export", "show", "info"]
+OTHER_COMMANDS = ["simulate", "inject", "export", "markers", "show", "info"]
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--help"], ["ingest", "--help"], ["simulate", "--help"], ["export", "--help"]]
+    "arguments",
+    [
+        ["--help"],
+        ["ingest", "--help"],
+        ["simulate", "--help"],
+        ["export", "--help"],
+        ["markers", "--help"],
+    ],
 )
 def test_imports_nothing_heavy(arguments):
     code = (

@@ -77,7 +77,8 @@ def fitted(evidence: Evidence, *explanations: Explanation, rounds: int = 3) -> t
         trials = []
         for t, one in enumerate(evidence.trials):
             mine = (e.wrench(one.scene) for e in fit.explanations if t in e.place.trials)
-            trials.append(one.with_noise_beside(sum(mine, np.zeros_like(one.scene.measured))))
+            change = sum(mine, np.zeros_like(one.scene.measured))
+            trials.append(one.with_noise_beside(one.filtered.filter(change[..., None])[..., 0]))
         evidence = together(tuple(trials))
         fit = fit_together(evidence, fit.explanations)
     return evidence, fit

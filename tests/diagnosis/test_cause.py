@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from moving_scene import moving
 
-from bsip_cli.diagnosis.cause import Blocks, Cause, method_of
+from bsip_cli.diagnosis.cause import Blocks, Cause, change_by, method_of, unseen_change_by
 from bsip_cli.effects.plate_zero import PlateZero
 from bsip_cli.effects.sync_offset import SyncOffset
 
@@ -24,9 +24,9 @@ def test_block_and_fold_of_a_time():
 def test_every_frame_has_the_sizes_of_its_own_fold():
     scene = moving()
     fold = BLOCKS.fold_of(scene.times_s)
-    change = OFFSET.unseen_change(scene, fold)
+    change = unseen_change_by([OFFSET], scene, fold)
     assert change[:, 2] == pytest.approx(FOLDS[fold, 0])
-    assert OFFSET.change(scene)[:, 2] == pytest.approx(25.0)
+    assert change_by([OFFSET], scene)[:, 2] == pytest.approx(25.0)
 
 
 def test_name_of_the_extended_model():

@@ -9,7 +9,7 @@ import pytest
 from moving_scene import moving
 from scipy.interpolate import CubicSpline
 
-from bsip_cli.diagnosis.cause import Cause
+from bsip_cli.diagnosis.cause import Cause, change_by
 from bsip_cli.diagnosis.corrected_wrench import corrected_wrench, is_of_the_forces
 from bsip_cli.effects.added_mass import AddedMass
 from bsip_cli.effects.clock_drift import ClockDrift
@@ -45,7 +45,7 @@ def late(scene: Scene, *causes: Cause) -> np.ndarray:
 
 def test_a_plate_is_put_right_exactly():
     scene = moving()
-    measured = scene.predicted + OFFSET.change(scene)
+    measured = scene.predicted + change_by([OFFSET], scene)
     wrench, valid = corrected_wrench(scene, measured, [OFFSET])
     assert wrench == pytest.approx(scene.predicted, abs=1e-9)
     assert valid.all()
@@ -57,7 +57,7 @@ def test_a_late_clock_is_put_right(causes):
     clocks = [cause for cause in causes if cause is not OFFSET]
     measured = late(scene, *clocks)
     if OFFSET in causes:
-        measured = measured + OFFSET.change(scene)
+        measured = measured + change_by([OFFSET], scene)
     wrench, valid = corrected_wrench(scene, measured, causes)
     left, before = (largest((x - scene.predicted)[valid]) for x in (wrench, measured))
     assert (left < 5e-3 * before).all()

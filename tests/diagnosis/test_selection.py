@@ -92,6 +92,19 @@ def test_a_second_cause_in_the_same_trial_is_found_too():
     assert offset == pytest.approx(OFFSET_N, abs=0.5)
 
 
+def test_what_a_large_cause_leaves_behind_is_no_other_cause():
+    """No linear course of a delay of 30 ms is quite that of the delay."""
+    scene = with_effect(late(part_of_moving(0, 12), 0.030), EFFECTS["plate_zero"], "1 fx", 2.0)
+    selection = selection_of(noisy(scene, 4))
+    (one,) = said_of(selection)
+    assert one.effect == "sync_offset"
+    rare = [t for r in selection.rounds for t in r.tried if t.p_value <= 0.05]
+    left = [t for t in rare if t.is_leftover]
+    assert left and not any(t.is_good for t in left)
+    rejected = findings_of(selection, np.random.default_rng(1))
+    assert any("what a larger cause leaves behind" in one.sentence for one in rejected)
+
+
 def test_every_round_says_what_was_tried():
     rounds = late_with_offset().rounds
     assert [one.kept is not None for one in rounds] == [True, True, False]
@@ -126,9 +139,23 @@ def test_a_swing_that_no_effect_knows_has_no_name(hertz):
     assert (one.effect, one.target) == ("unexplained", "fz")
     frequency = number_of(one, "frequency")
     assert frequency.value == pytest.approx(hertz, abs=0.01)
-    size = np.hypot(number_of(one, "cosine").value, number_of(one, "sine").value)
-    assert size == pytest.approx(20.0, abs=2.0)
-    assert "no name" in one.sentence and f"{hertz:.2f} Hz" in one.sentence
+    assert number_of(one, "amplitude").value == pytest.approx(20.0, abs=2.0)
+    assert "without a name" in one.sentence and f"{hertz:.2f} times per second" in one.sentence
+
+
+def test_a_swing_between_the_regular_frequencies_is_found_in_a_long_trial():
+    hertz, scene = 3.07, part_of_moving(0, 40)
+    swing = 6.0 * np.sin(2 * np.pi * hertz * scene.times_s)[:, None] * np.eye(6)[2]
+    places = signatures_of(all_of(noisy(shown(scene, swing), 6)), PATTERNS).places
+    asked = [
+        p.candidate.scanned[0] for p in places if p.candidate.target == "fz" and p.candidate.scanned
+    ]
+    assert min(abs(f - hertz) for f in asked) < 0.01
+    clean = signatures_of(all_of(noisy(scene, 6)), PATTERNS).places
+    regular = [
+        p.candidate.scanned[0] for p in clean if p.candidate.target == "fz" and p.candidate.scanned
+    ]
+    assert min(abs(f - hertz) for f in regular) > 0.02 and len(regular) < len(asked)
 
 
 # --- causes that look alike, and the rows of the artifact ---------------------------------------

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from moving_scene import MASS_KG, RATE_HZ, moving, phi, rms, scene_of, standing_still
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 from standing_person import Swing, standing
 
@@ -16,6 +17,7 @@ from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.effects.clock_drift import ClockDrift
 from bsip_cli.effects.gravity_tilt import GravityTilt
+from bsip_cli.effects.joint_change import joint_change
 from bsip_cli.effects.plate_crosstalk import PlateCrosstalk
 from bsip_cli.effects.plate_drift import PlateDrift
 from bsip_cli.effects.plate_gain import PlateGain
@@ -190,3 +192,31 @@ def test_a_standing_person_weighs_what_the_scene_says():
     scene = standing_still()
     np.testing.assert_allclose(scene.predicted[5, 2], MASS_KG * 9.80665, rtol=1e-9)
     np.testing.assert_allclose(scene.measured, scene.predicted, atol=1e-9)
+
+
+# --- several at once ----------------------------------------------------------------------------
+
+
+def test_delays_are_one_delay_and_the_rest_adds_up():
+    scene = moving()
+    late, early = np.array([0.03]), np.array([-0.03])
+    both = [(SyncOffset(), "", late), (SyncOffset(), "", early)]
+    assert not joint_change(scene, both).any()
+    added = SyncOffset().change(scene, "", late) + SyncOffset().change(scene, "", early)
+    assert np.abs(added[20:-20]).max() > 1.0
+    offset = (PlateZero(), "1 fz", np.array([10.0]))
+    together = joint_change(scene, [both[0], offset])
+    parts = SyncOffset().change(scene, "", late) + PlateZero().change(scene, *offset[1:])
+    np.testing.assert_allclose(together, parts, atol=1e-9)
+
+
+def test_what_plates_do_wrong_comes_as_late_as_their_forces():
+    scene, shift = moving(), (PlateTranslation(), "1", np.array([0.02, 0.0, 0.0]))
+    late_s = 0.02
+    delay = (SyncOffset(), "", np.array([late_s]))
+    together = joint_change(scene, [delay, shift])
+    wrong = PlateTranslation().change(scene, *shift[1:])
+    later = CubicSpline(scene.times_s, wrong)(np.minimum(scene.times_s + late_s, scene.times_s[-1]))
+    expected = SyncOffset().change(scene, *delay[1:]) + later
+    np.testing.assert_allclose(together, expected, atol=1e-9)
+    assert np.abs(later - wrong).max() > 0.1

@@ -220,3 +220,15 @@ def test_a_trial_is_solved_from_its_best_seen_frame_to_both_ends():
     assert len(poses.q) == 9
     assert np.isnan(poses.residual_m[:4, 5]).all()
     np.testing.assert_allclose(poses.q[0], poses.q[8], atol=2e-3)
+
+
+def test_a_person_who_walks_in_and_out_is_solved_between():
+    """Whole stretches without any marker at both ends."""
+    person = standing().person
+    markers = np.repeat(markers_of(person, standing().q[None]), 12, axis=0)
+    markers[:4] = markers[9:] = np.nan
+    poses = solve_trial(person, markers, **OPTIONS)
+    assert np.nanmax(poses.residual_m) < 1e-4
+    assert np.isnan(poses.residual_m[[0, 11]]).all()
+    assert (poses.coordinate_sd[[0, 11]].max(axis=1) > 1.0).all()
+    assert np.isfinite(poses.q).all()

@@ -23,7 +23,7 @@ def test_rigid_segment_is_exact():
     truth = _body()
     holed = truth.copy()
     holed[50:80, 3] = np.nan
-    result = fill_gaps(holed, RATE_HZ, [[0, 1, 2, 3]], max_gap_s=0.5)
+    result = fill_gaps(holed, RATE_HZ, [[0, 1, 2, 3]], max_gap_s=0.0, max_rigid_gap_s=0.5)
     np.testing.assert_allclose(result.markers_m, truth, atol=1e-12)
     assert result.filled.sum() == 30 and result.rigid.sum() == 30
     assert result.filled[50:80, 3].all()
@@ -33,9 +33,26 @@ def test_spline_where_the_segment_cannot_help():
     truth = _body()
     holed = truth.copy()
     holed[50:58, 3] = holed[50:58, 2] = np.nan
-    result = fill_gaps(holed, RATE_HZ, [[0, 1, 2, 3]], max_gap_s=0.2)
+    result = fill_gaps(holed, RATE_HZ, [[0, 1, 2, 3]], max_gap_s=0.2, max_rigid_gap_s=0.2)
     assert not result.rigid.any() and result.filled.sum() == 16
     assert np.abs(result.markers_m - truth).max() < 5e-4
+
+
+def test_the_segment_bridges_what_the_spline_must_leave():
+    holed = _body()
+    holed[50:70, 3] = np.nan  # its mates are seen
+    holed[100:120, :] = np.nan  # nothing is
+    result = fill_gaps(holed, RATE_HZ, [[0, 1, 2, 3]], max_gap_s=0.1, max_rigid_gap_s=0.3)
+    assert result.rigid[50:70, 3].all() and result.rigid.sum() == result.filled.sum() == 20
+    assert np.isnan(result.markers_m[100:120]).all()
+
+
+def test_limits_hold_to_the_frame():
+    for frames, expected in ((10, True), (11, False)):
+        holed = _body()
+        holed[50 : 50 + frames, 3] = np.nan
+        result = fill_gaps(holed, RATE_HZ, [], max_gap_s=0.1, max_rigid_gap_s=0.5)
+        assert result.filled.any() == expected
 
 
 def test_markers_on_a_line_give_no_orientation():
@@ -43,13 +60,13 @@ def test_markers_on_a_line_give_no_orientation():
     truth[:, 2] = 2 * truth[:, 1] - truth[:, 0]
     holed = truth.copy()
     holed[50:55, 3] = np.nan
-    result = fill_gaps(holed, RATE_HZ, [[0, 1, 2, 3]], max_gap_s=0.2)
+    result = fill_gaps(holed, RATE_HZ, [[0, 1, 2, 3]], max_gap_s=0.2, max_rigid_gap_s=0.2)
     assert not result.rigid.any() and result.filled.sum() == 5
 
 
 def test_long_gaps_and_ends_stay():
     holed = _body()
     holed[:10, 0] = holed[-10:, 1] = holed[60:90, 2] = np.nan
-    result = fill_gaps(holed, RATE_HZ, [], max_gap_s=0.2)
+    result = fill_gaps(holed, RATE_HZ, [], max_gap_s=0.2, max_rigid_gap_s=0.2)
     assert not result.filled.any()
     np.testing.assert_array_equal(result.markers_m, holed)

@@ -35,7 +35,56 @@ def test_duplicates_match_nothing_and_are_said():
     assert any("share" in finding.found for finding in match.findings)
 
 
+def test_separators_do_not_count():
+    match = match_labels(["R.ASI", "L_ASI", "c 7", "T-10", "r.heel", "R_HEE"], WANTED)
+    assert match.index == {"RASIS": 0, "LASIS": 1, "C7": 2, "T10": 3, "RCAL": 5}
+
+
+def test_spellings_that_fall_together_match_nothing():
+    match = match_labels(["R.ASI", "R_ASI", "LASI"], {"RASIS": ["RASI"], "LASIS": ["LASI"]})
+    assert match.index == {"LASIS": 2}
+
+
+def test_labels_cut_to_four_characters():
+    wanted = {"FHEAD": [], "RKNEL": [], "RKNEM": [], "LHAND": []}
+    match = match_labels(["FHEA", "RKNE", "LHAN", "a longer label"], wanted)
+    assert match.index == {"FHEAD": 0, "LHAND": 2}  # RKNE may be either
+    whole = match_labels(["FHEA", "LHAN", "a longer label", "another"], wanted)
+    assert whole.index == {}
+
+
+def test_empty_points_are_not_there_and_are_said():
+    labels = ["RASI", "LASI", "C7", "T10", "RHEE", "RHEE"]
+    match = match_labels(labels, WANTED, seen=[True, True, False, True, False, True])
+    assert match.index == {"RASIS": 0, "LASIS": 1, "T10": 3, "RCAL": 5}
+    assert [(f.subject, f.found) for f in match.findings] == [
+        ("C7", "labelled, but seen in no frame"),
+        ("C7", "1 of 5 markers not in the file"),
+    ]
+
+
+def test_nobody_misses_optional_markers():
+    match = match_labels(["RASI", "LASI", "T10"], WANTED, optional=("C7", "RCAL"))
+    assert match.missing == ("C7", "RCAL") and match.findings == ()
+
+
+def test_many_shared_labels_are_refused_with_what_to_do():
+    with pytest.raises(BadDataError, match=r"3 of 5 markers .* RASIS, LASIS, C7") as caught:
+        match_labels(["RASI", "LASI", "C7", "T10", "RASI", "LASI", "C7"], WANTED)
+    assert "DESCRIPTIONS" in caught.value.remedy and "prefixes" in caught.value.remedy
+
+
 def test_two_people_are_refused_with_the_list():
     labels = [p + m for p in ("A:", "B:") for m in ("RASI", "LASI", "C7", "T10")]
     with pytest.raises(BadDataError, match=r"'A:'.*'B:'"):
         match_labels(labels, WANTED)
+
+
+def test_a_prefix_chooses_between_two_people():
+    labels = [p + m for p in ("A:", "B:") for m in ("RASI", "LASI", "C7", "T10")]
+    for wish in ("B:", "B"):
+        match = match_labels(labels, WANTED, prefix=wish)
+        assert match.prefix == "B:"
+        assert match.index == {"RASIS": 4, "LASIS": 5, "C7": 6, "T10": 7}
+    with pytest.raises(BadDataError, match=r"'Carl'.*A:, B:"):
+        match_labels(labels, WANTED, prefix="Carl")

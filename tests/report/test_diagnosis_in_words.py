@@ -3,26 +3,23 @@
 import numpy as np
 import pandas as pd
 import pytest
-from fake_study import attribution, detection, diagnosis, gains
+from fake_study import attribution, changes, detection, diagnosis, gains
 
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.report.diagnosis import (
-    UNNAMED,
-    candidates_of,
-    causes_of,
-    gain_sentence,
-    headline,
-    limits_of,
-    limits_sentence,
-    verdict_words,
-)
+from bsip_cli.report.candidates import UNNAMED, candidates_of, causes_of
 from bsip_cli.report.effect_words import EFFECT_WORDS, place_label, size_words
 from bsip_cli.report.figures.wrench_residual import amplitude_spectrum
+from bsip_cli.report.limits import limits_of, limits_sentence
+from bsip_cli.report.movement_phases import PHASES, motion_of, phases_of
+from bsip_cli.report.participant import detection as limits_section
 from bsip_cli.report.participant.attribution import pooled_shares
-from bsip_cli.report.participant.diagnosis import gain_blocks
-from bsip_cli.report.participant.residual import phases_of, residuals_of
+from bsip_cli.report.participant.diagnosis import gain_blocks, ranking
+from bsip_cli.report.participant.residual import residuals_of
 from bsip_cli.report.records import EXTENDED, with_all_causes
+from bsip_cli.report.separating import separating_recording
+from bsip_cli.report.usual_sizes import USUAL
+from bsip_cli.report.verdict import change_sentence, gain_sentence, headline, verdict_of
 
 TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]
 
@@ -36,48 +33,83 @@ def test_every_effect_has_words():
     assert set(EFFECT_WORDS) == {*EFFECTS, UNNAMED}
 
 
+def text_of(*tables) -> str:
+    return " ".join(verdict_of(*tables).paragraphs())
+
+
 def test_the_verdict_says_what_how_large_how_sure_and_where(found):
-    text = " ".join(verdict_words(found, detection(TRIALS), None))
+    text = text_of(found, detection(TRIALS))
     assert text.startswith(
-        "Something is wrong: 1 cause named and 1 narrowed down to rivals that look alike here."
+        "Something is wrong: 1 cause named and 1 narrowed down to rivals that look alike in these "
+        "recordings."
     )
-    assert "Plate 1 is turned by +2.0 degrees — yaw 2.01° (95 % interval 1.75 to 2.26)." in text
-    assert "Seen in sequence (run 1) and basketball (run 1)." in text
-    assert "Chance alone would bring as much in 0.5 % of cases" in text
-    assert "removes 8.0 % (95 % interval 4.0 to 12.0 %)" in text
+    assert (
+        "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
+        "both recordings. Likely (chance 0.5 %): explains 8.0 % (4.0 to 12.0 %)" in text
+    )
     assert text.count(EFFECT_WORDS["plate_rotation"].consequence) == 1  # plate_zero's is the same
+    assert f"Causes 1 and 2: {EFFECT_WORDS['plate_rotation'].consequence}" in text
+    rivals = found.replace({"effect": {"added_mass": "plate_gain"}})
+    assert "Causes 1 and 2: The measured forces" in text_of(rivals, detection(TRIALS))
+
+
+def test_a_gain_that_may_be_none_is_weak(found):
+    text = text_of(found.assign(gain_ci_low=-1.0), detection(TRIALS))
+    assert "Weak (chance 0.5 %): explains 8.0 % (−1.0 to 12.0 %)" in text
+    sure = text_of(found.assign(p_value=1e-9, gain_ci_high=140.0), detection(TRIALS))
+    assert "Sure (chance under 0.1 %): explains 8.0 % (4.0 to 100.0 %)" in sure
 
 
 def test_rivals_come_with_what_tells_them_apart(found):
-    text = " ".join(verdict_words(found, detection(TRIALS), None))
-    assert "One of these, which these recordings cannot tell apart: Channel fz has" in text
-    assert "; or 1.00 kg more move with the left hand" in text
-    both = f"{EFFECTS['plate_zero'].remedy}; or {EFFECTS['added_mass'].remedy}"
-    assert f"To tell them apart: {both}." in text
+    text = text_of(found, detection(TRIALS))
+    assert (
+        "One of these, which these recordings cannot tell apart, only in basketball (run 1): (a) "
+        "channel fz has an offset of +9.8 N (95 % interval 8.8 to 10.8 N); (b) 1.00 kg more move "
+        "with the left hand (95 % interval 0.90 to 1.10 kg)." in text
+    )
+    assert "To tell them apart: step off the plate for five seconds: an offset stays" in text
     assert "pray" not in text  # the sentence's own advice names one of the rivals' only
+
+
+def test_what_tells_rivals_apart_depends_on_all_of_them():
+    hands = [("added_mass", "hand_l"), ("added_mass", "hand_r")]
+    assert separating_recording(hands).endswith("one at a time: left hand and right hand")
+    assert "hop three times" in separating_recording(
+        [("gravity_tilt", ""), ("plate_rotation", "1")]
+    )
+    unknown = [("sync_offset", ""), ("over_smoothing", "")]
+    both = f"{EFFECTS['sync_offset'].remedy}; {EFFECTS['over_smoothing'].remedy}"
+    assert separating_recording(unknown) == both
+    assert "plates, cables" in separating_recording([("sync_offset", ""), (UNNAMED, "fx")])
 
 
 def test_nothing_wrong(found):
     none = found[found["verdict"] == "rejected"]
     first = pd.DataFrame([{**none.iloc[0], "effect": "none", "verdict": "named", "rank": 1}])
-    said = verdict_words(pd.concat([first, none]), detection(TRIALS), None)
-    assert said[0] == "Nothing wrong above the noise was found."
-    assert said[1] == "Looked at: basketball (run 1) and sequence (run 1)."
+    said = verdict_of(pd.concat([first, none]), detection(TRIALS))
+    assert not said.found
+    assert said.headline == "Nothing is wrong above the noise."
+    assert said.paragraphs()[1] == "Looked at: basketball (run 1) and sequence (run 1)."
+    assert said.paragraphs()[2].endswith("could not have been seen in these recordings.")
 
 
 def test_something_that_cannot_be_named(found):
     row = found[found["effect"] == "plate_zero"].assign(
         effect=UNNAMED, verdict="named", class_id="", sentence="something goes along with fz"
     )
-    assert headline(row) == "Something is wrong: 1 that cannot be named."
-    text = " ".join(verdict_words(row, detection(TRIALS), None))
-    assert "Something is wrong that cannot be named. Something goes along with fz" in text
+    assert headline(row) == "Something is wrong that has no name in the catalogue of causes."
+    text = text_of(row, detection(TRIALS))
+    assert "Something goes along with fz (95 % interval 8.8 to 10.8 N)" in text
+    assert EFFECT_WORDS[UNNAMED].consequence in text
+    assert "bsip extend" not in text  # what has no name cannot be put into a model
 
 
 def test_a_cause_named_twice_is_a_warning(found):
-    again = found[found["rank"] == 1].assign(rank=5)
-    text = " ".join(verdict_words(pd.concat([found, again]), detection(TRIALS), None))
-    assert "Named more than once: force plate turned or tilted: plate 1." in text
+    again = pd.concat([found, found[found["rank"] == 1].assign(rank=5)])
+    warning = "Named more than once: force plate turned or tilted: plate 1."
+    assert warning in text_of(again, detection(TRIALS))
+    apart = again.assign(trials=[TRIALS[rank == 5] for rank in again["rank"]])
+    assert warning not in text_of(apart, detection(TRIALS))  # in two recordings, once each
 
 
 def test_candidates_keep_their_order_and_their_reason(found):
@@ -87,6 +119,36 @@ def test_candidates_keep_their_order_and_their_reason(found):
     assert candidates[3].why_not() == "chance brings as much in 40 % of cases"
     assert "chance" not in candidates[3].what()
     assert [len(cause) for cause in causes_of(candidates)] == [1, 2]
+
+
+def test_an_interval_has_a_sign_where_its_sentence_has_one(found):
+    late = found[found["rank"] == 1].assign(
+        effect="sync_offset", target="", parameter="delay", unit="s",
+        estimate=-0.02, ci_low=-0.021, ci_high=-0.019,
+        sentence="the forces were recorded 20.0 ms before the markers (delay: 95 % interval -0.0)",
+    )  # fmt: skip
+    (one,) = candidates_of(late)
+    assert one.told().endswith("20.0 ms before the markers (95 % interval 19.0 to 21.0 ms)")
+    drift = late.assign(effect="plate_drift", parameter="drift", unit="N/s", sentence="by -0.02 N")
+    assert candidates_of(drift)[0].told() == "by −0.02 N (95 % interval −0.0210 to −0.0190 N/s)"
+
+
+def test_a_regularity_without_a_name_has_a_label(found):
+    spring = found[found["rank"] == 2].assign(
+        effect=UNNAMED, target="y by z", parameter="stiffness"
+    )
+    assert (
+        candidates_of(spring)[0].label
+        == "something without a name: pull on the pelvis along Y, growing along Z"
+    )
+    swing = spring.assign(target="fx", parameter="amplitude")
+    assert candidates_of(swing)[0].label == "something without a name: swing, force x"
+
+
+def test_a_marker_of_any_name_is_drawn_as_it_is(found):
+    foreign = found.assign(effect="marker_shift", target="$\\frac{$")
+    picture = ranking(candidates_of(foreign))[0]
+    assert b"<svg" in picture.svg
 
 
 # --- limits -------------------------------------------------------------------------------------
@@ -115,9 +177,29 @@ def test_units_that_people_read():
     assert size_words("rate_error", "1", 7.5e-5) == "75 ppm"
     assert size_words("coefficient", "1", 0.0262) == "2.6 %"
     assert size_words("mass", "kg", 18.2) == "18 kg"
-    assert place_label("plate_crosstalk", "1 fx>fy") == "plate 1, fx into fy"
+    assert place_label("plate_crosstalk", "1 fx>fz") == "plate 1, force x into vertical force"
+    assert place_label("marker_swap", "A+B") == "markers A and B"
     assert place_label("added_mass", "hand_l") == "left hand"
     assert place_label("sync_offset", "") == ""
+    assert place_label("unmeasured_contact", "hand_l+hand_r") == "left hand and right hand"
+    assert place_label("plate_gain", "all fz") == "all plates, vertical force"
+
+
+def test_limits_stand_beside_sizes_that_labs_meet(found):
+    nothing = found[found["verdict"] == "rejected"]
+    *_, limits, masses, grid = limits_section.blocks(detection(TRIALS), nothing)
+    assert (limits.name, masses.name) == ("diagnosis_limits", "diagnosis_masses")
+    rows = {row[0].text: [cell.text for cell in row[1:]] for row in grid.cells()}
+    assert rows["forces and markers out of step"] == ["2.5 ms", "22 ms", "–", "5 to 20 ms"]
+    assert rows["force plate not where the file says"][0] == "4.0 to 6.0 mm"
+    assert set(USUAL) <= set(EFFECTS)
+
+
+def test_what_no_recording_shows_is_not_put_in_figures(found):
+    far = detection(TRIALS).assign(effect="joint_centre", parameter="shift_x", unit="m")
+    far["limit"] = np.where(far["target"] == "hand_l", 1e5, 0.02)
+    *_, grid = limits_section.blocks(far, found)
+    assert grid.cells()[0][1].text == "from 20 mm, or not at all"
 
 
 # --- gains --------------------------------------------------------------------------------------
@@ -129,26 +211,48 @@ def test_gains_lead_with_what_improves():
     worse = gains().assign(component=["cop_ap", "mz"], ci_high=[60.0, -1.0])
     assert gain_sentence(worse).endswith("It rises in moment, lab Z (up).")
     assert gain_sentence(worse[1:]).endswith("in the model, no component follows better.")
-    (grid,) = gain_blocks(gains())
-    assert "held out: basketball (run 1)" in grid.caption
-    assert [row[4].mark for row in grid.cells()] == ["better", ""]
+    where, grid = gain_blocks(gains())
+    assert where.text.endswith("in basketball (run 1) (that identified no parameter).")
+    assert [row[3].mark for row in grid.cells()] == ["better", ""]
 
 
 def test_the_verdict_tells_gains_where_they_are(found):
-    with_them = verdict_words(found, detection(TRIALS), gains())
-    assert set(with_them) - set(verdict_words(found, detection(TRIALS), None)) == {
-        gain_sentence(gains())
-    }
+    assert verdict_of(found, detection(TRIALS), gains()).results == (gain_sentence(gains()),)
+    (advice,) = verdict_of(found, detection(TRIALS)).results
+    assert "bsip extend" in advice
+
+
+def test_changes_of_the_body_lead_with_the_largest():
+    table = changes()
+    text = change_sentence(table)
+    assert "left thigh +1.20 kg, its centre of mass moves by 15 mm" in text
+    assert "right foot" not in text
+    assert "next to nothing" in change_sentence(table[table["segment"] == "foot_r"])
+    assert change_sentence(table[:0]) == ""
 
 
 # --- residual and attribution -------------------------------------------------------------------
 
 
-def test_thirds_of_the_frames_by_vertical_force():
-    force = np.array([9.0, 1, 2, 3, 4, 5, 6, 7, 8, np.nan])
-    valid = np.ones(10, dtype=bool)
-    assert list(phases_of(force, valid)) == [2, 0, 0, 0, 1, 1, 1, 2, 2, -1]
-    assert (phases_of(force, ~valid) == -1).all()
+def test_phases_of_the_movement():
+    down, up, still, level = (np.array([[0, 0, z]]) for z in (-0.3, 0.3, 0.0, 0.0))
+    pelvis = np.concatenate([still, level, down, up, up, still])
+    joints = np.array([0.1, 2.0, 1.0, 1.0, 1.0, np.nan])
+    load = np.array([1.0, 1.0, 0.9, 1.1, 1.8, 1.0])
+    phase = phases_of(pelvis, joints, load, np.ones(6, dtype=bool))
+    assert [PHASES[k] for k in phase[:5]] == list(PHASES)
+    assert phase[5] == -1  # an unknown motion has no phase
+    assert (phases_of(pelvis, joints, load, np.zeros(6, dtype=bool)) == -1).all()
+
+
+def test_motion_comes_from_where_the_pelvis_is():
+    t = np.arange(100) / 50.0
+    table = {"time_s": t, "q_root_tx": 0.0, "q_root_ty": 2 * t, "q_root_tz": -t, "v_root_tx": 9.0}
+    frame = pd.DataFrame(table).assign(v_knee_l=3.0, v_hip_l_x=-4.0)
+    pelvis, joints = motion_of(frame, np.array([0.5, 1.0, 5.0]))
+    np.testing.assert_allclose(pelvis[:2], [[0, 2, -1], [0, 2, -1]], atol=1e-12)
+    np.testing.assert_allclose(joints, [4.0, 4.0, np.nan])
+    assert np.isnan(pelvis[2]).all()
 
 
 def test_residuals_are_measured_less_simulated_before_and_after():

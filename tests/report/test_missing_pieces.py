@@ -69,6 +69,7 @@ def test_no_trial_served(record):
     names = [p.name for p in document.pictures()]
     assert names == [
         "diagnosis_causes",
+        "diagnosis_limits",
         "diagnosis_masses",
         "attribution",
         "masses",

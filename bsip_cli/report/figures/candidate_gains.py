@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,16 +13,19 @@ from bsip_cli.report.figures.canvas import (
     BLUE,
     INK,
     ORANGE,
+    PURPLE,
     SOFT,
     house_style,
-    legend_above,
+    literal,
     new_figure,
     tidy,
 )
 
-_LEAST, _ROOM = 5.0, 1.25
+_LEAST, _ROOM = 5.0, 1.15
+_LABEL_WIDTH = 40  # letters in a line
 _STYLES = {  # verdict: colour, marker, filled, what the legend says
     "named": (BLUE, "o", True, "named"),
+    "unnamed": (PURPLE, "^", True, "without a name"),
     "ambiguous": (ORANGE, "D", True, "one of several rivals"),
     "rejected": (SOFT, "s", False, "rejected"),
 }
@@ -42,36 +46,50 @@ class CandidateGains:
 def candidate_gains(data: CandidateGains) -> Figure:
     """A row per candidate; what runs out of the axis ends in an arrow at its edge."""
     rows = len(data.labels)
-    figure = new_figure(22.0 + 6.5 * rows)
+    labels = [fill(literal(label), _LABEL_WIDTH) for label in data.labels]
+    lines = max((label.count("\n") + 1 for label in labels), default=1)
+    figure = new_figure(22.0 + rows * max(6.5, 3.5 * lines))
     axes = figure.add_subplot()
-    edge = _edge(data)
+    low, high = _edges(data)
     for row in range(rows):
-        _draw(axes, data, row, edge)
+        _draw(axes, data, row, low, high)
     axes.axvline(0.0, color=INK, lw=0.9)
-    axes.set_xlim(-edge, edge)
+    axes.set_xlim(low, high)
     axes.set_ylim(rows - 0.4, -0.6)
-    axes.set_yticks(range(rows), data.labels)
-    axes.set_xlabel("removed of the squared residual in data held out [%]")
+    axes.set_yticks(range(rows), labels)
+    axes.set_xlabel("removed in unseen seconds [%]")
     tidy(axes, grid="x")
-    legend_above(axes)
+    handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    figure.legend(
+        handles.values(),
+        handles.keys(),
+        loc="outside upper left",
+        ncols=len(_STYLES),
+        frameon=False,
+        fontsize=8,
+    )
     return figure
 
 
-def _edge(data: CandidateGains) -> float:
-    """Of the axis: all gains above zero fit, and the intervals of what was named."""
+def _edges(data: CandidateGains) -> tuple[float, float]:
+    """Of the axis: all gains above zero fit, and the intervals of what was kept; to the left at most
+    as far as to the right."""
     kept = np.array([verdict != "rejected" for verdict in data.verdicts])
-    sizes = np.concatenate([data.gain, np.where(kept, data.high, np.nan)])
-    return _ROOM * max(_LEAST, float(np.nanmax(sizes, initial=_LEAST)))
+    highs = np.concatenate([data.gain, np.where(kept, data.high, np.nan)])
+    high = _ROOM * max(_LEAST, float(np.nanmax(highs, initial=_LEAST)))
+    low = _ROOM * min(-_LEAST, float(np.nanmin(data.low, initial=-_LEAST)))
+    return max(low, -high), high
 
 
-def _draw(axes: Axes, data: CandidateGains, row: int, edge: float) -> None:
+def _draw(axes: Axes, data: CandidateGains, row: int, left: float, right: float) -> None:
     colour, marker, filled, label = _STYLES[data.verdicts[row]]
-    low, high = np.clip([data.low[row], data.high[row]], -edge, edge)
+    low, high = np.clip([data.low[row], data.high[row]], left, right)
     axes.plot([low, high], [row, row], color=colour, lw=1.4)
-    for end, sign in ((data.low[row], -1.0), (data.high[row], 1.0)):
-        if sign * end > edge:
-            axes.plot(sign * edge, row, marker="<" if sign < 0 else ">", color=colour, ms=5)
-    if abs(data.gain[row]) <= edge:
+    if data.low[row] < left:
+        axes.plot(left, row, marker="<", color=colour, ms=5)
+    if data.high[row] > right:
+        axes.plot(right, row, marker=">", color=colour, ms=5)
+    if left <= data.gain[row] <= right:
         axes.plot(
             data.gain[row],
             row,

@@ -98,8 +98,12 @@ def legend_above(axes: Axes, columns: int = 4) -> None:
 
 def plain(text: str) -> str:
     """A foreign label as it is: no mathematics, nothing unprintable, cut where it is too long."""
-    short = text if len(text) <= LONGEST_LABEL else f"{text[: LONGEST_LABEL - 1]}…"
-    return "".join(c if c.isprintable() else "?" for c in short).replace("$", r"\$")
+    return literal(text if len(text) <= LONGEST_LABEL else f"{text[: LONGEST_LABEL - 1]}…")
+
+
+def literal(text: str) -> str:
+    """A foreign text as it is: no mathematics, nothing unprintable."""
+    return "".join(c if c.isprintable() else "?" for c in text).replace("$", r"\$")
 
 
 def thinned(length: int, most: int = MOST_POINTS) -> slice:

@@ -25,7 +25,8 @@ from bsip_cli.report.figures.canvas import (
 _SEGMENT_S = 4.0  # of a spectrum: 0.25 Hz apart
 _SHORTEST_S = 1.0  # of a stretch that enters a spectrum
 _HIGHEST_HZ = 15.0
-_STYLES = ((BLUE, "-", 0.7), (ORANGE, "--", 0.9))
+_ALONE = ((BLUE, "-", 0.7),)
+_BEFORE_AFTER = (("#8fc1e3", "-", 1.7), (ORANGE, "-", 0.7))  # light and wide, dark and thin
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,8 @@ def wrench_residual(data: WrenchResidual) -> Figure:
     figure = new_figure(18.0 + 19.0 * rows)
     panels = figure.subplots(rows, 2, squeeze=False, width_ratios=(2.4, 1), sharex="col")
     for (left, right), (name, methods) in zip(panels, data.residuals.items(), strict=True):
-        for (method, values), style in zip(methods.items(), _STYLES, strict=False):
+        styles = _BEFORE_AFTER if len(methods) > 1 else _ALONE
+        for (method, values), style in zip(methods.items(), styles, strict=False):
             _draw(left, right, data.time_s, values, method, style)
         left.axhline(0.0, color=INK, lw=0.6)
         left.set_title(f"{name} [{data.units[name]}]", fontsize=7.5, loc="left", pad=2)

@@ -2,74 +2,65 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 
-from bsip_cli.body.names import SEGMENTS
 from bsip_cli.report.blocks import (
     Block,
     Cell,
     Grid,
     Heading,
     Mark,
+    Numbered,
     Paragraph,
     Picture,
     Section,
     Tone,
 )
-from bsip_cli.report.diagnosis import (
-    Candidate,
-    Limit,
-    candidates_of,
-    causes_of,
-    limits_of,
-    limits_sentence,
-    verdict_words,
-)
-from bsip_cli.report.effect_words import effect_title, place_label
+from bsip_cli.report.candidates import Candidate, candidates_of
 from bsip_cli.report.figures.candidate_gains import CandidateGains, candidate_gains
-from bsip_cli.report.figures.mass_limits import MassLimits, mass_limits
-from bsip_cli.report.participant import attribution, residual
+from bsip_cli.report.participant import attribution, detection, residual
 from bsip_cli.report.records import ParticipantRecord
+from bsip_cli.report.verdict import (
+    LEAST_TOLD,
+    change_sentence,
+    put_right_sentence,
+    verdict_of,
+    worth_telling,
+)
 from bsip_cli.report.words import (
-    MISSING,
+    capital,
     component_label,
     labelled,
     number,
     percent,
     segment_label,
+    signed,
 )
 
 NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 _MOST_IN_FIGURE = 12
-_WHOLE_LAB = (  # causes whose limits fit into one table
-    "sync_offset",
-    "clock_drift",
-    "plate_translation",
-    "plate_rotation",
-    "plate_gain",
-    "plate_crosstalk",
-    "plate_zero",
-    "plate_drift",
-    "gravity_tilt",
-    "released_object",
-    "wobbling_mass",
-    "breathing",
-    "unmeasured_contact",
-    "marker_shift",
-)
 
 
 def verdict(record: ParticipantRecord) -> list[Block]:
     """What stands on the first screen."""
     if record.diagnosis is None or record.detection is None:
         return [Paragraph(NOT_RUN, "note")]
-    said = verdict_words(record.diagnosis, record.detection, record.gains)
-    found = bool(causes_of(candidates_of(record.diagnosis)))
-    tone: Tone = "warning" if found or record.diagnosis.empty else "good"
-    return [Paragraph(said[0], tone), *(Paragraph(text) for text in said[1:])]
+    said = verdict_of(record.diagnosis, record.detection, record.gains, record.changes)
+    tone: Tone = "warning" if said.found or record.diagnosis.empty else "good"
+    blocks: list[Block] = [Paragraph(said.headline, tone)]
+    if said.causes:
+        blocks.append(Numbered(said.causes))
+    rest = (*put_right(record), *said.results, *said.advice, said.limits)
+    return [*blocks, *(Paragraph(text) for text in rest if text)]
+
+
+def put_right(record: ParticipantRecord) -> tuple[str, ...]:
+    """What of the markers was wrong and is no longer, before anything was diagnosed."""
+    tables = [(trial.stem, trial.marker_events) for trial in record.trials]
+    return put_right_sentence([(stem, t) for stem, t in tables if t is not None])
 
 
 def section(record: ParticipantRecord) -> Section:
@@ -77,20 +68,26 @@ def section(record: ParticipantRecord) -> Section:
         Paragraph(
             "The simulated ground forces are compared with the measured ones, and every known cause "
             "of a difference is tried: errors of the plates, the clocks, the markers and the model. "
-            "A cause is named only if chance would rarely bring as much (family-wise 5 %) and if it "
-            "helps on data that it was not fitted to. Causes that look alike in these recordings "
-            "are named together."
+            "A cause is named only if chance would rarely bring as much (in 5 % of studies with "
+            "nothing wrong, counting all causes together) and if it helps in seconds that it was "
+            "not fitted to. Causes that look alike in these recordings are named together."
         )
     ]
     if record.diagnosis is None or record.detection is None:
         blocks.append(Paragraph(NOT_RUN, "note"))
     else:
-        candidates = candidates_of(record.diagnosis)
-        limits = limits_of(record.detection, record.diagnosis)
-        blocks += [Heading("The causes looked at"), *ranking(candidates)]
-        if record.gains is not None:
-            blocks += [Heading("What the result gains"), *gain_blocks(record.gains)]
-        blocks += [Heading("What could not have been seen"), *detection(limits)]
+        blocks += [
+            Heading("The causes looked at"),
+            *ranking(candidates_of(record.diagnosis)),
+        ]
+        if record.gains is not None and len(record.gains):
+            blocks += [Heading("What the forces gain"), *gain_blocks(record.gains)]
+        if record.changes is not None and len(record.changes):
+            blocks += [Heading("What the body's parameters become"), *change_blocks(record)]
+        blocks += [
+            Heading("What could not have been seen"),
+            *detection.blocks(record.detection, record.diagnosis),
+        ]
     blocks += [*residual.blocks(record), *attribution.blocks(record)]
     return Section("diagnosis", "What the simulation gets wrong", tuple(blocks))
 
@@ -109,38 +106,45 @@ def ranking(candidates: Sequence[Candidate]) -> list[Block]:
         figure = candidate_gains(
             CandidateGains(
                 tuple(_numbered(k, one) for k, one in enumerate(known, start=1)),
-                tuple(one.verdict for one in known),
+                tuple(one.answer for one in known),
                 gain,
                 low,
                 high,
             )
         )
         caption = (
-            "The candidates that were fitted in full, in the order of the diagnosis. How much of "
-            "the squared (whitened) residual each removes from data held out; an interval that "
-            "reaches below zero may be no gain at all. Arrows: the interval runs on."
+            "The causes that were fitted in full, in the order of the diagnosis: how much of the "
+            "squared difference between measured and simulated forces (in units of its noise) each "
+            "removes in seconds that it was not fitted to, with 95 % interval. An interval that "
+            "reaches below zero may be no gain at all; an arrow: it runs on. Letters in brackets: "
+            "rivals of one class."
         )
         blocks.append(Picture(figure, caption, "Dots: gain of each cause.", "diagnosis_causes"))
     rows = tuple(_row(k, one) for k, one in enumerate(candidates, start=1))
-    head = ("cause", "verdict", "in words", "in", "chance [%]", "gain [%]")
-    return [*blocks, Grid(head, rows, "Causes looked at, gain with 95 % interval", words=4)]
+    head = ("cause", "verdict", "in words", "recordings", "chance [%]", "removes [%]")
+    caption = (
+        "Causes looked at. Chance: how often it would bring as much; removes: of the squared "
+        "difference in unseen seconds, with 95 % interval"
+    )
+    return [*blocks, Grid(head, rows, caption, words=4)]
 
 
 def _numbered(k: int, one: Candidate) -> str:
-    return f"{k}. {one.label}"
+    return f"{k}. {f'({one.class_id}) ' if one.class_id else ''}{one.label}"
 
 
 def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
     marks: dict[str, Mark] = {"named": "group", "ambiguous": "warning"}
-    verdict = f"rival, class {one.class_id}" if one.verdict == "ambiguous" else one.verdict
+    answers = {"ambiguous": f"rival in class {one.class_id}", "unnamed": "found, without a name"}
+    verdict = answers.get(one.answer, one.answer)
     gain, low, high = one.gain
     reason = one.why_not()
     return (
         _numbered(k, one),
         Cell(verdict, marks.get(one.verdict, "")),
-        f"{one.what()}; rejected: {reason}" if reason else one.what(),
+        capital(f"{one.what()}; rejected: {reason}" if reason else one.told()),
         one.where(),
-        percent(one.p_value, 1),
+        percent(one.p_value, 1) if one.p_value >= LEAST_TOLD else "< 0.1",
         f"{number(gain, 1)} ({number(low, 1)} to {number(high, 1)})",
     )
 
@@ -149,13 +153,10 @@ def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
 
 
 def gain_blocks(gains: pd.DataFrame) -> list[Block]:
-    """A ``gain`` table: errors before and after the causes are in the model."""
-    if gains.empty:
-        return [Paragraph("No cause was added to the model, so nothing was gained.")]
+    """A ``gain`` table with rows: errors before and after the causes are in the model."""
     rows = tuple(
         (
             component_label(r["component"]),
-            r["method"],
             r["unit"],
             number(r["rmse_before"], 2),
             Cell(number(r["rmse_after"], 2), "better" if r["ci_low"] > 0 else ""),
@@ -163,66 +164,56 @@ def gain_blocks(gains: pd.DataFrame) -> list[Block]:
         )
         for r in gains.to_dict("records")
     )
-    data = "; ".join(labelled(text).replace("_", " ") for text in gains["data"].unique())
-    head = ("component", "method", "unit", "before", "after", "gain [%]")
+    return [
+        Paragraph(_data_words(gains)),
+        Grid(
+            ("component", "unit", "before", "after", "less by [%]"),
+            rows,
+            "Error of OM before and after the causes are in the model; ✓ marks a sure gain",
+            words=2,
+            groups=(("", 2), ("RMSE", 2), ("95 % interval", 1)),
+        ),
+    ]
+
+
+def _data_words(gains: pd.DataFrame) -> str:
+    """On which recordings, from ``held_out: a, b; identification: c``."""
+    kinds = {
+        "held_out": "that identified no parameter",
+        "identification": "that identified the parameters too",
+    }
+    parts = [text.partition(": ") for data in gains["data"].unique() for text in data.split("; ")]
+    said = [f"{labelled(stems)} ({kinds.get(kind, kind)})" for kind, _, stems in parts]
+    return (
+        "Every second was judged with sizes of the causes that were found without it, in "
+        f"{'; '.join(dict.fromkeys(said))}."
+    )
+
+
+def change_blocks(record: ParticipantRecord) -> list[Block]:
+    """Masses and centres of mass before and after the causes are in the model."""
+    assert record.changes is not None
+    worth = worth_telling(record.changes)
+    if worth.empty:
+        return [Paragraph(change_sentence(record.changes))]
+    before = record.method("OM")
+    rows = tuple(
+        (
+            segment_label(r["segment"]),
+            number(before["mass_kg"].get(r["segment"]), 3),
+            number(before["mass_kg"].get(r["segment"], np.nan) + r["mass_change_kg"], 3),
+            signed(r["mass_change_kg"], 3),
+            number(1000 * r["com_change_m"], 1),
+        )
+        for r in worth.to_dict("records")
+    )
+    head = ("segment", "OM", "with the causes", "change", "centre of mass moves [mm]")
     return [
         Grid(
             head,
             rows,
-            f"Error (RMSE) without and with the causes in the model; data — {data}",
-            words=3,
-            groups=(("", 3), ("RMSE", 2), ("", 1)),
+            "The identified parameters without and with the causes in the model, segments that "
+            "change",
+            groups=(("", 1), ("mass [kg]", 3), ("", 1)),
         )
     ]
-
-
-# --- detection limits ---------------------------------------------------------------------------
-
-
-def detection(limits: Sequence[Limit]) -> list[Block]:
-    """What these very recordings could not have shown, in words, a figure and a table."""
-    if not limits:
-        return [Paragraph("The limits of detection are not known.", "note")]
-    sentence = limits_sentence(limits)
-    blocks: list[Block] = [Paragraph(sentence)] if sentence else []
-    blocks.append(
-        Paragraph(
-            "Each limit is the size that would be found in 95 of 100 recordings like these, while "
-            "the inertial parameters and the cause's other numbers stay free. Smaller errors may be "
-            "there. Causes that were found have no limit.",
-            "note",
-        )
-    )
-    masses = {
-        x.target: x.size for x in limits if x.effect == "added_mass" and x.parameter == "mass"
-    }
-    shown = [segment for segment in SEGMENTS if segment in masses]
-    if shown:
-        figure = mass_limits(
-            MassLimits(tuple(segment_label(s) for s in shown), np.array([masses[s] for s in shown]))
-        )
-        caption = (
-            "How heavy something unknown on a segment must be, wherever on it, to be told from the "
-            "segment's own uncertain parameters."
-        )
-        blocks.append(Picture(figure, caption, "Dots: least mass.", "diagnosis_masses"))
-    rows = tuple(row for effect in _WHOLE_LAB for row in _limit_rows(effect, limits))
-    if rows:
-        head = ("cause", "found from", "where it shows best", "recordings")
-        blocks.append(Grid(head, rows, "Least size that would be found", words=3))
-    return blocks
-
-
-def _limit_rows(effect: str, limits: Sequence[Limit]) -> Iterator[tuple[str, ...]]:
-    """A row per unit: the range over all places and directions."""
-    of_it = [x for x in limits if x.effect == effect]
-    for unit in dict.fromkeys(x.unit for x in of_it):
-        sizes = sorted((x for x in of_it if x.unit == unit), key=lambda x: x.size)
-        least, most = sizes[0], sizes[-1]
-        words = [least.in_words(), most.in_words()]
-        yield (
-            effect_title(effect),
-            words[0] if words[0] == words[1] else " to ".join(words),
-            place_label(effect, least.target) if len({x.target for x in sizes}) > 1 else MISSING,
-            "together" if least.trials > 1 else "the best alone",
-        )

@@ -271,31 +271,24 @@ def _fit_grid(trial: TrialRecord, fit: pd.DataFrame) -> Grid:
     rows = {(row["method"], row["component"]): row for row in fit.to_dict("records")}
     lines: list[tuple[str | Cell, ...]] = []
     for component in (*COMPONENTS, *sorted(set(fit["component"]) - set(COMPONENTS))):
-        own = [rows.get((method, component)) for method in methods]
-        known = [row for row in own if row is not None]
-        if not known:
-            continue
-        cells = [
-            cell for column, _, digits in _MEASURES for cell in _measure_cells(own, column, digits)
+        known = [(m, rows[m, component]) for m in methods if (m, component) in rows]
+        columns = [
+            _measure_cells([row for _, row in known], column, digits)
+            for column, _, digits in _MEASURES
         ]
-        lines.append(
-            (
-                component_label(component),
-                str(known[0]["unit"]),
-                *cells,
-                number(known[0]["n"], 0),
-                number(known[-1]["n_effective"], 0),
-            )
-        )
+        for k, (method, row) in enumerate(known):
+            name = (component_label(component), str(row["unit"])) if k == 0 else ("", "")
+            samples = (number(row["n"], 0), number(row["n_effective"], 0))
+            lines.append((*name, method, *(cells[k] for cells in columns), *samples))
     data = _DATA.get(str(fit["data"].iloc[-1]), str(fit["data"].iloc[-1]))
-    head = ("component", "unit", *methods * len(_MEASURES), "samples", "independent")
-    groups = (("", 2), *((title, len(methods)) for _, title, _ in _MEASURES), ("", 2))
-    return Grid(head, tuple(lines), f"{trial.label}: {data}", groups=groups, words=2)
+    titles = (title for _, title, _ in _MEASURES)
+    head = ("component", "unit", "method", *titles, "samples", "independent")
+    return Grid(head, tuple(lines), f"{trial.label}: {data}", words=3)
 
 
-def _measure_cells(rows: Sequence[Mapping | None], column: str, digits: int) -> list[Cell]:
+def _measure_cells(rows: Sequence[Mapping], column: str, digits: int) -> list[Cell]:
     """One cell per method; the best by more than the tolerance is marked."""
-    values = [float(row[column]) if row is not None else np.nan for row in rows]
+    values = [float(row[column]) for row in rows]
     badness: Callable[[float], float] = (lambda v: 1.0 - v) if column == "pearson_r" else abs
     bad = np.array([badness(value) for value in values])
     marks: list[Mark] = [""] * len(values)

@@ -1,4 +1,4 @@
-"""What is left of the ground force after simulation: over time, frequency and loading."""
+"""What is left of the ground force after simulation: over time, frequency and movement."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.blocks import Block, Cell, Grid, Heading, Paragraph, Picture
-from bsip_cli.report.diagnosis import candidates_of, causes_of, looked_at
+from bsip_cli.report.candidates import candidates_of, causes_of
+from bsip_cli.report.figures.residual_by_phase import ResidualByPhase, residual_by_phase
 from bsip_cli.report.figures.wrench_residual import WrenchResidual, wrench_residual
+from bsip_cli.report.limits import looked_at
+from bsip_cli.report.movement_phases import PHASES, motion_of, phases_of
 from bsip_cli.report.records import (
     EXTENDED,
     ParticipantRecord,
@@ -18,7 +21,7 @@ from bsip_cli.report.records import (
     flags_of,
     signals_of,
 )
-from bsip_cli.report.words import component_label, listing, number
+from bsip_cli.report.words import component_label, count, listing, number
 
 BEFORE = "OM"
 _COLUMNS = {
@@ -31,18 +34,23 @@ _COLUMNS = {
     "cop_ap": ("cop_ap_m", "mm", 1000.0),
     "cop_ml": ("cop_ml_m", "mm", 1000.0),
 }
-_PHASES = ("least loaded third", "middle third", "most loaded third")
 _STANDS_OUT = 1.5  # times the smallest of the phases: worth a mark
+_LEAST_FRAMES = 10  # of a phase, to be told
 
 
 def blocks(record: ParticipantRecord) -> list[Block]:
-    """The residual of one trial as curves, and of all trials by component and phase."""
+    """The residual of one trial as curves, and of the trials concerned by component and phase."""
     able = [trial for trial in record.trials if trial.role != "static" and _frames(trial) > 1]
     heading = Heading("The residual: measured less simulated")
     if not able:
         return [heading, Paragraph("No trial has a residual to look at.", "note")]
-    shown = _shown(record, able)
-    return [heading, _curves(shown), _phase_grid(able)]
+    concerned = _concerned(record, able)
+    return [
+        heading,
+        _curves(max(concerned, key=_relief)),
+        Heading("The residual by phase of the movement"),
+        *_phases(concerned, record.body_weight()),
+    ]
 
 
 def _frames(trial: TrialRecord) -> int:
@@ -52,16 +60,29 @@ def _frames(trial: TrialRecord) -> int:
     return int(flags_of(frame, "valid").sum())
 
 
-def _shown(record: ParticipantRecord, able: Sequence[TrialRecord]) -> TrialRecord:
-    """Of the trials that show what was found (else that were diagnosed), the one compared longest."""
+def _concerned(record: ParticipantRecord, able: Sequence[TrialRecord]) -> list[TrialRecord]:
+    """The trials that show what was found, else those that were diagnosed, else all."""
     stems: set[str] = set()
     if record.diagnosis is not None:
         causes = causes_of(candidates_of(record.diagnosis))
         stems = {stem for cause in causes for one in cause for stem in one.trials}
     if not stems and record.detection is not None:
         stems = set(looked_at(record.detection))
-    concerned = [trial for trial in able if trial.stem in stems]
-    return max(concerned or able, key=_frames)
+    return [trial for trial in able if trial.stem in stems] or list(able)
+
+
+def _relief(trial: TrialRecord) -> tuple[float, int]:
+    """By what part the residual falls with the causes, and how long the trial is compared."""
+    frame = trial.reconstruction
+    assert frame is not None
+    falls = []
+    for component in _COLUMNS:
+        residuals = residuals_of(frame, component)
+        before, after = (
+            _rms(residuals.get(name, residuals[BEFORE])) for name in (BEFORE, EXTENDED)
+        )
+        falls.append(1.0 - after / before if before > 0 else 0.0)
+    return max(falls), _frames(trial)
 
 
 def residuals_of(frame: pd.DataFrame, component: str) -> dict[str, np.ndarray]:
@@ -78,14 +99,24 @@ def residuals_of(frame: pd.DataFrame, component: str) -> dict[str, np.ndarray]:
     }
 
 
+def _labels(names: Sequence[str]) -> dict[str, str]:
+    """What the legend calls OM, and OM with the causes."""
+    if EXTENDED not in names:
+        return {BEFORE: "OM"}
+    return {BEFORE: "before: OM", EXTENDED: "after: OM with the causes found"}
+
+
 def _curves(trial: TrialRecord) -> Picture:
     frame = trial.reconstruction
     assert frame is not None
-    residuals = {component_label(c): residuals_of(frame, c) for c in _COLUMNS}
+    labels = _labels(list(frame["method"].unique()))
+    residuals = {
+        component_label(c): {labels[m]: v for m, v in residuals_of(frame, c).items()}
+        for c in _COLUMNS
+    }
     units = {component_label(c): unit for c, (_, unit, _) in _COLUMNS.items()}
     figure = wrench_residual(WrenchResidual(clock_of(frame), residuals, units))
-    is_extended = EXTENDED in set(frame["method"])
-    what = f"with OM (before) and with {EXTENDED} (after)" if is_extended else "with OM"
+    what = "before and after the causes are in the model" if len(labels) > 1 else "with OM"
     caption = (
         f"{trial.label}: measured less simulated {what}, over time (left) and as an amplitude "
         "spectrum (right). Noise is a flat, structureless band; slow waves, steps or a peak at the "
@@ -97,46 +128,84 @@ def _curves(trial: TrialRecord) -> Picture:
 # --- phases -------------------------------------------------------------------------------------
 
 
-def phases_of(vertical_force: np.ndarray, valid: np.ndarray) -> np.ndarray:
-    """(n,) 0, 1 or 2: the third of the compared frames, by vertical force; -1 elsewhere."""
-    known = valid & np.isfinite(vertical_force)
-    phase = np.full(len(valid), -1)
-    if known.any():
-        limits = np.quantile(vertical_force[known], (1 / 3, 2 / 3))
-        phase[known] = np.searchsorted(limits, vertical_force[known])
-    return phase
-
-
-def _phase_grid(trials: Sequence[TrialRecord]) -> Grid:
-    frames = [trial.reconstruction for trial in trials]
-    rows = tuple(
-        _phase_row(component, [frame for frame in frames if frame is not None])
-        for component in _COLUMNS
+def _phases(trials: Sequence[TrialRecord], body_weight_N: float) -> list[Block]:
+    """A figure and a table over all trials: RMS by component and phase, before and after."""
+    parts = [_phase(trial, body_weight_N) for trial in trials]
+    phase = np.concatenate(parts)
+    shown = [k for k in range(len(PHASES)) if (phase == k).sum() >= _LEAST_FRAMES]
+    if not shown:
+        return [Paragraph("The phases of the movement are not known.", "note")]
+    frames = [trial.reconstruction for trial in trials if trial.reconstruction is not None]
+    rms = {c: _rms_by_phase(frames, c, phase, shown) for c in _COLUMNS}
+    figure = residual_by_phase(
+        ResidualByPhase(
+            tuple(PHASES[k] for k in shown),
+            {f"{component_label(c)} [{_COLUMNS[c][1]}]": methods for c, methods in rms.items()},
+        )
     )
+    where = listing([trial.label for trial in trials]) if len(trials) < 4 else ""
+    over = where or count(len(trials), "recording")
+    caption = (
+        f"Root mean square of the residual in each phase of the movement, over {over}. An error "
+        "that grows in one phase tells of its cause: with the load, a plate; with every landing, "
+        "soft tissue; standing still, an offset."
+    )
+    return [
+        Picture(figure, caption, "Dots: residual by phase.", "residual_phases"),
+        _phase_grid(rms, [PHASES[k] for k in shown], over),
+    ]
+
+
+def _phase(trial: TrialRecord, body_weight_N: float) -> np.ndarray:
+    frame = trial.reconstruction
+    assert frame is not None
+    clock, valid = clock_of(frame), flags_of(frame, "valid")
+    if trial.kinematics is None:
+        return np.full(len(clock), -1)
+    pelvis, joints = motion_of(trial.kinematics, clock)
+    load = signals_of(frame, "fz_N")["measured"] / body_weight_N
+    return phases_of(pelvis, joints, load, valid)
+
+
+def _rms_by_phase(
+    frames: Sequence[pd.DataFrame], component: str, phase: np.ndarray, shown: Sequence[int]
+) -> dict[str, np.ndarray]:
+    """Label of the method -> RMS (p,); a trial without causes counts as it is."""
+    residuals = [residuals_of(frame, component) for frame in frames]
+    names = [n for n in (BEFORE, EXTENDED) if any(n in one for one in residuals)]
+    labels = _labels(names)
+    joined = {n: np.concatenate([one.get(n, one[BEFORE]) for one in residuals]) for n in names}
+    return {
+        labels[n]: np.array([_rms(values[phase == k]) for k in shown])
+        for n, values in joined.items()
+    }
+
+
+def _phase_grid(rms: dict[str, dict[str, np.ndarray]], phases: Sequence[str], over: str) -> Grid:
+    rows = tuple(_phase_row(component, methods) for component, methods in rms.items())
+    arrow = ", before → after" if any(len(methods) > 1 for methods in rms.values()) else ""
     return Grid(
-        ("component", "unit", "all", *_PHASES),
+        ("component", "unit", *phases),
         rows,
-        f"RMS of the residual with OM over {listing([t.label for t in trials])}, by how hard the "
-        "feet press on the ground (thirds of each trial's frames by vertical force)",
+        f"RMS of the residual with OM{arrow}, over {over}; marked: "
+        f"{number(_STANDS_OUT, 1)} times the smallest phase or more",
         words=2,
     )
 
 
-def _phase_row(component: str, frames: Sequence[pd.DataFrame]) -> tuple[str | Cell, ...]:
-    residual = np.concatenate([residuals_of(frame, component)[BEFORE] for frame in frames])
-    phase = np.concatenate(
-        [
-            phases_of(signals_of(frame, "fz_N")["measured"], flags_of(frame, "valid"))
-            for frame in frames
-        ]
-    )
-    by_phase = [_rms(residual[phase == k]) for k in range(len(_PHASES))]
-    least = min((x for x in by_phase if np.isfinite(x)), default=np.nan)
+def _phase_row(component: str, methods: dict[str, np.ndarray]) -> tuple[str | Cell, ...]:
+    columns = list(zip(*methods.values(), strict=True))
+    least = min((column[0] for column in columns), default=np.nan)
     return (
         component_label(component),
         _COLUMNS[component][1],
-        number(_rms(residual), 2),
-        *(Cell(number(x, 2), "warning" if x > _STANDS_OUT * least else "") for x in by_phase),
+        *(
+            Cell(
+                " → ".join(number(x, 2) for x in column),
+                "warning" if column[0] > _STANDS_OUT * least else "",
+            )
+            for column in columns
+        ),
     )
 
 

@@ -11,6 +11,7 @@ from bsip_cli.report.records import ParticipantRecord, TrialRecord, messages
 from bsip_cli.report.words import (
     component_label,
     count,
+    labelled,
     listing,
     number,
     percent,
@@ -287,9 +288,9 @@ def _quality(record: ParticipantRecord, level: str) -> list[str]:
 def _finding(check: str, action: str, trials: dict[str, set[str]]) -> str:
     told = set().union(*trials.values())
     what = told.pop() if len(told) == 1 else f"{count(len(told), 'finding')}, see section 3"
-    return f"{check} in {listing(list(trials))}: {what}{f' ({action})' if action else ''}"
+    return f"{check.replace('_', ' ')} in {listing(list(trials))}: {what}{f' ({action})' if action else ''}"
 
 
 def _messages(record: ParticipantRecord) -> list[str]:
     """What later stages warned of; ingest's findings stand for themselves."""
-    return [text for stage, _, text in messages(record.origins) if stage != "ingest"]
+    return [labelled(text) for stage, _, text in messages(record.origins) if stage != "ingest"]

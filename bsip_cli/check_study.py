@@ -1,9 +1,9 @@
-"""Whether the known loads of study.toml fit the study: nothing named that is not there."""
+"""Whether loads and prefixes of study.toml fit the study: nothing named that is not there."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.config import Load
@@ -11,6 +11,18 @@ from bsip_cli.errors import UsageError
 from bsip_cli.study import Study
 
 _REMEDY = "correct [[loads]] in study.toml"
+
+
+def check_prefixes(prefixes: Mapping[str, str], study: Study) -> None:
+    """Every prefix belongs to a participant of the study.
+
+    Raises
+    ------
+    UsageError
+        The first that does not, with the nearest known name.
+    """
+    known = [participant.id for participant in study.participants]
+    _check_names("ingest.prefixes", prefixes, known, "correct [ingest] prefixes in study.toml")
 
 
 def check_segments(loads: Sequence[Load], skeleton: Skeleton) -> None:
@@ -49,12 +61,14 @@ def check_trials(loads: Sequence[Load], study: Study) -> None:
             )
 
 
-def _check_names(option: str, names: Iterable[str], known: Collection[str]) -> None:
+def _check_names(
+    option: str, names: Iterable[str], known: Collection[str], remedy: str = _REMEDY
+) -> None:
     for name in names:
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
             raise UsageError(
                 f"{option}: there is no {name}" + (f" (did you mean {near[0]}?)" if near else ""),
                 expected=f"one of {', '.join(known)}" if known else "none, no recording has any",
-                remedy=_REMEDY,
+                remedy=remedy,
             )

@@ -1,0 +1,101 @@
+"""The noise beside what the likeliest candidates explain.
+
+A cause must not be taken for noise: whitening would hide it, and the noise of a trial with a large
+cause would make all causes look alike. So the candidates that chance alone hardly ever brings are
+taken off, in each trial its own, before the noise is estimated; which of them are causes is judged
+later.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.diagnosis.explanation import Fit, changes_of, fit_together
+from bsip_cli.diagnosis.signatures import Signatures
+from bsip_cli.diagnosis.together import together
+
+MOST = 3  # candidates in one trial
+SURE = 20.0  # -log p of a candidate that is taken off
+# While causes are looked for, this part of the noise's power counts as white: else the slow course
+# of a hand that leans on something would pass for noise.
+LOOKING = 0.1
+
+
+def with_likely_noise(signatures: Signatures, before: Fit) -> tuple[Signatures, Fit]:
+    """Signatures and fit in the coordinates of the noise beside a fit and the likeliest else."""
+    none = _nothing(signatures)
+    looking, beside = _with_noise(signatures, before, none, floor=LOOKING)
+    return _with_noise(signatures, before, _likely_changes(looking, beside))
+
+
+def with_noise_beside(signatures: Signatures, fit: Fit) -> tuple[Signatures, Fit]:
+    """The same beside a fit alone."""
+    return _with_noise(signatures, fit, _nothing(signatures))
+
+
+def _nothing(signatures: Signatures) -> list[np.ndarray]:
+    return [np.zeros_like(one.filtered.residual) for one in signatures.evidence.trials]
+
+
+def _with_noise(
+    signatures: Signatures, fit: Fit, more: list[np.ndarray], **floor: float
+) -> tuple[Signatures, Fit]:
+    """Coordinates of the noise beside a fit and more changes (n, 6), filtered, of each trial."""
+    changes = changes_of(signatures.evidence, fit.explanations)
+    trials = []
+    for one, change, other in zip(signatures.evidence.trials, changes, more, strict=True):
+        beside = one.filtered.filter(change[..., None])[..., 0] + other
+        trials.append(one.with_noise_beside(beside, **floor))
+    signatures = signatures.on(together(tuple(trials)))
+    return signatures, fit_together(signatures.evidence, fit.explanations)
+
+
+def likely_columns(signatures: Signatures, fit: Fit) -> np.ndarray:
+    """(R, q) white signatures of what is likely beside a fit, in each trial its own."""
+    return _chosen(signatures, fit)[1]
+
+
+def _likely_changes(signatures: Signatures, before: Fit) -> list[np.ndarray]:
+    """(n, 6) of each trial, filtered: what its own likeliest candidates change."""
+    chosen, columns = _chosen(signatures, before)
+    known = np.column_stack([before.tangent, columns])
+    sizes = np.linalg.lstsq(known, before.residual, rcond=None)[0][before.tangent.shape[1] :]
+    changes = [np.zeros_like(one.filtered.residual) for one in signatures.evidence.trials]
+    for t, part in chosen:
+        width = part.stop - part.start
+        changes[t] += signatures.filtered[t].columns[..., part] @ sizes[:width]
+        sizes = sizes[width:]
+    return changes
+
+
+def _chosen(signatures: Signatures, before: Fit) -> tuple[list[tuple[int, slice]], np.ndarray]:
+    """Trial and columns of the likely candidates, one after the other; their signatures (R, q)."""
+    evidence = signatures.evidence
+    columns = np.zeros((len(before.residual), 0))
+    chosen: list[tuple[int, slice]] = []
+    for _ in range(MOST):
+        known = np.column_stack([before.tangent, columns])
+        new = _likeliest(signatures, before.residual, known)
+        if not new:
+            break
+        for t, part in new:
+            mine = signatures.stored[t].columns[:, part].astype(float)
+            columns = np.column_stack([columns, evidence.white({t: mine})])
+        chosen += new
+    return chosen, columns
+
+
+def _likeliest(
+    signatures: Signatures, residual: np.ndarray, known: np.ndarray
+) -> list[tuple[int, slice]]:
+    """The best candidate of each trial, if it is a sure one, by the columns of its signature."""
+    scores, _ = signatures.scores(residual[:, None], known)
+    best: dict[int, int] = {}
+    for k, place in enumerate(signatures.places):
+        if len(place.trials) == 1 and scores[k, 0] > SURE:
+            (t,) = place.trials
+            if t not in best or scores[k, 0] > scores[best[t], 0]:
+                best[t] = k
+    return [
+        (t, signatures.stored[t].parts[signatures.places[k].candidate]) for t, k in best.items()
+    ]

@@ -1,0 +1,75 @@
+"""Somebody stands quietly, and the plates do not read the stated mass.
+
+Nothing in a quiet trial tells why, and nothing in the moving ones where the inertial parameters
+follow the plates: so this is a class of causes, of which every one is printed with its own size.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import norm
+
+from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.diagnosis.findings import Finding, Number
+from bsip_cli.diagnosis.held_out import Z95
+from bsip_cli.diagnosis.scale_mass import NOTICED, TRUSTED
+from bsip_cli.effects.added_mass import AddedMass
+from bsip_cli.effects.plate_gain import PlateGain
+from bsip_cli.effects.plate_zero import PlateZero
+from bsip_cli.effects.scene import Scene
+
+CLASS = "W"  # of the weight; those found in the motion are A, B, C
+REMEDY = (
+    "weigh the person as recorded, put a known weight on each plate, and read them with nobody on"
+)
+LOADED = 0.05  # of body weight: a plate that carries less is not stood upon
+_UNKNOWN = (np.nan, np.nan, np.nan)
+
+
+def loaded_channel(scene: Scene) -> str:
+    """The vertical channel of the plate that carries the person; of ``all`` where several do."""
+    least = LOADED * scene.mass_kg * GRAVITY_M_S2
+    loads = {one.name: np.nan_to_num(one.wrench[scene.valid, 2]).mean() for one in scene.plates}
+    loaded = [name for name, load in loads.items() if load > least]
+    return f"{loaded[0] if len(loaded) == 1 else 'all'} fz"
+
+
+def stated_mass_findings(
+    share: float, mass_kg: float, channel: str, trial: str
+) -> tuple[Finding, ...]:
+    """The class of causes if the plates differ from the stated mass by more than NOTICED.
+
+    share : of the stated mass, from ``weight_share``. channel : from ``loaded_channel``.
+    trial : the name of the recording.
+    """
+    if abs(share) < NOTICED:
+        return ()
+    p_value = float(2 * norm.sf(abs(share) / TRUSTED))
+    error = TRUSTED * mass_kg
+    extra = share * mass_kg
+    told = (
+        f"the plates read {mass_kg + extra:.2f} kg in quiet standing, {abs(extra):.1f} kg "
+        f"{'more' if extra > 0 else 'less'} than stated"
+    )
+    weight, weight_error = extra * GRAVITY_M_S2, error * GRAVITY_M_S2
+    causes = [
+        (PlateGain.name, "gain", "1", share, TRUSTED, "the plates' vertical gain is off"),
+        (PlateZero.name, "offset", "N", weight, weight_error, "the plates' zero is off"),
+    ]
+    if extra > 0:
+        cause = "something is worn or carried that the stated mass leaves out"
+        causes.insert(0, (AddedMass.name, "mass", "kg", extra, error, cause))
+    return tuple(
+        Finding(
+            effect,
+            "" if effect == AddedMass.name else channel,
+            (trial,),
+            "ambiguous",
+            CLASS,
+            p_value,
+            _UNKNOWN,
+            (Number(name, unit, x, x - Z95 * sd, x + Z95 * sd),),
+            f"{told}: {why}, or the stated mass is wrong; to tell them apart, {REMEDY}",
+        )
+        for effect, name, unit, x, sd, why in causes
+    )

@@ -1,0 +1,160 @@
+"""Hands that hold on to something for a whole trial: a contact that no plate measures.
+
+Two things must come together. A hand stands still in the room while the trunk moves; and the
+plates miss a mean force that nothing inside a body can make: over a trial the mean horizontal
+force is the change of momentum by time, the mean vertical one the weight beside it. What the hand
+bears from one moment to the next no instrument shows, so nothing else is asked of such a trial:
+the swings of that force would be taken for other causes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.body.names import in_words
+from bsip_cli.diagnosis.findings import Finding, Number
+from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, Z95, Gain
+from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.unmeasured_contact import UnmeasuredContact
+from bsip_cli.statistics.effective_samples import effective_samples
+
+HANDS, TRUNK = ("hand_l", "hand_r"), "upper_torso"
+STILL_M = 0.004  # root mean square distance of a hand that holds on from its mean place
+STILLER = 3.0  # times that the trunk moves further than such a hand
+UNBALANCED = 0.01  # of body weight: missing mean horizontal force
+LIGHTER = 0.02  # of body weight: missing mean vertical force
+SURE = 4.0  # standard errors
+
+
+@dataclass(frozen=True)
+class Support:
+    """What hands hold on to in one trial.
+
+    hand_moves_m, trunk_moves_m : root mean square distance from their mean places; of the hands
+        that hold on the largest. start_s, end_s : the frames compared.
+    force_N, error_N : (3,) mean force on the body, world, all hands together, and standard error.
+    gain : what the mean force takes off the squared residual of forces it has not seen.
+    """
+
+    hands: tuple[str, ...]
+    hand_moves_m: float
+    trunk_moves_m: float
+    start_s: float
+    end_s: float
+    force_N: np.ndarray
+    error_N: np.ndarray
+    gain: Gain
+
+    def finding(self, trial: str) -> Finding:
+        """As the diagnosis prints it."""
+        p_value = float(chi2.sf(((self.force_N / self.error_N) ** 2).sum(), 3))
+        return Finding(
+            UnmeasuredContact.name,
+            "+".join(self.hands),
+            (trial,),
+            "named",
+            "",
+            p_value,
+            self.gain.interval(),
+            self._numbers(),
+            self._sentence(),
+        )
+
+    def _numbers(self) -> tuple[Number, ...]:
+        size = float(np.linalg.norm(self.force_N))
+        error = float(np.linalg.norm(self.force_N * self.error_N)) / size
+        rows = [("force", size, error)]
+        parts = zip("xyz", self.force_N.tolist(), self.error_N.tolist(), strict=True)
+        rows += [(f"force_{axis}", x, e) for axis, x, e in parts]
+        times = (("start", self.start_s), ("end", self.end_s))
+        return (
+            *(Number(name, "s", at, at, at) for name, at in times),
+            *(Number(name, "N", x, x - Z95 * e, x + Z95 * e) for name, x, e in rows),
+        )
+
+    def _sentence(self) -> str:
+        hands = " and ".join(in_words(hand) for hand in self.hands)
+        verb = "stand" if len(self.hands) > 1 else "stands"
+        return (
+            f"{hands} {verb} still within {1000 * self.hand_moves_m:.0f} mm while the trunk moves "
+            f"by {1000 * self.trunk_moves_m:.0f} mm, and the plates miss "
+            f"{np.linalg.norm(self.force_N):.0f} N of the trial's mean force: something beside "
+            "them bears it, and what else may be wrong in this trial is not asked"
+        )
+
+
+def support_of(scene: Scene) -> Support | None:
+    """What the hands hold on to throughout a trial; None if they hold on to nothing."""
+    paths = {name: _path_m(scene, name) for name in HANDS if name in scene.bodies}
+    missing = (scene.predicted - scene.measured)[scene.valid, :3]
+    weight = scene.mass_kg * GRAVITY_M_S2
+    return held_by(paths, _path_m(scene, TRUNK), missing, scene.times_s[scene.valid], weight)
+
+
+def held_by(
+    hands_m: Mapping[str, np.ndarray],
+    trunk_m: np.ndarray,
+    missing_N: np.ndarray,
+    times_s: np.ndarray,
+    weight_N: float,
+) -> Support | None:
+    """The same from the paths (n, 3) of hands and trunk and the force (n, 3) that the plates miss,
+    all world."""
+    trunk = _moves_m(trunk_m)
+    moves = {name: _moves_m(path) for name, path in hands_m.items()}
+    still = tuple(h for h, x in moves.items() if x < STILL_M and STILLER * x < trunk)
+    force, error = missing_N.mean(axis=0), _standard_errors(missing_N)
+    if not still or not _is_unbalanced(force, error, weight_N):
+        return None
+    return Support(
+        still,
+        max(moves[hand] for hand in still),
+        trunk,
+        float(times_s[0]),
+        float(times_s[-1]),
+        force,
+        error,
+        _gain(missing_N, times_s),
+    )
+
+
+def _path_m(scene: Scene, segment: str) -> np.ndarray:
+    """(n, 3) of a segment's centre of mass in the valid frames, world."""
+    return scene.point(segment, scene.centre_of(segment)).position_m[scene.valid]
+
+
+def _moves_m(path_m: np.ndarray) -> float:
+    """Root mean square distance from the mean place."""
+    return float(np.sqrt(((path_m - path_m.mean(axis=0)) ** 2).sum(axis=1).mean()))
+
+
+def _standard_errors(series: np.ndarray) -> np.ndarray:
+    """(3,) of the means of autocorrelated courses (n, 3)."""
+    counts = np.array([effective_samples(course) for course in series.T])
+    return series.std(axis=0) / np.sqrt(np.fmax(counts, 1.0))
+
+
+def _is_unbalanced(force: np.ndarray, error: np.ndarray, weight_N: float) -> bool:
+    aside = float(np.linalg.norm(force[:2]))
+    aside_error = float(np.linalg.norm(error[:2]))
+    pushed = aside > UNBALANCED * weight_N and aside > SURE * aside_error
+    lighter = bool(force[2] > LIGHTER * weight_N and force[2] > SURE * error[2])
+    return pushed or lighter
+
+
+def _gain(missing: np.ndarray, times_s: np.ndarray) -> Gain:
+    """Of the mean force, each second judged by the mean of the others."""
+    numbers = ((times_s - times_s[0]) / BLOCK_S).astype(int)
+    saved = np.zeros(len(missing))
+    for fold in range(FOLDS):
+        test = numbers % FOLDS == fold
+        if test.any() and not test.all():
+            mean = missing[~test].mean(axis=0)
+            saved[test] = (missing[test] ** 2 - (missing[test] - mean) ** 2).sum(axis=1)
+    blocks = np.bincount(numbers, weights=saved)
+    return Gain(blocks, np.ones(len(blocks), dtype=bool), float((missing**2).sum()))

@@ -1,0 +1,231 @@
+"""``bsip markers``: what a recording's labels are, which marker set they fit, what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from shlex import quote
+
+import click
+import numpy as np
+
+from bsip_cli.body.joint_centres import missing_landmarks
+from bsip_cli.body.markersets import Marker, MarkerSet, load_marker_set
+from bsip_cli.body.names import in_words, without_side
+from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.config import load_config
+from bsip_cli.errors import UsageError
+from bsip_cli.recordings.label_words import meanings
+from bsip_cli.recordings.labels import LabelMatch, match_labels
+from bsip_cli.recordings.marker_guess import SetFit, fits
+from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.read import read_recording
+from bsip_cli.recordings.starter_set import starter_toml
+
+_RIVALS = 3
+
+
+@dataclass(frozen=True)
+class Request:
+    """What was asked: the file, a marker set ("auto" guesses), a person, where to write."""
+
+    file: Path
+    marker_set: str
+    prefix: str
+    write: Path | None
+
+
+def markers_command(request: Request) -> int:
+    """Print everything; write a starter set where asked, or where no set fits.
+
+    Returns 0 where the set has all that a skeleton needs, 3 where no set fits or something that a
+    skeleton cannot do without is missing.
+    """
+    recording = read_recording(request.file)
+    _say([f"{request.file}: {_size(recording)}", *_findings(recording)])
+    chosen = _chosen(request, recording)
+    if chosen is None:
+        understood = meanings([_bare(label) for label in recording.labels])
+        words = {
+            k: f"seems to be {_place(m.segment, m.landmark)}"
+            for k, label in enumerate(recording.labels)
+            if (m := understood.get(_bare(label)))
+        }
+        _say(["", "labels:", *_label_rows(recording, words, "not understood")])
+    complete = chosen is not None and _compared(request, recording, chosen)
+    if chosen is None or request.write is not None:
+        _write_starter(request, recording)
+    return 0 if complete else 3
+
+
+def _compared(request: Request, recording: Recording, chosen: MarkerSet) -> bool:
+    """Print what a marker set finds in a recording; whether a skeleton can be built from it."""
+    match = match_labels(
+        recording.labels,
+        chosen.wanted(),
+        optional=chosen.optional(),
+        seen=np.isfinite(recording.markers_m[..., 0]).any(axis=0),
+        prefix=request.prefix,
+    )
+    there = {match.index[m.label]: m for m in chosen.markers if m.label in match.index}
+    words = {k: _meaning(_bare(recording.labels[k]), marker) for k, marker in there.items()}
+    _say([*_prefix(match), "", "labels:", *_label_rows(recording, words, "not in the set")])
+    skeleton = load_skeleton(load_config([]).skeleton)
+    informed = skeleton.informed({marker.segment for marker in there.values()})
+    unmarked = [s for s, known in zip(skeleton.segments, informed, strict=True) if not known]
+    _say(["", "segments:", *_segment_rows(chosen, match, skeleton, unmarked)])
+    needed = missing_landmarks({marker.landmark for marker in there.values()})
+    if needed:
+        _say(["", f"a skeleton cannot be built without: {', '.join(needed)}"])
+    return not needed and all(_may_be_held(segment) for segment in unmarked)
+
+
+def _say(lines: Sequence[str]) -> None:
+    click.echo("\n".join(lines))
+
+
+def _size(recording: Recording) -> str:
+    return (
+        f"{len(recording.labels)} markers, {recording.n_frames} frames at "
+        f"{recording.marker_rate_hz:g} Hz"
+    )
+
+
+def _findings(recording: Recording) -> list[str]:
+    """What reading the points had to put right."""
+    return [
+        f"{finding.found}: {finding.action}" + (f" ({finding.subject})" if finding.subject else "")
+        for finding in recording.findings
+        if finding.check in ("labels", "points")
+    ]
+
+
+# --- which set ---------------------------------------------------------------------------------
+
+
+def _chosen(request: Request, recording: Recording) -> MarkerSet | None:
+    """The set that was named, or the one that fits best; None where none fits. Says which."""
+    if request.marker_set != "auto":
+        chosen = load_marker_set(request.marker_set)
+        _say(["", f"marker set: {chosen.name} ({chosen.description}), as asked"])
+        return chosen
+    ranked = fits(recording.labels)
+    best = next((fit for fit in ranked if fit.fits), None)
+    if best is None:
+        _say(["", "marker set: none of the shipped sets fits", *map(_rival, ranked[:_RIVALS])])
+        return None
+    others = [fit for fit in ranked if fit is not best][: _RIVALS - 1]
+    _say(
+        [
+            "",
+            f"marker set: {best.marker_set.name} ({best.marker_set.description}), guessed: "
+            f"{best.required_found} of its {best.required} markers (optional ones aside), "
+            f"{best.found} of {best.labels} labels",
+            *map(_rival, others),
+        ]
+    )
+    return best.marker_set
+
+
+def _rival(fit: SetFit) -> str:
+    return f"  {fit.marker_set.name}: {fit.required_found} of {fit.required} markers"
+
+
+def _prefix(match: LabelMatch) -> list[str]:
+    return [f"labels of the person with the prefix '{match.prefix}'"] if match.prefix else []
+
+
+# --- what is there ------------------------------------------------------------------------------
+
+
+def _label_rows(recording: Recording, words: Mapping[int, str], others: str) -> Iterator[str]:
+    """A line per column of the file: seen in how much of the time, and what it is."""
+    width = max(map(len, recording.labels), default=0)
+    seen = np.isfinite(recording.markers_m[..., 0])
+    for k, label in enumerate(recording.labels):
+        share = 100 * float(seen[:, k].mean()) if len(seen) else 0.0
+        meaning = words.get(k, others) if share > 0 else "labelled, but seen in no frame"
+        yield f"  {label:<{width}}  seen {share:5.1f} %  {meaning}"
+
+
+def _meaning(label: str, marker: Marker) -> str:
+    renamed = "" if marker.label == label else f"{marker.label}: "
+    return renamed + _place(marker.segment, marker.landmark)
+
+
+def _place(segment: str, landmark: str) -> str:
+    return f"{in_words(segment)}, {in_words(landmark) if landmark else 'tracks only'}"
+
+
+def _may_be_held(segment: str) -> bool:
+    return without_side(segment) in load_config([]).scale.may_be_held
+
+
+def _segment_rows(
+    marker_set: MarkerSet, match: LabelMatch, skeleton: Skeleton, unmarked: Collection[str]
+) -> Iterator[str]:
+    """A line per segment: how many of its markers are there, which are not, what that means."""
+    width = max(len(in_words(segment)) for segment in skeleton.segments)
+    for segment in skeleton.segments:
+        own = [m for m in marker_set.markers if m.segment == segment]
+        count = sum(m.label in match.index for m in own)
+        gone = [m.label for m in own if m.label not in match.index and not m.optional]
+        text = f"  {in_words(segment):<{width}}  {count:2d} markers"
+        if gone:
+            text += f"; missing: {', '.join(gone)}"
+        yield text + (_consequence(segment) if segment in unmarked else "")
+
+
+def _consequence(segment: str) -> str:
+    if _may_be_held(segment):
+        return "; its joint is held at the neutral pose, with the table's inertia"
+    return "; refused, unless scale.may_be_held in study.toml names it"
+
+
+# --- a first set --------------------------------------------------------------------------------
+
+
+def _write_starter(request: Request, recording: Recording) -> None:
+    """Write the labels of the file as a marker set; never over a file that is there.
+
+    Raises
+    ------
+    UsageError
+        The file that was asked for is there, or cannot be written.
+    """
+    target = request.write or Path(f"{request.file.stem.replace(' ', '_')}_markers.toml")
+    labels = [_bare(label) for label in recording.labels if _is_of(label, request.prefix)]
+    text = starter_toml(labels, request.file.name, target.name)
+    try:
+        with target.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        if request.write is None:
+            _say(["", f"{target} is there already and is not written over"])
+            return
+        raise UsageError(
+            "is there already and is not written over",
+            file=target,
+            remedy="name another file with --write, or check that one with --marker-set",
+        ) from None
+    except OSError as error:
+        raise UsageError(f"cannot be written ({error.strerror})", file=target) from None
+    again = f"bsip markers {quote(str(request.file))} --marker-set {quote(str(target))}"
+    _say(
+        [
+            "",
+            f"wrote {target}: a first marker set, guessed from the labels; correct it, check it "
+            f"with `{again}`, and name it in study.toml",
+        ]
+    )
+
+
+def _bare(label: str) -> str:
+    return label.rpartition(":")[2].strip()
+
+
+def _is_of(label: str, prefix: str) -> bool:
+    """Whether a label is the person's; everybody's without a prefix."""
+    before = label.rpartition(":")[0]
+    return not prefix or before in ("", prefix.rstrip(":"))

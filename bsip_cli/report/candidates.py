@@ -1,0 +1,154 @@
+"""The causes that a diagnosis looked at, with their numbers as people read them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.report.effect_words import (
+    MAIN_NUMBERS,
+    digits_of,
+    effect_title,
+    parameter_label,
+    place_label,
+    readable_unit,
+    unnamed_label,
+)
+from bsip_cli.report.words import listing, number, trial_label
+
+NOTHING = "none"
+UNNAMED = "unexplained"
+_INTERVAL = re.compile(r" \([^()]*: 95 % interval .*$")  # what follows it the report says itself
+_REASON = re.compile(r" \(([^()]*)\)$")  # why a candidate was rejected
+_MINUS = re.compile(r"(?<![\w.)])-(?=\d)")
+_SIGNED = re.compile(r"[+−]\d")
+_NO_SIZES = ("start", "end", "from_time", "release_time", "frequency", "damping_ratio")
+
+
+@dataclass(frozen=True)
+class Number:
+    """A parameter with its 95 % interval, NaN where there is none."""
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+
+    def interval(self, signed: bool = True) -> str:
+        """``1.87 to 2.14°``; without signs as sizes, if zero is not between them."""
+        factor, unit = readable_unit(self.name, self.unit)
+        low, high = factor * self.low, factor * self.high
+        if not np.isfinite(high - low):
+            return ""
+        if not signed and low * high > 0:
+            low, high = sorted((abs(low), abs(high)))
+        digits = digits_of(high - low if high > low else factor * self.value)
+        space = "" if unit == "°" else " "
+        return f"{number(low, digits)} to {number(high, digits)}{space}{unit}".strip()
+
+    def certainty(self) -> float:
+        """Its size over the width of its interval; 0 where none is known."""
+        width = self.high - self.low
+        return abs(self.value) / max(width, 1e-12) if np.isfinite(width) else 0.0
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A cause that was looked at, with its numbers; ``trials`` are stems of recordings."""
+
+    effect: str
+    target: str
+    verdict: str
+    class_id: str
+    p_value: float
+    gain: tuple[float, float, float]
+    sentence: str
+    trials: tuple[str, ...]
+    numbers: tuple[Number, ...]
+
+    @property
+    def label(self) -> str:
+        """``force plate turned or tilted: plate 1``."""
+        where = place_label(self.effect, self.target)
+        if self.effect == UNNAMED and self.numbers:
+            where = unnamed_label(self.numbers[0].name, where)
+        return effect_title(self.effect) + (f": {where}" if where else "")
+
+    @property
+    def answer(self) -> str:
+        """The verdict, but ``unnamed`` for something that was found and has no name."""
+        unnamed = self.verdict == "named" and self.effect == UNNAMED
+        return "unnamed" if unnamed else self.verdict
+
+    def what(self) -> str:
+        """Its sentence without interval, advice and reason."""
+        text = re.sub(_INTERVAL, "", self.sentence).removeprefix("not so: ")
+        text = re.sub(_REASON, "", text) if self.verdict == "rejected" else text
+        return re.sub(_MINUS, "−", text)
+
+    def told(self) -> str:
+        """Its sentence with the interval of its main number."""
+        main, what = self.main_number(), self.what()
+        interval = main.interval(bool(_SIGNED.search(what))) if main else ""
+        if main is None or not interval:
+            return what
+        name = parameter_label(self.effect, main.name)
+        name = "" if name in what else name
+        return f"{what} ({name}{': ' if name else ''}95 % interval {interval})"
+
+    def main_number(self) -> Number | None:
+        """The number that the effect is about; of several alike, the one that is known best."""
+        wanted = MAIN_NUMBERS.get(self.effect, ())
+        main = [n for n in self.numbers if n.name in wanted]
+        sizes = main or [n for n in self.numbers if n.name not in _NO_SIZES]
+        return max(sizes or self.numbers, key=Number.certainty, default=None)
+
+    def where(self) -> str:
+        """``hops (run 1) and squat (run 1)``."""
+        return listing([trial_label(stem) for stem in self.trials])
+
+    def why_not(self) -> str:
+        """Why it was rejected; empty if it was not."""
+        found = re.search(_REASON, self.sentence) if self.verdict == "rejected" else None
+        return found[1] if found else ""
+
+
+def candidates_of(diagnosis: pd.DataFrame) -> tuple[Candidate, ...]:
+    """The candidates of a ``diagnosis`` table in their order; the row ``none`` is none."""
+    rows = diagnosis[diagnosis["effect"] != NOTHING]
+    return tuple(_candidate(group) for _, group in rows.groupby("rank", sort=True))
+
+
+def _candidate(rows: pd.DataFrame) -> Candidate:
+    first = rows.iloc[0]
+    numbers = tuple(
+        Number(r["parameter"], r["unit"], r["estimate"], r["ci_low"], r["ci_high"])
+        for r in rows.to_dict("records")
+        if r["parameter"]
+    )
+    gain, low, high = (float(first[f"gain_{name}"]) for name in ("percent", "ci_low", "ci_high"))
+    return Candidate(
+        first["effect"],
+        first["target"],
+        first["verdict"],
+        first["class_id"],
+        float(first["p_value"]),
+        (gain, low, min(high, 100.0)),  # more than everything cannot go
+        first["sentence"],
+        tuple(str(first["trials"]).split(", ")),
+        numbers,
+    )
+
+
+def causes_of(candidates: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], ...]:
+    """What was found: a single candidate each, or all candidates of a class."""
+    groups: dict[str, list[Candidate]] = {}
+    for k, one in enumerate(candidates):
+        if one.verdict != "rejected":
+            groups.setdefault(one.class_id or f"#{k}", []).append(one)
+    return tuple(tuple(group) for group in groups.values())

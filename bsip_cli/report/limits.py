@@ -1,0 +1,90 @@
+"""How small a cause might have been and still been seen in these recordings, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.report.candidates import candidates_of, causes_of
+from bsip_cli.report.effect_words import size_words
+
+_EXAMPLES = (  # effects whose limits are told in the sentence
+    ("sync_offset", "", "a delay between forces and markers"),
+    ("plate_translation", "", "a plate shifted"),
+    ("plate_gain", "fz", "a vertical gain wrong"),
+    ("added_mass", "hand_l", "a mass on the left hand"),
+)
+_BY = ("plate_translation", "plate_gain")  # shifted *by* less than, but a delay *under*
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Smallest size of a cause that these recordings would have shown."""
+
+    effect: str
+    target: str
+    parameter: str
+    unit: str
+    size: float
+    trials: int
+
+    def in_words(self) -> str:
+        return size_words(self.parameter, self.unit, self.size)
+
+
+def limits_of(
+    detection: pd.DataFrame, diagnosis: pd.DataFrame, alone: bool = False
+) -> tuple[Limit, ...]:
+    """Of each cause and place the limit with most recordings together; found causes have none.
+
+    Of causes that only single recordings can show, the best recording counts; with ``alone``, of
+    all causes.
+    """
+    causes = causes_of(candidates_of(diagnosis))
+    found = {(one.effect, one.target) for cause in causes for one in cause}
+    rows = detection[np.isfinite(detection["limit"].astype(float))]
+    rows = rows.assign(together=rows["trials"].str.count(",") + 1)
+    rows = rows[rows["together"] == 1] if alone else rows
+    rows = rows.sort_values(["together", "limit"], ascending=[False, True], kind="stable")
+    rows = rows.drop_duplicates(["effect", "target", "parameter"]).sort_index()
+    return tuple(
+        Limit(
+            r["effect"],
+            r["target"],
+            r["parameter"],
+            r["unit"],
+            float(r["limit"]),
+            int(r["together"]),
+        )
+        for r in rows.to_dict("records")
+        if (r["effect"], r["target"]) not in found
+    )
+
+
+def limits_sentence(limits: Sequence[Limit]) -> str:
+    """``A delay ... under 2.5 ms or ... could not have been seen.``; empty without examples."""
+    parts = []
+    for effect, ends, words in _EXAMPLES:
+        of_it = [
+            x
+            for x in limits
+            if x.effect == effect
+            and x.target.endswith(ends)
+            and x.parameter in ("delay", "x", "y", "gain", "mass")
+        ]
+        if of_it:
+            worst = max(of_it, key=lambda x: x.size)
+            relation = "by less than" if effect in _BY else "under"
+            parts.append(f"{words} {relation} {worst.in_words()}")
+    if not parts:
+        return ""
+    text = " or ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
+    return f"{text[0].upper()}{text[1:]} could not have been seen in these recordings."
+
+
+def looked_at(detection: pd.DataFrame) -> tuple[str, ...]:
+    """Stems of the recordings that were diagnosed."""
+    return tuple(dict.fromkeys(s for t in detection["trials"] for s in str(t).split(", ")))

@@ -1,0 +1,145 @@
+"""What these very recordings could not have shown: in words, as figures and as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.body.names import SEGMENTS
+from bsip_cli.report.blocks import Block, Grid, Paragraph, Picture
+from bsip_cli.report.effect_words import effect_title, place_label, size_words
+from bsip_cli.report.figures.detection_limits import DetectionLimits, detection_limits
+from bsip_cli.report.figures.mass_limits import MassLimits, mass_limits
+from bsip_cli.report.limits import Limit, limits_of, limits_sentence
+from bsip_cli.report.usual_sizes import USUAL, usual_words
+from bsip_cli.report.words import MISSING, segment_label
+
+_FAR = 20.0  # times the largest usual size: not seen at all
+
+
+def blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
+    """From the artifacts ``detection`` and ``diagnosis``."""
+    together = limits_of(detection, diagnosis)
+    alone = limits_of(detection, diagnosis, alone=True)
+    if not together:
+        return [Paragraph("The limits of detection are not known.", "note")]
+    sentence = limits_sentence(together)
+    said: list[Block] = [Paragraph(sentence)] if sentence else []
+    said.append(
+        Paragraph(
+            "Each limit is the size that would be found in 95 of 100 recordings like these, while "
+            "the inertial parameters and the cause's other numbers stay free. Smaller errors may be "
+            "there. Causes that were found have no limit; exchanged labels and smoothed markers have "
+            "none in a unit that could be told.",
+            "note",
+        )
+    )
+    said += [*_usual_figure(together), *_mass_figure(together, alone)]
+    rows = tuple(row for effect in USUAL for row in _rows(effect, together, alone))
+    head = ("cause", "in all recordings", "in one alone", "shows best at", "usual in labs")
+    caption = "Least size that would be found, from the best place or direction to the worst"
+    return [*said, Grid(head, rows, caption, words=5)]
+
+
+# --- figures ------------------------------------------------------------------------------------
+
+
+def _usual_figure(limits: Sequence[Limit]) -> list[Block]:
+    """Every cause's limits over the sizes that labs meet."""
+    shown = {effect: _usual(effect, limits) for effect in USUAL}
+    shown = {effect: sizes for effect, sizes in shown.items() if sizes}
+    if not shown:
+        return []
+    usual = [USUAL[effect] for effect in shown]
+    least = np.array([one.least for one in usual])
+    figure = detection_limits(
+        DetectionLimits(
+            tuple(effect_title(effect) for effect in shown),
+            tuple(_range(effect, sizes) for effect, sizes in shown.items()),
+            np.array([min(x.size for x in sizes) for sizes in shown.values()]) / least,
+            np.array([max(x.size for x in sizes) for sizes in shown.values()]) / least,
+            np.array([one.most for one in usual]) / least,
+        )
+    )
+    caption = (
+        "How small each cause might have been and still been found in these recordings. Dot: at the "
+        "place or in the direction that shows it best; bar: up to the worst; to the right the same "
+        "in figures. Grey: sizes that laboratories meet. Left of the black line every usual size "
+        "would have been found, right of the grey none."
+    )
+    return [Picture(figure, caption, "Bars: limits over usual sizes.", "diagnosis_limits")]
+
+
+def _mass_figure(together: Sequence[Limit], alone: Sequence[Limit]) -> list[Block]:
+    always, once = (
+        {x.target: x.size for x in limits if x.effect == "added_mass" and x.parameter == "mass"}
+        for limits in ([x for x in together if x.trials > 1], alone)
+    )
+    shown = [segment for segment in SEGMENTS if segment in {*always, *once}]
+    if not shown:
+        return []
+    masses = (np.array([one.get(s, np.nan) for s in shown]) for one in (always, once))
+    figure = mass_limits(MassLimits(tuple(segment_label(s) for s in shown), *masses))
+    caption = (
+        "How heavy something unknown on a segment must be, wherever on it, to be told from the "
+        "segment's own uncertain parameters: worn in all recordings (these parameters then take up "
+        "most of it), or in the single recording that shows it best."
+    )
+    return [Picture(figure, caption, "Dots: least mass.", "diagnosis_masses")]
+
+
+# --- table --------------------------------------------------------------------------------------
+
+
+def _rows(
+    effect: str, together: Sequence[Limit], alone: Sequence[Limit]
+) -> Iterator[tuple[str, ...]]:
+    """A row per unit: the range over all places and directions."""
+    lasting = [x for x in together if x.effect == effect and x.trials > 1]
+    single = [x for x in alone if x.effect == effect]
+    usual = USUAL[effect]
+    for unit in dict.fromkeys(x.unit for x in (*lasting, *single)):
+        columns = [
+            [x for x in limits if x.unit == unit and _counts(x)] for limits in (lasting, single)
+        ]
+        if not any(columns):
+            continue
+        best = min(columns[0] or columns[1], key=lambda x: x.size)
+        yield (
+            effect_title(effect),
+            *(_range(effect, limits) for limits in columns),
+            place_label(effect, best.target) or MISSING,
+            usual_words(effect) if usual.unit == unit else MISSING,
+        )
+
+
+def _usual(effect: str, limits: Sequence[Limit]) -> list[Limit]:
+    """An effect's limits that can be compared with its usual sizes."""
+    return [x for x in limits if x.effect == effect and _counts(x) and x.unit == USUAL[effect].unit]
+
+
+def _counts(limit: Limit) -> bool:
+    """Not a number that only goes with the effect's size."""
+    return limit.parameter in USUAL[limit.effect].parameters
+
+
+def _range(effect: str, limits: Sequence[Limit]) -> str:
+    """``5.0 to 12 mm``; what no usual recording would show is not put in figures."""
+    if not limits:
+        return MISSING
+    best, worst = (end(limits, key=lambda x: x.size) for end in (min, max))
+    usual = USUAL[effect]
+    if usual.unit == best.unit and worst.size > _FAR * usual.most:
+        return f"from {best.in_words()}, or not at all"
+    return _between(best.parameter, best.unit, best.size, worst.size)
+
+
+def _between(parameter: str, unit: str, low: float, high: float) -> str:
+    """``5.0 to 12 mm``, or one size where both are the same."""
+    words = [size_words(parameter, unit, size) for size in (low, high)]
+    if words[0] == words[1]:
+        return words[0]
+    first = words[0].removesuffix("°") if words[0].endswith("°") else words[0].partition(" ")[0]
+    return f"{first} to {words[1]}"

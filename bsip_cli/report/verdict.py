@@ -1,0 +1,253 @@
+"""The diagnosis of one person in words: what is wrong, how large, how sure, what it does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.report.candidates import UNNAMED, Candidate, candidates_of, causes_of
+from bsip_cli.report.effect_words import EFFECT_WORDS
+from bsip_cli.report.limits import limits_of, limits_sentence, looked_at
+from bsip_cli.report.separating import separating_recording
+from bsip_cli.report.words import (
+    capital,
+    component_label,
+    count,
+    listing,
+    number,
+    segment_label,
+    signed,
+    trial_label,
+)
+
+LEAST_TOLD = 1e-3  # p-values below are not told in digits
+_MOST_GAINS = 3
+_MOST_CHANGES = 2
+_WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
+_NO_TRIAL = "No trial was long enough on the plates to look for errors: nobody can say."
+_NOTHING = "Nothing is wrong above the noise."
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """All that is said of a diagnosis.
+
+    Attributes
+    ----------
+    headline : whether anything is wrong. found : whether anything was.
+    causes : a text per cause or class of rivals.
+    results : what the causes do to forces and parameters.
+    advice : what follows for the reader.
+    limits : what could not have been seen; empty where that is not known.
+    """
+
+    headline: str
+    found: bool
+    causes: tuple[str, ...]
+    results: tuple[str, ...]
+    advice: tuple[str, ...]
+    limits: str
+
+    def paragraphs(self) -> tuple[str, ...]:
+        """Everything, in order."""
+        limits = (self.limits,) if self.limits else ()
+        return (self.headline, *self.causes, *self.results, *self.advice, *limits)
+
+
+def verdict_of(
+    diagnosis: pd.DataFrame,
+    detection: pd.DataFrame,
+    gains: pd.DataFrame | None = None,
+    changes: pd.DataFrame | None = None,
+) -> Verdict:
+    """From the artifacts ``diagnosis`` and ``detection``, and of ``extend`` where it has run
+    ``gain`` and ``bsip-change``, with one method each."""
+    causes = causes_of(candidates_of(diagnosis))
+    everywhere = looked_at(detection)
+    return Verdict(
+        headline(diagnosis),
+        bool(causes),
+        tuple(cause_text(cause, everywhere) for cause in causes),
+        _results(causes, gains, changes) if causes else _seen_in(everywhere),
+        (*filter(None, [_named_twice(causes)]), *consequences(causes)),
+        limits_sentence(limits_of(detection, diagnosis)),
+    )
+
+
+def headline(diagnosis: pd.DataFrame) -> str:
+    """One sentence on whether anything is wrong."""
+    if diagnosis.empty:
+        return _NO_TRIAL
+    causes = causes_of(candidates_of(diagnosis))
+    if not causes:
+        return _NOTHING
+    unnamed = sum(len(c) == 1 and c[0].effect == UNNAMED for c in causes)
+    classes = sum(len(c) > 1 for c in causes)
+    named = len(causes) - unnamed - classes
+    if unnamed == len(causes):
+        return "Something is wrong that has no name in the catalogue of causes."
+    parts = [f"{count(named, 'cause')} named"] if named else []
+    if classes:
+        parts.append(f"{classes} narrowed down to rivals that look alike in these recordings")
+    if unnamed:
+        parts.append(f"{unnamed} without a name")
+    return f"Something is wrong: {listing(parts)}."
+
+
+def _seen_in(everywhere: Sequence[str]) -> tuple[str, ...]:
+    names = [trial_label(stem) for stem in everywhere]
+    return (f"Looked at: {listing(names)}.",) if names else ()
+
+
+# --- a cause ----------------------------------------------------------------------------------
+
+
+def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
+    """A cause, or a class of rivals: what, how large, where and how sure."""
+    first = cause[0]
+    where, sure = where_seen(first.trials, everywhere), how_sure(first)
+    if len(cause) == 1:
+        return f"{capital(first.told())}, {where}. {sure}"
+    rivals = "; ".join(f"({chr(ord('a') + k)}) {one.told()}" for k, one in enumerate(cause))
+    apart = separating_recording([(one.effect, one.target) for one in cause])
+    return (
+        f"One of these, which these recordings cannot tell apart, {where}: {rivals}. {sure} To tell "
+        f"them apart: {apart}."
+    )
+
+
+def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
+    """``in all 4 recordings`` or ``only in squat (run 3)``; ``everywhere``: those looked at."""
+    names = [trial_label(stem) for stem in trials]
+    if len(everywhere) > 1 and set(trials) >= set(everywhere):
+        return (
+            "in both recordings" if len(everywhere) == 2 else f"in all {len(everywhere)} recordings"
+        )
+    return f"{'only ' if len(everywhere) > len(trials) else ''}in {listing(names)}"
+
+
+def how_sure(one: Candidate) -> str:
+    """Against chance, and on data that were not used to size it."""
+    gain, low, high = one.gain
+    chance = f"chance {number(100 * one.p_value, 1)} %"
+    if one.p_value < LEAST_TOLD:
+        chance = "chance under 0.1 %"
+    if not np.isfinite(gain):
+        return f"How sure: {chance}."
+    level = "Weak" if low <= 0 else "Sure" if one.p_value < LEAST_TOLD else "Likely"
+    digits = 0 if gain >= 10 else 1
+    share, least, most = (number(x, digits) for x in (gain, low, high))
+    return (
+        f"{level} ({chance}): explains {share} % ({least} to {most} %) of the difference in seconds "
+        "it was not fitted to."
+    )
+
+
+# --- what it does -----------------------------------------------------------------------------
+
+
+def _results(
+    causes: Sequence[Sequence[Candidate]], gains: pd.DataFrame | None, changes: pd.DataFrame | None
+) -> tuple[str, ...]:
+    if all(cause[0].effect == UNNAMED for cause in causes):
+        return ()  # what has no name cannot be put into a model
+    if gains is None:
+        return ("What it does to the result is not known: run `bsip extend`.",)
+    said = [gain_sentence(gains), change_sentence(changes) if changes is not None else ""]
+    return tuple(filter(None, said))
+
+
+def gain_sentence(gains: pd.DataFrame) -> str:
+    """What the causes do to the forces: the components that improve most, and those that lose.
+
+    ``gains`` is a ``gain`` table; empty text where it has no number. The vertical force, which it
+    has twice, counts once.
+    """
+    whole = gains[np.isfinite(gains["gain_percent"]) & (gains["component"] != "fz")]
+    best = whole[whole["gain_percent"] > 0].nlargest(_MOST_GAINS, "gain_percent")
+    if best.empty:
+        return (
+            "" if whole.empty else "With what was found in the model, no component follows better."
+        )
+    parts = [
+        f"{component_label(r['component'])} {number(r['rmse_before'], 2)} → "
+        f"{number(r['rmse_after'], 2)} {r['unit']} ({number(r['gain_percent'], 0)} % less, "
+        f"{number(r['ci_low'], 0)} to {number(r['ci_high'], 0)} %)"
+        for r in best.to_dict("records")
+    ]
+    worse = [component_label(c) for c in whole.loc[whole["ci_high"] < 0, "component"]]
+    rises = f" It rises in {listing(worse)}." if worse else ""
+    return (
+        "What it does to the forces: with what was found in the model, the error on data that did "
+        f"not size it falls — {'; '.join(parts)}.{rises}"
+    )
+
+
+def change_sentence(changes: pd.DataFrame) -> str:
+    """What the causes do to the person's parameters; ``changes`` is a ``bsip-change`` table."""
+    if changes.empty:
+        return ""
+    worth = worth_telling(changes)
+    if worth.empty:
+        return (
+            "What it does to the body's parameters: next to nothing; no segment changes by "
+            f"{_WORTH_KG:g} kg or {_WORTH_MM:g} mm."
+        )
+    by_mass = worth.loc[worth["mass_change_kg"].abs().nlargest(_MOST_CHANGES).index]
+    by_place = worth.loc[worth["com_change_m"].nlargest(1).index]
+    rows = pd.concat([by_mass, by_place]).drop_duplicates("segment")
+    parts = [
+        f"{segment_label(r['segment'])} {signed(r['mass_change_kg'], 2)} kg, its centre of mass "
+        f"moves by {number(1000 * r['com_change_m'], 0)} mm"
+        for r in rows.to_dict("records")
+    ]
+    return (
+        "What it does to the body's parameters: with what was found in the model, most of all "
+        f"{'; '.join(parts)}."
+    )
+
+
+def worth_telling(changes: pd.DataFrame) -> pd.DataFrame:
+    """Rows of ``bsip-change`` that are large enough to matter."""
+    millimetres = 1000.0 * changes["com_change_m"]
+    return changes[(changes["mass_change_kg"].abs() >= _WORTH_KG) | (millimetres >= _WORTH_MM)]
+
+
+def put_right_sentence(events: Sequence[tuple[str, pd.DataFrame]]) -> tuple[str, ...]:
+    """What ``ik`` has put right, from (stem, ``marker-events``); nothing where there was nothing."""
+    said = [
+        f"in {trial_label(stem)} {text.removesuffix('; put right')}"
+        for stem, table in events
+        for text in table.loc[table["put_right"].astype(bool), "sentence"]
+    ]
+    return (f"Put right already, before the search for causes: {'; '.join(said)}.",) if said else ()
+
+
+def consequences(causes: Sequence[Sequence[Candidate]]) -> tuple[str, ...]:
+    """What the causes mean for the reader, each once and with the numbers of its causes."""
+    numbers: dict[str, list[int]] = {}
+    for k, cause in enumerate(causes, start=1):
+        known = (EFFECT_WORDS[one.effect] for one in cause if one.effect in EFFECT_WORDS)
+        for text in dict.fromkeys(words.consequence for words in known):
+            numbers.setdefault(text, []).append(k)
+    if len(causes) == 1:
+        return tuple(numbers)
+    return tuple(
+        f"{'Cause' if len(of) == 1 else 'Causes'} {listing([str(k) for k in of])}: {text}"
+        for text, of in numbers.items()
+    )
+
+
+def _named_twice(causes: Sequence[Sequence[Candidate]]) -> str:
+    """A warning where one cause was kept more than once in the same recording; else empty."""
+    places = [(cause[0].label, stem) for cause in causes for stem in cause[0].trials]
+    twice = dict.fromkeys(label for label, stem in places if places.count((label, stem)) > 1)
+    if not twice:
+        return ""
+    return (
+        f"Named more than once: {listing(list(twice))}. Its parts add up, and their single sizes "
+        "and intervals, and causes named between them, should not be trusted."
+    )

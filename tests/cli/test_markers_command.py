@@ -1,0 +1,204 @@
+"""`bsip markers`: labels, the set they fit, what is missing, and a first set of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bsip_cli.body.markersets import load_marker_set
+from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.markers import Request, markers_command
+
+HANSEN = [marker.label for marker in load_marker_set("hansen2017").markers]
+OWN = [
+    "c7",
+    "IJ",
+    "LAcromion",
+    "RAcromion",
+    "LAsis",
+    "RAsis",
+    "Sacrum",
+    "LElbowLat",
+    "RElbowLat",
+    "LWrist",
+    "RWrist",
+    "LKneeLat",
+    "RKneeLat",
+    "LAnkleLat",
+    "RAnkleLat",
+    "LHeel",
+    "RHeel",
+    "LMT5",
+    "RMT5",
+    "Ball#1",
+]
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    """The current folder, where a first set is written."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def recording(folder: Path, labels: Sequence[str], empty: Sequence[str] = ()) -> Path:
+    """A TRC file of two frames with markers at different places."""
+    path = folder / "a trial.trc"
+    rows = [
+        "\t".join(
+            [str(frame + 1), f"{frame / 100:g}"]
+            + [
+                "\t\t" if label in empty else f"{k}\t{k + 1}\t{k + 2}"
+                for k, label in enumerate(labels)
+            ]
+        )
+        for frame in range(2)
+    ]
+    head = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits",
+        f"100\t100\t2\t{len(labels)}\tmm",
+        "Frame#\tTime\t" + "\t\t\t".join(labels) + "\t\t",
+        "\t\t" + "\t".join(f"X{k}\tY{k}\tZ{k}" for k in range(1, len(labels) + 1)),
+    ]
+    path.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+def asked(path: Path, **options) -> Request:
+    return Request(**{"file": path, "marker_set": "auto", "prefix": "", "write": None} | options)
+
+
+def test_a_known_set_is_complete(here, capsys):
+    assert markers_command(asked(recording(here, HANSEN))) == 0
+    said = capsys.readouterr().out
+    assert "marker set: hansen2017 (Hansen 2017, full body), guessed: 38 of its 38 markers" in said
+    assert "  RTEM   seen 100.0 %  head, right temple\n" in said
+    assert "  left hand         3 markers\n" in said
+    assert list(here.glob("*.toml")) == []
+
+
+def test_what_is_missing_on_which_segment(here, capsys):
+    gone = {"RTEM", "LTEM", "FHEAD", "LWRU", "RMALL"}
+    path = recording(here, [label for label in HANSEN if label not in gone], empty=["C7"])
+    assert markers_command(asked(path)) == 3
+    said = capsys.readouterr().out
+    assert "  head              0 markers; missing: RTEM, LTEM, FHEAD; its joint is held" in said
+    assert "  left hand         2 markers; missing: LWRU\n" in said
+    assert "  C7     seen   0.0 %  labelled, but seen in no frame\n" in said
+    assert "a skeleton cannot be built without: malleolus_lateral_r\n" in said
+
+
+def test_no_trunk_is_refused_as_scale_does(here, capsys):
+    on_legs = ("lower_torso", "thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r")
+    legs = [m.label for m in load_marker_set("hansen2017").markers if m.segment in on_legs]
+    assert markers_command(asked(recording(here, legs))) == 3
+    said = capsys.readouterr().out
+    assert "refused, unless scale.may_be_held in study.toml names it" in said
+    assert "cannot be built" not in said
+
+
+def test_an_unknown_set_is_written_down_and_serves(here, capsys):
+    path = recording(here, [f"P:{label}" for label in OWN])
+    assert markers_command(asked(path)) == 3
+    said = capsys.readouterr().out
+    assert "none of the shipped sets fits" in said
+    assert "  P:LWrist     seen 100.0 %  seems to be left forearm, left wrist\n" in said
+    assert "  P:Ball#1     seen 100.0 %  not understood\n" in said
+    starter = here / "a_trial_markers.toml"
+    assert "# Ball#1\n" in starter.read_text(encoding="utf-8")
+    landmarks = {m.label: m.landmark for m in load_marker_set(str(starter)).markers}
+    assert landmarks["RKneeLat"] == "knee_lateral_r" and landmarks["IJ"] == "suprasternale"
+    assert len(landmarks) == len(OWN) - 1
+    assert markers_command(asked(path, marker_set=str(starter))) == 0
+    assert "marker set: a_trial_markers" in capsys.readouterr().out
+
+
+def test_labels_without_sense_give_a_template(here):
+    assert markers_command(asked(recording(here, ["0001", 'a "b" \\', "0003"]))) == 3
+    starter = here / "a_trial_markers.toml"
+    with pytest.raises(UsageError, match="expected lines like head"):
+        load_marker_set(str(starter))
+    written = starter.read_text(encoding="utf-8")
+    assert '# forearm_l = { LABEL = "landmark" }' in written
+    starter.write_text(written.replace("# head", "head"), encoding="utf-8")
+    with pytest.raises(UsageError, match="LABEL: unknown landmark landmark"):
+        load_marker_set(str(starter))
+
+
+def test_nothing_is_written_over(here, capsys):
+    path, mine = recording(here, OWN), here / "a_trial_markers.toml"
+    mine.write_text("mine", encoding="utf-8")
+    assert markers_command(asked(path)) == 3
+    assert "is there already" in capsys.readouterr().out
+    with pytest.raises(UsageError, match="not written over"):
+        markers_command(asked(path, write=mine))
+    assert mine.read_text(encoding="utf-8") == "mine"
+    with pytest.raises(UsageError, match="cannot be written"):
+        markers_command(asked(path, write=here / "no" / "folder.toml"))
+
+
+def test_a_first_set_on_request_also_of_a_known_one(here):
+    target = here / "mine.toml"
+    assert markers_command(asked(recording(here, HANSEN), write=target)) == 0
+    mine = {m.label: (m.segment, m.landmark) for m in load_marker_set(str(target)).markers}
+    assert mine == {m.label: (m.segment, m.landmark) for m in load_marker_set("hansen2017").markers}
+
+
+def test_two_people(here, capsys):
+    path = recording(here, [f"{name}:{label}" for name in ("Anna", "Ben") for label in HANSEN])
+    with pytest.raises(BadDataError, match=r"2 people in one file: 'Anna:' .38 markers., 'Ben:'"):
+        markers_command(asked(path))
+    assert markers_command(asked(path, prefix="Ben")) == 0
+    said = capsys.readouterr().out
+    assert "labels of the person with the prefix 'Ben:'" in said
+    assert "  Ben:C7      seen 100.0 %  upper torso, c7\n" in said
+    assert "  Anna:C7     seen 100.0 %  not in the set\n" in said
+
+
+def test_exit_codes(bsip, here):
+    known = recording(here, HANSEN)
+    assert bsip("markers", known).code == 0
+    assert bsip("markers", known, "--marker-set", "plugin_gait", "--write", known).code == 2
+    unknown = bsip("markers", known, "--marker-set", "hansen")
+    assert unknown.code == 2 and "there is no such marker set" in unknown.err
+    (here / "empty.c3d").touch()
+    refused = bsip("markers", here / "empty.c3d")
+    assert refused.code == 3 and "the file is empty" in refused.err and refused.out == ""
+    gone = bsip("markers", here / "nowhere.c3d")
+    assert gone.code == 3 and "Traceback" not in gone.err
+
+
+def test_two_people_of_one_recording_in_a_study(bsip, here):
+    both = [f"{name}:{label}" for name in ("Anna", "Ben") for label in HANSEN]
+    source = recording(here, both)
+    for person in ("sub-01", "sub-02"):
+        folder = here / "study" / person
+        folder.mkdir(parents=True)
+        (folder / f"{person}_task-static.trc").write_bytes(source.read_bytes())
+    (here / "study" / "participants.tsv").write_text(
+        "participant_id\tsex\tmass_kg\theight_m\nsub-01\tF\t60\tn/a\nsub-02\tM\t70\tn/a\n"
+    )
+    refused = bsip("ingest", here / "study", "--out", here / "out")
+    assert refused.code == 3 and "2 people in one file: 'Anna:'" in refused.err
+    options = here / "study" / "study.toml"
+    options.write_text('[ingest]\nprefixes = { sub-01 = "Anna:", sub-03 = "Ben:" }\n')
+    unknown = bsip("ingest", here / "study", "--out", here / "out")
+    assert (
+        unknown.code == 2
+        and "ingest.prefixes: there is no sub-03 (did you mean sub-0" in unknown.err
+    )
+    options.write_text('[ingest]\nprefixes = { sub-01 = "Anna:", sub-02 = "Ben" }\n')
+    assert bsip("ingest", here / "study", "--out", here / "out").code == 0
+    first_y = {}
+    for person in ("sub-01", "sub-02"):
+        table = pd.read_parquet(here / "out" / person / f"{person}_task-static_markers.parquet")
+        first_y[person] = table.loc[0, ["x_m", "y_m", "z_m"]].to_numpy(dtype=float)
+        assert list(table["marker"][:3]) == HANSEN[:3]
+    assert np.linalg.norm(first_y["sub-02"] - first_y["sub-01"]) == pytest.approx(
+        len(HANSEN) * np.sqrt(3) * 1e-3
+    )

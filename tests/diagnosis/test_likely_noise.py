@@ -1,0 +1,66 @@
+"""The noise of a trial must not hold its causes, before these are known."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from noisy_trial import all_of, late, noisy, part_of_moving, with_effect
+
+from bsip_cli.diagnosis.explanation import Fit, fit_together
+from bsip_cli.diagnosis.likely_noise import likely_columns, with_likely_noise, with_noise_beside
+from bsip_cli.diagnosis.signatures import Signatures, signatures_of
+from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.scene import Scene
+
+EFFECTS_ASKED = [EFFECTS[name] for name in ("sync_offset", "plate_drift", "unmeasured_contact")]
+LEANING = ("hand_l", 0.0, 10.0, 60.0, 4.0, 4.0)
+
+
+def asked(*scenes: Scene) -> tuple[Signatures, Fit]:
+    signatures = signatures_of(all_of(*scenes), EFFECTS_ASKED)
+    return signatures, fit_together(signatures.evidence, ())
+
+
+@cache
+def clean() -> tuple[Signatures, Fit]:
+    return asked(noisy(part_of_moving(0, 10), 1), noisy(part_of_moving(10, 10), 2))
+
+
+@cache
+def wrong() -> tuple[Signatures, Fit]:
+    """The first trial is 8 ms late, in the second the person leans on something."""
+    first, second = part_of_moving(0, 10), part_of_moving(10, 10)
+    leaning = with_effect(second, EFFECTS["unmeasured_contact"], *LEANING)
+    return asked(noisy(late(first, 0.008), 1), noisy(leaning, 2))
+
+
+def spread_of(signatures: Signatures, trial: int) -> np.ndarray:
+    """(6,) mean noise."""
+    return signatures.evidence.trials[trial].whitening.spread.mean(axis=0)
+
+
+@pytest.mark.parametrize("trial", [0, 1])
+def test_each_trial_has_the_noise_beside_its_own_cause(trial):
+    expected = spread_of(clean()[0], trial)
+    before = spread_of(wrong()[0], trial)
+    found, _ = with_likely_noise(*wrong())
+    too_large = (before / expected).mean() - 1
+    assert too_large > 0.4
+    assert abs((spread_of(found, trial) / expected).mean() - 1) < 0.5 * too_large
+
+
+def test_nothing_is_likely_in_a_null():
+    signatures, fit = clean()
+    assert likely_columns(signatures, fit).shape == (len(fit.residual), 0)
+    likely, _ = with_likely_noise(signatures, fit)
+    alone, _ = with_noise_beside(signatures, fit)
+    np.testing.assert_array_equal(spread_of(likely, 0), spread_of(alone, 0))
+
+
+def test_what_is_likely_explains_the_residual():
+    signatures, fit = with_likely_noise(*wrong())
+    columns, residual = likely_columns(signatures, fit), signatures.evidence.residual
+    size = np.linalg.lstsq(columns, residual, rcond=None)[0]
+    assert np.std(residual - columns @ size) < 0.5 * np.std(residual)

@@ -1,0 +1,39 @@
+"""What ``bsip show`` prints of a diagnosis: lines that fit, and nothing that a file could hide."""
+
+import pandas as pd
+from fake_study import detection, diagnosis, marker_events
+
+from bsip_cli.report.verdict import put_right_sentence, verdict_of
+from bsip_cli.show import verdict_text
+
+TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]
+
+
+def text_of(table: pd.DataFrame, columns: int = 100, right: tuple[str, ...] = ()) -> str:
+    return verdict_text("sub-01", verdict_of(table, detection(TRIALS)), right, columns)
+
+
+def test_causes_are_numbered_and_lines_fit():
+    for columns in (60, 100, 500):
+        text = text_of(diagnosis(TRIALS), columns)
+        assert max(map(len, text.splitlines())) <= min(columns, 100)
+    assert "\n 1. Plate 1 is turned by +2.0 degrees" in text
+    assert "\n 2. One of these, which these recordings cannot tell apart" in text
+    assert text.startswith("\n## Is anything wrong: sub-01\nSomething is wrong: 1 cause named")
+
+
+def test_what_was_put_right_is_told_too():
+    events = marker_events().assign(put_right=True, sentence="A and B bear labels; put right")
+    right = put_right_sentence([(TRIALS[0], events)])
+    assert right == (
+        "Put right already, before the search for causes: in sequence (run 1) A and B bear labels.",
+    )
+    assert "Put right already" in text_of(diagnosis(TRIALS), right=right)
+    assert put_right_sentence([(TRIALS[0], marker_events())]) == ()
+
+
+def test_a_file_cannot_send_commands_to_the_terminal():
+    table = diagnosis(TRIALS).assign(sentence="marker \x1b[2J\x07KNEE\u202e sits wrong")
+    text = text_of(table)
+    assert "Marker ?[2J?KNEE? sits wrong" in text
+    assert all(c.isprintable() or c == "\n" for c in text)

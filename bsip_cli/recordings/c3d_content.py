@@ -1,31 +1,30 @@
-"""A C3D file's samples: points and analog channels, scaled as the file says."""
+"""What a C3D file holds: ezc3d reads it, after a check of its counts against its length.
+
+Own parsing goes as far as that check needs: header, records of parameters, counts, rates. Where
+ezc3d would misread or refuse a sound file (c3d_mend says which), it reads a copy written anew.
+"""
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.c3d_header import BLOCK, Header, read_header
+from bsip_cli.recordings.c3d_agreement import settle_rate, settle_scale
+from bsip_cli.recordings.c3d_guard import Samples, read_by_ezc3d
+from bsip_cli.recordings.c3d_header import BLOCK, read_header
 from bsip_cli.recordings.c3d_layout import Layout, settle_layout
-from bsip_cli.recordings.c3d_numbers import floats, integers
-from bsip_cli.recordings.c3d_parameters import (
-    Group,
-    Parameters,
-    number,
-    numbers,
-    read_parameters,
-    texts,
-)
+from bsip_cli.recordings.c3d_mend import mended, needs_mending, pieces
+from bsip_cli.recordings.c3d_parameters import Group, Parameters
+from bsip_cli.recordings.c3d_records import parameters_of, read_records
+from bsip_cli.recordings.c3d_scaling import says_unsigned, scaling_of
 from bsip_cli.recordings.model import Finding
 
 _LARGEST_FILE = 2**31  # bytes
-_FRAMES_TO_JUDGE = 500
-_SAME = 1e-3
-_INTEGER_LIMIT = 32_768.0
 
 
 @dataclass(frozen=True)
@@ -47,32 +46,33 @@ class Content:
 
 
 def read_content(path: Path) -> Content:
-    """Read a C3D file of any processor; memory stays within a few times the file's size."""
+    """Read a C3D file; a foreign, broken or cut one is refused before ezc3d sees it."""
     raw = _bytes(path)
     header = read_header(path, raw)
     reach = (header.data_start_block - 1) * BLOCK if header.data_start_block > 2 else None
-    parameters = read_parameters(path, raw[:reach], header.processor)
-    layout, findings = settle_layout(
-        path, header, parameters, len(raw), partial(_roughness, raw, header.processor)
-    )
-    rate_hz, about_rate = _rate(path, header, parameters, layout)
-    scale, about_scale = _point_scale(header, parameters)
-    frames = _frames(raw, layout, header.processor)
+    records = read_records(path, raw[:reach], header.processor)
+    stated = parameters_of(records, header.processor)
+    layout, findings = settle_layout(path, header, stated, len(raw))
+    rate_hz, about_rate = settle_rate(path, header, stated, layout)
+    point_scale, about_scale = settle_scale(header, stated)
+    scaling = scaling_of(stated.get("ANALOG", {}), layout.n_channels, says_unsigned(records))
+    if needs_mending(header, records, layout, rate_hz):
+        samples = _read_pieces(
+            path, layout, lambda part: mended(raw, header, records, part, rate_hz, point_scale)
+        )
+        samples = replace(samples, analog=scaling.applied(samples.analog, layout.is_float))
+    else:
+        samples = _read_piece(path, path, layout)
     if header.is_full:
-        frames = _without_padding(frames)
-    positions = frames[:, : 4 * layout.n_points].reshape(len(frames), layout.n_points, 4)
-    n_samples = len(frames) * layout.samples_per_frame
-    analog = frames[:, 4 * layout.n_points :].reshape(n_samples, layout.n_channels).T
-    factor = 1.0 if layout.is_float else abs(scale)
-    scales = _analog_scales(parameters.get("ANALOG", {}), layout.n_channels)
+        samples = _without_padding(samples, layout)
     return Content(
-        parameters=parameters,
+        parameters=samples.parameters,
         rate_hz=rate_hz,
         first_frame=max(header.first_frame, 1) - 1,
-        positions=positions[..., :3] * factor,
-        is_valid=positions[..., 3] >= 0,
-        analog=_scaled(analog, parameters.get("ANALOG", {}), scales, layout.is_float),
-        analog_scales=scales,
+        positions=samples.positions,
+        is_valid=samples.residuals >= 0,
+        analog=samples.analog,
+        analog_scales=scaling.scales,
         samples_per_frame=layout.samples_per_frame,
         findings=(*findings, *about_rate, *about_scale),
     )
@@ -93,116 +93,68 @@ def _bytes(path: Path) -> bytes:
         raise BadDataError(f"cannot be opened ({error.strerror})", file=path) from error
 
 
-def _frames(raw: bytes, layout: Layout, processor: int) -> np.ndarray:
-    """All words of the data as float64, (n_frames, words_per_frame)."""
-    data = raw[layout.start : layout.start + layout.n_bytes]
-    words = floats(data, processor) if layout.is_float else integers(data, processor).astype(float)
-    return words.reshape(layout.n_frames, layout.words_per_frame)
-
-
-def _without_padding(frames: np.ndarray) -> np.ndarray:
-    """Without the frames of zeros that only fill the last block of the file."""
-    most = min(BLOCK // (2 * frames.shape[1]), len(frames) - 1)
-    n = len(frames)
-    while n > len(frames) - most and not frames[n - 1].any():
-        n -= 1
-    return frames[:n]
-
-
-def _roughness(raw: bytes, processor: int, layout: Layout) -> float:
-    """How little one frame resembles the next: a wrong layout mixes coordinates and channels.
-
-    The median over the words of the mean step between frames over their spread.
-    """
-    if layout.n_frames < 2:
-        return np.inf
-    shown = replace(layout, n_frames=min(layout.n_frames, _FRAMES_TO_JUDGE))
-    frames = _frames(raw[: shown.start + shown.n_bytes], shown, processor)
-    with np.errstate(invalid="ignore", over="ignore"):
-        step, spread = np.abs(np.diff(frames, axis=0)).mean(axis=0), frames.std(axis=0)
-    known = np.isfinite(step) & np.isfinite(spread) & (spread > 0)
-    return float(np.median(step[known] / spread[known])) if known.any() else np.inf
-
-
-def _rate(
-    path: Path, header: Header, parameters: Parameters, layout: Layout
-) -> tuple[float, list[Finding]]:
-    """Frames per second, and findings where the file's statements of rates differ."""
-    stated = number(parameters.get("POINT", {}), "RATE")
-    usable = [rate for rate in (stated, header.rate_hz) if np.isfinite(rate) and 0 < rate < 1e5]
-    if not usable:
-        raise BadDataError(
-            f"POINT:RATE is {stated:g} Hz",
-            expected="a rate above 0 Hz",
-            remedy="export the trial with its rate",
-            file=path,
-        )
-    rate_hz = usable[0]
-    findings = []
-    if len(usable) < 2 or abs(usable[1] / rate_hz - 1) > _SAME:
-        findings.append(
-            Finding(
-                check="rate",
-                subject="points",
-                found=f"POINT:RATE says {stated:g} Hz, the header {header.rate_hz:g} Hz",
-                expected="one rate",
-                action=f"read {rate_hz:g} Hz",
-                level="warning",
-            )
-        )
-    analog_hz = number(parameters.get("ANALOG", {}), "RATE")
-    real_hz = rate_hz * layout.samples_per_frame
-    if layout.n_channels and not abs(analog_hz / real_hz - 1) <= _SAME:
-        findings.append(
-            Finding(
-                check="rate",
-                subject="analog",
-                found=f"ANALOG:RATE says {analog_hz:g} Hz, and each frame of the markers at "
-                f"{rate_hz:g} Hz has {layout.samples_per_frame} samples",
-                expected=f"{real_hz:g} Hz",
-                action=f"read {real_hz:g} Hz",
-                level="corrected",
-            )
-        )
-    return rate_hz, findings
-
-
-def _point_scale(header: Header, parameters: Parameters) -> tuple[float, list[Finding]]:
-    """Size of one count of the coordinates; floats are not scaled."""
-    stated = number(parameters.get("POINT", {}), "SCALE")
-    if not np.isfinite(stated) or stated == 0:
-        stated = header.scale
-    if header.scale < 0 or abs(abs(stated) - abs(header.scale)) <= _SAME * abs(stated):
-        return stated, []
-    finding = Finding(
-        check="scale",
-        subject="points",
-        found=f"POINT:SCALE is {stated:g}, the header says {header.scale:g}",
-        expected="one scale",
-        action=f"used {stated:g}",
-        level="warning",
+def _read_pieces(path: Path, layout: Layout, written: Callable[[Layout], bytes]) -> Samples:
+    """What ezc3d reads of a file that is written anew in one or several pieces."""
+    parts, read = pieces(layout), []
+    with tempfile.TemporaryDirectory(prefix="bsip-") as folder:
+        copy = Path(folder) / "mended.c3d"
+        for part in parts:
+            copy.write_bytes(written(part))
+            read.append(_read_piece(path, copy, part))
+    whole = [*map(_padded, read[:-1], parts), read[-1]]
+    return replace(
+        read[0],
+        positions=np.concatenate([one.positions for one in whole]),
+        residuals=np.concatenate([one.residuals for one in whole]),
+        analog=np.concatenate([one.analog for one in whole], axis=1),
     )
-    return stated, [finding]
 
 
-def _analog_scales(group: Group, n_channels: int) -> np.ndarray:
-    """GEN_SCALE times SCALE, one where the file says nothing or zero, (n_channels,)."""
-    general = number(group, "GEN_SCALE")
-    scales = np.ones(n_channels)
-    given = np.ravel(numbers(group, "SCALE"))[:n_channels]
-    scales[: len(given)] = given
-    scales *= general if np.isfinite(general) else 1.0
-    return scales
+def _read_piece(path: Path, file: Path, layout: Layout) -> Samples:
+    samples = read_by_ezc3d(file, path)
+    _check_counts(path, samples, layout)
+    return samples
 
 
-def _scaled(analog: np.ndarray, group: Group, scales: np.ndarray, is_float: bool) -> np.ndarray:
-    """(count - offset) x scale, (n_channels, n)."""
-    offsets = np.zeros(len(scales))
-    given = np.ravel(numbers(group, "OFFSET"))[: len(scales)]
-    offsets[: len(given)] = given
-    if texts(group, "FORMAT")[:1] == ["UNSIGNED"]:
-        offsets = np.where(offsets < 0, offsets + 2 * _INTEGER_LIMIT, offsets)
-        if not is_float:
-            analog = np.where(analog < 0, analog + 2 * _INTEGER_LIMIT, analog)
-    with np.errstate(invalid="ignore", over="ignore"):
-        return (analog - offsets[:, None]) * scales[:, None]
+def _padded(samples: Samples, layout: Layout) -> Samples:
+    """With the empty frames at the end, which ezc3d drops."""
+    missing = layout.n_frames - len(samples.positions)
+    return replace(
+        samples,
+        positions=np.pad(samples.positions, ((0, missing), (0, 0), (0, 0))),
+        residuals=np.pad(samples.residuals, ((0, missing), (0, 0)), constant_values=-1),
+        analog=np.pad(samples.analog, ((0, 0), (0, missing * layout.samples_per_frame))),
+    )
+
+
+def _without_padding(samples: Samples, layout: Layout) -> Samples:
+    """Without the frames of zeros that only fill the last block of the file."""
+    most = min(BLOCK // layout.bytes_per_frame, len(samples.positions) - 1)
+    n = len(samples.positions)
+    stop = n
+    while stop > n - most and not samples.positions[stop - 1].any():
+        stop -= 1
+    return replace(
+        samples,
+        positions=samples.positions[:stop],
+        residuals=samples.residuals[:stop],
+        analog=samples.analog[:, : stop * layout.samples_per_frame],
+    )
+
+
+def _check_counts(path: Path, samples: Samples, layout: Layout) -> None:
+    """Refuse what ezc3d reads with other counts; it may drop empty frames at the end."""
+    n_frames, n_points, _ = samples.positions.shape
+    n_channels, n_samples = samples.analog.shape
+    if (
+        (n_points, n_channels) == (layout.n_points, layout.n_channels)
+        and 0 < n_frames <= layout.n_frames
+        and (n_channels == 0 or n_samples == n_frames * layout.samples_per_frame)
+    ):
+        return
+    raise BadDataError(
+        f"ezc3d reads {n_points} points and {n_channels} channels in {n_frames} frames",
+        expected=layout.describe(),
+        remedy="export the trial again",
+        file=path,
+    )

@@ -11,7 +11,7 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.c3d_numbers import PROCESSORS, floats, integers
 
 BLOCK = 512
-_C3D_KEY = 0x50
+C3D_KEY = 0x50
 _FULL = 0xFFFF  # frame number that does not fit the header's word
 
 
@@ -48,7 +48,7 @@ def read_header(path: Path, content: bytes) -> Header:
             remedy="copy or export the trial again",
             file=path,
         )
-    if len(content) < BLOCK or content[1] != _C3D_KEY or content[0] < 1:
+    if len(content) < BLOCK or content[1] != C3D_KEY or content[0] < 1:
         raise BadDataError(
             f"no C3D header in a file of {len(content)} bytes",
             expected="a C3D file",

@@ -1,4 +1,4 @@
-"""Parameter sections: what they say in every processor's numbers, and broken ones."""
+"""Records of parameters: what they say in every processor's numbers, and broken ones."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from recording_writers import standing_markers, write_c3d
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.c3d_numbers import DEC, MIPS, PC, floats, integers
-from bsip_cli.recordings.c3d_parameters import number, numbers, read_parameters, texts
+from bsip_cli.recordings.c3d_parameters import number, numbers, texts
+from bsip_cli.recordings.c3d_records import parameters_of, read_records
 from bsip_cli.recordings.read import read_recording
 
 
@@ -21,14 +22,13 @@ def content(tmp_path) -> bytearray:
 
 
 def _parameters(tmp_path, content: bytes):
-    return read_parameters(tmp_path / "a.c3d", bytes(content), PC)
+    return parameters_of(read_records(tmp_path / "a.c3d", bytes(content), PC), PC)
 
 
-def test_numbers_and_texts_of_a_good_file(tmp_path, content):
+def test_numbers_of_a_good_file(tmp_path, content):
     point = _parameters(tmp_path, content)["POINT"]
     assert number(point, "RATE") == 100.0
     assert number(point, "USED") == 8
-    assert texts(point, "LABELS") == standing_markers(1)[1]
     assert len(numbers(point, "LABELS")) == 0 and texts(point, "RATE") == []
     assert np.isnan(number(point, "NONE"))
 

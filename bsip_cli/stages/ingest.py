@@ -9,6 +9,7 @@ import pandas as pd
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
+from bsip_cli.body.names import TRUNK
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.contacts import ContactWindows, contact_windows, plate_loads
 from bsip_cli.recordings.free_plates import nobody_near
@@ -17,13 +18,12 @@ from bsip_cli.recordings.labels import match_labels
 from bsip_cli.recordings.marker_guess import guess_marker_set
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.read import read_recording
+from bsip_cli.recordings.repeated_frames import without_repeats
 from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
 from bsip_cli.recordings.standing_mass import about_mass, plate_mass
 from bsip_cli.recordings.zero import plate_zero, subtract_zero
 from bsip_cli.stages.frames import WRENCH
 from bsip_cli.unit import Unit
-
-_TRUNK = ("lower_torso", "upper_torso")
 
 
 def run(unit: Unit) -> None:
@@ -40,14 +40,15 @@ def run(unit: Unit) -> None:
     )
     names = [marker.label for marker in marker_set.markers if marker.label in match.index]
     _require(unit, names)
-    findings = [*recording.findings, *match.findings]
+    recording, repeats = without_repeats(recording)
+    findings = [*recording.findings, *match.findings, *repeats]
     if unit.config.ingest.zero_unloaded_plates:
         recording, zeroed = _without_zero(recording)
         findings += zeroed
     filled = _fill(unit, recording, marker_set, names, match.index)
     findings += _gap_findings(names, filled)
     wrench = wrench_at_marker_rate(recording)
-    trunk = _markers_on(marker_set, names, filled, _TRUNK)
+    trunk = _markers_on(marker_set, names, filled, TRUNK)
     contacts = _contacts(unit, recording, marker_set, names, filled, wrench)
     findings += contacts.reasons
     findings += _mass_findings(unit, recording, wrench, contacts, trunk)
@@ -145,7 +146,7 @@ def _contacts(unit, recording, marker_set, names, filled, wrench: FrameWrench) -
         dict.fromkeys(feet),
         recording.marker_rate_hz,
         plate_loads(recording, wrench),
-        _markers_on(marker_set, names, filled, _TRUNK),
+        _markers_on(marker_set, names, filled, TRUNK),
         _mass_kg(unit, wrench),
     )
 

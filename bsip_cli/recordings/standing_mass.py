@@ -37,9 +37,11 @@ class PlateMass:
         error_m_s = _STILL_ERROR_M_S if self.is_still else _MOVING_ERROR_M_S
         return _PERCENT * error_m_s / (GRAVITY_M_S2 * self.seconds)
 
+    def manner(self) -> str:
+        return "quiet standing" if self.is_still else "movement (balance of momentum)"
+
     def words(self) -> str:
-        how = "quiet standing" if self.is_still else "movement (balance of momentum)"
-        return f"{self.mass_kg:.2f} kg in {self.seconds:.1f} s of {how}"
+        return f"{self.mass_kg:.2f} kg in {self.seconds:.1f} s of {self.manner()}"
 
 
 def plate_mass(
@@ -80,7 +82,7 @@ def still_frames(force_z_N: np.ndarray, valid: np.ndarray, rate_hz: float) -> np
 
     None if that is shorter than 0.8 s.
     """
-    smooth = uniform_filter1d(force_z_N, max(1, round(_NOISE_S * rate_hz)))
+    smooth = uniform_filter1d(np.nan_to_num(force_z_N), max(1, round(_NOISE_S * rate_hz)))
     still = np.zeros(len(valid), bool)
     for start, stop in runs(valid & (smooth > _LEAST_N)):
         first, last = _calmest(smooth[start:stop])

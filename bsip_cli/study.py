@@ -111,8 +111,6 @@ def _participant_rows(file: Path) -> list[dict[str, str]]:
             expected="tab-separated UTF-8 text",
             remedy="save it again as tab-separated text",
         ) from None
-    for row in rows:
-        _check_cells(file, row)
     known = (*required, "height_m")
     missing = [name for name in required if name not in header]
     if misspelt := _misspelt(header, known):
@@ -178,6 +176,7 @@ def _participant(
             expected="sub- and letters or digits",
             remedy="rename the participant and the folder",
         )
+    _check_cells(file, row)
     sex = (row["sex"] or "").strip().upper()
     if sex not in ("M", "F"):
         raise BadDataError(

@@ -19,7 +19,10 @@ import pandas as pd
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "real"))
 
+from every_recording import SECTION as EVERY
 from figaroh_csv import convert
+from fuzz import SECTION as FUZZ
+from sections import marks, read_section, replace_section
 
 
 @dataclass(frozen=True)
@@ -99,7 +102,10 @@ def main() -> None:
     arguments = parser.parse_args()
     page = render(arguments.data)
     if arguments.write:
+        kept = {name: read_section(arguments.write, name) for name in (EVERY, FUZZ)}
         arguments.write.write_text(page, encoding="utf-8")
+        for name, content in kept.items():
+            replace_section(arguments.write, name, content)
     else:
         print(page)
 
@@ -115,7 +121,8 @@ def render(data: Path) -> str:
             out = run(study)
             markers += marker_rows(source.name, out)
             forces += force_rows(source.name, out)
-    return _PAGE.format(markers=_table(markers), forces=_table(forces))
+    marked = {"every": "\n".join(marks(EVERY)), "fuzz": "\n".join(marks(FUZZ))}
+    return _PAGE.format(markers=_table(markers), forces=_table(forces), **marked)
 
 
 def make_study(study: Path, data: Path, source: Source) -> bool:
@@ -211,8 +218,8 @@ def _table(rows: list[dict[str, str]]) -> str:
 
 _PAGE = """# Real recordings
 
-Made by `python benchmarks/recordings.py ../shared/data --write docs/recordings.md`. The recordings
-belong to others and are not part of the project.
+Made by `python benchmarks/recordings.py ../shared/data --write docs/recordings.md`; the last two
+tables by scripts of their own. The recordings belong to others and are not part of the project.
 
 ## Markers after scaling
 
@@ -239,6 +246,37 @@ What is odd in them, and not the inertial parameters' fault: in the one-leg tria
 both hands hold a rail that bears 4 kg (see the [diagnosis](diagnosis_of_recordings.md)), so OM,
 identified from them, misses the static weight; the plates of `opencap_subject4` read 4 % under the
 stated mass in all trials but walking.
+
+## Every recording
+
+Made by `python benchmarks/every_recording.py ../shared/data --write docs/recordings.md`: each file
+alone, before a marker set is chosen and before unloaded plates are zeroed. `bsip` is the mean
+vertical force of all plates over g, `alone` the same frames as ezc3d's extraction has them (TRC and
+CSV: the vertical columns) without any correction. `standing` are the frames of the longest calm
+stretch of at least 0.8 s; `all` is every usable frame of a trial without one, which is no mass.
+
+{every}
+
+What is left open. `edge_nimble/JH_01`: reversed, plate 1 presses, inside its outline; but both
+loads rise and fall together, which a person who shifts weight cannot do, and its centre of pressure
+is 0.42 m from the nearest foot. As recorded, the sum stays within 0.6 N: a zero lost by about
+1100 N explains all of it, a wrong sign does not. The file does not tell the zero, so the plate
+stays reversed, with a warning. Three plates of `TYPE-3.c3d` pull in the samples of
+FORCE_PLATFORM:ZERO, and differ by that baseline. `type1.C3D`, `kyowadengyo.c3d` and `evart.c3d`
+hold other counts than ezc3d takes from their parameters; the forces of the first two (up to 732 and
+787 N, under the feet) bear the header out, those of the third are volts without a calibration.
+
+## Damaged files
+
+Made by `python benchmarks/fuzz.py --data ../shared/data --write docs/recordings.md`: bytes flipped,
+emptied, moved and cut, words set to extremes, text cells and lines mangled. `refused`: in words;
+`said`: read, with a warning that the sound file does not have; `unchanged`: the same numbers.
+`silent` would be another number without a word, `bug` a traceback, `died` a killed process (20 s,
+or 1.5 GB above the sound file). Numbers count as changed if the median of a marker moves by 2 mm,
+of a wrench by 1 %, or any by far; digits of a participant's mass or height in a table of good form
+are the user's word.
+
+{fuzz}
 """
 
 

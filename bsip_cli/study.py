@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -109,7 +111,15 @@ def _participant_rows(file: Path) -> list[dict[str, str]]:
             expected="tab-separated UTF-8 text",
             remedy="save it again as tab-separated text",
         ) from None
+    known = (*required, "height_m")
     missing = [name for name in required if name not in header]
+    if misspelt := _misspelt(header, known):
+        raise BadDataError(
+            "has " + ", ".join(f"a column {name!r} and no {near}" for name, near in misspelt),
+            file=file,
+            expected=", ".join(known),
+            remedy="correct the name",
+        )
     if missing:
         raise BadDataError(
             f"has no column {', '.join(missing)}" if rows else "names no participant",
@@ -118,6 +128,31 @@ def _participant_rows(file: Path) -> list[dict[str, str]]:
             remedy="add it",
         )
     return rows
+
+
+def _misspelt(header: Iterable[str], known: tuple[str, ...]) -> list[tuple[str, str]]:
+    """Columns whose names are cut or slightly other than one that is lacking, and that one."""
+    found = []
+    lacking = [name for name in known if name not in header]
+    for name in (str(name).strip().lower() for name in header if name not in known):
+        cut = [near for near in lacking if len(name) >= 3 and near.startswith(name)]
+        near = cut or difflib.get_close_matches(name, lacking, n=1, cutoff=0.75)
+        found += [(name, near[0])] if near else []
+    return found
+
+
+def _check_cells(file: Path, row: dict) -> None:
+    """Every line must have a cell for each column: else cells are lost or shifted."""
+    if None in row or None in row.values():
+        n_columns = sum(name is not None for name in row)
+        n_cells = sum(cell is not None for cell in row.values()) - (None in row)
+        n_cells += len(row.get(None, ()))
+        raise BadDataError(
+            f"the line of {row.get('participant_id')!r} has {n_cells} cells",
+            file=file,
+            expected=f"{n_columns}, as many as there are columns, separated by tabs",
+            remedy="write n/a where something is unknown",
+        )
 
 
 def _twice(root: Path, name: str) -> BadDataError:
@@ -141,6 +176,7 @@ def _participant(
             expected="sub- and letters or digits",
             remedy="rename the participant and the folder",
         )
+    _check_cells(file, row)
     sex = (row["sex"] or "").strip().upper()
     if sex not in ("M", "F"):
         raise BadDataError(

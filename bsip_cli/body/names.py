@@ -20,6 +20,7 @@ SEGMENTS = (
     "foot_r",
 )
 
+TRUNK = ("lower_torso", "upper_torso")
 _SIDES = {"_l": "left", "_r": "right"}
 
 

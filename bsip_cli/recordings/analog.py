@@ -1,4 +1,4 @@
-"""Which analog samples can be believed: not NaN, not clipped, not stuck."""
+"""Which analog samples can be believed: not NaN, clipped, stuck, lost or a spike."""
 
 from __future__ import annotations
 
@@ -10,6 +10,13 @@ _RAILS = (2047, 2048, 32767, 32768)  # counts of 12- and 16-bit converters
 _FLAT_S = 0.02  # a true peak is not flat for longer
 _STUCK_S = 0.5
 _LOAD_CHANGE = 0.2  # of the largest load
+_LOST_S = 0.1
+_ABRUPT_N = 100.0  # load beside samples that are all zero: they are lost
+_SPIKE_SHARE = 1.0  # of the channel's range: up and down again within one sample
+_SPIKE_NOISE = 20.0  # times the median step
+_ONE_LEVEL = 0.2  # of the spike: the samples beside it are alike
+_ABSURD_N = 15_000.0
+_MANY = 0.02  # of the samples
 
 
 @dataclass(frozen=True)
@@ -19,10 +26,12 @@ class SampleCheck:
     not_a_number: np.ndarray
     clipped: np.ndarray
     stuck: np.ndarray
+    lost: np.ndarray  # all channels zero amid load
+    spikes: np.ndarray  # single samples far from both neighbours, or beyond 15 kN
     silent_channels: tuple[int, ...]  # identically zero although the plate is loaded
 
     def usable(self) -> np.ndarray:
-        return ~(self.not_a_number | self.clipped | self.stuck)
+        return ~(self.not_a_number | self.clipped | self.stuck | self.lost | self.spikes)
 
 
 def check_samples(
@@ -43,7 +52,56 @@ def check_samples(
             silent.append(i)
         else:
             stuck |= stuck_here
-    return SampleCheck(nan, clipped, stuck & ~clipped, tuple(silent))
+    lost = lost_samples(channels, load, rate_hz)
+    spikes = spike_samples(channels, load)
+    return SampleCheck(
+        nan, clipped, stuck & ~clipped, lost, spikes & ~clipped & ~lost, tuple(silent)
+    )
+
+
+def lost_samples(channels: np.ndarray, load: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Short stretches in which all channels (n, k) are zero beside loaded samples, (n,) bool.
+
+    Longer ones may be flight on a plate whose small forces were set to zero. One sample on
+    each side, which may be half lost, belongs to them.
+    """
+    lost = np.zeros(len(load), bool)
+    heavy = np.concatenate([[False], np.abs(np.nan_to_num(load)) > _ABRUPT_N, [False]])
+    for start, stop in runs((channels == 0).all(axis=1)):
+        before = start == 0 or heavy[max(start - 1, 0) : start + 1].any()
+        after = stop == len(load) or heavy[stop + 1 : stop + 3].any()
+        if before and after and stop - start <= _LOST_S * rate_hz:
+            lost[max(start - 1, 0) : stop + 1] = True
+    return lost
+
+
+def spike_samples(channels: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Samples with a spike in one of the channels (n, k), or a load (n,) above 15 kN, (n,) bool.
+
+    If there are many they are no exceptions, and the plate as a whole is judged elsewhere.
+    """
+    spikes = np.abs(np.nan_to_num(load)) > _ABSURD_N
+    for channel in channels.T:
+        spikes |= _spikes(channel)
+    return spikes if spikes.mean() <= _MANY else np.zeros(len(spikes), bool)
+
+
+def _spikes(signal: np.ndarray) -> np.ndarray:
+    """Single samples that leave and come back by all of the signal's range, (n,) bool."""
+    spikes = np.zeros(len(signal), bool)
+    known = signal[np.isfinite(signal)]
+    if len(known) < 5:
+        return spikes
+    low, high = np.percentile(known, [1, 99])
+    least = max(
+        _SPIKE_SHARE * (high - low), _SPIKE_NOISE * float(np.median(np.abs(np.diff(known)))), 1e-3
+    )
+    padded = np.concatenate([signal[1:2], signal, signal[-2:-1]])
+    with np.errstate(invalid="ignore"):
+        left, right = padded[1:-1] - padded[:-2], padded[1:-1] - padded[2:]
+        jump = np.where(left * right > 0, np.minimum(np.abs(left), np.abs(right)), 0.0)
+        spikes |= (jump > least) & (np.abs(left - right) < _ONE_LEVEL * jump)
+    return spikes
 
 
 def runs(mask: np.ndarray) -> np.ndarray:

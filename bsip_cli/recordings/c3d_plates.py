@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.recordings.c3d_content import Content
+from bsip_cli.recordings.c3d_parameters import Group, number, numbers, texts, whole_numbers
 from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.plates import N_CHANNELS, PlateDescription, corners_are_plausible
 from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
@@ -22,34 +23,43 @@ class PlateChannels:
     baseline: slice | None  # analog samples of FORCE_PLATFORM:ZERO
 
 
+_MOST_PLATES = 64
+_VOLTS = {"V", "v", "Volts", "volts", "mV"}
+
+
 class _UnusablePlateError(Exception):
-    """Why one plate cannot be used; turned into a Finding."""
+    """Why one plate cannot be used, and what was expected; turned into a Finding."""
+
+    def __init__(self, found: str, expected: str) -> None:
+        super().__init__(found)
+        self.found = found
+        self.expected = expected
 
 
 def read_plates(
-    parameters: Mapping, analog: np.ndarray, samples_per_frame: int, length_unit_m: float
+    content: Content, length_unit_m: float
 ) -> tuple[list[PlateChannels], list[Finding]]:
     """All plates that the file describes and that its channels can fill.
 
-    ``analog`` (n_channels, n), scaled as the file says; ``length_unit_m`` is the size of
-    the unit of points, corners and origins.
+    ``length_unit_m`` is the size of the unit of points, corners and origins.
     """
-    group = parameters.get("FORCE_PLATFORM", {})
+    group = content.group("FORCE_PLATFORM")
     plates, findings = [], []
     for index in range(_n_plates(group)):
         try:
-            plates.append(_read_plate(parameters, analog, samples_per_frame, length_unit_m, index))
-            findings += _about_cop_polynomial(group, plates[-1].plate)
+            plate, about_units = _read_plate(content, length_unit_m, index)
+            plates.append(plate)
+            findings += about_units
         except _UnusablePlateError as reason:
+            action = "left the plate out; export the trial with its force plates set up"
             findings.append(
-                Finding("plate", str(index + 1), str(reason), "", "left the plate out", "excluded")
+                Finding("plate", str(index + 1), reason.found, reason.expected, action, "excluded")
             )
     return plates, findings
 
 
-def plate_surfaces(parameters: Mapping, length_unit_m: float) -> list[np.ndarray]:
+def plate_surfaces(group: Group, length_unit_m: float) -> list[np.ndarray]:
     """Corners (4, 3) of every plausible plate, lab frame, even of those without channels."""
-    group = parameters.get("FORCE_PLATFORM", {})
     surfaces = []
     for index in range(_n_plates(group)):
         try:
@@ -59,97 +69,80 @@ def plate_surfaces(parameters: Mapping, length_unit_m: float) -> list[np.ndarray
     return [corners for corners in surfaces if corners_are_plausible(corners)]
 
 
-def value(group: Mapping, name: str) -> list | np.ndarray:
-    """A parameter's value, an empty list where it is missing."""
-    return group[name]["value"] if name in group else []
-
-
-def _n_plates(group: Mapping) -> int:
-    used = np.ravel(value(group, "USED"))
-    claimed = int(used[0]) if len(used) else 0
-    return min(max(claimed, 0), 64)
+def _n_plates(group: Group) -> int:
+    used = number(group, "USED")
+    return int(min(max(used, 0), _MOST_PLATES)) if np.isfinite(used) else 0
 
 
 def _read_plate(
-    parameters: Mapping,
-    analog: np.ndarray,
-    samples_per_frame: int,
-    length_unit_m: float,
-    index: int,
-) -> PlateChannels:
-    group = parameters["FORCE_PLATFORM"]
+    content: Content, length_unit_m: float, index: int
+) -> tuple[PlateChannels, list[Finding]]:
+    group = content.group("FORCE_PLATFORM")
     kind = _kind(group, index)
     corners = _slab(group, "CORNERS", index, (3, 4)).T * length_unit_m
     if not corners_are_plausible(corners):
-        raise _UnusablePlateError(f"corners that are no plate: {_sides(corners)}")
+        raise _UnusablePlateError(
+            f"corners that are no plate: {_sides(corners)}", "a rectangle of 0.1 to 5 m"
+        )
     origin = _slab(group, "ORIGIN", index, (3,)) * length_unit_m
     if kind == 3 and not origin[:2].all():
-        raise _UnusablePlateError("a type 3 plate whose ORIGIN lacks the distances of the sensors")
-    rows = _channel_rows(group, kind, index, len(analog))
-    raw = analog[rows].T
-    return PlateChannels(
-        plate=PlateDescription(str(index + 1), kind, corners, origin),
-        channels=_in_si(parameters, kind, index, raw, rows, length_unit_m),
-        counts=raw / _scales(parameters.get("ANALOG", {}), len(analog))[rows],
-        baseline=_baseline(group, samples_per_frame, analog.shape[1]),
-    )
-
-
-def _about_cop_polynomial(group: Mapping, plate: PlateDescription) -> list[Finding]:
-    """Kistler's correction of the centre of pressure is known of, not applied."""
-    if plate.kind != 3 or not np.any(np.asarray(value(group, "FPCOPPOLY"), float)):
-        return []
-    return [
-        Finding(
-            check="plate_cop",
-            subject=plate.name,
-            found="FPCOPPOLY holds a correction of the centre of pressure",
-            expected="",
-            action="not applied: it moves the centre of pressure by up to about 1 cm near the rim",
-            level="info",
-        )
-    ]
-
-
-def _kind(group: Mapping, index: int) -> int:
-    kinds = np.ravel(value(group, "TYPE"))
-    if index >= len(kinds):
-        raise _UnusablePlateError("no FORCE_PLATFORM:TYPE")
-    if int(kinds[index]) not in N_CHANNELS:
         raise _UnusablePlateError(
-            f"force platform type {int(kinds[index])}, types 1 to 4 can be read"
+            "a type 3 plate whose ORIGIN lacks the distances of the sensors",
+            "the half distances a and b of the sensors",
         )
+    rows = _channel_rows(group, kind, index, len(content.analog))
+    raw = content.analog[rows].T
+    scales = content.analog_scales[rows]
+    plate = PlateChannels(
+        plate=PlateDescription(
+            str(index + 1), kind, corners, origin, _cop_polynomial(group, kind, index)
+        ),
+        channels=_in_si(content, kind, index, raw, rows, length_unit_m),
+        counts=raw / np.where(scales == 0, 1.0, scales),
+        baseline=_baseline(group, content.samples_per_frame, len(raw)),
+    )
+    return plate, _about_units(content, kind, index, rows)
+
+
+def _kind(group: Group, index: int) -> int:
+    kinds = np.ravel(whole_numbers(group, "TYPE"))
+    if index >= len(kinds):
+        raise _UnusablePlateError("no FORCE_PLATFORM:TYPE", "a type for each plate")
+    if kinds[index] not in N_CHANNELS:
+        raise _UnusablePlateError(f"force platform type {kinds[index]}", "types 1 to 4")
     return int(kinds[index])
 
 
-def _slab(group: Mapping, name: str, index: int, shape: tuple[int, ...]) -> np.ndarray:
+def _slab(group: Group, name: str, index: int, shape: tuple[int, ...]) -> np.ndarray:
     """The part of an array parameter that belongs to one plate (the last axis counts plates)."""
-    flat = np.ravel(np.asarray(value(group, name), float), order="F")
+    flat = np.ravel(numbers(group, name), order="F")
     size = int(np.prod(shape))
     if len(flat) < size * (index + 1):
-        raise _UnusablePlateError(f"FORCE_PLATFORM:{name} has no entry for it")
+        raise _UnusablePlateError(
+            f"FORCE_PLATFORM:{name} has no entry for it", f"{size} numbers for each plate"
+        )
     return flat[size * index : size * (index + 1)].reshape(shape, order="F")
 
 
-def _channel_rows(group: Mapping, kind: int, index: int, n_analog: int) -> np.ndarray:
-    table = np.atleast_1d(np.asarray(value(group, "CHANNEL"), float))
+def _channel_rows(group: Group, kind: int, index: int, n_analog: int) -> np.ndarray:
+    table = np.atleast_1d(whole_numbers(group, "CHANNEL"))
     table = table[:, None] if table.ndim == 1 else table
     wanted = N_CHANNELS[kind]
-    if table.shape[0] < wanted or table.shape[1] <= index:
+    if table.ndim != 2 or table.shape[0] < wanted or table.shape[1] <= index:
         raise _UnusablePlateError(
-            f"{table.shape[0]} channels listed for it, a type {kind} plate has {wanted}"
+            f"{table.shape[0]} channels listed for it", f"{wanted} channels of a type {kind} plate"
         )
-    rows = table[:wanted, index].astype(int) - 1
+    rows = table[:wanted, index] - 1
     if rows.min() < 0 or rows.max() >= n_analog:
+        claimed = rows.max() + 1 if rows.max() >= n_analog else 0
         raise _UnusablePlateError(
-            f"it claims analog channel {rows.max() + 1 if rows.max() >= n_analog else 0}, "
-            f"the file holds {n_analog}"
+            f"it claims analog channel {claimed}", f"one of the file's {n_analog}"
         )
     return rows
 
 
 def _in_si(
-    parameters: Mapping,
+    content: Content,
     kind: int,
     index: int,
     raw: np.ndarray,
@@ -157,10 +150,34 @@ def _in_si(
     length_unit_m: float,
 ) -> np.ndarray:
     """Channels in N, N m and m; a unit that is no mechanical one (V) means N and N x length."""
-    if kind == 4 and (matrix := _cal_matrix(parameters["FORCE_PLATFORM"], index)) is not None:
+    if kind == 4 and (matrix := _cal_matrix(content.group("FORCE_PLATFORM"), index)) is not None:
         return raw @ matrix.T * np.repeat([1.0, length_unit_m], 3)
-    units = _units(parameters.get("ANALOG", {}), rows)
+    units = _units(content.group("ANALOG"), rows)
     return raw * np.array([_size(unit, kind, i, length_unit_m) for i, unit in enumerate(units)])
+
+
+def _about_units(content: Content, kind: int, index: int, rows: np.ndarray) -> list[Finding]:
+    """A line for units that are no mechanical ones: volts may be scaled forces, a misprint not."""
+    if kind == 4 and _cal_matrix(content.group("FORCE_PLATFORM"), index) is not None:
+        return []
+    odd = {
+        unit
+        for unit in _units(content.group("ANALOG"), rows)
+        if unit and force_in_N(unit) is None and moment_in_Nm(unit) is None
+        if length_in_m(unit) is None
+    }
+    if not odd:
+        return []
+    return [
+        Finding(
+            check="unit",
+            subject=str(index + 1),
+            found=f"channels in {', '.join(sorted(repr(unit) for unit in odd))}",
+            expected="N and N mm or N m, or a calibration matrix",
+            action="took the scaled numbers as N, and as N times the unit of length",
+            level="info" if odd <= _VOLTS else "warning",
+        )
+    ]
 
 
 def _size(unit: str, kind: int, position: int, length_unit_m: float) -> float:
@@ -172,35 +189,32 @@ def _size(unit: str, kind: int, position: int, length_unit_m: float) -> float:
     return moment_in_Nm(unit) or length_unit_m
 
 
-def _units(group: Mapping, rows: np.ndarray) -> list[str]:
-    units = list(value(group, "UNITS"))
+def _units(group: Group, rows: np.ndarray) -> list[str]:
+    units = texts(group, "UNITS")
     return [units[row] if row < len(units) else "" for row in rows]
 
 
-def _cal_matrix(group: Mapping, index: int) -> np.ndarray | None:
+def _cal_matrix(group: Group, index: int) -> np.ndarray | None:
     """The plate's 6 x 6 matrix to N and N x length; None if there is none or only zeros."""
-    matrix = np.asarray(value(group, "CAL_MATRIX"), float)
+    matrix = numbers(group, "CAL_MATRIX")
     if matrix.ndim != 3 or matrix.shape[:2] != (6, 6) or matrix.shape[2] <= index:
         return None
     return matrix[:, :, index] if matrix[:, :, index].any() else None
 
 
-def _scales(group: Mapping, n_channels: int) -> np.ndarray:
-    """Size of one converter count per channel, (n_channels,)."""
-    general = np.ravel(value(group, "GEN_SCALE"))
-    scales = np.ones(n_channels)
-    given = np.ravel(value(group, "SCALE"))[:n_channels]
-    scales[: len(given)] = given
-    scales = scales * (float(general[0]) if len(general) else 1.0)
-    return np.where(scales == 0, 1.0, scales)
+def _cop_polynomial(group: Group, kind: int, index: int) -> np.ndarray | None:
+    """Kistler's coefficients, (2, 6); None if there are none or only zeros."""
+    flat = np.ravel(numbers(group, "FPCOPPOLY"), order="F")[12 * index : 12 * (index + 1)]
+    usable = kind == 3 and len(flat) == 12 and np.isfinite(flat).all() and flat.any()
+    return flat.reshape(2, 6) if usable else None
 
 
-def _baseline(group: Mapping, samples_per_frame: int, n_samples: int) -> slice | None:
+def _baseline(group: Group, samples_per_frame: int, n_samples: int) -> slice | None:
     """FORCE_PLATFORM:ZERO counts frames from 1; (1, 0) and (0, x) mean none."""
-    zero = np.ravel(value(group, "ZERO"))
+    zero = np.ravel(whole_numbers(group, "ZERO"))
     if len(zero) < 2 or zero[0] < 1 or zero[1] <= zero[0]:
         return None
-    start, stop = int(zero[0] - 1) * samples_per_frame, int(zero[1]) * samples_per_frame
+    start, stop = (int(zero[0]) - 1) * samples_per_frame, int(zero[1]) * samples_per_frame
     return slice(start, stop) if stop <= n_samples else None
 
 

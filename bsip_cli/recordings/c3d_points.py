@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.recordings.c3d_plates import value
+from bsip_cli.recordings.c3d_content import Content
+from bsip_cli.recordings.c3d_parameters import Group, texts
 from bsip_cli.recordings.labels import is_unlabelled
 from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.scene_size import without_absurd
 
 _OUTPUT_GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _OUTPUT_NAMES = re.compile(
@@ -29,17 +31,15 @@ class Points:
     findings: tuple[Finding, ...]
 
 
-def read_points(parameters: Mapping, content: Mapping, unit_m: float) -> Points:
+def read_points(content: Content, unit_m: float) -> Points:
     """The real markers: model outputs and unlabelled points dropped."""
-    data = content["data"]["points"]
-    positions = np.transpose(data[:3], (2, 1, 0)) * unit_m
-    residuals = content["data"]["meta_points"]["residuals"][0].T
+    positions = content.positions * unit_m
     invalid = ~np.isfinite(positions).all(axis=-1) | (positions == 0).all(axis=-1)
-    if residuals.shape == invalid.shape:
-        invalid |= residuals < 0
-    positions[invalid] = np.nan
-    labels, findings = _labels(parameters, positions)
-    outputs = _model_outputs(parameters, labels)
+    positions[invalid | ~content.is_valid] = np.nan
+    group = content.group("POINT")
+    labels, findings = _labels(group, positions)
+    findings += without_absurd(positions)
+    outputs = _model_outputs(group, labels)
     kept = [i for i, label in enumerate(labels) if i not in outputs and not is_unlabelled(label)]
     if len(kept) < len(labels):
         findings.append(_dropped(labels, outputs, len(kept)))
@@ -58,9 +58,8 @@ def _dropped(labels: Sequence[str], outputs: set[int], n_kept: int) -> Finding:
     )
 
 
-def _labels(parameters: Mapping, positions: np.ndarray) -> tuple[list[str], list[Finding]]:
+def _labels(group: Group, positions: np.ndarray) -> tuple[list[str], list[Finding]]:
     """POINT:LABELS with its continuations; duplicates resolved by POINT:DESCRIPTIONS."""
-    group = parameters.get("POINT", {})
     labels = _continued(group, "LABELS", positions.shape[1])
     counts = Counter(labels)
     twice = [i for i, label in enumerate(labels) if counts[label] > 1 and not is_unlabelled(label)]
@@ -83,21 +82,15 @@ def _labels(parameters: Mapping, positions: np.ndarray) -> tuple[list[str], list
     return (renamed if resolved else labels), [finding]
 
 
-def _continued(group: Mapping, name: str, n: int) -> list[str]:
+def _continued(group: Group, name: str, n: int) -> list[str]:
     """NAME, NAME2, NAME3, ... joined and padded with empty strings to n."""
-    texts = list(value(group, name))
-    more = 2
-    while f"{name}{more}" in group:
-        texts += list(value(group, f"{name}{more}"))
-        more += 1
-    texts = [text.strip() for text in texts[:n]]
-    return texts + [""] * (n - len(texts))
+    known = texts(group, name)[:n]
+    return known + [""] * (n - len(known))
 
 
-def _model_outputs(parameters: Mapping, labels: Sequence[str]) -> set[int]:
+def _model_outputs(group: Group, labels: Sequence[str]) -> set[int]:
     """Indices of angles, forces, moments, powers, modelled points and drawn segment axes."""
-    group = parameters.get("POINT", {})
-    listed = {name.strip() for key in _output_keys(group) for name in value(group, key)}
+    listed = {name for key in _output_keys(group) for name in texts(group, key)}
     bare = [label.split(":")[-1] for label in labels]
     axes = _segment_axes(bare)
     return {
@@ -107,15 +100,9 @@ def _model_outputs(parameters: Mapping, labels: Sequence[str]) -> set[int]:
     }
 
 
-def _output_keys(group: Mapping) -> list[str]:
+def _output_keys(group: Group) -> set[str]:
     """POINT:TYPE_GROUPS lists pairs of plural and singular; the plural names the list."""
-    plurals = [name.strip() for name in value(group, "TYPE_GROUPS")][::2]
-    names = {*plurals, *_OUTPUT_GROUPS}
-    return [name for name in names if name in group and _is_text(value(group, name))]
-
-
-def _is_text(values: Iterable) -> bool:
-    return all(isinstance(entry, str) for entry in values)
+    return {*(name.upper() for name in texts(group, "TYPE_GROUPS")[::2]), *_OUTPUT_GROUPS}
 
 
 def _segment_axes(labels: Sequence[str]) -> set[str]:

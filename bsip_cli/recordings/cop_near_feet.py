@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from bsip_cli.recordings.model import Finding, Plate, Recording
-from bsip_cli.recordings.plate_checks import LOADED_N
-from bsip_cli.recordings.plates import cop_at_height
+from bsip_cli.recordings.plates import LOADED_N, cop_at_height
 
+FAR_M = 0.3  # two feet on one plate: half their distance
+NEAR_M = 0.15
 _NEAR_FLOOR_M = 0.17  # ankles and below
-_FAR_M = 0.3  # two feet on one plate: half their distance
 _FEW = 200
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The markers in the world frame, and how their frames and the plates' samples meet."""
+
+    markers_m: np.ndarray  # (n_frames, n_markers, 3)
+    marker_rate_hz: float
+    analog_rate_hz: float
 
 
 def cop_findings(recording: Recording) -> list[Finding]:
@@ -18,13 +29,13 @@ def cop_findings(recording: Recording) -> list[Finding]:
     findings = []
     for plate in recording.plates:
         distance = median_distance_m(recording, plate)
-        if distance > _FAR_M:
+        if distance > FAR_M:
             findings.append(
                 Finding(
                     check="plate_cop",
                     subject=plate.name,
                     found=f"centre of pressure {distance:.2f} m from the nearest low marker",
-                    expected=f"less than {_FAR_M} m",
+                    expected=f"less than {FAR_M} m",
                     action="kept the plate; its frame, zero or gain may be wrong",
                     level="warning",
                 )
@@ -34,19 +45,33 @@ def cop_findings(recording: Recording) -> list[Finding]:
 
 def median_distance_m(recording: Recording, plate: Plate) -> float:
     """Median horizontal distance from the loaded plate's COP to the nearest low marker."""
-    load = np.where(plate.usable, plate.force_N[:, 2], 0.0)
-    loaded = np.flatnonzero(load > max(LOADED_N, 0.5 * np.percentile(load, 99)))
-    loaded = loaded[:: max(1, len(loaded) // _FEW)]
-    frames = np.round(loaded * recording.marker_rate_hz / recording.analog_rate_hz).astype(int)
-    loaded, frames = loaded[frames < recording.n_frames], frames[frames < recording.n_frames]
+    scene = Scene(recording.markers_m, recording.marker_rate_hz, recording.analog_rate_hz)
+    return distance_to_low_markers_m(scene, plate)
+
+
+def distance_to_low_markers_m(scene: Scene, plate: Plate) -> float:
+    """Median horizontal distance from the loaded plate's COP to the nearest low marker, or NaN."""
+    loaded, frames = _loaded_samples(scene, plate)
     height = 0.0 if plate.corners_m is None else float(plate.corners_m[:, 2].mean())
     cop = cop_at_height(plate.force_N[loaded], plate.moment_Nm[loaded], height)
     distances = [
-        _nearest(point, recording.markers_m[frame], height)
+        _nearest(point, scene.markers_m[frame], height)
         for point, frame in zip(cop, frames, strict=True)
     ]
     known = np.array([d for d in distances if np.isfinite(d)])
     return float(np.median(known)) if len(known) else float("nan")
+
+
+def _loaded_samples(scene: Scene, plate: Plate) -> tuple[np.ndarray, np.ndarray]:
+    """Some samples of heavy load and their frames, (n,) int each."""
+    load = np.where(plate.usable, plate.force_N[:, 2], 0.0)
+    if not len(load):
+        return np.zeros(0, int), np.zeros(0, int)
+    loaded = np.flatnonzero(load > max(LOADED_N, 0.5 * np.percentile(load, 99)))
+    loaded = loaded[:: max(1, len(loaded) // _FEW)]
+    frames = np.round(loaded * scene.marker_rate_hz / scene.analog_rate_hz).astype(int)
+    inside = frames < len(scene.markers_m)
+    return loaded[inside], frames[inside]
 
 
 def _nearest(point: np.ndarray, markers_m: np.ndarray, height_m: float) -> float:

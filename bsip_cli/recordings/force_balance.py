@@ -36,16 +36,26 @@ def force_mismatch(
     limits: ContactLimits,
 ) -> np.ndarray:
     """Frames in which the trunk's motion needs another vertical force than measured."""
-    height = _mean_height(trunk_markers_m)
-    if height is None:
+    velocity = trunk_velocity_m_s(trunk_markers_m, rate_hz, limits)
+    if velocity is None:
         return np.zeros(len(trunk_markers_m), bool)
-    acceleration = np.gradient(np.gradient(_low_pass(height, rate_hz, limits))) * rate_hz**2
+    acceleration = np.gradient(velocity) * rate_hz
     needed = mass_kg * (GRAVITY_M_S2 + acceleration)
     measured = _low_pass(total_force_z_N, rate_hz, limits)
     weight = mass_kg * GRAVITY_M_S2
     allowed = limits.mismatch_share * (weight + np.abs(needed - weight))
     different = np.abs(measured - needed) > allowed
     return long_runs(different, max(2, round(limits.mismatch_s * rate_hz)))
+
+
+def trunk_velocity_m_s(
+    trunk_markers_m: np.ndarray, rate_hz: float, limits: ContactLimits | None = None
+) -> np.ndarray | None:
+    """Vertical velocity of the markers' mean (n_frames, k, 3), low-passed, (n_frames,)."""
+    height = _mean_height(trunk_markers_m)
+    if height is None:
+        return None
+    return np.gradient(_low_pass(height, rate_hz, limits or ContactLimits())) * rate_hz
 
 
 def _mean_height(trunk_markers_m: np.ndarray) -> np.ndarray | None:

@@ -9,12 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.trc import read_lines
+from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.trc import read_lines, row_counts
 
 _COLUMN = re.compile(
     r"^(?P<before>.*?)(?P<what>force|torque|moment|grf|grm|cop)(?P<between>.*?)"
     r"(?P<kind>[vpmtf]?)_?(?P<axis>[xyz])$"
 )
+_SHORT = re.compile(  # F1_x, P1_x, M1_x and FP1_Fx, FP1_Px, FP1_Mx
+    r"^(?:(?P<kind1>[fpmt])(?P<id1>\d+)|fp(?P<id2>\d+)_(?P<kind2>[fpmt]))_?(?P<axis>[xyz])$"
+)
+_ROWS = re.compile(r"^(?:nrows\s*=|datarows)\s*(\d{1,12})$", re.IGNORECASE)
 _KINDS = {"v": "force", "f": "force", "p": "point", "m": "torque", "t": "torque"}
 _BARE = {
     "force": "force",
@@ -40,6 +45,7 @@ class GroundForce:
 class Mot:
     time_s: np.ndarray  # (n,)
     forces: tuple[GroundForce, ...]
+    findings: tuple[Finding, ...]
 
 
 def read_mot(path: Path) -> Mot:
@@ -47,23 +53,55 @@ def read_mot(path: Path) -> Mot:
     lines = read_lines(path)
     end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     body = [line for line in lines[end + 1 :] if line.strip()] if end is not None else []
-    if len(body) < 2:
-        raise BadDataError("no table after 'endheader'", expected="a MOT file", file=path)
+    if end is None or len(body) < 2:
+        raise BadDataError(
+            "no table after 'endheader'",
+            expected="a MOT file",
+            remedy="export the forces again",
+            file=path,
+        )
+    if "," in body[0]:
+        body = [line.replace(",", " ") for line in body]
     names = body[0].split()
-    table = _table(body[1:], len(names), path)
     if names[0].lower() != "time":
-        raise BadDataError(f"first column '{names[0]}'", expected="time", file=path)
-    return Mot(table[:, 0], _forces(names, table, path))
+        raise BadDataError(
+            f"first column '{names[0]}'",
+            expected="time",
+            remedy="export the forces again",
+            file=path,
+        )
+    table = _table(body[1:], len(names), path)
+    findings = row_counts("rows of forces", _stated_rows(lines[:end]), len(table))
+    return Mot(table[:, 0], _forces(names, table, path), tuple(findings))
+
+
+def _stated_rows(header: list[str]) -> float:
+    """nRows=... or datarows ...; NaN if the header says nothing."""
+    for line in header:
+        if match := _ROWS.match(line.strip()):
+            return float(match[1])
+    return float("nan")
 
 
 def _table(lines: list[str], n_columns: int, path: Path) -> np.ndarray:
+    rows = [line.split() for line in lines]
+    odd = next((row for row in rows if len(row) != n_columns), None)
+    if odd is not None:
+        raise BadDataError(
+            f"a row of {len(odd)} cells",
+            expected=f"{n_columns}, as many as there are columns",
+            remedy="export the forces again",
+            file=path,
+        )
     try:
-        table = np.array([[float(cell) for cell in line.split()] for line in lines])
+        return np.array(rows, dtype=float)
     except ValueError as error:
-        raise BadDataError(f"its table cannot be read: {error}", file=path) from error
-    if table.ndim != 2 or table.shape[1] != n_columns:
-        raise BadDataError("rows of unequal length", expected=f"{n_columns} cells", file=path)
-    return table
+        raise BadDataError(
+            f"its table cannot be read: {error}",
+            expected="numbers with a decimal point",
+            remedy="export the forces again",
+            file=path,
+        ) from error
 
 
 def _forces(names: list[str], table: np.ndarray, path: Path) -> tuple[GroundForce, ...]:
@@ -83,6 +121,7 @@ def _forces(names: list[str], table: np.ndarray, path: Path) -> tuple[GroundForc
         raise BadDataError(
             "no ground force among the columns " + ", ".join(names[:8]),
             expected="columns like ground_force_1_vx",
+            remedy="rename the columns or export the forces again",
             file=path,
         )
     return tuple(forces)
@@ -90,6 +129,9 @@ def _forces(names: list[str], table: np.ndarray, path: Path) -> tuple[GroundForc
 
 def _meaning(name: str) -> tuple[str, str, str] | None:
     """A column's plate, kind and axis: '1_ground_force_px' is ('1', 'point', 'x')."""
+    if short := _SHORT.match(name.lower()):
+        kind = _KINDS[short["kind1"] or short["kind2"]]
+        return short["id1"] or short["id2"], kind, short["axis"]
     match = _COLUMN.match(name.lower())
     if match is None:
         return None

@@ -8,21 +8,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bsip_cli.recordings.analog import SampleCheck
+from bsip_cli.recordings.cop_polynomial import correct_cop
 from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.plates import (
+    LOADED_N,
     LocalWrench,
     PlateDescription,
     inside_share,
     surface_offset_m,
 )
 
-LOADED_N = 100.0
 _LIGHTLY_LOADED_N = 20.0
 _ABSURD_N = 15_000.0
 _PULL_N = -20.0
 _GOOD_SHARE = 0.9
 _BAD_SHARE = 0.5
-_HOPELESS_SHARE = 0.2
+_NO_LABORATORY_M = 10.0  # a centre of pressure so far away: the moments' unit is wrong
 _PULL_SHARE = 0.2  # of the push's impulse
 _PERCENT = 100.0
 
@@ -33,6 +34,9 @@ class Checked:
 
     wrench: LocalWrench | None  # None: the plate is nonsense
     findings: tuple[Finding, ...]
+
+    def is_reversed(self) -> bool:
+        return any(f.check == "plate_sign" and f.level == "corrected" for f in self.findings)
 
 
 def check_wrench(
@@ -57,8 +61,8 @@ def check_wrench(
         return Checked(None, (*findings, fault))
     at_surface, found = _settle_moments(wrench, plate, good)
     findings += found
-    if at_surface is None:
-        return Checked(None, tuple(findings))
+    at_surface, about_maker = correct_cop(at_surface, plate)
+    findings += about_maker
     at_surface, found = _settle_sign(at_surface, plate, down_sign, good)
     findings += found
     if fault := _pulls(at_surface, plate, down_sign, good):
@@ -110,7 +114,7 @@ def _absurd(wrench: LocalWrench, plate: PlateDescription, good: np.ndarray) -> F
 
 def _settle_moments(
     wrench: LocalWrench, plate: PlateDescription, good: np.ndarray
-) -> tuple[LocalWrench | None, list[Finding]]:
+) -> tuple[LocalWrench, list[Finding]]:
     """The reading of unit and origin that puts the centre of pressure on the plate."""
     loaded = good & (np.abs(wrench.force_N[:, 2]) > LOADED_N)
     offset = surface_offset_m(plate)
@@ -120,18 +124,19 @@ def _settle_moments(
     share = _share_inside(stated, plate, loaded)
     if share >= _BAD_SHARE:
         return stated, []
-    for other, why in _other_readings(wrench, plate, offset):
+    for other, why in _other_readings(wrench, plate, offset, loaded):
         if _share_inside(other, plate, loaded) >= _GOOD_SHARE:
             return other, [_cop_finding(plate, share, why, "corrected")]
-    if share < _HOPELESS_SHARE:
-        return None, [_cop_finding(plate, share, "left the plate out", "excluded")]
     return stated, [_cop_finding(plate, share, "kept the plate", "warning")]
 
 
 def _other_readings(
-    wrench: LocalWrench, plate: PlateDescription, offset: np.ndarray
+    wrench: LocalWrench, plate: PlateDescription, offset: np.ndarray, loaded: np.ndarray
 ) -> Iterator[tuple[LocalWrench, str]]:
-    yield wrench.scaled(1e-3).at_surface(offset), "read the moments in N mm"
+    """Moments a thousand times too large (else any load would fit), and ORIGIN the other way."""
+    far_m = float(np.median(np.linalg.norm(wrench.at_surface(offset).cop()[loaded], axis=1)))
+    if far_m > _NO_LABORATORY_M:
+        yield wrench.scaled(1e-3).at_surface(offset), "read the moments in N mm"
     if plate.kind in (2, 4):
         yield wrench.at_surface(-offset), "reversed ORIGIN"
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 N_CHANNELS = {1: 6, 2: 6, 3: 8, 4: 6}
+LOADED_N = 100.0  # a foot stands on the plate
 _LEAST_FORCE_N = 1e-6
 
 
@@ -26,6 +27,7 @@ class PlateDescription:
     kind: int  # FORCE_PLATFORM:TYPE, 1 to 4
     corners_m: np.ndarray  # (4, 3)
     origin_m: np.ndarray  # (3,), see `LocalWrench.at_surface`; type 3: sensor distances a, b, az0
+    cop_polynomial: np.ndarray | None = None  # (2, 6), see `correct_cop`
 
     def centre_m(self) -> np.ndarray:
         return self.corners_m.mean(axis=0)

@@ -27,5 +27,8 @@ def _read(path: Path) -> Recording:
 
         return read_trc_mot(path)
     raise BadDataError(
-        f"a recording of type '{suffix}'", expected="a .c3d or a .trc file", file=path
+        f"a recording of type '{suffix}'",
+        expected="a .c3d or a .trc file",
+        remedy="export it as C3D",
+        file=path,
     )

@@ -37,6 +37,8 @@ def even_grid(stamps_s: np.ndarray, stated_rate_hz: float) -> Grid | None:
     kept = stamps_s[start:stop]
     if len(kept) < 2:
         return None
+    if np.isfinite(stated_rate_hz) and rate_hz != stated_rate_hz:
+        findings.append(_other_rate(rate_hz, stated_rate_hz))
     jitter = np.abs(kept - kept[0] - np.arange(len(kept)) / rate_hz).max() * rate_hz
     if jitter > _JITTER:
         rate_hz = float(1 / np.median(np.diff(kept)))
@@ -71,7 +73,7 @@ def _interpolated(time_s: np.ndarray, stamps_s: np.ndarray, column: np.ndarray) 
 def _rate(steps: np.ndarray, stated_rate_hz: float) -> float:
     """The stated rate if the stamps agree within 1 %, else the stamps' own."""
     own = 1 / float(np.median(steps))
-    if np.isfinite(stated_rate_hz) and abs(own / stated_rate_hz - 1) < 0.01:
+    if stated_rate_hz > 0 and abs(own / stated_rate_hz - 1) < 0.01:
         return stated_rate_hz
     own = 1 / float(np.mean(steps)) if np.ptp(steps) < np.median(steps) else own
     return float(round(own)) if abs(own - round(own)) < 1e-3 * own else own
@@ -83,6 +85,17 @@ def _longest_stretch(steps: np.ndarray, rate_hz: float) -> tuple[int, int]:
     edges = np.concatenate([[0], torn + 1, [len(steps) + 1]])
     longest = int(np.argmax(np.diff(edges)))
     return int(edges[longest]), int(edges[longest + 1])
+
+
+def _other_rate(rate_hz: float, stated_rate_hz: float) -> Finding:
+    return Finding(
+        check="rate",
+        subject="points",
+        found=f"the header says {stated_rate_hz:g} Hz, the time stamps {rate_hz:.4g} Hz",
+        expected="one rate",
+        action="took the time stamps",
+        level="warning",
+    )
 
 
 def _torn(steps: np.ndarray, start: int, stop: int, n: int) -> Finding:

@@ -9,10 +9,11 @@ import numpy as np
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings import world
+from bsip_cli.recordings.analog import spike_samples
 from bsip_cli.recordings.assemble import why_no_forces
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
-from bsip_cli.recordings.plate_checks import LOADED_N
+from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.timebase import even_grid, onto_grid
 from bsip_cli.recordings.trc import Trc, read_trc
 
@@ -46,7 +47,7 @@ def read_trc_mot(path: Path) -> Recording:
         markers_m=positions @ rotation.T,
         analog_rate_hz=analog_rate_hz,
         plates=() if note else plates,
-        findings=(*findings, *([turned] if turned else []), *found),
+        findings=(*trc.findings, *findings, *([turned] if turned else []), *found),
         rotation_world_lab=rotation,
         forces_note=note,
         time0_s=float(time_s[0]),
@@ -66,11 +67,19 @@ def _even_markers(
     """Times (n,), rate, positions (n, n_markers, 3) on an even grid, and what was done."""
     if len(trc.time_s) < 2:
         raise BadDataError(
-            f"{len(trc.time_s)} frame", expected="at least 2 frames with times", file=path
+            f"{len(trc.time_s)} frame",
+            expected="at least 2 frames with times",
+            remedy="export the whole trial",
+            file=path,
         )
     grid = even_grid(trc.time_s, trc.rate_hz)
     if grid is None:
-        raise BadDataError("times that do not increase", expected="increasing times", file=path)
+        raise BadDataError(
+            "times that do not increase",
+            expected="increasing times",
+            remedy="export the trial again",
+            file=path,
+        )
     return grid.time_s, grid.rate_hz, onto_grid(grid, trc.time_s, trc.positions_m), grid.findings
 
 
@@ -124,7 +133,7 @@ def _plates(
         _plate(name, onto_grid(analog, mot.time_s, np.hstack([force, moment])), rotation)
         for name, force, moment in zip(action.names, action.force_N, action.moment_Nm, strict=True)
     )
-    findings = [*grid.findings, *action.findings, *_coverage(plates)]
+    findings = [*mot.findings, *grid.findings, *action.findings, *_coverage(plates)]
     return grid.rate_hz, plates, why_no_forces(plates), tuple(findings)
 
 
@@ -157,22 +166,25 @@ def _finding(check: str, found: str, expected: str, action: str) -> Finding:
 
 def _plate(name: str, wrench: np.ndarray, rotation: np.ndarray) -> Plate:
     """A plate of unknown outline from its wrench (n, 6), lab frame."""
-    usable = np.isfinite(wrench).all(axis=1)
+    usable = np.isfinite(wrench).all(axis=1) & ~spike_samples(wrench, np.abs(wrench).max(axis=1))
     return Plate(name, wrench[:, :3] @ rotation.T, wrench[:, 3:] @ rotation.T, None, usable)
 
 
 def _coverage(plates: tuple[Plate, ...]) -> list[Finding]:
-    missing = int((~plates[0].usable).sum()) if plates else 0
-    if not missing:
-        return []
-    n = len(plates[0].usable)
-    return [
-        Finding(
-            check="analog_nan",
-            subject="",
-            found=f"no force for {missing} of {n} samples of the markers' time",
-            expected="forces as long as the markers",
-            action="marked them unusable",
-            level="warning",
-        )
-    ]
+    findings = []
+    for plate in plates:
+        missing = ~np.isfinite(plate.wrench()).all(axis=1)
+        spikes = ~plate.usable & ~missing
+        n = len(missing)
+        if missing.any():
+            found = f"no force for {missing.sum()} of {n} samples of the markers' time"
+            findings.append(_lost("nan", plate, found, "forces as long as the markers"))
+        if spikes.any():
+            found = f"{spikes.sum()} of {n} samples leave their neighbours and come back at once"
+            findings.append(_lost("spike", plate, found, "none"))
+    return findings
+
+
+def _lost(kind: str, plate: Plate, found: str, expected: str) -> Finding:
+    action = "marked them unusable"
+    return Finding(f"analog_{kind}", plate.name, found, expected, action, "warning")

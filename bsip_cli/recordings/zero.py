@@ -30,6 +30,7 @@ def plate_zero(
     plate: Plate,
     rate_hz: float,
     may_be_loaded: np.ndarray | None = None,
+    surely_free: np.ndarray | None = None,
     least_s: float = 0.4,
     largest_N: float = 45.0,
     quiet_N: float = 5.0,
@@ -37,9 +38,13 @@ def plate_zero(
     """Find unloaded stretches: long, low and quiet in the vertical force.
 
     ``may_be_loaded`` (n_analog,) bool excludes samples at which a foot is on the plate;
-    ``largest_N`` bounds the offset, ``quiet_N`` its slow changes within 0.2 s.
+    ``largest_N`` bounds the offset where ``surely_free`` (n_analog,) bool does not say that
+    nobody is near; ``quiet_N`` bounds its slow changes within 0.2 s.
     """
-    unloaded = _unloaded(plate, rate_hz, largest_N, quiet_N)
+    mean, is_quiet = _slow_force(plate, rate_hz, quiet_N)
+    unloaded = is_quiet & (np.abs(mean) < largest_N)
+    if surely_free is not None:
+        unloaded = _where_free(unloaded, mean, is_quiet & surely_free, largest_N)
     if may_be_loaded is not None:
         unloaded &= ~may_be_loaded
     unloaded = long_runs(unloaded, max(2, round(least_s * rate_hz)))
@@ -70,12 +75,25 @@ def subtract_zero(plate: Plate, zero: PlateZero) -> tuple[Plate, Finding]:
     return corrected, _finding(plate, found, "subtracted it", level)
 
 
-def _unloaded(plate: Plate, rate_hz: float, largest_N: float, quiet_N: float) -> np.ndarray:
+def _slow_force(plate: Plate, rate_hz: float, quiet_N: float) -> tuple[np.ndarray, np.ndarray]:
+    """Mean vertical force over 0.2 s, and where it hardly changes, (n_analog,) each."""
     width = max(1, round(_WINDOW_S * rate_hz))
     force = np.where(plate.usable, plate.force_N[:, 2], 0.0)
     mean = uniform_filter1d(force, width)
     slow = uniform_filter1d(mean, width)
-    return plate.usable & (np.abs(mean) < largest_N) & (np.abs(mean - slow) < quiet_N)
+    return mean, plate.usable & (np.abs(mean - slow) < quiet_N)
+
+
+def _where_free(
+    unloaded: np.ndarray, mean: np.ndarray, free: np.ndarray, largest_N: float
+) -> np.ndarray:
+    """A zero beyond the bound, seen while nobody is near, counts wherever the plate reads it."""
+    if not free.any():
+        return unloaded
+    level = float(np.median(mean[free]))
+    if abs(level) < largest_N:
+        return unloaded
+    return free & (np.abs(mean - level) < largest_N)
 
 
 def _finding(plate: Plate, found: str, action: str, level: str) -> Finding:

@@ -9,19 +9,21 @@ import pandas as pd
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
+from bsip_cli.body.names import TRUNK
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.contacts import ContactWindows, contact_windows, plate_loads
+from bsip_cli.recordings.free_plates import nobody_near
 from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps
 from bsip_cli.recordings.labels import match_labels
 from bsip_cli.recordings.marker_guess import guess_marker_set
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.read import read_recording
+from bsip_cli.recordings.repeated_frames import without_repeats
 from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
+from bsip_cli.recordings.standing_mass import about_mass, plate_mass
 from bsip_cli.recordings.zero import plate_zero, subtract_zero
 from bsip_cli.stages.frames import WRENCH
 from bsip_cli.unit import Unit
-
-_TRUNK = ("lower_torso", "upper_torso")
 
 
 def run(unit: Unit) -> None:
@@ -38,15 +40,18 @@ def run(unit: Unit) -> None:
     )
     names = [marker.label for marker in marker_set.markers if marker.label in match.index]
     _require(unit, names)
-    findings = [*recording.findings, *match.findings]
+    recording, repeats = without_repeats(recording)
+    findings = [*recording.findings, *match.findings, *repeats]
     if unit.config.ingest.zero_unloaded_plates:
         recording, zeroed = _without_zero(recording)
         findings += zeroed
     filled = _fill(unit, recording, marker_set, names, match.index)
     findings += _gap_findings(names, filled)
     wrench = wrench_at_marker_rate(recording)
+    trunk = _markers_on(marker_set, names, filled, TRUNK)
     contacts = _contacts(unit, recording, marker_set, names, filled, wrench)
     findings += contacts.reasons
+    findings += _mass_findings(unit, recording, wrench, contacts, trunk)
     if recording.forces_note:
         unit.warn(f"{unit.name}: kinematics only: {recording.forces_note}")
     for finding in findings:
@@ -75,7 +80,10 @@ def _chosen_plates(unit: Unit, recording: Recording) -> Recording:
 
 def _without_zero(recording: Recording) -> tuple[Recording, list[Finding]]:
     done = [
-        subtract_zero(plate, plate_zero(plate, recording.analog_rate_hz))
+        subtract_zero(
+            plate,
+            plate_zero(plate, recording.analog_rate_hz, surely_free=nobody_near(recording, plate)),
+        )
         for plate in recording.plates
     ]
     return replace(recording, plates=tuple(plate for plate, _ in done)), [f for _, f in done]
@@ -122,21 +130,43 @@ def _fill(unit, recording, marker_set, names, index) -> FilledMarkers:
     )
 
 
-def _contacts(unit, recording, marker_set, names, filled, wrench: FrameWrench) -> ContactWindows:
+def _markers_on(
+    marker_set: MarkerSet, names: list[str], filled: FilledMarkers, segments: tuple[str, ...]
+) -> np.ndarray:
+    """The markers of some segments, (n_frames, k, 3)."""
     segment = _segment_of(marker_set)
+    return filled.markers_m[:, [k for k, n in enumerate(names) if segment[n] in segments]]
 
-    def of(*segments: str) -> np.ndarray:
-        return filled.markers_m[:, [k for k, n in enumerate(names) if segment[n] in segments]]
 
-    feet = {side: of(f"foot_{side}") for side in "lr" if of(f"foot_{side}").shape[1]}
+def _contacts(unit, recording, marker_set, names, filled, wrench: FrameWrench) -> ContactWindows:
+    feet = {side: _markers_on(marker_set, names, filled, (f"foot_{side}",)) for side in "lr"}
+    feet = {side: markers for side, markers in feet.items() if markers.shape[1]}
     return contact_windows(
         feet,
         dict.fromkeys(feet),
         recording.marker_rate_hz,
         plate_loads(recording, wrench),
-        of(*_TRUNK),
+        _markers_on(marker_set, names, filled, TRUNK),
         _mass_kg(unit, wrench),
     )
+
+
+def _mass_findings(
+    unit: Unit,
+    recording: Recording,
+    wrench: FrameWrench,
+    contacts: ContactWindows,
+    trunk_markers_m: np.ndarray,
+) -> list[Finding]:
+    """The plates' reading of the person's mass against the stated one, with known loads."""
+    assert unit.participant is not None
+    carried = plate_mass(
+        wrench.total[:, 2], contacts.valid, trunk_markers_m, recording.marker_rate_hz
+    )
+    stated = unit.participant.mass_kg
+    expected = None if stated is None else stated + unit.load_kg()
+    finding = about_mass(carried, expected, unit.config.ingest.mass_tolerance_percent)
+    return [finding] if finding else []
 
 
 def _mass_kg(unit: Unit, wrench: FrameWrench) -> float:

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
-from bsip_cli.body.names import in_words, without_side
+from bsip_cli.body.names import TRUNK, in_words, without_side
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.calibration import Calibration, calibrate
 from bsip_cli.motion.inverse_kinematics import solve_poses, solve_trial, tree_of
 from bsip_cli.motion.scaling import Refinement, ScalingOptions, refine, varied_frames
+from bsip_cli.recordings.standing_mass import PlateMass, plate_mass
 from bsip_cli.stages.frames import WRENCH, markers_from, ordered_markers
 from bsip_cli.stages.known_loads import load_words
 from bsip_cli.study import Trial
@@ -60,8 +60,9 @@ def run(unit: Unit) -> None:
     for note in calibration.notes:
         unit.warn(f"{unit.name}: {note}")
     fit = _refine(unit, calibration, recorded, still, quiet)
-    plate_mass = _plate_mass(unit, still, quiet)
-    mass, source = _mass(unit, plate_mass, load_words(unit, still.trial))
+    carried = _plate_mass(unit, still, marker_set)
+    plate_kg = carried.mass_kg - unit.load_kg(still.trial) if carried else float("nan")
+    mass, source = _mass(unit, carried, plate_kg, load_words(unit, still.trial))
     _warn_missing(unit, marker_set, fit.person)
     unit.write("skeleton", _skeleton_table(skeleton, calibration, fit))
     unit.write("marker-positions", _marker_table(skeleton, calibration, fit))
@@ -73,7 +74,7 @@ def run(unit: Unit) -> None:
                     "sex": unit.participant.sex,
                     "mass_kg": mass,
                     "mass_source": source,
-                    "plate_mass_kg": plate_mass,
+                    "plate_mass_kg": plate_kg,
                     "height_m": calibration.stature_m,
                     "anterior_x": calibration.anterior[0],
                     "anterior_y": calibration.anterior[1],
@@ -206,39 +207,45 @@ def _refine(
 # --- mass -------------------------------------------------------------------------------------
 
 
-def _plate_mass(unit: Unit, still: _Recorded, quiet: slice) -> float:
-    """Mass [kg] that the plates read in quiet standing, known loads taken off; NaN if unknown."""
+def _plate_mass(unit: Unit, still: _Recorded, marker_set: MarkerSet) -> PlateMass | None:
+    """What the plates carried in the calibrating trial, known loads included."""
     wrench = unit.read("wrench", still.trial)
-    valid = wrench["valid"].to_numpy().copy()
-    inside = np.zeros(len(valid), dtype=bool)
-    inside[quiet] = True
-    force = wrench[WRENCH[2]].to_numpy()[valid & inside]
-    if not len(force):
-        return float("nan")
-    return float(force.mean() / GRAVITY_M_S2) - unit.load_kg(still.trial)
+    trunk = [
+        still.labels.index(marker.label)
+        for marker in marker_set.markers
+        if marker.segment in TRUNK and marker.label in still.labels
+    ]
+    step_s = float(np.median(np.diff(still.times))) if len(still.times) > 1 else 1.0
+    return plate_mass(
+        wrench[WRENCH[2]].to_numpy(),
+        wrench["valid"].to_numpy(),
+        still.positions[:, trunk],
+        1.0 / step_s,
+    )
 
 
-def _mass(unit: Unit, plate_mass: float, load: str) -> tuple[float, str]:
+def _mass(unit: Unit, carried: PlateMass | None, plate_kg: float, load: str) -> tuple[float, str]:
     """Mass of the person and where it is from; ``load``: what was taken off the plates' reading."""
     assert unit.participant is not None
     stated = unit.participant.mass_kg
     without = f" without the known load ({load})" if load else ""
     if stated is None:
-        if not plate_mass > 10:
+        if not plate_kg > 10:
             raise BadDataError(
                 "mass_kg is n/a and the plates do not tell it",
                 file=unit.name,
-                expected="a stated mass, or a quiet stretch with all contacts on plates",
+                expected="a stated mass, or all contacts on plates through 0.8 s of quiet standing "
+                "or 2 s of movement",
                 remedy="put the mass into participants.tsv",
             )
-        unit.warn(f"{unit.name}: mass {plate_mass:.2f} kg taken from the plates{without}")
-        return plate_mass, "plates"
-    difference = 100 * (plate_mass - stated) / stated
+        unit.warn(f"{unit.name}: mass {plate_kg:.2f} kg taken from the plates{without}")
+        return plate_kg, "plates"
+    difference = 100 * (plate_kg - stated) / stated
     limit = unit.config.ingest.mass_tolerance_percent
-    if abs(difference) > limit:
+    if carried and abs(difference) > limit + carried.uncertainty_percent:
         unit.warn(
-            f"{unit.name}: the plates read {plate_mass:.2f} kg in quiet standing{without}, stated "
-            f"are {stated:.2f} kg ({difference:+.1f} %, tolerance {limit:g} %)"
+            f"{unit.name}: the plates read {plate_kg:.2f} kg in {carried.manner()}{without}, "
+            f"stated are {stated:.2f} kg ({difference:+.1f} %, tolerance {limit:g} %)"
         )
     return stated, "participants.tsv"
 

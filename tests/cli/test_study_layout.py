@@ -59,7 +59,8 @@ def test_facts_of_the_participants(empty_study):
         ("sub-03\tF\t60\t1.7", "there is no folder sub-03"),
         ("../sub-02\tF\t60\t1.7", "participant_id '../sub-02'"),
         ("\tF\t60\t1.7", "participant_id ''"),
-        ("sub-02", "sex None of sub-02"),
+        ("sub-02", "the line of 'sub-02' has 1 cells; expected 4"),
+        ("sub-02\tF\t60\t1.7\t5", "the line of 'sub-02' has 5 cells; expected 4"),
         ("sub-01\tM\t71\t1.81", "sub-01 stands twice"),
     ],
 )

@@ -31,7 +31,6 @@ OF_REAL_FILES = {
 OF_NO_SET = (
     "edge_nimble/JH_01.c3d",
     "edge_ezc3d/FP_Type3.c3d",
-    "edge_ezc3d/C3DRotationExample.c3d",
     "c3dorg_plate_types/FP1.C3D",
     "type3_running_kistler/Running_0002.c3d",
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from recording_writers import (
@@ -79,7 +81,91 @@ def test_units(tmp_path, unit, force_unit, moment_unit):
     _check_wrench(recording)
     markers, _ = standing_markers(N)
     np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)
-    assert bool(_levels(recording, "unit")) == (unit == "mete")
+    expected = {"mete": ["corrected"], "mm": ["info"] if moment_unit == "V" else []}
+    assert _levels(recording, "unit") == expected.get(unit, [])
+
+
+def test_misprinted_units_of_channels_are_said(tmp_path):
+    recording = read_recording(_write(tmp_path / "a.c3d", _spec(), force_unit="Q"))
+    _check_wrench(recording)
+    assert _levels(recording, "unit") == ["warning"]
+
+
+@pytest.mark.parametrize(("unit", "size"), [("m", 1e-3), ("mm", 1.0), ("furlong", 1e-3)])
+def test_a_unit_that_makes_no_person_is_corrected(tmp_path, unit, size):
+    """Markers in mm called m, in m called mm, and in mm called nothing that is known."""
+    markers, labels = standing_markers(N)
+    path = write_c3d(
+        tmp_path / "a.c3d", markers / size * (1e-3 if unit == "mm" else 1), labels, unit=unit
+    )
+    recording = read_recording(path)
+    np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)
+    assert _levels(recording, "unit") == ["corrected"]
+
+
+def test_header_and_parameters_that_disagree(tmp_path):
+    """The frames' own order tells which counts are right; a rate is no count."""
+    content = bytearray(_write(tmp_path / "a.c3d", _spec()).read_bytes())
+    at = content.find(b"USED") + len("USED") + 2 + 2
+    assert content[at] == 8
+    content[at] = 9
+    path = tmp_path / "b.c3d"
+    path.write_bytes(content)
+    recording = read_recording(path)
+    _check_wrench(recording)
+    assert _levels(recording, "layout") == ["warning"]
+
+
+def test_rate_of_the_plates_that_is_no_multiple(tmp_path):
+    content = bytearray(_write(tmp_path / "a.c3d", _spec()).read_bytes())
+    group = content.find(b"ANALOG")
+    at = content.find(b"RATE", group) + len("RATE") + 2 + 2
+    content[at : at + 4] = np.array([1037.0], "<f4").tobytes()
+    path = tmp_path / "b.c3d"
+    path.write_bytes(content)
+    recording = read_recording(path)
+    _check_wrench(recording)
+    assert recording.analog_rate_hz == 1000.0
+    assert _levels(recording, "rate") == ["corrected"]
+
+
+def test_more_frames_than_the_header_can_count(tmp_path):
+    n = 66_000
+    markers = np.tile(np.arange(1, 5)[:, None] * 0.3 + 1, (n, 1, 3))
+    markers[:, 0, 0] += np.arange(n) * 1e-5
+    recording = read_recording(write_c3d(tmp_path / "a.c3d", markers, list("ABCD")))
+    assert recording.n_frames == n
+    np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)
+
+
+def test_data_elsewhere_than_the_header_says(tmp_path):
+    content = bytearray(_write(tmp_path / "a.c3d", _spec()).read_bytes())
+    content[16] += 1
+    path = tmp_path / "b.c3d"
+    path.write_bytes(content)
+    recording = read_recording(path)
+    _check_wrench(recording)
+    assert _levels(recording, "layout") == ["warning"]
+
+
+def test_a_header_that_promises_the_world_takes_no_memory(tmp_path):
+    content = bytearray(_write(tmp_path / "a.c3d", _spec()).read_bytes())
+    content[2:4] = content[8:10] = b"\xff\x7f"  # 32767 points, and frames
+    path = tmp_path / "b.c3d"
+    path.write_bytes(content)
+    tracemalloc.start()
+    recording = read_recording(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 30e6  # the header asks for 4 GB
+    assert _levels(recording, "layout") == ["warning"]
+    _check_wrench(recording)
+    group = content.find(b"POINT")
+    at = content.find(b"USED", group) + len("USED") + 2 + 2
+    content[at : at + 2] = b"\xff\x7f"
+    path.write_bytes(content)
+    with pytest.raises(BadDataError, match="promises"):
+        read_recording(path)
 
 
 def test_moments_in_nmm_labelled_nm_are_seen(tmp_path):

@@ -23,6 +23,8 @@ NAMINGS = {
     "in front": ("1_ground_force_v{}", "1_ground_force_p{}", "1_ground_torque_{}"),
     "joined": ("ground_force1_v{}", "ground_force1_p{}", "ground_torque1_{}"),
     "sided": ("R_ground_force_v{}", "R_ground_force_p{}", "R_ground_torque_{}"),
+    "short": ("F1_{}", "P1_{}", "M1_{}"),
+    "plate": ("FP1_F{}", "FP1_P{}", "FP1_M{}"),
     "moment": ("ground_force_r_v{}", "ground_force_r_p{}", "ground_moment_r_m{}"),
 }
 
@@ -63,6 +65,90 @@ def test_known_wrench_comes_back(tmp_path, naming, mot):
     assert recording.plates[0].corners_m is None
     assert recording.forces_note == ""
     assert [f.check for f in recording.findings] == ["up_axis"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("\n", "\r\n"),
+        ("PathFileType", "\ufeffPathFileType"),
+        ("Frame#\tTime", "Frame#\tTimes"),
+        ("Frame#", "frame #"),
+        ("\n\n", "\n"),
+        ("\t", " "),
+        ("\t\t\t", "\t\t"),
+        ("\tUnits", ""),
+        ("\tmm\n", "\tMM\n"),
+        ("\tmm\n", "\tm\n"),
+    ],
+)
+def test_header_variants(tmp_path, old, new):
+    _trial(tmp_path)
+    path = tmp_path / "a.trc"
+    path.write_text(path.read_text().replace(old, new))
+    recording = read_recording(path)
+    markers, labels = standing_markers(N)
+    assert recording.labels == tuple(labels)
+    np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)
+
+
+def test_comma_separated_forces(tmp_path):
+    _, _, force, _ = _trial(tmp_path)
+    path = tmp_path / "a.mot"
+    head, table = path.read_text().split("endheader")
+    path.write_text(head + "endheader" + table.replace("\t", ","))
+    recording = read_recording(tmp_path / "a.trc")
+    np.testing.assert_allclose(recording.plates[0].force_N, force, atol=1e-6)
+
+
+def _lines(tmp_path) -> list[str]:
+    return (tmp_path / "a.trc").read_text().splitlines()
+
+
+def _said(tmp_path, lines: list[str], end: str = "\n") -> list[str]:
+    (tmp_path / "a.trc").write_text("\n".join(lines) + end)
+    recording = read_recording(tmp_path / "a.trc")
+    return [f.found for f in recording.findings if f.check in ("layout", "rate", "time", "points")]
+
+
+def test_lost_rows_and_cells_are_said_or_refused(tmp_path):
+    _trial(tmp_path, mot=None)
+    lines = _lines(tmp_path)
+    assert _said(tmp_path, lines) == []
+    assert _said(tmp_path, lines[:-3]) == [f"the header counts {N} frames, the file has {N - 3}"]
+    assert "the last row is cut" in _said(tmp_path, [*lines[:-1], lines[-1][:40]], end="")
+    cells = lines[30].split("\t")
+
+    def with_row(row: list[str]) -> list[str]:
+        return _said(tmp_path, [*lines[:30], "\t".join(row), *lines[31:]])
+
+    assert with_row([*cells[:5], "1.2.3", *cells[6:]])[0].startswith("1 cells that are no numbers")
+    assert with_row([*cells[:5], "9e9", *cells[6:]])[0].startswith("1 positions more than")
+    with pytest.raises(BadDataError, match="25 cells under 8 labels"):
+        with_row(cells[:5] + cells[6:])
+    extra = [line + "\tMORE" if line.startswith("Frame#") else line for line in lines]
+    with pytest.raises(BadDataError, match="26 cells under 9 labels"):
+        _said(tmp_path, extra)
+
+
+def test_a_rate_that_the_times_deny(tmp_path):
+    _trial(tmp_path, mot=None)
+    lines = _lines(tmp_path)
+    lines[2] = lines[2].replace("100.0", "250")
+    (found,) = _said(tmp_path, lines)
+    assert "250 Hz" in found and "100 Hz" in found
+
+
+def test_spikes_and_short_forces_are_marked(tmp_path):
+    _trial(tmp_path, ratio=10)
+    path = tmp_path / "a.mot"
+    rows = path.read_text().splitlines()
+    cells = rows[200].split("\t")
+    cells[2] = "1e7"
+    path.write_text("\n".join([*rows[:200], "\t".join(cells), *rows[201:]]) + "\n")
+    recording = read_recording(tmp_path / "a.trc")
+    assert (~recording.plates[0].usable).sum() == 1
+    assert "analog_spike" in [f.check for f in recording.findings]
 
 
 @pytest.mark.parametrize("unit", ["mm", "m"])

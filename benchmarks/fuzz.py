@@ -1,0 +1,74 @@
+"""Thousands of damaged files: what bsip answers, how long it takes, how much memory.
+
+    python benchmarks/fuzz.py --cases 400 --data ../shared/data --write docs/recordings.md
+
+Per kind of file CASES copies are damaged (tests/fuzz/damage.py) and ingested in processes with
+limits of time and memory; with DATA the real C3D files of tests/fuzz/fuzz_study.py too. The
+exit code is 1 if any case failed: a traceback, a killed process, or a wrong number in silence.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "fuzz"))
+
+from fuzz_run import Result, run_cases
+from fuzz_study import REAL, TARGETS
+from sections import replace_section
+
+SECTION = "fuzz"
+_STATES = ("refused", "said", "unchanged", "silent", "bug", "died")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=400, help="per kind of file")
+    parser.add_argument("--real-cases", type=int, default=60, help="per real C3D file")
+    parser.add_argument("--data", type=Path, help="folder of real recordings")
+    parser.add_argument("--write", type=Path, help="put the table into this page")
+    arguments = parser.parse_args()
+    results: dict[str, list[Result]] = {}
+    with tempfile.TemporaryDirectory() as scratch:
+        for target in TARGETS:
+            results[target] = run_cases(target, 0, arguments.cases, Path(scratch) / target)
+            _tell(target, results[target])
+        for target in REAL if arguments.data else ():
+            folder = Path(scratch) / target
+            results[target] = run_cases(target, 0, arguments.real_cases, folder, arguments.data)
+            _tell(target, results[target])
+    if arguments.write:
+        replace_section(arguments.write, SECTION, table(results))
+    sys.exit(any(one.is_failure() for ones in results.values() for one in ones))
+
+
+def table(results: dict[str, list[Result]]) -> str:
+    """A row per kind of file: cases by answer, the slowest, the largest."""
+    lines = [
+        "| file | cases | " + " | ".join(_STATES) + " | slowest [s] | peak [MB] |",
+        "|---|" + "---|" * (len(_STATES) + 3),
+    ]
+    for target, ones in results.items():
+        counts = Counter(one.state for one in ones)
+        name = TARGETS[target][0] if target in TARGETS else REAL[target]
+        cells = [name, str(len(ones)), *(str(counts[state]) for state in _STATES)]
+        cells += [f"{max(one.seconds for one in ones):.1f}"]
+        cells += [f"{max(one.peak_MB for one in ones):.0f}"]
+        lines.append("| " + " | ".join(cells) + " |")
+    n = sum(len(ones) for ones in results.values())
+    return f"{n} cases.\n\n" + "\n".join(lines)
+
+
+def _tell(target: str, ones: list[Result]) -> None:
+    print(target, dict(Counter(one.state for one in ones)), flush=True)
+    for one in ones:
+        if one.is_failure():
+            print(f"  {one.index} {one.damage} {one.state}: {one.words[-300:]}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

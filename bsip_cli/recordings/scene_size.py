@@ -1,0 +1,73 @@
+"""Units of length against the size of a person, and positions that no laboratory holds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.recordings.model import Finding
+
+_PERSON_M = (0.25, 8.0)  # the markers' extent in one frame: a limb to two people
+_ANYTHING_M = (0.02, 30.0)  # a clearly stated unit is doubted only beyond this
+_FEWEST_MARKERS = 4
+_LARGEST_LAB_M = 100.0
+_SIZES = {1e-3: "mm", 1.0: "m", 1e-2: "cm"}
+
+
+def settle_unit(
+    positions: np.ndarray, stated: str, stated_m: float | None, name: str
+) -> tuple[float, list[Finding]]:
+    """Size of the unit in metres, and a finding where the file's statement cannot be taken.
+
+    ``positions`` (n_frames, n_markers, 3) as written, NaN = missing; ``stated`` is the file's
+    word and ``stated_m`` its size, None if it is unknown; ``name`` is the word's place. The
+    markers' extent decides where it fits a person in another unit only.
+    """
+    extent = _extent(positions)
+    fitting = [size for size in _SIZES if _PERSON_M[0] <= extent * size <= _PERSON_M[1]]
+    if stated_m is not None:
+        is_possible = _ANYTHING_M[0] <= extent * stated_m <= _ANYTHING_M[1]
+        if is_possible or not fitting:
+            spelt = stated.strip().lower() in _SIZES.values()
+            return stated_m, [] if spelt else [_finding(name, stated, stated_m, extent)]
+    size = fitting[0] if fitting else 1e-3 if extent > _PERSON_M[1] else 1.0
+    return size, [_finding(name, stated, size, extent)]
+
+
+def without_absurd(positions_m: np.ndarray) -> list[Finding]:
+    """Turn positions beyond any laboratory into missing ones (in place), and say so."""
+    absurd = np.abs(np.nan_to_num(positions_m)).max(axis=-1, initial=0.0) > _LARGEST_LAB_M
+    if not absurd.any():
+        return []
+    positions_m[absurd] = np.nan
+    return [
+        Finding(
+            check="points",
+            subject="",
+            found=f"{int(absurd.sum())} positions more than {_LARGEST_LAB_M:g} m away",
+            expected="markers in a laboratory",
+            action="took them as missing",
+            level="warning",
+        )
+    ]
+
+
+def _extent(positions: np.ndarray) -> float:
+    """Median over the frames of the largest side of the markers' box; NaN if there are few."""
+    known = np.isfinite(positions).all(axis=-1)
+    enough = known.sum(axis=1) >= _FEWEST_MARKERS
+    if not enough.any():
+        return float("nan")
+    some = np.flatnonzero(enough)[:: max(1, int(enough.sum()) // 200)]
+    sides = [np.ptp(positions[k, known[k]], axis=0).max() for k in some]
+    return float(np.median(sides))
+
+
+def _finding(name: str, stated: str, size: float, extent: float) -> Finding:
+    return Finding(
+        check="unit",
+        subject="points",
+        found=f"{name} '{stated}', and the markers span {extent:.4g} of it",
+        expected="m or mm, and the size of a person",
+        action=f"read lengths in {_SIZES[size]}",
+        level="corrected",
+    )

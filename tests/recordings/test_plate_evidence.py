@@ -1,0 +1,222 @@
+"""What the feet, the weight and the neighbours of a sample say about plates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from recording_writers import (
+    CORNERS_M,
+    PlateSpec,
+    standing_markers,
+    standing_wrench,
+    write_c3d,
+)
+
+from bsip_cli.recordings.analog import lost_samples, spike_samples
+from bsip_cli.recordings.cop_polynomial import correct_cop
+from bsip_cli.recordings.free_plates import nobody_near
+from bsip_cli.recordings.model import Plate, Recording
+from bsip_cli.recordings.plates import LocalWrench, PlateDescription
+from bsip_cli.recordings.read import read_recording
+from bsip_cli.recordings.standing_mass import about_mass, plate_mass, still_frames
+from bsip_cli.recordings.weight_shift import sign_doubts
+from bsip_cli.recordings.zero import plate_zero
+
+N, RATIO = 60, 10
+RATE_HZ = 1000.0
+
+
+def _read(tmp_path, *specs: PlateSpec, **options) -> Recording:
+    markers, labels = standing_markers(N)
+    return read_recording(write_c3d(tmp_path / "a.c3d", markers, labels, specs, **options))
+
+
+def _found(recording: Recording, check: str) -> list[tuple[str, str]]:
+    return [(f.level, f.action) for f in recording.findings if f.check == check]
+
+
+def _rotated(points: np.ndarray, axis: int, angle_rad: float) -> np.ndarray:
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    turned = points.copy()
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    turned[..., i], turned[..., j] = (
+        c * points[..., i] - s * points[..., j],
+        s * points[..., i] + c * points[..., j],
+    )
+    return turned
+
+
+@pytest.mark.parametrize("kind", [1, 2, 3, 4])
+def test_raised_and_tilted_plates_keep_the_wrench(tmp_path, kind):
+    force, moment = standing_wrench(N * RATIO)
+    corners = _rotated(CORNERS_M, 0, 0.05) + np.array([0, 0, 0.02])
+    origin = np.array([0.12, 0.2, -0.05]) if kind == 3 else np.array([0.0, 0.0, -0.04])
+    if kind == 1:  # knows a free moment about its own normal only
+        corners = CORNERS_M + np.array([0, 0, 0.02])
+    spec = PlateSpec(force, moment, kind=kind, corners_m=corners, origin_m=origin)
+    plate = _read(tmp_path, spec).plates[0]
+    np.testing.assert_allclose(plate.force_N, force, atol=0.01)
+    np.testing.assert_allclose(plate.moment_Nm, moment, atol=0.02)
+
+
+@pytest.mark.parametrize("n_plates", [0, 1, 3, 10])
+def test_any_number_of_plates_overlapping_or_not(tmp_path, n_plates):
+    force, moment = standing_wrench(N * RATIO)
+    share = max(n_plates, 1)
+    shifts = np.linspace(0, 0.02, share)
+    specs = [
+        PlateSpec(force / share, moment / share, corners_m=CORNERS_M + np.array([x, 0, 0]))
+        for x in shifts[:n_plates]
+    ]
+    recording = _read(tmp_path, *specs)
+    assert len(recording.plates) == n_plates
+    if n_plates:
+        total = np.sum([plate.wrench() for plate in recording.plates], axis=0)
+        np.testing.assert_allclose(total, np.hstack([force, moment]), atol=0.1)
+
+
+def test_an_outline_too_small_is_widened(tmp_path):
+    force, _ = standing_wrench(N * RATIO)
+    centre = CORNERS_M.mean(axis=0)
+    small = centre + np.array([0.13, 0.18, 0.0]) + 0.3 * (CORNERS_M - centre)
+    point = np.array([0.1, 0.2, 0.0])  # under the left foot, beside the outline
+    spec = PlateSpec(force, np.cross(point, force), corners_m=small)
+    recording = _read(tmp_path, spec)
+    assert [level for level, _ in _found(recording, "plate_cop")][-1] == "corrected"
+    np.testing.assert_allclose(recording.plates[0].force_N, force, atol=0.01)
+    np.testing.assert_allclose(recording.plates[0].moment_Nm, np.cross(point, force), atol=0.02)
+    low, high = recording.plates[0].corners_m.min(axis=0), recording.plates[0].corners_m.max(axis=0)
+    assert (low[:2] < point[:2]).all() and (point[:2] < high[:2]).all()
+
+
+def test_corners_in_another_order_are_turned_under_the_feet(tmp_path):
+    force, _ = standing_wrench(N * RATIO)
+    large = 2.5 * (CORNERS_M - CORNERS_M.mean(axis=0)) + [0.5, 0.9, 0.0]
+    point = np.array([0.1, 0.3, 0.0])
+    spec = PlateSpec(force, np.cross(point, force), corners_m=large)
+    spec.channels = PlateSpec(spec.force_N, spec.moment_Nm, corners_m=large).channels
+    spec.corners_m = np.roll(large, 2, axis=0)
+    recording = _read(tmp_path, spec)
+    (level, action), *_ = _found(recording, "plate_frame")
+    assert level == "corrected" and "180 degrees" in action
+    np.testing.assert_allclose(recording.plates[0].force_N, force, atol=0.01)
+
+
+def test_a_plate_whose_load_lies_nowhere_is_left_out(tmp_path):
+    force, _ = standing_wrench(N * RATIO)
+    spec = PlateSpec(force, np.cross([3.0, -2.0, 0.0], force))
+    recording = _read(tmp_path, spec)
+    assert recording.plates == ()
+    assert ("excluded", "left the plate out") in _found(recording, "plate_cop")
+
+
+def test_x_up_laboratory_with_a_plate(tmp_path):
+    force, moment = standing_wrench(N * RATIO)
+    markers, labels = standing_markers(N)
+    order = [2, 0, 1]
+    spec = PlateSpec(force[:, order], moment[:, order], corners_m=CORNERS_M[:, order])
+    recording = read_recording(
+        write_c3d(tmp_path / "a.c3d", markers[..., order], labels, [spec], ratio=RATIO)
+    )
+    assert [f.action for f in recording.findings] == ["turned the lab frame Z-up"]
+    np.testing.assert_allclose(recording.plates[0].force_N[:, 2], force[:, 2], atol=0.01)
+    np.testing.assert_allclose(recording.markers_m[..., 2], markers[..., 2], atol=1e-6)
+
+
+def test_analog_at_the_marker_rate(tmp_path):
+    force, moment = standing_wrench(N)
+    plate = _read(tmp_path, PlateSpec(force, moment), ratio=1).plates[0]
+    np.testing.assert_allclose(plate.force_N, force, atol=0.01)
+
+
+def _plate(force_z_N: np.ndarray, name: str = "1", corners_m: np.ndarray = CORNERS_M) -> Plate:
+    force = np.column_stack([0 * force_z_N, 0 * force_z_N, force_z_N])
+    return Plate(name, force, 0 * force, corners_m, np.ones(len(force), bool))
+
+
+def test_weight_that_does_not_shift_tells_a_lost_zero():
+    sway = 8 * np.sin(np.linspace(0, 20, 4000))
+    right, left = _plate(380 + sway, "2"), _plate(333 - sway, "1")
+    assert sign_doubts([left, right], ["1"], RATE_HZ) == []
+    (doubt,) = sign_doubts([_plate(713 + sway, "1"), right], ["1"], RATE_HZ)
+    assert doubt.level == "warning" and "r = 1.00" in doubt.found
+    assert sign_doubts([_plate(713 + sway, "1"), right], [], RATE_HZ) == []
+
+
+def test_spikes_and_lost_samples_are_marked():
+    force, _ = standing_wrench(2000)
+    channels = force + np.random.default_rng(1).normal(0, 1, force.shape)
+    channels[700, 1] += 1e4
+    load = channels[:, 2]
+    assert np.flatnonzero(spike_samples(channels, load)).tolist() == [700]
+    channels[300:330] = 0.0
+    lost = lost_samples(channels, channels[:, 2], RATE_HZ)
+    assert np.flatnonzero(lost).tolist() == list(range(299, 331))
+
+
+def test_flight_on_a_plate_set_to_zero_is_not_lost():
+    load = np.zeros(3000)
+    load[:1000] = load[2000:] = 700.0
+    channels = np.column_stack([0 * load, 0 * load, load])
+    assert not lost_samples(channels, load, RATE_HZ).any()  # a second: nobody loses so much
+    assert not spike_samples(channels, load).any()
+
+
+def test_kistlers_polynomial_moves_the_centre_of_pressure():
+    polynomial = np.zeros((2, 6))
+    polynomial[0, 5], polynomial[1, 2] = 0.1, 1e-6
+    plate = PlateDescription("1", 3, CORNERS_M, np.array([0.1, 0.2, -0.05]), polynomial)
+    force = np.array([[5.0, 3.0, -500.0]])
+    x, y = 0.05, 0.10
+    moment = np.array([[y * -500.0, -x * -500.0, 2.0]])
+    corrected, (finding,) = correct_cop(LocalWrench(force, moment), plate)
+    np.testing.assert_allclose(corrected.cop(), [[0.9 * x, y - 1e-3]])
+    np.testing.assert_allclose(corrected.moment_Nm[:, 2], 2.0)
+    assert finding.level == "info" and "5.1 mm" in finding.action
+
+
+def test_a_large_zero_counts_where_nobody_is_near():
+    markers, labels = standing_markers(400)
+    plate = _plate(np.full(4000, 300.0), corners_m=CORNERS_M + np.array([5.0, 0, 0]))
+    recording = Recording(
+        None, 100.0, tuple(labels), markers, RATE_HZ, (plate,), (), np.eye(3), "", 0.0
+    )
+    free = nobody_near(recording, plate)
+    assert free.mean() > 0.9
+    assert not plate_zero(plate, RATE_HZ).is_known()
+    zero = plate_zero(plate, RATE_HZ, surely_free=free)
+    assert zero.offset[2] == pytest.approx(300.0)
+    under = _plate(np.full(4000, 300.0))
+    assert not nobody_near(recording, under).any()
+
+
+def test_mass_in_quiet_standing_and_by_momentum():
+    t = np.arange(500) / 100.0
+    everywhere = np.ones(500, bool)
+    trunk = np.ones((500, 2, 3))
+    quiet = plate_mass(70 * 9.80665 + 5 * np.sin(20 * t), everywhere, trunk, 100.0)
+    assert quiet.is_still and quiet.mass_kg == pytest.approx(70, abs=0.05)
+    trunk[..., 2] += (0.3 * np.cos(2 * np.pi * t / 1.3))[:, None]
+    acceleration = -0.3 * (2 * np.pi / 1.3) ** 2 * np.cos(2 * np.pi * t / 1.3)
+    moving = plate_mass(70 * (9.80665 + acceleration), everywhere, trunk, 100.0)
+    assert not moving.is_still and moving.mass_kg == pytest.approx(70, rel=0.01)
+    assert plate_mass(0 * t, everywhere, trunk, 100.0) is None
+
+
+def test_still_frames_are_the_longest_calm_stretch():
+    force = np.concatenate([np.full(100, 700.0), np.linspace(700, 900, 100), np.full(200, 905.0)])
+    still = still_frames(force, np.ones(400, bool), 100.0)
+    assert still[200:].all() and not still[:150].any()
+
+
+@pytest.mark.parametrize(
+    ("stated_kg", "level"), [(69.5, "info"), (66.0, "warning"), (None, "info")]
+)
+def test_the_plates_against_the_stated_mass(stated_kg, level):
+    carried = plate_mass(
+        np.full(500, 70 * 9.80665), np.ones(500, bool), np.ones((500, 2, 3)), 100.0
+    )
+    finding = about_mass(carried, stated_kg, 2.0)
+    assert finding.check == "plate_mass" and finding.level == level
+    assert "70.00 kg in 5.0 s" in finding.found
+    assert about_mass(None, 70.0, 2.0) is None

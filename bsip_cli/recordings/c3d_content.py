@@ -50,7 +50,7 @@ def read_content(path: Path) -> Content:
     raw = _bytes(path)
     header = read_header(path, raw)
     reach = (header.data_start_block - 1) * BLOCK if header.data_start_block > 2 else None
-    records = read_records(path, raw[:reach], header.processor)
+    records = read_records(path, raw[:reach])
     stated = parameters_of(records, header.processor)
     layout, findings = settle_layout(path, header, stated, len(raw))
     rate_hz, about_rate = settle_rate(path, header, stated, layout)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.c3d_numbers import PROCESSORS, floats, integers
+from bsip_cli.recordings.c3d_numbers import DEC, MIPS, PC, floats, integers
 
 BLOCK = 512
 C3D_KEY = 0x50
@@ -61,18 +61,19 @@ def read_header(path: Path, content: bytes) -> Header:
 def _processor(path: Path, content: bytes) -> int:
     at = (content[0] - 1) * BLOCK + 3
     found = content[at] if at < len(content) else 0
-    if found not in PROCESSORS:
+    if found not in (PC, DEC):
+        name = " (MIPS)" if found == MIPS else ""
         raise BadDataError(
-            f"its parameter section names processor {found}",
-            expected="84 (PC), 85 (DEC) or 86 (MIPS)",
-            remedy="export the trial again",
+            f"its parameter section names processor {found}{name}, which ezc3d does not read",
+            expected="84 (PC) or 85 (DEC)",
+            remedy="export the trial again, or convert it to the PC format",
             file=path,
         )
     return found
 
 
 def _parse(content: bytes, processor: int) -> Header:
-    words = integers(content[:BLOCK], processor).view(np.uint16)
+    words = integers(content[:BLOCK]).view(np.uint16)
     scale, rate_hz = floats(content[12:16] + content[20:24], processor)
     return Header(
         processor=processor,

@@ -3,11 +3,11 @@
 Seen in real files: counts of points, channels, frames or rates in the parameters that the header
 and the file's length contradict, where ezc3d takes the parameters' word (`type1.C3D` has no
 ANALOG:RATE, `kyowadengyo.c3d` counts a point too many, `evart.c3d` lacks scales and has 17 samples
-at a rate that says 16); ANALOG:OFFSET as floats (`Dance.c3d`); numbers of MIPS processors
-(`Eb015si.c3d`); a gap between two parameters (`badParameterOffset.c3d`); a description of more
-than 127 characters (`BKINtechnologies.c3d`). From the format's text: offsets below zero, whose
-sign ezc3d drops; integer samples without a sign; more frames than the header can count, of which
-ezc3d reads the first 65535: these are written in pieces.
+at a rate that says 16); ANALOG:OFFSET as floats (`Dance.c3d`); a gap between two parameters
+(`badParameterOffset.c3d`); a description of more than 127 characters (`BKINtechnologies.c3d`).
+From the format's text: offsets below zero, whose sign ezc3d drops; integer samples without a sign;
+more frames than the header can count, of which ezc3d reads the first 65535: these are written in
+pieces.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 
 from bsip_cli.recordings.c3d_header import BLOCK, C3D_KEY, Header
 from bsip_cli.recordings.c3d_layout import Layout
-from bsip_cli.recordings.c3d_numbers import MIPS, PC, floats, integers
+from bsip_cli.recordings.c3d_numbers import PC, floats, integers
 from bsip_cli.recordings.c3d_parameters import Group, number, numbers
 from bsip_cli.recordings.c3d_records import (
     FLOAT,
@@ -46,8 +46,7 @@ def needs_mending(
     point, analog = parameters.get("POINT", {}), parameters.get("ANALOG", {})
     per_frame = layout.samples_per_frame * layout.n_channels
     return not (
-        header.processor != MIPS
-        and all(record.is_plain for record in records)
+        all(record.is_plain for record in records)
         and (header.n_points, header.n_analog_per_frame) == (layout.n_points, per_frame)
         and header.n_frames == layout.n_frames == _whole(number(point, "FRAMES")) & _FULL
         and (header.data_start_block - 1) * BLOCK == layout.start
@@ -111,7 +110,7 @@ def _as_pc(record: Record, processor: int) -> Record:
     """The record with numbers as a PC stores them."""
     value = record.value
     if record.kind == INTEGER:
-        value = integers(value, processor).astype("<i2").tobytes()
+        value = integers(value).astype("<i2").tobytes()
     if record.kind == FLOAT:
         value = floats(value, processor).astype("<f4").tobytes()
     return replace(record, value=value, description=record.description[:LONGEST_DESCRIPTION])
@@ -120,7 +119,7 @@ def _as_pc(record: Record, processor: int) -> Record:
 def _data_as_pc(data: bytes, header: Header, layout: Layout) -> bytes:
     if layout.is_float:
         return floats(data, header.processor).astype("<f4").tobytes()
-    return integers(data, header.processor).astype("<i2").tobytes()
+    return integers(data).astype("<i2").tobytes()
 
 
 def _replaced(

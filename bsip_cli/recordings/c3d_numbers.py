@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-PC, DEC, MIPS = 84, 85, 86
-PROCESSORS = (PC, DEC, MIPS)
+PC, DEC, MIPS = 84, 85, 86  # the last is refused: ezc3d knows no such numbers
 
 
-def integers(raw: bytes, processor: int) -> np.ndarray:
+def integers(raw: bytes) -> np.ndarray:
     """Signed 16-bit integers."""
-    return np.frombuffer(raw, ">i2" if processor == MIPS else "<i2").astype(np.int16)
+    return np.frombuffer(raw, "<i2").astype(np.int16)
 
 
 def floats(raw: bytes, processor: int) -> np.ndarray:
@@ -18,7 +17,7 @@ def floats(raw: bytes, processor: int) -> np.ndarray:
     with np.errstate(invalid="ignore"):  # bits of a signalling NaN
         if processor == DEC:
             return _vax(np.frombuffer(raw, "<u2"))
-        return np.frombuffer(raw, ">f4" if processor == MIPS else "<f4").astype(float)
+        return np.frombuffer(raw, "<f4").astype(float)
 
 
 def _vax(words: np.ndarray) -> np.ndarray:

@@ -41,7 +41,7 @@ class Record:
             return np.zeros(0)
         read = {
             BYTE: lambda: np.frombuffer(self.value, np.uint8).astype(np.int16),
-            INTEGER: lambda: integers(self.value, processor),
+            INTEGER: lambda: integers(self.value),
             FLOAT: lambda: floats(self.value, processor),
         }[self.kind]
         return read().reshape(self.shape or (1,), order="F")
@@ -51,10 +51,10 @@ class _BrokenError(Exception):
     """Where the chain of records cannot be followed; turned into a BadDataError."""
 
 
-def read_records(path: Path, content: bytes, processor: int) -> list[Record]:
+def read_records(path: Path, content: bytes) -> list[Record]:
     """All records in their order; ``content`` is the file up to its data."""
     try:
-        return _records(content, processor)
+        return _records(content)
     except _BrokenError as fault:
         raise BadDataError(
             f"its parameter section is broken: {fault}",
@@ -79,7 +79,7 @@ def group_names(records: Sequence[Record]) -> Mapping[int, str]:
     return {-record.group: record.name for record in records if record.group < 0}
 
 
-def _records(content: bytes, processor: int) -> list[Record]:
+def _records(content: bytes) -> list[Record]:
     found: list[Record] = []
     position = (content[0] - 1) * BLOCK + 4
     for _ in range(_MOST_RECORDS):
@@ -90,7 +90,7 @@ def _records(content: bytes, processor: int) -> list[Record]:
             break
         after_name = position + 2 + length
         name = _name(content, position + 2, after_name)
-        step = int(integers(content[after_name : after_name + 2], processor)[0]) & 0xFFFF
+        step = int(integers(content[after_name : after_name + 2])[0]) & 0xFFFF
         found.append(_record(content, _signed(content[position + 1]), name, after_name, step))
         if step == 0:
             break

@@ -55,7 +55,7 @@ _HEAD_OF_TEXT = 1500
 _NUMBER = re.compile(r"[-+]?\d[\d.e+-]*")
 
 
-REAL = {  # plates of all types and numbers of all processors
+REAL = {  # plates of all types and numbers of both processors
     "type1": "c3dorg_plate_types/type1.C3D",
     "type2": "c3dorg_plate_types/TYPE-2.C3D",
     "type3": "type3_running_kistler/Running_0002.c3d",
@@ -63,7 +63,6 @@ REAL = {  # plates of all types and numbers of all processors
     "treadmill": "edge_nimble/JH_01.c3d",
     "pc": "edge_c3dorg/Eb015pi.c3d",
     "dec": "edge_c3dorg/Eb015vi.c3d",
-    "mips": "edge_c3dorg/Eb015si.c3d",
     "yup": "c3dorg_plate_types/MotionMonitorC3D.c3d",
     "gait": "btk_pig/PiG_Motion-FlatFoot-Full.c3d",
 }

@@ -35,6 +35,7 @@ REFUSED = {
     "bad_parameter_section.c3d": "LABELS claims 192 bytes",
     "Optotrak.c3d": "promises 992736 bytes",
     "C3DRotationExample.c3d": "no points",
+    "Eb015si.c3d": "processor 86 (MIPS), which ezc3d does not read",
 }
 EZC3D_MISREADS = {"type1.C3D", "kyowadengyo.c3d", "evart.c3d"}  # header against parameters
 NOT_FOLLOWED = {"BKINtechnologies.c3d"}  # ezc3d fills 12 GB before it refuses it
@@ -208,11 +209,10 @@ def test_layouts_that_ezc3d_alone_misreads(real_data, name, largest_N):
     assert np.nanmax([median_distance_m(recording, p) for p in recording.plates]) < 0.2
 
 
-def test_the_same_trial_in_the_numbers_of_three_processors(real_data):
-    pc, dec, mips = (_read(real_data / f"edge_c3dorg/Eb015{k}i.c3d") for k in ("p", "v", "s"))
-    for other in (dec, mips):
-        np.testing.assert_allclose(other.markers_m, pc.markers_m, atol=1e-9)
-        np.testing.assert_allclose(other.plates[0].force_N, pc.plates[0].force_N, atol=1e-3)
+def test_the_same_trial_in_the_numbers_of_two_processors(real_data):
+    pc, dec = (_read(real_data / f"edge_c3dorg/Eb015{k}i.c3d") for k in ("p", "v"))
+    np.testing.assert_allclose(dec.markers_m, pc.markers_m, atol=1e-9)
+    np.testing.assert_allclose(dec.plates[0].force_N, pc.plates[0].force_N, atol=1e-3)
 
 
 def test_clipped_samples_of_sample21_are_left_out(real_data):

@@ -17,7 +17,7 @@ UNEXPLAINED = "unexplained"
 PERSON = "participant"  # the source that is no trial
 # From best to worst for a hidden effect of the catalogue.
 RIGHT_NAME, RIGHT_CLASS = "right name", "right class"
-PUT_RIGHT, MISSED, SILENT = "put right by ik", "missed", "no answer"
+PUT_RIGHT, MISSED, SILENT = "put right", "missed", "no answer"
 WRONG_CLASS, WRONG_NAME = "wrong class", "wrong name"
 VERDICTS = (
     *(RIGHT_NAME, RIGHT_CLASS, PUT_RIGHT, UNEXPLAINED),
@@ -185,7 +185,7 @@ def _score_of(
     verdict, says = _verdict(aim.effect, present, _twin(record, recorded, answers), answers)
     if wrong and aim.effect == UNEXPLAINED:  # the worst answer of all, whatever stands beside
         verdict, says = WRONG_NAME, wrong[0].partition(" ")[0]
-    if verdict == MISSED and _put_right(out, recorded, aim):
+    if verdict == MISSED and _put_right(out, recorded, record["effect"], aim):
         verdict = PUT_RIGHT
     found = [a for a in answers if a.about(aim.effect)]
     right = [a for a in found if any(aim.same_target(t) for t in a.about(aim.effect))]
@@ -328,15 +328,21 @@ def _mean(values: pd.Series) -> float | None:
     return float(known.mean()) if len(known) else None
 
 
-def _put_right(out: Path, recorded: Recorded, aim: Expected) -> bool:
-    """Whether the marker events say that exchanged labels of this pair stand right again."""
-    if aim.effect != "marker_swap":
-        return False
+def _put_right(out: Path, recorded: Recorded, effect: str, aim: Expected) -> bool:
+    """Whether an earlier stage says that it has undone the effect: exchanged labels of this pair
+    stand right again, frames that repeat the one before are gaps."""
+    if effect == "marker_swap":
+        events = _tables(out, recorded, "marker-events")
+        swaps = (row for table in events for row in table[table["kind"] == "swap"].itertuples())
+        return any(x.put_right and aim.same_target(f"{x.marker}+{x.partner}") for x in swaps)
+    if effect == "outside_repeated_frames":
+        tables = _tables(out, recorded, "quality")
+        return any(table["check"].eq("repeated_frames").any() for table in tables)
+    return False
+
+
+def _tables(out: Path, recorded: Recorded, kind: str) -> list[pd.DataFrame]:
+    """An artifact of all recordings that hold the effect."""
     folder = out / recorded.participant
-    files = (folder / f"{stem}_marker-events.parquet" for stem in recorded.stems)
-    tables = [pd.read_parquet(path) for path in files if path.is_file()]
-    return any(
-        row.put_right and aim.same_target(f"{row.marker}+{row.partner}")
-        for table in tables
-        for row in table[table["kind"] == "swap"].itertuples()
-    )
+    files = (folder / f"{stem}_{kind}.parquet" for stem in recorded.stems)
+    return [pd.read_parquet(path) for path in files if path.is_file()]

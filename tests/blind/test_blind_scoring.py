@@ -283,6 +283,16 @@ def test_labels_that_were_put_right_before_are_noted(tmp_path):
     assert only(score(tmp_path, swapped)).verdict == RIGHT_NAME
 
 
+def test_repeated_frames_that_are_gaps_are_noted(tmp_path):
+    repeated = {"effect": "outside_repeated_frames", "size": 0.2, "unit": "1"}
+    diagnosis(tmp_path, SQUAT, row("none"))
+    lines = pd.DataFrame({"check": ["markers", "repeated_frames"]})
+    lines[:1].to_parquet(tmp_path / "sub-01" / f"{SQUAT}_quality.parquet")
+    assert only(score(tmp_path, hidden(repeated))).verdict == MISSED
+    lines.to_parquet(tmp_path / "sub-01" / f"{SQUAT}_quality.parquet")
+    assert only(score(tmp_path, hidden(repeated))).verdict == PUT_RIGHT
+
+
 def test_the_gain_artifact_beside_the_answer_is_averaged(tmp_path):
     diagnosis(tmp_path, SQUAT, row("sync_offset", gain_percent=30.0))
     gains = pd.DataFrame({"component": ["fx", "fz"], "gain_percent": [10.0, 30.0]})

@@ -45,7 +45,8 @@ def limits_of(selection: Selection) -> Iterator[Limit]:
         least = max(last.limit(place.trials, ALPHA), WORTH * rows / 2)
         for parameter, sd in zip(place.candidate.free(scene), spread, strict=True):
             needed = max(sd * (np.sqrt(2 * least) + _SURE), NEGLIGIBLE)
-            limit = Limit(place, parameter.name, parameter.unit, needed * parameter.typical)
+            size = max(needed * parameter.typical, effect.least_named.get(parameter.name, 0.0))
+            limit = Limit(place, parameter.name, parameter.unit, size)
             key = (effect.name, place.candidate.target, place.trials, parameter.name)
             # Of the moments, frequencies and windows, the one where it shows best.
             if key not in found or limit.size < found[key].size:

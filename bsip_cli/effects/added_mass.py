@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
+
 import numpy as np
 
 from bsip_cli.body.names import in_words
@@ -9,7 +11,6 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
 REACH_M = 0.6
-LEAST_KG = 0.2  # less is what the segment itself may differ by
 MOMENT_KG_M = 0.02  # a few centimetres: the segment's own frame is known to no less
 
 
@@ -25,6 +26,7 @@ class AddedMass(Effect):
     of_the_lab = False
     of_the_person = True
     remedy = "weigh the person as recorded, and record once without the load"
+    least_named = MappingProxyType({"mass": 0.2})  # less is what the segment may differ by
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
         return scene.bodies
@@ -57,7 +59,7 @@ class AddedMass(Effect):
         return (("mass", "kg", float(values[0])), *positions)
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        within = super().possible(scene, target, values) and values[0] >= LEAST_KG
+        within = super().possible(scene, target, values) and values[0] >= self.least_named["mass"]
         return bool(within and np.linalg.norm(values[1:]) <= REACH_M * values[0])
 
     def sentence(self, target: str, values: np.ndarray) -> str:

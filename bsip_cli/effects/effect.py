@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import ClassVar
@@ -51,6 +51,7 @@ class Effect(ABC):
     of_the_person: ClassVar[bool] = False  # the same in every trial of a person
     of_the_plates: ClassVar[bool] = False  # the truth is what was measured, less the change
     remedy: ClassVar[str]  # what would separate it from its rivals
+    least_named: ClassVar[Mapping[str, float]] = {}  # of a parameter: smaller ones are not told
 
     @property
     def lasts(self) -> bool:

@@ -32,6 +32,7 @@ NAMES = (
     "released_object",
 )
 OFFSET_N, DELAY_S = 8.0, 0.010
+MASS = ("added_mass", "mass")
 
 
 def selection_of(*scenes: Scene) -> Selection:
@@ -266,6 +267,12 @@ def test_longer_recordings_show_smaller_causes():
     assert len(above) > 5
     assert 0.2 < np.median(ratios) < 0.85 and min(ratios) < 0.75
     assert max(ratios) < 1.1
+
+
+def test_no_limit_is_smaller_than_what_would_be_named():
+    found = limits(late_with_offset())
+    masses = [one.size for (name, _, part), one in found.items() if (name, part) == MASS]
+    assert masses and min(masses) == EFFECTS["added_mass"].least_named["mass"]
 
 
 def test_limits_are_told_though_nothing_was_worth_a_try():

@@ -19,7 +19,7 @@ from bsip_cli.statistics.chi_square import minus_log_p
 
 MOST = 3  # causes in one trial
 TRIES = 10  # candidates that are refitted in a round
-SHOWN = 5  # that are looked at even where nothing stands out
+SHOWN = 3  # that are looked at even where nothing stands out
 WORTH_A_TRY = 0.5  # of the best score
 ALPHA = 0.01  # in every round; with the chance's own errors one null in twenty has an alarm
 BEYOND_DOUBT = 1e-6  # so rare by chance that a gain above its standard error is enough
@@ -133,7 +133,7 @@ def _tried(
         place, score = signatures.places[k], scores[k, 0]
         best_yet = max((t[2] for t in tried), default=0.0)
         hopeless = score < WORTH_A_TRY * max(best_yet, rough.limit(place.trials, ALPHA))
-        if len(tried) >= TRIES or (hopeless and asked >= SHOWN):
+        if len(tried) >= TRIES or (hopeless and (len(tried) >= SHOWN or asked >= 2 * TRIES)):
             break
         one = _refitted(signatures, before, place, sizes[k], open_trials)
         if one is not None:

@@ -20,28 +20,29 @@ _LEAST_MOVING_S = 2.0
 _LEAST_N = 100.0
 _STILL_ERROR_M_S = 0.1  # standing still, as far as the force tells
 _MOVING_ERROR_M_S = 0.2  # the trunk stands for the centre of mass
+_UNSEEN_ERROR_M_S = 0.4  # of a stretch of movement of which the force alone is known
 _PERCENT = 100.0
 
 
 @dataclass(frozen=True)
 class PlateMass:
-    """What the plates carried, and for how long it was seen."""
+    """What the plates carried, for how long it was seen, and how.
+
+    error_m_s : of the change of the centre of mass's velocity meanwhile.
+    """
 
     mass_kg: float
     seconds: float
-    is_still: bool
+    manner: str
+    error_m_s: float
 
     @property
     def uncertainty_percent(self) -> float:
-        """By the change of the centre of mass's velocity that nobody sees."""
-        error_m_s = _STILL_ERROR_M_S if self.is_still else _MOVING_ERROR_M_S
-        return _PERCENT * error_m_s / (GRAVITY_M_S2 * self.seconds)
-
-    def manner(self) -> str:
-        return "quiet standing" if self.is_still else "movement (balance of momentum)"
+        """By the change of velocity that nobody sees."""
+        return _PERCENT * self.error_m_s / (GRAVITY_M_S2 * self.seconds)
 
     def words(self) -> str:
-        return f"{self.mass_kg:.2f} kg in {self.seconds:.1f} s of {self.manner()}"
+        return f"{self.mass_kg:.2f} kg in {self.seconds:.1f} s of {self.manner}"
 
 
 def plate_mass(
@@ -57,9 +58,22 @@ def plate_mass(
     found = [_by_momentum(force_z_N, valid, trunk_markers_m, rate_hz)]
     if still.any():
         mass_kg = float(force_z_N[still].mean()) / GRAVITY_M_S2
-        found.append(PlateMass(mass_kg, still.sum() / rate_hz, True))
+        seconds = still.sum() / rate_hz
+        found.append(PlateMass(mass_kg, seconds, "quiet standing", _STILL_ERROR_M_S))
     known = [one for one in found if one is not None]
     return min(known, key=lambda one: one.uncertainty_percent, default=None)
+
+
+def rough_mass(force_z_N: np.ndarray, valid: np.ndarray, rate_hz: float) -> PlateMass | None:
+    """The mean force over g in all valid frames: where nothing better tells a mass."""
+    pieces = len(runs(valid))
+    mean_N = float(force_z_N[valid].mean()) if pieces else 0.0
+    if mean_N < _LEAST_N:
+        return None
+    error_m_s = _UNSEEN_ERROR_M_S * float(np.sqrt(pieces))
+    return PlateMass(
+        mean_N / GRAVITY_M_S2, valid.sum() / rate_hz, "movement (mean force)", error_m_s
+    )
 
 
 def about_mass(
@@ -127,7 +141,8 @@ def _by_momentum(
     if seconds < _LEAST_MOVING_S or mean_N < _LEAST_N:
         return None
     acceleration = float(velocity[stop - 1] - velocity[start]) / seconds
-    return PlateMass(mean_N / (GRAVITY_M_S2 + acceleration), seconds, False)
+    mass_kg = mean_N / (GRAVITY_M_S2 + acceleration)
+    return PlateMass(mass_kg, seconds, "movement (balance of momentum)", _MOVING_ERROR_M_S)
 
 
 def _finding(carried: PlateMass, expected: str, action: str, level: str) -> Finding:

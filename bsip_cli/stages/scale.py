@@ -16,7 +16,7 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.motion.calibration import Calibration, calibrate
 from bsip_cli.motion.inverse_kinematics import solve_poses, solve_trial, tree_of
 from bsip_cli.motion.scaling import Refinement, ScalingOptions, refine, varied_frames
-from bsip_cli.recordings.standing_mass import PlateMass, plate_mass
+from bsip_cli.recordings.standing_mass import PlateMass, plate_mass, rough_mass
 from bsip_cli.stages.frames import WRENCH, markers_from, ordered_markers
 from bsip_cli.stages.known_loads import load_words
 from bsip_cli.study import Trial
@@ -216,12 +216,12 @@ def _plate_mass(unit: Unit, still: _Recorded, marker_set: MarkerSet) -> PlateMas
         if marker.segment in TRUNK and marker.label in still.labels
     ]
     step_s = float(np.median(np.diff(still.times))) if len(still.times) > 1 else 1.0
-    return plate_mass(
-        wrench[WRENCH[2]].to_numpy(),
-        wrench["valid"].to_numpy(),
-        still.positions[:, trunk],
-        1.0 / step_s,
-    )
+    force, valid = wrench[WRENCH[2]].to_numpy(), wrench["valid"].to_numpy()
+    carried = plate_mass(force, valid, still.positions[:, trunk], 1.0 / step_s)
+    assert unit.participant is not None
+    if carried is None and unit.participant.mass_kg is None:
+        return rough_mass(force, valid, 1.0 / step_s)
+    return carried
 
 
 def _mass(unit: Unit, carried: PlateMass | None, plate_kg: float, load: str) -> tuple[float, str]:
@@ -234,17 +234,20 @@ def _mass(unit: Unit, carried: PlateMass | None, plate_kg: float, load: str) -> 
             raise BadDataError(
                 "mass_kg is n/a and the plates do not tell it",
                 file=unit.name,
-                expected="a stated mass, or all contacts on plates through 0.8 s of quiet standing "
-                "or 2 s of movement",
+                expected="a stated mass, or a stretch with all contacts on plates",
                 remedy="put the mass into participants.tsv",
             )
-        unit.warn(f"{unit.name}: mass {plate_kg:.2f} kg taken from the plates{without}")
+        assert carried is not None
+        unit.warn(
+            f"{unit.name}: mass {plate_kg:.2f} kg (to {carried.uncertainty_percent:.1f} %) taken "
+            f"from the plates in {carried.seconds:.1f} s of {carried.manner}{without}"
+        )
         return plate_kg, "plates"
     difference = 100 * (plate_kg - stated) / stated
     limit = unit.config.ingest.mass_tolerance_percent
     if carried and abs(difference) > limit + carried.uncertainty_percent:
         unit.warn(
-            f"{unit.name}: the plates read {plate_kg:.2f} kg in {carried.manner()}{without}, "
+            f"{unit.name}: the plates read {plate_kg:.2f} kg in {carried.manner}{without}, "
             f"stated are {stated:.2f} kg ({difference:+.1f} %, tolerance {limit:g} %)"
         )
     return stated, "participants.tsv"

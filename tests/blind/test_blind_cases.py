@@ -137,7 +137,8 @@ def quiet(case: Case) -> Score:
 
 def test_an_interrupted_suite_goes_on_and_writes_its_tables(tmp_path, monkeypatch):
     page, results = tmp_path / "page.md", tmp_path / "results"
-    page.write_text(f"before\n{blind_long.BEGIN}\nold\n{blind_long.END}\nafter\n")
+    begin, end = (f"<!-- made by {blind_long.MARK}: {edge} -->" for edge in ("begin", "end"))
+    page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
     arguments = ["--results", str(results), "--document", str(page), "--draws", "1"]
     arguments += ["--nulls", "4", "--others", "2"]
     monkeypatch.setattr(blind_long, "run_batch", FakeBatches(1))

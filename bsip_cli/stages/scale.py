@@ -240,7 +240,7 @@ def _mass(unit: Unit, carried: PlateMass | None, plate_kg: float, load: str) -> 
         assert carried is not None
         unit.warn(
             f"{unit.name}: mass {plate_kg:.2f} kg (to {carried.uncertainty_percent:.1f} %) taken "
-            f"from the plates in {carried.seconds:.1f} s of {carried.manner}{without}"
+            f"from the plates{without} in {carried.seconds:.1f} s of {carried.manner}"
         )
         return plate_kg, "plates"
     difference = 100 * (plate_kg - stated) / stated

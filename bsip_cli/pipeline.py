@@ -114,6 +114,7 @@ STAGES = (
         reads=(
             "markers",
             "kinematics",
+            "marker-events",
             "wrench",
             "plates",
             "skeleton",

@@ -67,6 +67,11 @@ class Explanation:
         """With all parameters changed by ``step`` (K,) typical sizes, within their bounds."""
         return self._within(evidence, self.values + step * self.all_typical(evidence))
 
+    def alike(self, evidence: Evidence) -> list[Explanation]:
+        """Those that these recordings cannot tell from it, the plainest first."""
+        values = self.effect.alike(self.scene(evidence), self.target, self.values)
+        return [Explanation(self.place, one) for one in values]
+
     def reported(self, evidence: Evidence) -> tuple[tuple[str, str, float], ...]:
         """Name, unit and value of what the diagnosis prints."""
         return self.effect.reported(self.scene(evidence), self.target, self.values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -106,12 +106,12 @@ def _finding(
     said_so: tuple[Verdict, str, str],
     rng: np.random.Generator,
 ) -> Finding:
-    one = tried.explanation
+    one = tried.explanation.alike(evidence)[0]
     verdict, class_id, remedy = said_so
     number = place % len(tried.fit.explanations)
     draws = drawn_explanations(evidence, tried.fit, number, rng)
     numbers = _numbers(evidence, one, draws)
-    sentence = one.effect.sentence(one.target, one.values) + _interval_words(numbers)
+    sentence = one.effect.sentence(one.target, one.values) + interval_words(numbers)
     if verdict == "ambiguous":
         sentence += f"; other causes look alike here: to tell them apart, {remedy}"
     return _with(evidence, tried, verdict, class_id, numbers, sentence)
@@ -150,16 +150,23 @@ def _with(evidence, tried: Tried, verdict: Verdict, class_id: str, numbers, sent
 
 
 def _numbers(evidence: Evidence, one: Explanation, draws: list[Explanation]) -> tuple[Number, ...]:
-    drawn = np.array([[x[2] for x in draw.reported(evidence)] for draw in draws])
-    low, high = np.percentile(drawn, [2.5, 97.5], axis=0)
-    reported = one.reported(evidence)
+    return numbers_of(one.reported(evidence), [draw.reported(evidence) for draw in draws])
+
+
+Reported = tuple[tuple[str, str, float], ...]
+
+
+def numbers_of(reported: Reported, drawn: Sequence[Reported]) -> tuple[Number, ...]:
+    """What is reported, with the 95 % intervals of draws."""
+    values = np.array([[x for *_, x in one] for one in drawn])
+    low, high = np.percentile(values, [2.5, 97.5], axis=0)
     return tuple(
         Number(n, u, x, min(float(a), x), max(float(b), x))
         for (n, u, x), a, b in zip(reported, low, high, strict=True)
     )
 
 
-def _interval_words(numbers: tuple[Number, ...]) -> str:
+def interval_words(numbers: tuple[Number, ...]) -> str:
     """Of the surest number, with the digits that its interval deserves."""
     first = max(numbers, key=lambda x: abs(x.value) / max(x.high - x.low, 1e-12))
     width = max(first.high - first.low, 1e-12)

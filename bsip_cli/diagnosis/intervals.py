@@ -28,7 +28,8 @@ def drawn_explanations(
     simple = np.array([p.known_to for p in one.parameters(evidence)])
     covariance = covariance + np.diag((scale**2 + simple**2) / one.all_typical(evidence) ** 2)
     steps = _at_least(steps - np.median(steps, axis=0), covariance, rng)
-    return [one.all_moved(evidence, step) for step in steps]
+    drawn = (one.all_moved(evidence, step).alike(evidence) for step in steps)
+    return [alike[rng.integers(len(alike))] for alike in drawn]
 
 
 def bounds(evidence: Evidence, fit: Fit, number: int) -> dict[str, float]:

@@ -20,6 +20,8 @@ from bsip_cli.effects.scene import Scene
 
 UNEXPLAINED = "unexplained"
 _SIZE_N, _SIZE_NM = 40.0, 20.0
+_PLAY_N, _PLAY_NM = 10.0, 5.0
+_PLAYS_N, _PLAYS_NM = (4.0, 8.0, 16.0), (2.0, 4.0, 8.0)
 _FASTEST_HZ = 8.0  # beyond it the low-pass leaves nothing but its own edge
 _LINE, _AROUND_HZ, _MOST_LINES = 30.0, 0.75, 3  # of noise one in 10^9 frequencies is as high
 _ALONG = {"x": "along the lab's X axis", "y": "along the lab's Y axis", "z": "up and down"}
@@ -121,27 +123,48 @@ class Curve(Pattern):
 
 
 class Play(Pattern):
-    """A component that lags behind itself: it errs by its own direction of change."""
+    """A component that follows with play: it sticks until the true one has moved on by so much."""
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
         return CHANNELS
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        size, unit = _SIZE_N if target.startswith("f") else _SIZE_NM, unit_of(target)
-        return (Parameter("play", unit, -1e3, 1e3, size),)
+        force = target.startswith("f")
+        size, widths = (_PLAY_N, _PLAYS_N) if force else (_PLAY_NM, _PLAYS_NM)
+        unit = unit_of(target)
+        return (
+            Parameter("error", unit, -1e3, 1e3, size),
+            Parameter("play", unit, 0.1 * widths[0], 3 * widths[-1], widths[0], widths),
+        )
+
+    def spacing(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        return values[1:] / 2
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         course = scene.predicted[:, CHANNELS.index(target)]
-        speed = np.gradient(course) * scene.rate_hz
-        typical = np.sqrt(np.mean(speed[scene.valid] ** 2)) if scene.valid.any() else 1.0
-        return _in_channel(scene, target, values[0] * np.tanh(2 * speed / max(typical, 1e-9)))
+        behind = with_play(course, float(values[1])) - course
+        return _in_channel(scene, target, values[0] * behind / (0.5 * values[1]))
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
-        order = "with" if values[0] > 0 else "against"
+        order = "against" if values[0] > 0 else "with"
         return (
             f"an error of {OF_THE_LAB[target]} by up to {abs(values[0]):.1f} {unit_of(target)} "
             f"{order} the direction in which it is changing, as of play or friction"
         )
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        return (("error", unit_of(target), float(abs(values[0]))),)
+
+
+def with_play(course: np.ndarray, width: float) -> np.ndarray:
+    """(N,) what shows a course (N,) through a play of this full width, from its middle."""
+    shown, at = np.empty_like(course), course[0]
+    for k, value in enumerate(course):
+        at = min(max(at, value - 0.5 * width), value + 0.5 * width)
+        shown[k] = at
+    return shown
 
 
 class Spring(Pattern):

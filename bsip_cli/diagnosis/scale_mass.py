@@ -73,6 +73,5 @@ def _tried(
     found = Explanation(place, np.array([size]))
     fit = fit_together(evidence, (found,))
     gain = gain_of(evidence, trials, before.residual, fit.residual, fit.tangent)
-    return Tried(
-        fit.explanations[0], score_of(before, fit, 1), p_value, gain, fit, is_leftover=False
-    )
+    score = score_of(before, fit, 1)
+    return Tried(fit.explanations[0], score, p_value, gain, fit, is_leftover=False, is_first=True)

@@ -25,6 +25,8 @@ ALPHA = 0.01  # in every round; with the chance's own errors one null in twenty 
 BEYOND_DOUBT = 1e-6  # so rare by chance that a gain above its standard error is enough
 WORTH = 0.01  # of the squared residual of its trials: what takes less changes no result
 SUPPORT = 8.0  # squared white residual that a trial must save to share a cause
+# Of what a cause explains in a trial: so much is lost where its size is a fifth off.
+OTHER_SIZE = 0.04
 # A cause from the catalogue is named though a regularity without a name explains a bit more.
 NAMED_AT = 0.95
 # What a large cause leaves behind, since no model of it is exact, is no other cause.
@@ -34,7 +36,10 @@ AGAIN = 1.25  # how much more an effect counts that another trial shows already
 
 @dataclass(frozen=True)
 class Tried:
-    """A candidate that was refitted in full, beside the causes found before it."""
+    """A candidate that was refitted in full, beside the causes found before it.
+
+    is_first : none of its trials holds one of them.
+    """
 
     explanation: Explanation
     score: float
@@ -42,16 +47,17 @@ class Tried:
     gain: Gain
     fit: Fit
     is_leftover: bool
+    is_first: bool
 
     @property
     def is_good(self) -> bool:
         """Rarer by chance than ALPHA, better on what it has not seen, worth a name, and not what
-        is left over of a larger cause. What has no name, or is not far beyond chance, must be
-        better for sure."""
+        is left over of a larger cause. What has no name, comes after another cause, or is not far
+        beyond chance, must be better for sure."""
         if self.p_value > ALPHA or self.is_leftover or self.gain.percent < 100 * WORTH:
             return False
         unnamed = self.explanation.effect.name == UNEXPLAINED
-        doubtful = unnamed or self.p_value > BEYOND_DOUBT
+        doubtful = unnamed or not self.is_first or self.p_value > BEYOND_DOUBT
         return self.gain.is_sure() if doubtful else self.gain.is_real()
 
 
@@ -233,7 +239,8 @@ def _refitted(
 ) -> tuple[Explanation, Fit, float] | None:
     """In full, beside the causes found before; nothing if it turns out impossible.
 
-    What lasts is tried in all trials too, and given up in those that do not support it.
+    What lasts is tried in all trials too, and given up in those that do not support it, or
+    with another size.
     """
     evidence = signatures.evidence
     start = refined(evidence, _start(evidence, place, sizes), before)
@@ -261,14 +268,33 @@ def _squares(fit: Fit) -> float:
 
 
 def _supported(evidence: Evidence, before: Fit, fit: Fit) -> Fit:
-    """The last cause in those of its trials only whose residual becomes smaller by it."""
+    """The last cause in those of its trials only whose residual becomes smaller by it, and that
+    agree on its size."""
     one = fit.explanations[-1]
     saved = before.residual**2 - fit.residual**2
     trials = tuple(t for t in one.place.trials if saved[evidence.rows(t)].sum() > SUPPORT)
+    if trials == one.place.trials and len(trials) > 1:
+        trials = _agreeing(evidence, fit, saved)
     if not trials or trials == one.place.trials:
         return fit
     fewer = replace(one, place=replace(one.place, trials=trials))
-    return fit_together(evidence, (*fit.explanations[:-1], fewer))
+    return _supported(evidence, before, fit_together(evidence, (*fit.explanations[:-1], fewer)))
+
+
+def _agreeing(evidence: Evidence, fit: Fit, saved: np.ndarray) -> tuple[int, ...]:
+    """Trials of the last cause but the one, if any, that a size of its own fits far better."""
+    trials = fit.explanations[-1].place.trials
+    mine = fit.columns(len(fit.explanations) - 1, evidence)
+    shares = {}
+    for t in trials:
+        rows = evidence.rows(t)
+        tangent, residual = fit.tangent[rows, mine], fit.residual[rows]
+        step = np.linalg.lstsq(tangent, residual, rcond=None)[0]
+        more = float(residual @ tangent @ step)
+        whole = more + float(saved[rows].sum())
+        shares[t] = more / max(whole, SUPPORT / OTHER_SIZE)
+    odd = max(trials, key=lambda t: shares[t])
+    return tuple(t for t in trials if t != odd or shares[t] < OTHER_SIZE)
 
 
 def _judged(
@@ -282,7 +308,9 @@ def _judged(
     trials = found.place.trials
     gain = gain_of(evidence, trials, before.residual, fit.residual, fit.tangent)
     leftover = _is_leftover(evidence, trials, before.residual, fit.residual)
-    return Tried(found, score, chance.p_value(score, trials), gain, fit, leftover)
+    touched = {t for e in before.explanations for t in e.place.trials}
+    first = touched.isdisjoint(trials)
+    return Tried(found, score, chance.p_value(score, trials), gain, fit, leftover, first)
 
 
 def _is_leftover(

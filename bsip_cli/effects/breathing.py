@@ -11,6 +11,7 @@ SLOWEST_HZ, FASTEST_HZ = 0.12, 0.6
 # The breastbone moves ahead and up; torso axes.
 OUTWARD = np.array([0.8, 0.6, 0.0])
 LEAST_BREATHS = 3
+PACE_HZ = 3e-4  # to which a pace is known: nobody breathes like a clock
 
 
 class Breathing(Effect):
@@ -29,7 +30,7 @@ class Breathing(Effect):
         return (
             Parameter("cosine", "kg m", -1.0, 1.0, 0.05),
             Parameter("sine", "kg m", -1.0, 1.0, 0.05),
-            Parameter("frequency", "Hz", _slowest_hz(scene), 0.7, apart, paces),
+            Parameter("frequency", "Hz", _slowest_hz(scene), 0.7, apart, paces, known_to=PACE_HZ),
         )
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:

@@ -96,6 +96,11 @@ class Effect(ABC):
         parameters = self.parameters(scene, target)
         return tuple((p.name, p.unit, float(x)) for p, x in zip(parameters, values, strict=True))
 
+    def alike(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """(n, K) values whose change is the same wherever the recording is valid, the plainest
+        first; by default these alone."""
+        return values[None]
+
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Whether the values can be true of a body or a lab; at a bound they would go beyond it."""
         parameters = self.parameters(scene, target)

@@ -9,6 +9,8 @@ from bsip_cli.effects.displaced import displaced
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
+MOST_M = 0.05
+
 
 class JointCentre(Effect):
     """The true centre is the model's plus the shift, in the parent's axes.
@@ -40,6 +42,10 @@ class JointCentre(Effect):
         apart = (_apart(scene, i) @ values)[:, None, :, None]
         errors = np.broadcast_to(apart, (len(apart), len(markers), 3, 1))
         return scene.pose_response.left(errors, markers)[..., 0]
+
+    def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
+        """No further than palpated or regressed centres lie off."""
+        return super().possible(scene, target, values) and bool(np.linalg.norm(values) < MOST_M)
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         return (

@@ -11,6 +11,7 @@ from bsip_cli.effects.scene import Scene
 APART_S = 0.5
 BEFORE_S = 1.0
 ABSORBED = (0.0, 0.5)
+SKIN_M, MOMENT_S = 0.0015, 0.03  # to which place and moment are known: skin gives way
 ASTRAY_M = 0.006  # a residual that lasts, or changes its level, by this much
 OWN_SHARE = 0.3  # of the marker's own squared residual that a shift must take away
 
@@ -45,9 +46,15 @@ class MarkerShift(Effect):
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         first, last = float(scene.times_s[0]), float(scene.times_s[-1])
         return (
-            *(Parameter(axis, "m", -0.15, 0.15, 0.02) for axis in "xyz"),
+            *(Parameter(axis, "m", -0.15, 0.15, 0.02, known_to=SKIN_M) for axis in "xyz"),
             Parameter(
-                "from_time", "s", first - BEFORE_S, last, APART_S, self._moments(scene, target)
+                "from_time",
+                "s",
+                first - BEFORE_S,
+                last,
+                APART_S,
+                self._moments(scene, target),
+                known_to=MOMENT_S,
             ),
             Parameter("absorbed", "1", 0.0, 1.0, 0.25, ABSORBED),
         )

@@ -15,6 +15,8 @@ from bsip_cli.effects.scene import Scene
 BELOW = 0.4  # of length and mass of the upper torso: up to T12/L1
 CHORD = 0.3  # share at which the change is exact; for others it is taken for linear
 AXES = {"flexion": 2, "lateral": 0, "axial": 1}
+LITTLE_RAD = 0.15
+SHARE = 0.15  # to which a part is known: no trunk bends at two places only
 _WORTH_A_WORD = 0.05
 _MOVEMENTS = {"flexion": "bending forwards", "lateral": "bending sideways", "axial": "turning"}
 
@@ -61,7 +63,7 @@ class MissingJoint(Effect):
         return tuple(s for s, kind in jointed if s == "upper_torso" and kind == "spherical")
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        return tuple(Parameter(axis, "1", -0.5, 1.5, 0.3) for axis in AXES)
+        return tuple(Parameter(axis, "1", -0.5, 1.5, 0.3, known_to=SHARE) for axis in AXES)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         return scene.once(self.name, lambda: _wrenches(scene, target)) @ values
@@ -74,10 +76,18 @@ class MissingJoint(Effect):
     def reported(
         self, scene: Scene, target: str, values: np.ndarray
     ) -> tuple[tuple[str, str, float], ...]:
-        """Range of the second bend about each axis."""
-        turn = _turn(scene, scene.person.skeleton.index(target))
+        """Range of the second bend about each axis: its part of the turn that the pose would have
+        without it."""
+        i = scene.person.skeleton.index(target)
+        turn = _turn(scene, i) - _dragged(scene, target, i) @ values
         ranges = np.ptp(turn[:, list(AXES.values())], axis=0) * values
         return tuple((axis, "rad", float(x)) for axis, x in zip(AXES, ranges, strict=True))
+
+    def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
+        """A movement that is hardly made says nothing of its part."""
+        made = np.ptp(_turn(scene, scene.person.skeleton.index(target)), axis=0) > LITTLE_RAD
+        asked = np.where(made[list(AXES.values())], values, 0.0)
+        return super().possible(scene, target, asked)
 
     def sentence(self, target: str, values: np.ndarray) -> str:
         shares = dict(zip(AXES, values.tolist(), strict=True))
@@ -90,6 +100,13 @@ def _turn(scene: Scene, i: int) -> np.ndarray:
     """(N, 3) rotation vector of a spherical joint [rad]."""
     at = scene.person.skeleton.q_starts[i]
     return Rotation.from_quat(scene.q[:, at : at + 4]).as_rotvec()
+
+
+def _dragged(scene: Scene, target: str, i: int) -> np.ndarray:
+    """(N, 3, 3) by how much less the pose turns the waist, as a rotation vector, per share."""
+    moved = scene.pose_response.of(_errors(scene, target), scene.markers_beyond(i))
+    at = scene.person.skeleton.v_starts[i]
+    return moved[:, at : at + 3]
 
 
 def _shift_of(scene: Scene, i: int, place_m: np.ndarray) -> np.ndarray:

@@ -14,6 +14,7 @@ WINDOWS_S = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0
 SHORTEST_S = 0.7
 RAMP_S = 0.3  # in which a person leans on something, or lets go
 EDGE_S = 0.05  # to which it is known when that begins and ends: nobody does it along a ramp
+ALIKE = 21  # windows that differ only where nothing is measured
 MOST_WINDOWS = 30  # side by side; shorter contacts are found in part of a window, and refined
 
 
@@ -73,6 +74,18 @@ class UnmeasuredContact(Effect):
             *parts,
         )
 
+    def alike(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """A touch that is whole when the plates begin to measure may have begun long before; the
+        plainest is that it began just then. So with its end."""
+        start, end = values[3] - values[4] / 2, values[3] + values[4] / 2
+        ramp = min(RAMP_S, values[4] / 2)
+        plateau = values[:3] / (1 - ramp / values[4])
+        starts = np.linspace(*_unseen(scene, start, ramp), ALIKE)
+        ends = -np.linspace(*_unseen(scene, -end, ramp, backwards=True), ALIKE)
+        lengths = ends - starts
+        forces = plateau * (1 - np.minimum(RAMP_S / lengths, 0.5))[:, None]
+        return np.column_stack([forces, (starts + ends) / 2, lengths])
+
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """A touch that lasts: at the edge of what is measured a step onto the plate looks alike."""
         touching = np.abs(scene.times_s - values[3]) <= values[4] / 2
@@ -86,6 +99,20 @@ class UnmeasuredContact(Effect):
             f"{in_words(target)} "
             f"with {np.linalg.norm(values[:3]):.0f} N"
         )
+
+
+def _unseen(scene: Scene, edge: float, ramp: float, backwards: bool = False) -> tuple[float, float]:
+    """Latest and earliest time at which a touch may have begun that is whole when it is seen.
+
+    Both are the edge itself where the plates measure how it grows. Backwards in time for its end.
+    """
+    sign = -1 if backwards else 1
+    times, valid = sign * scene.times_s[::sign], scene.valid[::sign]
+    after, before = valid & (times >= edge), valid & (times < edge)
+    first = float(times[after][0]) if after.any() else edge
+    last = float(times[before][-1]) if before.any() else float(times[0])
+    hidden = edge + ramp <= first
+    return (first - ramp, min(last, first - ramp)) if hidden else (edge, edge)
 
 
 def _contact_m(scene: Scene, target: str) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from zlib import crc32
 
 import numpy as np
@@ -15,6 +16,7 @@ from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import FOLDS, values_without
 from bsip_cli.diagnosis.intervals import bounds
+from bsip_cli.diagnosis.marker_proof import Proof, Slip, proofs_of
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.diagnosis.scale_mass import weight_round, weight_share
@@ -43,12 +45,14 @@ def run(unit: Unit) -> None:
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     prior = prior_of(unit, person)
-    trials, held = moving_trials(unit, person, prior)
-    told = (*held, *_standing(unit, person, prior))
+    looked_at = moving_trials(unit, person, prior)
+    trials = tuple(one.evidence for one in looked_at if one.evidence is not None)
+    told = (*(f for one in looked_at for f in one.told), *_standing(unit, person, prior))
     if trials:
-        _write(unit, *_asked(unit, trials, told))
+        proven = [cause for one in looked_at for cause in one.causes]
+        _write(unit, *_asked(unit, trials, told, proven))
         return
-    if not held:
+    if not told:
         unit.warn(
             f"{unit.name}: no trial has {_SHORTEST_S:g} s of motion with every contact on a "
             "plate; no movement can be diagnosed"
@@ -58,7 +62,7 @@ def run(unit: Unit) -> None:
 
 
 def _asked(
-    unit: Unit, trials: tuple[TrialEvidence, ...], told: tuple[Finding, ...]
+    unit: Unit, trials: tuple[TrialEvidence, ...], told: tuple[Finding, ...], proven: list[dict]
 ) -> tuple[pd.DataFrame, pd.DataFrame, dict]:
     """Diagnosis, detection limits and facts, of the moving trials and of what is told already."""
     rng = np.random.default_rng(crc32(unit.name.encode()))
@@ -67,7 +71,8 @@ def _asked(
     selection = select(signatures_of(evidence, ASKED), rng, first)
     findings = findings_of(selection, rng)
     facts = _facts(selection, findings)
-    facts["trials"] += _trials_of(told)
+    facts["trials"] = list(dict.fromkeys([*facts["trials"], *_trials_of(told)]))
+    facts["causes"] = [*proven, *facts["causes"]]
     rows = rows_of((*told, *findings), tuple(one.name for one in trials))
     return rows, _detection(selection), facts
 
@@ -82,14 +87,20 @@ def _write(unit: Unit, diagnosis: pd.DataFrame, limits: pd.DataFrame, facts: dic
             unit.warn(f"{unit.name}: {sentence}")
 
 
-def moving_trials(
-    unit: Unit, person: Person, prior: Prior
-) -> tuple[tuple[TrialEvidence, ...], tuple[Finding, ...]]:
-    """The evidence of trials that move, and what the hands hold on to in others."""
+@dataclass(frozen=True)
+class LookedAt:
+    """A moving trial: its evidence, if there is enough to ask; what it tells by itself; and of
+    that the causes in full that the forces show too."""
+
+    evidence: TrialEvidence | None = None
+    told: tuple[Finding, ...] = ()
+    causes: tuple[dict, ...] = ()
+
+
+def moving_trials(unit: Unit, person: Person, prior: Prior) -> tuple[LookedAt, ...]:
+    """The evidence of trials that move, and what hands or markers tell of them beforehand."""
     moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
-    looked_at = [_looked_at(unit, person, prior, trial) for trial in moving]
-    trials = tuple(one for one in looked_at if isinstance(one, TrialEvidence))
-    return trials, tuple(one for one in looked_at if isinstance(one, Finding))
+    return tuple(_looked_at(unit, person, prior, trial) for trial in moving)
 
 
 def prior_of(unit: Unit, person: Person) -> Prior:
@@ -98,23 +109,57 @@ def prior_of(unit: Unit, person: Person) -> Prior:
     return prior_from(unit, unit.read("regression"), person, **(known if _is_weighed(unit) else {}))
 
 
-def _looked_at(
-    unit: Unit, person: Person, prior: Prior, trial: Trial
-) -> TrialEvidence | Finding | None:
-    """A trial's evidence, or what the hands hold on to in it; None if the trial is too short."""
+def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial) -> LookedAt:
     scene = scene_of(unit, person, prior.phi, trial)
     if scene.valid.sum() < _SHORTEST_S * scene.rate_hz:
-        return None
+        return LookedAt()
     fewer = slow(scene)
     held = support_of(fewer)
     if held is not None:
-        return held.finding(trial.stem)
+        return LookedAt(told=(held.finding(trial.stem),))
     options = unit.config.diagnosis
     rng = np.random.default_rng(crc32(trial.stem.encode()))
     own = own_nuisances(fewer, options.skin_factor, options.skin_draws, rng)
     shared = shared_nuisances(fewer, prior.root, options.marker_sd_m)
     level = acceleration_noise(unit.read("kinematics", trial), person.skeleton)
-    return trial_evidence(trial.stem, scene, own, shared, level, options.cutoff_hz)
+
+    def evidence_with(nuisances: np.ndarray) -> TrialEvidence:
+        return trial_evidence(trial.stem, scene, nuisances, shared, level, options.cutoff_hz)
+
+    proofs = proofs_of(fewer, _slips(unit, trial), rng)
+    if not proofs:
+        return LookedAt(evidence_with(own))
+    alone = together((evidence_with(own),))
+    gains = [one.gain(alone) for one in proofs]
+    told = tuple(
+        one.finding(fewer, trial.stem, gain) for one, gain in zip(proofs, gains, strict=True)
+    )
+    beside = np.concatenate([own, *(one.columns(fewer) for one in proofs)], axis=2)
+    helping = (one for one, gain in zip(proofs, gains, strict=True) if gain.is_real())
+    causes = tuple(_proven(one, trial) for one in helping)
+    return LookedAt(evidence_with(beside), told, causes)
+
+
+def _slips(unit: Unit, trial: Trial) -> list[Slip]:
+    """That the inverse kinematics has found."""
+    events = unit.read("marker-events", trial)
+    slips = events[events["kind"] == "slip"]
+    columns = (slips[name] for name in ("marker", "start_s", "statistic"))
+    return [Slip(str(m), float(t), float(z)) for m, t, z in zip(*columns, strict=True)]
+
+
+def _proven(one: Proof, trial: Trial) -> dict:
+    """A cause in full, with the same sizes for every fold: no plate helped to find them."""
+    values = one.values.tolist()
+    return {
+        "effect": one.effect.name,
+        "target": one.target,
+        "trials": [trial.stem],
+        "verdict": "named" if one.is_alone else "ambiguous",
+        "values": values,
+        "folds": [values] * FOLDS,
+        "bounds": {},
+    }
 
 
 def _only_motion_weighs(unit: Unit) -> bool:

@@ -91,7 +91,8 @@ def signatures_of_person(batch: Path, name: str) -> Signatures:
     unit = Unit(stage, opened.study, batch / "out", opened.config, participant, None)
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    trials, _ = moving_trials(unit, person, prior_of(unit, person))
+    looked_at = moving_trials(unit, person, prior_of(unit, person))
+    trials = tuple(one.evidence for one in looked_at if one.evidence is not None)
     return signatures_of(together(trials), ASKED)
 
 

@@ -14,7 +14,7 @@ from bsip_cli.diagnosis.detection import Limit, limits_of
 from bsip_cli.diagnosis.explanation import NEGLIGIBLE
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import gain_of
-from bsip_cli.diagnosis.patterns import PATTERNS
+from bsip_cli.diagnosis.patterns import PATTERNS, with_play
 from bsip_cli.diagnosis.selection import ALPHA, Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
@@ -124,6 +124,25 @@ def test_what_lasts_is_one_cause_of_both_trials():
     (one,) = said_of(selection_of(noisy(late(first, 0.008), 5), noisy(late(second, 0.008), 6)))
     assert one.effect == "sync_offset" and one.trials == ("a", "b")
     assert number_of(one, "delay").value == pytest.approx(0.008, abs=2e-4)
+
+
+def test_trials_whose_delays_differ_have_a_delay_each():
+    first, second = part_of_moving(0, 8), part_of_moving(8, 8)
+    found = said_of(selection_of(noisy(late(first, 0.006), 5), noisy(late(second, 0.014), 6)))
+    sizes = {one.trials: number_of(one, "delay").value for one in found}
+    assert {one.effect for one in found} == {"sync_offset"}
+    assert sizes == {("a",): pytest.approx(0.006, abs=3e-4), ("b",): pytest.approx(0.014, abs=3e-4)}
+
+
+def test_a_channel_with_play_has_no_name():
+    scene = part_of_moving(0, 12)
+    course = scene.predicted[:, 1]
+    stuck = np.zeros((len(course), 6))
+    stuck[:, 1] = with_play(course, 16.0) - course
+    (one,) = said_of(selection_of(noisy(shown(scene, stuck), 2)))
+    assert one.effect == "unexplained" and "as of play or friction" in one.sentence
+    error = number_of(one, "error")
+    assert error.low < 8.0 < error.high
 
 
 def test_a_fault_of_one_trial_is_not_put_on_the_other():

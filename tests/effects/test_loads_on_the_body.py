@@ -14,7 +14,7 @@ from bsip_cli.effects.added_mass import AddedMass
 from bsip_cli.effects.breathing import OUTWARD, Breathing
 from bsip_cli.effects.released_object import ReleasedObject
 from bsip_cli.effects.segment_inertia import SegmentInertia
-from bsip_cli.effects.unmeasured_contact import UnmeasuredContact
+from bsip_cli.effects.unmeasured_contact import RAMP_S, UnmeasuredContact
 from bsip_cli.effects.wobbling_mass import WobblingMass
 
 G = 9.80665
@@ -113,6 +113,27 @@ def test_a_contact_lasts():
     assert effect.possible(scene, "hand_l", long)
     assert not effect.possible(scene, "hand_l", short)
     assert not effect.possible(replace(scene, valid=TIMES < 3.0), "hand_l", long)
+
+
+def test_a_contact_may_have_begun_while_nothing_was_measured():
+    effect = UnmeasuredContact()
+    scene = replace(moving(), valid=(TIMES < 1.0) | (TIMES >= 3.0))
+    long = np.array([10.0, 0.0, 50.0, 3.25, 2.5])  # from 2.0 to 4.5 s
+    windows = effect.alike(scene, "hand_l", long)
+    starts, ends = (windows[:, 3] + side * windows[:, 4] / 2 for side in (-1, 1))
+    np.testing.assert_allclose(ends, 4.5)
+    assert starts[0] == pytest.approx(3.0 - RAMP_S, abs=0.02)
+    assert starts[-1] == pytest.approx(1.0, abs=0.02)
+    for one in windows:
+        change = effect.change(scene, "hand_l", one) - effect.change(scene, "hand_l", long)
+        assert np.abs(change[scene.valid]).max() < 1e-9
+
+
+def test_a_contact_that_is_seen_to_begin_began_then():
+    scene, seen = moving(), np.array([10.0, 0.0, 50.0, 3.25, 2.5])
+    np.testing.assert_allclose(
+        UnmeasuredContact().alike(scene, "hand_l", seen)[[0, -1]], [seen] * 2
+    )
 
 
 @pytest.mark.parametrize(("frequency", "damping"), [(3.0, 0.1), (6.5, 0.3)])

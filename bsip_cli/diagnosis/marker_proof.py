@@ -1,0 +1,250 @@
+"""What the markers prove by themselves: a slip, a second bend of the trunk, a joint's true centre.
+
+The pose is the best that the model can do; what a cause leaves of the markers is linear in its
+sizes like the wrench, and far sharper: the skin slides by millimetres. What is proven here is no
+question to the plates any more, and its course in the wrench is nobody else's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from bsip_cli.diagnosis.candidates import Candidate
+from bsip_cli.diagnosis.explanation import Explanation
+from bsip_cli.diagnosis.findings import Finding, interval_words, numbers_of
+from bsip_cli.diagnosis.held_out import Gain
+from bsip_cli.diagnosis.intervals import DRAWS, SCALE_ERROR
+from bsip_cli.diagnosis.signatures import Place
+from bsip_cli.diagnosis.together import BLOCK_S, Evidence, clipped
+from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.scene import Scene
+
+ENOUGH_HZ = 10.0  # for a course of many seconds
+# Of the markers' squared residuals, their means left out: skin that follows the bending of the
+# trunk looks like a second bend for a tenth at most.
+PROVEN = 0.25
+OWN = 0.5  # of a marker's own squared residual: else its skin slides more than it slips
+RIVAL = 0.9  # of the best one's share: who explains as much cannot be told from it
+CLASS = "M"
+SLIP, BENDS = "marker_shift", ("missing_joint", "joint_centre")
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A level that a marker's residual changes to; unlikeliness in standard deviations."""
+
+    marker: str
+    start_s: float
+    statistic: float
+
+
+@dataclass(frozen=True)
+class Proof:
+    """A cause in one trial, sized by the markers.
+
+    values : (K,) all parameters, in the effect's order. draws : (DRAWS, K) as they might as well
+    be. share : of the markers' squared residuals, of a slip of its own marker's. is_alone :
+    nothing else explains them as well.
+    """
+
+    effect: Effect
+    target: str
+    values: np.ndarray
+    draws: np.ndarray
+    share: float
+    p_value: float
+    is_alone: bool = True
+
+    def columns(self, scene: Scene) -> np.ndarray:
+        """(N, 6, k) what it may do to the wrench, sizes of unit variance: the plates do not judge
+        how far the mass follows the markers."""
+        free = _is_free(self.effect, scene, self.target)
+        typical = np.array([p.typical for p in self.effect.parameters(scene, self.target)])
+        sizes = (typical + np.abs(self.values))[free]
+        return self.effect.tangent(scene, self.target, self.values) * sizes
+
+    def gain(self, evidence: Evidence) -> Gain:
+        """What it takes off the wrench's residual in its trial's evidence, which did not help to
+        find its sizes."""
+        scene = evidence.trials[0].scene
+        free = _is_free(self.effect, scene, self.target)
+        candidate = Candidate(self.effect, self.target, tuple(self.values[~free]))
+        one = Explanation(Place(candidate, (0,)), self.values)
+        before = clipped(evidence.residual)
+        saved = before**2 - clipped(evidence.residual - one.change(evidence)) ** 2
+        numbers, block = np.unique(evidence.blocks(), return_inverse=True)
+        blocks = np.bincount(block, saved)
+        return Gain(blocks, np.ones(len(numbers), dtype=bool), float((before**2).sum()))
+
+    def finding(self, scene: Scene, trial: str, gain: Gain) -> Finding:
+        """As the diagnosis prints it."""
+        reported = self.effect.reported(scene, self.target, self.values)
+        drawn = [self.effect.reported(scene, self.target, one) for one in self.draws]
+        numbers = numbers_of(reported, drawn)
+        told = self.effect.sentence(self.target, self.values) + interval_words(numbers)
+        whose = "the markers leave" if self.effect.name != SLIP else "the marker leaves"
+        sentence = f"{told}; this is {100 * self.share:.0f} % of what {whose}"
+        if not self.is_alone:
+            sentence += f"; other causes look alike here: to tell them apart, {self.effect.remedy}"
+        return Finding(
+            self.effect.name,
+            self.target,
+            (trial,),
+            "named" if self.is_alone else "ambiguous",
+            "" if self.is_alone else CLASS,
+            self.p_value,
+            gain.interval(),
+            numbers,
+            sentence,
+        )
+
+
+def proofs_of(scene: Scene, slips: Sequence[Slip], rng: np.random.Generator) -> tuple[Proof, ...]:
+    """What a trial's markers prove: the slips that were found in them, and what bends otherwise
+    than the model has it."""
+    if scene.residual_m is None:
+        return ()
+    fewer = scene.every(max(1, int(scene.rate_hz / ENOUGH_HZ)))
+    assert fewer.residual_m is not None
+    left, found = fewer.residual_m, []
+    for slip in slips:
+        p_value = float(chi2.sf(slip.statistic**2, 3))
+        one = _sized(fewer, left, EFFECTS[SLIP], slip.marker, (slip.start_s, 0.0), rng)
+        one = replace(one, p_value=p_value, share=_own_share(fewer, left, one))
+        if one.share < OWN:
+            continue
+        found.append(one)
+        left = left - _left(one.effect, fewer, one.target, one.values)
+    return (*found, *_bends(fewer, left, rng))
+
+
+def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:
+    """Part of the squared residual of the marker that slips, its mean left out."""
+    m = scene.person.markers.index(one.target)
+    own = residual_m[:, m : m + 1]
+    change = _left(one.effect, scene, one.target, one.values)[:, m : m + 1]
+    columns, course, _ = _in_rows(scene, change[..., None], own)
+    return 1 - float(((course - columns[:, 0]) ** 2).sum() / (course @ course))
+
+
+def _bends(scene: Scene, residual_m: np.ndarray, rng: np.random.Generator) -> tuple[Proof, ...]:
+    """What bends otherwise than the model has it: the best, and all that explain as much."""
+    tried = [
+        _sized(scene, residual_m, EFFECTS[name], target, (), rng)
+        for name in BENDS
+        for target in EFFECTS[name].targets(scene)
+    ]
+    possible = [one for one in tried if one.effect.possible(scene, one.target, one.values)]
+    best = max((one.share for one in possible), default=0.0)
+    if best < PROVEN:
+        return ()
+    alike = sorted((x for x in possible if x.share > RIVAL * best), key=lambda x: -x.share)
+    return tuple(replace(one, is_alone=len(alike) == 1) for one in alike)
+
+
+def _sized(
+    scene: Scene,
+    residual_m: np.ndarray,
+    effect: Effect,
+    target: str,
+    scanned: tuple[float, ...],
+    rng: np.random.Generator,
+) -> Proof:
+    """The effect's free parameters from the markers' residuals (N, m, 3), scanned ones given.
+
+    Stretches of BLOCK_S are taken for independent: so much noise is laid on each frame that all
+    frames together say no more, and the sizes have their typical spread before the data.
+    """
+    candidate = Candidate(effect, target, scanned)
+    parameters = candidate.free(scene)
+    typical = np.array([p.typical for p in parameters])
+    shapes = [
+        _left(effect, scene, target, candidate.values(scene, one)) for one in np.diag(typical)
+    ]
+    columns, course, block = _in_rows(scene, np.stack(shapes, axis=-1), residual_m)
+    grams, rights = _sums(columns, course, block)
+    least = np.linalg.lstsq(grams.sum(axis=0), rights.sum(axis=0), rcond=None)[0]
+    noise = float(((course - columns @ least) ** 2).mean()) * BLOCK_S * scene.rate_hz
+    prior = noise * np.eye(len(typical))
+    size = np.linalg.solve(grams.sum(axis=0) + prior, rights.sum(axis=0))
+    left = course - columns @ size
+    known_to = np.array([p.known_to / p.typical for p in parameters])
+    spread = np.hypot(known_to, SCALE_ERROR * size)
+    draws = [
+        candidate.values(scene, typical * (one + spread * rng.standard_normal(len(size))))
+        for one in _bootstrap(grams, rights, prior, rng)
+    ]
+    return Proof(
+        effect,
+        target,
+        candidate.values(scene, typical * size),
+        _scattered(effect, scene, target, np.array(draws), rng),
+        1 - float(left @ left) / float(course @ course),
+        float(chi2.sf(size @ grams.sum(axis=0) @ size / noise, len(size))),
+    )
+
+
+def _left(effect: Effect, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+    """(N, m, 3) what an effect that touches markers leaves of them."""
+    change = effect.marker_change(scene, target, values)
+    assert change is not None
+    return change
+
+
+def _in_rows(
+    scene: Scene, shapes_m: np.ndarray, residual_m: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Shapes (r, k), residual (r,) and number of the stretch (r,) where both are known, without
+    the mean of each marker and direction."""
+    known = np.isfinite(residual_m).all(axis=2) & np.isfinite(shapes_m).all(axis=(2, 3))
+    block = ((scene.times_s - scene.times_s[0]) / BLOCK_S).astype(int)
+    blocks = np.repeat(np.broadcast_to(block[:, None], known.shape)[known], 3)
+    columns, course = (_centred(x, known)[known] for x in (shapes_m, residual_m[..., None]))
+    return columns.reshape(-1, shapes_m.shape[-1]), course.ravel(), blocks
+
+
+def _centred(x: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """(N, m, 3, k) less its mean over the known frames (N, m)."""
+    weight = known[..., None, None]
+    total = np.where(weight, x, 0.0).sum(axis=0)
+    return x - total / np.maximum(weight.sum(axis=0), 1)
+
+
+def _sums(
+    columns: np.ndarray, course: np.ndarray, block: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(b, k, k) and (b, k) normal equations of each stretch."""
+    mine = [block == number for number in np.unique(block)]
+    grams = np.stack([columns[rows].T @ columns[rows] for rows in mine])
+    return grams, np.stack([columns[rows].T @ course[rows] for rows in mine])
+
+
+def _bootstrap(
+    grams: np.ndarray, rights: np.ndarray, prior: np.ndarray, rng: np.random.Generator
+) -> list[np.ndarray]:
+    """DRAWS of the sizes (k,), stretches drawn with replacement."""
+    count = len(grams)
+    drawn = rng.integers(count, size=(DRAWS, count))
+    return [
+        np.linalg.solve(grams[one].sum(axis=0) + prior, rights[one].sum(axis=0)) for one in drawn
+    ]
+
+
+def _scattered(
+    effect: Effect, scene: Scene, target: str, draws: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """Draws (n, K) whose scanned parameters are known as well as they can be."""
+    for k, parameter in enumerate(effect.parameters(scene, target)):
+        if parameter.scan:
+            draws[:, k] += parameter.known_to * rng.standard_normal(len(draws))
+    return draws
+
+
+def _is_free(effect: Effect, scene: Scene, target: str) -> np.ndarray:
+    """(K,) True for the parameters without a scan."""
+    return np.array([not p.scan for p in effect.parameters(scene, target)])

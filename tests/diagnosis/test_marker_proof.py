@@ -1,0 +1,107 @@
+"""What markers prove by themselves, in residuals of skin that slides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from moving_scene import moving
+from noisy_trial import all_of, noisy
+from scipy.ndimage import gaussian_filter1d
+
+from bsip_cli.diagnosis.marker_proof import Proof, Slip, proofs_of
+from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.scene import Scene
+
+SKIN_M, SLOW_S, DURATION_S = 0.003, 0.4, 12.0
+SLIP = Slip("LKNEL", 5.0, 12.0)
+
+
+def skin(scene: Scene, size_m: float) -> np.ndarray:
+    """(N, m, 3) errors of this size that come and go within SLOW_S."""
+    shape = (len(scene.times_s), len(scene.person.markers), 3)
+    drawn = np.random.default_rng(5).standard_normal(shape)
+    slow = gaussian_filter1d(drawn, SLOW_S * scene.rate_hz, axis=0)
+    return size_m * slow / slow.std()
+
+
+def seen(name: str = "", target: str = "", *values: float, skin_m: float = SKIN_M) -> Scene:
+    """The moving person whose markers slide, and leave what an effect makes of them."""
+    scene = noisy(moving(DURATION_S), 3)
+    residual = skin(scene, skin_m)
+    if name:
+        known = replace(scene, residual_m=residual)
+        residual = residual + EFFECTS[name].marker_change(known, target, np.array(values))
+    return replace(scene, residual_m=residual)
+
+
+def proofs(scene: Scene, *slips: Slip) -> tuple[Proof, ...]:
+    return proofs_of(scene, slips, np.random.default_rng(0))
+
+
+def numbers(scene: Scene, proof: Proof) -> dict[str, tuple[float, float, float]]:
+    (alone,) = all_of(scene).trials
+    finding = proof.finding(scene, "a", proof.gain(all_of(scene)))
+    assert alone.name == "a" and finding.trials == ("a",)
+    return {one.name: (one.low, one.value, one.high) for one in finding.numbers}
+
+
+def test_skin_that_slides_proves_nothing():
+    assert proofs(seen(), SLIP) == ()
+
+
+def test_a_slip_has_the_size_that_the_markers_show():
+    scene = seen("marker_shift", SLIP.marker, 0.02, 0.0, -0.015, SLIP.start_s, 0.0)
+    (found,) = proofs(scene, SLIP)
+    assert (found.effect.name, found.target) == ("marker_shift", "LKNEL")
+    low, size, high = numbers(scene, found)["shift"]
+    assert low < 0.025 < high and size == pytest.approx(0.025, abs=0.003)
+    low, moment, high = numbers(scene, found)["from_time"]
+    assert moment == 5.0 and high - low == pytest.approx(0.12, abs=0.06)
+    assert found.p_value < 1e-12
+
+
+def test_a_second_bend_of_the_trunk_is_no_joint_centre():
+    scene = seen("missing_joint", "upper_torso", 0.8, 0.8, 0.8)
+    (found,) = proofs(scene)
+    assert (found.effect.name, found.is_alone) == ("missing_joint", True)
+    np.testing.assert_allclose(found.values, 0.8, atol=0.15)
+    low, _, high = numbers(scene, found)["flexion"]
+    true = EFFECTS["missing_joint"].reported(scene, "upper_torso", np.array([0.8, 0.8, 0.8]))
+    assert low < true[0][2] < high
+
+
+def other_knee() -> Scene:
+    return seen("joint_centre", "knee_l", 0.04, 0.02, 0.0, skin_m=0.001)
+
+
+def test_a_knee_that_lies_elsewhere_is_named():
+    (found,) = proofs(other_knee())
+    assert (found.effect.name, found.target) == ("joint_centre", "knee_l")
+    np.testing.assert_allclose(found.values[:2], [0.04, 0.02], atol=0.005)
+
+
+def test_a_sentence_says_how_much_of_the_residuals_it_is():
+    scene = seen("missing_joint", "upper_torso", 0.8, 0.8, 0.8)
+    (found,) = proofs(scene)
+    said = found.finding(scene, "a", found.gain(all_of(scene))).sentence
+    assert "second joint" in said and f"{100 * found.share:.0f} % of what the markers leave" in said
+
+
+def test_what_explains_as_much_makes_a_class():
+    scene = other_knee()
+    (found,) = proofs(scene)
+    rival = replace(found, is_alone=False).finding(scene, "a", found.gain(all_of(scene)))
+    assert (rival.verdict, rival.class_id) == ("ambiguous", "M")
+    assert "to tell them apart" in rival.sentence
+
+
+def test_columns_are_what_the_sizes_do_to_the_wrench():
+    scene = other_knee()
+    (found,) = proofs(scene)
+    columns = found.columns(scene)
+    assert columns.shape == (len(scene.times_s), 6, 3)
+    change = found.effect.change(scene, "knee_l", np.array([0.0, 0.0, 0.01]))
+    typical = 0.015 + abs(found.values[2])
+    np.testing.assert_allclose(columns[..., 2] / typical * 0.01, change, atol=1e-9)

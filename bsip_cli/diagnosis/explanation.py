@@ -170,17 +170,22 @@ def changes_of(evidence: Evidence, explanations: tuple[Explanation, ...]) -> lis
     ]
 
 
+def left_by(evidence: Evidence, explanations: tuple[Explanation, ...]) -> np.ndarray:
+    """(R,) white residual that explanations leave, outliers clipped."""
+    if not explanations:
+        return clipped(evidence.residual)
+    changes = enumerate(changes_of(evidence, explanations))
+    touched = {t for e in explanations for t in e.place.trials}
+    parts = {t: evidence.trials[t].white(x[..., None]) for t, x in changes if t in touched}
+    return clipped(evidence.residual - evidence.white(parts)[:, 0])
+
+
 def _linear(
     evidence: Evidence, explanations: tuple[Explanation, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
-    residual = evidence.residual
-    if explanations:
-        changes = enumerate(changes_of(evidence, explanations))
-        touched = {t for e in explanations for t in e.place.trials}
-        parts = {t: evidence.trials[t].white(x[..., None]) for t, x in changes if t in touched}
-        residual = residual - evidence.white(parts)[:, 0]
+    residual = left_by(evidence, explanations)
     tangents = [np.zeros((len(residual), 0)), *(one.tangent(evidence) for one in explanations)]
-    return clipped(residual), np.concatenate(tangents, axis=1)
+    return residual, np.concatenate(tangents, axis=1)
 
 
 def refined(evidence: Evidence, one: Explanation, others: Fit) -> Explanation:

@@ -18,21 +18,17 @@ from pathlib import Path
 from zlib import crc32
 
 import numpy as np
+from blind_evidence import batches, evidence_of_person, unit_of_person
 from blind_running import ROOT, Recorded, write_atomically
 from blind_tables import between_marks, wilson
 from tqdm import tqdm
 
-from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.evidence import TrialEvidence
 from bsip_cli.diagnosis.findings import findings_of
 from bsip_cli.diagnosis.selection import select
 from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.diagnosis.together import together
-from bsip_cli.pipeline import stages_named
-from bsip_cli.session import open_study
-from bsip_cli.stages.diagnose import ASKED, moving_trials, prior_of
-from bsip_cli.stages.frames import person_from
-from bsip_cli.unit import Unit
+from bsip_cli.stages.diagnose import ASKED
 
 DOCUMENT = ROOT / "docs" / "blind_suite.md"
 MARK = "tests/blind/redrawn_nulls.py"
@@ -61,11 +57,6 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def batches(kept: Path) -> list[Path]:
-    """Folders of people whose recordings and artifacts were kept."""
-    return [path.parent for path in sorted(kept.glob("batch-*/truth.json"))]
-
-
 def nulls_of(batch: Path) -> list[str]:
     recorded = (Recorded.from_record(one) for one in json.loads((batch / "truth.json").read_text()))
     return [one.participant for one in recorded if not one.truth["effects"]]
@@ -85,15 +76,7 @@ def redraw_person(asked: tuple[Path, str, int, Path]) -> None:
 
 def signatures_of_person(batch: Path, name: str) -> Signatures:
     """Evidence and candidates of all moving trials, as ``bsip diagnose`` has them."""
-    opened = open_study(batch / "study", batch / "out", (name,), None)
-    (stage,) = (one for one in stages_named("diagnose") if one.level == "participant")
-    (participant,) = opened.participants
-    unit = Unit(stage, opened.study, batch / "out", opened.config, participant, None)
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    looked_at = moving_trials(unit, person, prior_of(unit, person))
-    trials = tuple(one.evidence for one in looked_at if one.evidence is not None)
-    return signatures_of(together(trials), ASKED)
+    return signatures_of(evidence_of_person(unit_of_person(batch, name)), ASKED)
 
 
 def redrawn_alarms(signatures: Signatures, rng: np.random.Generator) -> list[str]:

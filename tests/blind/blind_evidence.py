@@ -1,0 +1,34 @@
+"""What `bsip diagnose` asks of kept recordings: where a black box is not enough."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.diagnosis.together import Evidence, together
+from bsip_cli.pipeline import stages_named
+from bsip_cli.session import open_study
+from bsip_cli.stages.diagnose import moving_trials, prior_of
+from bsip_cli.stages.frames import person_from
+from bsip_cli.unit import Unit
+
+
+def batches(kept: Path) -> list[Path]:
+    """Folders of people whose recordings and artifacts were kept."""
+    return [path.parent for path in sorted(kept.glob("batch-*/truth.json"))]
+
+
+def unit_of_person(batch: Path, name: str) -> Unit:
+    """The stage that diagnoses a person."""
+    opened = open_study(batch / "study", batch / "out", (name,), None)
+    (stage,) = (one for one in stages_named("diagnose") if one.level == "participant")
+    (participant,) = opened.participants
+    return Unit(stage, opened.study, batch / "out", opened.config, participant, None)
+
+
+def evidence_of_person(unit: Unit) -> Evidence:
+    """Of all moving trials."""
+    skeleton = load_skeleton(unit.config.skeleton)
+    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    looked_at = moving_trials(unit, person, prior_of(unit, person))
+    return together(tuple(one.evidence for one in looked_at if one.evidence is not None))

@@ -1,0 +1,159 @@
+"""How much of what the true cause would gain the found one gains.
+
+Run from the checkout after the long blind suite with ``--keep``. In every recording in which a
+hidden effect was found at its place, the gain on blocks held out, with the sizes that the other
+blocks gave, stands beside the gain of the very effect that was hidden, in the same coordinates.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from blind_evidence import batches, evidence_of_person, unit_of_person
+from blind_running import ROOT, Recorded, write_atomically
+from blind_tables import between_marks, markdown
+from blind_truth import Expected, expected
+from tqdm import tqdm
+
+from bsip_cli.diagnosis.candidates import Candidate
+from bsip_cli.diagnosis.cause import Cause
+from bsip_cli.diagnosis.explanation import Explanation, changes_of, fit_together, left_by
+from bsip_cli.diagnosis.held_out import gain_of
+from bsip_cli.diagnosis.signatures import Place
+from bsip_cli.diagnosis.together import Evidence, together
+from bsip_cli.stages.found_causes import causes_of
+
+DOCUMENT = ROOT / "docs" / "blind_suite.md"
+MARK = "tests/blind/true_gains.py"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    options = parsed(arguments)
+    asked = [
+        (batch, name, options.results)
+        for batch in batches(options.kept)
+        for name in people_of(batch)
+    ]
+    if not asked:
+        raise SystemExit(f"{options.kept} holds no kept person in whom something is hidden")
+    with ProcessPoolExecutor(options.jobs, max_tasks_per_child=1) as pool:
+        for _ in tqdm(pool.map(gains_of_person, asked), total=len(asked), unit="person"):
+            pass
+    between_marks(options.document, MARK, summary(options.results))
+
+
+def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    add = parser.add_argument
+    add("--kept", type=Path, default=ROOT / "out" / "blind", help="results of the long suite")
+    add("--results", type=Path, default=ROOT / "out" / "true_gains", help="folder of results")
+    add("--document", type=Path, default=DOCUMENT, help="Markdown file that gets the numbers")
+    add("--jobs", type=int, default=2, help="processes at once")
+    return parser.parse_args(arguments)
+
+
+def recorded_in(batch: Path) -> list[Recorded]:
+    return [Recorded.from_record(one) for one in json.loads((batch / "truth.json").read_text())]
+
+
+def people_of(batch: Path) -> list[str]:
+    """In whom something is hidden."""
+    return sorted({one.participant for one in recorded_in(batch) if one.truth["effects"]})
+
+
+def gains_of_person(asked: tuple[Path, str, Path]) -> None:
+    """A file with the gains of all causes found in a person."""
+    batch, name, results = asked
+    path = results / f"{batch.name}-{name}.json"
+    if path.exists():
+        return
+    unit = unit_of_person(batch, name)
+    causes = causes_of(unit)
+    found = [(cause, true) for cause in causes for true in _hidden(batch, name, cause)]
+    gains = list(_gains(evidence_of_person(unit), causes, found)) if found else []
+    write_atomically(path, json.dumps(gains))
+
+
+def _hidden(batch: Path, name: str, cause: Cause) -> Iterator[Expected]:
+    """What was hidden in a trial of a cause and is what the cause says, at its place."""
+    for one in recorded_in(batch):
+        stems = set(one.stems) & set(cause.trials)
+        if one.participant != name or not stems:
+            continue
+        stem = max(stems, key=lambda s: one.truth["trials"][s]["duration_s"])
+        for record in one.truth["effects"]:
+            true = expected(record, one.truth["trials"][stem])
+            if true.effect == cause.effect.name and true.same_target(cause.target):
+                yield true
+                return
+
+
+def _gains(
+    evidence: Evidence, causes: Sequence[Cause], found: Sequence[tuple[Cause, Expected]]
+) -> Iterator[dict]:
+    """Percent that each found cause, and the truth in its stead, takes off the squared residual."""
+    names = [one.name for one in evidence.trials]
+    known = {id(cause): _explanation(evidence, names, cause, cause.values) for cause in causes}
+    evidence = _with_noise_beside(evidence, tuple(known.values()))
+    for cause, true in found:
+        names_of = [p.name for p in known[id(cause)].parameters(evidence)]
+        if not set(names_of) <= set(true.values):
+            continue  # the truth has no such numbers: a phase, a share
+        others = tuple(one for key, one in known.items() if key != id(cause))
+        before = fit_together(evidence, others)
+        after = fit_together(evidence, (*others, known[id(cause)]))
+        values = np.array([true.values[name] for name in names_of])
+        truth = _explanation(evidence, names, cause, values)
+        trials = truth.place.trials
+        held_out = gain_of(evidence, trials, before.residual, after.residual, after.tangent)
+        saved = before.residual**2 - left_by(evidence, (*others, truth)) ** 2
+        best = 100 * sum(float(saved[evidence.rows(t)].sum()) for t in trials) / held_out.before
+        yield {"effect": cause.effect.name, "found": held_out.percent, "truth": best}
+
+
+def _explanation(
+    evidence: Evidence, names: Sequence[str], cause: Cause, values: np.ndarray
+) -> Explanation:
+    trials = tuple(names.index(stem) for stem in cause.trials)
+    parameters = cause.effect.parameters(evidence.trials[trials[0]].scene, cause.target)
+    scanned = tuple(float(x) for p, x in zip(parameters, values, strict=True) if p.scan)
+    return Explanation(Place(Candidate(cause.effect, cause.target, scanned), trials), values)
+
+
+def _with_noise_beside(evidence: Evidence, known: tuple[Explanation, ...]) -> Evidence:
+    changes = changes_of(evidence, known)
+    trials = (
+        one.with_noise_beside(one.filtered.filter(change[..., None])[..., 0])
+        for one, change in zip(evidence.trials, changes, strict=True)
+    )
+    return together(tuple(trials))
+
+
+def summary(results: Path) -> str:
+    """Per effect: median gains, and of their ratio the median and the least of ten."""
+    rows = [row for path in sorted(results.glob("*.json")) for row in json.loads(path.read_text())]
+    table = pd.DataFrame(rows, columns=["effect", "found", "truth"])
+    table["share"] = table["found"] / table["truth"]
+    groups = table.groupby("effect")
+    told = groups.median(numeric_only=True)
+    told.insert(0, "cases", groups.size())
+    told["worst tenth"] = groups["share"].quantile(0.1)
+    told.columns = [
+        "cases",
+        "gain of what was found [%]",
+        "gain of the truth [%]",
+        "share",
+        "share, worst tenth",
+    ]
+    whole = table["share"].median() if len(table) else np.nan
+    return f"{markdown(told)}\n\nAll {len(table)} cases: {whole:.3f} of the truth's gain (median)."
+
+
+if __name__ == "__main__":
+    main()

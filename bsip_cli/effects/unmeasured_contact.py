@@ -15,6 +15,7 @@ SHORTEST_S = 0.7
 RAMP_S = 0.3  # in which a person leans on something, or lets go
 EDGE_S = 0.05  # to which it is known when that begins and ends: nobody does it along a ramp
 ALIKE = 21  # windows that differ only where nothing is measured
+STEADY_N = 1.0  # to which a mean force is known: nobody leans steadily
 MOST_WINDOWS = 30  # side by side; shorter contacts are found in part of a window, and refined
 
 
@@ -36,7 +37,10 @@ class UnmeasuredContact(Effect):
         lengths = tuple(w for w in fitting if (end - start) / w <= MOST_WINDOWS) or (fitting[-1],)
         middles = tuple(float(t) for t in np.arange(start, end, min(lengths) / 2))
         return (
-            *(Parameter(f"force_{axis}", "N", -800.0, 800.0, 40.0) for axis in "xyz"),
+            *(
+                Parameter(f"force_{axis}", "N", -800.0, 800.0, 40.0, known_to=STEADY_N)
+                for axis in "xyz"
+            ),
             Parameter("middle", "s", start, end, 0.25, middles, known_to=EDGE_S / np.sqrt(2)),
             Parameter("length", "s", 0.2, end - start, 0.5, lengths, known_to=EDGE_S * np.sqrt(2)),
         )

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
 
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.together import Evidence, together
@@ -16,6 +21,13 @@ from bsip_cli.unit import Unit
 def batches(kept: Path) -> list[Path]:
     """Folders of people whose recordings and artifacts were kept."""
     return [path.parent for path in sorted(kept.glob("batch-*/truth.json"))]
+
+
+def for_each(work: Callable[[Any], None], asked: Sequence[Any], jobs: int) -> None:
+    """Ask of every person in a process of its own."""
+    with ProcessPoolExecutor(jobs, max_tasks_per_child=1) as pool:
+        for _ in tqdm(pool.map(work, asked), total=len(asked), unit="person"):
+            pass
 
 
 def unit_of_person(batch: Path, name: str) -> Unit:

@@ -12,16 +12,14 @@ import argparse
 import json
 from collections import Counter
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from zlib import crc32
 
 import numpy as np
-from blind_evidence import batches, evidence_of_person, unit_of_person
+from blind_evidence import batches, evidence_of_person, for_each, unit_of_person
 from blind_running import ROOT, Recorded, write_atomically
 from blind_tables import between_marks, wilson
-from tqdm import tqdm
 
 from bsip_cli.diagnosis.evidence import TrialEvidence
 from bsip_cli.diagnosis.findings import findings_of
@@ -40,9 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if not people:
         raise SystemExit(f"{options.kept} holds no kept person with nothing hidden")
     asked = [(batch, name, options.draws, options.results) for batch, name in people]
-    with ProcessPoolExecutor(options.jobs, max_tasks_per_child=1) as pool:
-        for _ in tqdm(pool.map(redraw_person, asked), total=len(asked), unit="person"):
-            pass
+    for_each(redraw_person, asked, options.jobs)
     between_marks(options.document, MARK, summary(options.results))
 
 

@@ -10,16 +10,14 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from blind_evidence import batches, evidence_of_person, unit_of_person
+from blind_evidence import batches, evidence_of_person, for_each, unit_of_person
 from blind_running import ROOT, Recorded, write_atomically
 from blind_tables import between_marks, markdown
 from blind_truth import Expected, expected
-from tqdm import tqdm
 
 from bsip_cli.diagnosis.candidates import Candidate
 from bsip_cli.diagnosis.cause import Cause
@@ -42,9 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ]
     if not asked:
         raise SystemExit(f"{options.kept} holds no kept person in whom something is hidden")
-    with ProcessPoolExecutor(options.jobs, max_tasks_per_child=1) as pool:
-        for _ in tqdm(pool.map(gains_of_person, asked), total=len(asked), unit="person"):
-            pass
+    for_each(gains_of_person, asked, options.jobs)
     between_marks(options.document, MARK, summary(options.results))
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsip_cli.diagnosis.explanation import NEGLIGIBLE
-from bsip_cli.diagnosis.patterns import UNEXPLAINED
+from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.selection import ALPHA, WORTH, Selection
 from bsip_cli.diagnosis.signatures import Place
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.diagnosis.held_out import standard_error
-from bsip_cli.diagnosis.patterns import UNEXPLAINED
+from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.selection import Round, Tried
 from bsip_cli.diagnosis.together import Evidence
 

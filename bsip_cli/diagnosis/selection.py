@@ -12,7 +12,7 @@ from bsip_cli.diagnosis.chance import Chance, chance_of, flipped
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together, refined
 from bsip_cli.diagnosis.held_out import Gain, gain_of
 from bsip_cli.diagnosis.likely_noise import likely_columns, with_likely_noise, with_noise_beside
-from bsip_cli.diagnosis.patterns import UNEXPLAINED
+from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.signatures import Place, Signatures
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.statistics.chi_square import minus_log_p

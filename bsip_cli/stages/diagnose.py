@@ -16,6 +16,7 @@ from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import FOLDS, values_without
 from bsip_cli.diagnosis.intervals import bounds
+from bsip_cli.diagnosis.loud_noise import loud_findings
 from bsip_cli.diagnosis.marker_proof import Proof, Slip, proofs_of
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.patterns import PATTERNS
@@ -69,7 +70,8 @@ def _asked(
     evidence = together(trials)
     first = weight_round(evidence) if _only_motion_weighs(unit) else None
     selection = select(signatures_of(evidence, ASKED), rng, first)
-    findings = findings_of(selection, rng)
+    findings = (*findings_of(selection, rng), *loud_findings(selection))
+    findings = tuple(sorted(findings, key=lambda one: one.verdict == "rejected"))
     facts = _facts(selection, findings)
     facts["trials"] = list(dict.fromkeys([*facts["trials"], *_trials_of(told)]))
     facts["causes"] = [*proven, *facts["causes"]]

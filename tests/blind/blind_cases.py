@@ -104,6 +104,9 @@ OUTSIDE: dict[str, Range] = {
     "outside_plate_saturation": Range(0.03, 0.1, ("-",), (SESSION, "hops")),
     "outside_repeated_frames": Range(0.1, 0.3, ("-",), (SESSION, "squat")),
     "outside_elastic_tether": Range(50.0, 200.0, ("-",), (SESSION, "squat")),
+    "outside_late_channel": Range(0.01, 0.04, ("fx", "fy", "fz"), (SESSION, "squat")),
+    "outside_loose_connector": Range(0.01, 0.04, ("-",), (SESSION, "squat")),
+    "outside_clock_jump": Range(0.02, 0.1, ("-",), (SESSION, "squat"), True),
 }
 # Two of these at once can be told apart in any trial that holds both.
 DOUBLES: tuple[tuple[str, str], ...] = (

@@ -23,6 +23,7 @@ from blind_tables import between_marks, wilson
 
 from bsip_cli.diagnosis.evidence import TrialEvidence
 from bsip_cli.diagnosis.findings import findings_of
+from bsip_cli.diagnosis.loud_noise import loud_findings, noise_of
 from bsip_cli.diagnosis.selection import select
 from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.diagnosis.together import together
@@ -80,7 +81,8 @@ def redrawn_alarms(signatures: Signatures, rng: np.random.Generator) -> list[str
     trials = signatures.evidence.trials
     shared = rng.standard_normal(trials[0].filtered.shared.shape[2])
     drawn = together(tuple(redrawn(one, shared, rng) for one in trials))
-    findings = findings_of(select(signatures.on(drawn), rng), rng)
+    selection = select(signatures.on(drawn), rng)
+    findings = (*findings_of(selection, rng), *loud_findings(selection))
     return [
         f"{one.effect} {one.target} ({len(one.trials)} trials)"
         for one in findings
@@ -96,16 +98,6 @@ def redrawn(one: TrialEvidence, shared: np.ndarray, rng: np.random.Generator) ->
     residual = noise + own + filtered.shared @ shared
     drawn = replace(one, filtered=replace(filtered, residual=residual))
     return drawn.with_noise_beside(np.zeros_like(residual))
-
-
-def noise_of(one: TrialEvidence) -> np.ndarray:
-    """(n, 6) of the residual, what its nuisances do not explain."""
-    filtered = one.filtered
-    nuisances = np.concatenate([filtered.own, filtered.shared], axis=2)
-    known = one.whitening.innovations(nuisances)
-    white = one.whitening.innovations(filtered.residual[..., None])[:, 0]
-    sizes = np.linalg.solve(known.T @ known + np.eye(known.shape[1]), known.T @ white)
-    return filtered.residual - nuisances @ sizes
 
 
 def with_random_phases(courses: np.ndarray, rng: np.random.Generator) -> np.ndarray:

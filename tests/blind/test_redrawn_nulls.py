@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from blind_tables import between_marks
 from noisy_trial import evidence_of, late, noisy, part_of_moving
-from redrawn_nulls import noise_of, redrawn, summary, with_random_phases
+from redrawn_nulls import redrawn, summary, with_random_phases
+
+from bsip_cli.diagnosis.loud_noise import noise_of
 
 
 @pytest.mark.parametrize("count", [300, 301])

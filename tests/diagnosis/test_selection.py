@@ -10,11 +10,12 @@ import pytest
 from noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
 
 from bsip_cli.diagnosis import selection
+from bsip_cli.diagnosis.channel_patterns import with_play
 from bsip_cli.diagnosis.detection import Limit, limits_of
 from bsip_cli.diagnosis.explanation import NEGLIGIBLE
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import gain_of
-from bsip_cli.diagnosis.patterns import PATTERNS, with_play
+from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.diagnosis.selection import ALPHA, Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
@@ -134,15 +135,49 @@ def test_trials_whose_delays_differ_have_a_delay_each():
     assert sizes == {("a",): pytest.approx(0.006, abs=3e-4), ("b",): pytest.approx(0.014, abs=3e-4)}
 
 
+def spoilt(channel: int, error: np.ndarray) -> Scene:
+    """Twelve seconds of movement whose plates err by (N,) in one component."""
+    change = np.zeros((len(error), 6))
+    change[:, channel] = error
+    return noisy(shown(part_of_moving(0, 12), change), 2)
+
+
 def test_a_channel_with_play_has_no_name():
-    scene = part_of_moving(0, 12)
-    course = scene.predicted[:, 1]
-    stuck = np.zeros((len(course), 6))
-    stuck[:, 1] = with_play(course, 16.0) - course
-    (one,) = said_of(selection_of(noisy(shown(scene, stuck), 2)))
+    course = part_of_moving(0, 12).predicted[:, 1]
+    (one,) = said_of(selection_of(spoilt(1, with_play(course, 16.0) - course)))
     assert one.effect == "unexplained" and "as of play or friction" in one.sentence
     error = number_of(one, "error")
     assert error.low < 8.0 < error.high
+
+
+def test_a_channel_that_comes_late_alone_has_no_name():
+    course = part_of_moving(0, 12).predicted[:, 1]
+    (one,) = said_of(
+        selection_of(spoilt(1, np.interp(np.arange(1200) - 2, np.arange(1200), course) - course))
+    )
+    assert one.effect == "unexplained" and "which alone comes" in one.sentence
+    assert number_of(one, "delay").value == pytest.approx(0.02, abs=0.003)
+
+
+def test_a_gain_that_changes_has_no_name():
+    course, part = part_of_moving(0, 12).predicted[:, 0], np.linspace(-0.5, 0.5, 1200)
+    (one,) = said_of(selection_of(spoilt(0, 0.8 * part * course)))
+    assert one.effect == "unexplained" and "through the trial" in one.sentence
+    assert number_of(one, "change_of_gain").value == pytest.approx(0.8, abs=0.05)
+
+
+def test_a_clock_that_jumps_has_no_name():
+    scene = part_of_moving(0, 12)
+    jumped = late(scene, 0.03)
+    after = scene.times_s[:, None] >= 7.0
+    plates = tuple(
+        replace(one, wrench=np.where(after, other.wrench, one.wrench))
+        for one, other in zip(scene.plates, jumped.plates, strict=True)
+    )
+    (one,) = said_of(selection_of(noisy(replace(scene, plates=plates), 3)))
+    assert one.effect == "unexplained" and "as if frames were lost" in one.sentence
+    assert number_of(one, "jump").value == pytest.approx(0.03, abs=0.002)
+    assert number_of(one, "from_time").value == pytest.approx(7.0, abs=0.3)
 
 
 def test_a_fault_of_one_trial_is_not_put_on_the_other():

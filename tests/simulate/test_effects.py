@@ -61,6 +61,9 @@ SIZES = {
     "outside_plate_saturation": 0.05,
     "outside_repeated_frames": 0.2,
     "outside_elastic_tether": 120.0,
+    "outside_late_channel": 0.02,
+    "outside_loose_connector": 0.03,
+    "outside_clock_jump": 0.05,
 }
 
 
@@ -568,3 +571,35 @@ def test_repeated_frames_have_the_asked_share():
     stalled = measured_with("squat", ("outside_repeated_frames", 0.25, ""))
     still = np.all(np.diff(stalled.points_m, axis=0) == 0.0, axis=(1, 2))
     assert 0.2 < still.mean() < 0.35
+
+
+def channel_of(name: str, size: float, column: int, target: str = "") -> tuple[np.ndarray, ...]:
+    """A channel (N,) without and with an effect, and the times of its samples."""
+    plain, other = measured_with("squat"), measured_with("squat", (name, size, target))
+    rest = [c for c in range(6) if c != column]
+    if name != "outside_clock_jump":
+        np.testing.assert_allclose(plain.channels[:, rest], other.channels[:, rest], atol=1e-6)
+    times = np.arange(len(plain.channels)) / plain.rates.analog_hz
+    return plain.channels[:, column], other.channels[:, column], times
+
+
+def test_a_late_channel_is_the_channel_of_a_moment_ago():
+    plain, late, times = channel_of("outside_late_channel", 0.02, 0, "fx")
+    lag = round(0.02 / (times[1] - times[0]))
+    np.testing.assert_allclose(late[lag:], plain[:-lag], atol=1e-6)
+
+
+def test_a_loose_connector_changes_the_gain_of_the_vertical_channel():
+    plain, other, _ = channel_of("outside_loose_connector", 0.03, 2)
+    gain = other / plain - 1.0
+    assert 0.005 < gain.std() < 0.06
+    assert np.abs(np.diff(gain)).max() < 1e-3
+
+
+def test_a_clock_that_jumps_is_right_before_and_late_after():
+    plain, other, times = channel_of("outside_clock_jump", 0.05, 2)
+    before, after = times < 0.3 * times[-1], times > 0.7 * times[-1]
+    np.testing.assert_allclose(other[before], plain[before], atol=1e-6)
+    lag = round(0.05 / (times[1] - times[0]))
+    shifted = np.roll(plain, lag)
+    np.testing.assert_allclose(other[after], shifted[after], atol=1e-6)

@@ -15,7 +15,10 @@ from bsip_cli.simulate.effects.marker_errors import MarkerShift, MarkerSwap, Ove
 from bsip_cli.simulate.effects.missing_joint import MissingJoint
 from bsip_cli.simulate.effects.outside import (
     BeltVibration,
+    ClockJump,
     ElasticTether,
+    LateChannel,
+    LooseConnector,
     PlateHysteresis,
     PlateSaturation,
     RepeatedFrames,
@@ -60,5 +63,8 @@ OUTSIDE: tuple[type[Effect], ...] = (
     PlateSaturation,
     RepeatedFrames,
     ElasticTether,
+    LateChannel,
+    LooseConnector,
+    ClockJump,
 )
 EFFECTS = {effect.name: effect for effect in (*CATALOGUE, *OUTSIDE)}

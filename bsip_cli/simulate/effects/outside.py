@@ -12,7 +12,7 @@ import numpy as np
 
 from bsip_cli.simulate.effects.base import Effect, Target
 from bsip_cli.simulate.effects.plate_channels import on_plates
-from bsip_cli.simulate.instruments import Instruments, SensingPlate
+from bsip_cli.simulate.instruments import COMPONENTS, Instruments, SensingPlate
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
 from bsip_cli.simulate.poses import Poses
@@ -20,6 +20,7 @@ from bsip_cli.simulate.poses import Poses
 LOADED_N = 40.0
 BELT_HZ = 5.0
 BURST_FRAMES = (4, 12)
+WANDERS_S = 1.5
 SLACK_M = 0.1
 FASTENED_M = (-1.2, 0.1, 0.3)  # the tether's far end from the first place of the pelvis
 
@@ -109,6 +110,94 @@ class PlateSaturation(Effect):
         changed = reading.copy()
         changed[:, 2] *= 1.0 - np.minimum(self.size * (reading[:, 2] / 1000.0) ** 2, 0.5)
         return changed
+
+
+@dataclass(frozen=True)
+class LateChannel(Effect):
+    """One channel comes `size` seconds late: its amplifier's filter is slower than the others'."""
+
+    channel: str
+
+    name = "outside_late_channel"
+    unit = "s"
+    least, most = 0.0, 0.2
+    targets = "fx, fy, fz (if none), mx, my or mz"
+    injectable = True
+    needs_plates = True
+    personal = False
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        channel = target.name or "fz"
+        if channel not in COMPONENTS:
+            raise cls.wrong_target(channel)
+        return cls(size, channel)
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        return on_plates(instruments, 0, self._late)
+
+    def _late(self, reading: np.ndarray, _: SensingPlate, times_s: np.ndarray) -> np.ndarray:
+        changed, column = reading.copy(), COMPONENTS.index(self.channel)
+        changed[:, column] = np.interp(times_s - self.size, times_s, reading[:, column])
+        return changed
+
+
+@dataclass(frozen=True)
+class LooseConnector(Effect):
+    """The vertical channel's gain wanders: a contact that opens and closes within seconds.
+
+    `size` is the standard deviation of the gain.
+    """
+
+    seed: int
+
+    name = "outside_loose_connector"
+    unit = "1"
+    least, most = 0.0, 0.2
+    injectable = True
+    needs_plates = True
+    personal = False
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        if target.name:
+            raise cls.wrong_target(target.name)
+        return cls(size, int(rng.integers(1 << 31)))
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        return on_plates(instruments, 0, self._wandering)
+
+    def _wandering(self, reading: np.ndarray, _: SensingPlate, times_s: np.ndarray) -> np.ndarray:
+        knots = np.arange(times_s[0], times_s[-1] + WANDERS_S, WANDERS_S)
+        drawn = np.random.default_rng([self.seed, len(times_s)]).standard_normal(len(knots))
+        changed = reading.copy()
+        changed[:, 2] *= 1.0 + self.size * np.interp(times_s, knots, drawn)
+        return changed
+
+
+@dataclass(frozen=True)
+class ClockJump(Effect):
+    """From a moment on the force comes `size` seconds later: a buffer of the plates was lost."""
+
+    from_share: float
+
+    name = "outside_clock_jump"
+    unit = "s"
+    least, most = -0.3, 0.3
+    injectable = True
+    needs_plates = True
+    personal = False
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        if target.name:
+            raise cls.wrong_target(target.name)
+        return cls(size, float(rng.uniform(0.35, 0.65)))
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        times = instruments.sample_times_s()
+        later = times > self.from_share * times[-1]
+        return instruments.with_forces_from(times - self.size * later)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,194 @@
+"""Regularities of one component of the measured wrench."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.signal import find_peaks
+
+from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.diagnosis.pattern import UNEXPLAINED, Pattern, in_channel
+from bsip_cli.effects.channel_words import OF_THE_LAB, unit_of
+from bsip_cli.effects.effect import Parameter
+from bsip_cli.effects.plate_frame import CHANNELS
+from bsip_cli.effects.scene import Scene
+
+_SIZE_N, _SIZE_NM = 40.0, 20.0
+_SMALL_N, _SMALL_NM = 10.0, 5.0
+_PLAYS_N, _PLAYS_NM = (4.0, 8.0, 16.0), (2.0, 4.0, 8.0)
+_FASTEST_HZ = 8.0  # beyond it the low-pass leaves nothing but its own edge
+_LINE, _AROUND_HZ, _MOST_LINES = 30.0, 0.75, 3  # of noise one in 10^9 frequencies is as high
+
+
+class ChannelPattern(Pattern):
+    """In one of the six components."""
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        return CHANNELS
+
+
+class Tone(ChannelPattern):
+    """One component that swings at one frequency."""
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        size, unit = _SIZE_N if target.startswith("f") else _SIZE_NM, unit_of(target)
+        duration = max(float(np.ptp(scene.times_s)), 2.0)
+        slowest, fastest = 2.0 / duration, min(_FASTEST_HZ, 0.16 * scene.rate_hz)
+        count = min(60, int((fastest - slowest) * duration))
+        regular = np.linspace(slowest, fastest, count)
+        paces = tuple(float(f) for f in (*regular, *_lines_hz(scene, target, slowest, fastest)))
+        return (
+            Parameter("cosine", unit, -1e3, 1e3, size),
+            Parameter("sine", unit, -1e3, 1e3, size),
+            Parameter("frequency", "Hz", 0.5 * slowest, fastest, 0.3 / duration, paces),
+        )
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        phase = 2 * np.pi * values[2] * (scene.times_s - scene.times_s[0])
+        wave = values[0] * np.cos(phase) + values[1] * np.sin(phase)
+        return in_channel(scene, target, wave)
+
+    def goes_along_with(self, target: str, values: np.ndarray) -> str:
+        size = f"{np.hypot(values[0], values[1]):.1f} {unit_of(target)}"
+        return f"a swing of {OF_THE_LAB[target]} by {size}, {values[2]:.2f} times per second"
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        amplitude = float(np.hypot(values[0], values[1]))
+        return ("amplitude", unit_of(target), amplitude), ("frequency", "Hz", float(values[2]))
+
+
+def _lines_hz(scene: Scene, channel: str, slowest: float, fastest: float) -> np.ndarray:
+    """(k,) frequencies at which a channel's residual stands far out of its spectrum.
+
+    In a long trial a swing at one frequency would fall between the regular ones.
+    """
+    key = (UNEXPLAINED, channel)
+    return scene.once(key, lambda: _computed_lines_hz(scene, channel, slowest, fastest))
+
+
+def _computed_lines_hz(scene: Scene, channel: str, slowest: float, fastest: float) -> np.ndarray:
+    residual = (scene.measured - scene.predicted)[:, CHANNELS.index(channel)]
+    course = np.where(scene.valid, np.nan_to_num(residual), 0.0)
+    course = np.where(scene.valid, course - course[scene.valid].mean(), 0.0)
+    count = 2 * len(course)
+    power = np.abs(np.fft.rfft(course * np.hanning(len(course)), count)) ** 2
+    hertz = np.fft.rfftfreq(count, 1 / scene.rate_hz)
+    around = 2 * round(_AROUND_HZ * count / scene.rate_hz) + 1
+    height = power / np.maximum(median_filter(power, around, mode="nearest"), 1e-12)
+    peaks, found = find_peaks(height, height=_LINE)
+    peaks = peaks[np.argsort(-found["peak_heights"])][:_MOST_LINES]
+    inside = (hertz[peaks] > slowest) & (hertz[peaks] < fastest)
+    return hertz[peaks][inside]
+
+
+class Curve(ChannelPattern):
+    """Forces that are not in proportion: a part that grows with the square of the vertical one."""
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        size, unit = _SIZE_N if target.startswith("f") else _SIZE_NM, unit_of(target)
+        return (Parameter("curvature", unit, -1e3, 1e3, size),)
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        load = scene.predicted[:, 2] / (scene.mass_kg * GRAVITY_M_S2)
+        return in_channel(scene, target, values[0] * load**2)
+
+    def goes_along_with(self, target: str, values: np.ndarray) -> str:
+        return (
+            f"a part of {OF_THE_LAB[target]} that grows with the square of the load "
+            f"({values[0]:+.1f} {unit_of(target)} at body weight)"
+        )
+
+
+class Play(ChannelPattern):
+    """A component that follows with play: it sticks until the true one has moved on by so much."""
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        force = target.startswith("f")
+        size, widths = (_SMALL_N, _PLAYS_N) if force else (_SMALL_NM, _PLAYS_NM)
+        unit = unit_of(target)
+        return (
+            Parameter("error", unit, -1e3, 1e3, size),
+            Parameter("play", unit, 0.1 * widths[0], 3 * widths[-1], widths[0], widths),
+        )
+
+    def spacing(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        return values[1:] / 2
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        course = scene.predicted[:, CHANNELS.index(target)]
+        behind = with_play(course, float(values[1])) - course
+        return in_channel(scene, target, values[0] * behind / (0.5 * values[1]))
+
+    def goes_along_with(self, target: str, values: np.ndarray) -> str:
+        order = "against" if values[0] > 0 else "with"
+        return (
+            f"an error of {OF_THE_LAB[target]} by up to {abs(values[0]):.1f} {unit_of(target)} "
+            f"{order} the direction in which it is changing, as of play or friction"
+        )
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        return (("error", unit_of(target), float(abs(values[0]))),)
+
+
+def with_play(course: np.ndarray, width: float) -> np.ndarray:
+    """(N,) what shows a course (N,) through a play of this full width, from its middle."""
+    shown, at = np.empty_like(course), course[0]
+    for k, value in enumerate(course):
+        at = min(max(at, value - 0.5 * width), value + 0.5 * width)
+        shown[k] = at
+    return shown
+
+
+class Lag(ChannelPattern):
+    """A component that comes late by itself: its filter is slower than the others'."""
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        return (Parameter("delay", "s", -0.5, 0.5, 0.02),)
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        course = scene.predicted[:, CHANNELS.index(target)]
+        return in_channel(scene, target, -values[0] * np.gradient(course) * scene.rate_hz)
+
+    def goes_along_with(self, target: str, values: np.ndarray) -> str:
+        order = "late" if values[0] > 0 else "early"
+        return f"{OF_THE_LAB[target]}, which alone comes {1000 * abs(values[0]):.1f} ms too {order}"
+
+
+class Warming(ChannelPattern):
+    """A component whose gain changes through the trial."""
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        return (Parameter("change_of_gain", "1", -1.0, 1.0, 0.04),)
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        course = scene.predicted[:, CHANNELS.index(target)]
+        return in_channel(scene, target, values[0] * (_through(scene) - 0.5) * course)
+
+    def goes_along_with(self, target: str, values: np.ndarray) -> str:
+        size = 100 * values[0]
+        return f"a gain of {OF_THE_LAB[target]} that changes by {size:+.1f} % through the trial"
+
+
+class Bow(ChannelPattern):
+    """A component whose zero goes away and comes back in the course of the trial."""
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        size, unit = _SMALL_N if target.startswith("f") else _SMALL_NM, unit_of(target)
+        return (Parameter("bow", unit, -1e3, 1e3, size),)
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        through = _through(scene)
+        return in_channel(scene, target, values[0] * 4 * through * (1 - through))
+
+    def goes_along_with(self, target: str, values: np.ndarray) -> str:
+        size = f"{values[0]:+.1f} {unit_of(target)}"
+        return f"a zero of {OF_THE_LAB[target]} that goes to {size} by the middle and comes back"
+
+
+def _through(scene: Scene) -> np.ndarray:
+    """(N,) part of the trial that is over."""
+    return (scene.times_s - scene.times_s[0]) / max(float(np.ptp(scene.times_s)), 1e-9)

@@ -1,0 +1,68 @@
+"""One component that is louder than all others let expect."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from noisy_trial import all_of, noisy, part_of_moving, shown
+from scipy.ndimage import gaussian_filter1d
+
+from bsip_cli.diagnosis.loud_noise import loud_findings, loudest, usual_noise
+from bsip_cli.diagnosis.selection import select
+from bsip_cli.diagnosis.signatures import signatures_of
+from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.scene import Scene
+
+WANDER_N = 30.0
+NOTHING = np.zeros((600, 6))  # at the rate of the evidence
+
+
+def wandering(component: int) -> Scene:
+    """Twelve seconds in which one component errs by WANDER_N within half a second, at random."""
+    scene = noisy(part_of_moving(0, 12), 4)
+    course = gaussian_filter1d(np.random.default_rng(6).standard_normal(1200), 50.0)
+    change = np.zeros((1200, 6))
+    change[:, component] = WANDER_N * course / course.std()
+    return shown(scene, change)
+
+
+def loud(scene: Scene):
+    return loudest(all_of(scene).trials[0], NOTHING)
+
+
+def test_clean_plates_are_not_loud():
+    assert loud(noisy(part_of_moving(0, 12), 4)) is None
+
+
+@pytest.mark.parametrize("component", [0, 2])
+def test_a_component_that_wanders_is_loud(component):
+    found = loud(wandering(component))
+    assert found.channel == ("fx", "fy", "fz")[component]
+    assert found.noise == pytest.approx(WANDER_N, rel=0.35)
+    assert found.louder > 12
+
+
+def test_what_is_known_is_not_loud():
+    scene = wandering(2)
+    known = NOTHING.copy()
+    known[:, 2] = (scene.measured - part_of_moving(0, 12).predicted)[::2, 2]
+    assert loudest(all_of(scene).trials[0], known) is None
+
+
+def test_noise_of_markers_shakes_all_components():
+    scene = part_of_moving(0, 12)
+    usual = usual_noise(scene, np.zeros(3))
+    assert usual.shape == (6,) and (usual > 0).all()
+    below = usual_noise(scene, scene.q[0, :3])
+    assert below[3] < usual[3]  # moments about the pelvis feel forces less
+
+
+def test_a_trial_without_a_name_for_it_is_unexplained():
+    effects = [EFFECTS[name] for name in ("sync_offset", "plate_gain")]
+    signatures = signatures_of(all_of(noisy(part_of_moving(0, 12), 3), wandering(2)), effects)
+    (one,) = loud_findings(select(signatures, np.random.default_rng(0)))
+    assert (one.effect, one.target, one.trials) == ("unexplained", "fz", ("b",))
+    assert one.verdict == "named" and "root mean square" in one.sentence
+    (number,) = one.numbers
+    assert number.low < number.value < number.high and number.unit == "N"
+    assert one.p_value < 0.01

@@ -38,7 +38,10 @@ class ClockJump(Delay, Pattern):
         seen = min(before.sum(), after.sum()) >= least
         return super().possible(scene, target, values) and bool(seen)
 
+    def sentence(self, target: str, values: np.ndarray) -> str:
+        return f"without a known cause, {self.goes_along_with(target, values)}"
+
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
         order = "later" if values[0] > 0 else "earlier"
         size = f"{1000 * abs(values[0]):.0f} ms {order}"
-        return f"time: from {values[1]:.2f} s on the forces come {size}, as if frames were lost"
+        return f"from {values[1]:.2f} s on the forces come {size}, as if frames were lost"

@@ -31,6 +31,7 @@ PROVEN = 0.25
 OWN = 0.5  # of a marker's own squared residual: else its skin slides more than it slips
 RIVAL = 0.9  # of the best one's share: who explains as much cannot be told from it
 CLASS = "M"
+_UNKNOWN = (np.nan, np.nan, np.nan)
 SLIP, BENDS = "marker_shift", ("missing_joint", "joint_centre")
 
 
@@ -89,6 +90,8 @@ class Proof:
         told = self.effect.sentence(self.target, self.values) + interval_words(numbers)
         whose = "the markers leave" if self.effect.name != SLIP else "the marker leaves"
         sentence = f"{told}; this is {100 * self.share:.0f} % of what {whose}"
+        if not gain.is_real():
+            sentence += ", and the forces do not show it"
         if not self.is_alone:
             sentence += f"; other causes look alike here: to tell them apart, {self.effect.remedy}"
         return Finding(
@@ -98,7 +101,7 @@ class Proof:
             "named" if self.is_alone else "ambiguous",
             "" if self.is_alone else CLASS,
             self.p_value,
-            gain.interval(),
+            gain.interval() if gain.is_real() else _UNKNOWN,
             numbers,
             sentence,
         )
@@ -166,7 +169,8 @@ def _sized(
     shapes = [
         _left(effect, scene, target, candidate.values(scene, one)) for one in np.diag(typical)
     ]
-    columns, course, block = _in_rows(scene, np.stack(shapes, axis=-1), residual_m)
+    told = np.stack(shapes, axis=-1) * effect.is_told(scene, target)
+    columns, course, block = _in_rows(scene, told, residual_m)
     grams, rights = _sums(columns, course, block)
     least = np.linalg.lstsq(grams.sum(axis=0), rights.sum(axis=0), rcond=None)[0]
     noise = float(((course - columns @ least) ** 2).mean()) * BLOCK_S * scene.rate_hz

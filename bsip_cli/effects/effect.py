@@ -96,6 +96,11 @@ class Effect(ABC):
         parameters = self.parameters(scene, target)
         return tuple((p.name, p.unit, float(x)) for p, x in zip(parameters, values, strict=True))
 
+    def is_told(self, scene: Scene, target: str) -> np.ndarray:
+        """(k,) True for the parameters without a scan of which the motion can tell anything."""
+        free = [p for p in self.parameters(scene, target) if not p.scan]
+        return np.ones(len(free), dtype=bool)
+
     def alike(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """(n, K) values whose change is the same wherever the recording is valid, the plainest
         first; by default these alone."""

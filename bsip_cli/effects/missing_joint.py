@@ -83,10 +83,13 @@ class MissingJoint(Effect):
         ranges = np.ptp(turn[:, list(AXES.values())], axis=0) * values
         return tuple((axis, "rad", float(x)) for axis, x in zip(AXES, ranges, strict=True))
 
-    def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
+    def is_told(self, scene: Scene, target: str) -> np.ndarray:
         """A movement that is hardly made says nothing of its part."""
         made = np.ptp(_turn(scene, scene.person.skeleton.index(target)), axis=0) > LITTLE_RAD
-        asked = np.where(made[list(AXES.values())], values, 0.0)
+        return made[list(AXES.values())]
+
+    def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
+        asked = np.where(self.is_told(scene, target), values, 0.0)
         return super().possible(scene, target, asked)
 
     def sentence(self, target: str, values: np.ndarray) -> str:

@@ -39,6 +39,7 @@ OPTIONS = StudyOptions(
 )
 TRIALS = ("task-sequence_run-1", "task-squat_run-1", "task-static")
 GOLDEN = Path(__file__).with_name("files_of_a_run.txt")
+SOMETIMES = "diagnosis_causes"  # a figure of those people of whom a cause was fitted in full
 UNITS = 2 * (3 * 5 + 7) + 3  # 5 stages per trial, 7 per participant, 3 of the cohort
 
 
@@ -126,7 +127,9 @@ def test_files_of_a_run(first_run):
     """Exactly these: a new or a lost file is a change that others must hear of."""
     golden = GOLDEN.read_text(encoding="utf-8").splitlines()
     names = {name.replace("sub-XX", sub) for name in golden for sub in ("sub-01", "sub-02")}
-    assert set(first_run.files()) == names
+    found = set(first_run.files())
+    assert found <= names
+    assert {name for name in names - found if SOMETIMES not in name} == set()
 
 
 def test_two_runs_give_the_same_bytes(first_run, bsip, tmp_path):

@@ -12,7 +12,7 @@ from bsip_cli.motion.inverse_kinematics import tree_of
 from bsip_cli.motion.jacobian import model_markers, pose_columns, subtrees
 
 _BLOCK = 400
-_PRIOR_M = 1e-3  # against the markers' metres: a joint without markers stays where it is
+_PRIOR_M = 1e-3  # against the markers' metres: what no marker shows stays where it is
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class PoseResponse:
     Attributes
     ----------
     weights : (N, m) of the markers; 0 where one is missing.
-    inverse : (N, nv, nv) of the weighted normal matrix, with a weak prior on the angles.
+    inverse : (N, nv, nv) of the weighted normal matrix, with a weak prior on all coordinates.
     """
 
     person: Person
@@ -72,7 +72,7 @@ def pose_responses(person: Person, q: np.ndarray, trust: np.ndarray | None = Non
     for part, columns, _ in _columns(person, q):
         weighted = _flat(np.sqrt(weights[part])[..., None, None] * columns)
         information = weighted.swapaxes(1, 2) @ weighted
-        information[:, range(6, nv), range(6, nv)] += _PRIOR_M**2
+        information[:, range(nv), range(nv)] += _PRIOR_M**2
         inverse[part] = np.linalg.inv(information)
     return PoseResponse(person, q, weights, inverse)
 

@@ -86,3 +86,12 @@ def test_a_missing_marker_pulls_nothing():
     errors = np.ones((len(scene.q), 1, 3, 1))
     assert not blind.pose_response.of(errors, [7]).any()
     assert np.isfinite(blind.markers_m).all()
+
+
+def test_a_frame_without_markers_stays_where_it_is():
+    q = moving().q[::100]
+    trust = np.ones((len(q), len(PERSON.markers)))
+    trust[2] = 0.0
+    moved = pose_responses(PERSON, q, trust).of(np.full((*trust.shape, 3, 1), 0.01))
+    assert np.abs(moved[2]).max() == 0.0
+    assert np.abs(moved[1]).max() > 0.005

@@ -23,6 +23,7 @@ from bsip_cli.diagnosis.selection import Selection
 from bsip_cli.effects.channel_words import OF_THE_LAB, unit_of
 from bsip_cli.effects.plate_frame import CHANNELS
 from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.wobbling_mass import has_impacts
 from bsip_cli.statistics.effective_samples import effective_samples
 
 LOUDER = 12.0  # times the median of the components
@@ -63,7 +64,12 @@ def loud_findings(selection: Selection) -> tuple[Finding, ...]:
 
 
 def loudest(one: TrialEvidence, change: np.ndarray) -> Loud | None:
-    """The component that is too loud beside what is known to change (N, 6); None if none is."""
+    """The component that is too loud beside what is known to change (N, 6); None if none is.
+
+    Nothing is asked where somebody lands: a smoothed motion cannot follow that.
+    """
+    if has_impacts(one.scene):
+        return None
     left = one.filtered.residual - one.filtered.filter(change[..., None])[..., 0]
     without = replace(one, filtered=replace(one.filtered, residual=left))
     noise = noise_of(without.with_noise_beside(np.zeros_like(left)))

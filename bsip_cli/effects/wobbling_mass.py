@@ -29,8 +29,7 @@ class WobblingMass(Effect):
     remedy = "hop three times, or drop on the heels"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
-        weight = scene.mass_kg * GRAVITY_M_S2
-        if not scene.valid.any() or scene.measured[scene.valid, 2].max() < IMPACT * weight:
+        if not has_impacts(scene):
             return ()
         soft = ("lower_torso", "upper_torso", "thigh", "shank")
         return tuple(s for s in scene.person.skeleton.segments if s.startswith(soft))
@@ -78,3 +77,9 @@ def _response(
     denominator = [1.0, 2 * damping * pace_rad_s, pace_rad_s**2]
     b, a, _ = cont2discrete((numerator, denominator), 1 / rate_hz, method="foh")
     return lfilter(np.ravel(b), a, ground - ground[0], axis=0)
+
+
+def has_impacts(scene: Scene) -> bool:
+    """Whether the ground ever pushes with IMPACT body weights."""
+    weight = scene.mass_kg * GRAVITY_M_S2
+    return bool((scene.measured[scene.valid, 2] > IMPACT * weight).any())

@@ -42,6 +42,13 @@ def test_a_component_that_wanders_is_loud(component):
     assert found.louder > 12
 
 
+def test_nothing_is_asked_where_somebody_lands():
+    scene = wandering(2)
+    landing = np.zeros((1200, 6))
+    landing[600:604, 2] = 1.5 * scene.mass_kg * 9.81
+    assert loud(shown(scene, landing)) is None
+
+
 def test_what_is_known_is_not_loud():
     scene = wandering(2)
     known = NOTHING.copy()

@@ -1,4 +1,4 @@
-"""What the markers prove by themselves: a slip, a second bend of the trunk, a joint's true centre.
+"""What the markers prove by themselves: a slip, a second bend of the trunk.
 
 The pose is the best that the model can do; what a cause leaves of the markers is linear in its
 sizes like the wrench, and far sharper: the skin slides by millimetres. What is proven here is no
@@ -32,7 +32,7 @@ OWN = 0.5  # of a marker's own squared residual: else its skin slides more than 
 RIVAL = 0.9  # of the best one's share: who explains as much cannot be told from it
 CLASS = "M"
 _UNKNOWN = (np.nan, np.nan, np.nan)
-SLIP, BENDS = "marker_shift", ("missing_joint", "joint_centre")
+SLIP, BEND, CENTRE = "marker_shift", "missing_joint", "joint_centre"
 
 
 @dataclass(frozen=True)
@@ -108,8 +108,7 @@ class Proof:
 
 
 def proofs_of(scene: Scene, slips: Sequence[Slip], rng: np.random.Generator) -> tuple[Proof, ...]:
-    """What a trial's markers prove: the slips that were found in them, and what bends otherwise
-    than the model has it."""
+    """What a trial's markers prove: the slips that were found in them, and a second bend."""
     if scene.residual_m is None:
         return ()
     fewer = scene.every(max(1, int(scene.rate_hz / ENOUGH_HZ)))
@@ -136,18 +135,22 @@ def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:
 
 
 def _bends(scene: Scene, residual_m: np.ndarray, rng: np.random.Generator) -> tuple[Proof, ...]:
-    """What bends otherwise than the model has it: the best, and all that explain as much."""
+    """A second bend, with the joints' centres that explain as much; nothing if one explains more:
+    scaling may err by that."""
     tried = [
         _sized(scene, residual_m, EFFECTS[name], target, (), rng)
-        for name in BENDS
+        for name in (BEND, CENTRE)
         for target in EFFECTS[name].targets(scene)
     ]
     possible = [one for one in tried if one.effect.possible(scene, one.target, one.values)]
-    best = max((one.share for one in possible), default=0.0)
-    if best < PROVEN:
+    bend = next((one for one in possible if one.effect.name == BEND), None)
+    if bend is None or bend.share < PROVEN:
         return ()
-    alike = sorted((x for x in possible if x.share > RIVAL * best), key=lambda x: -x.share)
-    return tuple(replace(one, is_alone=len(alike) == 1) for one in alike)
+    centres = sorted((x for x in possible if x.effect.name == CENTRE), key=lambda x: -x.share)
+    rivals = [one for one in centres if one.share > RIVAL * bend.share]
+    if any(RIVAL * one.share > bend.share for one in rivals):
+        return ()
+    return tuple(replace(one, is_alone=not rivals) for one in (bend, *rivals))
 
 
 def _sized(

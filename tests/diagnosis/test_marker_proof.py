@@ -63,7 +63,7 @@ def test_a_slip_has_the_size_that_the_markers_show():
 
 
 def test_a_second_bend_of_the_trunk_is_no_joint_centre():
-    scene = seen("missing_joint", "upper_torso", 0.8, 0.8, 0.8)
+    scene = bent()
     (found,) = proofs(scene)
     assert (found.effect.name, found.is_alone) == ("missing_joint", True)
     np.testing.assert_allclose(found.values, 0.8, atol=0.15)
@@ -72,25 +72,28 @@ def test_a_second_bend_of_the_trunk_is_no_joint_centre():
     assert low < true[0][2] < high
 
 
-def other_knee() -> Scene:
-    return seen("joint_centre", "knee_l", 0.04, 0.02, 0.0, skin_m=0.001)
+def bent() -> Scene:
+    return seen("missing_joint", "upper_torso", 0.8, 0.8, 0.8)
 
 
-def test_a_knee_that_lies_elsewhere_is_named():
-    (found,) = proofs(other_knee())
-    assert (found.effect.name, found.target) == ("joint_centre", "knee_l")
-    np.testing.assert_allclose(found.values[:2], [0.04, 0.02], atol=0.005)
+def test_a_joint_that_lies_elsewhere_is_no_proof():
+    """By how much scaling errs at a knee is not known to the markers alone."""
+    assert proofs(seen("joint_centre", "knee_l", 0.04, 0.02, 0.0, skin_m=0.001)) == ()
+
+
+def test_a_waist_that_lies_elsewhere_is_no_second_bend():
+    assert proofs(seen("joint_centre", "waist", 0.02, 0.03, 0.0, skin_m=0.001)) == ()
 
 
 def test_a_sentence_says_how_much_of_the_residuals_it_is():
-    scene = seen("missing_joint", "upper_torso", 0.8, 0.8, 0.8)
+    scene = bent()
     (found,) = proofs(scene)
     said = found.finding(scene, "a", found.gain(all_of(scene))).sentence
     assert "second joint" in said and f"{100 * found.share:.0f} % of what the markers leave" in said
 
 
 def test_what_explains_as_much_makes_a_class():
-    scene = other_knee()
+    scene = bent()
     (found,) = proofs(scene)
     rival = replace(found, is_alone=False).finding(scene, "a", found.gain(all_of(scene)))
     assert (rival.verdict, rival.class_id) == ("ambiguous", "M")
@@ -98,10 +101,10 @@ def test_what_explains_as_much_makes_a_class():
 
 
 def test_columns_are_what_the_sizes_do_to_the_wrench():
-    scene = other_knee()
+    scene = bent()
     (found,) = proofs(scene)
     columns = found.columns(scene)
     assert columns.shape == (len(scene.times_s), 6, 3)
-    change = found.effect.change(scene, "knee_l", np.array([0.0, 0.0, 0.01]))
-    typical = 0.015 + abs(found.values[2])
-    np.testing.assert_allclose(columns[..., 2] / typical * 0.01, change, atol=1e-9)
+    change = found.effect.change(scene, "upper_torso", np.array([0.0, 0.0, 0.1]))
+    size = 0.3 + abs(found.values[2])
+    np.testing.assert_allclose(columns[..., 2] / size * 0.1, change, atol=1e-9)

@@ -9,7 +9,7 @@ import numpy as np
 
 from bsip_cli.errors import UsageError
 from bsip_cli.simulate.effects import EFFECTS
-from bsip_cli.simulate.effects.base import Effect, Target
+from bsip_cli.simulate.effects.base import NOWHERE, Effect, Target
 from bsip_cli.simulate.options import Asked, StudyOptions
 
 NO_TARGET = ("", "-")
@@ -67,7 +67,10 @@ def drawn(asked: Asked, rng: np.random.Generator) -> Effect:
             f"{asked.name} of size {asked.size:g}",
             expected=f"{kind.least:g} to {kind.most:g} {kind.unit}, not 0",
         )
-    return kind.draw(asked.size, parsed_target(asked), rng)
+    target = parsed_target(asked)
+    if target.name and kind.targets == NOWHERE:
+        raise kind.wrong_target(target.name)
+    return kind.draw(asked.size, target, rng)
 
 
 def parsed_target(asked: Asked) -> Target:

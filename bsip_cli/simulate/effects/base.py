@@ -17,6 +17,8 @@ from bsip_cli.simulate.instruments import Instruments
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
 
+NOWHERE = "none"  # what the target of an effect without a place may be
+
 
 @dataclass(frozen=True)
 class Target:
@@ -51,7 +53,7 @@ class Effect:
     unit: ClassVar[str]
     least: ClassVar[float]
     most: ClassVar[float]
-    targets: ClassVar[str] = "none"
+    targets: ClassVar[str] = NOWHERE
     settings: ClassVar[tuple[str, ...]] = ()
     spares_static: ClassVar[bool] = False
     injectable: ClassVar[bool] = False
@@ -63,8 +65,6 @@ class Effect:
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
         """The effect with all its parameters; those that the target leaves open are drawn."""
-        if target.name:
-            raise cls.wrong_target(target.name)
         return cls(size)
 
     @classmethod

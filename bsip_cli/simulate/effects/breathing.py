@@ -35,8 +35,6 @@ class Breathing(Effect):
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        if target.name:
-            raise cls.wrong_target(target.name)
         frequency = target.get("frequency", float(rng.uniform(0.2, 0.32)))
         if not 0.05 <= frequency <= 2.0:
             raise UsageError(f"breathing at {frequency:g} Hz", expected="0.05 to 2 Hz")

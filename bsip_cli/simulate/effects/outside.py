@@ -11,8 +11,8 @@ from typing import Self
 import numpy as np
 
 from bsip_cli.simulate.effects.base import Effect, Target
-from bsip_cli.simulate.effects.plate_channels import on_plates
-from bsip_cli.simulate.instruments import COMPONENTS, Instruments, SensingPlate
+from bsip_cli.simulate.effects.plate_channels import ChannelFault, on_plates
+from bsip_cli.simulate.instruments import Instruments, SensingPlate
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
 from bsip_cli.simulate.poses import Poses
@@ -41,8 +41,6 @@ class BeltVibration(Effect):
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        if target.name:
-            raise cls.wrong_target(target.name)
         frequency = BELT_HZ * float(rng.uniform(0.8, 1.2))
         return cls(size, frequency, float(rng.uniform(-np.pi, np.pi)))
 
@@ -113,33 +111,15 @@ class PlateSaturation(Effect):
 
 
 @dataclass(frozen=True)
-class LateChannel(Effect):
-    """One channel comes `size` seconds late: its amplifier's filter is slower than the others'."""
-
-    channel: str
+class LateChannel(ChannelFault):
+    """The channel comes `size` seconds late: its amplifier's filter is slower than the others'."""
 
     name = "outside_late_channel"
     unit = "s"
     least, most = 0.0, 0.2
-    targets = "fx, fy, fz (if none), mx, my or mz"
-    injectable = True
-    needs_plates = True
-    personal = False
 
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        channel = target.name or "fz"
-        if channel not in COMPONENTS:
-            raise cls.wrong_target(channel)
-        return cls(size, channel)
-
-    def measured(self, instruments: Instruments) -> Instruments:
-        return on_plates(instruments, 0, self._late)
-
-    def _late(self, reading: np.ndarray, _: SensingPlate, times_s: np.ndarray) -> np.ndarray:
-        changed, column = reading.copy(), COMPONENTS.index(self.channel)
-        changed[:, column] = np.interp(times_s - self.size, times_s, reading[:, column])
-        return changed
+    def read(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+        return np.interp(times_s - self.size, times_s, values)
 
 
 @dataclass(frozen=True)
@@ -160,8 +140,6 @@ class LooseConnector(Effect):
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        if target.name:
-            raise cls.wrong_target(target.name)
         return cls(size, int(rng.integers(1 << 31)))
 
     def measured(self, instruments: Instruments) -> Instruments:
@@ -190,8 +168,6 @@ class ClockJump(Effect):
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        if target.name:
-            raise cls.wrong_target(target.name)
         return cls(size, float(rng.uniform(0.35, 0.65)))
 
     def measured(self, instruments: Instruments) -> Instruments:
@@ -214,8 +190,6 @@ class RepeatedFrames(Effect):
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        if target.name:
-            raise cls.wrong_target(target.name)
         return cls(size, int(rng.integers(1 << 31)))
 
     def measured(self, instruments: Instruments) -> Instruments:

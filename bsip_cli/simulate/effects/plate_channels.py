@@ -5,6 +5,7 @@ Channels are the six components in the plate's own axes, moments about its senso
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
@@ -32,7 +33,7 @@ def on_plates(instruments: Instruments, number: int, change: Change) -> Instrume
 
 
 @dataclass(frozen=True)
-class _ChannelFault(Effect):
+class ChannelFault(Effect, ABC):
     """An error of one channel. plate : its number, or 0 for all."""
 
     channel: str
@@ -60,16 +61,16 @@ class _ChannelFault(Effect):
         changed[:, column] = self.read(reading[:, column], times_s)
         return changed
 
+    @abstractmethod
     def read(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
         """What the channel (N,) shows instead of its true values."""
-        raise NotImplementedError
 
     def place(self) -> str:
         return self.channel + (f" of plate {self.plate}" if self.plate else "")
 
 
 @dataclass(frozen=True)
-class PlateGain(_ChannelFault):
+class PlateGain(ChannelFault):
     """The channel shows 1 + size times the truth."""
 
     name = "plate_gain"
@@ -81,7 +82,7 @@ class PlateGain(_ChannelFault):
 
 
 @dataclass(frozen=True)
-class PlateZero(_ChannelFault):
+class PlateZero(ChannelFault):
     """A constant is added to the channel."""
 
     name = "plate_zero"
@@ -93,7 +94,7 @@ class PlateZero(_ChannelFault):
 
 
 @dataclass(frozen=True)
-class PlateDrift(_ChannelFault):
+class PlateDrift(ChannelFault):
     """The channel's zero moves at a constant rate, from 0 at the start of each trial."""
 
     name = "plate_drift"

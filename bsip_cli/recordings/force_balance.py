@@ -18,6 +18,9 @@ class ContactLimits:
     touch_height_m: float = 0.035  # above a marker's own standing height
     sole_height_m: float = 0.06  # markers this low belong to the footprint
     touch_speed_m_s: float = 0.6
+    roll_height_m: float = 0.09  # of the lowest marker while only the toes touch
+    roll_speed_m_s: float = 1.2
+    roll_s: float = 0.2  # a step is pushed off within this time
     outline_tolerance_m: float = 0.03
     loaded_N: float = 20.0
     cop_distance_m: float = 0.35

@@ -64,6 +64,19 @@ def test_a_foot_beside_the_plate_is_not():
     assert result.on_ground["r"][:95].all() and not result.on_plate["r"].any()
 
 
+def test_a_foot_beside_the_plate_rolls_over_its_toes_before_it_leaves():
+    """The heel marker rises first, then the toe marker, and the toes push on; a swing is faster."""
+    frames = np.arange(N)
+    rolling = _foot(0.8)
+    rolling[..., 0, 2] += np.clip((frames - 80) * 0.01, 0.0, 0.3)
+    rolling[..., 1, 2] += np.clip((frames - 95) * 0.004, 0.0, 0.2)
+    slow = _windows(_foot(0.1), rolling, [_plate(WEIGHT_N)])
+    assert not slow.valid[:110].any() and slow.valid[125:].all()
+    rolling[100:, :, 0] += 0.02 * (frames[100:] - 100)[:, None]  # 2 m/s forwards
+    fast = _windows(_foot(0.1), rolling, [_plate(WEIGHT_N)])
+    assert 0.05 <= (slow.valid.argmax() - fast.valid.argmax()) / RATE_HZ <= 0.2
+
+
 def test_outline_has_a_tolerance():
     assert _windows(_foot(0.1), _foot(0.52), [_plate(WEIGHT_N)]).valid.all()
     assert not _windows(_foot(0.1), _foot(0.54), [_plate(WEIGHT_N)]).valid.any()

@@ -13,9 +13,10 @@ from bsip_cli.effects.effect import Parameter
 from bsip_cli.effects.plate_frame import CHANNELS
 from bsip_cli.effects.scene import Scene
 
-_SIZE_N, _SIZE_NM = 40.0, 20.0
-_SMALL_N, _SMALL_NM = 10.0, 5.0
-_PLAYS_N, _PLAYS_NM = (4.0, 8.0, 16.0), (2.0, 4.0, 8.0)
+# By the component's unit.
+_SIZE = {"N": 40.0, "N m": 20.0}
+_SMALL = {"N": 10.0, "N m": 5.0}
+_PLAYS = {"N": (4.0, 8.0, 16.0), "N m": (2.0, 4.0, 8.0)}
 _FASTEST_HZ = 8.0  # beyond it the low-pass leaves nothing but its own edge
 _LINE, _AROUND_HZ, _MOST_LINES = 30.0, 0.75, 3  # of noise one in 10^9 frequencies is as high
 
@@ -31,15 +32,15 @@ class Tone(ChannelPattern):
     """One component that swings at one frequency."""
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        size, unit = _SIZE_N if target.startswith("f") else _SIZE_NM, unit_of(target)
+        unit = unit_of(target)
         duration = max(float(np.ptp(scene.times_s)), 2.0)
         slowest, fastest = 2.0 / duration, min(_FASTEST_HZ, 0.16 * scene.rate_hz)
         count = min(60, int((fastest - slowest) * duration))
         regular = np.linspace(slowest, fastest, count)
         paces = tuple(float(f) for f in (*regular, *_lines_hz(scene, target, slowest, fastest)))
         return (
-            Parameter("cosine", unit, -1e3, 1e3, size),
-            Parameter("sine", unit, -1e3, 1e3, size),
+            Parameter("cosine", unit, -1e3, 1e3, _SIZE[unit]),
+            Parameter("sine", unit, -1e3, 1e3, _SIZE[unit]),
             Parameter("frequency", "Hz", 0.5 * slowest, fastest, 0.3 / duration, paces),
         )
 
@@ -87,8 +88,8 @@ class Curve(ChannelPattern):
     """Forces that are not in proportion: a part that grows with the square of the vertical one."""
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        size, unit = _SIZE_N if target.startswith("f") else _SIZE_NM, unit_of(target)
-        return (Parameter("curvature", unit, -1e3, 1e3, size),)
+        unit = unit_of(target)
+        return (Parameter("curvature", unit, -1e3, 1e3, _SIZE[unit]),)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         load = scene.predicted[:, 2] / (scene.mass_kg * GRAVITY_M_S2)
@@ -105,11 +106,10 @@ class Play(ChannelPattern):
     """A component that follows with play: it sticks until the true one has moved on by so much."""
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        force = target.startswith("f")
-        size, widths = (_SMALL_N, _PLAYS_N) if force else (_SMALL_NM, _PLAYS_NM)
         unit = unit_of(target)
+        widths = _PLAYS[unit]
         return (
-            Parameter("error", unit, -1e3, 1e3, size),
+            Parameter("error", unit, -1e3, 1e3, _SMALL[unit]),
             Parameter("play", unit, 0.1 * widths[0], 3 * widths[-1], widths[0], widths),
         )
 
@@ -177,8 +177,8 @@ class Bow(ChannelPattern):
     """A component whose zero goes away and comes back in the course of the trial."""
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        size, unit = _SMALL_N if target.startswith("f") else _SMALL_NM, unit_of(target)
-        return (Parameter("bow", unit, -1e3, 1e3, size),)
+        unit = unit_of(target)
+        return (Parameter("bow", unit, -1e3, 1e3, _SMALL[unit]),)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         through = _through(scene)

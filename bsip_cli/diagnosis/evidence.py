@@ -49,6 +49,10 @@ class Filter:
         filtered[:, 3:] -= np.cross(self.reference_m, filtered[:, :3], axisb=1, axisc=1)
         return filtered
 
+    def one(self, wrench: np.ndarray) -> np.ndarray:
+        """(n, 6) of one world wrench (N, 6)."""
+        return self(wrench[..., None])[..., 0]
+
 
 def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
     """Low-pass and decimation inside the valid stretches, moments about where the person stands."""
@@ -172,7 +176,7 @@ def _residual(scene: Scene, filter_: Filter, stride: int, cutoff_hz: float) -> n
     operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz)
     wanted = np.searchsorted(frames, filter_.frames * stride)
     full = replace(filter_, operator=operator[wanted])
-    return full((scene.measured - scene.predicted)[..., None])[..., 0]
+    return full.one(scene.measured - scene.predicted)
 
 
 def _whitening(filtered: Filtered, beside: np.ndarray, floor: float) -> Whitening:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
 
+from bsip_cli.diagnosis.candidates import Candidate
 from bsip_cli.diagnosis.signatures import Place
-from bsip_cli.diagnosis.together import Evidence, clipped
+from bsip_cli.diagnosis.together import Evidence, clipped, together
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.joint_change import joint_change
 from bsip_cli.effects.scene import Scene
@@ -86,7 +88,7 @@ class Explanation:
 
     def is_free(self, evidence: Evidence) -> np.ndarray:
         """(K,) True for the parameters without a scan."""
-        return np.array([not p.scan for p in self.parameters(evidence)])
+        return self.effect.is_free(self.scene(evidence), self.target)
 
     def typical(self, evidence: Evidence) -> np.ndarray:
         """(k,) typical sizes of the free parameters."""
@@ -129,6 +131,15 @@ class Explanation:
         return self.effect.parameters(self.scene(evidence), self.target)
 
 
+def explanation_of(
+    effect: Effect, target: str, values: np.ndarray, scene: Scene, trials: tuple[int, ...]
+) -> Explanation:
+    """An effect with all of its parameters (K,), in some trials; the scene is of one of them."""
+    scanned = values[~effect.is_free(scene, target)]
+    candidate = Candidate(effect, target, tuple(scanned.tolist()))
+    return Explanation(Place(candidate, trials), values)
+
+
 @dataclass(frozen=True)
 class Fit:
     """Explanations fitted together: white residual that they leave (R,), and the derivative (R, K)
@@ -168,6 +179,23 @@ def changes_of(evidence: Evidence, explanations: tuple[Explanation, ...]) -> lis
         )
         for t, one in enumerate(evidence.trials)
     ]
+
+
+def with_noise_beside(
+    evidence: Evidence,
+    explanations: tuple[Explanation, ...],
+    more: Sequence[np.ndarray] | None = None,
+    **floor: float,
+) -> Evidence:
+    """In the coordinates of the noise beside explanations, and beside ``more`` changes (n, 6) of
+    each trial, filtered."""
+    filtered = [
+        one.filtered.filter.one(change)
+        for one, change in zip(evidence.trials, changes_of(evidence, explanations), strict=True)
+    ]
+    beside = filtered if more is None else [a + b for a, b in zip(filtered, more, strict=True)]
+    trials = zip(evidence.trials, beside, strict=True)
+    return together(tuple(one.with_noise_beside(change, **floor) for one, change in trials))
 
 
 def left_by(evidence: Evidence, explanations: tuple[Explanation, ...]) -> np.ndarray:

@@ -8,11 +8,12 @@ later.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from bsip_cli.diagnosis.explanation import Fit, changes_of, fit_together
+from bsip_cli.diagnosis.explanation import Fit, fit_together, with_noise_beside
 from bsip_cli.diagnosis.signatures import Signatures
-from bsip_cli.diagnosis.together import together
 
 MOST = 3  # candidates in one trial
 SURE = 20.0  # -log p of a candidate that is taken off
@@ -23,31 +24,16 @@ LOOKING = 0.1
 
 def with_likely_noise(signatures: Signatures, before: Fit) -> tuple[Signatures, Fit]:
     """Signatures and fit in the coordinates of the noise beside a fit and the likeliest else."""
-    none = _nothing(signatures)
-    looking, beside = _with_noise(signatures, before, none, floor=LOOKING)
-    return _with_noise(signatures, before, _likely_changes(looking, beside))
+    looking, beside = noise_beside_fit(signatures, before, floor=LOOKING)
+    return noise_beside_fit(signatures, before, _likely_changes(looking, beside))
 
 
-def with_noise_beside(signatures: Signatures, fit: Fit) -> tuple[Signatures, Fit]:
-    """The same beside a fit alone."""
-    return _with_noise(signatures, fit, _nothing(signatures))
-
-
-def _nothing(signatures: Signatures) -> list[np.ndarray]:
-    return [np.zeros_like(one.filtered.residual) for one in signatures.evidence.trials]
-
-
-def _with_noise(
-    signatures: Signatures, fit: Fit, more: list[np.ndarray], **floor: float
+def noise_beside_fit(
+    signatures: Signatures, fit: Fit, more: Sequence[np.ndarray] | None = None, **floor: float
 ) -> tuple[Signatures, Fit]:
-    """Coordinates of the noise beside a fit and more changes (n, 6), filtered, of each trial."""
-    changes = changes_of(signatures.evidence, fit.explanations)
-    trials = []
-    for one, change, other in zip(signatures.evidence.trials, changes, more, strict=True):
-        beside = one.filtered.filter(change[..., None])[..., 0] + other
-        trials.append(one.with_noise_beside(beside, **floor))
-    signatures = signatures.on(together(tuple(trials)))
-    return signatures, fit_together(signatures.evidence, fit.explanations)
+    """The same beside a fit, and beside more changes (n, 6), filtered, of each trial."""
+    evidence = with_noise_beside(signatures.evidence, fit.explanations, more, **floor)
+    return signatures.on(evidence), fit_together(evidence, fit.explanations)
 
 
 def likely_columns(signatures: Signatures, fit: Fit) -> np.ndarray:

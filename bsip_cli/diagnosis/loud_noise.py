@@ -70,7 +70,7 @@ def loudest(one: TrialEvidence, change: np.ndarray) -> Loud | None:
     """
     if has_impacts(one.scene):
         return None
-    left = one.filtered.residual - one.filtered.filter(change[..., None])[..., 0]
+    left = one.filtered.residual - one.filtered.filter.one(change)
     without = replace(one, filtered=replace(one.filtered, residual=left))
     noise = noise_of(without.with_noise_beside(np.zeros_like(left)))
     middle = np.median(noise, axis=0)

@@ -14,11 +14,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from bsip_cli.diagnosis.candidates import Candidate
-from bsip_cli.diagnosis.explanation import Explanation
+from bsip_cli.diagnosis.explanation import explanation_of
 from bsip_cli.diagnosis.findings import Finding, interval_words, numbers_of
 from bsip_cli.diagnosis.held_out import Gain
 from bsip_cli.diagnosis.intervals import DRAWS, SCALE_ERROR
-from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import BLOCK_S, Evidence, clipped
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect
@@ -64,7 +63,7 @@ class Proof:
     def columns(self, scene: Scene) -> np.ndarray:
         """(N, 6, k) what it may do to the wrench, sizes of unit variance: the plates do not judge
         how far the mass follows the markers."""
-        free = _is_free(self.effect, scene, self.target)
+        free = self.effect.is_free(scene, self.target)
         typical = np.array([p.typical for p in self.effect.parameters(scene, self.target)])
         sizes = (typical + np.abs(self.values))[free]
         return self.effect.tangent(scene, self.target, self.values) * sizes
@@ -73,9 +72,7 @@ class Proof:
         """What it takes off the wrench's residual in its trial's evidence, which did not help to
         find its sizes."""
         scene = evidence.trials[0].scene
-        free = _is_free(self.effect, scene, self.target)
-        candidate = Candidate(self.effect, self.target, tuple(self.values[~free]))
-        one = Explanation(Place(candidate, (0,)), self.values)
+        one = explanation_of(self.effect, self.target, self.values, scene, (0,))
         before = clipped(evidence.residual)
         saved = before**2 - clipped(evidence.residual - one.change(evidence)) ** 2
         numbers, block = np.unique(evidence.blocks(), return_inverse=True)
@@ -250,8 +247,3 @@ def _scattered(
         if parameter.scan:
             draws[:, k] += parameter.known_to * rng.standard_normal(len(draws))
     return draws
-
-
-def _is_free(effect: Effect, scene: Scene, target: str) -> np.ndarray:
-    """(K,) True for the parameters without a scan."""
-    return np.array([not p.scan for p in effect.parameters(scene, target)])

@@ -11,7 +11,7 @@ import numpy as np
 from bsip_cli.diagnosis.chance import Chance, chance_of, flipped
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together, refined
 from bsip_cli.diagnosis.held_out import Gain, gain_of
-from bsip_cli.diagnosis.likely_noise import likely_columns, with_likely_noise, with_noise_beside
+from bsip_cli.diagnosis.likely_noise import likely_columns, noise_beside_fit, with_likely_noise
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.signatures import Place, Signatures
 from bsip_cli.diagnosis.together import Evidence
@@ -97,7 +97,7 @@ def select(
         found = one.kept.fit.explanations
     last = fit_together(signatures.evidence, found)
     if found:
-        signatures, last = with_noise_beside(signatures, last)
+        signatures, last = noise_beside_fit(signatures, last)
     return Selection(signatures, tuple(rounds), last)
 
 

@@ -96,10 +96,13 @@ class Effect(ABC):
         parameters = self.parameters(scene, target)
         return tuple((p.name, p.unit, float(x)) for p, x in zip(parameters, values, strict=True))
 
+    def is_free(self, scene: Scene, target: str) -> np.ndarray:
+        """(K,) True for the parameters without a scan."""
+        return np.array([not p.scan for p in self.parameters(scene, target)])
+
     def is_told(self, scene: Scene, target: str) -> np.ndarray:
         """(k,) True for the parameters without a scan of which the motion can tell anything."""
-        free = [p for p in self.parameters(scene, target) if not p.scan]
-        return np.ones(len(free), dtype=bool)
+        return np.ones(int(self.is_free(scene, target).sum()), dtype=bool)
 
     def alike(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """(n, K) values whose change is the same wherever the recording is valid, the plainest

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
+from blind_running import DOCUMENT, ROOT
 from tqdm import tqdm
 
 from bsip_cli.body.skeleton import load_skeleton
@@ -16,6 +18,17 @@ from bsip_cli.session import open_study
 from bsip_cli.stages.diagnose import moving_trials, prior_of
 from bsip_cli.stages.frames import person_from
 from bsip_cli.unit import Unit
+
+
+def parser_of_kept(description: str | None, results: str) -> argparse.ArgumentParser:
+    """Options of every script that asks kept recordings."""
+    parser = argparse.ArgumentParser(description=description)
+    add = parser.add_argument
+    add("--kept", type=Path, default=ROOT / "out" / "blind", help="results of the long suite")
+    add("--results", type=Path, default=ROOT / "out" / results, help="folder of results")
+    add("--document", type=Path, default=DOCUMENT, help="Markdown file that gets the numbers")
+    add("--jobs", type=int, default=2, help="processes at once")
+    return parser
 
 
 def batches(kept: Path) -> list[Path]:

@@ -15,12 +15,11 @@ from pathlib import Path
 
 from blind_batch import Batch, run_batch
 from blind_cases import Case, Session, long_suite
-from blind_running import ROOT, STAGES, write_atomically
+from blind_running import DOCUMENT, ROOT, STAGES, write_atomically
 from blind_scoring import Score
 from blind_tables import between_marks, document, scores_frame
 from tqdm import tqdm
 
-DOCUMENT = ROOT / "docs" / "blind_suite.md"
 MARK = "tests/blind/blind_long.py"
 BATCH = 8  # people of one study; an interruption loses at most their work
 

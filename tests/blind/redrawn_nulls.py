@@ -17,8 +17,8 @@ from pathlib import Path
 from zlib import crc32
 
 import numpy as np
-from blind_evidence import batches, evidence_of_person, for_each, unit_of_person
-from blind_running import ROOT, Recorded, write_atomically
+from blind_evidence import batches, evidence_of_person, for_each, parser_of_kept, unit_of_person
+from blind_running import Recorded, write_atomically
 from blind_tables import between_marks, wilson
 
 from bsip_cli.diagnosis.evidence import TrialEvidence
@@ -29,7 +29,6 @@ from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.diagnosis.together import together
 from bsip_cli.stages.diagnose import ASKED
 
-DOCUMENT = ROOT / "docs" / "blind_suite.md"
 MARK = "tests/blind/redrawn_nulls.py"
 
 
@@ -44,13 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
-    add = parser.add_argument
-    add("--kept", type=Path, default=ROOT / "out" / "blind", help="results of the long suite")
-    add("--results", type=Path, default=ROOT / "out" / "redrawn", help="folder of results")
-    add("--document", type=Path, default=DOCUMENT, help="Markdown file that gets the numbers")
-    add("--draws", type=int, default=13, help="redrawn nulls per person")
-    add("--jobs", type=int, default=2, help="processes at once")
+    parser = parser_of_kept(__doc__, "redrawn")
+    parser.add_argument("--draws", type=int, default=13, help="redrawn nulls per person")
     return parser.parse_args(arguments)
 
 

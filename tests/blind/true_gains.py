@@ -14,20 +14,23 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from blind_evidence import batches, evidence_of_person, for_each, unit_of_person
-from blind_running import ROOT, Recorded, write_atomically
+from blind_evidence import batches, evidence_of_person, for_each, parser_of_kept, unit_of_person
+from blind_running import Recorded, write_atomically
 from blind_tables import between_marks, markdown
 from blind_truth import Expected, expected
 
-from bsip_cli.diagnosis.candidates import Candidate
 from bsip_cli.diagnosis.cause import Cause
-from bsip_cli.diagnosis.explanation import Explanation, changes_of, fit_together, left_by
+from bsip_cli.diagnosis.explanation import (
+    Explanation,
+    explanation_of,
+    fit_together,
+    left_by,
+    with_noise_beside,
+)
 from bsip_cli.diagnosis.held_out import gain_of
-from bsip_cli.diagnosis.signatures import Place
-from bsip_cli.diagnosis.together import Evidence, together
+from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.stages.found_causes import causes_of
 
-DOCUMENT = ROOT / "docs" / "blind_suite.md"
 MARK = "tests/blind/true_gains.py"
 
 
@@ -45,13 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
-    add = parser.add_argument
-    add("--kept", type=Path, default=ROOT / "out" / "blind", help="results of the long suite")
-    add("--results", type=Path, default=ROOT / "out" / "true_gains", help="folder of results")
-    add("--document", type=Path, default=DOCUMENT, help="Markdown file that gets the numbers")
-    add("--jobs", type=int, default=2, help="processes at once")
-    return parser.parse_args(arguments)
+    return parser_of_kept(__doc__, "true_gains").parse_args(arguments)
 
 
 def recorded_in(batch: Path) -> list[Recorded]:
@@ -96,7 +93,7 @@ def _gains(
     """Percent that each found cause, and the truth in its stead, takes off the squared residual."""
     names = [one.name for one in evidence.trials]
     known = {id(cause): _explanation(evidence, names, cause, cause.values) for cause in causes}
-    evidence = _with_noise_beside(evidence, tuple(known.values()))
+    evidence = with_noise_beside(evidence, tuple(known.values()))
     for cause, true in found:
         names_of = [p.name for p in known[id(cause)].parameters(evidence)]
         if not set(names_of) <= set(true.values):
@@ -117,18 +114,8 @@ def _explanation(
     evidence: Evidence, names: Sequence[str], cause: Cause, values: np.ndarray
 ) -> Explanation:
     trials = tuple(names.index(stem) for stem in cause.trials)
-    parameters = cause.effect.parameters(evidence.trials[trials[0]].scene, cause.target)
-    scanned = tuple(float(x) for p, x in zip(parameters, values, strict=True) if p.scan)
-    return Explanation(Place(Candidate(cause.effect, cause.target, scanned), trials), values)
-
-
-def _with_noise_beside(evidence: Evidence, known: tuple[Explanation, ...]) -> Evidence:
-    changes = changes_of(evidence, known)
-    trials = (
-        one.with_noise_beside(one.filtered.filter(change[..., None])[..., 0])
-        for one, change in zip(evidence.trials, changes, strict=True)
-    )
-    return together(tuple(trials))
+    scene = evidence.trials[trials[0]].scene
+    return explanation_of(cause.effect, cause.target, values, scene, trials)
 
 
 def summary(results: Path) -> str:

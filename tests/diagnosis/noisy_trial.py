@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from bsip_cli.diagnosis.candidates import Candidate
 from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
-from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together
+from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together, with_noise_beside
 from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.effect import Effect
@@ -74,12 +74,7 @@ def fitted(evidence: Evidence, *explanations: Explanation, rounds: int = 3) -> t
     """Explanations, the noise estimated anew beside them, as the selection does."""
     fit = fit_together(evidence, explanations)
     for _ in range(rounds - 1):
-        trials = []
-        for t, one in enumerate(evidence.trials):
-            mine = (e.wrench(one.scene) for e in fit.explanations if t in e.place.trials)
-            change = sum(mine, np.zeros_like(one.scene.measured))
-            trials.append(one.with_noise_beside(one.filtered.filter(change[..., None])[..., 0]))
-        evidence = together(tuple(trials))
+        evidence = with_noise_beside(evidence, fit.explanations)
         fit = fit_together(evidence, fit.explanations)
     return evidence, fit
 

@@ -104,7 +104,7 @@ def test_beside_a_known_effect_the_noise_is_smaller():
     """A large effect is taken for noise until it is known."""
     effect = swing(60.0) * (np.arange(COUNT) % 400 < 200)[:, None]
     found = evidence(1, effect)
-    known = found.with_noise_beside(found.filtered.filter(effect[..., None])[..., 0])
+    known = found.with_noise_beside(found.filtered.filter.one(effect))
     clean = evidence(1)
     apart = known.whitening.spread[:, 2] / clean.whitening.spread[:, 2]
     np.testing.assert_allclose(apart, 1.0, atol=0.02)

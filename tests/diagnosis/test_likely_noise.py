@@ -9,7 +9,7 @@ import pytest
 from noisy_trial import all_of, late, noisy, part_of_moving, with_effect
 
 from bsip_cli.diagnosis.explanation import Fit, fit_together
-from bsip_cli.diagnosis.likely_noise import likely_columns, with_likely_noise, with_noise_beside
+from bsip_cli.diagnosis.likely_noise import likely_columns, noise_beside_fit, with_likely_noise
 from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
@@ -55,7 +55,7 @@ def test_nothing_is_likely_in_a_null():
     signatures, fit = clean()
     assert likely_columns(signatures, fit).shape == (len(fit.residual), 0)
     likely, _ = with_likely_noise(signatures, fit)
-    alone, _ = with_noise_beside(signatures, fit)
+    alone, _ = noise_beside_fit(signatures, fit)
     np.testing.assert_array_equal(spread_of(likely, 0), spread_of(alone, 0))
 
 

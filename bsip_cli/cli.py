@@ -276,6 +276,22 @@ def show(out):
 
 
 @cli.command()
+@click.argument("what", type=click.Choice(["show", "audit"]))
+@click.argument("paper", required=False)
+def published(what, paper):
+    """The tables of the papers that the method comes from.
+
+    `show` prints them as they are in print; `audit` recomputes intervals, t, p, d, F and sums from
+    the printed means and standard deviations, and lists what cannot be true, with the likely
+    reading. PAPER is hansen2014, hansen2017 or robert2017; without it, all.
+    """
+    from bsip_cli.published import shown
+
+    for part in shown(what, paper):
+        click.echo(part)
+
+
+@cli.command()
 def info() -> None:
     """Versions of bsip and of the libraries its numbers depend on (for bug reports)."""
     import platform

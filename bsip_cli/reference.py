@@ -19,6 +19,7 @@ from pydantic.fields import FieldInfo
 from bsip_cli.cli import cli
 from bsip_cli.config import Config, Section, shipped
 from bsip_cli.pipeline import STAGES, Stage, producer
+from bsip_cli.published import shown
 from bsip_cli.schemas import SCHEMAS, Level, Schema
 
 REGENERATE = "python -m bsip_cli.reference docs"
@@ -27,7 +28,12 @@ _NOTE = f"<!-- Made by `{REGENERATE}`; change the code instead. -->"
 
 def pages() -> dict[str, str]:
     """File name to Markdown of every page."""
-    return {"cli.md": cli_page(), "options.md": options_page(), "artifacts.md": artifacts_page()}
+    return {
+        "cli.md": cli_page(),
+        "options.md": options_page(),
+        "artifacts.md": artifacts_page(),
+        "published.md": published_page(),
+    }
 
 
 def write_pages(folder: Path) -> None:
@@ -104,6 +110,24 @@ def _default(option: click.Option) -> str:
     if option.required:
         return "required"
     return f"`{option.default}`" if option.show_default else ""
+
+
+# --- published values -------------------------------------------------------------------------
+
+
+def published_page() -> str:
+    """The papers' tables, and what in them cannot be as printed."""
+    about = (
+        "Tables of the three papers that the method comes from, and what their own numbers "
+        "contradict: differences of means against the middles of their intervals, t against the "
+        "interval, p against t, F against means and standard deviations, Cohen's d against every "
+        "common definition, sums, marks, captions, units. Every printed number stands for all "
+        "that round to it; a reading is given where one change alone makes the numbers agree. "
+        "`bsip published audit` prints the same."
+    )
+    parts = [f"## What cannot be as printed\n\n{chr(10).join(shown('audit', None))}"]
+    parts.append(f"## As printed\n\n{chr(10).join(shown('show', None))}")
+    return _page("Published values", [about, *parts])
 
 
 # --- options ----------------------------------------------------------------------------------

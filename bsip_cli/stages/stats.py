@@ -18,7 +18,7 @@ from bsip_cli.pipeline import STAGES, producer
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.statistics.cohort import DATA_SHARE, Criteria, compare
 from bsip_cli.statistics.cohort_correlations import CorrelationRun, PersonTest, person_tests
-from bsip_cli.statistics.cohort_values import MEASURED, OM, RM, Value
+from bsip_cli.statistics.cohort_values import DIFFERENCE, MEASURED, OM, RM, Value
 from bsip_cli.study import Participant, Trial
 from bsip_cli.unit import Unit
 
@@ -65,11 +65,13 @@ class Recording:
 
 def run(unit: Unit) -> None:
     missing = _Missing(unit)
-    values = [v for person, bsip in _inertias(unit, missing) for v in _masses(person, bsip)]
+    people = list(_inertias(unit, missing))
+    values = [v for person, bsip in people for v in _masses(person, bsip)]
     recordings = _with_roles(unit, list(_recordings(unit, missing)))
     missing.without_sequence(recordings)
     for recording in recordings:
         values += _values_of(recording)
+    values += [v for person, bsip in people for v in _centres(person, bsip)]
     correlations = person_tests("table5", (r for rec in recordings for r in _correlations(rec)))
     values += [value for test in correlations for value in test.values()]
     if not values:
@@ -116,7 +118,7 @@ class _Missing:
         there = {r.trial.participant_id for r in recordings}
         having = {r.trial.participant_id for r in recordings if r.role == "sequence"}
         for name in sorted(there - having):
-            self.add(f"{name} has no identification trial", 2, 3)
+            self.add(f"{name} has no identification trial", 2, 3, 6)
 
 
 def _in_words(numbers: tuple[int, ...]) -> str:
@@ -138,15 +140,15 @@ def _inertias(unit: Unit, missing: _Missing) -> Iterator[tuple[Participant, pd.D
     for participant in unit.study.participants:
         refused = _refused(unit, participant)
         if refused:
-            missing.add(f"{participant.id} was refused by {refused}", 1, 2, 3, 4, 5)
+            missing.add(f"{participant.id} was refused by {refused}", 1, 2, 3, 4, 5, 6)
             continue
         if not unit.path("bsip", participant=participant).exists():
-            missing.add(f"{participant.id} has no identified parameters", 1)
+            missing.add(f"{participant.id} has no identified parameters", 1, 6)
             continue
         frame = unit.read("bsip", participant=participant)
         lacking = [method for method in (OM, RM) if method not in set(frame["method"])]
         if lacking:
-            missing.add(f"{participant.id} has no parameters of {' and '.join(lacking)}", 1)
+            missing.add(f"{participant.id} has no parameters of {' and '.join(lacking)}", 1, 6)
         yield participant, frame
 
 
@@ -170,7 +172,7 @@ def _recordings(unit: Unit, missing: _Missing) -> Iterator[Recording]:
 
 
 def _tables_of(kind: str, trial: Trial) -> tuple[int, ...]:
-    in_sequence = {"fit": (2, 4, 5), "posturography": (3,), "correlation-difference": (5,)}
+    in_sequence = {"fit": (2, 4, 5, 6), "posturography": (3,), "correlation-difference": (5,)}
     in_others = {"fit": (4, 5), "posturography": (), "correlation-difference": (5,)}
     return (in_sequence if trial.role == "sequence" else in_others)[kind]
 
@@ -209,6 +211,18 @@ def _masses(participant: Participant, bsip: pd.DataFrame) -> Iterator[Value]:
             yield Value(*person, f"{segment}{DATA_SHARE}", OM, row["mass_data_share"], "1")
 
 
+def _centres(participant: Participant, bsip: pd.DataFrame) -> Iterator[Value]:
+    """How far OM's centres of mass lie from RM's along the segments, as Robert 2017's table 1."""
+    along = bsip.pivot_table(index="segment", columns="method", values="com_y_m", sort=False)
+    if not {OM, RM} <= set(along.columns):
+        return
+    apart = (along[OM] - along[RM]).abs() * 1000
+    summary = {"mean": apart.mean(), "median": apart.median(), "max": apart.max()}
+    person = (participant.id, "", "all", "", "", "table6")
+    for name, value in (*apart.items(), *summary.items()):
+        yield Value(*person, f"com_{name}", DIFFERENCE, float(value), "mm")
+
+
 def _values_of(recording: Recording) -> list[Value]:
     values: list[Value] = []
     if "fit" in recording.frames:
@@ -217,6 +231,7 @@ def _values_of(recording: Recording) -> list[Value]:
         for method in (OM, RM):
             values += _cop_errors(recording, method, fits)
             values += _force_errors(recording, method, fits)
+            values += _residuals(recording, method, fits)
     if "posturography" in recording.frames and recording.role == "sequence":
         values += _sway(recording, recording.frames["posturography"])
     return values
@@ -244,6 +259,16 @@ def _force_errors(recording: Recording, method: str, fits: dict) -> Iterator[Val
         for measure in MEASURES:
             unit = row["unit"] if measure == "rmse" else "1"
             yield recording.value("table5", f"{component}_{measure}", method, row[measure], unit)
+
+
+def _residuals(recording: Recording, method: str, fits: dict) -> Iterator[Value]:
+    """Root mean square of the force's and the moment's error as vectors."""
+    if recording.role != "sequence" or any((method, c) not in fits for c in COMPONENTS):
+        return
+    errors = {c: fits[method, c]["rmse"] for c in COMPONENTS}
+    force, moment = (hypot(*(errors[f"{kind}{axis}"] for axis in "xyz")) for kind in "fm")
+    yield recording.value("table6", "force_residual", method, force, "N")
+    yield recording.value("table6", "moment_residual", method, moment, "N m")
 
 
 def _sway(recording: Recording, frame: pd.DataFrame) -> Iterator[Value]:

@@ -1,4 +1,4 @@
-"""Cohort: the papers' five tables as CSV, Markdown and LaTeX.
+"""Cohort: the papers' six tables, and the published values beside them, as CSV, Markdown and LaTeX.
 
 Reads values, comparisons. Writes OUT/group/tables/*, tables-files.
 """

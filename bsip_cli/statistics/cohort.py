@@ -1,4 +1,4 @@
-"""The tests of the five tables, from the participants' values."""
+"""The tests of the six tables, from the participants' values."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from bsip_cli.statistics.cohort_pairs import (
     t_and_rank_tests,
 )
 from bsip_cli.statistics.cohort_values import (
+    DIFFERENCE,
     MEASURED,
     OM,
     RM,
@@ -95,10 +96,20 @@ def _six_components(
     return (pair_description(topic, om, rm),)
 
 
+def _table_or_identified(
+    topic: Topic, values: Sequence[Value], criteria: Criteria
+) -> tuple[Comparison, ...]:
+    if all(value.method == DIFFERENCE for value in values):
+        return (description(topic, DIFFERENCE, per_participant(values, (DIFFERENCE,))[:, 0]),)
+    om, rm = per_participant(values, (OM, RM)).T
+    return t_and_rank_tests(topic, om, rm, criteria.alpha, "added")
+
+
 _TABLES: dict[str, Callable[[Topic, Sequence[Value], Criteria], tuple[Comparison, ...]]] = {
     "table1": _segment_mass,
     "table2": _cop_rmse,
     "table3": _posturography,
     "table4": _cross_validation,
     "table5": _six_components,
+    "table6": _table_or_identified,
 }

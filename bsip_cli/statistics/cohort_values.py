@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 
 OM, RM, MEASURED = "OM", "RM", "measured"
 
-OVER_TASKS = ("table2", "table3")
+DIFFERENCE = "|OM-RM|"
+"""The method of a value that is how far both are apart."""
+
+OVER_TASKS = ("table2", "table3", "table6")
 """Tables of the identification sequence, under whatever task names it was recorded."""
 
 

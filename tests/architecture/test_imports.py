@@ -27,9 +27,10 @@ ALLOWED = {
     "export": "__init__ artifacts body errors pipeline provenance runner schemas session stages "
     "unit",
     "show": "artifacts errors report schemas",
+    "published": "report statistics",
     "markers": "body config errors recordings",
-    "cli": "__init__ errors export markers pipeline provenance session show simulate",
-    "reference": "cli config pipeline schemas",
+    "cli": "__init__ errors export markers pipeline provenance published session show simulate",
+    "reference": "cli config pipeline published schemas",
     "body": "config errors",
     "dynamics": "body errors",
     "motion": "body dynamics errors",

@@ -6,7 +6,7 @@ import pytest
 
 from bsip_cli.artifacts import read_header, write_artifact
 from bsip_cli.errors import UsageError
-from bsip_cli.report.tables.build import NAMES, RENDERERS, show
+from bsip_cli.report.tables.build import BESIDE, NAMES, RENDERERS, show
 from bsip_cli.runner import perform
 from bsip_cli.stages import stats as stats_stage
 
@@ -55,10 +55,10 @@ def test_one_refused_participant_is_named_and_left_out(make_cohort):
     outcome = cohort.perform("stats")
     assert outcome.state == "done"
     sentence = "sub-03 was refused by identify"
-    assert f"{sentence}: not in tables 1, 2, 3, 4 and 5" in outcome.sentences
+    assert f"{sentence}: not in tables 1, 2, 3, 4, 5 and 6" in outcome.sentences
     assert cohort.perform("tables").state == "done"
     for name in NAMES:
-        assert set(cohort.table(name)["n"]) == {7}
+        assert set(cohort.table(name)["n"]) == {7}, name
         assert f"Missing: {sentence}." in cohort.text(name)
     assert "sub-03" not in set(cohort.group("values")["participant"])
 
@@ -73,7 +73,7 @@ def test_refused_and_missing_trials(make_cohort):
     messages = cohort.perform("stats").sentences
     cohort.perform("tables")
     assert messages == (
-        "sub-05 has no identified parameters: not in table 1",
+        "sub-05 has no identified parameters: not in tables 1 and 6",
         "sub-02_task-walking has no fit, no posturography, no correlation-difference: not in "
         "tables 4 and 5",
         "sub-04_task-walking has no correlation-difference: not in table 5",
@@ -94,7 +94,7 @@ def test_participant_without_sequence_is_named(make_cohort):
     for kind in stats_stage.TRIAL_KINDS:
         cohort.path(kind, "sub-01", trial).unlink()
     messages = cohort.perform("stats").sentences
-    assert "sub-01 has no identification trial: not in tables 2 and 3" in messages
+    assert "sub-01 has no identification trial: not in tables 2, 3 and 6" in messages
 
 
 def test_columns_that_do_not_vary(make_cohort):
@@ -181,7 +181,7 @@ def test_no_identification_data_at_all(make_cohort):
     """Neither a sequence nor a trial that identified: tables 2 and 3 are empty, and say so."""
     cohort = make_cohort(3, ("static", "walking"))
     messages = cohort.perform("stats").sentences
-    assert "sub-02 has no identification trial: not in tables 2 and 3" in messages
+    assert "sub-02 has no identification trial: not in tables 2, 3 and 6" in messages
     assert cohort.perform("tables").state == "done"
     assert len(cohort.table("table2_cop_rmse")) == len(cohort.table("table3_posturography")) == 0
     assert "sub-02 has no identification trial" in cohort.text("table3_posturography")
@@ -201,7 +201,7 @@ def test_freshness_and_files(make_cohort):
     cohort.run()
     assert [cohort.perform(name).state for name in ("stats", "tables")] == ["fresh", "fresh"]
     files = sorted(path.name for path in (cohort.out / "group" / "tables").iterdir())
-    assert files == sorted(f"{name}.{ending}" for name in NAMES for ending in RENDERERS)
+    assert files == sorted(f"{name}.{ending}" for name in (*NAMES, *BESIDE) for ending in RENDERERS)
     listed = cohort.group("tables-files")
     assert sorted(listed["file"]) == [f"group/tables/{file}" for file in files]
     before = {file: (cohort.out / file).read_bytes() for file in listed["file"]}

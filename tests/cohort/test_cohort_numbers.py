@@ -125,6 +125,26 @@ def test_table_3(cohort):
         assert row["lilliefors_p_smallest"] == pytest.approx(min(lilliefors_p(v) for v in x.T))
 
 
+def test_table_6(cohort):
+    table = cohort.table("table6_centres_of_mass").set_index("variable")
+    fit = cohort.all_of("fit").query("task == 'sequence'")
+    for kind, unit in (("force", "N"), ("moment", "Nm")):
+        axes = [f"{kind[0]}{axis}" for axis in "xyz"]
+        squares = fit[fit["component"].isin(axes)].assign(rmse=lambda f: f["rmse"] ** 2)
+        sums = squares.groupby(["participant", "method"], as_index=False)["rmse"].sum()
+        om, rm = (np.sqrt(v) for v in by_person(sums, "rmse").values())
+        check_pair(table.loc[f"{kind}_residual"], om, rm, unit)
+    bsip = cohort.all_of("bsip")
+    places = bsip.pivot(index=["participant", "segment"], columns="method", values="com_y_m")
+    apart = (1000 * (places["OM"] - places["RM"]).abs()).unstack("segment")
+    for name, values in (("mean", apart.mean(axis=1)), ("max", apart.max(axis=1))):
+        assert table.loc[f"com_{name}", "apart_mean_mm"] == pytest.approx(values.mean())
+        assert table.loc[f"com_{name}", "apart_sd_mm"] == pytest.approx(values.std())
+    assert table.loc["com_median", "apart_mean_mm"] == pytest.approx(apart.median(axis=1).mean())
+    for segment in SEGMENTS:
+        assert table.loc[f"com_{segment}", "apart_mean_mm"] == pytest.approx(apart[segment].mean())
+
+
 def check_one_way(row, x) -> None:
     n, k = x.shape
     test = stats.f_oneway(*x.T)
@@ -264,7 +284,7 @@ def test_one_unit_in_every_csv_column(cohort):
 
 def test_values_hold_every_run_and_only_om_rm_and_measured(cohort):
     values = cohort.group("values")
-    assert set(values["method"]) == {"OM", "RM", "measured", "OM-RM"}
+    assert set(values["method"]) == {"OM", "RM", "measured", "OM-RM", "|OM-RM|"}
     runs = values.query("table == 'table4' and task == 'throwing' and variable == 'cop_ap'")
     assert len(runs) == 8 * 2 * 2
     assert set(runs["data"]) == {"held_out"}

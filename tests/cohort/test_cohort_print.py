@@ -7,7 +7,7 @@ from math import nan
 
 import pytest
 
-from bsip_cli.report.tables.build import NAMES, render_markdown, show
+from bsip_cli.report.tables.build import BESIDE, NAMES, render_markdown, show
 from bsip_cli.report.tables.csv import to_csv
 from bsip_cli.report.tables.labels import segment
 from bsip_cli.report.tables.latex import escape as latex
@@ -172,6 +172,27 @@ def test_post_hoc_marks_of_table_3(cohort):
         assert not cells[2].endswith("#")
 
 
+def test_published_values_stand_beside_the_studys(cohort):
+    """The study's numbers are those of its own table; exchanged cells stand where they belong."""
+    rows = rows_of(cohort.text("table2_beside_hansen2017"))
+    own = rows_of(cohort.text("table2_cop_rmse"))
+    for (name, _, om, om_print, rm, rm_print, *_), mine in zip(rows[2:], own[2:], strict=True):
+        assert [name, om, rm] == mine[:3]
+        meant = {"AP": ("3.84(1.49)", "88.67(11.03)†"), "ML": ("12.69(4.82)†", "69.63(22.36)")}
+        assert (om_print, rm_print) == meant[name]
+    table = cohort.table("table1_beside_hansen2017").set_index("row")
+    assert table.loc["left hand", "om_printed_mean"] == 0.95
+    own_mass = cohort.table("table1_segment_mass").set_index("segment")
+    assert table.loc["left hand", "om_mean"] == own_mass.loc["hand_l", "om_mean_kg"]
+    walking = cohort.table("table4_beside_hansen2017").set_index("row").loc["COP error, walking"]
+    four = cohort.table("table4_cross_validation").set_index(["quantity", "task"])
+    assert walking["rm_mean"] == four.loc[("cop_error", "walking"), "rm_mean_mm"]
+    assert walking["chen_2011_printed_mean"] == 12.08
+    sway = cohort.table("table3_beside_hansen2017").set_index("row")
+    three = cohort.table("table3_posturography").set_index("variable")
+    assert sway.loc["RMS AP", "fp_mean"] == three.loc["rms_ap_origin", "fp_mean_m"]
+
+
 def test_no_absent_number_is_printed_as_nan(cohort):
     for ending in ("md", "tex", "csv"):
         for name in NAMES:
@@ -182,5 +203,5 @@ def test_render_and_show_give_the_written_texts(cohort):
     texts = render_markdown(
         cohort.group("values"), cohort.group("comparisons"), Criteria(0.05, 10.0)
     )
-    assert texts == {name: cohort.text(name) for name in NAMES}
-    assert show(cohort.out) == "\n\n".join(texts.values())
+    assert texts == {name: cohort.text(name) for name in (*NAMES, *BESIDE)}
+    assert show(cohort.out) == "\n\n".join(texts[name] for name in NAMES)

@@ -28,7 +28,7 @@ def test_links_lead_to_what_is_there(reports, page):
 
 def test_who_is_missing_is_said(page):
     assert "2 of 3 participants" in page
-    assert "sub-03 has no identified parameters: not in table 1" in page
+    assert "sub-03 has no identified parameters: not in tables 1 and 6" in page
 
 
 def test_all_five_tables_are_there(page):

@@ -1,4 +1,4 @@
-"""Section 4: the papers' five tables with their legends."""
+"""Section 4: the papers' six tables with their legends."""
 
 from __future__ import annotations
 

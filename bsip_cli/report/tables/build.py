@@ -1,8 +1,8 @@
-"""The papers' five tables, from the cohort's results to text."""
+"""The papers' six tables, from the cohort's results to text."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,10 +10,12 @@ import pandas as pd
 
 from bsip_cli.errors import UsageError
 from bsip_cli.report.tables import (
+    centres_of_mass,
     cop_rmse,
     cross_validation,
     notes,
     posturography,
+    published,
     segment_mass,
     six_components,
 )
@@ -32,11 +34,21 @@ BUILDERS: dict[str, Callable[[Results, Criteria], Table]] = {
     "table3": posturography.build,
     "table4": cross_validation.build,
     "table5": six_components.build,
+    "table6": centres_of_mass.build,
 }
+IN_PRINT = ("table1", "table2", "table3", "table4")
 NAMES = tuple(
     module.NAME
-    for module in (segment_mass, cop_rmse, posturography, cross_validation, six_components)
+    for module in (
+        segment_mass,
+        cop_rmse,
+        posturography,
+        cross_validation,
+        six_components,
+        centres_of_mass,
+    )
 )
+BESIDE = tuple(published.name_beside(tag) for tag in IN_PRINT)
 RENDERERS: dict[str, Callable[[Table], str]] = {
     "csv": to_csv,
     "md": to_markdown,
@@ -50,7 +62,7 @@ def build_tables(
     criteria: Criteria,
     missing: Sequence[Mapping] = (),
 ) -> tuple[Table, ...]:
-    """The five tables as data.
+    """The six tables as data, and the first four beside the published values.
 
     Parameters
     ----------
@@ -69,7 +81,13 @@ def build_tables(
             notes.missing(absent),
         )
         tables.append(replace(table, notes=(*table.notes, *filter(None, more))))
-    return tuple(tables)
+    return (*tables, *_beside_print(rows))
+
+
+def _beside_print(rows: Sequence[Comparison]) -> Iterator[Table]:
+    """Tables 1 to 4 with the published values."""
+    for tag in IN_PRINT:
+        yield published.beside(tag, Results(row for row in rows if row.topic.table == tag))
 
 
 def render_markdown(
@@ -78,7 +96,7 @@ def render_markdown(
     criteria: Criteria,
     missing: Sequence[Mapping] = (),
 ) -> dict[str, str]:
-    """The five tables as Markdown, by the stem of their file; parameters as `build_tables`."""
+    """All tables as Markdown, by the stem of their file; parameters as `build_tables`."""
     tables = build_tables(values, comparisons, criteria, missing)
     return {table.name: to_markdown(table) for table in tables}
 

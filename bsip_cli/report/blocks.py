@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Literal
 
+from bsip_cli.report.poses import Poses
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -98,7 +100,17 @@ class Picture:
         return to_svg(self.figure)
 
 
-Block = Paragraph | Heading | Bullets | Numbered | Grid | Picture
+@dataclass(frozen=True)
+class Film:
+    """Poses that move when asked to; ``alt`` for those who cannot see it."""
+
+    kind: ClassVar[str] = "film"
+    poses: Poses
+    caption: str
+    alt: str
+
+
+Block = Paragraph | Heading | Bullets | Numbered | Grid | Picture | Film
 
 
 @dataclass(frozen=True)

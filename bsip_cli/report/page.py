@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import re
 from pathlib import Path
 
@@ -10,13 +11,15 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from bsip_cli.report.blocks import Document
+from bsip_cli.report.film import film_data
 
 _BEFORE_UNIT = re.compile(r"(?<=[\d)]) (?=(?:mm|ms|kg|m|s|N|Hz)\b|%)|(?<=N) (?=m\b)|(?<=%) (?=BW)")
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
 def render(document: Document) -> str:
-    """The page: figures as data, no scripts, nothing from the network; all texts escaped."""
+    """The page: figures as data, nothing from the network, no script but its own, which the page's
+    policy names by its hash; all texts escaped."""
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES),
         autoescape=True,
@@ -26,8 +29,21 @@ def render(document: Document) -> str:
     )
     environment.filters["svg_source"] = _svg_source
     environment.filters["tied"] = _tied
-    style = Markup((_TEMPLATES / "report.css").read_text(encoding="utf-8"))  # our own
-    return environment.get_template("report.html.j2").render(document=document, style=style)
+    environment.filters["film_data"] = film_data
+    style, script = (Markup(_own(name)) for name in ("report.css", "report.js"))
+    return environment.get_template("report.html.j2").render(
+        document=document, style=style, script=script, script_hash=_hash(script)
+    )
+
+
+def _own(name: str) -> str:
+    return (_TEMPLATES / name).read_text(encoding="utf-8")
+
+
+def _hash(script: str) -> str:
+    """As a content security policy names an inline script."""
+    digest = hashlib.sha256(script.encode()).digest()
+    return f"sha256-{base64.b64encode(digest).decode('ascii')}"
 
 
 def _tied(text: str) -> str:

@@ -9,7 +9,7 @@ import pandas as pd
 
 from bsip_cli.body.person import Person
 from bsip_cli.motion.inverse_kinematics import tree_of
-from bsip_cli.report.figures.stick_strip import StickStrip
+from bsip_cli.report.poses import Poses
 from bsip_cli.report.records import clock_of, flags_of, signals_of
 
 _FORCES = ("fx_N", "fy_N", "fz_N")
@@ -28,26 +28,47 @@ class _Skeleton:
     sides: tuple[str, ...]
 
 
-def strip_of(
-    body: Person,
-    kinematics: pd.DataFrame,
-    reconstruction: pd.DataFrame | None,
-    anterior: np.ndarray,
-    body_weight_N: float,
-    instants: int,
-) -> StickStrip | None:
-    """The poses of a trial at evenly spread instants; None where no frame is determined.
+@dataclass(frozen=True)
+class Motion:
+    """A trial's motion as the model makes it; anterior (2,) is the person's forward direction in
+    the world."""
 
-    Parameters
-    ----------
-    anterior : (2,) the person's forward direction in the world.
-    """
-    rows = _choose(kinematics, reconstruction, instants)
+    body: Person
+    kinematics: pd.DataFrame
+    reconstruction: pd.DataFrame | None
+    anterior: np.ndarray
+    body_weight_N: float
+
+
+def poses_at_instants(motion: Motion, instants: int) -> Poses | None:
+    """Poses at evenly spread instants; None where no frame is determined."""
+    rows = _compared(motion)
     if rows.empty:
         return None
+    return _poses(motion, rows.iloc[np.unique(np.linspace(0, len(rows) - 1, instants).astype(int))])
+
+
+def poses_of_stretch(motion: Motion, longest_s: float, rate_hz: float) -> Poses | None:
+    """Poses of the middle of a trial, as long and as often as asked; None where no frame is
+    determined."""
+    rows = _compared(motion)
+    if rows.empty:
+        return None
+    times = rows["time_s"].to_numpy()
+    inside = rows[np.abs(times - 0.5 * (times[0] + times[-1])) <= 0.5 * longest_s]
+    times = inside["time_s"].to_numpy()
+    if not len(times):  # a gap in the very middle
+        return None
+    wanted = np.arange(times[0], times[-1] + 0.5 / rate_hz, 1 / rate_hz)
+    nearest = np.unique(np.clip(np.searchsorted(times, wanted), 0, len(times) - 1))
+    return _poses(motion, inside.iloc[nearest])
+
+
+def _poses(motion: Motion, rows: pd.DataFrame) -> Poses:
+    body = motion.body
     q = rows[[f"q_{name}" for name in body.skeleton.q_names]].to_numpy()
     R, p = tree_of(body).forward(q)
-    axes = _person_axes(anterior)
+    axes = _person_axes(motion.anterior)
     lines = _bones(body)
     start = _points(R, p, lines.starts, lines.start_m) @ axes.T
     end = _points(R, p, lines.ends, lines.end_m) @ axes.T
@@ -56,35 +77,31 @@ def strip_of(
     low = np.minimum(start[..., 2], end[..., 2]).min(axis=1)
     times = rows["time_s"].to_numpy()
     ground = float(np.percentile(low, _ON_GROUND_PERCENTILE))
-    force, point = _forces(reconstruction, times, axes, ground)
-    return StickStrip(
+    force, point = _forces(motion.reconstruction, times, axes, ground)
+    return Poses(
         time_s=times,
         bones_m=np.stack([start, end], axis=2),
         sides=lines.sides,
         head_m=(p[:, head] + R[:, head] @ centre) @ axes.T,
         head_radius_m=_HEAD_RADIUS_M,
+        markers_m=_points(R, p, body.marker_segments, body.markers_in_joint_m()) @ axes.T,
         force_m=point,
         forces=force,
         ground_m=ground,
-        body_weight=body_weight_N,
+        body_weight=motion.body_weight_N,
     )
 
 
-def _choose(
-    kinematics: pd.DataFrame, reconstruction: pd.DataFrame | None, instants: int
-) -> pd.DataFrame:
-    """Rows at evenly spread determined frames, within the compared span if there is one."""
+def _compared(motion: Motion) -> pd.DataFrame:
+    """Rows of determined frames, within the compared span if there is one."""
+    kinematics, reconstruction = motion.kinematics, motion.reconstruction
     rows = kinematics[kinematics["determined"].astype(bool)]
     if reconstruction is not None:
         compared = clock_of(reconstruction)[flags_of(reconstruction, "valid")]
         if len(compared):
             inside = rows["time_s"].between(compared[0], compared[-1])
             rows = rows[inside] if inside.any() else rows
-    return (
-        rows.iloc[np.unique(np.linspace(0, len(rows) - 1, instants).astype(int))]
-        if len(rows)
-        else rows
-    )
+    return rows
 
 
 def _person_axes(anterior: np.ndarray) -> np.ndarray:

@@ -5,8 +5,10 @@ Reads values, comparisons, person, identification, tables-files. Writes group-re
 
 from __future__ import annotations
 
+from bsip_cli.pipeline import STAGES, producer, stages_named
 from bsip_cli.report.cohort.document import cohort_document
 from bsip_cli.report.cohort.record import CohortRecord, Member
+from bsip_cli.report.figures.workflow import Step
 from bsip_cli.report.page import render
 from bsip_cli.report.records import Origin
 from bsip_cli.report.tables.build import build_tables
@@ -44,7 +46,22 @@ def record_of(unit: Unit) -> CohortRecord:
         table_files=tuple(unit.read("tables-files")["file"]),
         missing=tuple(_missing_sentence(gone) for gone in missing),
         origins=_origins(unit),
+        steps=steps(),
     )
+
+
+def steps() -> tuple[Step, ...]:
+    """The stages of the pipeline, those of one name as one."""
+    names = tuple(dict.fromkeys(stage.name for stage in STAGES))
+    return tuple(_step(name) for name in names)
+
+
+def _step(name: str) -> Step:
+    stages = stages_named(name)
+    before = {producer(kind).name for stage in stages for kind in stage.inputs} - {name}
+    levels = tuple(dict.fromkeys(stage.level for stage in stages))
+    order = dict.fromkeys(stage.name for stage in STAGES if stage.name in before)
+    return Step(name, levels, stages[0].summary, tuple(order))
 
 
 def _missing_sentence(gone: dict) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from bsip_cli.report.blocks import Block, Bullets, Heading, Paragraph, Section
+from bsip_cli.report.blocks import Block, Bullets, Heading, Paragraph, Picture, Section
 from bsip_cli.report.cohort.record import CohortRecord
+from bsip_cli.report.figures.workflow import workflow
 from bsip_cli.report.origins import options_grids
 from bsip_cli.report.records import messages
 
@@ -29,5 +30,21 @@ def section(record: CohortRecord) -> Section:
     return Section(
         "limits",
         "Limits, warnings, options",
-        (Bullets(_MIND), Heading("Warnings"), warned, *options_grids(record.origins)),
+        (
+            Bullets(_MIND),
+            Heading("Warnings"),
+            warned,
+            Heading("How the numbers were made"),
+            _way(record),
+            *options_grids(record.origins),
+        ),
+    )
+
+
+def _way(record: CohortRecord) -> Block:
+    return Picture(
+        workflow(record.steps),
+        "The way of the data: each stage with those whose results it needs.",
+        f"Flow chart of the stages: {', '.join(step.name for step in record.steps)}.",
+        "fig2_workflow",
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from bsip_cli.report.figures.workflow import Step
 from bsip_cli.report.gains import Gain
 from bsip_cli.report.records import Origin, Refusal
 from bsip_cli.report.tables.model import Table
@@ -28,7 +29,8 @@ class Member:
 
 @dataclass(frozen=True)
 class CohortRecord:
-    """Attributes: ``missing`` sentences on who is in no table; ``table_files`` relative to OUT."""
+    """Attributes: ``missing`` sentences on who is in no table; ``table_files`` relative to OUT;
+    ``steps`` the stages in order."""
 
     members: tuple[Member, ...]
     values: pd.DataFrame
@@ -36,6 +38,7 @@ class CohortRecord:
     table_files: tuple[str, ...]
     missing: tuple[str, ...]
     origins: tuple[Origin, ...]
+    steps: tuple[Step, ...]
 
     def gains(self) -> dict[str, tuple[Gain, ...]]:
         """Participant -> errors of RM and OM in each trial and component."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
@@ -11,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from bsip_cli.report.figures.canvas import GREEN, INK, SOFT, WIDTH_MM, house_style, new_figure
+from bsip_cli.report.poses import Poses
 
 _MARGIN_M = 0.22
 _COLOURS = {"l": "#9a9a9a", "r": INK, "": INK}
@@ -19,43 +18,8 @@ _TALLEST_MM = 40.0
 _LABEL_MM = 12.0
 
 
-@dataclass(frozen=True)
-class StickStrip:
-    """Poses at n instants; positions and forces in the person's axes (anterior, right, up).
-
-    Attributes
-    ----------
-    time_s : (n,).
-    bones_m : (n, b, 2, 3) end points of the bones.
-    sides : (b,) ``l``, ``r`` or empty.
-    head_m : (n, 3) centre of the head; head_radius_m : its radius.
-    force_m : (n, 3) where the ground force acts; forces : (n, 3), NaN where it is not measured.
-    ground_m : height of the ground.
-    body_weight : what an arrow of half a body height stands for.
-    """
-
-    time_s: np.ndarray
-    bones_m: np.ndarray
-    sides: tuple[str, ...]
-    head_m: np.ndarray
-    head_radius_m: float
-    force_m: np.ndarray
-    forces: np.ndarray
-    ground_m: float
-    body_weight: float
-
-    def arrow_m_per_newton(self) -> float:
-        """One body weight is as long as half the tallest pose."""
-        top = float(np.nanmax(self.head_m[:, 2])) + self.head_radius_m - self.ground_m
-        return 0.5 * top / self.body_weight
-
-    def arrow_tips_m(self) -> np.ndarray:
-        """(n, 3) tips of the force arrows."""
-        return self.force_m + self.forces * self.arrow_m_per_newton()
-
-
 @house_style()
-def stick_strip(data: StickStrip) -> Figure:
+def stick_strip(data: Poses) -> Figure:
     """Two rows of stick figures: from the right side, and from behind."""
     slots = _slots(data)
     width, height = slots[-1, 1], _height(data)
@@ -78,7 +42,7 @@ def stick_strip(data: StickStrip) -> Figure:
     return figure
 
 
-def _height(data: StickStrip) -> float:
+def _height(data: Poses) -> float:
     tops = [data.bones_m[..., 2].max(), data.head_m[:, 2].max() + data.head_radius_m]
     tips = data.arrow_tips_m()[:, 2]
     if np.isfinite(tips).any():
@@ -86,7 +50,7 @@ def _height(data: StickStrip) -> float:
     return float(max(tops)) - data.ground_m + 0.05
 
 
-def _half_width(data: StickStrip, k: int) -> float:
+def _half_width(data: Poses, k: int) -> float:
     """How far pose ``k`` reaches from its pelvis to either side, in either view."""
     tip = data.arrow_tips_m()[k]
     points = [*data.bones_m[k].reshape(-1, 3), data.head_m[k] + data.head_radius_m]
@@ -94,14 +58,14 @@ def _half_width(data: StickStrip, k: int) -> float:
     return float(np.abs(np.array(points)[:, :2] - data.bones_m[k, 0, 0, :2]).max())
 
 
-def _slots(data: StickStrip) -> np.ndarray:
+def _slots(data: Poses) -> np.ndarray:
     """(n, 2) left and right edge of the room that each pose gets."""
     halves = np.array([_half_width(data, k) for k in range(len(data.time_s))]) + _MARGIN_M / 2
     edges = np.concatenate([[0.0], np.cumsum(2.0 * halves)])
     return np.stack([edges[:-1], edges[1:]], axis=1)
 
 
-def _draw_row(axes: Axes, data: StickStrip, slots: np.ndarray, axis: int) -> None:
+def _draw_row(axes: Axes, data: Poses, slots: np.ndarray, axis: int) -> None:
     shifts = slots.mean(axis=1) - data.bones_m[:, 0, 0, axis]
     bones = data.bones_m[..., [axis, 2]] + np.stack([shifts, 0.0 * shifts], axis=1)[:, None, None]
     for side in ("l", "", "r"):  # the left side lies behind
@@ -124,7 +88,7 @@ def _draw_row(axes: Axes, data: StickStrip, slots: np.ndarray, axis: int) -> Non
     axes.spines[:].set_visible(False)
 
 
-def _draw_forces(axes: Axes, data: StickStrip, shifts: np.ndarray, axis: int) -> None:
+def _draw_forces(axes: Axes, data: Poses, shifts: np.ndarray, axis: int) -> None:
     tips = data.arrow_tips_m()
     seen = np.isfinite(tips).all(axis=1)
     if seen.any():

@@ -33,7 +33,12 @@ def write_artifact(path: Path, kind: str, frame: pd.DataFrame, provenance: Mappi
     provenance : what made it; stored as JSON in the file's metadata.
     """
     table = _to_arrow(SCHEMAS[kind], frame, provenance)
-    write_atomically(path, lambda temporary: pq.write_table(table, temporary, compression="zstd"))
+    write_atomically(
+        path,
+        lambda temporary: pq.write_table(
+            table, temporary, compression="zstd", write_page_checksum=True
+        ),
+    )
 
 
 def write_atomically(path: Path, write) -> None:
@@ -73,7 +78,7 @@ def read_artifact(path: Path, kind: str) -> pd.DataFrame:
     """
     read_header(path, kind)
     try:
-        return pq.read_table(path).to_pandas()
+        return pq.read_table(path, page_checksum_verification=True).to_pandas()
     except (OSError, pa.ArrowException) as error:
         raise _not_an_artifact(path, error) from None
 

@@ -292,15 +292,14 @@ def published(what, paper):
 
 
 @cli.command()
-def info() -> None:
-    """Versions of bsip and of the libraries its numbers depend on (for bug reports)."""
-    import platform
+@click.argument("artifact", required=False, type=click.Path(path_type=Path))
+def info(artifact) -> None:
+    """What an artifact holds and what made it; without one, the versions of bsip and of the
+    libraries its numbers depend on (for bug reports)."""
+    from bsip_cli.info import artifact_info, versions
 
-    from bsip_cli.provenance import library_versions
-
-    click.echo(f"bsip {__version__}\npython {platform.python_version()}")
-    for name, version in library_versions().items():
-        click.echo(f"{name} {version}")
+    for line in versions() if artifact is None else artifact_info(artifact):
+        click.echo(line)
 
 
 def main() -> None:

@@ -73,7 +73,7 @@ def cli_page() -> str:
     parts = [_paragraphs(cli)]
     for arguments, names in groups.items():
         usages = [f"bsip {name} {_usage(cli.commands[name])}" for name in names]
-        meanings = [(f"`bsip {name}`", _paragraphs(cli.commands[name])) for name in names]
+        meanings = [(f"`bsip {name}`", _in_a_cell(cli.commands[name])) for name in names]
         parts += [f"## {', '.join(names)}", "```\n" + "\n".join(usages) + "\n```"]
         parts += [_table(("command", "what it does"), meanings), *filter(None, [arguments])]
     return _page("The command line", parts)
@@ -81,6 +81,10 @@ def cli_page() -> str:
 
 def _paragraphs(command: click.Command) -> str:
     return "\n\n".join(" ".join(text.split()) for text in (command.help or "").split("\n\n"))
+
+
+def _in_a_cell(command: click.Command) -> str:
+    return _paragraphs(command).replace("\n\n", " ")
 
 
 def _usage(command: click.Command) -> str:

@@ -16,6 +16,7 @@ import pandas as pd
 from bsip_cli.artifacts import write_artifact
 from bsip_cli.config import Config
 from bsip_cli.errors import BadDataError, BsipError, NumericalError, UsageError
+from bsip_cli.lock import held_alone
 from bsip_cli.pipeline import Stage, producer
 from bsip_cli.study import Participant, Study
 from bsip_cli.unit import Unit
@@ -78,14 +79,30 @@ def _outcomes(
 
 
 def _run(
-    stages: Iterable[Stage],
+    stages: tuple[Stage, ...],
     study: Study,
     out: Path,
     config: Config,
     force: bool,
     participant: Participant | None = None,
 ) -> list[Outcome]:
-    """Stages of one participant, or of the cohort."""
+    """Stages of one participant, or of the cohort, unless another bsip is at them."""
+    name = participant.id if participant else "group"
+    try:
+        with held_alone(out / name):
+            return _run_alone(stages, study, out, config, force, participant)
+    except UsageError as error:
+        return [Outcome(stages[0].name, name, "refused", (str(error),), error.exit_code)]
+
+
+def _run_alone(
+    stages: Iterable[Stage],
+    study: Study,
+    out: Path,
+    config: Config,
+    force: bool,
+    participant: Participant | None,
+) -> list[Outcome]:
     if participant is not None:
         _forget_gone_recordings(out / participant.id, participant)
     outcomes = []

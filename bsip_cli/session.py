@@ -15,6 +15,7 @@ from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.check_study import check_prefixes, check_segments, check_trials
 from bsip_cli.config import Config, load_config, with_estimators
+from bsip_cli.dataset import describe_dataset
 from bsip_cli.errors import UsageError
 from bsip_cli.pipeline import stages_named
 from bsip_cli.runner import Outcome, refusal_sentence, run_stages
@@ -39,6 +40,7 @@ def run_session(
     ``estimators`` stand for the configured ones, unless empty.
     """
     opened = open_study(root, out, chosen, config_file, estimators)
+    describe_dataset(out, opened.study.root)
     participants = opened.participants
     stages = stages_named(command)
     if chosen and command == "run":

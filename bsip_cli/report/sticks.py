@@ -15,6 +15,7 @@ from bsip_cli.report.records import clock_of, flags_of, signals_of
 _FORCES = ("fx_N", "fy_N", "fz_N")
 _HEAD_RADIUS_M = 0.1
 _ON_GROUND_PERCENTILE = 2.0
+_GAP_S = 0.1  # a film does not freeze longer
 
 
 @dataclass(frozen=True)
@@ -49,19 +50,19 @@ def poses_at_instants(motion: Motion, instants: int) -> Poses | None:
 
 
 def poses_of_stretch(motion: Motion, longest_s: float, rate_hz: float) -> Poses | None:
-    """Poses of the middle of a trial, as long and as often as asked; None where no frame is
-    determined."""
+    """Poses of the longest stretch without a gap, its middle if it lasts longer than asked, at
+    about this rate; None where no frame is determined."""
     rows = _compared(motion)
     if rows.empty:
         return None
     times = rows["time_s"].to_numpy()
-    inside = rows[np.abs(times - 0.5 * (times[0] + times[-1])) <= 0.5 * longest_s]
-    times = inside["time_s"].to_numpy()
-    if not len(times):  # a gap in the very middle
-        return None
-    wanted = np.arange(times[0], times[-1] + 0.5 / rate_hz, 1 / rate_hz)
-    nearest = np.unique(np.clip(np.searchsorted(times, wanted), 0, len(times) - 1))
-    return _poses(motion, inside.iloc[nearest])
+    gaps = np.flatnonzero(np.diff(times) > _GAP_S) + 1
+    longest = max(np.split(np.arange(len(times)), gaps), key=len)
+    start, end = times[longest[0]], times[longest[-1]]
+    spare = max(0.0, end - start - longest_s) / 2
+    wanted = np.arange(start + spare, end - spare + 0.5 / rate_hz, 1 / rate_hz)
+    chosen = longest[np.abs(times[longest][:, None] - wanted).argmin(axis=0)]
+    return _poses(motion, rows.iloc[np.unique(chosen)])
 
 
 def _poses(motion: Motion, rows: pd.DataFrame) -> Poses:

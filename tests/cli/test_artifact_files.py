@@ -156,3 +156,29 @@ def test_unknown_version_names_the_command_to_rerun(written):
 def test_another_kind_under_this_name(written):
     with pytest.raises(BadDataError, match="holds used-blocks version 1; expected bsip version 1"):
         read_artifact(written, "bsip")
+
+
+# --- damage -------------------------------------------------------------------------------------
+
+
+def test_no_flipped_byte_is_read_as_another_number(path):
+    """Whatever byte of the file is hit: the same table, or a sentence that names the file."""
+    rng = np.random.default_rng(8)
+    table = pd.DataFrame(
+        {"trial": ["a"] * 400, "start_s": rng.normal(size=400), "end_s": np.arange(400.0)}
+    )
+    write_artifact(path, "used-blocks", table, NOTES)
+    sound = path.read_bytes()
+    refused = 0
+    for place in range(0, len(sound), 7):
+        damaged = bytearray(sound)
+        damaged[place] ^= 0xFF
+        path.write_bytes(damaged)
+        try:
+            found = read_artifact(path, "used-blocks")
+        except BadDataError as error:
+            assert str(path) in str(error)
+            refused += 1
+        else:
+            pd.testing.assert_frame_equal(found, table, check_dtype=False)
+    assert refused > 0.5 * len(range(0, len(sound), 7))

@@ -25,7 +25,7 @@ HEAVY = [
     "statsmodels",
 ]
 STAGE_COMMANDS = [*dict.fromkeys(stage.name for stage in STAGES), "run"]
-OTHER_COMMANDS = ["simulate", "inject", "export", "markers", "show", "info"]
+OTHER_COMMANDS = ["simulate", "inject", "export", "markers", "show", "published", "info"]
 
 
 @pytest.mark.parametrize(
@@ -36,6 +36,7 @@ OTHER_COMMANDS = ["simulate", "inject", "export", "markers", "show", "info"]
         ["simulate", "--help"],
         ["export", "--help"],
         ["markers", "--help"],
+        ["published", "--help"],
     ],
 )
 def test_imports_nothing_heavy(arguments):

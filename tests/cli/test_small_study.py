@@ -6,8 +6,11 @@ All tests that need the run stand in this file, so that they share it.
 from __future__ import annotations
 
 import hashlib
+import json
+import multiprocessing
 import os
 import shutil
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +22,7 @@ import pytest
 from bsip_cli import __version__
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.config import Config, load_config
+from bsip_cli.lock import held_alone
 from bsip_cli.pipeline import STAGES, producer
 from bsip_cli.runner import Outcome, perform
 from bsip_cli.schemas import SCHEMAS
@@ -191,6 +195,29 @@ def test_show_prints_the_tables(first_run, bsip):
     assert str(first_run.out / "sub-02" / "report.html") in answer.out
     assert answer.out.count("| ") > 20
     assert "Is anything wrong: sub-01" in answer.out
+
+
+def test_info_tells_what_made_an_artifact(first_run, bsip):
+    path = first_run.path("bsip")
+    answer = bsip("info", path)
+    assert answer.code == 0
+    lines = answer.out.splitlines()
+    assert lines[0] == path.name
+    assert lines[1].startswith("kind      bsip, version 1: ")
+    assert any(line.startswith(f"made by   bsip identify {__version__} with") for line in lines)
+    assert any(line.startswith("  input   sub-01_skeleton.parquet sha256 ") for line in lines)
+    assert "  option  participant = " in answer.out
+    assert "  mass_kg [kg" in answer.out
+
+
+def test_the_folder_says_what_it_is(first_run):
+    found = json.loads((first_run.out / "dataset_description.json").read_text())
+    assert found["DatasetType"] == "derivative"
+    assert found["GeneratedBy"][0] == {
+        "Name": "bsip",
+        "Version": __version__,
+        "Description": "body segment inertial parameters from motion and ground forces",
+    }
 
 
 # --- what runs again ----------------------------------------------------------------------------
@@ -460,7 +487,7 @@ def test_bad_line_of_the_table_does_not_stop_the_others(run, bsip, tmp_path):
     (sentence,) = [line for line in answer.err.splitlines() if line.startswith("study: ")]
     assert f"{table}: sex 'female' of sub-02; expected M or F. To mend it: " in sentence
     assert answer.summary.startswith("bsip ingest: 3 done, 1 refused;")
-    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["sub-01"]
+    assert sorted(path.name for path in (tmp_path / "new").iterdir() if path.is_dir()) == ["sub-01"]
 
 
 def test_place_that_cannot_be_written_is_no_refusal_of_the_data(run):
@@ -511,3 +538,47 @@ def test_every_schema_is_exercised(first_run):
     """Nothing above would notice a kind that no run writes."""
     kinds = {kind_of(name) for name in first_run.files() if "parquet" in name}
     assert kinds == set(SCHEMAS) - {"refusal"}
+
+
+# --- two at once ---------------------------------------------------------------------------------
+
+
+def _hold(folder: Path, ready, seconds: float) -> None:
+    with held_alone(folder):
+        ready.set()
+        time.sleep(seconds)
+
+
+@pytest.fixture
+def holder():
+    """Starts a process that holds a folder for a minute."""
+    context = multiprocessing.get_context("spawn")
+    started = []
+
+    def hold(folder: Path) -> multiprocessing.Process:
+        ready = context.Event()
+        process = context.Process(target=_hold, args=(folder, ready, 60.0))
+        process.start()
+        started.append(process)
+        assert ready.wait(30)
+        return process
+
+    yield hold
+    for process in started:
+        process.kill()
+        process.join()
+
+
+def test_a_second_run_on_the_same_folder_is_refused(run, bsip, holder):
+    """It says who is busy, changes nothing there, and does everybody else."""
+    before = {name: path.read_bytes() for name, path in run.files().items()}
+    process = holder(run.out / "sub-01")
+    answer = bsip("run", run.study, "--out", run.out, "--force")
+    assert answer.code == 2
+    assert "sub-01: another bsip is writing there. To mend it: wait until" in answer.err
+    assert {n: run.files()[n].read_bytes() for n in before if "sub-01" in n} == {
+        n: content for n, content in before.items() if "sub-01" in n
+    }
+    process.kill()
+    process.join()
+    assert bsip("run", run.study, "--out", run.out).code == 0  # a dead process holds nothing

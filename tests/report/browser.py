@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import select
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+PATIENCE_S = 60.0
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -61,6 +63,8 @@ class Page:
 
     def _next(self) -> dict[str, Any]:
         while b"\0" not in self._rest:
+            ready, _, _ = select.select([self._read], [], [], PATIENCE_S)
+            assert ready, f"the browser has been silent for {PATIENCE_S:g} s"
             more = os.read(self._read, 1 << 20)
             assert more, "the browser has gone"
             self._rest += more

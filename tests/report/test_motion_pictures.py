@@ -10,7 +10,7 @@ import pytest
 from matplotlib.patches import FancyBboxPatch
 
 from bsip_cli.pipeline import STAGES
-from bsip_cli.report.figures.body_model import body_model
+from bsip_cli.report.figures.body_model import body_model, projected
 from bsip_cli.report.figures.workflow import Step, workflow
 from bsip_cli.report.film import film_data
 from bsip_cli.report.poses import Poses
@@ -58,6 +58,14 @@ def test_the_model_shows_its_markers_and_the_force(poses):
     assert "700 N" in [text.get_text() for text in axes.texts]
     (without,) = body_model(poses, 1).axes
     assert not without.texts
+
+
+def test_the_model_is_seen_from_the_front_and_above():
+    """The person looks along x: toes towards the viewer are drawn lower than the heel."""
+    toe, heel, right = np.array([[0.2, 0.0, 0.0], [-0.1, 0.0, 0.0], [0.0, 0.2, 0.0]])
+    centre = np.zeros(3)
+    assert projected(toe, centre)[1] < projected(heel, centre)[1]
+    assert projected(right, centre)[0] < 0.0  # facing us, their right is on our left
 
 
 def test_the_flow_chart_has_every_stage_once():

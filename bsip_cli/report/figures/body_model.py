@@ -13,7 +13,7 @@ from matplotlib.patches import Circle
 from bsip_cli.report.figures.canvas import BLUE, FAINT, GREEN, INK, SOFT, house_style, new_figure
 from bsip_cli.report.poses import Poses
 
-_YAW, _PITCH = np.radians(140.0), np.radians(12.0)  # from the front
+_YAW, _PITCH = np.radians(-140.0), np.radians(12.0)  # from the front, from their right
 _SIZE_MM = 95.0
 _LIMB_PT = 7.0
 _MARGIN_M = 0.08
@@ -26,18 +26,18 @@ def body_model(poses: Poses, k: int) -> Figure:
     figure = new_figure(1.25 * _SIZE_MM, _SIZE_MM)
     axes = figure.subplots()
     centre = poses.bones_m[k, 0, 0].copy()
-    bones = _seen(poses.bones_m[k], centre)
-    ground = _seen(_tiles(poses.ground_m, centre), centre)
+    bones = projected(poses.bones_m[k], centre)
+    ground = projected(_tiles(poses.ground_m, centre), centre)
     axes.add_collection(LineCollection(list(ground), colors=FAINT, linewidths=0.6))
     axes.add_collection(
         LineCollection(list(bones), colors="#dcdcdc", linewidths=_LIMB_PT, capstyle="round")
     )
     axes.add_collection(LineCollection(list(bones), colors=INK, linewidths=1.1, capstyle="round"))
-    head = _seen(poses.head_m[k], centre)
+    head = projected(poses.head_m[k], centre)
     axes.add_patch(Circle(tuple(head), poses.head_radius_m, fc="#dcdcdc", ec=INK, lw=1.1))
-    markers = _seen(poses.markers_m[k], centre)
+    markers = projected(poses.markers_m[k], centre)
     axes.plot(*markers.T, "o", ms=3.2, mfc="white", mec=BLUE, mew=1.0, label="markers")
-    foot, tip = (_seen(x[k], centre) for x in (poses.force_m, poses.arrow_tips_m()))
+    foot, tip = (projected(x[k], centre) for x in (poses.force_m, poses.arrow_tips_m()))
     points = [bones.reshape(-1, 2), markers, head[None] + poses.head_radius_m]
     if np.isfinite(tip).all():
         arrow = {"color": GREEN, "lw": 2.2, "arrowstyle": "-|>", "mutation_scale": 12}
@@ -56,12 +56,12 @@ def body_model(poses: Poses, k: int) -> Figure:
     return figure
 
 
-def _seen(points_m: np.ndarray, centre_m: np.ndarray) -> np.ndarray:
-    """(..., 2) of points (..., 3): turned about the vertical, then tilted towards the viewer."""
+def projected(points_m: np.ndarray, centre_m: np.ndarray) -> np.ndarray:
+    """(..., 2) of points (..., 3) [m]: turned about the vertical, seen from a little above."""
     x, y, z = np.moveaxis(points_m - np.array([centre_m[0], centre_m[1], 0.0]), -1, 0)
     across = -np.sin(_YAW) * x + np.cos(_YAW) * y
     away = np.cos(_YAW) * x + np.sin(_YAW) * y
-    return np.stack([across, np.cos(_PITCH) * z - np.sin(_PITCH) * away], axis=-1)
+    return np.stack([across, np.cos(_PITCH) * z + np.sin(_PITCH) * away], axis=-1)
 
 
 def _tiles(ground_m: float, centre_m: np.ndarray) -> np.ndarray:

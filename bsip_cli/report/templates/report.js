@@ -7,7 +7,9 @@ const COLOURS = { l: "#9a9a9a", r: "#1c1c1c", "-": "#1c1c1c" };
 const FORCE = "#009E73", MARKER = "#0072B2", FLOOR = "#d4d4d4";
 const TURN_PER_PIXEL = 0.01;
 const MARGIN = 0.06;
-const OBLIQUE = [2.4, 0.2]; // yaw and pitch: from the front, a little to the right and above
+const OBLIQUE = [-2.4, 0.25]; // yaw and pitch: from the front, from their right and above
+const STEP = 0.1; // of an arrow key [rad]
+const TILE = 500, TILES = 3;
 
 function unpack(film) {
   const bytes = Uint8Array.from(atob(film.positions), (letter) => letter.charCodeAt(0));
@@ -29,13 +31,22 @@ function unpack(film) {
   };
 }
 
+// Where a point is seen, to the right and up. The person looks along x, y points to their right, z up;
+// yaw 0 is from behind, a positive pitch from above.
+function projected([x, y, z], { yaw, pitch }) {
+  const across = -Math.sin(yaw) * x + Math.cos(yaw) * y;
+  const away = Math.cos(yaw) * x + Math.sin(yaw) * y;
+  return [across, Math.cos(pitch) * z + Math.sin(pitch) * away];
+}
+
+// How far a film's poses reach from their own pelvis, and how high.
 function reach(film, poseAt) {
   let wide = 500, high = 1000;
   for (let k = 0; k < film.frames; k++) {
-    const pose = poseAt(k);
+    const pose = poseAt(k), [px, py] = pose.bones[0];
     for (const [x, y, z] of [...pose.bones, pose.head, pose.tip]) {
       if (x === MISSING) continue;
-      wide = Math.max(wide, Math.hypot(x, y));
+      wide = Math.max(wide, Math.hypot(x - px, y - py));
       high = Math.max(high, z + film.head_mm);
     }
   }
@@ -47,15 +58,14 @@ function player(canvas) {
   const poseAt = unpack(film);
   const { wide, high } = reach(film, poseAt);
   const pen = canvas.getContext("2d");
-  const scale = Math.min(canvas.height * (1 - 2 * MARGIN) / high, canvas.width / (2 * wide) * (1 - MARGIN));
-  const state = { frame: 0, yaw: OBLIQUE[0], pitch: OBLIQUE[1], playing: false, from: 0, started: 0 };
+  const room = 1 - 2 * MARGIN;
+  const scale = Math.min(canvas.height * room / Math.hypot(high, wide), canvas.width * room / (2 * wide));
+  const state = { frame: 0, yaw: OBLIQUE[0], pitch: OBLIQUE[1], pelvis: [0, 0], playing: false, from: 0, started: null };
 
-  // The person looks along x, y points to the right, z up.
+  // The view follows the pelvis.
   function seen([x, y, z]) {
-    const across = -Math.sin(state.yaw) * x + Math.cos(state.yaw) * y;
-    const away = Math.cos(state.yaw) * x + Math.sin(state.yaw) * y;
-    const up = Math.cos(state.pitch) * z - Math.sin(state.pitch) * away;
-    return [canvas.width / 2 + scale * across, canvas.height * (1 - MARGIN) - scale * up];
+    const [across, up] = projected([x - state.pelvis[0], y - state.pelvis[1], z - high / 2], state);
+    return [canvas.width / 2 + scale * across, canvas.height / 2 - scale * up];
   }
 
   function line(a, b, colour, width) {
@@ -68,9 +78,12 @@ function player(canvas) {
   }
 
   function floor() {
-    for (let k = -2; k <= 2; k++) {
-      line([500 * k, -1000, 0], [500 * k, 1000, 0], FLOOR, 1);
-      line([-1000, 500 * k, 0], [1000, 500 * k, 0], FLOOR, 1);
+    const [cx, cy] = state.pelvis.map((place) => Math.round(place / TILE));
+    const half = TILES * TILE;
+    for (let k = -TILES; k <= TILES; k++) {
+      const x = TILE * (cx + k), y = TILE * (cy + k);
+      line([x, TILE * cy - half, 0], [x, TILE * cy + half, 0], FLOOR, 1);
+      line([TILE * cx - half, y, 0], [TILE * cx + half, y, 0], FLOOR, 1);
     }
   }
 
@@ -95,6 +108,7 @@ function player(canvas) {
 
   function draw() {
     const pose = poseAt(state.frame);
+    state.pelvis = [pose.bones[0][0], pose.bones[0][1]];
     pen.clearRect(0, 0, canvas.width, canvas.height);
     pen.lineCap = "round";
     floor();
@@ -104,16 +118,17 @@ function player(canvas) {
     if (pose.tip[0] !== MISSING) arrow(pose.foot, pose.tip);
     slider.value = state.frame;
     time.textContent = (film.times_ms[state.frame] / 1000).toFixed(2) + " s";
+    slider.setAttribute("aria-valuetext", time.textContent);
   }
 
   function step(now) {
     if (!state.playing) return;
+    state.started ??= now;
     const at = state.from + now - state.started;
-    let frame = film.times_ms.findIndex((t) => t > at) - 1;
-    if (frame < 0) frame = film.frames - 1;
-    state.frame = frame;
+    const later = film.times_ms.findIndex((t) => t > at);
+    state.frame = later < 0 ? film.frames - 1 : Math.max(0, later - 1);
     draw();
-    if (frame === film.frames - 1) stop();
+    if (later < 0) stop();
     else requestAnimationFrame(step);
   }
 
@@ -126,7 +141,7 @@ function player(canvas) {
     if (state.frame === film.frames - 1) state.frame = 0;
     state.playing = true;
     state.from = film.times_ms[state.frame];
-    state.started = performance.now();
+    state.started = null;
     button.textContent = "Pause";
     requestAnimationFrame(step);
   }
@@ -158,11 +173,21 @@ function player(canvas) {
   }
   canvas.after(controls);
 
-  canvas.onpointermove = (event) => {
-    if (event.buttons !== 1) return;
-    state.yaw -= TURN_PER_PIXEL * event.movementX;
-    state.pitch = Math.max(-0.2, Math.min(1.5, state.pitch + TURN_PER_PIXEL * event.movementY));
+  function turn(yaw, pitch) {
+    state.yaw -= yaw;
+    state.pitch = Math.max(-0.2, Math.min(1.5, state.pitch + pitch));
     draw();
+  }
+
+  const keys = { ArrowLeft: [-STEP, 0], ArrowRight: [STEP, 0], ArrowUp: [0, STEP], ArrowDown: [0, -STEP] };
+  canvas.tabIndex = 0;
+  canvas.onkeydown = (event) => {
+    if (!(event.key in keys)) return;
+    event.preventDefault();
+    turn(...keys[event.key]);
+  };
+  canvas.onpointermove = (event) => {
+    if (event.buttons === 1) turn(TURN_PER_PIXEL * event.movementX, TURN_PER_PIXEL * event.movementY);
   };
   canvas.onpointerdown = (event) => canvas.setPointerCapture(event.pointerId);
   draw();
@@ -170,16 +195,26 @@ function player(canvas) {
 
 // Tables: a click on a column's title sorts by it; a button copies the table.
 
+const NUMBER = /^[[<>≤≥|]*\s*([-−+]?\d*\.?\d+)(?:\s*×\s*10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?/;
+const HIGH = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+
+// The number at the start of a cell; null where there is none. "<.001" is a little less than .001.
 function number(text) {
-  const found = text.replace("−", "-").match(/-?\d*\.?\d+/);
-  return found ? Number(found[0]) : null;
+  const found = text.replace(/[\u2009\u202f]/g, "").match(NUMBER);
+  if (!found) return null;
+  const power = [...(found[2] ?? "")].map((sign) => (sign === "⁻" ? "-" : HIGH.indexOf(sign))).join("");
+  const value = Number(found[1].replace("−", "-")) * 10 ** Number(power || 0);
+  return text.startsWith("<") ? value - 1e-9 : value;
 }
 
-function order(a, b) {
-  const x = number(a), y = number(b);
-  if (x !== null && y !== null && x !== y) return x - y;
-  if ((x === null) !== (y === null)) return x === null ? 1 : -1;
-  return a.localeCompare(b);
+// Rows in order; cells that hold nothing come last either way.
+function sorted(rows, text, isWords, up) {
+  const key = (row) => (isWords ? text(row) || null : number(text(row)));
+  const order = (a, b) => (isWords ? a.localeCompare(b, undefined, { numeric: true }) : a - b);
+  const known = rows.filter((row) => key(row) !== null);
+  const rest = rows.filter((row) => key(row) === null);
+  known.sort((a, b) => (up ? 1 : -1) * order(key(a), key(b)));
+  return [...known, ...rest];
 }
 
 function sortable(table) {
@@ -195,8 +230,7 @@ function sortable(table) {
       titles.forEach((other) => other.removeAttribute("aria-sort"));
       title.setAttribute("aria-sort", up ? "ascending" : "descending");
       const text = (row) => row.cells[column].textContent.trim();
-      const rows = [...body.rows].sort((a, b) => (up ? 1 : -1) * order(text(a), text(b)));
-      body.append(...rows);
+      body.append(...sorted([...body.rows], text, title.classList.contains("words"), up));
     };
   });
 }
@@ -208,7 +242,8 @@ function copyable(grid) {
   button.textContent = "Copy";
   button.onclick = async () => {
     const rows = [...grid.querySelector("table").rows];
-    const text = rows.map((row) => [...row.cells].map((cell) => cell.textContent.trim()).join("\t")).join("\n");
+    const wide = (cell) => [cell.textContent.trim(), ...Array(cell.colSpan - 1).fill("")];
+    const text = rows.map((row) => [...row.cells].flatMap(wide).join("\t")).join("\n");
     try {
       await navigator.clipboard.writeText(text);
       button.textContent = "Copied";

@@ -1,0 +1,65 @@
+"""``bsip info``: versions, or what an artifact holds and what made it."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+
+from bsip_cli import __version__
+from bsip_cli.artifacts import read_header
+from bsip_cli.provenance import library_versions
+from bsip_cli.schemas import SCHEMAS
+
+
+def versions() -> Iterator[str]:
+    """A line each for bsip, Python and the libraries that numbers depend on."""
+    yield f"bsip {__version__}"
+    yield f"python {platform.python_version()}"
+    for name, version in library_versions().items():
+        yield f"{name} {version}"
+
+
+def artifact_info(path: Path) -> Iterator[str]:
+    """The lines of what an artifact holds and what made it.
+
+    Raises
+    ------
+    BadDataError
+        It is not there, or no artifact.
+    """
+    header = read_header(path)
+    kind, provenance = header["kind"], header["provenance"]
+    meaning = f": {SCHEMAS[kind].meaning}" if kind in SCHEMAS else ""
+    yield f"{path.name}"
+    yield f"kind      {kind}, version {header['schema_version']}{meaning}"
+    yield f"rows      {pq.read_metadata(path).num_rows}"
+    yield from _made(provenance["made_by"], "made by")
+    if "amended_by" in provenance:
+        yield from _made(provenance["amended_by"], "amended")
+    for message in provenance["messages"]:
+        yield f"warning   {message}"
+    for name, fact in provenance["facts"].items():
+        yield f"fact      {name} = {json.dumps(fact, ensure_ascii=False)}"
+    yield "columns"
+    for field in pq.read_schema(path):
+        notes = {key.decode(): text.decode() for key, text in (field.metadata or {}).items()}
+        yield f"  {field.name}{_unit(notes)}  {notes.get('meaning', '')}".rstrip()
+
+
+def _made(made_by: dict[str, Any], title: str) -> Iterator[str]:
+    libraries = ", ".join(f"{name} {version}" for name, version in made_by["libraries"].items())
+    yield f"{title:<9} bsip {made_by['stage']} {made_by['bsip_version']} with {libraries}"
+    for name, digest in made_by["inputs"].items():
+        yield f"  input   {name} sha256 {digest}"
+    for name, value in made_by["options"].items():
+        yield f"  option  {name} = {json.dumps(value, ensure_ascii=False)}"
+
+
+def _unit(notes: dict[str, str]) -> str:
+    where = ", ".join(filter(None, (notes.get("unit"), notes.get("frame"))))
+    return f" [{where}]" if where else ""

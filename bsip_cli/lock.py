@@ -1,0 +1,45 @@
+"""Only one program at a time writes into a folder of results."""
+
+from __future__ import annotations
+
+import fcntl
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bsip_cli.errors import UsageError
+
+NAME = ".lock"
+
+
+@contextmanager
+def held_alone(folder: Path) -> Iterator[None]:
+    """Hold a folder's lock; the system lets go of it whatever becomes of the process.
+
+    Raises
+    ------
+    UsageError
+        Another process holds it, or the folder cannot be written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with (folder / NAME).open("a") as handle:
+            _lock(handle.fileno(), folder)
+            yield
+    except OSError as error:
+        raise UsageError(
+            f"cannot be written ({error.strerror or error})",
+            file=folder,
+            remedy="make room there, or name another folder with --out",
+        ) from None
+
+
+def _lock(descriptor: int, folder: Path) -> None:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise UsageError(
+            "another bsip is writing there",
+            file=folder,
+            remedy="wait until it has ended, and run again",
+        ) from None

@@ -28,4 +28,10 @@ def _tables(paper: Paper) -> Iterator[str]:
 
 def _audit(paper: Paper) -> Iterator[str]:
     table = audited(paper)
-    yield to_markdown(table) if table.rows else f"**{paper.key}: its numbers agree.**\n"
+    yield to_markdown(table) if table.rows else f"**{paper.name}: {_sound(paper)}.**\n"
+
+
+def _sound(paper: Paper) -> str:
+    if all(table.design == "described" and not table.claims for table in paper.tables):
+        return "nothing in it can be recomputed from what is printed"
+    return "its numbers agree"

@@ -125,7 +125,7 @@ def published_page() -> str:
         "Tables of the three papers that the method comes from, and what their own numbers "
         "contradict: differences of means against the middles of their intervals, t against the "
         "interval, p against t, F against means and standard deviations, Cohen's d against every "
-        "common definition, sums, marks, captions, units. Every printed number stands for all "
+        "usual definition, sums, marks, captions, units. Every printed number stands for all "
         "that round to it; a reading is given where one change alone makes the numbers agree. "
         "`bsip published audit` prints the same."
     )

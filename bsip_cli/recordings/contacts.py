@@ -147,20 +147,22 @@ def _touches(
     without_outline = any(plate.corners_m is None for plate in plates)
     measured = inside | near_load if without_outline else inside
     off = long_runs(touching & ~measured, max(1, round(limits.blink_s * rate_hz)))
-    off = _until_toe_off(off, foot, rate_hz, limits)
+    flat = (foot.height_m < limits.sole_height_m).all(axis=1)
+    off = _until_toe_off(off, flat & measured, foot, rate_hz, limits)
     on_ground = (touching & measured) | off
     return on_ground, on_ground & ~off
 
 
 def _until_toe_off(
-    touching: np.ndarray, foot: _Foot, rate_hz: float, limits: ContactLimits
+    off: np.ndarray, standing: np.ndarray, foot: _Foot, rate_hz: float, limits: ContactLimits
 ) -> np.ndarray:
-    """The foot rolls over its toes: its markers rise well before the toes leave the floor."""
+    """Contacts beside the plates (n_frames,) until the toes have left the floor, or the whole foot
+    is standing (n_frames,) on a plate: its markers rise well before the toes do."""
     rolling = foot.height_m.min(axis=1) < limits.roll_height_m
-    rolling &= foot.speed_m_s < limits.roll_speed_m_s
+    rolling &= (foot.speed_m_s < limits.roll_speed_m_s) & ~standing
     longest = round(limits.roll_s * rate_hz)
-    lasting = touching.copy()
-    for _, stop in runs(touching):
+    lasting = off.copy()
+    for _, stop in runs(off):
         has_left = ~rolling[stop : stop + longest]
         lasting[stop : stop + (has_left.argmax() if has_left.any() else len(has_left))] = True
     return lasting

@@ -77,6 +77,14 @@ def test_a_foot_beside_the_plate_rolls_over_its_toes_before_it_leaves():
     assert 0.05 <= (slow.valid.argmax() - fast.valid.argmax()) / RATE_HZ <= 0.2
 
 
+def test_a_foot_that_steps_onto_the_plate_is_measured_at_once():
+    """It slides over the edge within a tenth of a second and stands there."""
+    x = np.interp(np.arange(N), [0, 60, 66, N], [0.6, 0.6, 0.4, 0.4])
+    result = _windows(_foot(0.1), _foot(x), [_plate(WEIGHT_N)])
+    assert not result.valid[:58].any()
+    assert result.valid[70:].all()
+
+
 def test_outline_has_a_tolerance():
     assert _windows(_foot(0.1), _foot(0.52), [_plate(WEIGHT_N)]).valid.all()
     assert not _windows(_foot(0.1), _foot(0.54), [_plate(WEIGHT_N)]).valid.any()

@@ -18,7 +18,7 @@ from bsip_cli.statistics.published.sway_audit import unit_of_length
 COMPARED = "hansen2017"
 """The paper whose tables this study's tables 1 to 4 repeat."""
 
-_PAIR_TESTS = {"table1": "paired_t", "table2": "paired_t", "table4": "paired_t"}
+_PAIRED = ("table1", "table2", "table4")
 _METHODS = {"FP": MEASURED, "OM": OM, "RM": RM}
 _MOVED = "†"
 _DIGITS = 9  # more than print has, fewer than the arithmetic of its rounding
@@ -57,7 +57,7 @@ def audited(paper: published.Paper) -> Table:
         Row(
             {
                 "where": one.row,
-                "what": one.what,
+                "what": f"{one.what} (remark)" if one.is_remark else one.what,
                 "printed": one.printed,
                 "recomputed": one.recomputed,
                 "reading": one.reading,
@@ -143,10 +143,10 @@ def _printed_values(method: str, row: published.Row) -> dict[str, Cell]:
 
 
 def _topic(results: Results, row: published.Row) -> Topic | None:
-    """What this study calls the row."""
+    """The same variable of this study, in the task of that name where the row is of one."""
     variable, _, task = row.compare.partition(" ")
     for topic in results.topics:
-        role_fits = topic.role == "sequence" if task == "sequence" else task in topic.task
+        role_fits = topic.role == "sequence" if task == "sequence" else task in ("", topic.task)
         if topic.variable == variable and role_fits:
             return topic
     return None
@@ -154,8 +154,8 @@ def _topic(results: Results, row: published.Row) -> Topic | None:
 
 def _here(tag: str, results: Results, topic: Topic) -> dict[str, Cell]:
     """This study's n, means and standard deviations by the paper's names of the methods."""
-    if tag in _PAIR_TESTS:
-        found = [results.find(topic, _PAIR_TESTS[tag])]
+    if tag in _PAIRED:
+        found = [results.find(topic, "paired_t")]
     else:
         found = [results.find(topic, "bonferroni_t", MEASURED, method) for method in (OM, RM)]
     values: dict[str, Cell] = {"n": found[0].n}
@@ -178,4 +178,5 @@ def _notes(
         yield f"{_MOVED} In print these cells stand in each other's place (bsip published audit)."
     unit = unit_of_length(paper, as_printed)
     if unit:
-        yield f"The printed lengths fit {unit}, whatever the text says (bsip published audit)."
+        rows = " and ".join(row.name for row in as_printed.rows if row.error_of)
+        yield f"The printed {rows} fit {unit}, whatever the text says (bsip published audit)."

@@ -7,6 +7,7 @@ degrees of freedom.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 
 import numpy as np
 from scipy import stats
@@ -28,11 +29,12 @@ def group_slips(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
 def _f_value(paper: Paper, table: PrintedTable, row: Row) -> Iterator[Slip]:
     computed = f_of_groups(
         [row.cells[method].mean for method in table.methods],
-        [sd for method in table.methods if (sd := row.cells[method].sd) is not None],
+        [row.cells[method].spread() for method in table.methods],
         paper.participants,
     )
     if not computed.meets(row.printed("F")):
-        yield slip(table, row.name, "F", row.tests["F"], range_words(computed))
+        found = range_words(computed)
+        yield slip(table, row.name, "F", printed=row.tests["F"], recomputed=found)
 
 
 def _p_value(paper: Paper, table: PrintedTable, row: Row) -> Iterator[Slip]:
@@ -40,18 +42,16 @@ def _p_value(paper: Paper, table: PrintedTable, row: Row) -> Iterator[Slip]:
     df = groups - 1, groups * (paper.participants - 1)
     computed = image(lambda f: float(stats.f.sf(max(f, 0.0), *df)), row.printed("F"))
     if not computed.meets(row.printed("p")):
-        yield slip(table, row.name, "p", row.tests["p"], range_words(computed, 3))
+        found = range_words(computed, 3)
+        yield slip(table, row.name, "p", printed=row.tests["p"], recomputed=found)
 
 
 def f_of_groups(means: list[Interval], sds: list[Interval], n: int) -> Interval:
     """F of groups of n whose means and standard deviations round to what is printed."""
     spread = image(lambda *x: float(np.var(x, ddof=1)), *means)
-    noise = image(lambda *x: float(np.mean(np.square(x))), *(_positive(sd) for sd in sds))
-    return Interval(n * _least_variance(means) / noise.high, n * spread.high / noise.low)
-
-
-def _positive(sd: Interval) -> Interval:
-    return Interval(max(sd.low, 1e-12), sd.high)
+    noise = image(lambda *x: float(np.mean(np.square(x))), *sds)
+    most = n * spread.high / noise.low if noise.low > 0.0 else inf
+    return Interval(n * _least_variance(means) / noise.high, most)
 
 
 def _least_variance(means: list[Interval]) -> float:
@@ -65,10 +65,35 @@ def _least_variance(means: list[Interval]) -> float:
 
 
 def _marks(table: PrintedTable) -> Iterator[Slip]:
-    """Signs that the legend does not explain, and explained ones that no cell has."""
-    used = {cell.marks: row.name for row in table.rows for cell in row.cells.values()}
-    for sign, row in used.items():
-        if sign and sign not in table.marks:
-            yield slip(table, row, "marks", sign, "the legend has no such sign")
-    for sign in set(table.marks) - set(used):
-        yield slip(table, "all rows", "marks", f"{sign} in the legend", "no cell has it")
+    """Signs where the legend has none, and signs of the legend that no cell has."""
+    used = {sign for row in table.rows for cell in row.cells.values() for sign in cell.marks}
+    unused = [sign for sign in table.marks if sign not in used]
+    for row in table.rows:
+        for method, cell in row.cells.items():
+            wrong = _wrong_signs(table, method, cell.marks)
+            if wrong:
+                likely = [sign for sign in unused if method in table.marks[sign]]
+                yield slip(
+                    table,
+                    f"{row.name} {method}",
+                    "marks",
+                    printed=cell.text,
+                    recomputed="; ".join(wrong),
+                    reading=f"one {cell.marks[-1]} for {likely[0]}" if len(likely) == 1 else "",
+                )
+    for sign in unused:
+        found = "no cell has it"
+        yield slip(table, "all rows", "marks", printed=f"{sign} in the legend", recomputed=found)
+
+
+def _wrong_signs(table: PrintedTable, method: str, marks: str) -> list[str]:
+    """What the legend has against the signs of a method's cell."""
+    wrong = []
+    for sign in dict.fromkeys(marks):
+        if sign not in table.marks:
+            wrong.append(f"the legend has no {sign}")
+        elif method not in table.marks[sign]:
+            wrong.append(f"{sign} is of {' and '.join(table.marks[sign])}")
+        elif marks.count(sign) > 1:
+            wrong.append(f"{sign} stands there {marks.count(sign)} times")
+    return wrong

@@ -135,36 +135,68 @@ def load_paper(name: str) -> Paper:
     )
 
 
+_TABLE_KEYS = {
+    "number",
+    "about",
+    "design",
+    "unit",
+    "methods",
+    "star",
+    "adds_up_to_body_mass",
+    "claims",
+    "marks",
+    "values",
+    "errors_in",
+    "rows",
+}
+_ROW_KEYS = {"name", "key", "compare", "unit", "error_of", "ci", "t", "p", "d", "F"}
+
+
 def _table(paper: str, data: dict[str, Any]) -> PrintedTable:
-    methods = tuple(data["methods"])
-    unit = data.get("unit", "")
+    _refuse_unknown(data, _TABLE_KEYS, f"{paper}, table {data['number']}")
+    methods, unit = tuple(data["methods"]), data.get("unit", "")
+    rows = tuple(_row(one, methods, unit) for one in data["rows"])
+    claims = tuple(_claim(one) for one in data.get("claims", ()))
+    named = {row.name for row in rows}
+    unknown = [name for claim in claims for name in claim.but if name not in named]
+    if unknown:
+        raise ValueError(f"{paper}, table {data['number']}: no rows {', '.join(unknown)}")
     return PrintedTable(
-        paper,
-        data["number"],
-        data["about"],
-        data["design"],
-        methods,
-        tuple(_row(one, methods, unit) for one in data["rows"]),
-        data.get("star", ""),
-        data.get("adds_up_to_body_mass", False),
-        {sign: tuple(pair) for sign, pair in data.get("marks", {}).items()},
-        tuple(
-            Claim(one["where"], one["says"], tuple(one.get("but", ())), one.get("method", ""))
-            for one in data.get("claims", ())
-        ),
-        data.get("values", 0),
-        data.get("errors_in", 0),
+        paper=paper,
+        number=data["number"],
+        about=data["about"],
+        design=data["design"],
+        methods=methods,
+        rows=rows,
+        star=data.get("star", ""),
+        adds_up_to_body_mass=data.get("adds_up_to_body_mass", False),
+        marks={sign: tuple(pair) for sign, pair in data.get("marks", {}).items()},
+        claims=claims,
+        values=data.get("values", 0),
+        errors_in=data.get("errors_in", 0),
     )
+
+
+def _claim(data: dict[str, Any]) -> Claim:
+    _refuse_unknown(data, {"where", "says", "but", "method"}, "a claim")
+    return Claim(data["where"], data["says"], tuple(data.get("but", ())), data.get("method", ""))
 
 
 def _row(data: dict[str, str], methods: tuple[str, ...], unit: str) -> Row:
+    _refuse_unknown(data, _ROW_KEYS | set(methods), f"row {data['name']}")
     return Row(
-        data["name"],
-        data.get("key", ""),
-        data.get("unit", unit),
-        {method: Cell.of(data[method]) for method in methods if method in data},
-        {name: data[name] for name in ("t", "p", "d", "F") if name in data},
-        data.get("compare", data.get("key", "")),
-        data.get("ci", ""),
-        data.get("error_of", ""),
+        name=data["name"],
+        key=data.get("key", ""),
+        unit=data.get("unit", unit),
+        cells={method: Cell.of(data[method]) for method in methods if method in data},
+        tests={name: data[name] for name in ("t", "p", "d", "F") if name in data},
+        compare=data.get("compare", data.get("key", "")),
+        ci_text=data.get("ci", ""),
+        error_of=data.get("error_of", ""),
     )
+
+
+def _refuse_unknown(data: dict[str, Any], known: set[str], where: str) -> None:
+    unknown = sorted(set(data) - known)
+    if unknown:
+        raise ValueError(f"{where}: unknown {', '.join(unknown)}")

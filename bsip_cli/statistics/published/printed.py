@@ -27,12 +27,21 @@ class Interval:
         """Whether some number lies in both."""
         return self.low <= other.high and other.low <= self.high
 
+    def size(self) -> Interval:
+        """Of the numbers without their sign."""
+        if self.low <= 0.0 <= self.high:
+            return Interval(0.0, max(-self.low, self.high))
+        return Interval(*sorted((abs(self.low), abs(self.high))))
+
+    def negative(self) -> Interval:
+        return Interval(-self.high, -self.low)
+
     def __sub__(self, other: Interval) -> Interval:
         return Interval(self.low - other.high, self.high - other.low)
 
 
 def image(function: Callable[..., float], *arguments: Interval) -> Interval:
-    """What a function makes of intervals; it rises or falls with each argument throughout."""
+    """What a function makes of intervals; it must rise or fall with each argument throughout."""
     corners = product(*((one.low, one.high) for one in arguments))
     values = [function(*corner) for corner in corners]
     return Interval(min(values), max(values))
@@ -53,12 +62,25 @@ def rounded_from(text: str) -> Interval:
 
 @dataclass(frozen=True)
 class Cell:
-    """M(SD) with the marks behind it; ``sd`` is None where only one number is printed."""
+    """M(SD) with the marks behind it; ``sd``, never below 0, is None where only one number is
+    printed."""
 
     text: str
     mean: Interval
     sd: Interval | None
     marks: str
+
+    def spread(self) -> Interval:
+        """The standard deviation.
+
+        Raises
+        ------
+        ValueError
+            None is printed.
+        """
+        if self.sd is None:
+            raise ValueError(f"{self.text} has no standard deviation")
+        return self.sd
 
     @classmethod
     def of(cls, text: str) -> Cell:
@@ -73,6 +95,8 @@ class Cell:
         if found is None:
             raise ValueError(f"neither a number nor M(SD): {text!r}")
         sd = rounded_from(found["sd"]) if found["sd"] else None
+        if sd is not None:
+            sd = Interval(max(sd.low, 0.0), sd.high)
         return cls(text, rounded_from(found["mean"]), sd, found["marks"])
 
 

@@ -11,7 +11,7 @@ from bsip_cli.statistics.published.printed import Interval
 @dataclass(frozen=True)
 class Slip:
     """``printed`` beside ``recomputed`` as text; ``reading``: what was likely meant, if the numbers
-    allow only one."""
+    allow only one. is_remark : worth knowing, but no contradiction by itself."""
 
     paper: str
     table: int
@@ -20,17 +20,21 @@ class Slip:
     printed: str
     recomputed: str
     reading: str = ""
+    is_remark: bool = False
 
 
 def slip(
-    table: PrintedTable, row: str, what: str, printed: str, recomputed: str, reading: str = ""
+    table: PrintedTable,
+    row: str,
+    what: str,
+    *,
+    printed: str,
+    recomputed: str,
+    reading: str = "",
+    is_remark: bool = False,
 ) -> Slip:
-    return Slip(table.paper, table.number, row, what, printed, recomputed, reading)
-
-
-def words(values: Interval, decimals: int = 2) -> str:
-    """The middle, for numbers that rounding leaves nearly as they are."""
-    return f"{values.middle:.{decimals}f}"
+    """Of a row of a table."""
+    return Slip(table.paper, table.number, row, what, printed, recomputed, reading, is_remark)
 
 
 def range_words(values: Interval, decimals: int = 2) -> str:

@@ -1,25 +1,28 @@
 """Sway: what the measures of one path say of each other, and of its unit.
 
 mean velocity = length / duration; area of the 95 % ellipse = pi chi2(0.95, 2) sd_ap sd_ml
-sqrt(1 - r^2), at most that of r = 0; the root mean squares of two paths and of their difference
-obey the triangle inequality, in the mean over people too.
+sqrt(1 - r^2), at most that of r = 0. The root mean square of two paths' difference is at least the
+difference of their root mean squares, in the mean over people too; it is at most their sum if both
+are about the same place and no constant offset sets the paths apart.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import pi, sqrt
+from math import inf, pi, sqrt
 
 from scipy import stats
 
 from bsip_cli.statistics.published.paper import Paper, PrintedTable, Row
 from bsip_cli.statistics.published.printed import Interval, image
 from bsip_cli.statistics.published.readings import as_meant
-from bsip_cli.statistics.published.slip import Slip, slip, words
+from bsip_cli.statistics.published.slip import Slip, range_words, slip
 
 METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 STRAIGHT = 0.95  # correlation of the axes beyond which a path is a line
-EVEN = 0.2  # of the least spread over people of the other measures: no measure of sway is so even
+# Of the least spread over people of the other measures of the same table: lengths, areas and the
+# other axis follow how much a person sways, so the root mean square should too.
+EVEN = 0.2
 _ELLIPSE = pi * float(stats.chi2.ppf(0.95, 2))
 VELOCITY, LENGTH, AREA, AP, ML = "mean_velocity", "sway_length", "ellipse_area", "rms_ap", "rms_ml"
 
@@ -41,7 +44,7 @@ def _duration(paper: Paper, table: PrintedTable, rows: dict[str, Row]) -> Iterat
         return
     stated = paper.sequence_s
     found = [_ratio(rows[LENGTH], rows[VELOCITY], method) for method in table.methods]
-    if any(one.meets(stated) for one in found):
+    if all(one.meets(stated) for one in found):
         return
     whole = Interval(min(one.low for one in found), max(one.high for one in found))
     steps = (METRES[a] / METRES[b] for a in METRES for b in METRES)
@@ -50,9 +53,9 @@ def _duration(paper: Paper, table: PrintedTable, rows: dict[str, Row]) -> Iterat
         table,
         f"{rows[LENGTH].name} / {rows[VELOCITY].name}",
         "duration",
-        f"the sequence lasts {stated.middle:g} s",
-        f"{words(whole)} s",
-        "" if fits else "no choice of units makes it so: they are of different stretches or rates",
+        printed=f"the sequence lasts {stated.middle:g} s",
+        recomputed=f"{range_words(whole)} s",
+        reading="" if fits else "no choice of units makes it so",
     )
 
 
@@ -73,14 +76,14 @@ def _unit(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
     unit = unit_of_length(paper, table)
     linked = next(row for row in table.rows if row.error_of)
     for row, method, error in _impossible(paper, table, linked.unit):
-        reference = table.methods[0]
+        beside = f"{table.methods[0]} {row.cells[table.methods[0]].text}"
         yield slip(
             table,
             f"{row.name} {method}",
             "unit",
-            f"{row.cells[method].text} beside {reference} {row.cells[reference].text} {row.unit}",
-            f"the two paths are {words(error)} mm apart (root mean square)",
-            f"the unit is {unit}" if unit else "",
+            printed=f"{row.cells[method].text} beside {beside} {row.unit}",
+            recomputed=f"the two paths are {error.middle:.2f} mm apart (root mean square)",
+            reading=f"the unit is {unit}, unless an offset sets the paths apart" if unit else "",
         )
 
 
@@ -106,26 +109,29 @@ def _about_an_origin(table: PrintedTable, rows: dict[str, Row]) -> Iterator[Slip
     method = table.methods[0]
     for key, other in ((ML, AP), (AP, ML)):
         row = rows[key]
-        mine, rest = _evenness(row, method), [_evenness(r, method) for r in rows.values()]
+        rest = min(_evenness(one, method).low for name, one in rows.items() if name != key)
+        mine = _evenness(row, method).high
         likely = image(
             lambda area, side: area / (_ELLIPSE * side),
             rows[AREA].cells[method].mean,
             rows[other].cells[method].mean,
         )
         most = likely.high / sqrt(1 - STRAIGHT**2)
-        others = [one for one in rest if one != mine]
-        if mine < EVEN * min(others) and row.cells[method].mean.low > most:
+        if mine < EVEN * rest and row.cells[method].mean.low > most:
             yield slip(
                 table,
                 row.name,
                 "origin",
-                f"{row.cells[method].text}, the same in all people within {100 * mine:.0f} %",
-                f"about {likely.middle:.1g} from the area, if about the mean",
-                "the distance from an origin that all share, not about the mean",
+                printed=f"{row.cells[method].text}, equal in all people within {100 * mine:.1g} %",
+                recomputed=f"about {likely.middle:.1g} from the area, if about the mean",
+                reading="the distance from an origin that all share, not about the mean",
+                is_remark=True,
             )
 
 
-def _evenness(row: Row, method: str) -> float:
-    """Standard deviation over people beside the mean."""
+def _evenness(row: Row, method: str) -> Interval:
+    """Standard deviation over people as a part of the mean."""
     cell = row.cells[method]
-    return cell.sd.middle / cell.mean.middle if cell.sd is not None else float("inf")
+    if cell.mean.low <= 0.0:
+        return Interval(0.0, inf)
+    return image(lambda sd, mean: sd / mean, cell.spread(), cell.mean)

@@ -300,7 +300,12 @@ SCHEMAS = {
             "joint coordinates and their derivatives",
             (
                 _TIME,
-                Column("determined", "bool", "", "the markers determine this frame"),
+                Column(
+                    "determined",
+                    "bool",
+                    "",
+                    "the markers determine this frame, and no gap or end is too near",
+                ),
                 Column("marker_rms_m", "float", "m", "RMS residual of the frame's markers"),
                 Column("angle_sd_rad", "float", "rad", "largest standard deviation of an angle"),
                 Column("cutoff_hz", "float", "Hz", "where the local smoother's gain is one half"),

@@ -1,7 +1,8 @@
 """Estimator ``hansen2017``: what the data show by least squares, the rest nearest to RM.
 
-Hansen 2017 solves the base parameters by least squares and takes the segment parameters nearest
-to the regression among those that have these base parameters, with masses > 0. Nearness is
+Hansen 2017 solves the base parameters by least squares (eq. 7). How segments follow from them is
+not in print; we take those nearest to the regression among all with these base parameters and
+masses > 0, since 128 combinations do not make 150 parameters. Nearness is
 measured in standard deviations of people about the table, and a combination that the data do not
 know clearly better than the table stays at the table: the paper's motions are rich enough for all,
 a clinic's trial is not. With everything excited this is the paper's method.

@@ -1,4 +1,4 @@
-"""Compiled inverse kinematics: Gauss-Newton on the tree, one frame from the last.
+"""Compiled inverse kinematics: Gauss-Newton and Newton on the tree, one frame from the last.
 
 The Gauss-Newton matrix of a tree of markers is the joint-space mass matrix of point masses: every
 marker is a mass of its weight. It is built by the composite-rigid-body algorithm and factored

@@ -28,7 +28,7 @@ from scipy.signal import spectrogram
 from scipy.stats import chi2
 
 _DEGREE = 5
-_KNOT_RATE_HZ = 100.0  # at most; human motion ends far below
+_KNOT_RATE_HZ = 100.0  # about: a whole number of samples per knot; human motion ends far below
 _SECOND, _FOURTH = np.array([1.0, -2.0, 1.0]), np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 _NOISE_ORDER, _NOISE_BAND_HZ, _NOISE_WINDOW_S = 3, (12.0, 20.0), 0.64
 _ROUNDS = 20

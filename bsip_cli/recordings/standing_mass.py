@@ -94,7 +94,7 @@ def about_mass(
 def still_frames(force_z_N: np.ndarray, valid: np.ndarray, rate_hz: float) -> np.ndarray:
     """The longest valid stretch in which the force stays near its own mean, (n_frames,) bool.
 
-    None if that is shorter than 0.8 s.
+    No frame if that is shorter than 0.8 s.
     """
     smooth = uniform_filter1d(np.nan_to_num(force_z_N), max(1, round(_NOISE_S * rate_hz)))
     still = np.zeros(len(valid), bool)

@@ -10,6 +10,7 @@ from textwrap import fill
 import pandas as pd
 
 from bsip_cli.artifacts import read_artifact
+from bsip_cli.errors import UsageError
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.report.verdict import Verdict, put_right_sentence, verdict_of
@@ -25,11 +26,19 @@ def shown(out: Path) -> Iterator[str]:
     Raises
     ------
     UsageError
-        No tables have been written there.
+        Nothing to show has been written there.
     BadDataError
         A diagnosis cannot be read.
     """
-    yield tables_of(out)
+    tables = tables_of(out)
+    people = sorted(out.glob("sub-*/*_diagnosis.parquet"))
+    if not tables and not people:
+        raise UsageError(
+            "there are no tables and no diagnoses",
+            file=out,
+            remedy="run `bsip run` first, or name the folder that it was given with --out",
+        )
+    yield from [tables] if tables else []
     for folder in sorted(path for path in out.glob("sub-*") if path.is_dir()):
         diagnosis, detection = (_table(folder, kind) for kind in ("overall-diagnosis", "detection"))
         if diagnosis is not None and detection is not None:

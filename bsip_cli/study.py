@@ -120,6 +120,13 @@ def _participant_rows(file: Path) -> list[dict[str, str]]:
             expected=", ".join(known),
             remedy="correct the name",
         )
+    if missing and _is_one_column(header):
+        raise BadDataError(
+            f"has one column, {next(iter(header))!r}",
+            file=file,
+            expected=f"{', '.join(known)}, separated by tabs",
+            remedy="put a tab between the cells of every line, no spaces or commas",
+        )
     if missing:
         raise BadDataError(
             f"has no column {', '.join(missing)}" if rows else "names no participant",
@@ -128,6 +135,12 @@ def _participant_rows(file: Path) -> list[dict[str, str]]:
             remedy="add it",
         )
     return rows
+
+
+def _is_one_column(header: Iterable[str | None]) -> bool:
+    """Whether all columns' names have come as one: the table is separated by something else."""
+    (*names,) = header
+    return len(names) == 1 and "participant_id" in str(names[0]) and str(names[0]).count("_") > 1
 
 
 def _misspelt(header: Iterable[str], known: tuple[str, ...]) -> list[tuple[str, str]]:
@@ -219,9 +232,20 @@ def _number(
             f"{column} {text!r} of {name}",
             file=file,
             expected=f"a number between {low:g} and {high:g}, or n/a",
-            remedy="correct it",
+            remedy=_how_to_write(text, low, high),
         )
     return value
+
+
+def _how_to_write(text: str, low: float, high: float) -> str:
+    """The likely reason why a number is none, or out of range."""
+    try:
+        value = float(text.replace(",", "."))
+    except ValueError:
+        return "correct it"
+    if low <= value <= high:
+        return "write a point for the comma"
+    return "give it in metres" if low <= value / 100 <= high else "correct it"
 
 
 def _trials(
@@ -256,11 +280,14 @@ def _trials(
             remedy="remove one or give it a run number",
         )
     if not trials:
+        named = ", ".join(Path(one.file).name for one in misnamed)
         raise BadDataError(
-            "no recordings",
+            f"no recordings but {named}, whose name does not say what it is"
+            if misnamed
+            else "no recordings",
             file=folder,
             expected=f"recordings with {_NAME_RULE}",
-            remedy="add them",
+            remedy="rename them" if misnamed else "add them",
         )
     return tuple(trials), misnamed
 

@@ -46,5 +46,8 @@ def _note(fit: Fit, terms: Terms) -> str:
         f"{max(tensors):.0f} % in the inertias (weight {fit.weights.gamma:g} of staying near it)"
     )
     if fit.decided < _LITTLE:
-        note += "; too little motion: the parameters stay near the table (RM)"
+        note += (
+            "; too little motion, or errors that hide what it tells (see the diagnosis): the "
+            "parameters stay near the table (RM)"
+        )
     return note

@@ -143,7 +143,7 @@ def _touches(
     low = foot.height_m.min(axis=1) < limits.touch_height_m
     touching = low & ((foot.speed_m_s < limits.touch_speed_m_s) | near_load)
     outlines = [plate.corners_m for plate in plates if plate.corners_m is not None]
-    inside = _inside_outlines(foot, outlines, limits) if outlines else False
+    inside = _inside_outlines(foot, outlines, limits) if outlines else np.zeros_like(low)
     without_outline = any(plate.corners_m is None for plate in plates)
     measured = inside | near_load if without_outline else inside
     off = long_runs(touching & ~measured, max(1, round(limits.blink_s * rate_hz)))

@@ -57,6 +57,8 @@ def run(unit: Unit) -> None:
         [dict(zip(one.labels, one.positions.swapaxes(0, 1), strict=True)) for one in recorded],
     )
     _require_markers(unit, marker_set, calibration.person)
+    if unit.config.marker_set == "auto":
+        unit.warn(f"{unit.name}: marker set {marker_set.name}, told from the labels")
     for note in calibration.notes:
         unit.warn(f"{unit.name}: {note}")
     fit = _refine(unit, calibration, recorded, still, quiet)

@@ -71,7 +71,7 @@ def test_out_that_is_a_file(bsip, empty_study, tmp_path):
 def test_show_without_tables(bsip, tmp_path):
     answer = bsip("show", tmp_path)
     assert_usage_error(answer)
-    assert "run `bsip tables` or `bsip run` first" in one_sentence(answer)
+    assert "run `bsip run` first, or name the folder" in one_sentence(answer)
 
 
 # --- configuration ------------------------------------------------------------------------------
@@ -162,7 +162,7 @@ def test_corrupt_recording_is_refused_in_one_sentence(bsip, empty_study, tmp_pat
     assert ". To mend it: " in sentence
     assert summary == f"bsip ingest: 1 refused; results in {out}"
     written = out / "sub-02" / "sub-02_task-static_refusal-ingest.parquet"
-    assert [path.name for path in (out / "sub-02").iterdir()] == [written.name]
+    assert {path.name for path in (out / "sub-02").iterdir()} == {".lock", written.name}
     row = read_artifact(written, "refusal").iloc[0]
     assert (row["stage"], row["kind"]) == ("ingest", "bad data")
     assert row["sentence"] in sentence

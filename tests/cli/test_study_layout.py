@@ -77,7 +77,9 @@ def test_bad_line_is_refused_and_the_others_stay(empty_study, line, said):
     [
         (b"", "names no participant"),
         (HEADER.encode(), "names no participant"),
-        (b"participant_id,sex,mass_kg\nsub-01,M,70\n", "has no column"),
+        (b"participant_id,sex,mass_kg\nsub-01,M,70\n", "put a tab between the cells"),
+        (b"participant_id sex mass_kg\nsub-01 M 70\n", "put a tab between the cells"),
+        (b"name\tage\nsub-01\t70\n", "has no column participant_id, sex, mass_kg"),
         (HEADER.encode("utf-16"), "is not a text table"),
     ],
 )
@@ -95,6 +97,30 @@ def test_recording_whose_name_says_nothing(empty_study):
     assert [trial.task for trial in study.participants[0].trials] == ["static"]
     assert len(refusals) == 1
     assert refusals[0].startswith(f"{odd}: its name does not say what it is")
+
+
+def test_a_folder_whose_only_recording_is_misnamed_names_it(empty_study):
+    folder = empty_study / "sub-01"
+    (folder / "sub-01_task-static.c3d").rename(folder / "sub-01_task-my-static.c3d")
+    _, refusals = load(empty_study)
+    assert "no recordings but sub-01_task-my-static.c3d, whose name" in refusals[0]
+    assert "rename them" in refusals[0]
+
+
+@pytest.mark.parametrize(
+    ("mass", "height", "remedy"),
+    [
+        ("70,5", "1.73", "write a point for the comma"),
+        ("70.5", "173", "give it in metres"),
+        ("seventy", "1.73", "correct it"),
+    ],
+)
+def test_a_number_that_is_none_comes_with_its_likely_reason(empty_study, mass, height, remedy):
+    row = f"sub-01\tM\t{mass}\t{height}\n"
+    header = "participant_id\tsex\tmass_kg\theight_m\n"
+    (empty_study / "participants.tsv").write_text(header + row)
+    _, refusals = load(empty_study)
+    assert refusals[0].endswith(f"To mend it: {remedy}.")
 
 
 def test_two_recordings_of_one_name(empty_study):

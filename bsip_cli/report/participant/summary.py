@@ -60,7 +60,7 @@ def _who(record: ParticipantRecord) -> str:
     if not np.isfinite(plates):
         return f"{who} No quiet standing on the plates was found to check the mass against."
     if facts["mass_source"] == "plates":
-        return f"{who} No mass was stated, so the plates' reading in quiet standing is used."
+        return f"{who} No mass was stated, so what the plates carried is used."
     return (
         f"{who} In quiet standing the plates read {number(plates, 2)} kg "
         f"({signed(100.0 * (plates / mass - 1.0), 1)} %)."

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pandas as pd
 
-from bsip_cli.errors import UsageError
 from bsip_cli.report.tables import (
     centres_of_mass,
     cop_rmse,
@@ -107,17 +106,7 @@ def folder(out: Path) -> Path:
 
 
 def show(out: Path) -> str:
-    """The written Markdown tables of an output folder, one after the other.
-
-    Raises
-    ------
-    UsageError
-        None has been written there.
-    """
+    """The written Markdown tables of an output folder, one after the other; empty without any."""
     paths = [folder(out) / f"{name}.md" for name in NAMES]
     texts = [path.read_text(encoding="utf-8") for path in paths if path.exists()]
-    if not texts:
-        raise UsageError(
-            "there are no tables", file=folder(out), remedy="run `bsip tables` or `bsip run` first"
-        )
     return "\n\n".join(texts)

@@ -2,14 +2,19 @@
 # make test     set up, check the code's form, run all tests
 # make blind    hide effects in recordings and see whether `bsip diagnose` finds them (hours)
 # make cohort   simulate twelve people with 120 s sequences and run them
+# make COHORT=path [OUT=path] [-j 4] [-n]   your study: every participant on their own, then the
+#               tables of all; only what changed is done again, who fails is named and stops nobody
 PYTHON ?= python3
 JOBS ?= 2
 DRAWS ?= 10
-BIN := .venv/bin
+BIN ?= .venv/bin
+READY ?= .venv/ready
+COHORT ?=
+OUT ?= $(patsubst %/,%,$(COHORT))_results
 
-.PHONY: sample test blind cohort check clean
+.PHONY: sample test blind cohort check clean study
 
-sample: .venv/ready
+sample: $(READY)
 	$(BIN)/bsip run sample_data --out out/sample --jobs $(JOBS)
 	$(BIN)/bsip show out/sample
 
@@ -27,6 +32,38 @@ cohort: .venv/ready
 	test -d out/cohort_study || $(BIN)/bsip simulate out/cohort_study --preset cohort
 	$(BIN)/bsip run out/cohort_study --out out/cohort --jobs $(JOBS)
 	$(BIN)/bsip show out/cohort
+
+# --- a study of your own --------------------------------------------------------------------------
+
+ifneq ($(COHORT),)
+.DEFAULT_GOAL := study
+PEOPLE := $(shell cut -f 1 '$(COHORT)/participants.tsv' | grep '^sub-')
+MADE := $(OUT)/.made
+
+study: $(MADE)/group
+	@test -n "$(strip $(PEOPLE))" || { echo "make: $(COHORT)/participants.tsv names nobody" >&2; exit 2; }
+	@$(BIN)/bsip show $(OUT)
+	@failed=; for who in $(PEOPLE); do test -f $(MADE)/$$who || failed="$$failed $$who"; done; \
+	test -z "$$failed" || { echo "make: not done:$$failed; read what bsip said of them" >&2; exit 3; }
+
+# A participant that bsip refuses (exit code 3) is done until a file of theirs changes.
+define participant
+$(MADE)/$(1): $$(wildcard $(COHORT)/$(1)/*) $$(wildcard $(COHORT)/*.t*) | $(READY)
+	@mkdir -p $(MADE)
+	$(BIN)/bsip run $(COHORT) --out $(OUT) --participant $(1); code=$$$$?; \
+	case $$$$code in 0|3) touch $$@;; *) rm -f $$@; echo "make: $(1) failed ($$$$code)" >&2;; esac
+endef
+$(foreach who,$(PEOPLE),$(eval $(call participant,$(who))))
+
+$(MADE)/group: $(addprefix $(MADE)/,$(PEOPLE))
+	@mkdir -p $(MADE)
+	$(BIN)/bsip stats $(COHORT) --out $(OUT)
+	$(BIN)/bsip tables $(COHORT) --out $(OUT)
+	$(BIN)/bsip report $(COHORT) --out $(OUT)
+	@touch $@
+endif
+
+# --- setting up -----------------------------------------------------------------------------------
 
 .venv/ready: requirements.lock pyproject.toml
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'bsip needs Python 3.11 or later; name one with make PYTHON=...')"

@@ -87,9 +87,9 @@ def _poses(motion: Motion, rows: pd.DataFrame) -> Poses:
         head_radius_m=_HEAD_RADIUS_M,
         markers_m=_points(R, p, body.marker_segments, body.markers_in_joint_m()) @ axes.T,
         force_m=point,
-        forces=force,
+        forces_N=force,
         ground_m=ground,
-        body_weight=motion.body_weight_N,
+        body_weight_N=motion.body_weight_N,
     )
 
 

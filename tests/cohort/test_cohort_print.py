@@ -193,6 +193,13 @@ def test_published_values_stand_beside_the_studys(cohort):
     assert sway.loc["RMS AP", "fp_mean"] == three.loc["rms_ap_origin", "fp_mean_m"]
 
 
+def test_latex_beside_print_is_plain(cohort):
+    """A dagger is no letter that every LaTeX knows."""
+    for name in BESIDE:
+        assert cohort.text(name, "tex").isascii()
+    assert r"88.67(11.03)\dag{}" in cohort.text(BESIDE[1], "tex")
+
+
 def test_no_absent_number_is_printed_as_nan(cohort):
     for ending in ("md", "tex", "csv"):
         for name in NAMES:

@@ -30,9 +30,9 @@ def poses() -> Poses:
         head_radius_m=0.1,
         markers_m=rng.uniform(0.2, 1.6, (3, 4, 3)),
         force_m=np.where(np.isnan(forces), np.nan, 0.05),
-        forces=forces,
+        forces_N=forces,
         ground_m=0.05,
-        body_weight=700.0,
+        body_weight_N=700.0,
     )
 
 

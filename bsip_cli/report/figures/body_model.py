@@ -42,7 +42,7 @@ def body_model(poses: Poses, k: int) -> Figure:
     if np.isfinite(tip).all():
         arrow = {"color": GREEN, "lw": 2.2, "arrowstyle": "-|>", "mutation_scale": 12}
         axes.annotate("", tuple(tip), tuple(foot), arrowprops=arrow)
-        size = float(np.linalg.norm(poses.forces[k]))
+        size = float(np.linalg.norm(poses.forces_N[k]))
         label = axes.annotate(f"{size:.0f} N", tuple(tip), (8, 4), textcoords="offset points")
         label.set(color=GREEN, fontsize=8.5, bbox={"fc": "white", "ec": "none", "pad": 1.0})
         points += [foot[None], tip[None]]

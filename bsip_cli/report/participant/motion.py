@@ -81,7 +81,7 @@ def _widest(poses: Poses) -> tuple[float, int]:
 
 def _is_loaded(poses: Poses) -> np.ndarray:
     """(n,) True where the plates carry half the body's weight at least."""
-    return np.nan_to_num(poses.forces[:, 2]) > 0.5 * poses.body_weight
+    return np.nan_to_num(poses.forces_N[:, 2]) > 0.5 * poses.body_weight_N
 
 
 def _poses(record: ParticipantRecord, trial: TrialRecord) -> list[Block]:

@@ -43,9 +43,10 @@ def build(results: Results, criteria: Criteria) -> Table:
         (
             notes.star_legend(criteria.alpha),
             "As published (Robert 2017, table 1): residuals of force and moment, and mean, median "
-            "and largest distance of the centres of mass over a person's segments, along the "
-            "segment's long axis. Added: the tests, and each segment. Residuals are root mean "
-            "squares of the error as a vector, the moment about the world's origin.",
+            "and largest distance of the centres of mass over a person's segments, along each "
+            "segment's Y axis: its length, of a foot its height. Added: the tests, and each segment. "
+            "Residuals are root mean squares of the error as a vector, the moment about the lab's "
+            "origin, so that it grows with the plate's distance from there.",
             f"In print, of single people: {'; '.join(_in_print())}.",
             *notes.not_possible(results, named),
         ),

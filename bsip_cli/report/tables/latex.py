@@ -22,6 +22,7 @@ _SIGNS = {
     ">": r"\textgreater{}",
     "|": r"\textbar{}",
     "²": r"\textsuperscript{2}",
+    "†": r"\dag{}",
     "–": "--",
     "×": r"$\times$",
     "−": "$-$",

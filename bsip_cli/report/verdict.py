@@ -71,7 +71,7 @@ def verdict_of(
         headline(diagnosis),
         bool(causes),
         tuple(cause_text(cause, everywhere) for cause in causes),
-        _results(causes, gains, changes) if causes else _seen_in(everywhere),
+        (*(_results(causes, gains, changes) if causes else ()), *_seen_in(everywhere)),
         (*filter(None, [_named_twice(causes)]), *consequences(causes)),
         limits_sentence(limits_of(detection, diagnosis)),
     )
@@ -91,9 +91,10 @@ def headline(diagnosis: pd.DataFrame) -> str:
         return "Something is wrong that has no name in the catalogue of causes."
     parts = [f"{count(named, 'cause')} named"] if named else []
     if classes:
-        parts.append(f"{classes} narrowed down to rivals that look alike in these recordings")
+        how_many = str(classes) if named else count(classes, "cause")
+        parts.append(f"{how_many} narrowed down to rivals that look alike in these recordings")
     if unnamed:
-        parts.append(f"{unnamed} without a name")
+        parts.append(f"{unnamed if parts else count(unnamed, 'cause')} without a name")
     return f"Something is wrong: {listing(parts)}."
 
 

@@ -219,9 +219,12 @@ def test_gains_lead_with_what_improves():
 
 
 def test_the_verdict_tells_gains_where_they_are(found):
-    assert verdict_of(found, detection(TRIALS), gains()).results == (gain_sentence(gains()),)
-    (advice,) = verdict_of(found, detection(TRIALS)).results
+    looked = "Looked at: basketball (run 1) and sequence (run 1)."
+    told = verdict_of(found, detection(TRIALS), gains()).results
+    assert told == (gain_sentence(gains()), looked)
+    advice, where = verdict_of(found, detection(TRIALS)).results
     assert "bsip extend" in advice
+    assert where == looked
 
 
 def test_changes_of_the_body_lead_with_the_largest():

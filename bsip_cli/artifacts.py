@@ -13,7 +13,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.errors import BadDataError, not_writable
 from bsip_cli.schemas import SCHEMAS, Schema
 
 _TYPES = {"float": pa.float64(), "int": pa.int64(), "bool": pa.bool_(), "text": pa.string()}
@@ -60,11 +60,7 @@ def write_atomically(path: Path, write) -> None:
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:
-        raise UsageError(
-            f"cannot be written ({error.strerror or error})",
-            file=path,
-            remedy="make room there, or name another folder with --out",
-        ) from None
+        raise not_writable(path, error) from None
 
 
 def read_artifact(path: Path, kind: str) -> pd.DataFrame:

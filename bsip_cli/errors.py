@@ -45,6 +45,15 @@ class UsageError(BsipError):
     exit_code = 2
 
 
+def not_writable(file: object, error: OSError) -> UsageError:
+    """What to raise where results cannot be written."""
+    return UsageError(
+        f"cannot be written ({error.strerror or error})",
+        file=file,
+        remedy="make room there, or name another folder with --out",
+    )
+
+
 class BadDataError(BsipError):
     """A recording, table or artifact cannot be used (exit code 3)."""
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from bsip_cli.errors import UsageError
+from bsip_cli.errors import UsageError, not_writable
 
 NAME = ".lock"
 
@@ -23,15 +23,12 @@ def held_alone(folder: Path) -> Iterator[None]:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with (folder / NAME).open("a") as handle:
-            _lock(handle.fileno(), folder)
-            yield
+        handle = (folder / NAME).open("a")
     except OSError as error:
-        raise UsageError(
-            f"cannot be written ({error.strerror or error})",
-            file=folder,
-            remedy="make room there, or name another folder with --out",
-        ) from None
+        raise not_writable(folder, error) from None
+    with handle:
+        _lock(handle.fileno(), folder)
+        yield
 
 
 def _lock(descriptor: int, folder: Path) -> None:
@@ -43,3 +40,5 @@ def _lock(descriptor: int, folder: Path) -> None:
             file=folder,
             remedy="wait until it has ended, and run again",
         ) from None
+    except OSError as error:
+        raise not_writable(folder, error) from None

@@ -19,6 +19,11 @@ def test_info_of_something_else_is_refused(content, bsip, tmp_path):
     assert "Traceback" not in answer.err
 
 
+def test_an_error_of_the_work_itself_stays_what_it_is(tmp_path):
+    with pytest.raises(FileNotFoundError, match="a bug"), held_alone(tmp_path / "sub-01"):
+        raise FileNotFoundError("a bug")
+
+
 def test_a_folder_that_cannot_be_made_is_told(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(UsageError, match="cannot be written"), held_alone(tmp_path / "file" / "x"):

@@ -4,21 +4,24 @@
 # make cohort   simulate twelve people with 120 s sequences and run them
 # make COHORT=path [OUT=path] [-j 4] [-n]   your study: every participant on their own, then the
 #               tables of all; only what changed is done again, who fails is named and stops nobody
+# make cluster COHORT=path [OUT=path] [PROFILE=slurm]   the same by Snakemake (workflow/README.md)
 PYTHON ?= python3
 JOBS ?= 2
 DRAWS ?= 10
 BIN ?= .venv/bin
 READY ?= .venv/ready
 COHORT ?=
+PROFILE ?= plain
+CLUSTER ?= .venv-cluster
 OUT ?= $(patsubst %/,%,$(COHORT))_results
 
-.PHONY: sample test blind cohort check clean study
+.PHONY: sample test blind cohort check clean study cluster
 
 sample: $(READY)
 	$(BIN)/bsip run sample_data --out out/sample --jobs $(JOBS)
 	$(BIN)/bsip show out/sample
 
-test: check
+test: check $(CLUSTER)/ready
 	$(BIN)/pytest -n $(JOBS) --dist loadfile
 
 blind: .venv/ready
@@ -37,7 +40,7 @@ cohort: .venv/ready
 
 ifneq ($(COHORT),)
 .DEFAULT_GOAL := study
-PEOPLE := $(shell cut -f 1 '$(COHORT)/participants.tsv' | grep '^sub-')
+PEOPLE := $(shell cut -f 1 '$(COHORT)/participants.tsv' | tr -d ' \r' | grep -Ex 'sub-[A-Za-z0-9]+')
 MADE := $(OUT)/.made
 
 study: $(MADE)/group
@@ -57,10 +60,15 @@ $(foreach who,$(PEOPLE),$(eval $(call participant,$(who))))
 
 $(MADE)/group: $(addprefix $(MADE)/,$(PEOPLE))
 	@mkdir -p $(MADE)
-	$(BIN)/bsip stats $(COHORT) --out $(OUT)
-	$(BIN)/bsip tables $(COHORT) --out $(OUT)
-	$(BIN)/bsip report $(COHORT) --out $(OUT)
+	$(BIN)/bsip run $(COHORT) --out $(OUT) --group || [ $$? -eq 3 ]
 	@touch $@
+
+SNAKEMAKE = $(CLUSTER)/bin/snakemake --snakefile workflow/Snakefile \
+	--profile workflow/profiles/$(PROFILE) --config study=$(COHORT) out=$(OUT) bsip=$(abspath $(BIN))/bsip
+
+cluster: $(READY) $(CLUSTER)/ready
+	$(SNAKEMAKE) -- everybody; code=$$?; \
+	$(SNAKEMAKE) -- group && $(BIN)/bsip show $(OUT) && exit $$code
 endif
 
 # --- setting up -----------------------------------------------------------------------------------
@@ -72,5 +80,10 @@ endif
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --editable .
 	touch .venv/ready
 
+$(CLUSTER)/ready: requirements-cluster.lock
+	$(PYTHON) -m venv $(CLUSTER)
+	$(CLUSTER)/bin/python -m pip install --quiet --disable-pip-version-check --requirement requirements-cluster.lock
+	touch $@
+
 clean:
-	rm -rf .venv out
+	rm -rf .venv $(CLUSTER) out

@@ -56,14 +56,10 @@ def _stage_command(name: str, summary: str) -> click.Command:
         "--jobs", default=1, show_default=True, type=click.IntRange(1), help="Participants at once."
     )
     @click.option("--force", is_flag=True, help="Redo what is up to date.")
-    def command(study, out, chosen, config_file, jobs, force, estimators=()):
+    def command(study, out, chosen, config_file, **options):
         from bsip_cli.session import run_session
 
-        sys.exit(
-            run_session(
-                name, study, out, chosen, config_file, jobs=jobs, force=force, estimators=estimators
-            )
-        )
+        sys.exit(run_session(name, study, out, chosen, config_file, **options))
 
     return command
 
@@ -80,6 +76,10 @@ cli.commands["identify"].params.append(
     )
 )
 cli.add_command(_stage_command("run", "All stages, from recordings to the report."))
+for _name in ("report", "run"):
+    cli.commands[_name].params.append(
+        click.Option(["--group"], is_flag=True, help="Only what is about all participants.")
+    )
 
 
 def _effect_options(command: Any) -> Any:

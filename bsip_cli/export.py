@@ -83,11 +83,11 @@ def export_session(
     writers = _writers(request, skeleton)
 
     def running() -> Iterator[Outcome]:
-        for participant in opened.participants:
+        for participant in opened.study.participants:
             unit = Unit(_READER, opened.study, out, opened.config, participant)
             yield _export(unit, skeleton, request, writers)
 
-    return follow("export", opened.refusals, running(), len(opened.participants), out)
+    return follow("export", opened.refusals, running(), len(opened.study.participants), out)
 
 
 def _writers(request: Request, skeleton: Skeleton) -> dict[str, Writer]:

@@ -40,7 +40,6 @@ def run_stages(
     study: Study,
     out: Path,
     config: Config,
-    participants: tuple[Participant, ...],
     *,
     force: bool,
     jobs: int,
@@ -52,10 +51,11 @@ def run_stages(
     personal = tuple(stage for stage in stages if stage.level != "cohort")
     if personal:
         with _processes(jobs) as pool:
-            running = {
-                participant.id: pool.submit(_run, personal, study, out, config, force, participant)
-                for participant in participants
-            }
+            running = {}
+            for participant in study.participants:
+                alone = Study(study.root, (participant,))  # all that its process needs to know
+                work = pool.submit(_run, personal, alone, out, config, force, participant)
+                running[participant.id] = work
             for name, future in running.items():
                 yield from _outcomes(future, name, personal)
     shared = tuple(stage for stage in stages if stage.level == "cohort")

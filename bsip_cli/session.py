@@ -16,10 +16,10 @@ from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.check_study import check_prefixes, check_segments, check_trials
 from bsip_cli.config import Config, load_config, with_estimators
 from bsip_cli.dataset import describe_dataset
-from bsip_cli.errors import UsageError
-from bsip_cli.pipeline import stages_named
+from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.pipeline import Stage, stages_named
 from bsip_cli.runner import Outcome, refusal_sentence, run_stages
-from bsip_cli.study import Participant, Study, load_study
+from bsip_cli.study import Study, load_study
 
 _SEVERITY = (0, 3, 4, 2, 1)  # of several exit codes the gravest counts
 
@@ -34,20 +34,20 @@ def run_session(
     jobs: int,
     force: bool,
     estimators: tuple[str, ...] = (),
+    group: bool = False,
 ) -> int:
     """Run a command's stages on a study and return the exit code.
 
-    ``estimators`` stand for the configured ones, unless empty.
+    ``estimators`` stand for the configured ones, unless empty; ``group`` leaves out what is
+    about one participant.
     """
+    stages = _stages(command, chosen, group)
+    if any(stage.level == "cohort" for stage in stages):
+        chosen = ()  # what is about all needs all
     opened = open_study(root, out, chosen, config_file, estimators)
     describe_dataset(out, opened.study.root)
-    participants = opened.participants
-    stages = stages_named(command)
-    if chosen and command == "run":
-        stages = tuple(stage for stage in stages if stage.level != "cohort")
-    running = run_stages(
-        stages, opened.study, out, opened.config, participants, force=force, jobs=jobs
-    )
+    participants = opened.study.participants
+    running = run_stages(stages, opened.study, out, opened.config, force=force, jobs=jobs)
     total = sum(
         1
         if s.level == "cohort"
@@ -57,13 +57,24 @@ def run_session(
     return follow(command, opened.refusals, running, total, out)
 
 
+def _stages(command: str, chosen: tuple[str, ...], group: bool) -> tuple[Stage, ...]:
+    """A command's stages, without those of the group for some participants, or these alone."""
+    if group and chosen:
+        raise UsageError("--group is about all participants", remedy="leave out --participant")
+    stages = stages_named(command)
+    of_all = tuple(stage for stage in stages if stage.level == "cohort")
+    if group:
+        return of_all
+    personal = tuple(stage for stage in stages if stage.level != "cohort")
+    return personal or of_all if chosen else stages
+
+
 @dataclass(frozen=True)
 class OpenedStudy:
-    """A study as a command meets it: the chosen participants, and who could not be listed."""
+    """A study as a command meets it: its chosen participants, and who could not be listed."""
 
     study: Study
     config: Config
-    participants: tuple[Participant, ...]
     refusals: tuple[Outcome, ...]
 
 
@@ -84,13 +95,19 @@ def open_study(
         participants.tsv cannot be used.
     """
     config = with_estimators(_config(root, config_file), estimators)
-    study, refusals = load_study(root, config.roles.model_dump())
+    roles = config.roles.model_dump()
+    study, refusals = load_study(root, roles, chosen)
+    if config.loads or config.ingest.prefixes:
+        _check_names(config, *(load_study(root, roles) if chosen else (study, refusals)))
+    _check_out(out)
+    return OpenedStudy(study, config, tuple(refusal_sentence(refusals)))
+
+
+def _check_names(config: Config, study: Study, refusals: list[BadDataError]) -> None:
+    """Whether loads and prefixes name who and what is there, in the whole study."""
     if not refusals:  # else a load may belong to who or what was refused
         check_trials(config.loads, study)
         check_prefixes(config.ingest.prefixes, study)
-    participants = _choose(study, chosen)
-    _check_out(out)
-    return OpenedStudy(study, config, participants, tuple(refusal_sentence(refusals)))
 
 
 def follow(
@@ -135,18 +152,6 @@ def _check_out(out: Path) -> None:
         raise UsageError(
             f"is no folder to write to ({error.strerror})", file=out, remedy="check --out"
         ) from None
-
-
-def _choose(study: Study, chosen: tuple[str, ...]) -> tuple[Participant, ...]:
-    known = {participant.id: participant for participant in study.participants}
-    unknown = [name for name in chosen if name not in known]
-    if unknown:
-        raise UsageError(
-            f"no participant {', '.join(unknown)}",
-            file=study.root / "participants.tsv",
-            expected=f"one of {', '.join(known) or 'none, every line was refused'}",
-        )
-    return tuple(known[name] for name in dict.fromkeys(chosen)) if chosen else study.participants
 
 
 def _tell(outcome: Outcome) -> None:

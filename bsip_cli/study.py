@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -19,6 +19,9 @@ _TRIAL = re.compile(
     r"(?P<participant>sub-[A-Za-z0-9]+)_task-(?P<task>[A-Za-z0-9]+)(_run-(?P<run>[0-9]+))?"
 )
 _RECORDINGS = (".c3d", ".trc")
+MANY = 20
+"""So many participants are no more named one by one in a message."""
+
 _NAME_RULE = "names like sub-01_task-sequence_run-1.c3d (letters and digits only)"
 
 
@@ -51,13 +54,16 @@ class Study:
     participants: tuple[Participant, ...]
 
 
-def load_study(root: Path, roles: dict[str, tuple[str, ...]]) -> tuple[Study, list[BadDataError]]:
+def load_study(
+    root: Path, roles: dict[str, tuple[str, ...]], chosen: Sequence[str] = ()
+) -> tuple[Study, list[BadDataError]]:
     """Read participants.tsv and list the recordings.
 
     Parameters
     ----------
     root : the study's folder.
     roles : task names of the roles ``static`` and ``sequence``.
+    chosen : only these participants, in this order; nothing of the others is looked at.
 
     Returns
     -------
@@ -67,7 +73,7 @@ def load_study(root: Path, roles: dict[str, tuple[str, ...]]) -> tuple[Study, li
     Raises
     ------
     UsageError
-        There is no study at ``root``.
+        There is no study at ``root``, or participants.tsv does not name who is chosen.
     BadDataError
         participants.tsv cannot be read or lacks a column.
     """
@@ -75,20 +81,39 @@ def load_study(root: Path, roles: dict[str, tuple[str, ...]]) -> tuple[Study, li
         raise UsageError(
             "there is no such folder", file=root, remedy="name the folder with participants.tsv"
         )
-    participants: list[Participant] = []
+    rows = _participant_rows(root / "participants.tsv")
+    if chosen:
+        rows = _rows_of(chosen, rows, root / "participants.tsv")
+    participants: dict[str, Participant] = {}
     refusals: list[BadDataError] = []
-    for row in _participant_rows(root / "participants.tsv"):
+    for row in rows:
         try:
             participant, misnamed = _participant(root, row, roles)
         except BadDataError as refusal:
             refusals.append(refusal)
             continue
-        if any(participant.id == other.id for other in participants):
+        if participant.id in participants:
             refusals.append(_twice(root, participant.id))
             continue
-        participants.append(participant)
+        participants[participant.id] = participant
         refusals += misnamed
-    return Study(root, tuple(participants)), refusals
+    return Study(root, tuple(participants.values())), refusals
+
+
+def _rows_of(chosen: Sequence[str], rows: list[dict[str, str]], file: Path) -> list[dict[str, str]]:
+    """The rows of some participants, in their order."""
+    known: dict[str, list[dict[str, str]]] = {}
+    for row in rows:
+        known.setdefault((row["participant_id"] or "").strip(), []).append(row)
+    unknown = [name for name in chosen if name not in known]
+    if unknown:
+        near = [n for name in unknown for n in difflib.get_close_matches(name, known)]
+        raise UsageError(
+            f"no participant {', '.join(unknown)}",
+            file=file,
+            expected=f"one of {', '.join(known if len(known) < MANY else near or [*known][:MANY])}",
+        )
+    return [row for name in dict.fromkeys(chosen) for row in known[name]]
 
 
 def _participant_rows(file: Path) -> list[dict[str, str]]:

@@ -41,9 +41,7 @@ def outcomes(empty_study, tmp_path):
     def of(*stages: Stage):
         study, _ = load_study(empty_study, {"static": ("static",), "sequence": ()})
         out = tmp_path / "out"
-        running = run_stages(
-            stages, study, out, load_config([]), study.participants, force=True, jobs=1
-        )
+        running = run_stages(stages, study, out, load_config([]), force=True, jobs=1)
         return [(o.stage, o.unit, o.state, o.exit_code, o.sentences) for o in running]
 
     return of

@@ -60,6 +60,13 @@ def test_unknown_participants_are_named_with_the_known_ones(bsip, empty_study, t
     assert "no participant sub-07, sub-9; expected one of sub-01, sub-02" in sentence
 
 
+def test_the_group_needs_everybody(bsip, empty_study, tmp_path):
+    chosen = ["--participant", "sub-01", "--group"]
+    answer = bsip("run", empty_study, "--out", tmp_path / "out", *chosen)
+    assert_usage_error(answer)
+    assert "--group is about all participants" in one_sentence(answer)
+
+
 def test_out_that_is_a_file(bsip, empty_study, tmp_path):
     (tmp_path / "out").write_text("mine")
     answer = bsip("run", empty_study, "--out", tmp_path / "out")

@@ -65,8 +65,9 @@ def test_every_stage_takes_the_same_arguments(name):
     arguments = [each.name for each in params if isinstance(each, click.Argument)]
     options = [each.opts for each in params if isinstance(each, click.Option)]
     assert arguments == ["study"]
-    own = [["--estimator"]] if name == "identify" else []
-    assert options == [["--out"], ["--participant"], ["--config"], ["--jobs"], ["--force"], *own]
+    own = {"identify": [["--estimator"]], "report": [["--group"]], "run": [["--group"]]}
+    common = [["--out"], ["--participant"], ["--config"], ["--jobs"], ["--force"]]
+    assert options == [*common, *own.get(name, [])]
 
 
 @pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.label)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bsip_cli.config import load_config
-from bsip_cli.errors import BadDataError
+from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.pipeline import STAGES
 from bsip_cli.study import load_study
 from bsip_cli.unit import Unit
@@ -46,6 +46,23 @@ def test_facts_of_the_participants(empty_study):
     first, second = load(empty_study)[0].participants
     assert (first.sex, first.mass_kg, first.height_m) == ("M", 70.0, 1.8)
     assert (second.sex, second.mass_kg, second.height_m) == ("F", 60.0, None)
+
+
+def test_only_who_is_chosen_is_looked_at(empty_study):
+    write_table(empty_study, "sub-01\tM\t70\t1.8", "sub-02\tX\t60\tn/a", "sub-03\tF\t60\tn/a")
+    study, refusals = load_study(empty_study, ROLES, ["sub-01"])
+    assert ([p.id for p in study.participants], refusals) == (["sub-01"], [])
+    study, refusals = load_study(empty_study, ROLES, ["sub-02"])
+    assert study.participants == ()
+    assert "sex 'X' of sub-02" in str(refusals[0])
+
+
+def test_many_participants_are_not_listed_in_a_message(empty_study):
+    write_table(empty_study, *(f"sub-{k:03d}\tM\t70\t1.8" for k in range(200)))
+    with pytest.raises(UsageError) as error:
+        load_study(empty_study, ROLES, ["sub-0123"])
+    assert "expected one of sub-123" in str(error.value)
+    assert len(str(error.value)) < 300
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,8 @@ sample: $(READY)
 	$(BIN)/bsip run sample_data --out out/sample --jobs $(JOBS)
 	$(BIN)/bsip show out/sample
 
-test: check $(CLUSTER)/ready
+test: check
+	@$(MAKE) --no-print-directory $(CLUSTER)/ready || echo "Snakemake cannot be installed: its tests will skip"
 	$(BIN)/pytest -n $(JOBS) --dist loadfile
 
 blind: .venv/ready

@@ -1,0 +1,27 @@
+"""The workflow on a real SLURM of one node: workflow/test_slurm.sh, where it can run."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+CANNOT = 77
+
+
+@pytest.mark.slow
+def test_node_that_dies_and_job_over_its_memory(tmp_path):
+    bsip = tmp_path / "bsip"
+    bsip.write_text(f'#!/bin/sh\nexec {sys.executable} -m bsip_cli "$@"\n')
+    bsip.chmod(0o755)
+    snakemake = ROOT / ".venv-cluster" / "bin" / "snakemake"
+    script = ROOT / "workflow" / "test_slurm.sh"
+    done = subprocess.run([script, bsip, snakemake], capture_output=True, text=True)
+    if done.returncode == CANNOT:
+        pytest.skip(done.stderr.splitlines()[-1])
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "passed: a job over its memory and a node that died" in done.stdout
+    assert "equal to those of bsip run" in done.stdout

@@ -50,9 +50,10 @@ study: $(MADE)/group
 	@failed=; for who in $(PEOPLE); do test -f $(MADE)/$$who || failed="$$failed $$who"; done; \
 	test -z "$$failed" || { echo "make: not done:$$failed; read what bsip said of them" >&2; exit 3; }
 
+# A name with a blank comes out of the inner wildcard in pieces, and of the outer not at all.
 # A participant that bsip refuses (exit code 3) is done until a file of theirs changes.
 define participant
-$(MADE)/$(1): $$(wildcard $(COHORT)/$(1)/*) $$(wildcard $(COHORT)/*.t*) | $(READY)
+$(MADE)/$(1): $$(wildcard $$(wildcard $(COHORT)/$(1)/* $(COHORT)/*.t*)) | $(READY)
 	@mkdir -p $(MADE)
 	$(BIN)/bsip run $(COHORT) --out $(OUT) --participant $(1); code=$$$$?; \
 	case $$$$code in 0|3) touch $$@;; *) rm -f $$@; echo "make: $(1) failed ($$$$code)" >&2;; esac

@@ -18,6 +18,8 @@ from bsip_cli.schemas import SCHEMAS, Schema
 
 _TYPES = {"float": pa.float64(), "int": pa.int64(), "bool": pa.bool_(), "text": pa.string()}
 
+_UNFINISHED = ".part"
+
 
 def empty_table(kind: str) -> pd.DataFrame:
     """A table of this kind without rows."""
@@ -49,7 +51,7 @@ def write_atomically(path: Path, write) -> None:
     UsageError
         The disk is full, or the place cannot be written to; what was there stays.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}{_UNFINISHED}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -61,6 +63,12 @@ def write_atomically(path: Path, write) -> None:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise not_writable(path, error) from None
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Take away what killed processes left half written; only for who holds the folder alone."""
+    for left in folder.rglob(f".*{_UNFINISHED}"):
+        left.unlink(missing_ok=True)
 
 
 def read_artifact(path: Path, kind: str) -> pd.DataFrame:

@@ -31,6 +31,7 @@ from bsip_cli.body.exports.osim_given import (
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError, BsipError, UsageError
+from bsip_cli.lock import held_alone
 from bsip_cli.pipeline import Stage
 from bsip_cli.provenance import file_hash
 from bsip_cli.runner import Outcome, lacking
@@ -151,22 +152,23 @@ def _export(
     notes: list[str] = []
     errors: list[BsipError] = []
     try:
-        body = _identified(unit, skeleton, request.method)
-        if request.repair:
-            known = body.made_of
-            body = body.repaired()
-            notes += body.made_of[len(known) :]
-        for ending, writer in writers.items():
-            path = unit.out / unit.name / "export" / f"{body.name}{ending}"
-            try:
-                text, note = writer(body)
-            except BadDataError as error:
-                _remove(path)  # an older one would pass for this method's
-                errors.append(error)
-                continue
-            write_atomically(path, partial(_write, text))
-            written.append(path.name)
-            notes += [note] if note else []
+        with held_alone(unit.out / unit.name):
+            body = _identified(unit, skeleton, request.method)
+            if request.repair:
+                known = body.made_of
+                body = body.repaired()
+                notes += body.made_of[len(known) :]
+            for ending, writer in writers.items():
+                path = unit.out / unit.name / "export" / f"{body.name}{ending}"
+                try:
+                    text, note = writer(body)
+                except BadDataError as error:
+                    _remove(path)  # an older one would pass for this method's
+                    errors.append(error)
+                    continue
+                write_atomically(path, partial(_write, text))
+                written.append(path.name)
+                notes += [note] if note else []
     except BsipError as error:
         errors.append(error)
     return _outcome(unit, written, notes, errors)

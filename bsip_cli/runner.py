@@ -13,7 +13,7 @@ from typing import Literal
 
 import pandas as pd
 
-from bsip_cli.artifacts import write_artifact
+from bsip_cli.artifacts import remove_unfinished, write_artifact
 from bsip_cli.config import Config
 from bsip_cli.errors import BadDataError, BsipError, NumericalError, UsageError
 from bsip_cli.lock import held_alone
@@ -90,6 +90,7 @@ def _run(
     name = participant.id if participant else "group"
     try:
         with held_alone(out / name):
+            remove_unfinished(out / name)
             return _run_alone(stages, study, out, config, force, participant)
     except UsageError as error:
         return [Outcome(stages[0].name, name, "refused", (str(error),), error.exit_code)]

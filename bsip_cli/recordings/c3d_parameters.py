@@ -6,6 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from bsip_cli.recordings.printable import printable
+
 Value = tuple[str, ...] | np.ndarray
 Group = Mapping[str, Value]
 Parameters = Mapping[str, Group]
@@ -30,7 +32,7 @@ def whole_numbers(group: Group, name: str) -> np.ndarray:
 def texts(group: Group, name: str) -> list[str]:
     """A text parameter with its continuations (LABELS, LABELS2, ...); empty if there is none."""
     parts = [part for part in _continued(group, name) if isinstance(part, tuple)]
-    return [text for part in parts for text in part]
+    return [printable(text) for part in parts for text in part]
 
 
 def number(group: Group, name: str) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.printable import printable
 from bsip_cli.recordings.scene_size import settle_unit, without_absurd
 from bsip_cli.recordings.units import length_in_m
 
@@ -111,8 +112,8 @@ def row_counts(what: str, stated: float, found: int) -> list[Finding]:
 def _labels(line: str) -> tuple[str, ...]:
     """Names behind 'Frame#' and 'Time', apart by tabs, or by blanks in a line without tabs."""
     if "\t" in line:
-        return tuple(name.strip() for name in line.split("\t")[2:] if name.strip())
-    return tuple(_HEADER.sub("", line).split()[1:])
+        return tuple(printable(name.strip()) for name in line.split("\t")[2:] if name.strip())
+    return tuple(map(printable, _HEADER.sub("", line).split()[1:]))
 
 
 def _header_fields(lines: list[str]) -> dict[str, str]:

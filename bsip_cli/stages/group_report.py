@@ -1,6 +1,7 @@
 """Report (cohort): one HTML page with the papers' tables and the gain per participant.
 
-Reads values, comparisons, person, identification, tables-files. Writes group-report-files.
+Reads values, comparisons, person, identification, tables-files; links to the participants'
+reports where report-files are there. Writes group-report-files.
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ def _member(unit: Unit, participant: Participant) -> Member:
         participant.id,
         facts.iloc[0] if facts is not None else None,
         tables["identification"],
-        (unit.out / participant.id / "report.html").exists(),
+        unit.path("report-files", participant=participant).exists(),
         refusals_of(unit, participant),
     )
 

@@ -27,7 +27,7 @@ ALLOWED = {
     "check_study": "body config errors study",
     "session": "body check_study config dataset errors pipeline runner study",
     "__main__": "cli",
-    "export": "__init__ artifacts body errors pipeline provenance runner schemas session stages "
+    "export": "__init__ artifacts body errors lock pipeline provenance runner schemas session stages "
     "unit",
     "show": "artifacts errors report schemas",
     "published": "report statistics",

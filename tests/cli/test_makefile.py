@@ -77,6 +77,16 @@ def test_only_what_changed_is_done_again(cohort):
     assert cohort.calls() == ["run sub-02", *GROUP]
 
 
+def test_odd_names_do_no_harm(cohort):
+    study = cohort.folder / "study"
+    (study / "sub-01" / "notes $(touch hacked).c3d").write_bytes(b"")
+    with (study / "participants.tsv").open("a") as table:
+        table.write("sub-09; touch hacked\tM\nsub-$(touch hacked)\tM\n")
+    assert cohort.make().returncode == 0
+    assert cohort.calls() == [*EVERYBODY, *GROUP]
+    assert list(cohort.folder.rglob("hacked")) == []
+
+
 def test_several_at_once_and_a_dry_run(cohort):
     said = cohort.make("-n").stdout
     assert all(f"--participant sub-0{k}" in said for k in (1, 2, 3))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,43 @@ def write_artifact(path: Path, kind: str, frame: pd.DataFrame, provenance: Mappi
     )
 
 
+def write_artifact_in_parts(
+    path: Path, kind: str, parts: Iterable[pd.DataFrame], provenance: Callable[[], Mapping]
+) -> None:
+    """Write a table that is longer than the memory; a row group for each part.
+
+    Parameters
+    ----------
+    provenance : asked for when the last part is written.
+    """
+    layout = SCHEMAS[kind]
+    schema = pa.schema(_fields(layout, [column.name for column in layout.columns]))
+    tables = (_to_arrow(layout, part[schema.names], {}) for part in parts)
+
+    def write(temporary: Path) -> None:
+        rows = temporary.with_name(f"{temporary.name}{_UNFINISHED}")
+        try:
+            _write_tables(rows, schema, tables)
+            whole = schema.with_metadata(_header(layout, provenance()))
+            _write_tables(temporary, whole, _row_groups(rows))
+        finally:
+            rows.unlink(missing_ok=True)
+
+    write_atomically(path, write)
+
+
+def _write_tables(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:
+    with pq.ParquetWriter(path, schema, compression="zstd", write_page_checksum=True) as writer:
+        for table in tables:
+            writer.write_table(table.replace_schema_metadata(schema.metadata))
+
+
+def _row_groups(path: Path) -> Iterator[pa.Table]:
+    with pq.ParquetFile(path) as file:
+        for k in range(file.num_row_groups):
+            yield file.read_row_group(k)
+
+
 def write_atomically(path: Path, write) -> None:
     """Call ``write`` with a temporary path beside ``path``, then rename it into place.
 
@@ -71,8 +108,13 @@ def remove_unfinished(folder: Path) -> None:
         left.unlink(missing_ok=True)
 
 
-def read_artifact(path: Path, kind: str) -> pd.DataFrame:
+def read_artifact(path: Path, kind: str, **wanted: Collection[str]) -> pd.DataFrame:
     """Read a table of a known kind and version.
+
+    Parameters
+    ----------
+    wanted : by the name of a text column, the values of which rows are read; the others never
+        come into memory all at once.
 
     Raises
     ------
@@ -82,7 +124,10 @@ def read_artifact(path: Path, kind: str) -> pd.DataFrame:
     """
     read_header(path, kind)
     try:
-        return pq.read_table(path, page_checksum_verification=True).to_pandas()
+        filters = [(column, "in", sorted(values)) for column, values in wanted.items()]
+        return pq.read_table(
+            path, filters=filters or None, page_checksum_verification=True
+        ).to_pandas()
     except (OSError, pa.ArrowException) as error:
         raise _not_an_artifact(path, error) from None
 
@@ -132,16 +177,27 @@ def _to_arrow(schema: Schema, frame: pd.DataFrame, provenance: Mapping) -> pa.Ta
     unknown = [name for name in frame.columns if schema.column(name) is None]
     if missing or unknown:
         raise ValueError(f"{schema.kind}: missing columns {missing}, unknown columns {unknown}")
-    fields, arrays = [], []
-    for name in frame.columns:
+    fields = _fields(schema, list(frame.columns))
+    arrays = [
+        pa.array(_plain(frame[field.name]), type=field.type, from_pandas=False) for field in fields
+    ]
+    metadata = _header(schema, provenance) if provenance else None
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=metadata))
+
+
+def _fields(schema: Schema, names: list[str]) -> list[pa.Field]:
+    fields = []
+    for name in names:
         column = schema.column(name)
         assert column is not None
-        arrays.append(pa.array(_plain(frame[name]), type=_TYPES[column.type], from_pandas=False))
         notes = {"unit": column.unit, "frame": column.frame, "meaning": column.meaning}
         fields.append(pa.field(name, _TYPES[column.type], metadata=notes))
+    return fields
+
+
+def _header(schema: Schema, provenance: Mapping) -> dict[str, str]:
     header = {"kind": schema.kind, "schema_version": schema.version, "provenance": provenance}
-    metadata = {"bsip": json.dumps(header, sort_keys=True)}
-    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=metadata))
+    return {"bsip": json.dumps(header, sort_keys=True)}
 
 
 def _plain(series: pd.Series) -> Any:

@@ -663,7 +663,7 @@ SCHEMAS = {
         Schema(
             "values",
             "cohort",
-            1,
+            2,
             "one row per participant, trial, method and variable",
             (
                 _text("participant", "participant_id"),

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path
 
 import pandas as pd
 
-from bsip_cli.artifacts import read_artifact, read_header, write_artifact
+from bsip_cli.artifacts import (
+    read_artifact,
+    read_header,
+    write_artifact,
+    write_artifact_in_parts,
+)
 from bsip_cli.config import Config, Load
 from bsip_cli.errors import BadDataError
 from bsip_cli.pipeline import STAGES, Stage, producer
@@ -216,18 +221,30 @@ class Unit:
     # --- reading and writing ----------------------------------------------------------------
 
     def read(
-        self, kind: str, trial: Trial | None = None, participant: Participant | None = None
+        self,
+        kind: str,
+        trial: Trial | None = None,
+        participant: Participant | None = None,
+        **wanted: Collection[str],
     ) -> pd.DataFrame:
-        return read_artifact(self.path(kind, trial, participant), kind)
+        """An artifact, or those of its rows with the wanted values in text columns."""
+        return read_artifact(self.path(kind, trial, participant), kind, **wanted)
 
     def facts(self, kind: str, trial: Trial | None = None) -> dict:
         """What the producing stage said of its result as a whole."""
         return read_header(self.path(kind, trial), kind)["provenance"]["facts"]
 
     def write(self, kind: str, frame: pd.DataFrame, facts: dict | None = None) -> None:
-        made_by = self.provenance()
-        notes = {"made_by": made_by, "messages": list(self.messages), "facts": facts or {}}
-        write_artifact(self.path(kind), kind, frame, notes)
+        write_artifact(self.path(kind), kind, frame, self._notes(facts or {}))
+
+    def write_in_parts(
+        self, kind: str, parts: Iterable[pd.DataFrame], facts: Callable[[], dict]
+    ) -> None:
+        """Write what does not fit into memory; the facts are known after the last part."""
+        write_artifact_in_parts(self.path(kind), kind, parts, lambda: self._notes(facts()))
+
+    def _notes(self, facts: dict) -> dict:
+        return {"made_by": self.provenance(), "messages": list(self.messages), "facts": facts}
 
     def amend(self, kind: str, rows: pd.DataFrame) -> None:
         """Put rows below those of the stage that made the artifact, instead of earlier ones.

@@ -8,7 +8,12 @@ from __future__ import annotations
 
 from bsip_cli.pipeline import STAGES, producer, stages_named
 from bsip_cli.report.cohort.document import cohort_document
-from bsip_cli.report.cohort.record import CohortRecord, Member
+from bsip_cli.report.cohort.record import (
+    ERROR_TABLES,
+    ERROR_VARIABLES,
+    CohortRecord,
+    Member,
+)
 from bsip_cli.report.figures.workflow import Step
 from bsip_cli.report.page import render
 from bsip_cli.report.records import Origin
@@ -36,16 +41,17 @@ def run(unit: Unit) -> None:
 
 def record_of(unit: Unit) -> CohortRecord:
     """Everything that is there of the whole study."""
-    values, comparisons = unit.read("values"), unit.read("comparisons")
-    missing = unit.facts("values").get("missing", [])
+    facts = unit.facts("values")
     options = unit.config.stats
     criteria = Criteria(options.alpha, options.equivalence_percent)
     return CohortRecord(
         members=tuple(_member(unit, participant) for participant in unit.study.participants),
-        values=values,
-        tables=build_tables(values, comparisons, criteria, missing),
+        errors=unit.read("values", table=ERROR_TABLES, variable=ERROR_VARIABLES),
+        tables=build_tables(
+            unit.read("comparisons"), criteria, facts["fitted_on"], facts["missing"]
+        ),
         table_files=tuple(unit.read("tables-files")["file"]),
-        missing=tuple(_missing_sentence(gone) for gone in missing),
+        missing=tuple(_missing_sentence(gone) for gone in facts["missing"]),
         origins=_origins(unit),
         steps=steps(),
     )

@@ -18,11 +18,12 @@ from bsip_cli.unit import Unit
 
 def run(unit: Unit) -> None:
     options = unit.config.stats
+    facts = unit.facts("values")
     tables = build_tables(
-        unit.read("values"),
         unit.read("comparisons"),
         Criteria(options.alpha, options.equivalence_percent),
-        unit.facts("values")["missing"],
+        facts["fitted_on"],
+        facts["missing"],
     )
     written = []
     for table in tables:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from bsip_cli.statistics.cohort_comparison import Comparison, with_holm
-from bsip_cli.statistics.cohort_correlations import PAIR, PersonTest, over_participants
+from bsip_cli.statistics.cohort_comparison import Comparison
+from bsip_cli.statistics.cohort_correlations import PAIR
 from bsip_cli.statistics.cohort_groups import methods_beside_each_other
 from bsip_cli.statistics.cohort_pairs import (
     description,
@@ -38,15 +38,10 @@ class Criteria:
     equivalence_percent: float
 
 
-def compare(
-    values: Iterable[Value], correlations: Iterable[PersonTest], criteria: Criteria
-) -> tuple[Comparison, ...]:
-    """Every test of every table, in the order in which the values come."""
-    rows: list[Comparison] = []
+def tests_of(values: Iterable[Value], criteria: Criteria) -> Iterator[Comparison]:
+    """Every test of the topics that these values belong to; all of a topic's must be there."""
     for topic, group in topics(v for v in values if v.method != PAIR).items():
-        rows += _TABLES[topic.table](topic, group, criteria)
-    rows += over_participants(correlations, criteria.alpha)
-    return with_holm(rows)
+        yield from _TABLES[topic.table](topic, group, criteria)
 
 
 def _segment_mass(

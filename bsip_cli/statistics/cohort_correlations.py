@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from array import array
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from math import isnan, nan
+from typing import Literal
 
 import numpy as np
 
@@ -101,41 +103,63 @@ def person_tests(table: str, runs: Iterable[CorrelationRun]) -> tuple[PersonTest
     return tuple(tests)
 
 
-def over_participants(tests: Iterable[PersonTest], alpha: float) -> tuple[Comparison, ...]:
-    """Median t and p of each topic, and in how many participants OM or RM is better."""
-    groups: dict[Topic, list[PersonTest]] = defaultdict(list)
-    for test in tests:
-        groups[test.topic].append(test)
-    rows = []
-    for topic, group in groups.items():
-        williams = [(test.williams.t, test.williams.p) for test in group]
-        fisher = [(test.fisher.z, test.fisher.p) for test in group]
-        why = sorted({test.williams.reason for test in group if test.williams.reason})
-        why_fisher = sorted({test.fisher.reason for test in group if test.fisher.reason})
-        rows.append(_counted(topic, "williams_t", "added", williams, why, alpha))
-        rows.append(_counted(topic, "fisher_z", "published", fisher, why_fisher, alpha))
-    return tuple(rows)
+class PersonTestCounts:
+    """What the participants' tests come to; keeps numbers of them, not the tests."""
+
+    def __init__(self) -> None:
+        self._topics: dict[Topic, dict[str, _Results]] = {}
+
+    def add(self, tests: Iterable[PersonTest]) -> None:
+        for test in tests:
+            topic = self._topics.setdefault(
+                test.topic, {"williams_t": _Results("added"), "fisher_z": _Results("published")}
+            )
+            topic["williams_t"].add(test.williams.t, test.williams.p, test.williams.reason)
+            topic["fisher_z"].add(test.fisher.z, test.fisher.p, test.fisher.reason)
+
+    def comparisons(self, alpha: float) -> tuple[Comparison, ...]:
+        """Median t and p of each topic, and in how many participants OM or RM is better."""
+        return tuple(
+            results.comparison(topic, test, alpha)
+            for topic, tests in self._topics.items()
+            for test, results in tests.items()
+        )
 
 
-def _counted(topic, test, origin, results: Sequence[tuple[float, float]], reasons, alpha: float):
-    possible = [(t, p) for t, p in results if not isnan(p)]
-    better = sum(t > 0.0 and p < alpha for t, p in possible)
-    worse = sum(t < 0.0 and p < alpha for t, p in possible)
-    impossible = len(results) - len(possible)
-    like = ", for instance" if len(reasons) > 1 else ""
-    concerned = f"in {impossible} of {len(results)} participants{like}"
-    return Comparison(
-        topic,
-        test,
-        origin,
-        OM,
-        RM,
-        n=len(possible),
-        statistic=float(np.median([t for t, _ in possible])) if possible else nan,
-        p_value=float(np.median([p for _, p in possible])) if possible else nan,
-        effect_size=(better + worse) / len(possible) if possible else nan,
-        effect_size_name="share of participants whose correlations differ",
-        count_a=better,
-        count_b=worse,
-        reason=f"{concerned}: {reasons[0]}" if reasons else "",
-    )
+@dataclass
+class _Results:
+    """Statistic and p of one test in every participant, and why it is missing in some."""
+
+    origin: Literal["published", "added"]
+    statistics: array[float] = field(default_factory=lambda: array("d"))
+    p_values: array[float] = field(default_factory=lambda: array("d"))
+    reasons: set[str] = field(default_factory=set)
+
+    def add(self, statistic: float, p_value: float, reason: str) -> None:
+        self.statistics.append(statistic)
+        self.p_values.append(p_value)
+        if reason:
+            self.reasons.add(reason)
+
+    def comparison(self, topic: Topic, test: str, alpha: float) -> Comparison:
+        t, p = np.array(self.statistics), np.array(self.p_values)
+        t, p = t[~np.isnan(p)], p[~np.isnan(p)]
+        better, worse = (int(np.sum((sign * t > 0.0) & (p < alpha))) for sign in (1.0, -1.0))
+        total = len(self.p_values)
+        like = ", for instance" if len(self.reasons) > 1 else ""
+        concerned = f"in {total - len(p)} of {total} participants{like}"
+        return Comparison(
+            topic,
+            test,
+            self.origin,
+            OM,
+            RM,
+            n=len(p),
+            statistic=float(np.median(t)) if len(p) else nan,
+            p_value=float(np.median(p)) if len(p) else nan,
+            effect_size=(better + worse) / len(p) if len(p) else nan,
+            effect_size_name="share of participants whose correlations differ",
+            count_a=better,
+            count_b=worse,
+            reason=f"{concerned}: {min(self.reasons)}" if self.reasons else "",
+        )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +19,7 @@ OVER_TASKS = ("table2", "table3", "table6")
 """Tables of the identification sequence, under whatever task names it was recorded."""
 
 
-@dataclass(frozen=True)
-class Value:
+class Value(NamedTuple):
     """One number of one participant, trial and method; `trial` is empty where there is none.
 
     `role` is sequence or validation, `data` what the trial was to OM: identification or held_out.
@@ -51,10 +51,15 @@ class Topic:
 def topics(values: Iterable[Value]) -> dict[Topic, list[Value]]:
     """The values of each topic, in the order in which the topics first appear."""
     groups: dict[Topic, list[Value]] = defaultdict(list)
-    for v in values:
-        task = "" if v.table in OVER_TASKS else v.task
-        groups[Topic(v.table, v.variable, task, v.role, v.unit)].append(v)
+    for value in values:
+        groups[line_of(value)].append(value)
     return {_with_task_names(topic, group): group for topic, group in groups.items()}
+
+
+def line_of(one: Value | Topic) -> Topic:
+    """The topic of a value, or a topic itself, without the names of tasks that do not matter."""
+    task = "" if one.table in OVER_TASKS else one.task
+    return Topic(one.table, one.variable, task, one.role, one.unit)
 
 
 def _with_task_names(topic: Topic, group: Sequence[Value]) -> Topic:

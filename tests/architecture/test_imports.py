@@ -27,8 +27,8 @@ ALLOWED = {
     "check_study": "body config errors study",
     "session": "body check_study config dataset errors pipeline runner study",
     "__main__": "cli",
-    "export": "__init__ artifacts body errors lock pipeline provenance runner schemas session stages "
-    "unit",
+    "export": "__init__ artifacts body errors lock pipeline provenance runner schemas session "
+    "stages unit",
     "show": "artifacts errors report schemas",
     "published": "report statistics",
     "markers": "body config errors recordings",
@@ -135,6 +135,7 @@ def test_stages_do_not_know_each_other():
         "stages.gain_rows",
         "stages.identification_problem",
         "stages.known_loads",
+        "stages.person_values",
         "stages.reconstructed",
         "stages.report",
         "stages.trial_scene",

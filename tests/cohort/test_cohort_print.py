@@ -7,6 +7,7 @@ from math import nan
 
 import pytest
 
+from bsip_cli.artifacts import read_header
 from bsip_cli.report.tables.build import BESIDE, NAMES, render_markdown, show
 from bsip_cli.report.tables.csv import to_csv
 from bsip_cli.report.tables.labels import segment
@@ -207,8 +208,7 @@ def test_no_absent_number_is_printed_as_nan(cohort):
 
 
 def test_render_and_show_give_the_written_texts(cohort):
-    texts = render_markdown(
-        cohort.group("values"), cohort.group("comparisons"), Criteria(0.05, 10.0)
-    )
+    facts = read_header(cohort.out / "group" / "group_values.parquet")["provenance"]["facts"]
+    texts = render_markdown(cohort.group("comparisons"), Criteria(0.05, 10.0), facts["fitted_on"])
     assert texts == {name: cohort.text(name) for name in (*NAMES, *BESIDE)}
     assert show(cohort.out) == "\n\n".join(texts[name] for name in NAMES)

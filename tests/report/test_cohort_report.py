@@ -50,7 +50,7 @@ def test_gain_is_that_of_the_values(reports, page):
 
 def test_empty_cohort_gives_sentences(reports):
     record = record_of(reports.unit("report"))
-    bare = type(record)(record.members[2:], record.values.iloc[:0], (), (), (), (), record.steps)
+    bare = type(record)(record.members[2:], record.errors.iloc[:0], (), (), (), (), record.steps)
     document = cohort_document(bare)
     texts = [getattr(block, "text", "") for s in document.sections for block in s.blocks]
     assert "No trial could be compared with both methods." in texts

@@ -42,7 +42,7 @@ def _dots(record: CohortRecord) -> list[Block]:
 
 
 def _per_task(record: CohortRecord, variable: str, quantity: str, name: str) -> list[Block]:
-    rows = record.errors(variable).dropna(subset=["RM", "OM"], how="all")
+    rows = record.errors_per_task(variable).dropna(subset=["RM", "OM"], how="all")
     if rows.empty:
         return [Paragraph(f"There is no {quantity} to show.", "note")]
     keys = list(dict.fromkeys(zip(rows["task"], rows["data"], strict=True)))

@@ -14,6 +14,8 @@ from bsip_cli.report.tables.model import Table
 from bsip_cli.report.words import COMPONENTS, trial_label
 
 _OF_TABLE = {"table4": "", "table5": "_rmse"}  # tables of errors, and the ending of their variables
+ERROR_TABLES = (*_OF_TABLE,)
+ERROR_VARIABLES = ("cop_error", *(c + ending for c in COMPONENTS for ending in _OF_TABLE.values()))
 
 
 @dataclass(frozen=True)
@@ -29,11 +31,12 @@ class Member:
 
 @dataclass(frozen=True)
 class CohortRecord:
-    """Attributes: ``missing`` sentences on who is in no table; ``table_files`` relative to OUT;
-    ``steps`` the stages in order."""
+    """Attributes: ``errors`` the rows of the values that are of `ERROR_TABLES` and
+    `ERROR_VARIABLES`; ``missing`` sentences on who is in no table; ``table_files`` relative to
+    OUT; ``steps`` the stages in order."""
 
     members: tuple[Member, ...]
-    values: pd.DataFrame
+    errors: pd.DataFrame
     tables: tuple[Table, ...]
     table_files: tuple[str, ...]
     missing: tuple[str, ...]
@@ -42,12 +45,12 @@ class CohortRecord:
 
     def gains(self) -> dict[str, tuple[Gain, ...]]:
         """Participant -> errors of RM and OM in each trial and component."""
-        people = self.values.groupby("participant", sort=True)
+        people = self.errors.groupby("participant", sort=True)
         return {str(name): _gains(rows) for name, rows in people}
 
-    def errors(self, variable: str) -> pd.DataFrame:
+    def errors_per_task(self, variable: str) -> pd.DataFrame:
         """Rows of one error of table 4: participant, task, data, RM, OM; the mean over the runs."""
-        rows = self.values[self.values["table"] == "table4"]
+        rows = self.errors[self.errors["table"] == "table4"]
         rows = rows[rows["variable"] == variable]
         wide = rows.pivot_table(
             index=["participant", "task", "data"], columns="method", values="value", aggfunc="mean"

@@ -25,7 +25,6 @@ from bsip_cli.report.tables.model import Table
 from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_comparison import Comparison
-from bsip_cli.statistics.cohort_values import Value
 
 BUILDERS: dict[str, Callable[[Results, Criteria], Table]] = {
     "table1": segment_mass.build,
@@ -56,27 +55,29 @@ RENDERERS: dict[str, Callable[[Table], str]] = {
 
 
 def build_tables(
-    values: pd.DataFrame,
     comparisons: pd.DataFrame,
     criteria: Criteria,
+    fitted_on: Sequence[Mapping] = (),
     missing: Sequence[Mapping] = (),
 ) -> tuple[Table, ...]:
     """The six tables as data, and the first four beside the published values.
 
     Parameters
     ----------
-    values, comparisons : the artifacts of ``stats``.
-    criteria : the options with which they were computed.
+    comparisons : the artifact of ``stats``.
+    criteria : the options with which it was computed.
+    fitted_on : what each task's data were to OM, as a fact of the values: ``table``, ``task``,
+        ``role``, and of how many participants (``everyone``) OM was fitted to them
+        (``identification``).
     missing : who is not in which tables: ``sentence`` and ``tables`` (as in `BUILDERS`).
     """
     rows = [Comparison.from_row(row) for row in comparisons.to_dict("records")]
-    tidy = [Value(**{str(k): v for k, v in row.items()}) for row in values.to_dict("records")]
     tables = []
     for tag, build in BUILDERS.items():
         table = build(Results(row for row in rows if row.topic.table == tag), criteria)
         absent = [str(gone["sentence"]) for gone in missing if tag in gone["tables"]]
         more = (
-            *notes.identified_on(value for value in tidy if value.table == tag),
+            *notes.fitted_on(counts for counts in fitted_on if counts["table"] == tag),
             notes.missing(absent),
         )
         tables.append(replace(table, notes=(*table.notes, *filter(None, more))))
@@ -90,13 +91,13 @@ def _beside_print(rows: Sequence[Comparison]) -> Iterator[Table]:
 
 
 def render_markdown(
-    values: pd.DataFrame,
     comparisons: pd.DataFrame,
     criteria: Criteria,
+    fitted_on: Sequence[Mapping] = (),
     missing: Sequence[Mapping] = (),
 ) -> dict[str, str]:
     """All tables as Markdown, by the stem of their file; parameters as `build_tables`."""
-    tables = build_tables(values, comparisons, criteria, missing)
+    tables = build_tables(comparisons, criteria, fitted_on, missing)
     return {table.name: to_markdown(table) for table in tables}
 
 

@@ -9,7 +9,7 @@ from math import isnan
 from bsip_cli.report.tables.numbers import p_value
 from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort_comparison import Comparison
-from bsip_cli.statistics.cohort_values import OM, Topic, Value
+from bsip_cli.statistics.cohort_values import Topic
 
 NAMED_AT_MOST = 6
 """Missing participants and rows that are named one by one."""
@@ -75,22 +75,23 @@ def missing(sentences: Sequence[str]) -> str:
     return f"Missing: {_named(sentences, '; ')}." if sentences else ""
 
 
-def identified_on(values: Iterable[Value]) -> tuple[str, ...]:
-    """For each task what its data were to OM: those it was fitted to, or data it never saw."""
-    people: dict[tuple[str, str], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
-    for value in values:
-        if value.method == OM and value.data:
-            people[value.task, value.role][value.data].add(value.participant)
+def fitted_on(counts: Iterable[Mapping]) -> tuple[str, ...]:
+    """For each task what its data were to OM: those it was fitted to, or data it never saw.
+
+    Parameters
+    ----------
+    counts : task, role, and of how many participants (``everyone``) OM was fitted to its data
+        (``identification``).
+    """
     sentences = []
-    for (task, role), by_data in people.items():
-        fitted = len(by_data["identification"])
-        everyone = len(by_data["identification"] | by_data["held_out"])
+    for count in counts:
+        task, fitted = count["task"], count["identification"]
         if fitted:
             sentences.append(
-                f"{task}: OM was fitted to these very data in {fitted} of {everyone} participants; "
-                "there its error is that of a fit, not of a prediction."
+                f"{task}: OM was fitted to these very data in {fitted} of {count['everyone']} "
+                "participants; there its error is that of a fit, not of a prediction."
             )
-        elif role == "sequence":
+        elif count["role"] == "sequence":
             sentences.append(f"{task}: only stretches that OM was not fitted to.")
     return tuple(sentences)
 

@@ -6,6 +6,8 @@ reports where report-files are there. Writes group-report-files.
 
 from __future__ import annotations
 
+from typing import Any
+
 from bsip_cli.pipeline import STAGES, producer, stages_named
 from bsip_cli.report.cohort.document import cohort_document
 from bsip_cli.report.cohort.record import (
@@ -77,20 +79,20 @@ def _missing_sentence(gone: dict) -> str:
 
 
 def _member(unit: Unit, participant: Participant) -> Member:
-    tables = {
-        kind: unit.read(kind, participant=participant)
-        if unit.path(kind, participant=participant).exists()
-        else None
-        for kind in ("person", "identification")
-    }
-    facts = tables["person"]
     return Member(
         participant.id,
-        facts.iloc[0] if facts is not None else None,
-        tables["identification"],
+        _first_row(unit, "person", participant),
+        _first_row(unit, "identification", participant),
         unit.path("report-files", participant=participant).exists(),
         refusals_of(unit, participant),
     )
+
+
+def _first_row(unit: Unit, kind: str, participant: Participant) -> dict[str, Any] | None:
+    if not unit.path(kind, participant=participant).exists():
+        return None
+    rows = unit.read(kind, participant=participant).head(1).to_dict("records")
+    return {str(name): value for row in rows for name, value in row.items()}
 
 
 def _origins(unit: Unit) -> tuple[Origin, ...]:

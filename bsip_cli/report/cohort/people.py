@@ -48,5 +48,4 @@ def _row(member: Member) -> tuple[str | Cell, ...]:
 
 
 def _first(member: Member, column: str) -> float:
-    table = member.identification
-    return float(table[column].iloc[0]) if table is not None and len(table) else np.nan
+    return float((member.identification or {}).get(column, np.nan))

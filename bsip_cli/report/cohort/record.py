@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,11 +22,11 @@ ERROR_VARIABLES = ("cop_error", *(c + ending for c in COMPONENTS for ending in _
 
 @dataclass(frozen=True)
 class Member:
-    """One participant of the study; ``facts`` and ``identification`` are None if not there."""
+    """One participant of the study; the first rows of person and identification, if there."""
 
     id: str
-    facts: pd.Series | None
-    identification: pd.DataFrame | None
+    facts: Mapping[str, Any] | None
+    identification: Mapping[str, Any] | None
     has_report: bool
     refusals: tuple[Refusal, ...]
 

@@ -12,17 +12,20 @@ from measure import ROOT, Usage, machine, markdown, run_child
 
 # isort: split
 from bsip_cli.pipeline import STAGES
-from bsip_cli.simulate.options import StudyOptions
+from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 
 TARGET_CPU_S = 20.0
 BAD_DATA = 3  # some trial was refused, the rest is done
 
 
-def study_options(sequence_s: float, seed: int) -> StudyOptions:
-    """Static, one sequence and four short trials of one person, everything at 100 Hz."""
+def study_options(
+    sequence_s: float, seed: int, marker_hz: int = 100, participants: int = 1
+) -> StudyOptions:
+    """Static, one sequence and four short trials of every person."""
     return StudyOptions(
-        participants=1,
+        participants=participants,
+        rates={"default": Rates(marker_hz=marker_hz)},
         seed=seed,
         tasks=("static", "sequence", "throwing", "basketball", "squat", "walking"),
         durations_s={
@@ -89,12 +92,13 @@ def table(found: list[tuple[str, float, float, float]]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sequence-s", type=float, default=120.0, help="[s]")
+    parser.add_argument("--marker-hz", type=int, default=100, help="100 or 250, for instance")
     parser.add_argument("--seed", type=int, default=2017)
     parser.add_argument("--rounds", type=int, default=3)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         study, out = Path(folder, "study"), Path(folder, "out")
-        simulate_study(study, study_options(options.sequence_s, options.seed))
+        simulate_study(study, study_options(options.sequence_s, options.seed, options.marker_hz))
         run_stage("run", study, out)  # everything compiled once
         print(f"machine: {machine()}; medians of {options.rounds} rounds\n")
         print(table(measure(study, out, options.rounds)))

@@ -29,19 +29,22 @@ from bsip_cli.schemas import SCHEMAS
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 
-OPTIONS = StudyOptions(
-    participants=2,
-    seed=3,
-    sexes="MF",
-    tasks=("static", "sequence"),
-    durations_s={"static": 1.0, "sequence": 6.0},
-    rates={"default": Rates(marker_hz=50, analog_hz=250)},
-)
-AMENDED = {SCHEMAS[kind].file_name for stage in STAGES for kind in stage.amends}
 LEFT_KB = (8, 4000)
 """So much room is on the disk before it is full."""
 
 ENOUGH_KB = 200_000
+AMENDED = {SCHEMAS[kind].file_name for stage in STAGES for kind in stage.amends}
+
+
+def study_options(participants: int) -> StudyOptions:
+    return StudyOptions(
+        participants=participants,
+        seed=3,
+        sexes="MF",
+        tasks=("static", "sequence"),
+        durations_s={"static": 1.0, "sequence": 6.0},
+        rates={"default": Rates(marker_hz=50, analog_hz=250)},
+    )
 
 
 @dataclass
@@ -50,6 +53,7 @@ class Bench:
 
     folder: Path
     chance: random.Random
+    participants: int
     study: Path = field(init=False)
     out: Path = field(init=False)
     whole: dict[str, bytes] = field(init=False)
@@ -58,9 +62,7 @@ class Bench:
 
     def __post_init__(self) -> None:
         self.study, self.out = self.folder / "study", self.folder / "out"
-        simulate_study(self.study, OPTIONS)
-        self.run()  # compiles what is to be compiled
-        self.empty()
+        simulate_study(self.study, study_options(self.participants))
         began = time.monotonic()
         done = self.run()
         self.takes_s = time.monotonic() - began
@@ -256,7 +258,7 @@ def main() -> int:
         folder = Path(name)
         own_disk = mount_own_disk(folder / "out")
         try:
-            bench = Bench(folder, random.Random(arguments.seed))
+            bench = Bench(folder, random.Random(arguments.seed), participants=2)
             kinds = (*ANYWHERE, *(ON_OWN_DISK if own_disk else ()))
             hits = disturb(bench, kinds, arguments.rounds)
         finally:

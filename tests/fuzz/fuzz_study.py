@@ -136,9 +136,9 @@ def ask(study: Path, out: Path) -> Answer:
     except BsipError as error:
         return Answer("refused", (str(error),))
     sentences = [s for refusal in opened.refusals for s in refusal.sentences]
-    if not opened.participants:
+    if not opened.study.participants:
         return Answer("refused", tuple(sentences))
-    participant = opened.participants[0]
+    participant = opened.study.participants[0]
     numbers = _stated(asdict(participant))
     stage = stages_named("ingest")[0]
     for trial in participant.trials:

@@ -23,7 +23,7 @@ sample: $(READY)
 
 test: check
 	@$(MAKE) --no-print-directory $(CLUSTER)/ready || echo "Snakemake cannot be installed: its tests will skip"
-	$(BIN)/pytest -n $(JOBS) --dist loadfile
+	$(BIN)/pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
 blind: .venv/ready
 	$(BIN)/python tests/blind/blind_long.py --jobs $(JOBS) --draws $(DRAWS)

@@ -5,7 +5,7 @@
 #   - recordings of a simulated person, the artifacts equal to those of `bsip run`.
 # Needs root and Debian's packages slurmctld, slurmd, slurm-client and munge; exit code 77 without.
 #
-#   workflow/test_slurm.sh [BSIP] [SNAKEMAKE]
+#   workflow/test_slurm.sh [BSIP] [SNAKEMAKE] [short]     short: without the recordings
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 bsip=$(realpath "${1:-$here/../.venv/bin/bsip}")
@@ -20,7 +20,7 @@ unshare --mount --pid --fork true 2> /dev/null || skip "no namespace of its own 
 [ -x "$snakemake" ] || skip "there is no $snakemake; make .venv-cluster/ready installs it"
 
 # Processes and mounts of its own: nothing is left behind, and /etc/slurm stays what it is.
-[ -n "${APART:-}" ] || APART=1 exec unshare --mount --pid --fork --kill-child --mount-proc "$0" "$bsip" "$snakemake"
+[ -n "${APART:-}" ] || APART=1 exec unshare --mount --pid --fork --kill-child --mount-proc "$0" "$bsip" "$snakemake" "${3:-}"
 
 work=$(mktemp -d)
 export CALLS=$work/calls XDG_CACHE_HOME=$work
@@ -131,6 +131,8 @@ times() { grep -c "$1" "$CALLS" || true; }
 grep -q -i "memory" slurmd.log || { echo "SLURM did not kill the job over its memory" >&2; exit 1; }
 [ -f out/.made/sub-01.report ] && [ -f out/.made/sub-02.report ]
 echo "passed: a job over its memory and a node that died"
+
+[ "${3:-}" = short ] && exit 0
 
 # --- the same artifacts ----------------------------------------------------------------------------
 

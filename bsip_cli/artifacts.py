@@ -34,7 +34,8 @@ def write_artifact(path: Path, kind: str, frame: pd.DataFrame, provenance: Mappi
     frame : columns as the kind's schema says; a missing or an unknown one is a bug.
     provenance : what made it; stored as JSON in the file's metadata.
     """
-    table = _to_arrow(SCHEMAS[kind], frame, provenance)
+    header = _header(SCHEMAS[kind], provenance)
+    table = _to_arrow(SCHEMAS[kind], frame).replace_schema_metadata(header)
     write_atomically(
         path,
         lambda temporary: pq.write_table(
@@ -54,7 +55,7 @@ def write_artifact_in_parts(
     """
     layout = SCHEMAS[kind]
     schema = pa.schema(_fields(layout, [column.name for column in layout.columns]))
-    tables = (_to_arrow(layout, part[schema.names], {}) for part in parts)
+    tables = (_to_arrow(layout, part[schema.names]) for part in parts)
 
     def write(temporary: Path) -> None:
         rows = temporary.with_name(f"{temporary.name}{_UNFINISHED}")
@@ -171,7 +172,7 @@ def _not_an_artifact(path: Path, error: Exception) -> BadDataError:
     )
 
 
-def _to_arrow(schema: Schema, frame: pd.DataFrame, provenance: Mapping) -> pa.Table:
+def _to_arrow(schema: Schema, frame: pd.DataFrame) -> pa.Table:
     plain = [column.name for column in schema.columns if not column.name.endswith("*")]
     missing = [name for name in plain if name not in frame.columns]
     unknown = [name for name in frame.columns if schema.column(name) is None]
@@ -181,8 +182,7 @@ def _to_arrow(schema: Schema, frame: pd.DataFrame, provenance: Mapping) -> pa.Ta
     arrays = [
         pa.array(_plain(frame[field.name]), type=field.type, from_pandas=False) for field in fields
     ]
-    metadata = _header(schema, provenance) if provenance else None
-    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=metadata))
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields))
 
 
 def _fields(schema: Schema, names: list[str]) -> list[pa.Field]:

@@ -98,7 +98,8 @@ def open_study(
     roles = config.roles.model_dump()
     study, refusals = load_study(root, roles, chosen)
     if config.loads or config.ingest.prefixes:
-        _check_names(config, *(load_study(root, roles) if chosen else (study, refusals)))
+        whole = load_study(root, roles) if chosen else (study, refusals)
+        _check_names(config, *whole)
     _check_out(out)
     return OpenedStudy(study, config, tuple(refusal_sentence(refusals)))
 

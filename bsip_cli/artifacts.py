@@ -123,13 +123,14 @@ def read_artifact(path: Path, kind: str, **wanted: Collection[str]) -> pd.DataFr
         The file is not an artifact of this kind, is damaged, or of a version this bsip does not
         know.
     """
-    read_header(path, kind)
     try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            _check_kind(_header_in(file.schema_arrow), SCHEMAS[kind], path)
+            if not wanted:
+                return file.read().to_pandas()
         filters = [(column, "in", sorted(values)) for column, values in wanted.items()]
-        return pq.read_table(
-            path, filters=filters or None, page_checksum_verification=True
-        ).to_pandas()
-    except (OSError, pa.ArrowException) as error:
+        return pq.read_table(path, filters=filters, page_checksum_verification=True).to_pandas()
+    except (OSError, pa.ArrowException, KeyError, ValueError) as error:
         raise _not_an_artifact(path, error) from None
 
 
@@ -142,13 +143,16 @@ def read_header(path: Path, kind: str | None = None) -> dict[str, Any]:
         The file is missing or is not an artifact; with ``kind``, it is of another kind or version.
     """
     try:
-        metadata = pq.read_schema(path).metadata or {}
-        found = json.loads(metadata[b"bsip"])
+        found = _header_in(pq.read_schema(path))
     except (OSError, pa.ArrowException, KeyError, ValueError) as error:
         raise _not_an_artifact(path, error) from None
     if kind is not None:
         _check_kind(found, SCHEMAS[kind], path)
     return found
+
+
+def _header_in(schema: pa.Schema) -> dict[str, Any]:
+    return json.loads((schema.metadata or {})[b"bsip"])
 
 
 def _check_kind(found: Mapping, schema: Schema, path: Path) -> None:

@@ -26,18 +26,24 @@ def _file_hash(path: str, _modified: int, _size: int) -> str:
         return hashlib.file_digest(handle, "sha256").hexdigest()
 
 
+def hash_of_files(files: Mapping[str, Path]) -> str:
+    """SHA-256 of the lines "name hash" of some files, in the order of their names."""
+    lines = (f"{name} {file_hash(path)}\n" for name, path in sorted(files.items()))
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
+
+
 @lru_cache(maxsize=1)
 def library_versions() -> dict[str, str]:
     """Versions of the libraries that numbers depend on."""
     return {name: version(name) for name in _LIBRARIES}
 
 
-def describe(stage: str, inputs: Mapping[str, Path], options: Mapping) -> dict:
-    """The provenance of what ``stage`` makes from ``inputs`` (name: file) with ``options``."""
+def describe(stage: str, inputs: Mapping[str, str], options: Mapping) -> dict:
+    """The provenance of what ``stage`` makes from ``inputs`` (name: hash) with ``options``."""
     return {
         "stage": stage,
         "bsip_version": __version__,
         "libraries": library_versions(),
-        "inputs": {name: file_hash(path) for name, path in sorted(inputs.items())},
+        "inputs": dict(sorted(inputs.items())),
         "options": json.loads(json.dumps(options, sort_keys=True)),
     }

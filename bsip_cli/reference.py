@@ -237,8 +237,9 @@ def artifacts_page() -> str:
     parts = [
         "Parquet files, one table each. A column's unit, frame and meaning stand in the file too, "
         "and beside them, as JSON under the key `bsip`: the kind and version of the table, the "
-        "stage and versions that made it, the SHA-256 of every input, the options the stage read, "
-        "its warnings. `*` in a column's name stands for a family of columns."
+        "stage and versions that made it, the SHA-256 of every input (of the group's artifacts one "
+        'for each participant, over the lines "name hash" of all that was read), the options the '
+        "stage read, its warnings. `*` in a column's name stands for a family of columns."
     ]
     for stage in STAGES:
         parts += _stage_parts(stage)

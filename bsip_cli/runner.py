@@ -128,7 +128,8 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
     waiting = lacking(unit)
     if waiting is not None:
         return waiting
-    if not force and unit.is_fresh():
+    fresh = unit.is_fresh()  # asked first: a file that changes from here on makes it stale
+    if fresh and not force:
         return Outcome(stage.name, unit.name, "fresh")
     try:
         importlib.import_module(stage.module).run(unit)
@@ -163,7 +164,7 @@ def _refused_upstream(unit: Unit) -> bool:
 def _write_refusal(unit: Unit, error: BsipError) -> None:
     kind = "numerical failure" if isinstance(error, NumericalError) else "bad data"
     row = pd.DataFrame([{"stage": unit.stage.name, "kind": kind, "sentence": str(error)}])
-    notes = {"made_by": unit.provenance(), "messages": list(unit.messages), "facts": {}}
+    notes = {"made_by": unit.made_by, "messages": list(unit.messages), "facts": {}}
     write_artifact(unit.refusal_path(), "refusal", row, notes)
 
 

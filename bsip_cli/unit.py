@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import takewhile
 from pathlib import Path
 
@@ -18,8 +19,9 @@ from bsip_cli.artifacts import (
 from bsip_cli.config import Config, Load
 from bsip_cli.errors import BadDataError
 from bsip_cli.pipeline import STAGES, Stage, producer
-from bsip_cli.provenance import describe, file_hash
+from bsip_cli.provenance import describe, file_hash, hash_of_files
 from bsip_cli.schemas import SCHEMAS
+from bsip_cli.standing import Folder
 from bsip_cli.study import Participant, Study, Trial
 
 
@@ -89,68 +91,66 @@ class Unit:
     def trials(self, *kinds: str) -> tuple[Trial, ...]:
         """The participant's trials for which all these kinds are there and not refused."""
         assert self.participant is not None
+        folder = self._folder(self.participant)
         return tuple(
             trial
             for trial in self.participant.trials
-            if all(self._stands(kind, self.participant, trial) for kind in kinds)
+            if all(self._stands(kind, folder, self.participant, trial) for kind in kinds)
         )
 
-    def _stands(self, kind: str, participant: Participant | None, trial: Trial | None) -> bool:
-        """It is there, and no stage up to its own has refused the trial or participant since."""
-        path = self.path(kind, trial, participant)
-        before = STAGES[: STAGES.index(producer(kind)) + 1]
-        return path.exists() and not self._refusals(path.parent, participant, trial, before)
+    def stands(self, kind: str, trial: Trial | None, participant: Participant) -> bool:
+        """An artifact is there and not refused."""
+        return self._stands(kind, self._folder(participant), participant, trial)
 
-    def _refusals(
-        self,
-        folder: Path,
-        participant: Participant | None,
-        trial: Trial | None,
-        stages: Iterable[Stage],
-    ) -> list[Path]:
-        owners = [participant.id if participant else "group", *([trial.stem] if trial else [])]
-        names = (f"{owner}_refusal-{stage.name}.parquet" for owner in owners for stage in stages)
-        return [folder / name for name in dict.fromkeys(names) if (folder / name).exists()]
+    def _folder(self, participant: Participant | None) -> Folder:
+        return Folder.now(self.out / (participant.id if participant else "group"))
+
+    def _stands(
+        self, kind: str, folder: Folder, participant: Participant | None, trial: Trial | None
+    ) -> bool:
+        """It is there, and no stage up to its own has refused the trial or participant since."""
+        before = STAGES[: STAGES.index(producer(kind)) + 1]
+        owners = _owners_of_refusals(participant, trial)
+        return folder.holds(self.path(kind, trial, participant)) and not folder.refusals(
+            owners, before
+        )
 
     # --- inputs, freshness ------------------------------------------------------------------
 
     def inputs(self) -> dict[str, Path]:
-        """Name and path of every file the unit reads; those a refusal left out are not in it."""
-        files = {path.name: path for kind in self.stage.inputs for path in self._standing(kind)}
-        if self.trial is None:
-            files |= {path.name: path for path in self._refused_before()}
-        elif not self.stage.inputs:
+        """Name and path of every file that a unit of a participant reads, but for refused ones."""
+        files = self._files_of(self.participant)
+        if self.trial is not None and not self.stage.inputs:
             files |= {path.name: path for path in _recording_files(self.trial.path)}
-        for name in ("marker_set", "skeleton"):
-            own = Path(getattr(self.config, name))
-            if name in self.stage.options and own.suffix == ".toml":
-                files[own.name] = own
-        return files
+        return files | self._files_of_options()
 
-    def _owners(self, kind: str) -> list[tuple[Participant | None, Trial | None]]:
-        """Whose artifact of a kind the unit reads: its own, or that of everybody below it."""
-        level = SCHEMAS[kind].level
-        if level == "cohort":
-            return [(None, None)]
-        if level == "trial" and self.trial is None:
-            return [(person, trial) for person in self.participants() for trial in person.trials]
-        return [(person, self.trial) for person in self.participants()]
-
-    def _standing(self, kind: str) -> list[Path]:
-        return [
-            self.path(kind, trial, person)
-            for person, trial in self._owners(kind)
-            if self._stands(kind, person, trial)
+    def _files_of(self, participant: Participant | None) -> dict[str, Path]:
+        """What the unit reads of a participant, or of the group: artifacts, refusals."""
+        folder = self._folder(participant)
+        kinds = [
+            k for k in self.stage.inputs if (SCHEMAS[k].level == "cohort") == (not participant)
         ]
+        paths = [path for kind in kinds for path in self._standing(kind, folder, participant)]
+        if participant is not None and self.trial is None:
+            owners = _owners_of_refusals(participant, *participant.trials)
+            before = takewhile(lambda stage: stage.label != self.stage.label, STAGES)
+            paths += folder.refusals(owners, tuple(before))  # reports tell of them
+        return {path.name: path for path in paths}
 
-    def _refused_before(self) -> list[Path]:
-        """What earlier stages refused of the unit's participants: reports tell of it."""
-        before = tuple(takewhile(lambda stage: stage.label != self.stage.label, STAGES))
+    def _files_of_options(self) -> dict[str, Path]:
+        named = (n for n in ("marker_set", "skeleton") if n in self.stage.options)
+        paths = (Path(getattr(self.config, name)) for name in named)
+        return {path.name: path for path in paths if path.suffix == ".toml"}
+
+    def _standing(self, kind: str, folder: Folder, participant: Participant | None) -> list[Path]:
+        """Artifacts of a kind that the unit reads: its own, or those of all trials below it."""
+        trials: Iterable[Trial | None] = (self.trial,)
+        if participant is not None and SCHEMAS[kind].level == "trial" and self.trial is None:
+            trials = participant.trials
         return [
-            path
-            for person in self.participants()
-            for trial in (None, *person.trials)
-            for path in self._refusals(self.out / person.id, person, trial, before)
+            self.path(kind, trial, participant)
+            for trial in trials
+            if self._stands(kind, folder, participant, trial)
         ]
 
     def missing(self) -> list[str]:
@@ -165,12 +165,19 @@ class Unit:
         return all(kind in self.stage.inputs and self._has(kind) for kind in kinds)
 
     def _has(self, kind: str) -> bool:
-        if self.participant is None and SCHEMAS[kind].level != "cohort":
-            return any(self.path(kind, trial, p).exists() for p, trial in self._owners(kind))
-        return bool(self._standing(kind))
+        if SCHEMAS[kind].level == "cohort":
+            return bool(self._standing(kind, self._folder(None), None))
+        if self.participant is not None:
+            return bool(self._standing(kind, self._folder(self.participant), self.participant))
+        return any(
+            self.path(kind, trial, person).exists()
+            for person in self.study.participants
+            for trial in (person.trials if SCHEMAS[kind].level == "trial" else (None,))
+        )
 
-    def provenance(self) -> dict:
-        present = {name: path for name, path in self.inputs().items() if path.exists()}
+    @cached_property
+    def made_by(self) -> dict:
+        """Provenance of what the unit writes: its inputs as they were when it was first asked."""
         options = self.config.options(self.stage.options)
         for name in ("marker_set", "skeleton"):
             if str(options.get(name, "")).endswith(".toml"):  # its content counts, not its place
@@ -183,13 +190,23 @@ class Unit:
                 "mass_kg": self.participant.mass_kg,
                 "height_m": self.participant.height_m,
             }
-        return describe(self.stage.name, present, options)
+        return describe(self.stage.name, self._hashes(), options)
+
+    def _hashes(self) -> dict[str, str]:
+        """Of every input; in the group, of everything of a participant together."""
+        if self.participant is not None:
+            files = self.inputs()
+            return {name: file_hash(path) for name, path in files.items() if path.exists()}
+        everybody = ((person.id, self._files_of(person)) for person in self.study.participants)
+        people = {name: hash_of_files(files) for name, files in everybody if files}
+        files = self._files_of(None) | self._files_of_options()
+        return {name: file_hash(path) for name, path in files.items()} | people
 
     def is_fresh(self) -> bool:
         """Everything the unit writes is there and made from what it would read now."""
+        wanted = self.made_by
         if self.refusal_path().exists():
             return False
-        wanted = self.provenance()
         return all(self._is_current(kind, wanted) for kind in self.stage.writes) and all(
             self._is_amended(kind, wanted) for kind in self.stage.amends
         )
@@ -244,7 +261,7 @@ class Unit:
         write_artifact_in_parts(self.path(kind), kind, parts, lambda: self._notes(facts()))
 
     def _notes(self, facts: dict) -> dict:
-        return {"made_by": self.provenance(), "messages": list(self.messages), "facts": facts}
+        return {"made_by": self.made_by, "messages": list(self.messages), "facts": facts}
 
     def amend(self, kind: str, rows: pd.DataFrame) -> None:
         """Put rows below those of the stage that made the artifact, instead of earlier ones.
@@ -254,9 +271,15 @@ class Unit:
         path = self.path(kind)
         notes = read_header(path, kind)["provenance"]
         made = read_artifact(path, kind).iloc[: notes.get("rows_made")]
-        notes |= {"amended_by": self.provenance(), "rows_made": len(made)}
+        notes |= {"amended_by": self.made_by, "rows_made": len(made)}
         whole = pd.concat([made, rows], ignore_index=True) if len(rows) else made
         write_artifact(path, kind, whole, notes)
+
+
+def _owners_of_refusals(participant: Participant | None, *trials: Trial | None) -> list[str]:
+    """Whose refusals concern a participant's artifacts in these trials."""
+    owner = participant.id if participant else "group"
+    return [owner, *(trial.stem for trial in trials if trial is not None)]
 
 
 def _recording_files(path: Path) -> list[Path]:

@@ -3,30 +3,50 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 from bsip_cli.report.blocks import Block, Cell, Grid, Heading
-from bsip_cli.report.records import Origin
+from bsip_cli.report.records import Message, Origin, messages_of
 
 _HASH_DIGITS = 12
 
 
-def options_grids(origins: Sequence[Origin]) -> list[Block]:
+@dataclass(frozen=True)
+class HowMade:
+    """What made many artifacts, without what they share again and again.
+
+    options, versions : name -> all values; files : recordings and the like, name -> SHA-256.
+    """
+
+    options: dict[str, set[str]] = field(default_factory=dict)
+    versions: dict[str, set[str]] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
+    messages: dict[Message, None] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, origins: Iterable[Origin]) -> HowMade:
+        made = cls()
+        for origin in origins:
+            for name, value in _flat(origin.options):
+                made.options.setdefault(name, set()).add(value)
+            for name, version in {"bsip": origin.bsip_version, **origin.libraries}.items():
+                made.versions.setdefault(name, set()).add(version)
+            made.files.update(_files(origin.inputs))
+            made.messages.update(dict.fromkeys(messages_of(origin)))
+        return made
+
+
+def options_grids(made: HowMade) -> list[Block]:
     """Options, versions, and the recordings with the start of their hashes."""
     blocks: list[Block] = [
         Heading("Options"),
-        Grid(("option", "value"), _rows(_options(origins)), words=2),
+        Grid(("option", "value"), _rows(made.options), words=2),
         Heading("Versions"),
-        Grid(("software", "version"), _rows(_versions(origins)), words=2),
+        Grid(("software", "version"), _rows(made.versions), words=2),
     ]
-    recordings = {
-        name: digest[:_HASH_DIGITS]
-        for origin in origins
-        for name, digest in origin.inputs.items()
-        if not name.endswith(".parquet")
-    }
-    if recordings:
-        rows = tuple(sorted(recordings.items()))
+    if made.files:
+        rows = tuple((name, made.files[name][:_HASH_DIGITS]) for name in sorted(made.files))
         blocks += [
             Heading("Recordings and files read"),
             Grid(("file", "SHA-256 (start)"), rows, words=2),
@@ -42,14 +62,6 @@ def _rows(values: Mapping[str, set[str]]) -> tuple[tuple[str | Cell, ...], ...]:
     )
 
 
-def _options(origins: Iterable[Origin]) -> dict[str, set[str]]:
-    found: dict[str, set[str]] = {}
-    for origin in origins:
-        for name, value in _flat(origin.options):
-            found.setdefault(name, set()).add(value)
-    return found
-
-
 def _flat(options: Mapping, before: str = "") -> Iterable[tuple[str, str]]:
     for name, value in options.items():
         if isinstance(value, Mapping):
@@ -58,10 +70,10 @@ def _flat(options: Mapping, before: str = "") -> Iterable[tuple[str, str]]:
             yield f"{before}{name}", value if isinstance(value, str) else json.dumps(value)
 
 
-def _versions(origins: Iterable[Origin]) -> dict[str, set[str]]:
-    found: dict[str, set[str]] = {}
-    for origin in origins:
-        found.setdefault("bsip", set()).add(origin.bsip_version)
-        for name, version in origin.libraries.items():
-            found.setdefault(name, set()).add(version)
-    return found
+def _files(inputs: Mapping[str, str]) -> dict[str, str]:
+    """Inputs that are neither artifacts nor all of a participant's."""
+    return {
+        name: digest
+        for name, digest in inputs.items()
+        if "." in name and not name.endswith(".parquet")
+    }

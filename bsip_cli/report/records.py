@@ -105,13 +105,17 @@ class ParticipantRecord:
         return otherwise
 
 
-def messages(origins: Iterable[Origin]) -> tuple[tuple[str, str, str], ...]:
-    """(stage, unit, message), each once, in the order of the origins."""
-    return tuple(
-        dict.fromkeys(
-            (origin.stage, origin.unit, text) for origin in origins for text in origin.messages
-        )
-    )
+Message = tuple[str, str, str]
+"""Stage, unit, text."""
+
+
+def messages_of(origin: Origin) -> tuple[Message, ...]:
+    return tuple((origin.stage, origin.unit, text) for text in origin.messages)
+
+
+def messages(origins: Iterable[Origin]) -> tuple[Message, ...]:
+    """Each once, in the order of the origins."""
+    return tuple(dict.fromkeys(said for origin in origins for said in messages_of(origin)))
 
 
 EXTENDED = "OM+causes"  # how reports call OM with every named cause in the model

@@ -6,17 +6,18 @@ reports where report-files are there. Writes group-report-files.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
+
+import pandas as pd
 
 from bsip_cli.pipeline import STAGES, producer, stages_named
 from bsip_cli.report.cohort.document import cohort_document
-from bsip_cli.report.cohort.record import (
-    ERROR_TABLES,
-    ERROR_VARIABLES,
-    CohortRecord,
-    Member,
-)
+from bsip_cli.report.cohort.people import SHOWN
+from bsip_cli.report.cohort.ratios import TASK_ERRORS, errors_per_task, ratios_of
+from bsip_cli.report.cohort.record import CohortRecord, Member
 from bsip_cli.report.figures.workflow import Step
+from bsip_cli.report.origins import HowMade
 from bsip_cli.report.page import render
 from bsip_cli.report.records import Origin
 from bsip_cli.report.tables.build import build_tables
@@ -46,15 +47,20 @@ def record_of(unit: Unit) -> CohortRecord:
     facts = unit.facts("values")
     options = unit.config.stats
     criteria = Criteria(options.alpha, options.equivalence_percent)
+
+    def read(table: str, variable: str) -> pd.DataFrame:
+        return unit.read("values", table=[table], variable=[variable])
+
     return CohortRecord(
         members=tuple(_member(unit, participant) for participant in unit.study.participants),
-        errors=unit.read("values", table=ERROR_TABLES, variable=ERROR_VARIABLES),
+        ratios=ratios_of(read),
+        task_errors={name: errors_per_task(read, name) for name in TASK_ERRORS},
         tables=build_tables(
             unit.read("comparisons"), criteria, facts["fitted_on"], facts["missing"]
         ),
         table_files=tuple(unit.read("tables-files")["file"]),
         missing=tuple(_missing_sentence(gone) for gone in facts["missing"]),
-        origins=_origins(unit),
+        made=HowMade.of(_origins(unit)),
         steps=steps(),
     )
 
@@ -91,16 +97,19 @@ def _member(unit: Unit, participant: Participant) -> Member:
 def _first_row(unit: Unit, kind: str, participant: Participant) -> dict[str, Any] | None:
     if not unit.path(kind, participant=participant).exists():
         return None
-    rows = unit.read(kind, participant=participant).head(1).to_dict("records")
-    return {str(name): value for row in rows for name, value in row.items()}
+    row = unit.read(kind, participant=participant).iloc[0]
+    return {name: row[name] for name in SHOWN[kind]}
 
 
-def _origins(unit: Unit) -> tuple[Origin, ...]:
-    origins = []
+def _origins(unit: Unit) -> Iterator[Origin]:
+    """Of all that is read; a participant's own facts are no options of the group."""
     for kind in unit.stage.reads:
         if SCHEMAS[kind].level == "cohort":
-            origins.append(origin_of(unit.path(kind), ""))
+            yield origin_of(unit.path(kind), "")
         else:
             paths = {p.id: unit.path(kind, participant=p) for p in unit.study.participants}
-            origins += [origin_of(path, name) for name, path in paths.items() if path.exists()]
-    return tuple(origins)
+            for name, path in paths.items():
+                if path.exists():
+                    origin = origin_of(path, name)
+                    origin.options.pop("participant", None)
+                    yield origin

@@ -38,7 +38,6 @@ class _Cohort:
     def __init__(self, unit: Unit) -> None:
         self._unit = unit
         self._missing = _Missing(unit)
-        self._usable = set(unit.inputs())
         trials = (trial for person in unit.study.participants for trial in person.trials)
         self._has_sequences = any(trial.role == "sequence" for trial in trials)
         self._lines: dict[Topic, None] = {}
@@ -130,8 +129,7 @@ class _Cohort:
         for trial in participant.trials:
             if trial.role == "static":
                 continue
-            paths = {kind: self._unit.path(kind, trial, participant) for kind in TRIAL_KINDS}
-            there = [k for k, path in paths.items() if path.name in self._usable and path.exists()]
+            there = [k for k in TRIAL_KINDS if self._unit.stands(k, trial, participant)]
             lacking = [kind for kind in TRIAL_KINDS if kind not in there]
             tables = sorted({number for kind in lacking for number in _tables_of(kind, trial)})
             if tables:

@@ -47,7 +47,7 @@ def unit_of_person(batch: Path, name: str) -> Unit:
     """The stage that diagnoses a person."""
     opened = open_study(batch / "study", batch / "out", (name,), None)
     (stage,) = (one for one in stages_named("diagnose") if one.level == "participant")
-    (participant,) = opened.participants
+    (participant,) = opened.study.participants
     return Unit(stage, opened.study, batch / "out", opened.config, participant, None)
 
 

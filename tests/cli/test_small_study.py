@@ -23,7 +23,7 @@ from bsip_cli import __version__
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.config import Config, load_config
 from bsip_cli.lock import held_alone
-from bsip_cli.pipeline import STAGES, producer
+from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.runner import Outcome, perform
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.simulate.options import Rates, StudyOptions
@@ -169,12 +169,28 @@ def test_every_artifact_says_what_made_it(first_run, stage):
             assert made_by["bsip_version"] == __version__
             assert {"numpy", "scipy", "pin", "ezc3d"} <= set(made_by["libraries"])
             assert set(made_by["options"]) == set(stage.options) | facts
-            hashes = {name: sha256(files[name]) for name in made_by["inputs"]}
+            of_people = {name: read_of(stage, name, files) for name in ("sub-01", "sub-02")}
+            named = set(made_by["inputs"])
+            hashes = {name: sha256(files[name]) for name in named - set(of_people)}
+            hashes |= {name: joint_sha256(of_people[name]) for name in named & set(of_people)}
             assert made_by["inputs"] == hashes
-            kinds = {kind_of(name) for name in hashes}
+            people = [path.name for found in of_people.values() for path in found]
+            kinds = {kind_of(name) for name in [*hashes, *people] if name not in of_people}
             recording = {path.name.removesuffix(f"_{kind}.parquet").split("_")[-1]}
             assert set(stage.reads) <= kinds
             assert kinds == (set(stage.inputs) or recording)
+
+
+def read_of(stage: Stage, participant: str, files: dict[str, Path]) -> list[Path]:
+    """What a stage of the group reads of a participant."""
+    read = stage.inputs if stage.level == "cohort" else ()
+    found = [path for path in files.values() if path.parent.name == participant]
+    return [path for path in found if kind_of(path.name) in read]
+
+
+def joint_sha256(paths: list[Path]) -> str:
+    lines = sorted(f"{path.name} {sha256(path)}\n" for path in paths)
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
 def sha256(path: Path) -> str:

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from bsip_cli.report.cohort.document import cohort_document
+from bsip_cli.report.cohort.ratios import Ratios
+from bsip_cli.report.cohort.record import CohortRecord
+from bsip_cli.report.origins import HowMade
 from bsip_cli.stages.group_report import record_of
 
 
@@ -38,11 +41,12 @@ def test_all_five_tables_are_there(page):
 
 
 def test_gain_is_that_of_the_values(reports, page):
-    record = record_of(reports.unit("report"))
-    ratios = [
-        np.mean([g.om / g.rm for g in gains if g.held_out and g.component == "cop_ap"])
-        for gains in record.gains().values()
-    ]
+    values = reports.unit("report").read("values", table=["table4"], variable=["cop_ap"])
+    ratios = []
+    for _, own in values[values["data"] == "held_out"].groupby("participant"):
+        errors = own.groupby("method")["value"].mean()
+        ratios.append(errors["OM"] / errors["RM"])
+    assert len(ratios) == 2
     typical = 100 * (np.exp(np.mean(np.log(ratios))) - 1)
     row = re.search(r"COP, anterior-posterior</td>\s*<td[^>]*>([^<]+)<", page)
     assert unescape(row[1]) == f"{typical:.0f}".replace("-", "−")
@@ -50,7 +54,9 @@ def test_gain_is_that_of_the_values(reports, page):
 
 def test_empty_cohort_gives_sentences(reports):
     record = record_of(reports.unit("report"))
-    bare = type(record)(record.members[2:], record.errors.iloc[:0], (), (), (), (), record.steps)
+    nobody = {name: rows.iloc[:0] for name, rows in record.task_errors.items()}
+    none = Ratios({}, held_out=False)
+    bare = CohortRecord(record.members[2:], none, nobody, (), (), (), HowMade(), record.steps)
     document = cohort_document(bare)
     texts = [getattr(block, "text", "") for s in document.sections for block in s.blocks]
     assert "No trial could be compared with both methods." in texts

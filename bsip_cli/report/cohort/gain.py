@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.report.blocks import Block, Heading, Paragraph, Picture, Section
-from bsip_cli.report.cohort.record import CohortRecord, ratio_of_means
-from bsip_cli.report.cohort.summary import chosen_gains
+from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.figures.errors_per_task import ErrorsPerTask, errors_per_task
 from bsip_cli.report.figures.gain_dots import GainDots, gain_dots
-from bsip_cli.report.words import COMPONENTS, component_label
+from bsip_cli.report.words import component_label
 
 _ERRORS = (
     ("cop_error", "COP error [mm]", "errors_cop"),
@@ -26,13 +25,11 @@ def section(record: CohortRecord) -> Section:
 
 
 def _dots(record: CohortRecord) -> list[Block]:
-    gains, held_out = chosen_gains(record)
-    table = {c: np.array([ratio_of_means(own, c) for own in gains.values()]) for c in COMPONENTS}
-    table = {c: ratios for c, ratios in table.items() if np.isfinite(ratios).any()}
+    table = record.ratios.of_component
     if not table:
         return [Paragraph("There is no error of both methods to compare.", "warning")]
     data = GainDots(tuple(component_label(c) for c in table), np.array(list(table.values())))
-    where = "held-out data" if held_out else "the data that identified the parameters"
+    where = "held-out data" if record.ratios.held_out else "the data that identified the parameters"
     caption = (
         f"Error of OM over error of RM, on {where}; a dot per participant (in the order of "
         "the participants, from top to bottom), the bar their geometric mean. The scale is "
@@ -42,7 +39,7 @@ def _dots(record: CohortRecord) -> list[Block]:
 
 
 def _per_task(record: CohortRecord, variable: str, quantity: str, name: str) -> list[Block]:
-    rows = record.errors_per_task(variable).dropna(subset=["RM", "OM"], how="all")
+    rows = record.task_errors[variable].dropna(subset=["RM", "OM"], how="all")
     if rows.empty:
         return [Paragraph(f"There is no {quantity} to show.", "note")]
     keys = list(dict.fromkeys(zip(rows["task"], rows["data"], strict=True)))

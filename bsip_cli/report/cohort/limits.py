@@ -6,7 +6,6 @@ from bsip_cli.report.blocks import Block, Bullets, Heading, Paragraph, Picture, 
 from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.figures.workflow import workflow
 from bsip_cli.report.origins import options_grids
-from bsip_cli.report.records import messages
 
 _MIND = (
     "The masses of table 1 come from the identified combinations and a rule that splits them, "
@@ -18,13 +17,15 @@ _MIND = (
 
 
 def section(record: CohortRecord) -> Section:
-    said = messages(record.origins)
     warned: Block = (
         Bullets(
-            tuple(f"{stage}{f' ({unit})' if unit else ''}: {text}" for stage, unit, text in said),
+            tuple(
+                f"{stage}{f' ({unit})' if unit else ''}: {text}"
+                for stage, unit, text in record.made.messages
+            ),
             "warning",
         )
-        if said
+        if record.made.messages
         else Paragraph("No stage had anything to warn of.")
     )
     return Section(
@@ -36,7 +37,7 @@ def section(record: CohortRecord) -> Section:
             warned,
             Heading("How the numbers were made"),
             _way(record),
-            *options_grids(record.origins),
+            *options_grids(record.made),
         ),
     )
 

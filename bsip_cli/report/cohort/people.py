@@ -8,6 +8,12 @@ from bsip_cli.report.blocks import Cell, Grid, Section
 from bsip_cli.report.cohort.record import CohortRecord, Member
 from bsip_cli.report.words import MISSING, number, signed, significant, trial_label
 
+SHOWN = {
+    "person": ("calibration_trial", "sex", "mass_kg", "plate_mass_kg", "height_m", "marker_rms_m"),
+    "identification": ("duration_s", "condition_number"),
+}
+"""Columns of a participant's artifacts that the section shows."""
+
 
 def section(record: CohortRecord) -> Section:
     head = (

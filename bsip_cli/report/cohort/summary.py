@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.report.blocks import Block, Bullets, Grid, Heading, Paragraph, Section
-from bsip_cli.report.cohort.record import CohortRecord, ratio_of_means
-from bsip_cli.report.gains import SAME_WITHIN, Gain
+from bsip_cli.report.cohort.record import CohortRecord
+from bsip_cli.report.gains import SAME_WITHIN
 from bsip_cli.report.words import (
-    COMPONENTS,
     component_label,
     count,
     listing,
@@ -49,17 +48,9 @@ def _missing(record: CohortRecord) -> list[Block]:
     ]
 
 
-def chosen_gains(record: CohortRecord) -> tuple[dict[str, tuple[Gain, ...]], bool]:
-    """Each participant's gains on held-out data; on all data (and False) where nobody has any."""
-    everything = record.gains()
-    held_out = {name: tuple(g for g in gains if g.held_out) for name, gains in everything.items()}
-    held_out = {name: gains for name, gains in held_out.items() if gains}
-    return (held_out, True) if held_out else (everything, False)
-
-
 def _gain(record: CohortRecord) -> list[Block]:
-    gains, held_out = chosen_gains(record)
-    rows = [row for row in (_row(component, gains) for component in COMPONENTS) if row]
+    held_out = record.ratios.held_out
+    rows = [_row(component, ratios) for component, ratios in record.ratios.of_component.items()]
     if not rows:
         return [Paragraph("No trial could be compared with both methods.", "warning")]
     blocks: list[Block] = []
@@ -100,11 +91,8 @@ def _gain(record: CohortRecord) -> list[Block]:
     return blocks
 
 
-def _row(component: str, gains: dict[str, tuple[Gain, ...]]) -> tuple[str, ...]:
-    ratios = np.array([ratio_of_means(own, component) for own in gains.values()])
+def _row(component: str, ratios: np.ndarray) -> tuple[str, ...]:
     ratios = ratios[np.isfinite(ratios)]
-    if len(ratios) == 0:
-        return ()
     better, worse = int((ratios < 1 - SAME_WITHIN).sum()), int((ratios > 1 + SAME_WITHIN).sum())
     typical = 100.0 * (float(np.exp(np.log(ratios).mean())) - 1.0)
     return (

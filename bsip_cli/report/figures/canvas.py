@@ -20,6 +20,7 @@ INK, SOFT, FAINT = "#1c1c1c", "#6e6e6e", "#d4d4d4"
 ORANGE, BLUE, GREEN, PURPLE = "#D55E00", "#0072B2", "#009E73", "#CC79A7"  # Okabe and Ito
 LONGEST_LABEL = 16
 MOST_POINTS = 1200  # of one curve: more than a page can show
+MANY_PEOPLE = 200  # from here on dots and lines are drawn as pixels: files stay small
 _MM = 1.0 / 25.4
 _RC: dict[Any, Any] = {
     "svg.hashsalt": "bsip",
@@ -119,7 +120,7 @@ def runs(flags: np.ndarray) -> list[tuple[int, int]]:
 
 def to_svg(figure: Figure) -> bytes:
     """The figure as SVG; the same figure gives the same bytes."""
-    return _save(figure, "svg", metadata={"Date": None, "Creator": None})
+    return _save(figure, "svg", metadata={"Date": None, "Creator": None}, dpi=200)
 
 
 def to_png(figure: Figure) -> bytes:

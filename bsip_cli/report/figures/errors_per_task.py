@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from bsip_cli.report.figures.canvas import (
     BLUE,
     FAINT,
+    MANY_PEOPLE,
     ORANGE,
     house_style,
     legend_above,
@@ -38,9 +40,19 @@ def errors_per_task(data: ErrorsPerTask) -> Figure:
     """Per task RM and OM side by side, joined by a line for each participant."""
     figure = new_figure(62)
     axes = figure.add_subplot()
+    people = data.rm.shape[1]
+    many = people > MANY_PEOPLE
     for task in range(len(data.tasks)):
         left, right = task - 0.18, task + 0.18
-        axes.plot([left, right], [data.rm[task], data.om[task]], color=FAINT, lw=0.8, zorder=1)
+        ends = np.stack(
+            [
+                np.column_stack([np.full(people, x), errors[task]])
+                for x, errors in ((left, data.rm), (right, data.om))
+            ],
+            axis=1,
+        )
+        lines = LineCollection(list(ends), color=FAINT, lw=0.8, zorder=1, rasterized=many)
+        axes.add_collection(lines)
         for x, values, colour, marker, label in (
             (left, data.rm[task], ORANGE, "s", "RM (table)"),
             (right, data.om[task], BLUE, "o", "OM (identified)"),
@@ -52,6 +64,7 @@ def errors_per_task(data: ErrorsPerTask) -> Figure:
                 marker=marker,
                 color=colour,
                 lw=0,
+                rasterized=many,
                 zorder=2,
                 label=label if task == 0 else None,
             )

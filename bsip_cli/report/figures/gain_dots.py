@@ -12,6 +12,7 @@ from bsip_cli.report.figures.canvas import (
     BLUE,
     FAINT,
     INK,
+    MANY_PEOPLE,
     ORANGE,
     SOFT,
     house_style,
@@ -37,13 +38,15 @@ def gain_dots(data: GainDots) -> Figure:
     rows, people = data.ratios.shape
     figure = new_figure(20.0 + 8.0 * rows)
     axes = figure.add_subplot()
+    many = people > MANY_PEOPLE
     offsets = np.linspace(-_SPREAD, _SPREAD, people) if people > 1 else np.zeros(1)
     for row, ratios in enumerate(data.ratios):
         axes.scatter(
             ratios,
             row + offsets,
-            s=24,
-            lw=0.5,
+            s=6 if many else 24,
+            lw=0.0 if many else 0.5,
+            rasterized=many,
             edgecolor="white",
             color=[BLUE if r < 1.0 else ORANGE for r in ratios],
             zorder=2,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bsip_cli.report.blocks import Block, Bullets, Heading, Paragraph, Section
-from bsip_cli.report.origins import options_grids
+from bsip_cli.report.origins import HowMade, options_grids
 from bsip_cli.report.records import ParticipantRecord, messages
 
 CANNOT_KNOW = (
@@ -30,7 +30,7 @@ def section(record: ParticipantRecord) -> Section:
         *_refused(record),
         Heading("Warnings"),
         *_warned(record),
-        *options_grids(record.origins),
+        *options_grids(HowMade.of(record.origins)),
     ]
     return Section("limits", "Limits, warnings, options", tuple(blocks))
 

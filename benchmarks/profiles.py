@@ -58,7 +58,7 @@ def place_of(file: str, name: str) -> str:
         return f"{path.relative_to(PACKAGE).with_suffix('').as_posix()}: {name}"
     if "site-packages" in path.parts:
         return path.parts[path.parts.index("site-packages") + 1]
-    return name if file == "~" else "Python's own library"
+    return name.strip("<>") if file == "~" else "Python's own library"
 
 
 def profiled(stages: list[Stage], opened: OpenedStudy, out: Path) -> cProfile.Profile:

@@ -86,7 +86,7 @@ def write_atomically(path: Path, write) -> None:
 
     Raises
     ------
-    UsageError
+    NotWritableError
         The disk is full, or the place cannot be written to; what was there stays.
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}{_UNFINISHED}")
@@ -106,7 +106,21 @@ def write_atomically(path: Path, write) -> None:
 def remove_unfinished(folder: Path) -> None:
     """Take away what killed processes left half written; only for who holds the folder alone."""
     for left in folder.rglob(f".*{_UNFINISHED}"):
-        left.unlink(missing_ok=True)
+        remove(left)
+
+
+def remove(path: Path) -> None:
+    """Take a file away, if it is there.
+
+    Raises
+    ------
+    NotWritableError
+        The place is closed.
+    """
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise not_writable(path, error) from None
 
 
 def read_artifact(path: Path, kind: str, **wanted: Collection[str]) -> pd.DataFrame:

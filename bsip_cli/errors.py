@@ -45,9 +45,13 @@ class UsageError(BsipError):
     exit_code = 2
 
 
-def not_writable(file: object, error: OSError) -> UsageError:
+class NotWritableError(UsageError):
+    """Results cannot be written: the disk is full, or the place is closed (exit code 2)."""
+
+
+def not_writable(file: object, error: OSError) -> NotWritableError:
     """What to raise where results cannot be written."""
-    return UsageError(
+    return NotWritableError(
         f"cannot be written ({error.strerror or error})",
         file=file,
         remedy="make room there, or name another folder with --out",

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli import __version__
-from bsip_cli.artifacts import write_atomically
+from bsip_cli.artifacts import remove, write_atomically
 from bsip_cli.body.exports.body_map import (
     BodyMap,
     check_segments,
@@ -163,7 +163,7 @@ def _export(
                 try:
                     text, note = writer(body)
                 except BadDataError as error:
-                    _remove(path)  # an older one would pass for this method's
+                    remove(path)  # an older one would pass for this method's
                     errors.append(error)
                     continue
                 write_atomically(path, partial(_write, text))
@@ -185,13 +185,6 @@ def _outcome(unit: Unit, written: list[str], notes: list[str], errors: list[Bsip
 
 def _write(text: str, path: Path) -> None:
     path.write_bytes(text.encode())
-
-
-def _remove(path: Path) -> None:
-    try:
-        path.unlink(missing_ok=True)
-    except OSError as error:
-        raise UsageError(f"cannot be removed ({error.strerror})", file=path) from None
 
 
 def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson:

@@ -13,15 +13,21 @@ from typing import Literal
 
 import pandas as pd
 
-from bsip_cli.artifacts import remove_unfinished, write_artifact
+from bsip_cli.artifacts import remove, remove_unfinished, write_artifact
 from bsip_cli.config import Config
-from bsip_cli.errors import BadDataError, BsipError, NumericalError, UsageError
+from bsip_cli.errors import (
+    BadDataError,
+    BsipError,
+    NotWritableError,
+    NumericalError,
+    UsageError,
+)
 from bsip_cli.lock import held_alone
 from bsip_cli.pipeline import Stage, producer
 from bsip_cli.study import Participant, Study
 from bsip_cli.unit import Unit
 
-State = Literal["done", "fresh", "waiting", "refused", "bug"]
+State = Literal["done", "fresh", "waiting", "refused", "unwritten", "bug"]
 
 
 @dataclass(frozen=True)
@@ -104,13 +110,17 @@ def _run_alone(
     force: bool,
     participant: Participant | None,
 ) -> list[Outcome]:
+    """Unit by unit; what cannot be written ends it, else the rest would be made without it."""
     if participant is not None:
         _forget_gone_recordings(out / participant.id, participant)
     outcomes = []
     for stage in stages:
         trials = participant.trials if participant and stage.level == "trial" else (None,)
         for trial in trials:
-            outcomes.append(perform(Unit(stage, study, out, config, participant, trial), force))
+            unit = Unit(stage, study, out, config, participant, trial)
+            outcomes.append(perform(unit, force))
+            if outcomes[-1].state == "unwritten":
+                return outcomes
     return outcomes
 
 
@@ -119,7 +129,7 @@ def _forget_gone_recordings(folder: Path, participant: Participant) -> None:
     known = {participant.id, *(trial.stem for trial in participant.trials)}
     for path in folder.glob("*_refusal-*.parquet"):
         if path.name.split("_refusal-")[0] not in known:
-            path.unlink()
+            remove(path)
 
 
 def perform(unit: Unit, force: bool = False) -> Outcome:
@@ -133,14 +143,23 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
         return Outcome(stage.name, unit.name, "fresh")
     try:
         importlib.import_module(stage.module).run(unit)
+        remove(unit.refusal_path())
     except BsipError as error:
-        if not isinstance(error, UsageError):  # nothing is wrong with the data
-            _write_refusal(unit, error)
-        sentence = str(error) if unit.name in str(error) else f"{unit.name}: {error}"
-        said = (*unit.messages, sentence)  # a warning may tell why it came to this
-        return Outcome(stage.name, unit.name, "refused", said, error.exit_code)
-    unit.refusal_path().unlink(missing_ok=True)
+        return _refused(unit, error)
     return Outcome(stage.name, unit.name, "done", tuple(unit.messages))
+
+
+def _refused(unit: Unit, error: BsipError) -> Outcome:
+    """Write down what is wrong with the data; say what is wrong, after the unit's warnings."""
+    if not isinstance(error, UsageError):
+        try:
+            _write_refusal(unit, error)
+        except NotWritableError as closed:
+            return _refused(unit, closed)
+    sentence = str(error) if unit.name in str(error) else f"{unit.name}: {error}"
+    said = (*unit.messages, sentence)
+    state: State = "unwritten" if isinstance(error, NotWritableError) else "refused"
+    return Outcome(unit.stage.name, unit.name, state, said, error.exit_code)
 
 
 def lacking(unit: Unit) -> Outcome | None:

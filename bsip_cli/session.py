@@ -166,6 +166,7 @@ def _summary(command: str, outcomes: Iterable[Outcome], out: Path) -> None:
         "done": "done",
         "fresh": "up to date",
         "refused": "refused",
+        "unwritten": "not to be written",
         "waiting": "without input",
         "bug": "failed by a bug",
     }

@@ -97,8 +97,8 @@ def _member(unit: Unit, participant: Participant) -> Member:
 def _first_row(unit: Unit, kind: str, participant: Participant) -> dict[str, Any] | None:
     if not unit.path(kind, participant=participant).exists():
         return None
-    row = unit.read(kind, participant=participant).iloc[0]
-    return {name: row[name] for name in SHOWN[kind]}
+    rows = unit.read(kind, participant=participant)
+    return None if rows.empty else {name: rows[name].iloc[0] for name in SHOWN[kind]}
 
 
 def _origins(unit: Unit) -> Iterator[Origin]:

@@ -517,6 +517,18 @@ def test_place_that_cannot_be_written_is_no_refusal_of_the_data(run):
     assert not [each for each in path.parent.iterdir() if each.name.endswith(".part")]
 
 
+def test_nothing_is_made_without_what_could_not_be_written(run, bsip):
+    """A trial lost to a full disk would else be missing in what is made of the others."""
+    path = run.path("wrench", f"sub-01_{TRIALS[1]}")
+    path.unlink()
+    path.mkdir()
+    before = run.files()
+    answer = bsip("run", run.study, "--out", run.out, "--participant", "sub-01", "--force")
+    assert answer.code == 2
+    assert answer.summary.startswith("bsip run: 1 done, 1 not to be written;")
+    assert run.files() == before
+
+
 def test_warnings_are_told_and_kept(run, bsip):
     """A mass that the plates contradict: said on the terminal and in the artifact."""
     table = run.study / "participants.tsv"

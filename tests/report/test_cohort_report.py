@@ -1,14 +1,19 @@
 import hashlib
 import re
+import shutil
+from dataclasses import replace
 from html import unescape
 
 import numpy as np
 import pytest
+from fake_study import Artifacts
 
+from bsip_cli.artifacts import empty_table
 from bsip_cli.report.cohort.document import cohort_document
 from bsip_cli.report.cohort.ratios import Ratios
 from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.origins import HowMade
+from bsip_cli.report.words import MISSING
 from bsip_cli.stages.group_report import record_of
 
 
@@ -50,6 +55,17 @@ def test_gain_is_that_of_the_values(reports, page):
     typical = 100 * (np.exp(np.mean(np.log(ratios))) - 1)
     row = re.search(r"COP, anterior-posterior</td>\s*<td[^>]*>([^<]+)<", page)
     assert unescape(row[1]) == f"{typical:.0f}".replace("-", "−")
+
+
+def test_person_of_whom_nothing_was_identified(reports, tmp_path):
+    """The table of the identification is there, without a row."""
+    shutil.copytree(reports.out, tmp_path, dirs_exist_ok=True)
+    person = reports.study.participants[1]
+    here = replace(reports, out=tmp_path)
+    Artifacts(tmp_path, person).write("identification", empty_table("identification"))
+    here.run("report")
+    row = re.search(rf"{person.id}</td>.*?</tr>", here.html("group"), re.DOTALL)
+    assert row[0].count(MISSING) == 2
 
 
 def test_empty_cohort_gives_sentences(reports):

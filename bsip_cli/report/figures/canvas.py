@@ -133,5 +133,5 @@ def _save(figure: Figure, form: str, **options) -> bytes:
     with house_style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a label in a script the font lacks
         figure.savefig(buffer, format=form, **options)
-    figure.set_layout_engine("none")  # laid out once; the next file keeps it
+    figure.set_layout_engine(None)  # laid out once; the next file keeps it
     return buffer.getvalue()

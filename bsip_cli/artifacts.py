@@ -62,7 +62,8 @@ def write_artifact_in_parts(
         try:
             _write_tables(rows, schema, tables)
             whole = schema.with_metadata(_header(layout, provenance()))
-            _write_tables(temporary, whole, _row_groups(rows))
+            with pq.ParquetFile(rows) as file:
+                _write_tables(temporary, whole, _row_groups(file))
         finally:
             rows.unlink(missing_ok=True)
 
@@ -75,10 +76,9 @@ def _write_tables(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> 
             writer.write_table(table.replace_schema_metadata(schema.metadata))
 
 
-def _row_groups(path: Path) -> Iterator[pa.Table]:
-    with pq.ParquetFile(path) as file:
-        for k in range(file.num_row_groups):
-            yield file.read_row_group(k)
+def _row_groups(file: pq.ParquetFile) -> Iterator[pa.Table]:
+    for k in range(file.num_row_groups):
+        yield file.read_row_group(k)
 
 
 def write_atomically(path: Path, write) -> None:
@@ -142,8 +142,9 @@ def read_artifact(path: Path, kind: str, **wanted: Collection[str]) -> pd.DataFr
             _check_kind(_header_in(file.schema_arrow), SCHEMAS[kind], path)
             if not wanted:
                 return file.read().to_pandas()
-        filters = [(column, "in", sorted(values)) for column, values in wanted.items()]
-        return pq.read_table(path, filters=filters, page_checksum_verification=True).to_pandas()
+            are_wanted = pq.filters_to_expression([(c, "in", v) for c, v in wanted.items()])
+            parts = [table.filter(are_wanted) for table in _row_groups(file)]
+            return pa.concat_tables([file.schema_arrow.empty_table(), *parts]).to_pandas()
     except (OSError, pa.ArrowException, KeyError, ValueError) as error:
         raise _not_an_artifact(path, error) from None
 

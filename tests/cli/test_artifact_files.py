@@ -11,7 +11,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from bsip_cli import artifacts
-from bsip_cli.artifacts import read_artifact, read_header, write_artifact, write_atomically
+from bsip_cli.artifacts import (
+    read_artifact,
+    read_header,
+    write_artifact,
+    write_artifact_in_parts,
+    write_atomically,
+)
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.schemas import SCHEMAS
 
@@ -104,6 +110,20 @@ def test_families_of_columns():
 
 
 # --- reading ------------------------------------------------------------------------------------
+
+
+def test_only_wanted_rows_are_read(path):
+    parts = (BLOCKS.assign(start_s=BLOCKS["start_s"] + k) for k in range(3))
+    write_artifact_in_parts(path, "used-blocks", parts, lambda: NOTES)
+    found = read_artifact(path, "used-blocks", trial=["b", "c"])
+    assert found["start_s"].tolist() == [1.0, 2.0, 3.0]
+    assert set(found["trial"]) == {"b"}
+    assert read_artifact(path, "used-blocks", trial=["c"]).empty
+
+
+def test_wanted_rows_of_an_empty_table(path):
+    write_artifact(path, "used-blocks", BLOCKS.iloc[:0], NOTES)
+    assert list(read_artifact(path, "used-blocks", trial=["a"])) == list(BLOCKS)
 
 
 def foreign(path):

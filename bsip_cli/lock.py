@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from bsip_cli.artifacts import remove_unfinished
 from bsip_cli.errors import UsageError, not_writable
 
 NAME = ".lock"
@@ -15,6 +16,8 @@ NAME = ".lock"
 @contextmanager
 def held_alone(folder: Path) -> Iterator[None]:
     """Hold a folder's lock; the system lets go of it whatever becomes of the process.
+
+    What killed processes left half written there is taken away.
 
     Raises
     ------
@@ -28,6 +31,7 @@ def held_alone(folder: Path) -> Iterator[None]:
         raise not_writable(folder, error) from None
     with handle:
         _lock(handle.fileno(), folder)
+        remove_unfinished(folder)
         yield
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -261,6 +262,13 @@ STAGES = (
 def stages_named(name: str) -> tuple[Stage, ...]:
     """The stages behind one command, in order; ``run`` is all of them."""
     return STAGES if name == "run" else tuple(s for s in STAGES if s.name == name)
+
+
+def by_level(stages: Iterable[Stage]) -> tuple[tuple[Stage, ...], tuple[Stage, ...]]:
+    """Those about one participant or trial, and those about all."""
+    stages = tuple(stages)
+    of_all = tuple(stage for stage in stages if stage.level == "cohort")
+    return tuple(stage for stage in stages if stage not in of_all), of_all
 
 
 def producer(kind: str) -> Stage:

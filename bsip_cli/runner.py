@@ -13,7 +13,7 @@ from typing import Literal
 
 import pandas as pd
 
-from bsip_cli.artifacts import remove, remove_unfinished, write_artifact
+from bsip_cli.artifacts import remove, write_artifact
 from bsip_cli.config import Config
 from bsip_cli.errors import (
     BadDataError,
@@ -23,7 +23,7 @@ from bsip_cli.errors import (
     UsageError,
 )
 from bsip_cli.lock import held_alone
-from bsip_cli.pipeline import Stage, producer
+from bsip_cli.pipeline import Stage, by_level, producer
 from bsip_cli.study import Participant, Study
 from bsip_cli.unit import Unit
 
@@ -54,7 +54,7 @@ def run_stages(
 
     ``force`` redoes what is fresh; ``jobs`` participants run at once, each in its own process.
     """
-    personal = tuple(stage for stage in stages if stage.level != "cohort")
+    personal, shared = by_level(stages)
     if personal:
         with _processes(jobs) as pool:
             running = {}
@@ -64,7 +64,6 @@ def run_stages(
                 running[participant.id] = work
             for name, future in running.items():
                 yield from _outcomes(future, name, personal)
-    shared = tuple(stage for stage in stages if stage.level == "cohort")
     if shared:
         with _processes(1) as pool:
             for stage in shared:
@@ -96,7 +95,6 @@ def _run(
     name = participant.id if participant else "group"
     try:
         with held_alone(out / name):
-            remove_unfinished(out / name)
             return _run_alone(stages, study, out, config, force, participant)
     except UsageError as error:
         return [Outcome(stages[0].name, name, "refused", (str(error),), error.exit_code)]

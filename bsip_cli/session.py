@@ -17,7 +17,7 @@ from bsip_cli.check_study import check_prefixes, check_segments, check_trials
 from bsip_cli.config import Config, load_config, with_estimators
 from bsip_cli.dataset import describe_dataset
 from bsip_cli.errors import BadDataError, UsageError
-from bsip_cli.pipeline import Stage, stages_named
+from bsip_cli.pipeline import Stage, by_level, stages_named
 from bsip_cli.runner import Outcome, refusal_sentence, run_stages
 from bsip_cli.study import Study, load_study
 
@@ -62,10 +62,9 @@ def _stages(command: str, chosen: tuple[str, ...], group: bool) -> tuple[Stage, 
     if group and chosen:
         raise UsageError("--group is about all participants", remedy="leave out --participant")
     stages = stages_named(command)
-    of_all = tuple(stage for stage in stages if stage.level == "cohort")
+    personal, of_all = by_level(stages)
     if group:
         return of_all
-    personal = tuple(stage for stage in stages if stage.level != "cohort")
     return personal or of_all if chosen else stages
 
 

@@ -21,7 +21,7 @@ ALLOWED = {
     "pipeline": "schemas",
     "standing": "pipeline",
     "unit": "artifacts config errors pipeline provenance schemas standing study",
-    "lock": "errors",
+    "lock": "artifacts errors",
     "dataset": "__init__ artifacts",
     "info": "__init__ artifacts provenance schemas",
     "runner": "artifacts config errors lock pipeline study unit",

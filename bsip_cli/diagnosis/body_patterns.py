@@ -11,6 +11,7 @@ from bsip_cli.effects.scene import Scene
 
 _ALONG = {"x": "along the lab's X axis", "y": "along the lab's Y axis", "z": "up and down"}
 _HANDS = ("hand_l", "hand_r")
+_BEARINGS_APART = np.pi / 6
 
 
 class Spring(Pattern):
@@ -36,6 +37,41 @@ class Spring(Pattern):
             order = "back to its mean place" if values[0] > 0 else "away from its mean place"
             return f"a pull on the pelvis {order}, as of an elastic or a rope: {size}"
         return f"a force on the pelvis {_ALONG[force]}: {size}"
+
+
+class Tether(Pattern):
+    """A rope or an elastic from a fixed place far off to the pelvis, never slack.
+
+    The force has one direction, and grows with the pelvis' way along it.
+    """
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        return ("",)
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        bearings = tuple(float(angle) for angle in np.arange(0.0, np.pi, _BEARINGS_APART))
+        return (
+            Parameter("pull_at_origin", "N", -1e5, 1e5, 20.0),
+            Parameter("stiffness", "N/m", 0.0, 1e4, 50.0),
+            Parameter("bearing", "rad", -np.pi, 2.0 * np.pi, _BEARINGS_APART, bearings),
+            Parameter("rise", "rad", -1.2, 1.2, 0.3, (0.0,)),
+        )
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        pull, stiffness, bearing, rise = values
+        flat = np.cos(rise)
+        away = np.array([flat * np.cos(bearing), flat * np.sin(bearing), np.sin(rise)])
+        pelvis = scene.q[:, :3]
+        push = np.outer(pull + stiffness * (pelvis @ away), away)
+        return np.hstack([push, np.cross(pelvis, push)])
+
+    def goes_along_with(self, target: str, values: np.ndarray) -> str:
+        _, stiffness, bearing, rise = values
+        return (
+            f"a pull on the pelvis, as of an elastic or a rope, {np.degrees(bearing):.0f} degrees "
+            f"from the lab's X axis and {np.degrees(rise):.0f} degrees from level: "
+            f"{stiffness:.0f} N more per metre"
+        )
 
 
 class Drag(Pattern):

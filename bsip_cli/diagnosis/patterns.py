@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bsip_cli.diagnosis.body_patterns import Band, Drag, Spring
+from bsip_cli.diagnosis.body_patterns import Band, Drag, Spring, Tether
 from bsip_cli.diagnosis.channel_patterns import Bow, Curve, Lag, Play, Tone, Warming
 from bsip_cli.diagnosis.clock_pattern import ClockJump
 from bsip_cli.diagnosis.pattern import Pattern
@@ -15,6 +15,7 @@ PATTERNS: tuple[Pattern, ...] = (
     Warming(),
     Bow(),
     Spring(),
+    Tether(),
     Drag(),
     Band(),
     ClockJump(),

@@ -166,6 +166,19 @@ def test_a_gain_that_changes_has_no_name():
     assert number_of(one, "change_of_gain").value == pytest.approx(0.8, abs=0.05)
 
 
+def test_an_elastic_from_the_wall_has_no_name():
+    """Most of its pull is always there, as of a tilt."""
+    scene = part_of_moving(0, 12)
+    pelvis = scene.q[:, :3]
+    away = pelvis - (pelvis[0] + [-1.2, 0.1, 0.3])
+    length = np.linalg.norm(away, axis=1, keepdims=True)
+    push = 100.0 * (length - length[0] + 0.1) * away / length
+    change = np.hstack([push, np.cross(pelvis, push)])
+    (one,) = said_of(selection_of(noisy(shown(scene, change), 2)))
+    assert one.effect == "unexplained" and "as of an elastic" in one.sentence
+    assert number_of(one, "stiffness").value == pytest.approx(100.0, abs=20.0)
+
+
 def test_a_clock_that_jumps_has_no_name():
     scene = part_of_moving(0, 12)
     jumped = late(scene, 0.03)

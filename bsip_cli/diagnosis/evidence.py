@@ -85,6 +85,12 @@ class Whitening:
         left, shrink = self.left.astype(kind), self.shrink.astype(kind)
         return columns - left @ (shrink[:, None] * (left.T @ columns))
 
+    def transposed(self, rows: np.ndarray) -> np.ndarray:
+        """(n, 6, k) whose products with filtered wrenches are those of rows (6 n, k) with the
+        white ones."""
+        kept = rows - self.left @ (self.shrink[:, None] * (self.left.T @ rows))
+        return _innovations_transposed(kept, self.recursion, self.filter) / self.spread[..., None]
+
     def innovations(self, wrenches: np.ndarray) -> np.ndarray:
         """(6 n, k) of filtered wrenches (n, 6, k): the noise alone is white, nuisances stay."""
         kind = wrenches.dtype
@@ -232,3 +238,14 @@ def _innovations(columns: np.ndarray, recursion: np.ndarray, filter_: Filter) ->
                 earlier = columns[start : stop - lag]
                 out[start + lag : stop] -= recursion[:, lag - 1, None] * earlier
     return out.reshape(-1, columns.shape[2])
+
+
+def _innovations_transposed(rows: np.ndarray, recursion: np.ndarray, filter_: Filter) -> np.ndarray:
+    """(n, 6, k) of (6 n, k): the same linear map, transposed."""
+    later = rows.reshape(len(rows) // 6, 6, rows.shape[1])
+    out = later.copy()
+    for start, stop in filter_.spans:
+        for lag in range(1, _ORDER + 1):
+            if stop - start > lag:
+                out[start : stop - lag] -= recursion[:, lag - 1, None] * later[start + lag : stop]
+    return out

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bsip_cli.diagnosis.candidates import Candidate
 from bsip_cli.diagnosis.explanation import Fit, fit_together, with_noise_beside
 from bsip_cli.diagnosis.signatures import Signatures
 
@@ -47,34 +48,35 @@ def _likely_changes(signatures: Signatures, before: Fit) -> list[np.ndarray]:
     known = np.column_stack([before.tangent, columns])
     sizes = np.linalg.lstsq(known, before.residual, rcond=None)[0][before.tangent.shape[1] :]
     changes = [np.zeros_like(one.filtered.residual) for one in signatures.evidence.trials]
-    for t, part in chosen:
-        width = part.stop - part.start
-        changes[t] += signatures.filtered[t].columns[..., part] @ sizes[:width]
-        sizes = sizes[width:]
+    for t, candidate in chosen:
+        mine = signatures.filtered[t]
+        part = mine.columns[..., mine.parts[candidate]]
+        changes[t] += part @ sizes[: part.shape[2]]
+        sizes = sizes[part.shape[2] :]
     return changes
 
 
-def _chosen(signatures: Signatures, before: Fit) -> tuple[list[tuple[int, slice]], np.ndarray]:
-    """Trial and columns of the likely candidates, one after the other; their signatures (R, q)."""
+def _chosen(signatures: Signatures, before: Fit) -> tuple[list[tuple[int, Candidate]], np.ndarray]:
+    """The likely candidates, each in its trial, one after the other; their signatures (R, q)."""
     evidence = signatures.evidence
     columns = np.zeros((len(before.residual), 0))
-    chosen: list[tuple[int, slice]] = []
+    chosen: list[tuple[int, Candidate]] = []
     for _ in range(MOST):
         known = np.column_stack([before.tangent, columns])
         new = _likeliest(signatures, before.residual, known)
         if not new:
             break
-        for t, part in new:
-            mine = signatures.stored[t].columns[:, part].astype(float)
-            columns = np.column_stack([columns, evidence.white({t: mine})])
+        for t, candidate in new:
+            mine = evidence.white({t: signatures.white(t, candidate)})
+            columns = np.column_stack([columns, mine])
         chosen += new
     return chosen, columns
 
 
 def _likeliest(
     signatures: Signatures, residual: np.ndarray, known: np.ndarray
-) -> list[tuple[int, slice]]:
-    """The best candidate of each trial, if it is a sure one, by the columns of its signature."""
+) -> list[tuple[int, Candidate]]:
+    """The best candidate of each trial, if it is a sure one."""
     scores, _ = signatures.scores(residual[:, None], known)
     best: dict[int, int] = {}
     for k, place in enumerate(signatures.places):
@@ -82,6 +84,4 @@ def _likeliest(
             (t,) = place.trials
             if t not in best or scores[k, 0] > scores[best[t], 0]:
                 best[t] = k
-    return [
-        (t, signatures.stored[t].parts[signatures.places[k].candidate]) for t, k in best.items()
-    ]
+    return [(t, signatures.places[k].candidate) for t, k in best.items()]

@@ -1,4 +1,4 @@
-"""The white signatures of all candidates, computed once and scored against any residual.
+"""The signatures of all candidates, computed once and scored against any white residual.
 
 A candidate's score is what its best linear size takes off the squared white residual; under the
 null a chi-square with as many degrees of freedom as it has free parameters.
@@ -32,21 +32,22 @@ class Place:
 
 @dataclass(frozen=True)
 class _Filtered:
-    """Signatures in one trial (n, 6, K), and which part of them is a candidate's."""
+    """Signatures in one trial (n, 6, K), and which part of them is a candidate's.
+
+    White ones are not kept beside them: these are by far the most that a diagnosis holds.
+    """
 
     columns: np.ndarray
     parts: dict[Candidate, slice]
 
 
 @dataclass(frozen=True)
-class _Stored:
-    """The same, white: columns (6 n, K), in the shared space (p, K), and each candidate's Gram
-    matrix (k, k)."""
+class _Products:
+    """Of the white signatures: those with the shared space (p, K), and each candidate's Gram matrix
+    (k, k)."""
 
-    columns: np.ndarray
     shared: np.ndarray
     grams: dict[Candidate, np.ndarray]
-    parts: dict[Candidate, slice]
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,6 @@ class Signatures:
 
     evidence: Evidence
     filtered: tuple[_Filtered, ...]
-    stored: tuple[_Stored, ...]
     places: tuple[Place, ...]
     batches: tuple[_Batch, ...]
 
@@ -82,7 +82,13 @@ class Signatures:
 
     def trials_of(self, candidate: Candidate) -> set[int]:
         """In which trials a candidate is possible."""
-        return {t for t, one in enumerate(self.stored) if candidate in one.parts}
+        return {t for t, one in enumerate(self.filtered) if candidate in one.parts}
+
+    def white(self, trial: int, candidate: Candidate) -> np.ndarray:
+        """(6 n, k) of a candidate, in the coordinates of one trial."""
+        one = self.filtered[trial]
+        mine = one.columns[..., one.parts[candidate]].astype(float)
+        return self.evidence.trials[trial].whitening.of_filtered(mine)
 
     def scores(
         self, residuals: np.ndarray, known: np.ndarray
@@ -121,12 +127,14 @@ class Signatures:
 
     def _products(self, courses: np.ndarray) -> list[np.ndarray]:
         """Per trial (K + 1, f) of all signatures, and of none, with courses (R, f)."""
-        turned = self.evidence.turned(courses).astype(np.float32)
+        turned = self.evidence.turned(courses)
         none = np.zeros((1, courses.shape[1]))
-        return [
-            np.concatenate([one.columns.T @ turned[self.evidence.rows(t)], none])
-            for t, one in enumerate(self.stored)
-        ]
+        found = []
+        for t, (one, trial) in enumerate(zip(self.filtered, self.evidence.trials, strict=True)):
+            rows = trial.whitening.transposed(turned[self.evidence.rows(t)]).astype(np.float32)
+            products = _flat(one.columns).T @ _flat(rows)
+            found.append(np.concatenate([products, none]))
+        return found
 
 
 def signatures_of(evidence: Evidence, effects: Sequence[Effect]) -> Signatures:
@@ -135,63 +143,75 @@ def signatures_of(evidence: Evidence, effects: Sequence[Effect]) -> Signatures:
 
 
 def _filtered(one: TrialEvidence, effects: Sequence[Effect]) -> _Filtered:
-    candidates = (c for effect in effects for c in candidates_of(effect, one.scene))
-    columns, parts, end = [], {}, 0
-    while batch := tuple(islice(candidates, _BATCH)):
-        signatures = [candidate.signature(one.scene) for candidate in batch]
-        filtered = one.filtered.filter(np.concatenate(signatures, axis=2))
-        ends = end + np.cumsum([0, *(s.shape[2] for s in signatures)])
-        for candidate, (start, stop) in zip(batch, pairwise(ends), strict=True):
-            mine = filtered[..., start - end : stop - end]
-            if mine.any(axis=(0, 1)).all():  # else it touches no valid frame
+    candidates = [c for effect in effects for c in candidates_of(effect, one.scene)]
+    ends = np.cumsum([0, *(len(candidate.free(one.scene)) for candidate in candidates)])
+    columns = np.empty((*one.filtered.residual.shape, ends[-1]), np.float32)
+    parts = {}
+    for first in range(0, len(candidates), _BATCH):
+        batch = candidates[first : first + _BATCH]
+        wrenches = np.concatenate([c.signature(one.scene) for c in batch], axis=2)
+        filtered = one.filtered.filter(wrenches)
+        mine = ends[first : first + len(batch) + 1]
+        columns[..., mine[0] : mine[-1]] = filtered
+        for candidate, (start, stop) in zip(batch, pairwise(mine), strict=True):
+            touched = filtered[..., start - mine[0] : stop - mine[0]].any(axis=(0, 1))
+            if touched.all():  # else it touches no valid frame
                 parts[candidate] = slice(int(start), int(stop))
-        columns.append(filtered.astype(np.float32))
-        end = int(ends[-1])
-    return _Filtered(np.concatenate(columns, axis=2), parts)
+    return _Filtered(columns, parts)
 
 
 def _on(evidence: Evidence, filtered: tuple[_Filtered, ...]) -> Signatures:
-    stored = tuple(_stored(evidence, t, one) for t, one in enumerate(filtered))
-    places = tuple(_places(stored))
-    return Signatures(evidence, filtered, stored, places, tuple(_batches(evidence, stored, places)))
+    products = tuple(_products(evidence, t, one) for t, one in enumerate(filtered))
+    places = tuple(_places(filtered))
+    batches = tuple(_batches(evidence, filtered, products, places))
+    return Signatures(evidence, filtered, places, batches)
 
 
-def _stored(evidence: Evidence, trial: int, filtered: _Filtered) -> _Stored:
-    columns = evidence.trials[trial].whitening.of_filtered(filtered.columns)
+def _products(evidence: Evidence, trial: int, filtered: _Filtered) -> _Products:
+    whitening = evidence.trials[trial].whitening
     left = evidence.left[evidence.rows(trial)].astype(np.float32)
-    shared = (left.T @ columns).astype(float)
+    shared = np.zeros((left.shape[1], filtered.columns.shape[2]))
     grams = {}
-    for candidate, part in filtered.parts.items():
-        mine = columns[:, part].astype(float)
-        grams[candidate] = mine.T @ mine
-    return _Stored(columns, shared, grams, filtered.parts)
+    candidates = iter(filtered.parts.items())
+    while batch := tuple(islice(candidates, _BATCH)):
+        start, stop = batch[0][1].start, batch[-1][1].stop
+        white = whitening.of_filtered(filtered.columns[..., start:stop])
+        shared[:, start:stop] = left.T @ white
+        for candidate, part in batch:
+            mine = white[:, part.start - start : part.stop - start].astype(float)
+            grams[candidate] = mine.T @ mine
+    return _Products(shared, grams)
 
 
-def _places(stored: tuple[_Stored, ...]) -> Iterator[Place]:
-    for t, one in enumerate(stored):
+def _places(filtered: tuple[_Filtered, ...]) -> Iterator[Place]:
+    for t, one in enumerate(filtered):
         for candidate in one.parts:
             yield Place(candidate, (t,))
-    for candidate in dict.fromkeys(c for one in stored for c in one.parts):
-        holding = tuple(t for t, one in enumerate(stored) if candidate in one.parts)
+    for candidate in dict.fromkeys(c for one in filtered for c in one.parts):
+        holding = tuple(t for t, one in enumerate(filtered) if candidate in one.parts)
         if candidate.effect.lasts and len(holding) > 1:
             yield Place(candidate, holding)
 
 
 def _batches(
-    evidence: Evidence, stored: tuple[_Stored, ...], places: Sequence[Place]
+    evidence: Evidence,
+    filtered: tuple[_Filtered, ...],
+    products: tuple[_Products, ...],
+    places: Sequence[Place],
 ) -> Iterator[_Batch]:
     numbers: dict[int, list[int]] = {}
     for number, place in enumerate(places):
-        part = stored[place.trials[0]].parts[place.candidate]
+        part = filtered[place.trials[0]].parts[place.candidate]
         numbers.setdefault(part.stop - part.start, []).append(number)
     for width, mine in numbers.items():
         members = [places[k] for k in mine]
-        columns = tuple(_columns_of(t, one, members, width) for t, one in enumerate(stored))
-        information = np.stack([_information(evidence, stored, place) for place in members])
+        columns = tuple(_columns_of(t, one, members, width) for t, one in enumerate(filtered))
+        found = (_information(evidence, filtered, products, place) for place in members)
+        information = np.stack(list(found))
         yield _Batch(np.array(mine), information, columns)
 
 
-def _columns_of(trial: int, one: _Stored, members: Sequence[Place], width: int) -> np.ndarray:
+def _columns_of(trial: int, one: _Filtered, members: Sequence[Place], width: int) -> np.ndarray:
     """(n, k) which of a trial's signatures belong to places, -1 for none."""
     columns = np.full((len(members), width), -1)
     for k, place in enumerate(members):
@@ -201,13 +221,23 @@ def _columns_of(trial: int, one: _Stored, members: Sequence[Place], width: int) 
     return columns
 
 
-def _information(evidence: Evidence, stored: tuple[_Stored, ...], place: Place) -> np.ndarray:
+def _information(
+    evidence: Evidence,
+    filtered: tuple[_Filtered, ...],
+    products: tuple[_Products, ...],
+    place: Place,
+) -> np.ndarray:
     """(k, k) Gram matrix less what the trials' shared parameters take."""
-    parts = [(stored[t], stored[t].parts[place.candidate]) for t in place.trials]
-    gram = np.sum([one.grams[place.candidate] for one, _ in parts], axis=0)
-    shared = np.sum([one.shared[:, part] for one, part in parts], axis=0)
+    grams = [products[t].grams[place.candidate] for t in place.trials]
+    parts = [products[t].shared[:, filtered[t].parts[place.candidate]] for t in place.trials]
+    shared = np.sum(parts, axis=0)
     kept = 1 - (1 - evidence.shrink) ** 2
-    return gram - shared.T @ (kept[:, None] * shared)
+    return np.sum(grams, axis=0) - shared.T @ (kept[:, None] * shared)
+
+
+def _flat(courses: np.ndarray) -> np.ndarray:
+    """(6 n, k) of (n, 6, k)."""
+    return courses.reshape(6 * len(courses), courses.shape[2])
 
 
 def _diagonal(matrices: np.ndarray) -> np.ndarray:

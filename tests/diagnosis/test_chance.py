@@ -56,8 +56,7 @@ def test_no_cause_that_lasts_survives_the_flips():
     found = signatures()
     place = next(k for k, p in enumerate(found.places) if p.candidate.effect.name == "sync_offset")
     trial = found.places[place].trials[0]
-    part = found.stored[trial].parts[found.places[place].candidate]
-    column = found.stored[trial].columns[:, part].astype(float)
+    column = found.white(trial, found.places[place].candidate)
     cause = found.evidence.white({trial: column})[:, 0]
     noise = np.random.default_rng(3).normal(size=len(cause))
     residual = noise + 25 * cause / np.linalg.norm(cause)

@@ -103,9 +103,4 @@ def test_in_other_noise_they_are_whitened_anew():
 
 def _stored_column(found: Signatures, k: int) -> np.ndarray:
     place = found.places[k]
-    return found.evidence.white(
-        {
-            t: found.stored[t].columns[:, found.stored[t].parts[place.candidate]].astype(float)
-            for t in place.trials
-        }
-    )
+    return found.evidence.white({t: found.white(t, place.candidate) for t in place.trials})

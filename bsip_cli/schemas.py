@@ -502,7 +502,12 @@ SCHEMAS = {
                 _text("target", "where it would sit"),
                 _text("parameter", "name of the number"),
                 _text("unit", "of the limit"),
-                Column("limit", "float", "as unit", "size that is found in 95 of 100 recordings"),
+                Column(
+                    "limit",
+                    "float",
+                    "as unit",
+                    "size that is found in 95 of 100 recordings; inf where no possible one is",
+                ),
                 _text("trials", "recordings that would show it"),
             ),
         ),

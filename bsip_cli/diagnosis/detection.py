@@ -13,11 +13,16 @@ from bsip_cli.diagnosis.selection import ALPHA, WORTH, Selection
 from bsip_cli.diagnosis.signatures import Place
 
 _SURE = 1.645  # standard deviations: found in 95 of 100 recordings like these
+_TOLD = (
+    1e-5  # of what the likeliest combination of an effect's parameters is told: less is rounding
+)
+_ALONE = 1e-3  # part of a parameter, squared, that lies in what is not told
 
 
 @dataclass(frozen=True)
 class Limit:
-    """Size of one parameter, the effect's others free, that would have been found."""
+    """Size of one parameter, the effect's others free, that would have been found; infinite where
+    no possible one would."""
 
     place: Place
     parameter: str
@@ -40,15 +45,25 @@ def limits_of(selection: Selection) -> Iterator[Limit]:
         if effect.name == UNEXPLAINED:
             continue
         scene = signatures.evidence.trials[place.trials[0]].scene
-        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(information, hermitian=True)), 0.0))
         rows = sum(len(signatures.evidence.trials[t].residual) for t in place.trials)
         least = max(last.limit(place.trials, ALPHA), WORTH * rows / 2)
-        for parameter, sd in zip(place.candidate.free(scene), spread, strict=True):
+        for parameter, sd in zip(place.candidate.free(scene), _spreads(information), strict=True):
             needed = max(sd * (np.sqrt(2 * least) + _SURE), NEGLIGIBLE)
             size = max(needed * parameter.typical, effect.least_named.get(parameter.name, 0.0))
+            size = size if size < parameter.most else np.inf
             limit = Limit(place, parameter.name, parameter.unit, size)
             key = (effect.name, place.candidate.target, place.trials, parameter.name)
             # Of the moments, frequencies and windows, the one where it shows best.
             if key not in found or limit.size < found[key].size:
                 found[key] = limit
     yield from found.values()
+
+
+def _spreads(information: np.ndarray) -> np.ndarray:
+    """(k,) standard deviations of an effect's sizes, infinite where the motion does not tell them:
+    a hinge hides a shift along its axis."""
+    squares, directions = np.linalg.eigh(information)
+    told = squares > _TOLD * max(squares[-1], 1.0)
+    spread = np.sqrt((directions[:, told] ** 2 / squares[told]).sum(axis=1))
+    hidden = (directions[:, ~told] ** 2).sum(axis=1) > _ALONE
+    return np.where(hidden, np.inf, spread)

@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import solve_toeplitz
+from scipy.linalg import eigh, solve_toeplitz
 from scipy.ndimage import median_filter
 
 from bsip_cli.dynamics.lowpass import lowpass_operator
@@ -29,6 +29,7 @@ _ORDER = 4  # of the autoregression
 _SMOOTH_HZ = 0.75  # half-width of the median over the spectrum
 _ROUNDS = 3
 _FLOOR = 1e-6  # of the noise's power, taken for white
+_MATTERS = 1e-3  # by which a direction is shrunk, at least
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,8 @@ def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
 @dataclass(frozen=True)
 class Whitening:
     """spread (n, 6) of the noise, recursion (6, p) of its autoregression, and of the whitened
-    nuisances N the left singular vectors (6 n, m) and by how much each is shrunk (m,)."""
+    nuisances N the left singular vectors (6 n, m) that matter and by how much each is shrunk (m,).
+    """
 
     filter: Filter
     spread: np.ndarray
@@ -205,8 +207,19 @@ def _whitening(filtered: Filtered, beside: np.ndarray, floor: float) -> Whitenin
         innovations = _innovations((remaining / spread)[..., None], recursion, filter_)
         spread = spread * innovations.reshape(-1, 6).std(axis=0)
         known = _innovations(nuisances / spread[..., None], recursion, filter_)
-    left, sizes, _ = np.linalg.svd(known[:, : filtered.own.shape[2]], full_matrices=False)
-    return Whitening(filter_, spread, recursion, left, 1 - 1 / np.sqrt(1 + sizes**2))
+    return Whitening(filter_, spread, recursion, *shrunk(known[:, : filtered.own.shape[2]]))
+
+
+def shrunk(columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of columns A (R, m) the left singular vectors (R, p) that (1 + A A^T)^-1/2 shrinks, and by
+    how much (p,).
+
+    By the small matrix A^T A: what its rounding spoils is hardly shrunk, and left out.
+    """
+    squares, right = eigh(columns.T @ columns)
+    shrink = 1 - 1 / np.sqrt(1 + np.maximum(squares, 0.0))
+    matter = shrink > _MATTERS
+    return columns @ right[:, matter] / np.sqrt(squares[matter]), shrink[matter]
 
 
 def _course(residual: np.ndarray, level: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.effects.effect import Effect
 from bsip_cli.statistics.chi_square import minus_log_p
 
-_RIDGE = 1e-9
+_RIDGE = 1e-6  # of the information: as much is rounding
 _BATCH = 60  # candidates at a time
 
 

@@ -8,6 +8,8 @@ for an effect.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bsip_cli.body.person import Person
@@ -15,6 +17,7 @@ from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.effects.scene import Scene
 
 SKIN_HZ = 8.0
+_FRAMES_AT_ONCE = 200_000  # of all draws together: bounds the memory
 
 
 def skin_draws(
@@ -24,9 +27,15 @@ def skin_draws(
 
     marker_rms_m (m,) : how far each marker slides, root mean square.
     """
-    features = joint_angles(scene.person.skeleton, scene.q)
-    errors = _marker_errors(scene, features, marker_rms_m, count, rng)
-    return scene.response.of(scene.pose_response.of(errors))
+    nearby = _nearby(scene)
+    mixing = [rng.normal(size=(3, angles.shape[1], count)) for angles in nearby]
+    at_once = max(1, _FRAMES_AT_ONCE // len(scene.q))
+    parts = []
+    for first in range(0, count, at_once):
+        some = [one[..., first : first + at_once] for one in mixing]
+        errors = _marker_errors(scene, nearby, some, marker_rms_m)
+        parts.append(scene.response.of(scene.pose_response.of(errors)))
+    return np.concatenate(parts, axis=2)
 
 
 def skin_inertia(scene: Scene) -> np.ndarray:
@@ -46,16 +55,30 @@ def skin_inertia(scene: Scene) -> np.ndarray:
     return scene.response.of(np.concatenate(columns, axis=2))
 
 
-def _marker_errors(scene, features, marker_rms_m, count, rng) -> np.ndarray:
-    """(N, m, 3, count) [m] in the world."""
-    person, rotation = scene.person, scene.motion.rotation
-    errors = np.empty((len(scene.q), len(person.markers), 3, count))
-    for k, segment in enumerate(person.marker_segments):
-        nearby = np.concatenate([features[i] for i in beside(person, int(segment))], axis=1)
+def _nearby(scene: Scene) -> list[np.ndarray]:
+    """(N, j) of each marker: angles of the joints at its segment, of variance 1 together."""
+    features = joint_angles(scene.person.skeleton, scene.q)
+    found = []
+    for segment in scene.person.marker_segments:
+        angles = [features[i] for i in beside(scene.person, int(segment))]
+        nearby = np.concatenate(angles, axis=1)
         scale = np.sqrt((nearby**2).sum(axis=1).mean())
-        mixing = rng.normal(size=(3, nearby.shape[1], count))
-        local = np.einsum("fj,xjc->fxc", nearby / max(scale, 1e-9), mixing)
-        errors[:, k] = marker_rms_m[k] * (rotation[:, segment] @ local)
+        found.append(nearby / max(scale, 1e-9))
+    return found
+
+
+def _marker_errors(
+    scene: Scene,
+    nearby: Sequence[np.ndarray],
+    mixing: Sequence[np.ndarray],
+    marker_rms_m: np.ndarray,
+) -> np.ndarray:
+    """(N, m, 3, k) [m] in the world, of k draws: mixing (3, j, k) of each marker."""
+    rotation, draws = scene.motion.rotation, mixing[0].shape[2]
+    errors = np.empty((len(scene.q), len(mixing), 3, draws))
+    for m, segment in enumerate(scene.person.marker_segments):
+        local = np.einsum("fj,xjc->fxc", nearby[m], mixing[m])
+        errors[:, m] = marker_rms_m[m] * (rotation[:, segment] @ local)
     return errors
 
 

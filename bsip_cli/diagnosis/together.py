@@ -12,11 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.diagnosis.evidence import TrialEvidence
+from bsip_cli.diagnosis.evidence import TrialEvidence, shrunk
 
 BLOCK_S = 1.0  # stretches of time that stand for independent ones
 _CLIP = 4.0  # standard deviations: a contact's edge must not stand for a minute of movement
-_MATTERS = 1e-3  # by which a direction is shrunk, at least
 
 
 @dataclass(frozen=True)
@@ -79,10 +78,7 @@ class Evidence:
 def together(trials: tuple[TrialEvidence, ...]) -> Evidence:
     """Join the evidence of trials that share their inertial parameters."""
     shared = np.concatenate([one.shared for one in trials])
-    left, sizes, _ = np.linalg.svd(shared, full_matrices=False)
-    shrink = 1 - 1 / np.sqrt(1 + sizes**2)
-    matter = shrink > _MATTERS
-    left, shrink = left[:, matter], shrink[matter]
+    left, shrink = shrunk(shared)
     residual = np.concatenate([one.residual for one in trials])
     residual = residual - left @ (shrink * (left.T @ residual))
     return Evidence(trials, left, shrink, residual)

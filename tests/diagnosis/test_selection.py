@@ -320,6 +320,18 @@ def in_typical_sizes(selection: Selection) -> dict[tuple[str, str, str], float]:
     return sizes
 
 
+def test_a_shift_along_a_hinge_would_not_be_found():
+    evidence = all_of(noisy(part_of_moving(0, 8), 2))
+    signatures = signatures_of(evidence, [EFFECTS["joint_centre"]])
+    found = limits(select(signatures, np.random.default_rng(0)))
+    sizes = {
+        joint: [found["joint_centre", joint, f"shift_{axis}"].size for axis in "xyz"]
+        for joint in ("knee_l", "hip_l")
+    }
+    assert sizes["knee_l"][2] == np.inf
+    assert np.isfinite(sizes["hip_l"]).all()
+
+
 def test_longer_recordings_show_smaller_causes():
     """Down to what is too small to matter; least where the parameters do much the same."""
     short, long = (

@@ -1,8 +1,9 @@
 """Participants per hour: `bsip run` for 1 to 12 people in one and in two processes.
 
-    python benchmarks/scaling.py [--participants 1 4 12] [--sequence-s 120]
+    python benchmarks/scaling.py [--participants 1 4 12] [--sequence-s 30]
 
-Both take turns on the same recordings; the clock counts, so nothing else should run.
+A static trial and a sequence each. Both take turns on the same recordings; the clock counts, so
+nothing else should run.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import shutil
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from measure import machine, markdown
@@ -35,13 +37,14 @@ def measured(study: Path, out: Path, jobs: int) -> tuple[float, float, float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--participants", type=int, nargs="+", default=[1, 2, 4, 8, 12])
-    parser.add_argument("--sequence-s", type=float, default=120.0)
+    parser.add_argument("--sequence-s", type=float, default=30.0)
     arguments = parser.parse_args()
     rows = []
     with tempfile.TemporaryDirectory() as name:
         for n in arguments.participants:
             study, out = Path(name, f"study{n}"), Path(name, f"out{n}")
-            simulate_study(study, study_options(arguments.sequence_s, SEED, participants=n))
+            options = study_options(arguments.sequence_s, SEED, participants=n)
+            simulate_study(study, replace(options, tasks=("static", "sequence")))
             one, two = (measured(study, out, jobs) for jobs in JOBS)
             per_hour = [n * 3600.0 / clock_s for clock_s, _, _ in (one, two)]
             rows.append(

@@ -33,10 +33,13 @@ def rivals_of(one: Round) -> tuple[Tried, ...]:
 
 
 def _is_rival(evidence: Evidence, kept: Tried, other: Tried) -> bool:
+    """What is another one in every trial is compared where it is, though a lasting cause may gain
+    in more of them."""
     if _explained(evidence, kept, other) > ALIKE:
         return True
-    either = kept.gain.concerned | other.gain.concerned
-    apart = (kept.gain.blocks - other.gain.blocks)[either]
+    lasts = kept.explanation.effect.lasts
+    where = kept.gain.concerned | (other.gain.concerned & lasts)
+    apart = (kept.gain.blocks - other.gain.blocks)[where]
     return float(apart.sum()) < standard_error(apart)
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice, product
 
 import numpy as np
 
@@ -32,6 +33,10 @@ NAMED_AT = 0.95
 # What a large cause leaves behind, since no model of it is exact, is no other cause.
 LEFTOVER = 0.005  # of the squared residual that earlier causes took from the same trials
 AGAIN = 1.25  # how much more an effect counts that another trial shows already
+
+
+Refitted = tuple[Explanation, Fit, float]
+"""A candidate in full, the fit with it, and its score."""
 
 
 @dataclass(frozen=True)
@@ -115,6 +120,7 @@ def _round(
     evidence = signatures.evidence
     rough = _chance(signatures, before, rng)
     tried = _tried(signatures, before, open_trials, rough)
+    tried += _elsewhere(signatures, before, tried)
     chance = _chance(signatures, max(tried, key=lambda t: t[2])[1] if tried else before, rng)
     judged = [_judged(evidence, before, *one, chance) for one in tried]
     while _kept(judged, before) is None and (in_vain := _in_vain(judged) & open_trials):
@@ -127,13 +133,13 @@ def _round(
 
 def _tried(
     signatures: Signatures, before: Fit, open_trials: set[int], rough: Chance
-) -> list[tuple[Explanation, Fit, float]]:
-    """The best candidates, refitted in full: cause, fit with it, score.
+) -> list[Refitted]:
+    """The best candidates, refitted in full.
 
     A few of them whatever they are; more only where chance may be left behind.
     """
     scores, sizes = signatures.scores(before.residual[:, None], before.tangent)
-    tried: list[tuple[Explanation, Fit, float]] = []
+    tried: list[Refitted] = []
     ranked = _best_of_each(signatures, scores[:, 0], sizes, open_trials, before)
     for asked, k in enumerate(ranked):
         place, score = signatures.places[k], scores[k, 0]
@@ -145,6 +151,39 @@ def _tried(
         if one is not None:
             tried.append(one)
     return tried
+
+
+def _elsewhere(
+    signatures: Signatures, before: Fit, tried: Sequence[Refitted]
+) -> Iterator[Refitted]:
+    """What betters a lasting cause in one of its trials, in the others of them too: a clock that
+    jumps in every trial, at another moment each, passes for one that drifts in all."""
+    evidence = signatures.evidence
+    leader, fit, _ = max(tried, key=lambda one: one[2], default=(None, None, 0.0))
+    if leader is None or fit is None or not leader.effect.lasts:
+        return
+    known = {(one.effect, one.place.trials) for one, *_ in tried}
+    better = dict.fromkeys(
+        one.effect
+        for one, own, _ in tried
+        if not one.effect.lasts
+        and set(one.place.trials) <= set(leader.place.trials)
+        and _squares_in(evidence, own, one.place.trials)
+        < _squares_in(evidence, fit, one.place.trials)
+    )
+    scores, sizes = signatures.scores(before.residual[:, None], before.tangent)
+    for effect, t in product(better, leader.place.trials):
+        if (effect, (t,)) not in known:
+            ranked = _best_of_each(signatures, scores[:, 0], sizes, {t}, before)
+            mine = (k for k in ranked if signatures.places[k].candidate.effect is effect)
+            for k in islice(mine, 1):
+                one = _refitted(signatures, before, signatures.places[k], sizes[k], {t})
+                if one is not None:
+                    yield one
+
+
+def _squares_in(evidence: Evidence, fit: Fit, trials: Sequence[int]) -> float:
+    return sum(float((fit.residual[evidence.rows(t)] ** 2).sum()) for t in trials)
 
 
 def _chance(signatures: Signatures, best: Fit, rng: np.random.Generator) -> Chance:
@@ -236,7 +275,7 @@ def _start(evidence: Evidence, place: Place, sizes: np.ndarray) -> Explanation:
 
 def _refitted(
     signatures: Signatures, before: Fit, place: Place, sizes: np.ndarray, open_trials: set[int]
-) -> tuple[Explanation, Fit, float] | None:
+) -> Refitted | None:
     """In full, beside the causes found before; nothing if it turns out impossible.
 
     What lasts is tried in all trials too, and given up in those that do not support it, or

@@ -179,15 +179,31 @@ def test_an_elastic_from_the_wall_has_no_name():
     assert number_of(one, "stiffness").value == pytest.approx(100.0, abs=20.0)
 
 
-def test_a_clock_that_jumps_has_no_name():
-    scene = part_of_moving(0, 12)
-    jumped = late(scene, 0.03)
-    after = scene.times_s[:, None] >= 7.0
+def jumped(scene: Scene, delay_s: float, after_s: float) -> Scene:
+    """The forces come later from a moment on."""
+    after = scene.times_s[:, None] >= after_s
     plates = tuple(
         replace(one, wrench=np.where(after, other.wrench, one.wrench))
-        for one, other in zip(scene.plates, jumped.plates, strict=True)
+        for one, other in zip(scene.plates, late(scene, delay_s).plates, strict=True)
     )
-    (one,) = said_of(selection_of(noisy(replace(scene, plates=plates), 3)))
+    return replace(scene, plates=plates)
+
+
+def test_a_clock_that_jumps_in_every_trial_is_none_that_drifts():
+    """A drift shared by all trials explains more than the jump in any one of them."""
+    moments = {0: 4.3, 12: 7.7, 24: 6.0}
+    scenes = [
+        noisy(jumped(part_of_moving(first, 12), 0.06, moment), seed)
+        for seed, (first, moment) in enumerate(moments.items())
+    ]
+    found = said_of(selection_of(*scenes))
+    assert {one.effect for one in found} == {"unexplained"}
+    sizes = {one.trials: number_of(one, "jump").value for one in found}
+    assert sizes == {(name,): pytest.approx(0.06, abs=0.004) for name in "abc"}
+
+
+def test_a_clock_that_jumps_has_no_name():
+    (one,) = said_of(selection_of(noisy(jumped(part_of_moving(0, 12), 0.03, 7.0), 3)))
     assert one.effect == "unexplained" and "as if frames were lost" in one.sentence
     assert number_of(one, "jump").value == pytest.approx(0.03, abs=0.002)
     assert number_of(one, "from_time").value == pytest.approx(7.0, abs=0.3)

@@ -158,22 +158,26 @@ def _elsewhere(
 ) -> Iterator[Refitted]:
     """What betters a lasting cause in one of its trials, in the others of them too: a clock that
     jumps in every trial, at another moment each, passes for one that drifts in all."""
-    evidence = signatures.evidence
-    leader, fit, _ = max(tried, key=lambda one: one[2], default=(None, None, 0.0))
-    if leader is None or fit is None or not leader.effect.lasts:
+    if not tried:
         return
-    known = {(one.effect, one.place.trials) for one, *_ in tried}
-    better = dict.fromkeys(
-        one.effect
+    leader, fit, _ = max(tried, key=lambda one: one[2])
+    shared = leader.place.trials if leader.effect.lasts else ()
+    alone = [
+        (one.effect, t, own)
         for one, own, _ in tried
         if not one.effect.lasts
-        and set(one.place.trials) <= set(leader.place.trials)
-        and _squares_in(evidence, own, one.place.trials)
-        < _squares_in(evidence, fit, one.place.trials)
+        for t in one.place.trials
+    ]
+    evidence = signatures.evidence
+    better = dict.fromkeys(
+        effect
+        for effect, t, own in alone
+        if t in shared and _squares_in(evidence, own, t) < _squares_in(evidence, fit, t)
     )
+    known = {(effect, t) for effect, t, _ in alone}
     scores, sizes = signatures.scores(before.residual[:, None], before.tangent)
-    for effect, t in product(better, leader.place.trials):
-        if (effect, (t,)) not in known:
+    for effect, t in product(better, shared):
+        if (effect, t) not in known:
             ranked = _best_of_each(signatures, scores[:, 0], sizes, {t}, before)
             mine = (k for k in ranked if signatures.places[k].candidate.effect is effect)
             for k in islice(mine, 1):
@@ -182,8 +186,8 @@ def _elsewhere(
                     yield one
 
 
-def _squares_in(evidence: Evidence, fit: Fit, trials: Sequence[int]) -> float:
-    return sum(float((fit.residual[evidence.rows(t)] ** 2).sum()) for t in trials)
+def _squares_in(evidence: Evidence, fit: Fit, trial: int) -> float:
+    return float((fit.residual[evidence.rows(trial)] ** 2).sum())
 
 
 def _chance(signatures: Signatures, best: Fit, rng: np.random.Generator) -> Chance:

@@ -62,7 +62,7 @@ class WrenchResponse:
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(N, 3) x (N, 3, k)."""
-    return np.cross(a[:, :, None], b, axis=1)
+    return skew(a) @ b
 
 
 def wrench_response(

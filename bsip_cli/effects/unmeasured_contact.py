@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from bsip_cli.body.names import in_words
+from bsip_cli.dynamics.regressor import skew
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
@@ -57,13 +58,16 @@ class UnmeasuredContact(Effect):
         return np.array([values[4] / 2, values[4]])
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        force, middle, length = values[:3], values[3], values[4]
+        return self.tangent(scene, target, values) @ values[:3]
+
+    def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        """The change is linear in the force."""
+        middle, length = values[3], values[4]
         ramp = min(RAMP_S, length / 2)
         inside = length / 2 - np.abs(scene.times_s - middle)
         touching = np.clip(inside / ramp, 0.0, 1.0) / (1 - ramp / length)  # 1 on average
-        missing = -touching[:, None] * force
-        point = scene.once((self.name, target), lambda: _contact_m(scene, target))
-        return np.hstack([missing, np.cross(point, missing)])
+        missing = scene.once((self.name, target), lambda: _missing_wrenches(scene, target))
+        return touching[:, None, None] * missing
 
     def reported(
         self, scene: Scene, target: str, values: np.ndarray
@@ -119,6 +123,8 @@ def _unseen(scene: Scene, edge: float, ramp: float, backwards: bool = False) -> 
     return (first - ramp, min(last, first - ramp)) if hidden else (edge, edge)
 
 
-def _contact_m(scene: Scene, target: str) -> np.ndarray:
-    """(N, 3) the segment's centre of mass, world."""
-    return scene.point(target, scene.centre_of(target)).position_m
+def _missing_wrenches(scene: Scene, target: str) -> np.ndarray:
+    """(N, 6, 3) what the plates lack for a unit force on the segment's centre of mass."""
+    point = scene.point(target, scene.centre_of(target)).position_m
+    forces = np.broadcast_to(np.eye(3), (len(point), 3, 3))
+    return -np.concatenate([forces, skew(point)], axis=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.body.person import Person
+from bsip_cli.motion import kernel
 from bsip_cli.motion.inverse_kinematics import Tree, tree_of
 
 
@@ -32,19 +33,11 @@ def subtrees(person: Person) -> np.ndarray:
 
 
 def pose_columns(
-    person: Person, tree: Tree, R: np.ndarray, p: np.ndarray, model: np.ndarray, below: np.ndarray
+    tree: Tree, R: np.ndarray, p: np.ndarray, model: np.ndarray, below: np.ndarray
 ) -> np.ndarray:
     """(N, m, 3, nv) velocity of each marker for each unit velocity."""
     columns = np.zeros((*model.shape, tree.nv))
-    for i, kind in enumerate(person.skeleton.joint_types):
-        at, mine = tree.arrays.v_starts[i], below[i]
-        if kind == "free":
-            columns[:, mine, :, at : at + 3] = R[:, None, i]
-            at += 3
-        arm = model[:, mine] - p[:, None, i]
-        axes = R[:, i] if kind != "revolute" else (R[:, i] @ tree.arrays.axes[i])[..., None]
-        for k in range(axes.shape[2]):
-            columns[..., at + k][:, mine] = np.cross(axes[:, None, :, k], arm)
+    kernel.marker_columns(R, p, model, tree.arrays, below, columns)
     return columns
 
 
@@ -55,7 +48,7 @@ def coordinate_covariance(person: Person, q: np.ndarray, prior_rad: float) -> np
     """
     tree = tree_of(person)
     R, p = tree.forward(q)
-    columns = pose_columns(person, tree, R, p, model_markers(person, R, p), subtrees(person))
+    columns = pose_columns(tree, R, p, model_markers(person, R, p), subtrees(person))
     columns *= np.sqrt(person.marker_weights)[:, None, None]
     flat = columns.reshape(len(q), -1, tree.nv)
     information = np.einsum("fki,fkj->fij", flat, flat, optimize=True)

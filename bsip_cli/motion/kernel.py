@@ -462,3 +462,21 @@ def forward_frames(q, tree, R, p):
     """Fill R (N, n, 3, 3) and p (N, n, 3) for q (N, nq)."""
     for frame in range(q.shape[0]):
         forward(q[frame], tree, R[frame], p[frame])
+
+
+@njit(cache=True)
+def marker_columns(R, p, markers, tree, below, columns):
+    """Fill columns (N, m, 3, nv) with the velocity of each marker (N, m, 3) for each unit velocity
+    where it hangs on that joint: below (n, m)."""
+    nv = tree.v_segments.size
+    d, w, x, turned = np.empty((nv, 3)), np.empty((nv, 3)), np.empty(3), np.empty(3)
+    for frame in range(markers.shape[0]):
+        _columns(R[frame], p[frame], tree, d, w)
+        for m in range(markers.shape[1]):
+            for j in range(3):
+                x[j] = markers[frame, m, j] - p[frame, 0, j]
+            for k in range(nv):
+                if below[tree.v_segments[k], m]:
+                    _cross(w[k], x, turned)
+                    for j in range(3):
+                        columns[frame, m, j, k] = d[k, j] + turned[j]

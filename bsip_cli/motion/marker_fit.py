@@ -130,7 +130,7 @@ def _response(
     distance = np.linalg.norm(residual_m, axis=2)
     frames = np.unique(np.linspace(0, len(R) - 1, _RESPONSE_FRAMES).astype(int))
     tree, m = tree_of(person), len(person.markers)
-    columns = pose_columns(person, tree, R[frames], p[frames], model[frames], subtrees(person))
+    columns = pose_columns(tree, R[frames], p[frames], model[frames], subtrees(person))
     turns = R[frames][:, person.marker_segments]
     columns = np.einsum("fmji,fmjv->fmiv", turns, columns).reshape(len(frames), 3 * m, tree.nv)
     total, seen_total = np.zeros((3 * m, 3 * m)), np.zeros(m)

@@ -98,7 +98,7 @@ def _columns(person: Person, q: np.ndarray) -> Iterator[tuple[slice, np.ndarray,
     for start in range(0, len(q), _BLOCK):
         part = slice(start, start + _BLOCK)
         R, p = tree.forward(q[part])
-        columns = pose_columns(person, tree, R, p, model_markers(person, R, p), below)
+        columns = pose_columns(tree, R, p, model_markers(person, R, p), below)
         yield part, columns, R[:, person.marker_segments]
 
 

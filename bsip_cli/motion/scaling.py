@@ -270,7 +270,7 @@ def _reduced_equations(
     root = np.sqrt(_marker_weights(poses, person, options, ik))[..., None]
     residual = np.where(root > 0, (markers_m - model) * root, 0.0)
     below = subtrees(person)
-    by_pose = pose_columns(person, tree, R, p, model, below) * root[..., None]
+    by_pose = pose_columns(tree, R, p, model, below) * root[..., None]
     by_parameter = (
         np.stack(
             [_column(parameter, person, R, p, model, below) for parameter in parameters], axis=-1

@@ -50,6 +50,8 @@ def run(unit: Unit) -> None:
     trials = tuple(one.evidence for one in looked_at if one.evidence is not None)
     told = (*(f for one in looked_at for f in one.told), *_standing(unit, person, prior))
     if trials:
+        for sentence in filter(None, (one.left_out for one in looked_at)):
+            unit.warn(sentence)
         proven = [cause for one in looked_at for cause in one.causes]
         _write(unit, *_asked(unit, trials, told, proven))
         return
@@ -91,12 +93,13 @@ def _write(unit: Unit, diagnosis: pd.DataFrame, limits: pd.DataFrame, facts: dic
 
 @dataclass(frozen=True)
 class LookedAt:
-    """A moving trial: its evidence, if there is enough to ask; what it tells by itself; and of
-    that the causes in full that the forces show too."""
+    """A moving trial: its evidence, if there is enough to ask; what it tells by itself; of that the
+    causes in full that the forces show too; or why it is left out."""
 
     evidence: TrialEvidence | None = None
     told: tuple[Finding, ...] = ()
     causes: tuple[dict, ...] = ()
+    left_out: str = ""
 
 
 def moving_trials(unit: Unit, person: Person, prior: Prior) -> tuple[LookedAt, ...]:
@@ -113,8 +116,12 @@ def prior_of(unit: Unit, person: Person) -> Prior:
 
 def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial) -> LookedAt:
     scene = scene_of(unit, person, prior.phi, trial)
-    if scene.valid.sum() < _SHORTEST_S * scene.rate_hz:
-        return LookedAt()
+    measured_s = float(scene.valid.sum()) / scene.rate_hz
+    if measured_s < _SHORTEST_S:
+        return LookedAt(
+            left_out=f"{trial.stem}: has no part in the diagnosis: every contact is on a plate for "
+            f"{measured_s:.1f} s only, {_SHORTEST_S:g} s are needed"
+        )
     fewer = slow(scene)
     held = support_of(fewer)
     if held is not None:

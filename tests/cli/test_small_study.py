@@ -540,6 +540,17 @@ def test_warnings_are_told_and_kept(run, bsip):
     assert told.removeprefix("scale: ") in kept
 
 
+def test_trials_too_short_to_diagnose_are_named(run, monkeypatch):
+    """The squat has 3 s, not all of them valid; were 5 needed, the sequence alone would do."""
+    monkeypatch.setattr("bsip_cli.stages.diagnose._SHORTEST_S", 5.0)
+    run.path("diagnosis").unlink()
+    outcome = run.perform("diagnose")
+    assert outcome.state == "done"
+    (told,) = [one for one in outcome.sentences if "has no part in the diagnosis" in one]
+    assert told.startswith(f"sub-01_{TRIALS[1]}: ")
+    assert told.endswith("on a plate for 2.8 s only, 5 s are needed")
+
+
 def test_exchanged_labels_are_put_right_before_the_poses(run):
     """The knee's markers bear each other's labels for a second: as if nothing had been."""
     stem = f"sub-01_{TRIALS[1]}"

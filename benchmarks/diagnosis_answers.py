@@ -56,7 +56,8 @@ class Answer:
     the injected cause as the diagnosis should print it.
 
     swaps : pairs of labels that ``ik`` put right. gains : per component what ``extend`` gained on
-    data held out, with its interval [%]. said : warnings of the stages.
+    data held out, with its interval [%]. limits : by effect, target and parameter (parted by bars)
+    the least size that some trial would show. said : warnings of the stages.
     """
 
     refused: str = ""
@@ -66,6 +67,7 @@ class Answer:
     swaps: tuple[str, ...] = ()
     gains: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     balances: tuple[Balance, ...] = ()
+    limits: dict[str, float] = field(default_factory=dict)
     said: tuple[str, ...] = ()
 
     @classmethod
@@ -77,6 +79,10 @@ class Answer:
         for name in ("swaps", "said"):
             others[name] = tuple(stored[name])
         return cls(**{**stored, **others})
+
+    def limit(self, effect: str, target: str, parameter: str) -> float:
+        """Least size that would be seen; NaN where that is not stated."""
+        return self.limits.get(f"{effect}|{target}|{parameter}", float("nan"))
 
     def mean_gain_percent(self) -> float:
         """Mean of the gains of the six components; NaN where nothing was extended."""
@@ -107,6 +113,7 @@ def answer_of(folder: Path, cpu_s: float, said: list[str]) -> Answer:
         swaps=_swaps(folder),
         gains=_gains(folder / f"{folder.name}_gain.parquet"),
         balances=_balances(folder),
+        limits=_limits(folder / f"{folder.name}_detection.parquet"),
         said=tuple(said),
     )
 
@@ -155,6 +162,12 @@ def _gains(file: Path) -> dict[str, tuple[float, float, float]]:
         str(name): (float(a), float(b), float(c))
         for name, (a, b, c) in zip(table["component"], numbers, strict=True)
     }
+
+
+def _limits(file: Path) -> dict[str, float]:
+    table = pd.read_parquet(file)
+    least = table.groupby(["effect", "target", "parameter"])["limit"].min()
+    return {"|".join(key): float(limit) for key, limit in least.items()}
 
 
 def _balances(folder: Path) -> tuple[Balance, ...]:

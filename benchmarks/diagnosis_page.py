@@ -9,6 +9,7 @@ from diagnosis_answers import COMPONENTS, Answer, Balance, Found
 from injected_causes import Cause
 from measure import markdown
 
+BELOW = "missed, below what is seen"
 RIGHT, IN_CLASS, ALIKE = "right name", "right class", "named as what looks alike"
 ELSEWHERE = "right effect, other place"
 PUT_RIGHT, MISSED, WRONG, REFUSED = "put right by ik", "missed", "another name", "not possible"
@@ -120,14 +121,18 @@ def injected_table(before: Answer, answers: Mapping[str, Answer], causes: Sequen
         for cause in causes
         if cause.words in answers
     ]
-    header = ["injected", "answer", "as", "size found (95 % interval)", "beside it", "gone"]
+    header = ["injected", "seen from", "answer", "as", "size found (95 % interval)"]
+    header += ["beside it", "gone"]
     return markdown([*header, "mean held-out gain by `extend` [%]"], rows)
 
 
 def _row(cause: Cause, before: Answer, after: Answer) -> list[str]:
     if after.refused:
-        return [REFUSED, after.refused, "", "", "", ""]
+        return ["", REFUSED, after.refused, "", "", "", ""]
     verdict, one = verdict_of(cause, before, after)
+    seen_from = seen_from_of(cause, before, after.place)
+    if verdict == MISSED and seen_from > abs(cause.size * cause.parameter.factor):
+        verdict = BELOW
     stood = {found.key for found in before.found}
     now = {found.key for found in after.found}
     beside = [
@@ -136,6 +141,7 @@ def _row(cause: Cause, before: Answer, after: Answer) -> list[str]:
     gone = [_called(x) for x in before.found if x.key not in now]
     gain = after.mean_gain_percent()
     return [
+        "" if np.isnan(seen_from) else f"{seen_from:.3g} {cause.parameter.unit}",
         verdict,
         _called(one) if one else "",
         _found_size(cause, before, one) if one and one.effect == cause.effect else "",
@@ -143,6 +149,12 @@ def _row(cause: Cause, before: Answer, after: Answer) -> list[str]:
         ", ".join(gone),
         "" if np.isnan(gain) else f"{gain:+.0f}",
     ]
+
+
+def seen_from_of(cause: Cause, before: Answer, place: str) -> float:
+    """The least size of the cause that the recordings as they are would show; NaN if not stated."""
+    limits = [before.limit(cause.effect, place, name) for name in cause.parameter.names]
+    return cause.parameter.factor * min(limits)
 
 
 def verdict_of(cause: Cause, before: Answer, after: Answer) -> tuple[str, Found | None]:
@@ -217,8 +229,10 @@ mean vertical one its weight, whatever its inertial parameters are.
 """
 
 _INJECTED = """`bsip inject` hides one cause in a copy: causes of the lab in all moving trials,
-those of a plate's vertical channel, of a marker and of a load in the first one only. "Right class":
-it is among causes that the recordings cannot tell apart. Sizes are less what the same cause had
-before; signs follow the plate's own axes, which may point down. "Beside it": other causes that are
-named, "(new)" if they were not before; "gone": what was named before and is not now.
+those of a plate's vertical channel, of a marker and of a load in the first one only. "Seen from":
+the size that `bsip diagnose` says it would find in 95 of 100 recordings like these as they are; it
+says none for markers. "Right class": it is among causes that the recordings cannot tell apart.
+Sizes are less what the same cause had before; signs follow the plate's own axes, which may point
+down. "Beside it": other causes that are named, "(new)" if they were not before; "gone": what was
+named before and is not now.
 """

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from diagnosis_answers import Answer, Found
 from diagnosis_page import (
     ALIKE,
+    BELOW,
     ELSEWHERE,
     IN_CLASS,
     MISSED,
@@ -63,6 +64,16 @@ def test_what_stood_there_before_counts_only_where_it_has_changed():
     assert verdict(SHIFT, before, moved) == RIGHT
     table = injected_table(before, {SHIFT.words: moved}, [SHIFT])
     assert "20 mm" in table and "beside 1 before" in table
+
+
+def test_a_miss_below_what_is_seen_is_told_from_others():
+    """Of the three shifts only that along x was injected, 20 mm of it."""
+    names = ("x", "y", "z")
+    for limit, told in ((0.03, BELOW), (0.005, MISSED)):
+        limits = {f"plate_translation|1|{name}": limit if name == "x" else 1e-3 for name in names}
+        table = injected_table(Answer(limits=limits), {SHIFT.words: answer()}, [SHIFT])
+        (row,) = (line for line in table.splitlines() if SHIFT.words in line)
+        assert row.split(" | ")[1:3] == [f"{1e3 * limit:.3g} mm", told]
 
 
 def test_what_looks_alike_and_labels_put_right():

@@ -7,6 +7,7 @@ means and standard deviations are given wherever they exist.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from math import nan, sqrt
 
@@ -157,10 +158,10 @@ def wilcoxon(x: ArrayLike, y: ArrayLike) -> WilcoxonTest:
         if x and y differ in shape.
     """
     x, y = finite_pairs(x, y)
-    difference = _without_rounding(x, y)
-    nonzero = difference[difference != 0.0]
-    n, m = len(difference), len(nonzero)
-    estimate = _hodges_lehmann(difference) if n else nan
+    whole, unit = _without_rounding(x, y)
+    nonzero = whole[whole != 0] * unit
+    n, m = len(whole), len(nonzero)
+    estimate = _hodges_lehmann(whole) * unit if n else nan
     if m < MINIMUM_FOR_WILCOXON:
         reason = (
             f"Wilcoxon's test needs {MINIMUM_FOR_WILCOXON} pairs that differ to reach p < 0.05, "
@@ -229,18 +230,37 @@ def _magnitude(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
     return float(np.max(np.abs(np.concatenate([x, y])), initial=0.0))
 
 
-def _without_rounding(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-    """x - y to twelve digits of the largest value: equal differences become exact ties."""
+def _without_rounding(
+    x: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], float]:
+    """x - y in whole units of the twelfth digit of the largest value, and that unit: equal
+    differences become exact ties."""
     magnitude = _magnitude(x, y)
-    if magnitude == 0.0:
-        return x - y
-    unit = 10.0 ** (np.floor(np.log10(magnitude)) - 11)
-    return np.round((x - y) / unit) * unit
+    unit = 10.0 ** (np.floor(np.log10(magnitude)) - 11) if magnitude else 1.0
+    return np.round((x - y) / unit).astype(np.int64), unit
 
 
-def _hodges_lehmann(difference: NDArray[np.float64]) -> float:
-    rows, columns = np.triu_indices(len(difference))
-    return float(np.median((difference[rows] + difference[columns]) / 2.0))
+def _hodges_lehmann(whole: NDArray[np.int64]) -> float:
+    """Median of the means of all pairs, each value with itself too.
+
+    The pairs are counted, not formed: those of a large cohort would fill the memory.
+    """
+    ordered = np.sort(whole)
+    count = len(ordered) * (len(ordered) + 1) // 2
+    middle = (_pair_sum(ordered, (count + 1) // 2), _pair_sum(ordered, count // 2 + 1))
+    return sum(middle) / 4.0
+
+
+def _pair_sum(ordered: NDArray[np.int64], number: int) -> int:
+    """The sum of a pair than which ``number - 1`` pairs have none that is larger."""
+    own = np.arange(len(ordered))
+
+    def pairs_up_to(total: int) -> int:
+        partners = np.searchsorted(ordered, total - ordered, side="right") - own
+        return int(np.maximum(partners, 0).sum())
+
+    sums = range(2 * int(ordered[0]), 2 * int(ordered[-1]) + 1)
+    return sums[bisect_left(sums, number, key=pairs_up_to)]
 
 
 def _signed_rank_p(nonzero: NDArray[np.float64], ranks: NDArray[np.float64]) -> float:

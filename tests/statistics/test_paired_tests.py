@@ -109,6 +109,23 @@ def test_depression_data():
     assert test.hodges_lehmann == pytest.approx(0.46, abs=0.005)
 
 
+@pytest.mark.parametrize("n", [1, 2, 3, 10, 57, 300])
+@pytest.mark.parametrize("digits", [0, 2, 12])
+def test_hodges_lehmann_is_the_median_of_all_pairs_means(n, digits):
+    """With ties (few digits) and without, an even and an odd number of pairs."""
+    rng = np.random.default_rng([n, digits])
+    x, y = np.round(rng.normal(1.0, 2.0, (2, n)), digits)
+    rows, columns = np.triu_indices(n)
+    means = ((x - y)[rows] + (x - y)[columns]) / 2
+    assert wilcoxon(x, y).hodges_lehmann == pytest.approx(np.median(means), abs=1e-10)
+
+
+def test_hodges_lehmann_of_a_large_cohort_forms_no_pairs():
+    """A hundred thousand values have five thousand million pairs."""
+    x = np.random.default_rng(4).standard_cauchy(100_000) + 3.0
+    assert wilcoxon(x, np.zeros(len(x))).hodges_lehmann == pytest.approx(3.0, abs=0.05)
+
+
 def test_ties_by_all_sign_flips():
     x = np.array([1.0, 1, 2, 2, 3, -1, 4, 5, 0])
     test = wilcoxon(x, np.zeros(9))

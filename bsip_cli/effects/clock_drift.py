@@ -8,6 +8,9 @@ from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.effect import Parameter
 from bsip_cli.effects.scene import Scene
 
+# Quartz keeps 100 ppm and 59.94 for 60 Hz is 1,000: clocks further apart are not two clocks.
+MOST = 0.003
+
 
 class ClockDrift(Delay):
     """The delay is zero where the trial begins and grows evenly."""
@@ -17,7 +20,7 @@ class ClockDrift(Delay):
     remedy = "hop at the beginning and at the end of a long recording"
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        return (Parameter("rate_error", "1", -0.02, 0.02, 3e-4),)
+        return (Parameter("rate_error", "1", -MOST, MOST, 3e-4),)
 
     def late_s(self, scene: Scene, values: np.ndarray) -> np.ndarray:
         return values[0] * (scene.times_s - scene.times_s[0])

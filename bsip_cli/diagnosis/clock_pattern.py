@@ -31,11 +31,13 @@ class ClockJump(Delay, Pattern):
         return values[0] * (scene.times_s >= values[1])
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        """Before and after it is seen what the forces are late by: else it is a delay."""
+        """Before and after it is seen what the forces are late by, else it is a delay; or nothing
+        of the time before is seen, since the person was not yet on a plate."""
         later = scene.times_s >= values[1]
         least = LEAST_S * scene.rate_hz
-        before, after = (scene.valid & side for side in (~later, later))
-        seen = min(before.sum(), after.sum()) >= least
+        before, after = ((scene.valid & side).sum() for side in (~later, later))
+        unseen = before == 0 and (~later).sum() >= least
+        seen = min(before, after) >= least or (unseen and after >= least)
         return super().possible(scene, target, values) and bool(seen)
 
     def sentence(self, target: str, values: np.ndarray) -> str:

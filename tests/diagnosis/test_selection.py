@@ -209,6 +209,22 @@ def test_a_clock_that_jumps_has_no_name():
     assert number_of(one, "from_time").value == pytest.approx(7.0, abs=0.3)
 
 
+def on_plates_from(scene: Scene, start_s: float) -> Scene:
+    """Before that the person is not yet on a plate."""
+    return replace(scene, valid=scene.valid & (scene.times_s >= start_s))
+
+
+def test_a_clock_that_has_jumped_before_anything_is_seen():
+    """Alone it is a delay; where another trial shows the jump, nobody knows which of the two."""
+    unseen = noisy(on_plates_from(jumped(part_of_moving(0, 12), 0.03, 3.0), 4.0), 3)
+    (alone,) = said_of(selection_of(unseen))
+    assert (alone.effect, alone.verdict) == ("sync_offset", "named")
+    found = said_of(selection_of(noisy(jumped(part_of_moving(12, 12), 0.03, 7.0), 4), unseen))
+    told = {(one.effect, one.trials, one.verdict) for one in found}
+    unknown = {(effect, ("b",), "ambiguous") for effect in ("unexplained", "sync_offset")}
+    assert told == {("unexplained", ("a",), "named"), *unknown}
+
+
 def test_a_fault_of_one_trial_is_not_put_on_the_other():
     first, second = part_of_moving(0, 8), part_of_moving(8, 8)
     zero = EFFECTS["plate_zero"]

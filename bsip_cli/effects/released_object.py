@@ -10,6 +10,7 @@ from bsip_cli.effects.scene import Scene
 
 STEP_S = 0.5
 SEEN_S = 1.0  # on either side of the release
+KNOWN_TO_KG = 0.03  # the arm that is relieved springs back, faster than smoothed markers follow
 
 
 class ReleasedObject(Effect):
@@ -26,7 +27,7 @@ class ReleasedObject(Effect):
         start, end = scene.times_s[0], scene.times_s[-1]
         moments = tuple(float(t) for t in np.arange(start + 2 * STEP_S, end - STEP_S, STEP_S))
         return (
-            Parameter("mass", "kg", 0.0, 20.0, 0.5),
+            Parameter("mass", "kg", 0.0, 20.0, 0.5, known_to=KNOWN_TO_KG),
             Parameter("release_time", "s", float(start), float(end), STEP_S, moments),
         )
 

@@ -10,7 +10,6 @@ from abc import abstractmethod
 
 import numpy as np
 
-from bsip_cli.dynamics.regressor import skew
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.plate_frame import CHANNELS
 from bsip_cli.effects.scene import Scene
@@ -38,5 +37,5 @@ def in_channel(scene: Scene, channel: str, course: np.ndarray) -> np.ndarray:
     wrench = np.zeros((len(course), 6))
     wrench[:, CHANNELS.index(channel)] = course
     place = np.append(scene.q[:, :2].mean(axis=0), 0.0)
-    wrench[:, 3:] += wrench[:, :3] @ skew(place[None])[0].T
+    wrench[:, 3:] += np.cross(place, wrench[:, :3])
     return wrench

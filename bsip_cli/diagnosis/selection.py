@@ -38,6 +38,9 @@ AGAIN = 1.25  # how much more an effect counts that another trial shows already
 Refitted = tuple[Explanation, Fit, float]
 """A candidate in full, the fit with it, and its score."""
 
+Scored = tuple[np.ndarray, list[np.ndarray]]
+"""Of all places in one round: their scores (K, 1) and likeliest sizes."""
+
 
 @dataclass(frozen=True)
 class Tried:
@@ -119,26 +122,27 @@ def _round(
     """Where the best is no cause, though chance hardly brings it, the other trials are asked."""
     evidence = signatures.evidence
     rough = _chance(signatures, before, rng)
-    tried = _tried(signatures, before, open_trials, rough)
-    tried += _elsewhere(signatures, before, tried)
+    scored = signatures.scores(before.residual[:, None], before.tangent)
+    tried = _tried(signatures, before, scored, open_trials, rough)
+    tried += _elsewhere(signatures, before, scored, tried)
     chance = _chance(signatures, max(tried, key=lambda t: t[2])[1] if tried else before, rng)
     judged = [_judged(evidence, before, *one, chance) for one in tried]
     while _kept(judged, before) is None and (in_vain := _in_vain(judged) & open_trials):
         open_trials = open_trials - in_vain
-        more = _tried(signatures, before, open_trials, rough)
+        more = _tried(signatures, before, scored, open_trials, rough)
         judged += [_judged(evidence, before, *one, chance) for one in more]
     judged.sort(key=lambda t: -t.score)
     return Round(evidence, tuple(judged), _kept(judged, before), chance)
 
 
 def _tried(
-    signatures: Signatures, before: Fit, open_trials: set[int], rough: Chance
+    signatures: Signatures, before: Fit, scored: Scored, open_trials: set[int], rough: Chance
 ) -> list[Refitted]:
     """The best candidates, refitted in full.
 
     A few of them whatever they are; more only where chance may be left behind.
     """
-    scores, sizes = signatures.scores(before.residual[:, None], before.tangent)
+    scores, sizes = scored
     tried: list[Refitted] = []
     ranked = _best_of_each(signatures, scores[:, 0], sizes, open_trials, before)
     for asked, k in enumerate(ranked):
@@ -154,7 +158,7 @@ def _tried(
 
 
 def _elsewhere(
-    signatures: Signatures, before: Fit, tried: Sequence[Refitted]
+    signatures: Signatures, before: Fit, scored: Scored, tried: Sequence[Refitted]
 ) -> Iterator[Refitted]:
     """What betters a lasting cause in one of its trials, in the others of them too: a clock that
     jumps in every trial, at another moment each, passes for one that drifts in all."""
@@ -175,7 +179,7 @@ def _elsewhere(
         if t in shared and _squares_in(evidence, own, t) < _squares_in(evidence, fit, t)
     )
     known = {(effect, t) for effect, t, _ in alone}
-    scores, sizes = signatures.scores(before.residual[:, None], before.tangent)
+    scores, sizes = scored
     for effect, t in product(better, shared):
         if (effect, t) not in known:
             ranked = _best_of_each(signatures, scores[:, 0], sizes, {t}, before)

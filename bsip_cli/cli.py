@@ -150,8 +150,13 @@ def _effect_options(command: Any) -> Any:
     type=click.IntRange(1),
     help="Number of the recordings: the same people move once more.",
 )
+@click.option(
+    "--plate-per-foot",
+    is_flag=True,
+    help="Two plates side by side, one under each foot, instead of one under both.",
+)
 @_effect_options
-def simulate(study, preset, participants, seed, sequence_s, tasks, run, **effects):
+def simulate(study, preset, **options):
     """Make a study of simulated people whose inertial parameters are known.
 
     With --effect, something is hidden in the recordings that a simulation would get wrong; the
@@ -159,7 +164,7 @@ def simulate(study, preset, participants, seed, sequence_s, tasks, run, **effect
     """
     from bsip_cli.simulate.command import simulate_command
 
-    simulate_command(study, preset, participants, seed, sequence_s, tasks=tasks, run=run, **effects)
+    simulate_command(study, preset, **options)
 
 
 @cli.command()

@@ -40,20 +40,20 @@ class Chance:
 
     def p_value(self, score: float, trials: tuple[int, ...]) -> float:
         """Family-wise: chance brings as much somewhere."""
-        group = _group(trials)
+        group = group_of(trials)
         own = gumbel_r.sf(score, self.location[group], self.scale[group])
         return float(min(1.0, own * len(self.location)))
 
     def limit(self, trials: tuple[int, ...], alpha: float) -> float:
         """The score whose p-value is alpha."""
-        group = _group(trials)
+        group = group_of(trials)
         part = alpha / len(self.location)
         return float(gumbel_r.isf(part, self.location[group], self.scale[group]))
 
 
 def chance_of(scores: np.ndarray, places: Sequence[Place]) -> Chance:
     """From the scores (K, FLIPS) of flipped residuals."""
-    groups = [_group(place.trials) for place in places]
+    groups = [group_of(place.trials) for place in places]
     location, scale = {}, {}
     for group in dict.fromkeys(groups):
         mine = np.array([one == group for one in groups])
@@ -63,5 +63,6 @@ def chance_of(scores: np.ndarray, places: Sequence[Place]) -> Chance:
     return Chance(location, scale)
 
 
-def _group(trials: tuple[int, ...]) -> tuple[int, ...]:
+def group_of(trials: tuple[int, ...]) -> tuple[int, ...]:
+    """A trial alone, or () for the trials together."""
     return trials if len(trials) == 1 else ()

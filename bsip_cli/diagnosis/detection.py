@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.diagnosis.chance import group_of
 from bsip_cli.diagnosis.explanation import NEGLIGIBLE
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.selection import ALPHA, WORTH, Selection
@@ -46,7 +47,8 @@ def limits_of(selection: Selection) -> Iterator[Limit]:
             continue
         scene = signatures.evidence.trials[place.trials[0]].scene
         rows = sum(len(signatures.evidence.trials[t].residual) for t in place.trials)
-        least = max(last.limit(place.trials, ALPHA), WORTH * rows / 2)
+        beyond = selection.background.get(group_of(place.trials), 0.0)
+        least = max(last.limit(place.trials, ALPHA), beyond, WORTH * rows / 2)
         for parameter, sd in zip(place.candidate.free(scene), _spreads(information), strict=True):
             needed = max(sd * (np.sqrt(2 * least) + _SURE), NEGLIGIBLE)
             size = max(needed * parameter.typical, effect.least_named.get(parameter.name, 0.0))

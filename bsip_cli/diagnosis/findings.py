@@ -10,6 +10,7 @@ import numpy as np
 
 from bsip_cli.diagnosis.explanation import Explanation
 from bsip_cli.diagnosis.intervals import drawn_explanations
+from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.rivals import rivals_of
 from bsip_cli.diagnosis.selection import ALPHA, Round, Selection, Tried
 from bsip_cli.diagnosis.together import Evidence
@@ -66,12 +67,39 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
         findings.append(_finding(evidence, cause, place, said_so, rng))
         for rival in rivals:
             findings.append(_finding(one.evidence, rival, -1, said_so, rng))
+    findings += _without_name(selection, {t for _, one, _ in kept for t in _trials(one)})
     for one in selection.rounds:
         for tried in one.tried:
             if _key(tried.explanation) not in said:
                 said.add(_key(tried.explanation))
                 findings.append(_rejected(evidence, tried))
     return tuple(findings)
+
+
+def _without_name(selection: Selection, told: set[int]) -> Iterator[Finding]:
+    """Trials of which nothing else is told, though a cause was found there that did not stand out:
+    what is wrong has no name."""
+    for one in selection.rounds:
+        for tried in one.tried:
+            if tried.is_drowned and told.isdisjoint(_trials(tried)):
+                yield _drowned(selection.signatures.evidence, tried)
+
+
+def _trials(tried: Tried) -> tuple[int, ...]:
+    return tried.explanation.place.trials
+
+
+def _drowned(evidence: Evidence, tried: Tried) -> Finding:
+    one = tried.explanation
+    percent = np.array(tried.gain.interval())
+    share, low, high = (float(x) for x in percent / 100)
+    sentence = (
+        "something without a name: no cause explains as much of it as remains beside all of them; "
+        f"the nearest is that {one.effect.sentence(one.target, one.values)}"
+    )
+    numbers = (Number("explained", "1", share, low, high),)
+    without_name = _with(evidence, tried, "named", "", numbers, sentence)
+    return replace(without_name, effect=UNEXPLAINED, target="")
 
 
 def _kept(evidence: Evidence, selection: Selection) -> Iterator[tuple[Round, Tried, int]]:
@@ -125,6 +153,8 @@ def _rejected(evidence: Evidence, tried: Tried) -> Finding:
         if tried.p_value > ALPHA
         else "it is no more than what a larger cause leaves behind"
         if tried.is_leftover
+        else "more than it explains remains without a cause"
+        if tried.is_drowned
         else "another cause explains it better"
         if tried.is_good
         else "on data held out it does not help, or hardly"

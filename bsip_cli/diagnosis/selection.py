@@ -9,7 +9,8 @@ from itertools import islice, product
 
 import numpy as np
 
-from bsip_cli.diagnosis.chance import Chance, chance_of, flipped
+from bsip_cli.diagnosis.background import Background, background_of, new_places
+from bsip_cli.diagnosis.chance import Chance, chance_of, flipped, group_of
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together, refined
 from bsip_cli.diagnosis.held_out import Gain, gain_of
 from bsip_cli.diagnosis.likely_noise import likely_columns, noise_beside_fit, with_likely_noise
@@ -46,7 +47,8 @@ Scored = tuple[np.ndarray, list[np.ndarray]]
 class Tried:
     """A candidate that was refitted in full, beside the causes found before it.
 
-    is_first : none of its trials holds one of them.
+    is_first : none of its trials holds one of them. is_drowned : in the end, more remains beside
+    all causes than it explains.
     """
 
     explanation: Explanation
@@ -56,13 +58,16 @@ class Tried:
     fit: Fit
     is_leftover: bool
     is_first: bool
+    is_drowned: bool = False
 
     @property
     def is_good(self) -> bool:
-        """Rarer by chance than ALPHA, better on what it has not seen, worth a name, and not what
-        is left over of a larger cause. What has no name, comes after another cause, or is not far
-        beyond chance, must be better for sure."""
-        if self.p_value > ALPHA or self.is_leftover or self.gain.percent < 100 * WORTH:
+        """Rarer by chance than ALPHA, better on what it has not seen, worth a name, not what is
+        left over of a larger cause, and more than what remains. What has no name, comes after
+        another cause, or is not far beyond chance, must be better for sure."""
+        if self.p_value > ALPHA or self.is_leftover or self.is_drowned:
+            return False
+        if self.gain.percent < 100 * WORTH:
             return False
         unnamed = self.explanation.effect.name == UNEXPLAINED
         doubtful = unnamed or not self.is_first or self.p_value > BEYOND_DOUBT
@@ -81,11 +86,15 @@ class Round:
 
 @dataclass(frozen=True)
 class Selection:
-    """All rounds, and everything kept fitted together, in the coordinates of the last noise."""
+    """All rounds, and everything kept fitted together, in the coordinates of the last noise.
+
+    background : what remains beside it.
+    """
 
     signatures: Signatures
     rounds: tuple[Round, ...]
     fit: Fit
+    background: Background
 
 
 def select(
@@ -103,10 +112,41 @@ def select(
         if one.kept is None:
             break
         found = one.kept.fit.explanations
-    last = fit_together(signatures.evidence, found)
+    return _standing_out(_fitted_in_the_end(signatures, tuple(rounds), found))
+
+
+def _fitted_in_the_end(
+    signatures: Signatures, rounds: tuple[Round, ...], found: tuple[Explanation, ...]
+) -> Selection:
+    fit = fit_together(signatures.evidence, found)
     if found:
-        signatures, last = noise_beside_fit(signatures, last)
-    return Selection(signatures, tuple(rounds), last)
+        signatures, fit = noise_beside_fit(signatures, fit)
+    return Selection(signatures, rounds, fit, background_of(signatures, fit))
+
+
+def _standing_out(selection: Selection) -> Selection:
+    """Without the causes, the weakest first, that explain less than remains beside all of them."""
+    shares = {
+        number: one.kept.score / selection.background[group_of(one.kept.explanation.place.trials)]
+        for number, one in enumerate(selection.rounds)
+        if one.kept is not None and one.chance is not None
+    }
+    weakest = min(shares, key=shares.__getitem__, default=None)
+    if weakest is None or shares[weakest] > 1:
+        return selection
+    kept = [number for number, one in enumerate(selection.rounds) if one.kept is not None]
+    explanations = zip(kept, selection.fit.explanations, strict=True)
+    found = tuple(one for number, one in explanations if number != weakest)
+    rounds = (
+        _drowned(one) if number == weakest else one for number, one in enumerate(selection.rounds)
+    )
+    return _standing_out(_fitted_in_the_end(selection.signatures, tuple(rounds), found))
+
+
+def _drowned(one: Round) -> Round:
+    """With what it kept as one of those that were only tried."""
+    tried = (replace(t, is_drowned=True) if t is one.kept else t for t in one.tried)
+    return replace(one, tried=tuple(tried), kept=None)
 
 
 def _open_trials(evidence: Evidence, found: tuple[Explanation, ...]) -> set[int]:
@@ -199,7 +239,8 @@ def _chance(signatures: Signatures, best: Fit, rng: np.random.Generator) -> Chan
     known = np.column_stack([best.tangent, likely_columns(signatures, best)])
     left = best.residual - known @ np.linalg.lstsq(known, best.residual, rcond=None)[0]
     scores, _ = signatures.scores(flipped(signatures.evidence, left, rng), known)
-    return chance_of(scores, signatures.places)
+    new = new_places(signatures, best)
+    return chance_of(scores[new], [signatures.places[k] for k in new])
 
 
 def _in_vain(judged: list[Tried]) -> set[int]:
@@ -257,14 +298,12 @@ def _best_of_each(
     An effect that does not last is another one in every trial.
     """
     seen = set()
-    known = {(e.effect, e.target, t) for e in before.explanations for t in e.place.trials}
-    for k in np.argsort(-scores):
+    new = np.array(new_places(signatures, before))
+    for k in new[np.argsort(-scores[new])]:
         place = signatures.places[k]
         if not open_trials.issuperset(place.trials):
             continue
         effect, target = place.candidate.effect, place.candidate.target
-        if any((effect, target, t) in known for t in place.trials):
-            continue
         key = (effect, target, () if effect.lasts else place.trials)
         if key in seen:
             continue

@@ -10,6 +10,8 @@ from bsip_cli.effects.scene import Scene
 
 # Feet deform where they press, and the height shows only where forces point sideways.
 KNOWN_TO_M = (0.0003, 0.0003, 0.002)
+# Far away is a plate that was moved; its height is off by the depth of its sensors, if by anything.
+MOST_M = (0.3, 0.3, 0.1)
 
 
 class PlateTranslation(Effect):
@@ -26,8 +28,8 @@ class PlateTranslation(Effect):
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         return tuple(
-            Parameter(axis, "m", -0.3, 0.3, 0.02, known_to=known)
-            for axis, known in zip("xyz", KNOWN_TO_M, strict=True)
+            Parameter(axis, "m", -most, most, 0.02, known_to=known)
+            for axis, most, known in zip("xyz", MOST_M, KNOWN_TO_M, strict=True)
         )
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:

@@ -32,6 +32,7 @@ def simulate_command(
     effect_tasks: Sequence[str] = (),
     tasks: Sequence[str] = (),
     run: int = 1,
+    plate_per_foot: bool = False,
 ) -> None:
     """Write a simulated study into a new or empty folder."""
     if study.exists() and any(study.iterdir()):
@@ -47,6 +48,9 @@ def simulate_command(
         options = replace(options, durations_s={**options.durations_s, "sequence": sequence_s})
     if tasks:
         options = replace(options, tasks=tuple(tasks))
+    if plate_per_foot:
+        laboratory = replace(options.laboratory, plate_per_foot=True)
+        options = replace(options, laboratory=laboratory)
     asked = pair_up(effects, sizes, targets)
     options = replace(options, run=run, effects=asked, effect_tasks=tuple(effect_tasks))
     simulate_study(study, options)

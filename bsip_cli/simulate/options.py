@@ -84,6 +84,8 @@ class Laboratory:
     facing_deg : heading of the walking direction from lab X, counter-clockwise.
     plates : 1, or 2: a second plate lies ahead of the first and stays unloaded
         unless a foot treads on it.
+    plate_per_foot : instead of the first plate two, left and right of its middle line; the feet
+        push against each other along the floor, as feet do.
     plate_depth_m : depth of the transducers' origin under the surface.
     """
 
@@ -91,6 +93,7 @@ class Laboratory:
     plate_centre_m: tuple[float, float] = (0.70, 0.40)
     facing_deg: float = 90.0
     plates: int = 1
+    plate_per_foot: bool = False
     plate_depth_m: float = 0.048
 
 

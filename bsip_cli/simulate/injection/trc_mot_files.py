@@ -155,13 +155,15 @@ def _instruments(
     even = np.abs(times - times[0] - step * np.arange(len(times))).max() < UNEVEN_SHARE * step
     if not even and ratio != 1:
         raise BadDataError("the frames' times are uneven", expected="even ones", file=file)
-    readings = np.stack([_about_origin(forces.values, each) for each in sets])
-    plate = SensingPlate(np.eye(3), np.zeros(3), np.zeros(3))
+    plates = tuple(_plate(forces.values, each) for each in sets)
+    readings = np.stack(
+        [_reading(forces.values, each, plate) for each, plate in zip(sets, plates, strict=True)]
+    )
     return Instruments(
         labels=tuple(labels),
         points_m=points,
         marker_hz=1.0 / step,
-        plates=(plate,) * len(sets),
+        plates=plates,
         readings=readings,
         analog_hz=ratio / step,
         up=_up(readings),
@@ -176,20 +178,31 @@ def _up(readings: np.ndarray) -> np.ndarray:
     return np.eye(3)[int(np.argmax(np.abs(force)))]
 
 
-def _about_origin(values: np.ndarray, each: ForceSet) -> np.ndarray:
-    """(N, 6) force and its moment about the origin."""
+def _plate(values: np.ndarray, each: ForceSet) -> SensingPlate:
+    """A plate whose sensor lies where the force acts in the mean: the file has no better place."""
+    load = np.linalg.norm(np.nan_to_num(values[:, each.force]), axis=1)
+    loaded = load > LOADED_N
+    if not loaded.any():
+        return SensingPlate(np.eye(3), np.zeros(3), np.zeros(3))
+    sensor = np.average(values[:, each.point][loaded], axis=0, weights=load[loaded])
+    return SensingPlate(np.eye(3), sensor, sensor)
+
+
+def _reading(values: np.ndarray, each: ForceSet, plate: SensingPlate) -> np.ndarray:
+    """(N, 6) force and its moment about the sensor."""
     force = values[:, each.force]
-    return np.hstack([force, np.cross(values[:, each.point], force) + values[:, each.torque]])
+    moment = np.cross(values[:, each.point], force) + values[:, each.torque]
+    return plate.reading(force, moment, np.zeros(3))
 
 
 def _with_reading(
-    values: np.ndarray, each: ForceSet, reading: np.ndarray, up: np.ndarray
+    values: np.ndarray, each: ForceSet, plate: SensingPlate, reading: np.ndarray, up: np.ndarray
 ) -> np.ndarray:
     """Nine columns (N, 9) for a reading (N, 6): the point moves in its plane.
 
     The torque keeps its horizontal parts; below LOADED_N the point stays where it was.
     """
-    force, moment = reading[:, :3], reading[:, 3:]
+    force, moment = plate.lab_wrench(reading, np.zeros(3))
     point, torque = values[:, each.point], values[:, each.torque]
     level = np.eye(3) - np.outer(up, up)
     upward = force @ up
@@ -221,9 +234,9 @@ def _new_trc(table: Table, before: Instruments, after: Instruments, scale: float
 def _new_mot(table: Table, sets: list[ForceSet], before: Instruments, after: Instruments) -> str:
     first = _first(before, after) * before.per_frame
     values = table.values[first : first + after.readings.shape[1]].copy()
-    for each, reading in zip(sets, after.readings, strict=True):
+    for each, plate, reading in zip(sets, after.plates, after.readings, strict=True):
         values[:, [*each.force, *each.point, *each.torque]] = _with_reading(
-            values, each, reading, after.up
+            values, each, plate, reading, after.up
         )
     head = [re.sub(r"(?i)^nRows=.*", f"nRows={len(values)}", line) for line in table.head]
     rows = ["\t".join(map(_number, row)) for row in values]

@@ -1,0 +1,103 @@
+"""A cause must explain more than what remains beside all causes."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from noisy_trial import all_of, late, noisy, part_of_moving, with_effect
+
+from bsip_cli.diagnosis import selection
+from bsip_cli.diagnosis.background import background_of, new_places
+from bsip_cli.diagnosis.explanation import fit_together
+from bsip_cli.diagnosis.findings import Finding, findings_of
+from bsip_cli.diagnosis.selection import Selection, select
+from bsip_cli.diagnosis.signatures import Signatures, signatures_of
+from bsip_cli.effects.catalogue import EFFECTS
+
+NAMES = ("sync_offset", "plate_gain", "plate_zero", "added_mass")
+EFFECTS_ASKED = [EFFECTS[name] for name in NAMES]
+DELAY_S, OFFSET_N = 0.010, 8.0
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+@cache
+def signatures() -> Signatures:
+    """A late trial, and one that is fine."""
+    delayed, fine = late(part_of_moving(0, 10), DELAY_S), part_of_moving(10, 10)
+    return signatures_of(all_of(noisy(delayed, 3), noisy(fine, 4)), EFFECTS_ASKED)
+
+
+@cache
+def selected() -> Selection:
+    return select(signatures(), rng())
+
+
+@cache
+def two_causes() -> Signatures:
+    scene = late(part_of_moving(0, 12), DELAY_S)
+    scene = with_effect(scene, EFFECTS["plate_zero"], "1 fx", OFFSET_N)
+    return signatures_of(all_of(noisy(scene, 4)), EFFECTS_ASKED)
+
+
+def named_in(chosen: Selection) -> list[Finding]:
+    findings = findings_of(chosen, np.random.default_rng(1))
+    return [one for one in findings if one.verdict == "named"]
+
+
+def test_the_rest_of_a_cause_is_no_other_cause():
+    chosen = selected()
+    assert [one.effect.name for one in chosen.fit.explanations] == ["sync_offset"]
+    places = [chosen.signatures.places[k] for k in new_places(chosen.signatures, chosen.fit)]
+    again = {place.trials for place in places if place.candidate.effect.name == "sync_offset"}
+    assert again == {(1,)}
+    nothing = fit_together(signatures().evidence, ())
+    assert len(new_places(signatures(), nothing)) == len(signatures().places)
+
+
+def test_what_nobody_has_found_remains_where_it_is():
+    before = background_of(signatures(), fit_together(signatures().evidence, ()))
+    after = selected().background
+    assert before.keys() == after.keys() == {(0,), (1,), ()}
+    assert before[0,] > 10 * after[0,]
+    assert before[0,] > 10 * before[1,]
+
+
+def test_a_cause_that_stands_out_is_named():
+    chosen = selected()
+    (kept,) = (one.kept for one in chosen.rounds if one.kept)
+    assert kept.score > 5 * chosen.background[0,]
+    assert [one.effect for one in named_in(chosen)] == ["sync_offset"]
+
+
+def test_what_does_not_stand_out_has_no_name(monkeypatch):
+    monkeypatch.setattr(selection, "background_of", remaining(1e4))
+    chosen = select(signatures(), rng())
+    assert chosen.fit.explanations == ()
+    (unnamed,) = named_in(chosen)
+    assert (unnamed.effect, unnamed.target, unnamed.trials) == ("unexplained", "", ("a",))
+    assert "remains beside all of them; the nearest is that the forces were" in unnamed.sentence
+    (number,) = unnamed.numbers
+    assert 100 * number.value == pytest.approx(unnamed.gain[0])
+    findings = findings_of(chosen, np.random.default_rng(1))
+    drowned = next(one for one in findings if one.effect == "sync_offset" and one.trials == ("a",))
+    assert drowned.verdict == "rejected" and "remains without a cause" in drowned.sentence
+
+
+def test_beside_a_named_cause_what_is_weaker_than_the_rest_is_left_out(monkeypatch):
+    strong, weak = (one.kept for one in select(two_causes(), rng()).rounds if one.kept)
+    assert strong.score > 1.15 * weak.score
+    monkeypatch.setattr(selection, "background_of", remaining(1.1 * weak.score))
+    (named,) = named_in(select(two_causes(), rng()))
+    assert named.effect == strong.explanation.effect.name
+
+
+def remaining(score: float):
+    def background(signatures, fit):
+        return dict.fromkeys(background_of(signatures, fit), score)
+
+    return background

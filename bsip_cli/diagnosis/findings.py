@@ -91,13 +91,13 @@ def _trials(tried: Tried) -> tuple[int, ...]:
 
 def _drowned(evidence: Evidence, tried: Tried) -> Finding:
     one = tried.explanation
-    percent = np.array(tried.gain.interval())
-    share, low, high = (float(x) for x in percent / 100)
-    sentence = (
-        "something without a name: no cause explains as much of it as remains beside all of them; "
-        f"the nearest is that {one.effect.sentence(one.target, one.values)}"
-    )
-    numbers = (Number("explained", "1", share, low, high),)
+    sentence = one.effect.sentence(one.target, one.values)
+    if one.effect.name != UNEXPLAINED:
+        sentence = (
+            "something without a name; the nearest cause explains less than it leaves over "
+            f"({sentence})"
+        )
+    numbers = (Number("explained", "1", tried.gain.percent / 100, np.nan, np.nan),)
     without_name = _with(evidence, tried, "named", "", numbers, sentence)
     return replace(without_name, effect=UNEXPLAINED, target="")
 

@@ -6,7 +6,7 @@ Only names, sizes and places of the simulator stand here. Sizes are in the effec
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,13 +44,15 @@ class Case:
 class Session:
     """One person and day: either one case in all recordings, or a case in each of some trials.
 
-    In the second, static, sequence and one squat are clean.
+    In the second, static, sequence and one squat are clean. plate_per_foot : whether the lab has
+    two plates, side by side; else one under both feet.
     """
 
     name: str
     seed: int
     sequence_s: float
     cases: tuple[Case, ...]
+    plate_per_foot: bool = False
 
     @property
     def whole(self) -> Case | None:
@@ -156,7 +158,10 @@ def nulls(count: int) -> list[Case]:
 
 
 def sessions_of(cases: Sequence[Case], seed: int, sequence_s: float) -> list[Session]:
-    """Each case of a whole session with a person of its own, the others five to a person."""
+    """Each case of a whole session with a person of its own, the others five to a person.
+
+    Half of the sessions are in a lab with a plate per foot, of which one has the plates' errors.
+    """
     rng = np.random.default_rng([seed, 3])
     whole = [(case,) for case in cases if case.place == SESSION]
     single = [case for case in cases if case.place != SESSION]
@@ -166,10 +171,27 @@ def sessions_of(cases: Sequence[Case], seed: int, sequence_s: float) -> list[Ses
     groups = whole + hosts
     groups = [groups[k] for k in rng.permutation(len(groups))]
     seeds = rng.choice(1_000_000, len(groups), replace=False)
-    return [
-        Session(f"session-{k + 1:03d}", int(seeds[k]), sequence_s, group)
+    apart = rng.permutation(len(groups)) < len(groups) // 2
+    sessions = [
+        Session(f"session-{k + 1:03d}", int(seeds[k]), sequence_s, group, bool(apart[k]))
         for k, group in enumerate(groups)
     ]
+    return [on_one_plate(one, rng) if one.plate_per_foot else one for one in sessions]
+
+
+def on_one_plate(session: Session, rng: np.random.Generator) -> Session:
+    """With the errors of plates in one of two, drawn for each case."""
+    cases = []
+    for case in session.cases:
+        plate = rng.integers(1, 3)
+        hidden = (
+            replace(one, target=f"{one.target},plate={plate}".removeprefix("-,"))
+            if one.effect.startswith("plate_")
+            else one
+            for one in case.hidden
+        )
+        cases.append(replace(case, hidden=tuple(hidden)))
+    return replace(session, cases=tuple(cases))
 
 
 def long_suite(each: int, null_count: int, others: int, seed: int) -> list[Session]:

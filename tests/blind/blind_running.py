@@ -131,6 +131,8 @@ def simulate(
     """Some recordings of the session's person, with a case's effects in them."""
     arguments = [str(place), "--preset", "diagnosis", "--seed", str(session.seed)]
     arguments += ["--sequence-s", f"{session.sequence_s:g}", "--run", str(run)]
+    if session.plate_per_foot:
+        arguments.append("--plate-per-foot")
     for task in tasks:
         arguments += ["--task", task]
     for hidden in case.hidden if case else ():

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-PLATE = "1"  # the simulated lab has one
+PLATE = "1"  # of a simulated lab that has one
 # The simulated plate's axes turned about x until z points up.
 Z_UP = {"fx": 1.0, "fy": -1.0, "fz": -1.0, "mx": 1.0, "my": -1.0, "mz": -1.0}
 ASIDE = 0.15  # horizontal part of an unmeasured contact, of its vertical part
@@ -54,7 +54,7 @@ def _sized(name: str) -> Callable[[Record, Record], tuple[str, dict[str, float]]
 def _channel(name: str, signed: bool) -> Callable[[Record, Record], tuple[str, dict[str, float]]]:
     def mapped(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
         sign = Z_UP[record["channel"]] if signed else 1.0
-        return f"{PLATE} {record['channel']}", {name: sign * record["size"]}
+        return f"{_plate(record)} {record['channel']}", {name: sign * record["size"]}
 
     return mapped
 
@@ -62,7 +62,7 @@ def _channel(name: str, signed: bool) -> Callable[[Record, Record], tuple[str, d
 def _crosstalk(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
     source, sink = record["source"], record["to"]
     sign = Z_UP[source] * Z_UP[sink]
-    return f"{PLATE} {source}>{sink}", {"coefficient": sign * record["size"]}
+    return f"{_plate(record)} {source}>{sink}", {"coefficient": sign * record["size"]}
 
 
 def _vector(names: tuple[str, ...], field: str, place: Callable[[Record], str]) -> Any:
@@ -131,7 +131,8 @@ def _swapped(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
 
 
 def _plate(record: Record) -> str:
-    return PLATE
+    """The plate that errs; 0 stands for all of them."""
+    return str(record["plate"] or PLATE)
 
 
 MAPPINGS: dict[str, Callable[[Record, Record], tuple[str, dict[str, float]]]] = {

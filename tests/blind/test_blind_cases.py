@@ -77,6 +77,19 @@ def test_a_session_holds_one_case_or_several_trials():
     assert long_suite(3, 2, 2, 5) == long_suite(3, 2, 2, 5) != long_suite(3, 2, 2, 6)
 
 
+def test_half_of_the_labs_have_a_plate_per_foot():
+    sessions = long_suite(10, 40, 20, 5)
+    apart = [session for session in sessions if session.plate_per_foot]
+    assert len(apart) == len(sessions) // 2
+    faults = [
+        one for case in cases_of(apart) for one in case.hidden if one.effect.startswith("plate_")
+    ]
+    plates = Counter(one.target.split(",")[-1] for one in faults)
+    assert set(plates) == {"plate=1", "plate=2"} and min(plates.values()) > 10
+    whole = [session for session in sessions if not session.plate_per_foot]
+    assert not any("plate=" in one.target for case in cases_of(whole) for one in case.hidden)
+
+
 def test_recordings_tell_nothing_of_what_they_hide(tmp_path):
     delayed = Case("delay", "single", "squat", (Hidden("sync_offset", 0.1),))
     carried = Case("ball", "single", "squat", (Hidden("added_mass", 2.0, "hand_l"),))

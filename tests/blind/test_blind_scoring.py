@@ -46,7 +46,13 @@ SQUAT, HOPS = "sub-01_task-squat_run-2", "sub-01_task-hops_run-1"
 TRIAL = {"recorded_from_s": 0.0, "duration_s": 10.0}
 GAIN = {"effect": "plate_gain", "size": 0.04, "unit": "1", "channel": "fz", "plate": 0}
 DELAY = {"effect": "sync_offset", "size": 0.01, "unit": "s"}
-SHIFT = {"effect": "plate_translation", "size": 0.02, "unit": "m", "shift_m": [0.02, 0.0, 0.0]}
+SHIFT = {
+    "effect": "plate_translation",
+    "size": 0.02,
+    "unit": "m",
+    "shift_m": [0.02, 0, 0],
+    "plate": 0,
+}
 TETHER = {"effect": "outside_elastic_tether", "size": 100.0, "unit": "N/m"}
 
 

@@ -80,7 +80,7 @@ def test_what_does_not_stand_out_has_no_name(monkeypatch):
     assert chosen.fit.explanations == ()
     (unnamed,) = named_in(chosen)
     assert (unnamed.effect, unnamed.target, unnamed.trials) == ("unexplained", "", ("a",))
-    assert "remains beside all of them; the nearest is that the forces were" in unnamed.sentence
+    assert "explains less than it leaves over (the forces were" in unnamed.sentence
     (number,) = unnamed.numbers
     assert 100 * number.value == pytest.approx(unnamed.gain[0])
     findings = findings_of(chosen, np.random.default_rng(1))

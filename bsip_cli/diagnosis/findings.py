@@ -10,9 +10,10 @@ import numpy as np
 
 from bsip_cli.diagnosis.explanation import Explanation
 from bsip_cli.diagnosis.intervals import drawn_explanations
+from bsip_cli.diagnosis.judging import ALPHA, Tried
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.rivals import rivals_of
-from bsip_cli.diagnosis.selection import ALPHA, Round, Selection, Tried
+from bsip_cli.diagnosis.selection import Round, Selection
 from bsip_cli.diagnosis.together import Evidence
 
 Verdict = Literal["named", "ambiguous", "rejected"]

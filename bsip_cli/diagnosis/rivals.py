@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.diagnosis.held_out import standard_error
+from bsip_cli.diagnosis.judging import Tried
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
-from bsip_cli.diagnosis.selection import Round, Tried
+from bsip_cli.diagnosis.selection import Round
 from bsip_cli.diagnosis.together import Evidence
 
 ALIKE = 0.9  # part of a signature that another explains

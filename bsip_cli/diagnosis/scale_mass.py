@@ -13,7 +13,9 @@ from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.candidates import Candidate
 from bsip_cli.diagnosis.explanation import Explanation, fit_together
 from bsip_cli.diagnosis.held_out import gain_of
-from bsip_cli.diagnosis.selection import Round, Tried, score_of
+from bsip_cli.diagnosis.judging import Tried
+from bsip_cli.diagnosis.refitting import score_of
+from bsip_cli.diagnosis.selection import Round
 from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.effects.plate_gain import PlateGain

@@ -11,67 +11,25 @@ import numpy as np
 
 from bsip_cli.diagnosis.background import Background, background_of, new_places
 from bsip_cli.diagnosis.chance import Chance, chance_of, flipped, group_of
-from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together, refined
-from bsip_cli.diagnosis.held_out import Gain, gain_of
+from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together
+from bsip_cli.diagnosis.judging import ALPHA, Tried, judged_by
 from bsip_cli.diagnosis.likely_noise import likely_columns, noise_beside_fit, with_likely_noise
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
-from bsip_cli.diagnosis.signatures import Place, Signatures
+from bsip_cli.diagnosis.refitting import Refitted, refitted, start_at
+from bsip_cli.diagnosis.signatures import Signatures
 from bsip_cli.diagnosis.together import Evidence
-from bsip_cli.statistics.chi_square import minus_log_p
 
 MOST = 3  # causes in one trial
 TRIES = 10  # candidates that are refitted in a round
 SHOWN = 3  # that are looked at even where nothing stands out
 WORTH_A_TRY = 0.5  # of the best score
-ALPHA = 0.01  # in every round; with the chance's own errors one null in twenty has an alarm
-BEYOND_DOUBT = 1e-6  # so rare by chance that a gain above its standard error is enough
-WORTH = 0.01  # of the squared residual of its trials: what takes less changes no result
-SUPPORT = 8.0  # squared white residual that a trial must save to share a cause
-# Of what a cause explains in a trial: so much is lost where its size is a fifth off.
-OTHER_SIZE = 0.04
 # A cause from the catalogue is named though a regularity without a name explains a bit more.
 NAMED_AT = 0.95
-# What a large cause leaves behind, since no model of it is exact, is no other cause.
-LEFTOVER = 0.005  # of the squared residual that earlier causes took from the same trials
 AGAIN = 1.25  # how much more an effect counts that another trial shows already
 
 
-Refitted = tuple[Explanation, Fit, float]
-"""A candidate in full, the fit with it, and its score."""
-
 Scored = tuple[np.ndarray, list[np.ndarray]]
 """Of all places in one round: their scores (K, 1) and likeliest sizes."""
-
-
-@dataclass(frozen=True)
-class Tried:
-    """A candidate that was refitted in full, beside the causes found before it.
-
-    is_first : none of its trials holds one of them. is_drowned : in the end, more remains beside
-    all causes than it explains.
-    """
-
-    explanation: Explanation
-    score: float
-    p_value: float
-    gain: Gain
-    fit: Fit
-    is_leftover: bool
-    is_first: bool
-    is_drowned: bool = False
-
-    @property
-    def is_good(self) -> bool:
-        """Rarer by chance than ALPHA, better on what it has not seen, worth a name, not what is
-        left over of a larger cause, and more than what remains. What has no name, comes after
-        another cause, or is not far beyond chance, must be better for sure."""
-        if self.p_value > ALPHA or self.is_leftover or self.is_drowned:
-            return False
-        if self.gain.percent < 100 * WORTH:
-            return False
-        unnamed = self.explanation.effect.name == UNEXPLAINED
-        doubtful = unnamed or not self.is_first or self.p_value > BEYOND_DOUBT
-        return self.gain.is_sure() if doubtful else self.gain.is_real()
 
 
 @dataclass(frozen=True)
@@ -166,11 +124,11 @@ def _round(
     tried = _tried(signatures, before, scored, open_trials, rough)
     tried += _elsewhere(signatures, before, scored, tried)
     chance = _chance(signatures, max(tried, key=lambda t: t[2])[1] if tried else before, rng)
-    judged = [_judged(evidence, before, *one, chance) for one in tried]
+    judged = [judged_by(evidence, before, *one, chance) for one in tried]
     while _kept(judged, before) is None and (in_vain := _in_vain(judged) & open_trials):
         open_trials = open_trials - in_vain
         more = _tried(signatures, before, scored, open_trials, rough)
-        judged += [_judged(evidence, before, *one, chance) for one in more]
+        judged += [judged_by(evidence, before, *one, chance) for one in more]
     judged.sort(key=lambda t: -t.score)
     return Round(evidence, tuple(judged), _kept(judged, before), chance)
 
@@ -191,7 +149,7 @@ def _tried(
         hopeless = score < WORTH_A_TRY * max(best_yet, rough.limit(place.trials, ALPHA))
         if len(tried) >= TRIES or (hopeless and (len(tried) >= SHOWN or asked >= 2 * TRIES)):
             break
-        one = _refitted(signatures, before, place, sizes[k], open_trials)
+        one = refitted(signatures, before, place, sizes[k], open_trials)
         if one is not None:
             tried.append(one)
     return tried
@@ -225,7 +183,7 @@ def _elsewhere(
             ranked = _best_of_each(signatures, scores[:, 0], sizes, {t}, before)
             mine = (k for k in ranked if signatures.places[k].candidate.effect is effect)
             for k in islice(mine, 1):
-                one = _refitted(signatures, before, signatures.places[k], sizes[k], {t})
+                one = refitted(signatures, before, signatures.places[k], sizes[k], {t})
                 if one is not None:
                     yield one
 
@@ -307,109 +265,8 @@ def _best_of_each(
         key = (effect, target, () if effect.lasts else place.trials)
         if key in seen:
             continue
-        start = _start(signatures.evidence, place, sizes[k])
+        start = start_at(signatures.evidence, place, sizes[k])
         if not start.is_possible(signatures.evidence):
             continue
         seen.add(key)
         yield int(k)
-
-
-def _start(evidence: Evidence, place: Place, sizes: np.ndarray) -> Explanation:
-    scene = evidence.trials[place.trials[0]].scene
-    null = Explanation(place, place.candidate.values(scene, np.zeros(len(sizes))))
-    return null.moved_freely(evidence, sizes)
-
-
-def _refitted(
-    signatures: Signatures, before: Fit, place: Place, sizes: np.ndarray, open_trials: set[int]
-) -> Refitted | None:
-    """In full, beside the causes found before; nothing if it turns out impossible.
-
-    What lasts is tried in all trials too, and given up in those that do not support it, or
-    with another size.
-    """
-    evidence = signatures.evidence
-    start = refined(evidence, _start(evidence, place, sizes), before)
-    known = {t for e in before.explanations if _alike(e, start) for t in e.place.trials}
-    everywhere = signatures.trials_of(place.candidate) & open_trials - known
-    fits = [fit_together(evidence, (*before.explanations, start))]
-    if place.candidate.effect.lasts and everywhere > set(place.trials):
-        wider = replace(start, place=replace(place, trials=tuple(sorted(everywhere))))
-        fits.append(fit_together(evidence, (*before.explanations, wider)))
-    fit = min((_supported(evidence, before, one) for one in fits), key=_squares)
-    found = fit.explanations[-1]
-    if not found.is_possible(evidence) or found.is_negligible(evidence):
-        return None
-    if not found.agrees_with_markers(evidence):
-        return None
-    return found, fit, score_of(before, fit, len(sizes))
-
-
-def _alike(one: Explanation, other: Explanation) -> bool:
-    return (one.effect, one.target) == (other.effect, other.target)
-
-
-def _squares(fit: Fit) -> float:
-    return float((fit.residual**2).sum())
-
-
-def _supported(evidence: Evidence, before: Fit, fit: Fit) -> Fit:
-    """The last cause in those of its trials only whose residual becomes smaller by it, and that
-    agree on its size."""
-    one = fit.explanations[-1]
-    saved = before.residual**2 - fit.residual**2
-    trials = tuple(t for t in one.place.trials if saved[evidence.rows(t)].sum() > SUPPORT)
-    if trials == one.place.trials and len(trials) > 1:
-        trials = _agreeing(evidence, fit, saved)
-    if not trials or trials == one.place.trials:
-        return fit
-    fewer = replace(one, place=replace(one.place, trials=trials))
-    return _supported(evidence, before, fit_together(evidence, (*fit.explanations[:-1], fewer)))
-
-
-def _agreeing(evidence: Evidence, fit: Fit, saved: np.ndarray) -> tuple[int, ...]:
-    """Trials of the last cause but the one, if any, that a size of its own fits far better."""
-    trials = fit.explanations[-1].place.trials
-    mine = fit.columns(len(fit.explanations) - 1, evidence)
-    shares = {}
-    for t in trials:
-        rows = evidence.rows(t)
-        tangent, residual = fit.tangent[rows, mine], fit.residual[rows]
-        step = np.linalg.lstsq(tangent, residual, rcond=None)[0]
-        more = float(residual @ tangent @ step)
-        whole = more + float(saved[rows].sum())
-        shares[t] = more / max(whole, SUPPORT / OTHER_SIZE)
-    odd = max(trials, key=lambda t: shares[t])
-    return tuple(t for t in trials if t != odd or shares[t] < OTHER_SIZE)
-
-
-def _judged(
-    evidence: Evidence,
-    before: Fit,
-    found: Explanation,
-    fit: Fit,
-    score: float,
-    chance: Chance,
-) -> Tried:
-    trials = found.place.trials
-    gain = gain_of(evidence, trials, before.residual, fit.residual, fit.tangent)
-    leftover = _is_leftover(evidence, trials, before.residual, fit.residual)
-    touched = {t for e in before.explanations for t in e.place.trials}
-    first = touched.isdisjoint(trials)
-    return Tried(found, score, chance.p_value(score, trials), gain, fit, leftover, first)
-
-
-def _is_leftover(
-    evidence: Evidence, trials: tuple[int, ...], before: np.ndarray, after: np.ndarray
-) -> bool:
-    rows = np.concatenate([np.arange(len(before))[evidence.rows(t)] for t in trials])
-    nothing, without, beside = (
-        float((residual[rows] ** 2).sum()) for residual in (evidence.residual, before, after)
-    )
-    return without - beside < LEFTOVER * (nothing - without)
-
-
-def score_of(before: Fit, after: Fit, free: int) -> float:
-    """-log p of what the squared residual loses, by the chi-square of the free parameters."""
-    lost = float((before.residual**2).sum() - (after.residual**2).sum())
-    return float(minus_log_p(lost, free))

@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 from noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
 
-from bsip_cli.diagnosis import selection
+from bsip_cli.diagnosis import judging, selection
 from bsip_cli.diagnosis.channel_patterns import with_play
 from bsip_cli.diagnosis.detection import Limit, limits_of
 from bsip_cli.diagnosis.explanation import NEGLIGIBLE
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import gain_of
+from bsip_cli.diagnosis.judging import ALPHA
 from bsip_cli.diagnosis.patterns import PATTERNS
-from bsip_cli.diagnosis.selection import ALPHA, Selection, select
+from bsip_cli.diagnosis.selection import Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
@@ -240,7 +241,7 @@ def test_what_turns_out_to_be_no_cause_does_not_hide_another_trial(monkeypatch):
         gain = gain_of(evidence, trials, *others)
         return replace(gain, blocks=-gain.blocks) if 1 in trials else gain
 
-    monkeypatch.setattr(selection, "gain_of", gain_but_in_b)
+    monkeypatch.setattr(judging, "gain_of", gain_but_in_b)
     offset = with_effect(part_of_moving(0, 8), EFFECTS["plate_zero"], "1 fx", OFFSET_N)
     delay = late(part_of_moving(8, 8), DELAY_S)
     chosen = selection_of(noisy(offset, 0), noisy(delay, 1))

@@ -1,0 +1,80 @@
+"""Whether a candidate that was refitted in full is a cause."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.diagnosis.chance import Chance
+from bsip_cli.diagnosis.explanation import Explanation, Fit
+from bsip_cli.diagnosis.held_out import Gain, gain_of
+from bsip_cli.diagnosis.pattern import UNEXPLAINED
+from bsip_cli.diagnosis.together import Evidence
+
+ALPHA = 0.01  # in every round; with the chance's own errors one null in twenty has an alarm
+BEYOND_DOUBT = 1e-6  # so rare by chance that a gain above its standard error is enough
+WORTH = 0.01  # of the squared residual of its trials: what takes less changes no result
+# What a large cause leaves behind, since no model of it is exact, is no other cause.
+LEFTOVER = 0.005  # of the squared residual that earlier causes took from the same trials
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A candidate that was refitted in full, beside the causes found before it.
+
+    is_first : none of its trials holds one of them. is_drowned : in the end, more remains beside
+    all causes than it explains.
+    """
+
+    explanation: Explanation
+    score: float
+    p_value: float
+    gain: Gain
+    fit: Fit
+    is_leftover: bool
+    is_first: bool
+    is_drowned: bool = False
+
+    @property
+    def is_good(self) -> bool:
+        """Rarer by chance than ALPHA, better on what it has not seen, worth a name, not what is
+        left over of a larger cause, and more than what remains. What has no name, comes after
+        another cause, or is not far beyond chance, must be better for sure."""
+        if self.p_value > ALPHA or self.is_leftover or self.is_drowned:
+            return False
+        if self.gain.percent < 100 * WORTH:
+            return False
+        unnamed = self.explanation.effect.name == UNEXPLAINED
+        doubtful = unnamed or not self.is_first or self.p_value > BEYOND_DOUBT
+        return self.gain.is_sure() if doubtful else self.gain.is_real()
+
+
+def judged_by(
+    evidence: Evidence,
+    before: Fit,
+    found: Explanation,
+    fit: Fit,
+    score: float,
+    chance: Chance,
+) -> Tried:
+    """A candidate that was refitted, against chance and on what it has not seen.
+
+    before, fit : without it and with it. score : of what the residual loses by it.
+    """
+    trials = found.place.trials
+    gain = gain_of(evidence, trials, before.residual, fit.residual, fit.tangent)
+    leftover = _is_leftover(evidence, trials, before.residual, fit.residual)
+    touched = {t for e in before.explanations for t in e.place.trials}
+    first = touched.isdisjoint(trials)
+    return Tried(found, score, chance.p_value(score, trials), gain, fit, leftover, first)
+
+
+def _is_leftover(
+    evidence: Evidence, trials: tuple[int, ...], before: np.ndarray, after: np.ndarray
+) -> bool:
+    rows = np.concatenate([np.arange(len(before))[evidence.rows(t)] for t in trials])
+    nothing, without, beside = (
+        float((residual[rows] ** 2).sum()) for residual in (evidence.residual, before, after)
+    )
+    return without - beside < LEFTOVER * (nothing - without)

@@ -1,0 +1,94 @@
+"""A candidate in full beside the causes found before it, in the trials that support it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together, refined
+from bsip_cli.diagnosis.signatures import Place, Signatures
+from bsip_cli.diagnosis.together import Evidence
+from bsip_cli.statistics.chi_square import minus_log_p
+
+SUPPORT = 8.0  # squared white residual that a trial must save to share a cause
+# Of what a cause explains in a trial: so much is lost where its size is a fifth off.
+OTHER_SIZE = 0.04
+
+Refitted = tuple[Explanation, Fit, float]
+"""A candidate in full, the fit with it, and its score."""
+
+
+def start_at(evidence: Evidence, place: Place, sizes: np.ndarray) -> Explanation:
+    scene = evidence.trials[place.trials[0]].scene
+    null = Explanation(place, place.candidate.values(scene, np.zeros(len(sizes))))
+    return null.moved_freely(evidence, sizes)
+
+
+def refitted(
+    signatures: Signatures, before: Fit, place: Place, sizes: np.ndarray, open_trials: set[int]
+) -> Refitted | None:
+    """In full, beside the causes found before; nothing if it turns out impossible.
+
+    What lasts is tried in all trials too, and given up in those that do not support it, or
+    with another size.
+    """
+    evidence = signatures.evidence
+    start = refined(evidence, start_at(evidence, place, sizes), before)
+    known = {t for e in before.explanations if _alike(e, start) for t in e.place.trials}
+    everywhere = signatures.trials_of(place.candidate) & open_trials - known
+    fits = [fit_together(evidence, (*before.explanations, start))]
+    if place.candidate.effect.lasts and everywhere > set(place.trials):
+        wider = replace(start, place=replace(place, trials=tuple(sorted(everywhere))))
+        fits.append(fit_together(evidence, (*before.explanations, wider)))
+    fit = min((_supported(evidence, before, one) for one in fits), key=_squares)
+    found = fit.explanations[-1]
+    if not found.is_possible(evidence) or found.is_negligible(evidence):
+        return None
+    if not found.agrees_with_markers(evidence):
+        return None
+    return found, fit, score_of(before, fit, len(sizes))
+
+
+def _alike(one: Explanation, other: Explanation) -> bool:
+    return (one.effect, one.target) == (other.effect, other.target)
+
+
+def _squares(fit: Fit) -> float:
+    return float((fit.residual**2).sum())
+
+
+def _supported(evidence: Evidence, before: Fit, fit: Fit) -> Fit:
+    """The last cause in those of its trials only whose residual becomes smaller by it, and that
+    agree on its size."""
+    one = fit.explanations[-1]
+    saved = before.residual**2 - fit.residual**2
+    trials = tuple(t for t in one.place.trials if saved[evidence.rows(t)].sum() > SUPPORT)
+    if trials == one.place.trials and len(trials) > 1:
+        trials = _agreeing(evidence, fit, saved)
+    if not trials or trials == one.place.trials:
+        return fit
+    fewer = replace(one, place=replace(one.place, trials=trials))
+    return _supported(evidence, before, fit_together(evidence, (*fit.explanations[:-1], fewer)))
+
+
+def _agreeing(evidence: Evidence, fit: Fit, saved: np.ndarray) -> tuple[int, ...]:
+    """Trials of the last cause but the one, if any, that a size of its own fits far better."""
+    trials = fit.explanations[-1].place.trials
+    mine = fit.columns(len(fit.explanations) - 1, evidence)
+    shares = {}
+    for t in trials:
+        rows = evidence.rows(t)
+        tangent, residual = fit.tangent[rows, mine], fit.residual[rows]
+        step = np.linalg.lstsq(tangent, residual, rcond=None)[0]
+        more = float(residual @ tangent @ step)
+        whole = more + float(saved[rows].sum())
+        shares[t] = more / max(whole, SUPPORT / OTHER_SIZE)
+    odd = max(trials, key=lambda t: shares[t])
+    return tuple(t for t in trials if t != odd or shares[t] < OTHER_SIZE)
+
+
+def score_of(before: Fit, after: Fit, free: int) -> float:
+    """-log p of what the squared residual loses, by the chi-square of the free parameters."""
+    lost = float((before.residual**2).sum() - (after.residual**2).sum())
+    return float(minus_log_p(lost, free))

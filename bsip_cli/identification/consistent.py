@@ -41,9 +41,9 @@ def _note(fit: Fit, terms: Terms) -> str:
     masses, centres, *tensors = 100 / np.sqrt(fit.weights.spread)
     note = (
         f"the data decide {fit.decided:.0f} of {terms.table.size} parameters, the table the rest; "
-        f"this person is as far from the table as {masses:.0f} % of the spread in [prior] in the "
-        f"masses, {centres:.0f} % in the centres of mass and {min(tensors):.0f} to "
-        f"{max(tensors):.0f} % in the inertias (weight {fit.weights.gamma:g} of staying near it)"
+        "of what people usually differ from the table, this person's masses differ "
+        f"{masses:.0f} %, centres of mass {centres:.0f} %, inertias {min(tensors):.0f} to "
+        f"{max(tensors):.0f} %"
     )
     if fit.decided < _LITTLE:
         note += (

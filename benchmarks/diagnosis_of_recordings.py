@@ -147,7 +147,8 @@ def inject(subject: Subject, cause: Cause, study: Path, copy: Path) -> str:
     for task in tasks:
         command += ["--effect-tasks", task]
     used = run_child(command, folder=ROOT, allowed=BAD_DATA)
-    return "" if used.code == 0 else used.stderr.strip().splitlines()[0]
+    first, *_ = [*used.stderr.strip().splitlines(), ""]
+    return "" if used.code == 0 else first.replace(f"{study.parent}/", "")
 
 
 def pipeline(study: Path, out: Path) -> Answer:

@@ -147,8 +147,8 @@ def inject(subject: Subject, cause: Cause, study: Path, copy: Path) -> str:
     for task in tasks:
         command += ["--effect-tasks", task]
     used = run_child(command, folder=ROOT, allowed=BAD_DATA)
-    first, *_ = [*used.stderr.strip().splitlines(), ""]
-    return "" if used.code == 0 else first.replace(f"{study.parent}/", "")
+    said = used.stderr.replace(f"{study.parent}/", "")
+    return "" if used.code == 0 else said.strip().splitlines()[0]
 
 
 def pipeline(study: Path, out: Path) -> Answer:

@@ -68,7 +68,7 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
         findings.append(_finding(evidence, cause, place, said_so, rng))
         for rival in rivals:
             findings.append(_finding(one.evidence, rival, -1, said_so, rng))
-    findings += _without_name(selection, {t for _, one, _ in kept for t in _trials(one)})
+    findings += _without_name(selection, {t for _, one, _ in kept for t in one.trials})
     for one in selection.rounds:
         for tried in one.tried:
             if _key(tried.explanation) not in said:
@@ -82,12 +82,8 @@ def _without_name(selection: Selection, told: set[int]) -> Iterator[Finding]:
     what is wrong has no name."""
     for one in selection.rounds:
         for tried in one.tried:
-            if tried.is_drowned and told.isdisjoint(_trials(tried)):
+            if tried.is_drowned and told.isdisjoint(tried.trials):
                 yield _drowned(selection.signatures.evidence, tried)
-
-
-def _trials(tried: Tried) -> tuple[int, ...]:
-    return tried.explanation.place.trials
 
 
 def _drowned(evidence: Evidence, tried: Tried) -> Finding:

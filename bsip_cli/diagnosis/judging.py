@@ -37,6 +37,11 @@ class Tried:
     is_drowned: bool = False
 
     @property
+    def trials(self) -> tuple[int, ...]:
+        """Where it is."""
+        return self.explanation.place.trials
+
+    @property
     def is_good(self) -> bool:
         """Rarer by chance than ALPHA, better on what it has not seen, worth a name, not what is
         left over of a larger cause, and more than what remains. What has no name, comes after

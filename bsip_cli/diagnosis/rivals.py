@@ -21,14 +21,14 @@ def rivals_of(one: Round) -> tuple[Tried, ...]:
     kept = one.kept
     if kept is None:
         return ()
-    mine = set(kept.explanation.place.trials)
+    mine = set(kept.trials)
     others = (
         t
         for t in one.tried
         if t is not kept
         and t.is_good
         and t.explanation.effect.name != UNEXPLAINED
-        and mine & set(t.explanation.place.trials)
+        and mine & set(t.trials)
     )
     return tuple(t for t in others if _is_rival(one.evidence, kept, t))
 

@@ -85,7 +85,7 @@ def _fitted_in_the_end(
 def _standing_out(selection: Selection) -> Selection:
     """Without the causes, the weakest first, that explain less than remains beside all of them."""
     shares = {
-        number: one.kept.score / selection.background[group_of(one.kept.explanation.place.trials)]
+        number: one.kept.score / selection.background[group_of(one.kept.trials)]
         for number, one in enumerate(selection.rounds)
         if one.kept is not None and one.chance is not None
     }
@@ -203,7 +203,7 @@ def _chance(signatures: Signatures, best: Fit, rng: np.random.Generator) -> Chan
 
 def _in_vain(judged: list[Tried]) -> set[int]:
     """Trials, each alone, of what chance hardly ever brings and yet is no cause."""
-    rare = [one.explanation.place.trials for one in judged if one.p_value <= ALPHA]
+    rare = [one.trials for one in judged if one.p_value <= ALPHA]
     return {t for trials in rare if len(trials) == 1 for t in trials}
 
 
@@ -236,7 +236,7 @@ def _with_recurrence(good: list[Tried], before: Fit) -> dict[int, float]:
         alike = [t for t in good if t.explanation.effect is one.explanation.effect]
         best: dict[int, float] = {}
         for other in alike:
-            for trial in set(other.explanation.place.trials) - set(place.trials):
+            for trial in set(other.trials) - set(place.trials):
                 best[trial] = max(best.get(trial, 0.0), other.score)
         weights[id(one)] += sum(best.values())
         if one.explanation.effect in known:

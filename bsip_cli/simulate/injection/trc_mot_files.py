@@ -181,7 +181,7 @@ def _up(readings: np.ndarray) -> np.ndarray:
 def _plate(values: np.ndarray, each: ForceSet) -> SensingPlate:
     """A plate whose sensor lies where the force acts in the mean: the file has no better place."""
     load = np.linalg.norm(np.nan_to_num(values[:, each.force]), axis=1)
-    loaded = load > LOADED_N
+    loaded = (load > LOADED_N) & np.isfinite(values[:, each.point]).all(axis=1)
     if not loaded.any():
         return SensingPlate(np.eye(3), np.zeros(3), np.zeros(3))
     sensor = np.average(values[:, each.point][loaded], axis=0, weights=load[loaded])

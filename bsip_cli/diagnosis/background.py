@@ -7,22 +7,51 @@ are the same in every repetition; the best score that remains does.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+import numpy as np
+
 from bsip_cli.diagnosis.chance import group_of
-from bsip_cli.diagnosis.explanation import Fit
+from bsip_cli.diagnosis.explanation import Fit, fit_together
+from bsip_cli.diagnosis.refitting import score_of, start_at
 from bsip_cli.diagnosis.signatures import Signatures
 
 Background = dict[tuple[int, ...], float]
 """By group of places (every trial alone, and the trials together) the best score that remains."""
 
+_TRIES = 5  # causes that are refitted in a group
+
 
 def background_of(signatures: Signatures, fit: Fit) -> Background:
-    """Beside a fit, whether it is possible or not, with a name or without."""
-    scores, _ = signatures.scores(fit.residual[:, None], fit.tangent)
+    """Beside a fit, with a name or without.
+
+    Refitted: signatures are those of small causes, and beside a long delay the signature of a short
+    one seems to explain what no other delay does.
+    """
+    scored = signatures.scores(fit.residual[:, None], fit.tangent)
+    scores, sizes = scored[0][:, 0], scored[1]
     best: Background = {}
-    for k in new_places(signatures, fit):
-        group = group_of(signatures.places[k].trials)
-        best[group] = max(best.get(group, 0.0), float(scores[k, 0]))
+    for k in _best_of_each(signatures, fit, scores):
+        place = signatures.places[k]
+        group = group_of(place.trials)
+        if scores[k] > best.setdefault(group, 0.0):
+            one = start_at(signatures.evidence, place, sizes[k])
+            full = fit_together(signatures.evidence, (*fit.explanations, one))
+            best[group] = max(best[group], score_of(fit, full, len(sizes[k])))
     return best
+
+
+def _best_of_each(signatures: Signatures, fit: Fit, scores: np.ndarray) -> Iterator[int]:
+    """In each group the best places of some causes, the best first."""
+    seen: dict[tuple[int, ...], set] = {}
+    new = np.array(new_places(signatures, fit))
+    for k in new[np.argsort(-scores[new])]:
+        place = signatures.places[k]
+        causes = seen.setdefault(group_of(place.trials), set())
+        cause = (place.candidate.effect, place.candidate.target)
+        if cause not in causes and len(causes) < _TRIES:
+            causes.add(cause)
+            yield int(k)
 
 
 def new_places(signatures: Signatures, fit: Fit) -> list[int]:

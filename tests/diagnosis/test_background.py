@@ -6,12 +6,15 @@ from functools import cache
 
 import numpy as np
 import pytest
-from noisy_trial import all_of, late, noisy, part_of_moving, with_effect
+from noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
 
 from bsip_cli.diagnosis import selection
 from bsip_cli.diagnosis.background import background_of, new_places
+from bsip_cli.diagnosis.clock_pattern import ClockJump
 from bsip_cli.diagnosis.explanation import fit_together
 from bsip_cli.diagnosis.findings import Finding, findings_of
+from bsip_cli.diagnosis.likely_noise import noise_beside_fit
+from bsip_cli.diagnosis.refitting import start_at
 from bsip_cli.diagnosis.selection import Selection, select
 from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
@@ -19,6 +22,7 @@ from bsip_cli.effects.catalogue import EFFECTS
 NAMES = ("sync_offset", "plate_gain", "plate_zero", "added_mass")
 EFFECTS_ASKED = [EFFECTS[name] for name in NAMES]
 DELAY_S, OFFSET_N = 0.010, 8.0
+LONG_S, BLUR_S2 = 0.03, 4e-4
 
 
 def rng() -> np.random.Generator:
@@ -101,3 +105,19 @@ def remaining(score: float):
         return dict.fromkeys(background_of(signatures, fit), score)
 
     return background
+
+
+def test_no_short_delay_remains_beside_a_long_one():
+    """Their signatures differ, so one alone would seem to explain what the simulation lacks."""
+    scene = late(part_of_moving(0, 12, amplitude=0.8), LONG_S)
+    blurred = shown(
+        scene, BLUR_S2 * np.gradient(np.gradient(scene.measured, axis=0), axis=0) * scene.rate_hz**2
+    )
+    asked = signatures_of(all_of(noisy(blurred, 4)), [EFFECTS["sync_offset"], ClockJump()])
+    delay = next(k for k, p in enumerate(asked.places) if p.candidate.effect.name == "sync_offset")
+    start = start_at(asked.evidence, asked.places[delay], np.array([5.0]))
+    signatures, fit = noise_beside_fit(asked, fit_together(asked.evidence, (start,)))
+    scores, _ = signatures.scores(fit.residual[:, None], fit.tangent)
+    linear = max(scores[k, 0] for k in new_places(signatures, fit))
+    assert linear > 40
+    assert background_of(signatures, fit)[0,] < 0.2 * linear

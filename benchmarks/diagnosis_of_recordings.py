@@ -64,7 +64,7 @@ SUBJECTS = (
         "L_elbow_lat+L_elbow_med",
         up="fy",
     ),
-    Subject(_BY_NAME["figaroh_human"], ("sequence",), "forearm_r", "LASI", "LANK+LHEE"),
+    Subject(_BY_NAME["figaroh_human"], ("sequence",), "hand_r", "LASI", "LANK+LHEE"),
     Subject(_BY_NAME["btk_pig (Full)"]),
     Subject(_BY_NAME["btk_pig (Hole)"]),
     Subject(

@@ -169,6 +169,20 @@ def test_a_mot_file_does_not_say_where_plates_lie(tmp_path, trc):
         inject_recording(trc, tmp_path / trc.name, [effect_of("plate_rotation", 0.03)])
 
 
+@pytest.mark.parametrize(
+    ("name", "target", "words"),
+    [
+        ("added_mass", "tail", "no marker of 'tail' is in the recording; expected labels.*RHAND"),
+        ("marker_shift", "TAIL", "no marker 'TAIL'; expected one of .*RHAND"),
+        ("plate_zero", "fz,plate=9", "no plate 9"),
+    ],
+)
+def test_what_a_file_does_not_have_is_said_of_that_file(tmp_path, recorded, name, target, words):
+    with pytest.raises(BadDataError, match=f"squat_run-1.c3d: .*{words}"):
+        inject_recording(recorded, tmp_path / "x.c3d", [effect_of(name, 0.1, target)])
+    assert not (tmp_path / "x.c3d").exists()
+
+
 def test_a_mot_file_s_plates_feel_under_the_feet(tmp_path, trc):
     """What leaks into a channel acts where the feet stand, not at the lab's origin."""
     before, after = injected(trc, tmp_path, effect_of("plate_crosstalk", 0.02, "fy:fx"))

@@ -54,7 +54,7 @@ def _smooth_path(instruments: Instruments, where: str) -> np.ndarray:
     if not labels:
         raise UsageError(
             f"no marker of {where!r} is in the recording",
-            expected="labels joined by " + ", of {', '.join(instruments.labels)}",
+            expected=f"labels joined by '+', of {', '.join(instruments.labels)}",
         )
     middle = instruments.points_m[:, [instruments.column(label) for label in labels]].mean(axis=1)
     times, seen = instruments.frame_times_s(), np.isfinite(middle).all(axis=1)

@@ -26,7 +26,8 @@ def changed_by(effects: Sequence[Effect], before: Instruments, file: object) -> 
 
     Raises
     ------
-    BadDataError : an effect of force plates in a file without them, or one that changes nothing.
+    BadDataError : an effect of force plates in a file without them; a marker or a plate that the
+        file does not have; an effect that changes nothing.
     """
     instruments = before
     for effect in effects:
@@ -37,13 +38,22 @@ def changed_by(effects: Sequence[Effect], before: Instruments, file: object) -> 
                 f"{effect.name} needs to know where the plates lie, and a MOT file does not say",
                 file=file,
             )
-        changed = effect.injected(instruments)
+        changed = _injected(effect, instruments, file)
         if _same(instruments.points_m, changed.points_m) and _same(
             instruments.readings, changed.readings
         ):
             raise BadDataError(f"{effect.name} changes nothing in this recording", file=file)
         instruments = changed
     return instruments
+
+
+def _injected(effect: Effect, instruments: Instruments, file: object) -> Instruments:
+    try:
+        return effect.injected(instruments)
+    except (UsageError, BadDataError) as error:  # what is asked for may be in the other files
+        raise BadDataError(
+            error.found, expected=error.expected, remedy=error.remedy, file=file
+        ) from error
 
 
 def _same(a: np.ndarray, b: np.ndarray) -> bool:

@@ -33,7 +33,8 @@ class Limit:
 
 
 def limits_of(selection: Selection) -> Iterator[Limit]:
-    """Per effect, target and parameter, in the trials together or alone."""
+    """Per effect, target and parameter, in the trials together or alone; what is of the body cannot
+    be in one trial alone."""
     signatures = selection.signatures
     fit = selection.fit
     chances = [one.chance for one in selection.rounds if one.chance is not None]
@@ -44,7 +45,8 @@ def limits_of(selection: Selection) -> Iterator[Limit]:
     found: dict[tuple, Limit] = {}
     for place, information in scores:
         effect = place.candidate.effect
-        if effect.name == UNEXPLAINED:
+        elsewhere = signatures.trials_of(place.candidate) - set(place.trials)
+        if effect.name == UNEXPLAINED or (effect.of_the_body and elsewhere):
             continue
         scene = signatures.evidence.trials[place.trials[0]].scene
         rows = sum(len(signatures.evidence.trials[t].residual) for t in place.trials)

@@ -49,6 +49,7 @@ class Effect(ABC):
     name: ClassVar[str]
     of_the_lab: ClassVar[bool]  # the same in every trial of a recording session
     of_the_person: ClassVar[bool] = False  # the same in every trial of a person
+    of_the_body: ClassVar[bool] = False  # of the person, and in one trial if in another
     of_the_plates: ClassVar[bool] = False  # the truth is what was measured, less the change
     remedy: ClassVar[str]  # what would separate it from its rivals
     least_named: ClassVar[Mapping[str, float]] = {}  # of a parameter: smaller ones are not told

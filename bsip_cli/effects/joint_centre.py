@@ -24,6 +24,7 @@ class JointCentre(Effect):
     name = "joint_centre"
     of_the_lab = False
     of_the_person = True
+    of_the_body = True
     remedy = "record a trial that turns this joint alone, and scale with it"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

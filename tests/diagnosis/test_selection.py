@@ -365,6 +365,17 @@ def test_a_shift_along_a_hinge_would_not_be_found():
     assert np.isfinite(sizes["hip_l"]).all()
 
 
+def test_a_joint_does_not_lie_elsewhere_in_one_trial_alone():
+    scenes = [noisy(part_of_moving(start, 6), start) for start in (0, 6)]
+    effects = [EFFECTS[name] for name in ("joint_centre", "added_mass")]
+    selection = select(signatures_of(all_of(*scenes), effects), np.random.default_rng(0))
+    trials: dict[str, set[tuple[int, ...]]] = {}
+    for limit in limits_of(selection):
+        place = limit.place
+        trials.setdefault(place.candidate.effect.name, set()).add(place.trials)
+    assert trials == {"joint_centre": {(0, 1)}, "added_mass": {(0,), (1,), (0, 1)}}
+
+
 def test_longer_recordings_show_smaller_causes():
     """Down to what is too small to matter; least where the parameters do much the same.
 

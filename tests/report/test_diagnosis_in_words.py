@@ -7,6 +7,7 @@ from fake_study import attribution, changes, detection, diagnosis, gains
 
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.report.blocks import Paragraph
 from bsip_cli.report.candidates import UNNAMED, candidates_of, causes_of
 from bsip_cli.report.effect_words import EFFECT_WORDS, place_label, size_words
 from bsip_cli.report.figures.wrench_residual import amplitude_spectrum
@@ -202,6 +203,15 @@ def test_what_no_recording_shows_is_not_put_in_figures(found):
     far["limit"] = np.where(far["target"] == "hand_l", 1e5, 0.02)
     *_, grid = limits_section.blocks(far, found)
     assert grid.cells()[0][1].text == "from 20 mm, or not at all"
+
+
+def test_what_no_recording_shows_at_all_is_said(found):
+    blind = detection(TRIALS)
+    blind.loc[blind["effect"] == "plate_gain", "limit"] = np.inf
+    said = [one.text for one in limits_section.blocks(blind, found) if isinstance(one, Paragraph)]
+    assert f"at any size that can be true: {EFFECT_WORDS['plate_gain'].title}." in " ".join(said)
+    usual = limits_section.blocks(detection(TRIALS), found)
+    assert "at any size" not in " ".join(one.text for one in usual if isinstance(one, Paragraph))
 
 
 # --- gains --------------------------------------------------------------------------------------

@@ -36,11 +36,21 @@ def blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
             "note",
         )
     )
-    said += [*_usual_figure(together), *_mass_figure(together, alone)]
+    said += [*_never_seen(detection), *_usual_figure(together), *_mass_figure(together, alone)]
     rows = tuple(row for effect in USUAL for row in _rows(effect, together, alone))
     head = ("cause", "in all recordings", "in one alone", "shows best at", "usual in labs")
     caption = "Least size that would be found, from the best place or direction to the worst"
     return [*said, Grid(head, rows, caption, words=5)]
+
+
+def _never_seen(detection: pd.DataFrame) -> list[Block]:
+    """Causes that these recordings do not show at all."""
+    seen = set(detection["effect"][np.isfinite(detection["limit"].astype(float))])
+    never = [e for e in dict.fromkeys(detection["effect"]) if e not in seen]
+    if not never:
+        return []
+    titles = "; ".join(effect_title(effect) for effect in never)
+    return [Paragraph(f"Not to be found here at any size that can be true: {titles}.")]
 
 
 # --- figures ------------------------------------------------------------------------------------

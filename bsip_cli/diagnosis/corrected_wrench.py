@@ -11,7 +11,7 @@ from bsip_cli.diagnosis.cause import Cause, change_by, delay_by
 from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.scene import Scene
 
-_ROUNDS = 2  # a clock's rate is wrong by 2 % at most: each round leaves 2 % of the error
+_ROUNDS = 2  # a clock's rate is wrong by 0.3 % at most: each round leaves as much of the error
 
 
 def is_of_the_forces(cause: Cause) -> bool:

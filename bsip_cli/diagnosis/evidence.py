@@ -18,7 +18,7 @@ from scipy import sparse
 from scipy.linalg import eigh, solve_toeplitz
 from scipy.ndimage import median_filter
 
-from bsip_cli.dynamics.lowpass import lowpass_operator
+from bsip_cli.dynamics.lowpass import lowpass_operator, stride_to
 from bsip_cli.effects.scene import Scene, standing_place_m
 from bsip_cli.identification.equations import ResidualSeries
 from bsip_cli.identification.noise import noise_of
@@ -57,7 +57,7 @@ class Filter:
 
 def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
     """Low-pass and decimation inside the valid stretches, moments about where the person stands."""
-    stride = max(1, int(scene.rate_hz / (_OVERSAMPLING * cutoff_hz)))
+    stride = stride_to(scene.rate_hz, _OVERSAMPLING * cutoff_hz)
     operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz, stride)
     cuts = np.flatnonzero(np.diff(frames) != stride) + 1
     edges = [0, *cuts.tolist(), len(frames)]
@@ -145,7 +145,7 @@ class TrialEvidence:
 
 def slow(scene: Scene) -> Scene:
     """The trial at the rate at which nuisances and signatures, smooth as they are, are computed."""
-    return scene.every(max(1, int(scene.rate_hz / ENOUGH_HZ)))
+    return scene.once("slow", lambda: scene.every(stride_to(scene.rate_hz, ENOUGH_HZ)))
 
 
 def trial_evidence(

@@ -115,8 +115,9 @@ class Explanation:
         return bool(np.linalg.norm(sizes) < NEGLIGIBLE)
 
     def is_possible(self, evidence: Evidence) -> bool:
-        """Whether it can be true of a body or a lab."""
-        return self.effect.possible(self.scene(evidence), self.target, self.values)
+        """Whether it can be true of a body or a lab, in all of its trials."""
+        scenes = (evidence.trials[t].scene for t in self.place.trials)
+        return all(self.effect.possible(scene, self.target, self.values) for scene in scenes)
 
     def agrees_with_markers(self, evidence: Evidence) -> bool:
         """Whether the markers of all of its trials allow it."""

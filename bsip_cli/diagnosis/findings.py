@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
+from string import ascii_uppercase
 from typing import Literal
 
 import numpy as np
@@ -17,6 +19,7 @@ from bsip_cli.diagnosis.selection import Round, Selection
 from bsip_cli.diagnosis.together import Evidence
 
 Verdict = Literal["named", "ambiguous", "rejected"]
+_LETTERS = ascii_uppercase.replace("W", "")  # W is the class of the stated mass
 
 
 @dataclass(frozen=True)
@@ -55,19 +58,18 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
     kept = list(_kept(evidence, selection))
     said = {_key(cause.explanation) for _, cause, _ in kept}
     findings = []
-    for letter, (one, cause, place) in enumerate(kept):
+    names = (a + b for a, b in product(("", *_LETTERS), _LETTERS))  # A, B, ... Z, AA, AB ...
+    for one, cause, number in kept:
         rivals = []
         for rival in rivals_of(one):
             if _key(rival.explanation) not in said and not _same(rival, cause):
                 rivals.append(rival)
                 said.add(_key(rival.explanation))
-        verdict: Verdict = "ambiguous" if rivals else "named"
-        class_id = chr(ord("A") + letter) if rivals else ""
-        remedy = cause.explanation.effect.remedy if rivals else ""
-        said_so = (verdict, class_id, remedy)
-        findings.append(_finding(evidence, cause, place, said_so, rng))
+        class_id = next(names) if rivals else ""
+        remedy = cause.explanation.effect.remedy
+        findings.append(_finding(evidence, cause, number, class_id, remedy, rng))
         for rival in rivals:
-            findings.append(_finding(one.evidence, rival, -1, said_so, rng))
+            findings.append(_finding(one.evidence, rival, -1, class_id, remedy, rng))
     findings += _without_name(selection, {t for _, one, _ in kept for t in one.trials})
     for one in selection.rounds:
         for tried in one.tried:
@@ -79,14 +81,16 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
 
 def _without_name(selection: Selection, told: set[int]) -> Iterator[Finding]:
     """Trials of which nothing else is told, though a cause was found there that did not stand out:
-    what is wrong has no name."""
-    for one in selection.rounds:
-        for tried in one.tried:
-            if tried.is_drowned and told.isdisjoint(tried.trials):
-                yield _drowned(selection.signatures.evidence, tried)
+    what is wrong has no name. Each trial once, with the cause that came nearest."""
+    drowned = [t for one in selection.rounds for t in one.tried if t.is_drowned]
+    for tried in sorted(drowned, key=lambda t: -t.score):
+        left = tuple(t for t in tried.trials if t not in told)
+        if left:
+            told = told | set(left)
+            yield _drowned(selection.signatures.evidence, tried, left)
 
 
-def _drowned(evidence: Evidence, tried: Tried) -> Finding:
+def _drowned(evidence: Evidence, tried: Tried, trials: tuple[int, ...]) -> Finding:
     one = tried.explanation
     sentence = one.effect.sentence(one.target, one.values)
     if one.effect.name != UNEXPLAINED:
@@ -96,7 +100,8 @@ def _drowned(evidence: Evidence, tried: Tried) -> Finding:
         )
     numbers = (Number("explained", "1", tried.gain.percent / 100, np.nan, np.nan),)
     without_name = _with(evidence, tried, "named", "", numbers, sentence)
-    return replace(without_name, effect=UNEXPLAINED, target="")
+    names = tuple(evidence.trials[t].name for t in trials)
+    return replace(without_name, effect=UNEXPLAINED, target="", trials=names)
 
 
 def _kept(evidence: Evidence, selection: Selection) -> Iterator[tuple[Round, Tried, int]]:
@@ -114,7 +119,7 @@ def _kept(evidence: Evidence, selection: Selection) -> Iterator[tuple[Round, Tri
 
 
 def _key(one: Explanation) -> tuple:
-    return one.effect.name, one.target, one.place.trials
+    return one.effect, one.target, one.place.trials
 
 
 def _same(one: Tried, other: Tried) -> bool:
@@ -127,17 +132,19 @@ def _same(one: Tried, other: Tried) -> bool:
 def _finding(
     evidence: Evidence,
     tried: Tried,
-    place: int,
-    said_so: tuple[Verdict, str, str],
+    number: int,
+    class_id: str,
+    remedy: str,
     rng: np.random.Generator,
 ) -> Finding:
+    """A cause that is kept, or with a ``class_id`` one of several; ``number`` in its fit."""
     one = tried.explanation.alike(evidence)[0]
-    verdict, class_id, remedy = said_so
-    number = place % len(tried.fit.explanations)
+    number = number % len(tried.fit.explanations)
     draws = drawn_explanations(evidence, tried.fit, number, rng)
     numbers = _numbers(evidence, one, draws)
     sentence = one.effect.sentence(one.target, one.values) + interval_words(numbers)
-    if verdict == "ambiguous":
+    verdict: Verdict = "ambiguous" if class_id else "named"
+    if class_id:
         sentence += f"; other causes look alike here: to tell them apart, {remedy}"
     return _with(evidence, tried, verdict, class_id, numbers, sentence)
 
@@ -160,7 +167,14 @@ def _rejected(evidence: Evidence, tried: Tried) -> Finding:
     return _with(evidence, tried, "rejected", "", numbers, sentence)
 
 
-def _with(evidence, tried: Tried, verdict: Verdict, class_id: str, numbers, sentence) -> Finding:
+def _with(
+    evidence: Evidence,
+    tried: Tried,
+    verdict: Verdict,
+    class_id: str,
+    numbers: tuple[Number, ...],
+    sentence: str,
+) -> Finding:
     one = tried.explanation
     trials = tuple(evidence.trials[t].name for t in one.place.trials)
     return Finding(

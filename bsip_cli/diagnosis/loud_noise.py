@@ -8,6 +8,7 @@ effects and none of the regularities describe: a channel that wanders, somebody 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,19 +49,19 @@ class Loud:
     louder: float
 
 
-def loud_findings(selection: Selection) -> tuple[Finding, ...]:
-    """One per component, for all trials in which nothing was named and it is too loud."""
+def loud_findings(selection: Selection, found: Sequence[Finding]) -> tuple[Finding, ...]:
+    """One per component, for all trials in which it is too loud and nothing was found."""
+    named = {trial for one in found if one.verdict != "rejected" for trial in one.trials}
     evidence = selection.signatures.evidence
-    explanations = selection.fit.explanations
-    named = {t for one in explanations for t in one.place.trials}
-    changes = changes_of(evidence, explanations)
-    found = [
-        loud
-        for t, (one, change) in enumerate(zip(evidence.trials, changes, strict=True))
-        if t not in named and (loud := loudest(one, change)) is not None
-    ]
-    channels = dict.fromkeys(one.channel for one in found)
-    return tuple(_finding([one for one in found if one.channel == c]) for c in channels)
+    changes = changes_of(evidence, selection.fit.explanations)
+    asked = (
+        loudest(one, change)
+        for one, change in zip(evidence.trials, changes, strict=True)
+        if one.name not in named
+    )
+    loud = [one for one in asked if one is not None]
+    channels = dict.fromkeys(one.channel for one in loud)
+    return tuple(_finding([one for one in loud if one.channel == c]) for c in channels)
 
 
 def loudest(one: TrialEvidence, change: np.ndarray) -> Loud | None:
@@ -114,7 +115,7 @@ def _finding(found: list[Loud]) -> Finding:
     number = Number("noise", unit, worst.noise, worst.noise - half, worst.noise + half)
     sentence = (
         f"something without a name makes {OF_THE_LAB[worst.channel]} err by {worst.noise:.1f} "
-        f"{unit} (root mean square), {worst.louder:.0f} times what the noise of the other "
+        f"{unit} (standard deviation), {worst.louder:.0f} times what the noise of the other "
         f"components lets expect{interval_words((number,))}"
     )
     return Finding(

@@ -7,7 +7,7 @@ question to the plates any more, and its course in the wrench is nobody else's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from bsip_cli.diagnosis.findings import Finding, interval_words, numbers_of
 from bsip_cli.diagnosis.held_out import Gain
 from bsip_cli.diagnosis.intervals import DRAWS, SCALE_ERROR
 from bsip_cli.diagnosis.together import BLOCK_S, Evidence, clipped
+from bsip_cli.dynamics.lowpass import stride_to
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Scene
@@ -29,7 +30,6 @@ ENOUGH_HZ = 10.0  # for a course of many seconds
 PROVEN = 0.25
 OWN = 0.5  # of a marker's own squared residual: else its skin slides more than it slips
 RIVAL = 0.9  # of the best one's share: who explains as much cannot be told from it
-CLASS = "M"
 _UNKNOWN = (np.nan, np.nan, np.nan)
 SLIP, BEND, CENTRE = "marker_shift", "missing_joint", "joint_centre"
 
@@ -49,7 +49,8 @@ class Proof:
 
     values : (K,) all parameters, in the effect's order. draws : (DRAWS, K) as they might as well
     be. share : of the markers' squared residuals, of a slip of its own marker's. is_alone :
-    nothing else explains them as well.
+    nothing else explains them as well. is_rival : of another cause, in the place of which it would
+    stand.
     """
 
     effect: Effect
@@ -59,6 +60,7 @@ class Proof:
     share: float
     p_value: float
     is_alone: bool = True
+    is_rival: bool = False
 
     def columns(self, scene: Scene) -> np.ndarray:
         """(N, 6, k) what it may do to the wrench, sizes of unit variance: the plates do not judge
@@ -79,8 +81,8 @@ class Proof:
         blocks = np.bincount(block, saved)
         return Gain(blocks, np.ones(len(numbers), dtype=bool), float((before**2).sum()))
 
-    def finding(self, scene: Scene, trial: str, gain: Gain) -> Finding:
-        """As the diagnosis prints it."""
+    def finding(self, scene: Scene, trial: str, class_id: str, gain: Gain) -> Finding:
+        """As the diagnosis prints it; the class is that of causes that look alike."""
         reported = self.effect.reported(scene, self.target, self.values)
         drawn = [self.effect.reported(scene, self.target, one) for one in self.draws]
         numbers = numbers_of(reported, drawn)
@@ -96,7 +98,7 @@ class Proof:
             self.target,
             (trial,),
             "named" if self.is_alone else "ambiguous",
-            "" if self.is_alone else CLASS,
+            "" if self.is_alone else class_id,
             self.p_value,
             gain.interval() if gain.is_real() else _UNKNOWN,
             numbers,
@@ -108,7 +110,7 @@ def proofs_of(scene: Scene, slips: Sequence[Slip], rng: np.random.Generator) -> 
     """What a trial's markers prove: the slips that were found in them, and a second bend."""
     if scene.residual_m is None:
         return ()
-    fewer = scene.every(max(1, int(scene.rate_hz / ENOUGH_HZ)))
+    fewer = scene.every(stride_to(scene.rate_hz, ENOUGH_HZ))
     assert fewer.residual_m is not None
     left, found = fewer.residual_m, []
     for slip in slips:
@@ -134,20 +136,26 @@ def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:
 def _bends(scene: Scene, residual_m: np.ndarray, rng: np.random.Generator) -> tuple[Proof, ...]:
     """A second bend, with the joints' centres that explain as much; nothing if one explains more:
     scaling may err by that."""
-    tried = [
-        _sized(scene, residual_m, EFFECTS[name], target, (), rng)
-        for name in (BEND, CENTRE)
-        for target in EFFECTS[name].targets(scene)
-    ]
-    possible = [one for one in tried if one.effect.possible(scene, one.target, one.values)]
-    bend = next((one for one in possible if one.effect.name == BEND), None)
+    bend = next(_possible(scene, residual_m, EFFECTS[BEND], rng), None)
     if bend is None or bend.share < PROVEN:
         return ()
-    centres = sorted((x for x in possible if x.effect.name == CENTRE), key=lambda x: -x.share)
+    centres = _possible(scene, residual_m, EFFECTS[CENTRE], rng)
     rivals = [one for one in centres if one.share > RIVAL * bend.share]
     if any(RIVAL * one.share > bend.share for one in rivals):
         return ()
-    return tuple(replace(one, is_alone=not rivals) for one in (bend, *rivals))
+    rivals.sort(key=lambda one: -one.share)
+    others = (replace(one, is_alone=False, is_rival=True) for one in rivals)
+    return replace(bend, is_alone=not rivals), *others
+
+
+def _possible(
+    scene: Scene, residual_m: np.ndarray, effect: Effect, rng: np.random.Generator
+) -> Iterator[Proof]:
+    """An effect wherever it may be, where its sizes can be true."""
+    for target in effect.targets(scene):
+        one = _sized(scene, residual_m, effect, target, (), rng)
+        if effect.possible(scene, target, one.values):
+            yield one
 
 
 def _sized(

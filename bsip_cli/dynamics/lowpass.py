@@ -14,6 +14,11 @@ def stretches(valid: np.ndarray) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
+def stride_to(rate_hz: float, enough_hz: float) -> int:
+    """Every which frame is enough for a rate; rounding in the times decides nothing."""
+    return max(1, int(rate_hz / enough_hz * (1 + 1e-6)))
+
+
 def lowpass_operator(
     valid: np.ndarray, rate_hz: float, cutoff_hz: float, stride: int = 1
 ) -> tuple[sparse.csr_array, np.ndarray]:

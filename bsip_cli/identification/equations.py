@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from scipy import sparse
 
-from bsip_cli.dynamics.lowpass import lowpass_operator
+from bsip_cli.dynamics.lowpass import lowpass_operator, stride_to
 from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
 
 _ROWS = 100  # outputs per block: some 15 MB of regressor
@@ -154,7 +154,7 @@ def _left_over(model, recording, cutoff_hz, reference_m, phi):
 def _filtered_blocks(
     model: pin.Model, recording: Recording, cutoff_hz: float, reference_m: np.ndarray
 ) -> Iterator[Samples]:
-    stride = max(1, int(recording.rate_hz / (_OVERSAMPLING * cutoff_hz)))
+    stride = stride_to(recording.rate_hz, _OVERSAMPLING * cutoff_hz)
     operator, frames = lowpass_operator(recording.use, recording.rate_hz, cutoff_hz, stride)
     measured = operator @ np.where(
         recording.use[:, None], move_moments(recording.wrench, reference_m), 0.0

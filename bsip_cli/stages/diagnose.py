@@ -27,6 +27,7 @@ from bsip_cli.diagnosis.stated_mass import loaded_channel, stated_mass_findings
 from bsip_cli.diagnosis.support import support_of
 from bsip_cli.diagnosis.together import BLOCK_S, together
 from bsip_cli.effects.catalogue import CATALOGUE
+from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.prior import Prior
 from bsip_cli.report.verdict import verdict_of
 from bsip_cli.stages.diagnosis_rows import rows_of
@@ -48,12 +49,14 @@ def run(unit: Unit) -> None:
     prior = prior_of(unit, person)
     looked_at = moving_trials(unit, person, prior)
     trials = tuple(one.evidence for one in looked_at if one.evidence is not None)
-    told = (*(f for one in looked_at for f in one.told), *_standing(unit, person, prior))
+    standing = _standing(unit, person, prior)
+    told = (*(f for one in looked_at for f in one.told), *_weighed(unit, standing))
+    for sentence in filter(None, (one.left_out for one in looked_at)):
+        unit.warn(sentence)
     if trials:
-        for sentence in filter(None, (one.left_out for one in looked_at)):
-            unit.warn(sentence)
         proven = [cause for one in looked_at for cause in one.causes]
-        _write(unit, *_asked(unit, trials, told, proven))
+        only_motion_weighs = _is_weighed(unit) and standing is None
+        _write(unit, *_asked(unit, trials, told, proven, only_motion_weighs))
         return
     if not told:
         unit.warn(
@@ -65,14 +68,20 @@ def run(unit: Unit) -> None:
 
 
 def _asked(
-    unit: Unit, trials: tuple[TrialEvidence, ...], told: tuple[Finding, ...], proven: list[dict]
+    unit: Unit,
+    trials: tuple[TrialEvidence, ...],
+    told: tuple[Finding, ...],
+    proven: list[dict],
+    only_motion_weighs: bool,
 ) -> tuple[pd.DataFrame, pd.DataFrame, dict]:
-    """Diagnosis, detection limits and facts, of the moving trials and of what is told already."""
+    """Diagnosis, detection limits and facts, of the moving trials and of what is told already;
+    whether the stated mass can be compared with moving trials only."""
     rng = np.random.default_rng(crc32(unit.name.encode()))
     evidence = together(trials)
-    first = weight_round(evidence) if _only_motion_weighs(unit) else None
+    first = weight_round(evidence) if only_motion_weighs else None
     selection = select(signatures_of(evidence, ASKED), rng, first)
-    findings = (*findings_of(selection, rng), *loud_findings(selection))
+    found = findings_of(selection, rng)
+    findings = (*found, *loud_findings(selection, found))
     findings = tuple(sorted(findings, key=lambda one: one.verdict == "rejected"))
     facts = _facts(selection, findings)
     facts["trials"] = list(dict.fromkeys([*facts["trials"], *_trials_of(told)]))
@@ -105,7 +114,9 @@ class LookedAt:
 def moving_trials(unit: Unit, person: Person, prior: Prior) -> tuple[LookedAt, ...]:
     """The evidence of trials that move, and what hands or markers tell of them beforehand."""
     moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
-    return tuple(_looked_at(unit, person, prior, trial) for trial in moving)
+    return tuple(
+        _looked_at(unit, person, prior, trial, f"M{k}") for k, trial in enumerate(moving, start=1)
+    )
 
 
 def prior_of(unit: Unit, person: Person) -> Prior:
@@ -114,7 +125,8 @@ def prior_of(unit: Unit, person: Person) -> Prior:
     return prior_from(unit, unit.read("regression"), person, **(known if _is_weighed(unit) else {}))
 
 
-def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial) -> LookedAt:
+def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial, class_id: str) -> LookedAt:
+    """class_id : of what its markers do not tell apart."""
     scene = scene_of(unit, person, prior.phi, trial)
     measured_s = float(scene.valid.sum()) / scene.rate_hz
     if measured_s < _SHORTEST_S:
@@ -141,11 +153,15 @@ def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial) -> Looked
     alone = together((evidence_with(own),))
     gains = [one.gain(alone) for one in proofs]
     told = tuple(
-        one.finding(fewer, trial.stem, gain) for one, gain in zip(proofs, gains, strict=True)
+        one.finding(fewer, trial.stem, class_id, gain)
+        for one, gain in zip(proofs, gains, strict=True)
     )
     beside = np.concatenate([own, *(one.columns(fewer) for one in proofs)], axis=2)
-    helping = (one for one, gain in zip(proofs, gains, strict=True) if gain.is_real())
-    causes = tuple(_proven(one, trial) for one in helping)
+    causes = tuple(
+        _proven(one, trial)
+        for one, gain in zip(proofs, gains, strict=True)
+        if gain.is_real() and not one.is_rival
+    )
     return LookedAt(evidence_with(beside), told, causes)
 
 
@@ -171,30 +187,27 @@ def _proven(one: Proof, trial: Trial) -> dict:
     }
 
 
-def _only_motion_weighs(unit: Unit) -> bool:
-    """Whether the stated mass can be compared with moving trials only."""
-    return _is_weighed(unit) and not _static(unit)
-
-
 def _is_weighed(unit: Unit) -> bool:
     assert unit.participant is not None
     return unit.participant.mass_kg is not None
 
 
-def _static(unit: Unit) -> list[Trial]:
-    return [t for t in unit.trials("kinematics", "wrench") if t.role == "static"]
+def _standing(unit: Unit, person: Person, prior: Prior) -> tuple[str, Scene] | None:
+    """Name and scene of the first static trial in which the plates carry the person."""
+    for trial in unit.trials("kinematics", "wrench"):
+        if trial.role == "static":
+            scene = scene_of(unit, person, prior.phi, trial)
+            if scene.valid.any():
+                return trial.stem, scene
+    return None
 
 
-def _standing(unit: Unit, person: Person, prior: Prior) -> tuple[Finding, ...]:
-    """What the static trial says of the stated mass; nothing without such a trial or mass."""
-    static = _static(unit)
-    if not _is_weighed(unit) or not static:
+def _weighed(unit: Unit, standing: tuple[str, Scene] | None) -> tuple[Finding, ...]:
+    """What quiet standing says of the stated mass; nothing without the one or the other."""
+    if standing is None or not _is_weighed(unit):
         return ()
-    scene = scene_of(unit, person, prior.phi, static[0])
-    if not scene.valid.any():
-        return ()
-    share, channel = weight_share(scene), loaded_channel(scene)
-    return stated_mass_findings(share, scene.mass_kg, channel, static[0].stem)
+    name, scene = standing
+    return stated_mass_findings(weight_share(scene), scene.mass_kg, loaded_channel(scene), name)
 
 
 def _trials_of(findings: tuple[Finding, ...]) -> list[str]:
@@ -210,7 +223,11 @@ def _facts(selection: Selection, findings: tuple[Finding, ...]) -> dict:
         {"best": max((t.score for t in one.tried), default=0.0), "kept": one.kept is not None}
         for one in selection.rounds
     ]
-    verdicts = {(one.effect, one.target, one.trials): one.verdict for one in findings}
+    verdicts = {
+        (one.effect, one.target, one.trials): one.verdict
+        for one in findings
+        if one.verdict != "rejected"
+    }
     causes = []
     unseen = values_without(evidence, selection.fit)
     for number, (one, folds) in enumerate(zip(selection.fit.explanations, unseen, strict=True)):

@@ -6,16 +6,17 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import empty_table
-from bsip_cli.diagnosis.findings import Finding
+from bsip_cli.diagnosis.findings import Finding, Number
 
 NOTHING = "none"
 _KIND = "overall-diagnosis"
 
 
 def rows_of(findings: tuple[Finding, ...], trials: tuple[str, ...]) -> pd.DataFrame:
-    """One row per parameter; where nothing is named, a first row that says so."""
+    """One row per parameter; where nothing is named in the trials that were looked at, a first row
+    that says so."""
     rows = []
-    if all(one.verdict == "rejected" for one in findings):
+    if trials and all(one.verdict == "rejected" for one in findings):
         rows.append(nothing(findings[0].p_value if findings else np.nan, trials))
     first = len(rows) + 1
     for rank, one in enumerate(findings, start=first):
@@ -45,7 +46,7 @@ def nothing(p_value: float, trials: tuple[str, ...]) -> dict:
     }
 
 
-def _row(rank: int, one: Finding, number) -> dict:
+def _row(rank: int, one: Finding, number: Number) -> dict:
     gain, low, high = one.gain
     return {
         "rank": rank,

@@ -22,12 +22,15 @@ _HALF_M = 0.3  # of a plate whose outline no file tells
 def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = None) -> Scene:
     """Motion, plates and marker residuals of a trial; phi (10 n,) of the person alone.
 
-    Known loads are part of what is simulated.
+    Known loads are part of what is simulated. The markers bear the labels that the poses rest on.
     """
     kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
     plates = _plates(unit.read("plates", trial), wrench)
-    _, labels, positions = markers_from(unit.read("markers", trial))
+    times, labels, positions = markers_from(unit.read("markers", trial))
     markers = ordered_markers(labels, positions, person.markers)
+    markers = with_labels_put_right(
+        markers, times, person.markers, unit.read("marker-events", trial)
+    )
     q, v, a = coordinates_from(kinematics, person.skeleton)
     valid = wrench["valid"].to_numpy() & kinematics["determined"].to_numpy()
     scene = Scene(
@@ -43,6 +46,18 @@ def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = 
         wrench=wrench[WRENCH].to_numpy(),
     )
     return replace(scene, residual_m=marker_residuals(person, q, markers))
+
+
+def with_labels_put_right(
+    markers_m: np.ndarray, times_s: np.ndarray, names: tuple[str, ...], events: pd.DataFrame
+) -> np.ndarray:
+    """(N, m, 3) markers with labels exchanged back where ``ik`` did so (``marker-events``)."""
+    found = markers_m.copy()
+    for one in events[events["put_right"].astype(bool)].itertuples():
+        pair = [names.index(one.marker), names.index(one.partner)]
+        frames = np.flatnonzero((times_s >= one.start_s) & (times_s <= one.end_s))[:, None]
+        found[frames, pair] = found[frames, pair[::-1]]
+    return found
 
 
 def _plates(corners: pd.DataFrame, wrench: pd.DataFrame) -> tuple[Plate, ...]:

@@ -76,7 +76,8 @@ def redrawn_alarms(signatures: Signatures, rng: np.random.Generator) -> list[str
     shared = rng.standard_normal(trials[0].filtered.shared.shape[2])
     drawn = together(tuple(redrawn(one, shared, rng) for one in trials))
     selection = select(signatures.on(drawn), rng)
-    findings = (*findings_of(selection, rng), *loud_findings(selection))
+    found = findings_of(selection, rng)
+    findings = (*found, *loud_findings(selection, found))
     return [
         f"{one.effect} {one.target} ({len(one.trials)} trials)"
         for one in findings

@@ -14,6 +14,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -21,6 +22,7 @@ import pytest
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
+from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, load_config
 from bsip_cli.lock import held_alone
 from bsip_cli.pipeline import STAGES, Stage, producer
@@ -28,6 +30,9 @@ from bsip_cli.runner import Outcome, perform
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
+from bsip_cli.stages import diagnose
+from bsip_cli.stages.frames import person_from
+from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study import load_study
 from bsip_cli.unit import Unit
 
@@ -551,8 +556,35 @@ def test_trials_too_short_to_diagnose_are_named(run, monkeypatch):
     assert told.endswith("on a plate for 2.8 s only, 5 s are needed")
 
 
+def test_where_no_trial_is_long_enough_nobody_says_that_nothing_is_wrong(run, monkeypatch):
+    monkeypatch.setattr("bsip_cli.stages.diagnose._SHORTEST_S", 500.0)
+    run.path("diagnosis").unlink()
+    outcome = run.perform("diagnose")
+    assert outcome.state == "done"
+    told = " ".join(outcome.sentences)
+    assert told.count("has no part in the diagnosis") == 2
+    assert "no movement can be diagnosed" in told and "nobody can say" in told
+    assert "Nothing is wrong" not in told
+    assert read_artifact(run.path("diagnosis"), "overall-diagnosis").empty
+
+
+def test_a_static_trial_off_the_plates_weighs_nobody(run):
+    stem = f"sub-01_{TRIALS[2]}"
+    unit = unit_of(run, "diagnose", stem)
+    skeleton = load_skeleton(unit.config.skeleton)
+    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    name, scene = diagnose._standing(unit, person, diagnose.prior_of(unit, person))
+    assert name == stem and scene.valid.any()
+    path = run.path("wrench", stem)
+    wrench, notes = read_artifact(path, "wrench"), read_header(path)["provenance"]
+    write_artifact(path, "wrench", wrench.assign(valid=False), notes)
+    unit = unit_of(run, "diagnose", f"sub-01_{TRIALS[1]}")
+    assert diagnose._standing(unit, person, diagnose.prior_of(unit, person)) is None
+
+
 def test_exchanged_labels_are_put_right_before_the_poses(run):
     """The knee's markers bear each other's labels for a second: as if nothing had been."""
+    before = residuals_seen(run)
     stem = f"sub-01_{TRIALS[1]}"
     clean = read_artifact(run.path("kinematics", stem), "kinematics")
     path = run.path("markers", stem)
@@ -571,6 +603,18 @@ def test_exchanged_labels_are_put_right_before_the_poses(run):
     assert event.put_right
     kinematics = read_artifact(run.path("kinematics", stem), "kinematics")
     pd.testing.assert_frame_equal(kinematics, clean, atol=1e-6)
+    np.testing.assert_allclose(residuals_seen(run), before, atol=1e-6)
+
+
+def residuals_seen(run: Run) -> np.ndarray:
+    """(N, m, 3) of the markers in the squat, as the diagnosis sees them."""
+    unit = unit_of(run, "diagnose", f"sub-01_{TRIALS[1]}")
+    skeleton = load_skeleton(unit.config.skeleton)
+    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    (squat,) = (t for t in unit.trials("kinematics") if t.stem == f"sub-01_{TRIALS[1]}")
+    scene = scene_of(unit, person, diagnose.prior_of(unit, person).phi, squat)
+    assert scene.residual_m is not None
+    return scene.residual_m
 
 
 def test_every_schema_is_exercised(first_run):

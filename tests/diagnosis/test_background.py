@@ -92,6 +92,35 @@ def test_what_does_not_stand_out_has_no_name(monkeypatch):
     assert drowned.verdict == "rejected" and "remains without a cause" in drowned.sentence
 
 
+def test_each_trial_is_without_a_name_once(monkeypatch):
+    """Two causes that do not stand out in one trial: the one that came nearer is told."""
+    strong, weak = (one.kept for one in select(two_causes(), rng()).rounds if one.kept)
+    monkeypatch.setattr(selection, "background_of", remaining(1e6))
+    chosen = select(two_causes(), rng())
+    assert sum(one.is_drowned for each in chosen.rounds for one in each.tried) == 2
+    (unnamed,) = named_in(chosen)
+    assert strong.score > weak.score
+    assert "(the forces were" in unnamed.sentence
+    assert strong.explanation.effect.name == "sync_offset"
+
+
+def test_of_a_cause_in_two_trials_the_one_without_another_is_told(monkeypatch):
+    scenes = [late(part_of_moving(start, 8), DELAY_S) for start in (0, 8)]
+    first = with_effect(scenes[0], EFFECTS["plate_zero"], "1 fx", 60.0)
+    both = signatures_of(all_of(noisy(first, 4), noisy(scenes[1], 5)), EFFECTS_ASKED)
+    found = {
+        one.kept.explanation.effect.name: one.kept for one in select(both, rng()).rounds if one.kept
+    }
+    assert found["sync_offset"].trials == (0, 1) and found["plate_zero"].trials == (0,)
+    monkeypatch.setattr(selection, "background_of", in_groups({(0,): 1.0, (1,): 1.0, (): 1e6}))
+    said = {(one.effect, one.trials) for one in named_in(select(both, rng()))}
+    assert said == {("plate_zero", ("a",)), ("unexplained", ("b",))}
+
+
+def in_groups(scores):
+    return lambda signatures, fit: scores
+
+
 def test_beside_a_named_cause_what_is_weaker_than_the_rest_is_left_out(monkeypatch):
     strong, weak = (one.kept for one in select(two_causes(), rng()).rounds if one.kept)
     assert strong.score > 1.15 * weak.score

@@ -39,6 +39,7 @@ def scene_of(measured: np.ndarray, rate_hz: float = RATE_HZ):
         predicted=np.zeros((count, 6)),
     )
     scene.every = lambda stride: scene
+    scene.once = lambda key, make: make()
     return scene
 
 

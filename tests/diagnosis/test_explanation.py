@@ -30,6 +30,16 @@ def test_a_release_is_found_between_the_moments_that_are_tried():
     assert (fit.residual**2).sum() < (coarse.residual**2).sum() - 10
 
 
+def test_what_one_trial_forbids_is_impossible_in_both(monkeypatch):
+    scenes = [noisy(part_of_moving(start, 6), start) for start in (0, 6)]
+    evidence = all_of(*scenes)
+    one = null(EFFECTS["sync_offset"], "", trials=(0, 1))
+    assert one.is_possible(evidence)
+    second = evidence.trials[1].scene
+    monkeypatch.setattr(type(one.effect), "possible", lambda self, scene, *_: scene is not second)
+    assert not one.is_possible(evidence)
+
+
 def test_without_a_scan_there_is_nothing_to_refine():
     evidence = all_of(noisy(part_of_moving(0, 6), 1))
     one = null(EFFECTS["sync_offset"], "")
@@ -63,7 +73,7 @@ def test_values_stay_within_their_bounds():
     assert one.moved(evidence, np.array([-3.0])).values.tolist() == [0.0, 3.0]
     assert not one.moved_freely(evidence, np.array([-3.0])).is_possible(evidence)
     assert one.is_negligible(evidence)
-    assert one.all_moved(evidence, np.array([2.0, 100.0])).values[1] == pytest.approx(5.99)
+    assert one.all_moved(evidence, np.array([2.0, 100.0])).values[1] == pytest.approx(5.98)
 
 
 def test_intervals_hold_the_truth_and_shrink_with_time():

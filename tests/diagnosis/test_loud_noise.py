@@ -67,9 +67,9 @@ def test_noise_of_markers_shakes_all_components():
 def test_a_trial_without_a_name_for_it_is_unexplained():
     effects = [EFFECTS[name] for name in ("sync_offset", "plate_gain")]
     signatures = signatures_of(all_of(noisy(part_of_moving(0, 12), 3), wandering(2)), effects)
-    (one,) = loud_findings(select(signatures, np.random.default_rng(0)))
+    (one,) = loud_findings(select(signatures, np.random.default_rng(0)), ())
     assert (one.effect, one.target, one.trials) == ("unexplained", "fz", ("b",))
-    assert one.verdict == "named" and "root mean square" in one.sentence
+    assert one.verdict == "named" and "standard deviation" in one.sentence
     (number,) = one.numbers
     assert number.low < number.value < number.high and number.unit == "N"
     assert one.p_value < 0.01

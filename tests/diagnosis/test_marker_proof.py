@@ -10,6 +10,7 @@ from moving_scene import moving
 from noisy_trial import all_of, noisy
 from scipy.ndimage import gaussian_filter1d
 
+from bsip_cli.diagnosis import marker_proof
 from bsip_cli.diagnosis.marker_proof import Proof, Slip, proofs_of
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
@@ -42,7 +43,7 @@ def proofs(scene: Scene, *slips: Slip) -> tuple[Proof, ...]:
 
 def numbers(scene: Scene, proof: Proof) -> dict[str, tuple[float, float, float]]:
     (alone,) = all_of(scene).trials
-    finding = proof.finding(scene, "a", proof.gain(all_of(scene)))
+    finding = proof.finding(scene, "a", "M1", proof.gain(all_of(scene)))
     assert alone.name == "a" and finding.trials == ("a",)
     return {one.name: (one.low, one.value, one.high) for one in finding.numbers}
 
@@ -88,16 +89,35 @@ def test_a_waist_that_lies_elsewhere_is_no_second_bend():
 def test_a_sentence_says_how_much_of_the_residuals_it_is():
     scene = bent()
     (found,) = proofs(scene)
-    said = found.finding(scene, "a", found.gain(all_of(scene))).sentence
+    said = found.finding(scene, "a", "M1", found.gain(all_of(scene))).sentence
     assert "second joint" in said and f"{100 * found.share:.0f} % of what the markers leave" in said
 
 
 def test_what_explains_as_much_makes_a_class():
     scene = bent()
     (found,) = proofs(scene)
-    rival = replace(found, is_alone=False).finding(scene, "a", found.gain(all_of(scene)))
-    assert (rival.verdict, rival.class_id) == ("ambiguous", "M")
+    rival = replace(found, is_alone=False).finding(scene, "a", "M1", found.gain(all_of(scene)))
+    assert (rival.verdict, rival.class_id) == ("ambiguous", "M1")
     assert "to tell them apart" in rival.sentence
+
+
+def test_rivals_of_a_bend_stand_in_its_place_and_not_beside_it(monkeypatch):
+    monkeypatch.setattr(marker_proof, "RIVAL", 0.1)
+    monkeypatch.setattr(marker_proof, "_possible", with_rival(marker_proof._possible))
+    first, *others = proofs(bent())
+    assert (first.effect.name, first.is_alone, first.is_rival) == ("missing_joint", False, False)
+    assert others and all(one.effect.name == "joint_centre" for one in others)
+    assert all(one.is_rival and not one.is_alone for one in others)
+
+
+def with_rival(possible):
+    """What is possible, none of it explaining more than the bend."""
+
+    def found(scene, residual_m, effect, rng):
+        for one in possible(scene, residual_m, effect, rng):
+            yield one if effect.name == "missing_joint" else replace(one, share=0.2)
+
+    return found
 
 
 def test_columns_are_what_the_sizes_do_to_the_wrench():

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from bsip_cli.dynamics.lowpass import lowpass_operator, stretches
+from bsip_cli.dynamics.lowpass import lowpass_operator, stretches, stride_to
 
 
 def holed(count, seed):
@@ -100,3 +100,10 @@ def test_nothing_valid():
     assert len(frames) == 0
     assert stretches(np.zeros(5, dtype=bool)) == []
     assert stretches(np.array([1, 1, 0, 1], dtype=bool)) == [(0, 2), (3, 4)]
+
+
+@pytest.mark.parametrize("seconds", [2, 5, 8, 14, 60])
+@pytest.mark.parametrize(("rate_hz", "stride"), [(30, 1), (50, 1), (100, 2), (120, 2), (250, 5)])
+def test_the_rounding_of_times_decides_no_stride(rate_hz, stride, seconds):
+    times = np.arange(seconds * rate_hz) / rate_hz
+    assert stride_to(1.0 / float(np.median(np.diff(times))), 50.0) == stride

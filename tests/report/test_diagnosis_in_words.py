@@ -14,6 +14,7 @@ from bsip_cli.report.figures.wrench_residual import amplitude_spectrum
 from bsip_cli.report.limits import limits_of, limits_sentence
 from bsip_cli.report.movement_phases import PHASES, motion_of, phases_of
 from bsip_cli.report.participant import detection as limits_section
+from bsip_cli.report.participant import diagnosis as diagnosis_section
 from bsip_cli.report.participant.attribution import pooled_shares
 from bsip_cli.report.participant.diagnosis import gain_blocks, ranking
 from bsip_cli.report.participant.residual import residuals_of
@@ -152,6 +153,19 @@ def test_a_marker_of_any_name_is_drawn_as_it_is(found):
     foreign = found.assign(effect="marker_shift", target="$\\frac{$")
     picture = ranking(candidates_of(foreign))[0]
     assert b"<svg" in picture.svg
+
+
+def test_figure_and_table_number_causes_alike(found, monkeypatch):
+    """A cause without a gain, such as one that the markers prove, stands in the table only."""
+    first = found["rank"] == found["rank"].min()
+    silent = found.assign(gain_percent=found["gain_percent"].mask(first))
+    shown = []
+    monkeypatch.setattr(diagnosis_section, "candidate_gains", shown.append)
+    monkeypatch.setattr(diagnosis_section, "Picture", lambda *_: Paragraph(""))
+    *_, grid = ranking(candidates_of(silent))
+    numbers = [row[0].text for row in grid.cells()]
+    assert numbers[0].startswith("1. ")
+    assert list(shown[0].labels) == numbers[1 : 1 + len(shown[0].labels)]
 
 
 # --- limits -------------------------------------------------------------------------------------

@@ -99,14 +99,15 @@ def ranking(candidates: Sequence[Candidate]) -> list[Block]:
     """The candidates as a figure and in words."""
     if not candidates:
         return [Paragraph("No cause came near to explaining anything.")]
-    known = [one for one in candidates if np.isfinite(one.gain[0])][:_MOST_IN_FIGURE]
+    numbered = list(enumerate(candidates, start=1))
+    known = [(k, one) for k, one in numbered if np.isfinite(one.gain[0])][:_MOST_IN_FIGURE]
     blocks: list[Block] = []
     if known:
-        gain, low, high = np.array([one.gain for one in known]).T
+        gain, low, high = np.array([one.gain for _, one in known]).T
         figure = candidate_gains(
             CandidateGains(
-                tuple(_numbered(k, one) for k, one in enumerate(known, start=1)),
-                tuple(one.answer for one in known),
+                tuple(_numbered(k, one) for k, one in known),
+                tuple(one.answer for _, one in known),
                 gain,
                 low,
                 high,
@@ -120,7 +121,7 @@ def ranking(candidates: Sequence[Candidate]) -> list[Block]:
             "rivals of one class."
         )
         blocks.append(Picture(figure, caption, "Dots: gain of each cause.", "diagnosis_causes"))
-    rows = tuple(_row(k, one) for k, one in enumerate(candidates, start=1))
+    rows = tuple(_row(k, one) for k, one in numbered)
     head = ("cause", "verdict", "in words", "recordings", "chance [%]", "removes [%]")
     caption = (
         "Causes looked at. Chance: how often it would bring as much; removes: of the squared "

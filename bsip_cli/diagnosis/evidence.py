@@ -28,7 +28,7 @@ _OVERSAMPLING = 2.5
 _ORDER = 4  # of the autoregression
 _SMOOTH_HZ = 0.75  # half-width of the median over the spectrum
 _ROUNDS = 3
-_FLOOR = 1e-6  # of the noise's power, taken for white
+FLOOR = 1e-6  # of the noise's power, taken for white
 _MATTERS = 1e-3  # by which a direction is shrunk, at least
 
 
@@ -127,7 +127,7 @@ class TrialEvidence:
     residual: np.ndarray
     shared: np.ndarray
 
-    def with_noise_beside(self, change: np.ndarray, floor: float = _FLOOR) -> TrialEvidence:
+    def with_noise_beside(self, change: np.ndarray, floor: float = FLOOR) -> TrialEvidence:
         """The same trial; its noise is what remains beside a known, filtered change (n, 6).
 
         floor : part of the noise's power that is white whatever the residual says.
@@ -171,7 +171,7 @@ def trial_evidence(
 
 
 def _evidence(
-    name: str, scene: Scene, filtered: Filtered, beside: np.ndarray, floor: float = _FLOOR
+    name: str, scene: Scene, filtered: Filtered, beside: np.ndarray, floor: float = FLOOR
 ) -> TrialEvidence:
     whitening = _whitening(filtered, beside, floor)
     white = whitening.of_filtered(filtered.residual[..., None])[:, 0]

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from bsip_cli.diagnosis.candidates import Candidate
+from bsip_cli.diagnosis.evidence import FLOOR
 from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence, clipped, together
 from bsip_cli.effects.effect import Effect, Parameter
@@ -186,17 +187,17 @@ def with_noise_beside(
     evidence: Evidence,
     explanations: tuple[Explanation, ...],
     more: Sequence[np.ndarray] | None = None,
-    **floor: float,
+    floor: float = FLOOR,
 ) -> Evidence:
     """In the coordinates of the noise beside explanations, and beside ``more`` changes (n, 6) of
-    each trial, filtered."""
+    each trial, filtered; ``floor`` as in the trial's evidence."""
     filtered = [
         one.filtered.filter.one(change)
         for one, change in zip(evidence.trials, changes_of(evidence, explanations), strict=True)
     ]
     beside = filtered if more is None else [a + b for a, b in zip(filtered, more, strict=True)]
     trials = zip(evidence.trials, beside, strict=True)
-    return together(tuple(one.with_noise_beside(change, **floor) for one, change in trials))
+    return together(tuple(one.with_noise_beside(change, floor) for one, change in trials))
 
 
 def left_by(evidence: Evidence, explanations: tuple[Explanation, ...]) -> np.ndarray:

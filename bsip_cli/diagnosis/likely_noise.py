@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bsip_cli.diagnosis.candidates import Candidate
+from bsip_cli.diagnosis.evidence import FLOOR
 from bsip_cli.diagnosis.explanation import Fit, fit_together, with_noise_beside
 from bsip_cli.diagnosis.signatures import Signatures
 
@@ -30,10 +31,13 @@ def with_likely_noise(signatures: Signatures, before: Fit) -> tuple[Signatures, 
 
 
 def noise_beside_fit(
-    signatures: Signatures, fit: Fit, more: Sequence[np.ndarray] | None = None, **floor: float
+    signatures: Signatures,
+    fit: Fit,
+    more: Sequence[np.ndarray] | None = None,
+    floor: float = FLOOR,
 ) -> tuple[Signatures, Fit]:
     """The same beside a fit, and beside more changes (n, 6), filtered, of each trial."""
-    evidence = with_noise_beside(signatures.evidence, fit.explanations, more, **floor)
+    evidence = with_noise_beside(signatures.evidence, fit.explanations, more, floor)
     return signatures.on(evidence), fit_together(evidence, fit.explanations)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +18,13 @@ SUPPORT = 8.0  # squared white residual that a trial must save to share a cause
 # Of what a cause explains in a trial: so much is lost where its size is a fifth off.
 OTHER_SIZE = 0.04
 
-Refitted = tuple[Explanation, Fit, float]
-"""A candidate in full, the fit with it, and its score."""
+
+class Refitted(NamedTuple):
+    """A candidate in full, the fit with it, and its score."""
+
+    explanation: Explanation
+    fit: Fit
+    score: float
 
 
 def start_at(evidence: Evidence, place: Place, sizes: np.ndarray) -> Explanation:
@@ -54,7 +60,7 @@ def refitted(
         return None
     if not found.agrees_with_markers(evidence):
         return None
-    return found, fit, score_of(before, fit, len(sizes))
+    return Refitted(found, fit, score_of(before, fit, len(sizes)))
 
 
 def _alike(one: Explanation, other: Explanation) -> bool:

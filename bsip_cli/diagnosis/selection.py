@@ -123,7 +123,7 @@ def _round(
     scored = signatures.scores(before.residual[:, None], before.tangent)
     tried = _tried(signatures, before, scored, open_trials, rough)
     tried += _elsewhere(signatures, before, scored, tried, rough)
-    chance = _chance(signatures, max(tried, key=lambda t: t[2])[1] if tried else before, rng)
+    chance = _chance(signatures, max(tried, key=lambda t: t.score).fit if tried else before, rng)
     judged = [judged_by(evidence, before, *one, chance) for one in tried]
     while _kept(judged, before) is None and (in_vain := _in_vain(judged) & open_trials):
         open_trials = open_trials - in_vain
@@ -145,7 +145,7 @@ def _tried(
     ranked = _best_of_each(signatures, scores[:, 0], sizes, open_trials, before)
     for asked, k in enumerate(ranked):
         place, score = signatures.places[k], scores[k, 0]
-        best_yet = max((t[2] for t in tried), default=0.0)
+        best_yet = max((t.score for t in tried), default=0.0)
         hopeless = score < WORTH_A_TRY * max(best_yet, rough.limit(place.trials, ALPHA))
         if len(tried) >= TRIES or (hopeless and (len(tried) >= SHOWN or asked >= 2 * TRIES)):
             break
@@ -162,7 +162,7 @@ def _elsewhere(
     jumps in every trial, at another moment each, passes for one that drifts in all."""
     if not tried:
         return
-    leader, fit, _ = max(tried, key=lambda one: one[2])
+    leader, fit, _ = max(tried, key=lambda one: one.score)
     shared = leader.place.trials if leader.effect.lasts else ()
     alone = [
         (one.effect, t, own)

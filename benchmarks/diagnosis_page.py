@@ -220,9 +220,8 @@ _ODD = """
   and its derivative.
 - `figaroh_human`: the forces are late by 7 to 10 ms in every component (9 ms in the vertical one,
   standard error 1 ms; 7, 9, 8, 8 and 10 ms in fifths of the trial), 0.27 of a frame, by regression
-  of the measured on the simulated forces and the measured ones' derivative. Where the diagnosis
-  names a larger delay and with it a drifting clock, that is wrong: two shifts in opposite
-  directions look like the fast forces that the smoothed motion lacks.
+  of the measured on the simulated forces and the measured ones' derivative. The diagnosis
+  names 13 ms, half as much again; why is not known.
 - Recordings that are refused have labels that no shipped marker set knows.
 """
 

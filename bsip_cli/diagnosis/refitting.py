@@ -7,9 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bsip_cli.diagnosis.chance import Chance
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together, refined
-from bsip_cli.diagnosis.judging import ALPHA
 from bsip_cli.diagnosis.signatures import Place, Signatures
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.statistics.chi_square import minus_log_p
@@ -34,16 +32,11 @@ def start_at(evidence: Evidence, place: Place, sizes: np.ndarray) -> Explanation
 
 
 def refitted(
-    signatures: Signatures,
-    before: Fit,
-    place: Place,
-    sizes: np.ndarray,
-    open_trials: set[int],
-    chance: Chance,
+    signatures: Signatures, before: Fit, place: Place, sizes: np.ndarray, open_trials: set[int]
 ) -> Refitted | None:
     """In full, beside the causes found before; nothing if it turns out impossible.
 
-    What lasts is tried in all trials too, and given up in those that do not support it, or for sure
+    What lasts is tried in all trials too, and given up in those that do not support it, or
     with another size.
     """
     evidence = signatures.evidence
@@ -54,7 +47,7 @@ def refitted(
     if place.candidate.effect.lasts and everywhere > set(place.trials):
         wider = replace(start, place=replace(place, trials=tuple(sorted(everywhere))))
         fits.append(fit_together(evidence, (*before.explanations, wider)))
-    fit = min((_supported(evidence, before, one, chance) for one in fits), key=_squares)
+    fit = min((_supported(evidence, before, one) for one in fits), key=_squares)
     found = fit.explanations[-1]
     if not found.is_possible(evidence) or found.is_negligible(evidence):
         return None
@@ -71,24 +64,22 @@ def _squares(fit: Fit) -> float:
     return float((fit.residual**2).sum())
 
 
-def _supported(evidence: Evidence, before: Fit, fit: Fit, chance: Chance) -> Fit:
+def _supported(evidence: Evidence, before: Fit, fit: Fit) -> Fit:
     """The last cause in those of its trials only whose residual becomes smaller by it, and that
     agree on its size."""
     one = fit.explanations[-1]
     saved = before.residual**2 - fit.residual**2
     trials = tuple(t for t in one.place.trials if saved[evidence.rows(t)].sum() > SUPPORT)
     if trials == one.place.trials and len(trials) > 1:
-        trials = _agreeing(evidence, fit, saved, chance)
+        trials = _agreeing(evidence, fit, saved)
     if not trials or trials == one.place.trials:
         return fit
     fewer = replace(one, place=replace(one.place, trials=trials))
-    less = fit_together(evidence, (*fit.explanations[:-1], fewer))
-    return _supported(evidence, before, less, chance)
+    return _supported(evidence, before, fit_together(evidence, (*fit.explanations[:-1], fewer)))
 
 
-def _agreeing(evidence: Evidence, fit: Fit, saved: np.ndarray, chance: Chance) -> tuple[int, ...]:
-    """Trials of the last cause but the one, if any, that a size of its own fits far better, and by
-    more than chance brings somewhere in that trial."""
+def _agreeing(evidence: Evidence, fit: Fit, saved: np.ndarray) -> tuple[int, ...]:
+    """Trials of the last cause but the one, if any, that a size of its own fits far better."""
     trials = fit.explanations[-1].place.trials
     mine = fit.columns(len(fit.explanations) - 1, evidence)
     shares = {}
@@ -98,7 +89,7 @@ def _agreeing(evidence: Evidence, fit: Fit, saved: np.ndarray, chance: Chance) -
         step = np.linalg.lstsq(tangent, residual, rcond=None)[0]
         more = float(residual @ tangent @ step)
         whole = more + float(saved[rows].sum())
-        shares[t] = more / whole if more > 2 * chance.limit((t,), ALPHA) else 0.0
+        shares[t] = more / max(whole, SUPPORT / OTHER_SIZE)
     odd = max(trials, key=lambda t: shares[t])
     return tuple(t for t in trials if t != odd or shares[t] < OTHER_SIZE)
 

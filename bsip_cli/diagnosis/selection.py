@@ -122,7 +122,7 @@ def _round(
     rough = _chance(signatures, before, rng)
     scored = signatures.scores(before.residual[:, None], before.tangent)
     tried = _tried(signatures, before, scored, open_trials, rough)
-    tried += _elsewhere(signatures, before, scored, tried, rough)
+    tried += _elsewhere(signatures, before, scored, tried)
     chance = _chance(signatures, max(tried, key=lambda t: t.score).fit if tried else before, rng)
     judged = [judged_by(evidence, before, *one, chance) for one in tried]
     while _kept(judged, before) is None and (in_vain := _in_vain(judged) & open_trials):
@@ -149,14 +149,14 @@ def _tried(
         hopeless = score < WORTH_A_TRY * max(best_yet, rough.limit(place.trials, ALPHA))
         if len(tried) >= TRIES or (hopeless and (len(tried) >= SHOWN or asked >= 2 * TRIES)):
             break
-        one = refitted(signatures, before, place, sizes[k], open_trials, rough)
+        one = refitted(signatures, before, place, sizes[k], open_trials)
         if one is not None:
             tried.append(one)
     return tried
 
 
 def _elsewhere(
-    signatures: Signatures, before: Fit, scored: Scored, tried: Sequence[Refitted], rough: Chance
+    signatures: Signatures, before: Fit, scored: Scored, tried: Sequence[Refitted]
 ) -> Iterator[Refitted]:
     """What betters a lasting cause in one of its trials, in the others of them too: a clock that
     jumps in every trial, at another moment each, passes for one that drifts in all."""
@@ -183,7 +183,7 @@ def _elsewhere(
             ranked = _best_of_each(signatures, scores[:, 0], sizes, {t}, before)
             mine = (k for k in ranked if signatures.places[k].candidate.effect is effect)
             for k in islice(mine, 1):
-                one = refitted(signatures, before, signatures.places[k], sizes[k], {t}, rough)
+                one = refitted(signatures, before, signatures.places[k], sizes[k], {t})
                 if one is not None:
                     yield one
 

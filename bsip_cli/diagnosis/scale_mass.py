@@ -26,42 +26,33 @@ TRUSTED = 0.008  # standard deviation of a stated mass, relative: clothes, shoes
 NOTICED = 0.02  # part of the mass from which on it is told
 
 
-def mass_difference(evidence: Evidence) -> np.ndarray:
-    """(trials,) mean vertical force against the simulated one, part of body weight."""
-    return np.array([weight_share(one.scene) for one in evidence.trials])
-
-
 def weight_share(scene: Scene) -> float:
     """Mean vertical force beyond the simulated one, part of body weight."""
     apart = (scene.measured - scene.predicted)[scene.valid, 2]
     return float(apart.mean()) / (scene.mass_kg * GRAVITY_M_S2)
 
 
-def weight_round(evidence: Evidence) -> Round | None:
-    """A vertical gain of the plates in all trials, and an offset beside it; nothing if plates and
-    scale agree, or the trials do not agree with each other."""
-    apart = mass_difference(evidence)
+def agreed_share(evidence: Evidence) -> float | None:
+    """What moving trials say of the stated mass, like ``weight_share``; nothing if plates and scale
+    agree, or the trials do not agree with each other."""
+    apart = np.array([weight_share(one.scene) for one in evidence.trials])
     share = float(np.median(apart))
     if abs(share) < NOTICED or np.abs(apart - share).max() > 0.5 * abs(share):
         return None
-    target = _heaviest(evidence)
-    if target is None:
-        return None
+    return share
+
+
+def weight_round(evidence: Evidence, share: float, channel: str) -> Round:
+    """A gain of the vertical channel of the only plate that carries the person, in all trials, and
+    an offset beside it.
+
+    share : of body weight, from ``agreed_share``.
+    """
     p_value = float(2 * norm.sf(abs(share) / TRUSTED))
     weight = share * evidence.trials[0].scene.mass_kg * GRAVITY_M_S2
-    gain = _tried(evidence, PlateGain(), target, share, p_value)
-    offset = _tried(evidence, PlateZero(), target, weight, p_value)
+    gain = _tried(evidence, PlateGain(), channel, share, p_value)
+    offset = _tried(evidence, PlateZero(), channel, weight, p_value)
     return Round(evidence, (gain, offset), gain, None)
-
-
-def _heaviest(evidence: Evidence) -> str | None:
-    """The vertical channel of the plate that carries most."""
-    loads: dict[str, float] = {}
-    for one in evidence.trials:
-        for plate in one.scene.plates:
-            mean = float(np.nan_to_num(plate.wrench[one.scene.valid, 2]).mean())
-            loads[plate.name] = loads.get(plate.name, 0.0) + mean
-    return f"{max(loads, key=lambda name: loads[name])} fz" if loads else None
 
 
 def _tried(

@@ -1,10 +1,13 @@
-"""Somebody stands quietly, and the plates do not read the stated mass.
+"""The plates do not read the stated mass.
 
-Nothing in a quiet trial tells why, and nothing in the moving ones where the inertial parameters
-follow the plates: so this is a class of causes, of which every one is printed with its own size.
+Nothing in a quiet trial tells why, and nothing in moving ones where the inertial parameters follow
+the plates or several plates carry the person. So this is a class of causes, of which every one is
+printed with its own size.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 from scipy.stats import norm
@@ -26,21 +29,25 @@ LOADED = 0.05  # of body weight: a plate that carries less is not stood upon
 _UNKNOWN = (np.nan, np.nan, np.nan)
 
 
-def loaded_channel(scene: Scene) -> str:
+def loaded_channel(scenes: Iterable[Scene]) -> str:
     """The vertical channel of the plate that carries the person; of ``all`` where several do."""
+    loaded = {name for scene in scenes for name in _loaded_plates(scene)}
+    return f"{loaded.pop() if len(loaded) == 1 else 'all'} fz"
+
+
+def _loaded_plates(scene: Scene) -> list[str]:
     least = LOADED * scene.mass_kg * GRAVITY_M_S2
     loads = {one.name: np.nan_to_num(one.wrench[scene.valid, 2]).mean() for one in scene.plates}
-    loaded = [name for name, load in loads.items() if load > least]
-    return f"{loaded[0] if len(loaded) == 1 else 'all'} fz"
+    return [name for name, load in loads.items() if load > least]
 
 
 def stated_mass_findings(
-    share: float, mass_kg: float, channel: str, trial: str
+    share: float, mass_kg: float, channel: str, trials: tuple[str, ...], manner: str
 ) -> tuple[Finding, ...]:
     """The class of causes if the plates differ from the stated mass by more than NOTICED.
 
-    share : of the stated mass, from ``weight_share``. channel : from ``loaded_channel``.
-    trial : the name of the recording.
+    share : of the stated mass, from ``weight_share`` or ``agreed_share``. channel : from
+    ``loaded_channel``. trials : the recordings that tell. manner : how they were read, in words.
     """
     if abs(share) < NOTICED:
         return ()
@@ -48,7 +55,7 @@ def stated_mass_findings(
     error = TRUSTED * mass_kg
     extra = share * mass_kg
     told = (
-        f"the plates read {mass_kg + extra:.2f} kg in quiet standing, {abs(extra):.1f} kg "
+        f"the plates read {mass_kg + extra:.2f} kg {manner}, {abs(extra):.1f} kg "
         f"{'more' if extra > 0 else 'less'} than stated"
     )
     weight, weight_error = extra * GRAVITY_M_S2, error * GRAVITY_M_S2
@@ -63,7 +70,7 @@ def stated_mass_findings(
         Finding(
             effect,
             "" if effect == AddedMass.name else channel,
-            (trial,),
+            trials,
             "ambiguous",
             CLASS,
             p_value,

@@ -20,12 +20,12 @@ from bsip_cli.diagnosis.loud_noise import loud_findings
 from bsip_cli.diagnosis.marker_proof import Proof, Slip, proofs_of
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.patterns import PATTERNS
-from bsip_cli.diagnosis.scale_mass import weight_round, weight_share
-from bsip_cli.diagnosis.selection import Selection, select
+from bsip_cli.diagnosis.scale_mass import agreed_share, weight_round, weight_share
+from bsip_cli.diagnosis.selection import Round, Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.diagnosis.stated_mass import loaded_channel, stated_mass_findings
 from bsip_cli.diagnosis.support import support_of
-from bsip_cli.diagnosis.together import BLOCK_S, together
+from bsip_cli.diagnosis.together import BLOCK_S, Evidence, together
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.prior import Prior
@@ -78,10 +78,10 @@ def _asked(
     whether the stated mass can be compared with moving trials only."""
     rng = np.random.default_rng(crc32(unit.name.encode()))
     evidence = together(trials)
-    first = weight_round(evidence) if only_motion_weighs else None
+    first, weighed = _weighed_moving(evidence) if only_motion_weighs else (None, ())
     selection = select(signatures_of(evidence, ASKED), rng, first)
     found = findings_of(selection, rng)
-    findings = (*found, *loud_findings(selection, found))
+    findings = (*found, *loud_findings(selection, found), *weighed)
     findings = tuple(sorted(findings, key=lambda one: one.verdict == "rejected"))
     facts = _facts(selection, findings)
     facts["trials"] = list(dict.fromkeys([*facts["trials"], *_trials_of(told)]))
@@ -207,7 +207,22 @@ def _weighed(unit: Unit, standing: tuple[str, Scene] | None) -> tuple[Finding, .
     if standing is None or not _is_weighed(unit):
         return ()
     name, scene = standing
-    return stated_mass_findings(weight_share(scene), scene.mass_kg, loaded_channel(scene), name)
+    share, channel = weight_share(scene), loaded_channel([scene])
+    return stated_mass_findings(share, scene.mass_kg, channel, (name,), "in quiet standing")
+
+
+def _weighed_moving(evidence: Evidence) -> tuple[Round | None, tuple[Finding, ...]]:
+    """What moving trials say of the stated mass: a cause to begin with where one plate carries the
+    person, else a class of causes."""
+    share = agreed_share(evidence)
+    if share is None:
+        return None, ()
+    scenes = [one.scene for one in evidence.trials]
+    channel = loaded_channel(scenes)
+    if not channel.startswith("all "):
+        return weight_round(evidence, share, channel), ()
+    names = tuple(one.name for one in evidence.trials)
+    return None, stated_mass_findings(share, scenes[0].mass_kg, channel, names, "in motion")
 
 
 def _trials_of(findings: tuple[Finding, ...]) -> list[str]:

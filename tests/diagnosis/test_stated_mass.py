@@ -7,20 +7,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from moving_scene import MASS_KG, standing_still
+from noisy_trial import all_of, noisy, part_of_moving, with_effect
 
-from bsip_cli.diagnosis.scale_mass import weight_share
+from bsip_cli.diagnosis.scale_mass import agreed_share, weight_round, weight_share
 from bsip_cli.diagnosis.stated_mass import (
     CLASS,
     loaded_channel,
     stated_mass_findings,
 )
+from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.scene import Scene
 
 
 @pytest.mark.parametrize("share", [0.06, -0.04])
 def test_plates_that_read_otherwise_make_a_class(share):
     scene = standing_still()
     scene = replace(scene, wrench=(1 + share) * scene.predicted)
-    found = stated_mass_findings(weight_share(scene), scene.mass_kg, "all fz", "standing")
+    found = stated_mass_findings(
+        weight_share(scene), scene.mass_kg, "all fz", ("standing",), "in quiet standing"
+    )
     sizes = {one.effect: one.numbers[0].value for one in found}
     assert abs(sizes["plate_gain"] - share) < 1e-9
     assert abs(sizes["plate_zero"] - share * MASS_KG * 9.81) < 0.05
@@ -37,12 +42,48 @@ def test_plates_that_agree_say_nothing():
     scene = standing_still()
     scene = replace(scene, wrench=1.01 * scene.predicted)
     share = weight_share(scene)
-    assert stated_mass_findings(share, scene.mass_kg, "all fz", "standing") == ()
+    assert (
+        stated_mass_findings(share, scene.mass_kg, "all fz", ("standing",), "in quiet standing")
+        == ()
+    )
 
 
 def test_the_channel_is_that_of_the_plates_stood_upon():
     scene = standing_still()
-    assert loaded_channel(scene) == "all fz"
+    assert loaded_channel([scene]) == "all fz"
     first, second = scene.plates
     alone = replace(second, wrench=0 * second.wrench)
-    assert loaded_channel(replace(scene, plates=(first, alone))) == "1 fz"
+    on_one = replace(scene, plates=(first, alone))
+    assert loaded_channel([on_one, on_one]) == "1 fz"
+    assert loaded_channel([on_one, scene]) == "all fz"
+
+
+def on_one_plate(gain: float, first_s: float) -> Scene:
+    """A moving trial on the first of two plates, whose vertical channel is off."""
+    scene = part_of_moving(first_s, 4.0)
+    first, second = scene.plates
+    plates = (
+        replace(first, wrench=scene.predicted),
+        replace(second, wrench=0 * scene.predicted),
+    )
+    alone = replace(scene, plates=plates)
+    return noisy(with_effect(alone, EFFECTS["plate_gain"], "1 fz", gain), round(first_s))
+
+
+def test_moving_trials_on_one_plate_give_its_gain_to_begin_with():
+    evidence = all_of(on_one_plate(0.05, 0), on_one_plate(0.05, 4))
+    share = agreed_share(evidence)
+    assert share == pytest.approx(0.05 / 1.05, abs=0.003)
+    begun = weight_round(evidence, share, "1 fz")
+    gain, offset = begun.tried
+    assert begun.kept is gain
+    assert gain.explanation.place.trials == (0, 1)
+    assert gain.explanation.values[0] == pytest.approx(share, rel=0.02)
+    assert gain.p_value < 1e-6
+    assert offset.explanation.values[0] == pytest.approx(share * MASS_KG * 9.81, rel=0.3)
+
+
+@pytest.mark.parametrize("gains", [(0.05, -0.05), (0.01, 0.01)])
+def test_moving_trials_that_disagree_or_are_near_say_nothing(gains):
+    evidence = all_of(on_one_plate(gains[0], 0), on_one_plate(gains[1], 4))
+    assert agreed_share(evidence) is None

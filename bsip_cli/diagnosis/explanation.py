@@ -126,8 +126,9 @@ class Explanation:
         return all(self.effect.agrees(scene, self.target, self.values) for scene in scenes)
 
     def scene(self, evidence: Evidence) -> Scene:
-        """One of its trials."""
-        return evidence.trials[self.place.trials[0]].scene
+        """The longest of its trials: a number that hangs on the movement is that of this one."""
+        scenes = (evidence.trials[t].scene for t in self.place.trials)
+        return max(scenes, key=lambda scene: scene.times_s[-1] - scene.times_s[0])
 
     def parameters(self, evidence: Evidence) -> tuple[Parameter, ...]:
         return self.effect.parameters(self.scene(evidence), self.target)

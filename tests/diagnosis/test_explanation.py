@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from noisy_trial import all_of, fitted, late, noisy, null, part_of_moving, with_effect
@@ -38,6 +40,14 @@ def test_what_one_trial_forbids_is_impossible_in_both(monkeypatch):
     second = evidence.trials[1].scene
     monkeypatch.setattr(type(one.effect), "possible", lambda self, scene, *_: scene is not second)
     assert not one.is_possible(evidence)
+
+
+def test_a_range_is_told_of_the_longest_trial():
+    evidence = all_of(noisy(part_of_moving(0, 4), 1), noisy(part_of_moving(4, 8), 1))
+    bend = replace(null(EFFECTS["missing_joint"], "upper_torso", trials=(0, 1)), values=np.ones(3))
+    scenes = (one.scene for one in evidence.trials)
+    short, long = (bend.effect.reported(scene, bend.target, bend.values) for scene in scenes)
+    assert bend.reported(evidence) == long != short
 
 
 def test_without_a_scan_there_is_nothing_to_refine():

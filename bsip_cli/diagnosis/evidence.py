@@ -84,7 +84,7 @@ class Whitening:
     def of_filtered(self, wrenches: np.ndarray) -> np.ndarray:
         """(6 n, k) of wrenches (n, 6, k) that have passed the filter."""
         columns, kind = self.innovations(wrenches), wrenches.dtype
-        left, shrink = self.left.astype(kind), self.shrink.astype(kind)
+        left, shrink = (x.astype(kind, copy=False) for x in (self.left, self.shrink))
         return columns - left @ (shrink[:, None] * (left.T @ columns))
 
     def transposed(self, rows: np.ndarray) -> np.ndarray:

@@ -46,7 +46,7 @@ class Evidence:
     def white(self, parts: dict[int, np.ndarray]) -> np.ndarray:
         """(R, k) of signatures that are white in their own trials: trial to (6 n, k)."""
         inside = sum(self.left[self.rows(trial)].T @ part for trial, part in parts.items())
-        columns = -self.left @ (self.shrink[:, None] * inside)
+        columns = self.left @ (-self.shrink[:, None] * inside)
         for trial, part in parts.items():
             columns[self.rows(trial)] += part
         return columns

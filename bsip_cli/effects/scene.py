@@ -86,7 +86,7 @@ class Scene:
     robust_limit_m: float = np.inf
     wrench: np.ndarray | None = None
 
-    @property
+    @cached_property
     def rate_hz(self) -> float:
         return 1.0 / float(np.median(np.diff(self.times_s)))
 

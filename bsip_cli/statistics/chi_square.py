@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import gammaln
-from scipy.stats import chi2
+from scipy.special import chdtrc, gammaln
 
 _FAR = 1000.0
 
@@ -17,7 +16,7 @@ def minus_log_p(statistic: np.ndarray | float, degrees: int) -> np.ndarray:
     """
     x = np.maximum(np.asarray(statistic, dtype=float), 0.0)
     half = degrees / 2
-    near = -chi2.logsf(np.minimum(x, _FAR), degrees)
+    near = -np.log(chdtrc(degrees, np.minimum(x, _FAR)))
     y = np.maximum(x, _FAR) / 2
     far = y - (half - 1) * np.log(y) + gammaln(half) - np.log1p((half - 1) / y)
     return np.where(x < _FAR, near, far)

@@ -24,13 +24,13 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from bsip_cli.errors import NumericalError
 from bsip_cli.simulate.calculus import HALF_WIDTH, bridge, derivative, integral
-from bsip_cli.simulate.kinematics import poses_of
+from bsip_cli.simulate.kinematics import Turns, poses_of, turns_of
 from bsip_cli.simulate.loads import GRAVITY, total_load
 from bsip_cli.simulate.mixing import Mixer
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
 from bsip_cli.simulate.poses import Poses
-from bsip_cli.simulate.rotations import euler_zxy, from_rotation_vector
+from bsip_cli.simulate.rotations import from_rotation_vector
 from bsip_cli.simulate.wrench import Momentum, locked_inertia, momentum_of
 
 G = -GRAVITY[1]
@@ -63,16 +63,12 @@ class State:
     pelvis_m: np.ndarray
     turn_rate: np.ndarray
 
-    def rotation(self, plan: Plan) -> np.ndarray:
-        """(T, 3, 3) pelvis rotation in the walkway frame."""
-        planned = euler_zxy(plan.pelvis_angles_rad)
-        if not self.turn_rate.any():
-            return planned
-        return from_rotation_vector(integral(self.turn_rate, plan.step_s)) @ planned
-
-    def poses(self, person: Person, plan: Plan) -> Poses:
-        """All bodies' poses."""
-        return poses_of(person, plan, self.pelvis_m, self.rotation(plan))
+    def poses(self, person: Person, plan: Plan, turns: Turns) -> Poses:
+        """All bodies' poses; ``turns`` are those of the plan."""
+        rotation = turns["lower_torso"]
+        if self.turn_rate.any():
+            rotation = from_rotation_vector(integral(self.turn_rate, plan.step_s)) @ rotation
+        return poses_of(person, plan, turns, self.pelvis_m, rotation)
 
     def moved(self, by_m: np.ndarray) -> State:
         """The pelvis shifted by (T, 3)."""
@@ -90,7 +86,7 @@ def balanced(person: Person, plan: Plan, thin: int = 1) -> Poses:
     state, height = _within_reach(person, coarse)
     if thin > 1:
         state = _refined(coarse, state, plan)
-    poses = state.poses(person, plan)
+    poses = state.poses(person, plan, turns_of(person, plan))
     excess = poses.excess_reach_m.max()
     if excess > 0.0:
         raise NumericalError(
@@ -161,9 +157,9 @@ def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[Sta
 
     The number is the size of the last correction, in m or rad.
     """
-    cop = plan.cop_m()
+    cop, turns = plan.cop_m(), turns_of(person, plan)
     if plan.sway_share:
-        state, cop = _with_sway(person, plan, state, cop)
+        state, cop = _with_sway(person, plan, turns, state, cop)
     tolerance, mixer = ROUGH_M, Mixer()
     if final:
         tolerance = CLOSE_ENOUGH_M if plan.flights else STANDING_CLOSE_ENOUGH_M
@@ -172,7 +168,7 @@ def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[Sta
     edge = EDGE_S / plan.step_s if plan.loads else 0
     inner = slice(round(edge), len(plan) - round(edge))
     for _ in range(MOST_ROUNDS):
-        poses = state.poses(person, plan)
+        poses = state.poses(person, plan, turns)
         momentum = momentum_of(person.inertias, poses, plan.step_s)
         load_force, load_moment = total_load(plan.all_loads(), poses, plan.step_s)
         shift = _com_target(plan, momentum, cop, load_force, load_moment) - momentum.com_m
@@ -190,7 +186,7 @@ def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[Sta
         state = State(state.pelvis_m + shift, state.turn_rate + turn)
         if left < tolerance:
             break
-    return state, state.poses(person, plan), float(left)
+    return state, state.poses(person, plan, turns), float(left)
 
 
 def _mixed(
@@ -204,11 +200,11 @@ def _mixed(
 
 
 def _with_sway(
-    person: Person, plan: Plan, state: State, cop: np.ndarray
+    person: Person, plan: Plan, turns: Turns, state: State, cop: np.ndarray
 ) -> tuple[State, np.ndarray]:
     """Stand over the planned COP, and leave a part of the COP's natural excursion in it."""
     for _ in range(3):
-        poses = state.poses(person, plan)
+        poses = state.poses(person, plan, turns)
         momentum = momentum_of(person.inertias, poses, plan.step_s)
         miss = np.zeros_like(momentum.com_m)
         miss[:, [0, 2]] = cop - momentum.com_m[:, [0, 2]]

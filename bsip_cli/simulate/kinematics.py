@@ -19,6 +19,9 @@ from bsip_cli.simulate.rotations import (
 )
 
 DOWN = np.array([0.0, -1.0, 0.0])
+Turns = dict[str, np.ndarray]
+"""Rotations (T, 3, 3) of bodies against the body they hang on; of the pelvis in the walkway frame,
+nominal in flight. None of the thorax where the trunk is stiff."""
 
 
 def centre_of_mass(person: Person, poses: Poses) -> np.ndarray:
@@ -29,15 +32,44 @@ def centre_of_mass(person: Person, poses: Poses) -> np.ndarray:
     return first / sum(part.mass_kg for part in person.inertias.values())
 
 
+def turns_of(person: Person, plan: Plan) -> Turns:
+    """What the plan prescribes above the hips, wherever the pelvis is."""
+    angles, bend = plan.angles_rad, person.trunk_bend
+    waist = angles["waist"]
+    turns = {
+        "lower_torso": euler_zxy(plan.pelvis_angles_rad),
+        "abdomen": euler_zxy((1.0 - bend) * waist),
+        "head": euler_zxy(angles["neck"]),
+    }
+    if bend:
+        turns["thorax"] = euler_zxy(bend * waist)
+    if "spine" in angles:
+        spine = euler_zxy(angles["spine"])
+        turns["thorax"] = turns["thorax"] @ spine if bend else spine
+    for side in SIDES:
+        sign = SIDE_SIGN[side]
+        mirror = np.array([1.0, -sign, sign])
+        flexion, deviation, pronation = angles[f"wrist_{side}"].T
+        turns[f"upper_arm_{side}"] = euler_zxy(mirror * angles[f"shoulder_{side}"])
+        turns[f"forearm_{side}"] = about_axis(
+            person.hinges[f"elbow_{side}"], angles[f"elbow_{side}"]
+        )
+        turns[f"hand_{side}"] = (
+            about_y(sign * pronation) @ about_z(flexion) @ about_x(-sign * deviation)
+        )
+    return turns
+
+
 def poses_of(
-    person: Person, plan: Plan, pelvis_m: np.ndarray, pelvis_rotation: np.ndarray
+    person: Person, plan: Plan, turns: Turns, pelvis_m: np.ndarray, pelvis_rotation: np.ndarray
 ) -> Poses:
-    """All bodies' poses for the pelvis' path (T, 3) and rotation (T, 3, 3)."""
+    """All bodies' poses for the pelvis' path (T, 3) and rotation (T, 3, 3), and ``turns_of`` the
+    plan."""
     rotation = {"lower_torso": pelvis_rotation}
     origin = {"lower_torso": pelvis_m}
-    _trunk(person, plan, rotation, origin)
+    _trunk(person, turns, rotation, origin)
     for side in SIDES:
-        _arm(person, plan, side, rotation, origin)
+        _arm(person, turns, side, rotation, origin)
     excess = np.maximum(
         _leg(person, plan, "l", rotation, origin), _leg(person, plan, "r", rotation, origin)
     )
@@ -45,40 +77,33 @@ def poses_of(
 
 
 def _trunk(
-    person: Person, plan: Plan, rotation: dict[str, np.ndarray], origin: dict[str, np.ndarray]
+    person: Person, turns: Turns, rotation: dict[str, np.ndarray], origin: dict[str, np.ndarray]
 ) -> None:
-    waist, bend = plan.angles_rad["waist"], person.trunk_bend
-    abdomen = rotation["lower_torso"] @ euler_zxy((1.0 - bend) * waist)
-    thorax = abdomen @ euler_zxy(bend * waist) if bend else abdomen
-    if "spine" in plan.angles_rad:
-        thorax = thorax @ euler_zxy(plan.angles_rad["spine"])
+    abdomen = rotation["lower_torso"] @ turns["abdomen"]
+    thorax = abdomen @ turns["thorax"] if "thorax" in turns else abdomen
     rotation["abdomen"], rotation["thorax"] = abdomen, thorax
     origin["abdomen"] = origin["lower_torso"]
     upper_joint = origin["abdomen"] + rotate(abdomen, person.joints_m["tjc"])
     origin["thorax"] = upper_joint + rotate(thorax, person.joints_m["cjc"])
-    rotation["head"] = thorax @ euler_zxy(plan.angles_rad["neck"])
+    rotation["head"] = thorax @ turns["head"]
     origin["head"] = origin["thorax"]
 
 
 def _arm(
     person: Person,
-    plan: Plan,
+    turns: Turns,
     side: str,
     rotation: dict[str, np.ndarray],
     origin: dict[str, np.ndarray],
 ) -> None:
-    sign, angles, joints = SIDE_SIGN[side], plan.angles_rad, person.joints_m
+    joints = person.joints_m
     upper, lower, hand = (f"{name}_{side}" for name in ("upper_arm", "forearm", "hand"))
-    mirror = np.array([1.0, -sign, sign])
     origin[upper] = origin["thorax"] + rotate(rotation["thorax"], joints[f"shoulder_{side}"])
-    rotation[upper] = rotation["thorax"] @ euler_zxy(mirror * angles[f"shoulder_{side}"])
+    rotation[upper] = rotation["thorax"] @ turns[upper]
     origin[lower] = origin[upper] + rotate(rotation[upper], joints[f"elbow_{side}"])
-    elbow = about_axis(person.hinges[f"elbow_{side}"], angles[f"elbow_{side}"])
-    rotation[lower] = rotation[upper] @ elbow
+    rotation[lower] = rotation[upper] @ turns[lower]
     origin[hand] = origin[lower] + rotate(rotation[lower], joints[f"wrist_{side}"])
-    flexion, deviation, pronation = angles[f"wrist_{side}"].T
-    wrist = about_y(sign * pronation) @ about_z(flexion) @ about_x(-sign * deviation)
-    rotation[hand] = rotation[lower] @ wrist
+    rotation[hand] = rotation[lower] @ turns[hand]
 
 
 def _leg(

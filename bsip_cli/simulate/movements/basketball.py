@@ -8,12 +8,11 @@ import numpy as np
 
 from bsip_cli.simulate.calculus import bridge
 from bsip_cli.simulate.curves import glide, soft_polyline, step
-from bsip_cli.simulate.kinematics import centre_of_mass, poses_of
+from bsip_cli.simulate.kinematics import centre_of_mass, poses_of, turns_of
 from bsip_cli.simulate.loads import GRAVITY
 from bsip_cli.simulate.movements.standing import add_breath_of_motion, add_sway, plate_under
 from bsip_cli.simulate.people import SIDES, Person
 from bsip_cli.simulate.plan import STEP_S, Plan
-from bsip_cli.simulate.rotations import euler_zxy
 from bsip_cli.simulate.sketch import Sketch, held_ball, sketch_for
 
 G = -GRAVITY[1]
@@ -77,7 +76,8 @@ def _draw_jump(sketch: Sketch, rng: np.random.Generator, duration_s: float) -> J
 def standing_com_height(sketch: Sketch) -> float:
     """Height of the centre of mass in the first sample."""
     first = sketch.plan().thinned(len(sketch.t_s))
-    poses = poses_of(sketch.person, first, first.pelvis_m, euler_zxy(first.pelvis_angles_rad))
+    turns = turns_of(sketch.person, first)
+    poses = poses_of(sketch.person, first, turns, first.pelvis_m, turns["lower_torso"])
     return float(centre_of_mass(sketch.person, poses)[0, 1])
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from bsip_cli.diagnosis.explanation import Explanation
 from bsip_cli.diagnosis.intervals import drawn_explanations
-from bsip_cli.diagnosis.judging import ALPHA, Tried
+from bsip_cli.diagnosis.judging import ALPHA, NAMELESS_WORTH, Tried
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.rivals import rivals_of
 from bsip_cli.diagnosis.selection import Round, Selection
@@ -82,7 +82,9 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
 def _without_name(selection: Selection, told: set[int]) -> Iterator[Finding]:
     """Trials of which nothing else is told, though a cause was found there that did not stand out:
     what is wrong has no name. Each trial once, with the cause that came nearest."""
-    drowned = [t for one in selection.rounds for t in one.tried if t.is_drowned]
+    worth = 100 * NAMELESS_WORTH
+    tried_in_all = (t for one in selection.rounds for t in one.tried)
+    drowned = [t for t in tried_in_all if t.is_drowned and t.gain.percent >= worth]
     for tried in sorted(drowned, key=lambda t: -t.score):
         left = tuple(t for t in tried.trials if t not in told)
         if left:
@@ -159,6 +161,8 @@ def _rejected(evidence: Evidence, tried: Tried) -> Finding:
         if tried.is_leftover
         else "more than it explains remains without a cause"
         if tried.is_drowned
+        else f"it has no name and explains less than {100 * NAMELESS_WORTH:.0f} %, as skin may"
+        if tried.is_slight
         else "another cause explains it better"
         if tried.is_good
         else "on data held out it does not help, or hardly"

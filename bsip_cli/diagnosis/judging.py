@@ -15,6 +15,7 @@ from bsip_cli.diagnosis.together import Evidence
 ALPHA = 0.01  # in every round; with the chance's own errors one null in twenty has an alarm
 BEYOND_DOUBT = 1e-6  # so rare by chance that a gain above its standard error is enough
 WORTH = 0.01  # of the squared residual of its trials: what takes less changes no result
+NAMELESS_WORTH = 0.1  # of what has no name: skin alone brings regularities of some percent
 # What a large cause leaves behind, since no model of it is exact, is no other cause.
 LEFTOVER = 0.005  # of the squared residual that earlier causes took from the same trials
 
@@ -40,6 +41,12 @@ class Tried:
     def trials(self) -> tuple[int, ...]:
         """Where it is."""
         return self.explanation.place.trials
+
+    @property
+    def is_slight(self) -> bool:
+        """Whether it has no name and explains too little to be told."""
+        nameless = self.explanation.effect.name == UNEXPLAINED
+        return nameless and self.gain.percent < 100 * NAMELESS_WORTH
 
     @property
     def is_good(self) -> bool:

@@ -208,10 +208,20 @@ def _in_vain(judged: list[Tried]) -> set[int]:
 
 
 def _kept(judged: list[Tried], before: Fit) -> Tried | None:
-    """The cause that explains most; those that recur in several trials count together."""
+    """The cause that explains most. Where that is a slight thing without a name nothing is told: a
+    cause of the catalogue that explains even less would be the wrong name."""
     good = [one for one in judged if one.is_good]
-    if not good:
-        return None
+    while good:
+        first = _foremost(good, before)
+        if not first.is_slight:
+            return first
+        good = [one for one in good if set(one.trials).isdisjoint(first.trials)]
+    return None
+
+
+def _foremost(good: list[Tried], before: Fit) -> Tried:
+    """What explains most, if possible with a name; what recurs in several trials counts
+    together."""
     weights = _with_recurrence(good, before)
     named = [one for one in good if one.explanation.effect.name != UNEXPLAINED]
     best = max(good, key=lambda one: weights[id(one)])

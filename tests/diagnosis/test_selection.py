@@ -251,16 +251,31 @@ def test_what_turns_out_to_be_no_cause_does_not_hide_another_trial(monkeypatch):
     assert [(one.effect, one.trials) for one in said_of(chosen)] == [("plate_zero", ("a",))]
 
 
+def swinging(hertz: float, newtons: float = 20.0) -> Scene:
+    scene = part_of_moving(0, 12)
+    swing = newtons * np.sin(2 * np.pi * hertz * scene.times_s)[:, None] * np.eye(6)[2]
+    return noisy(shown(scene, swing), 6)
+
+
 @pytest.mark.parametrize("hertz", [3.0, 5.0])
 def test_a_swing_that_no_effect_knows_has_no_name(hertz):
-    scene = part_of_moving(0, 12)
-    swing = 20.0 * np.sin(2 * np.pi * hertz * scene.times_s)[:, None] * np.eye(6)[2]
-    (one,) = said_of(selection_of(noisy(shown(scene, swing), 6)))
+    (one,) = said_of(selection_of(swinging(hertz)))
     assert (one.effect, one.target) == ("unexplained", "fz")
     frequency = number_of(one, "frequency")
     assert frequency.value == pytest.approx(hertz, abs=0.01)
     assert number_of(one, "amplitude").value == pytest.approx(20.0, abs=2.0)
     assert "without a name" in one.sentence and f"{hertz:.2f} times per second" in one.sentence
+
+
+def test_something_slight_without_a_name_is_not_told_and_hides_no_other_trial(monkeypatch):
+    """The swing is let count as slight; what explains less of its trial is not named instead."""
+    monkeypatch.setattr(judging, "NAMELESS_WORTH", 0.9)
+    offset = noisy(with_effect(part_of_moving(12, 8), EFFECTS["plate_zero"], "2 fx", OFFSET_N), 8)
+    chosen = selection_of(swinging(3.0), offset)
+    assert [(one.effect, one.trials) for one in said_of(chosen)] == [("plate_zero", ("b",))]
+    findings = findings_of(chosen, np.random.default_rng(1))
+    swing = next(one for one in findings if (one.effect, one.target) == ("unexplained", "fz"))
+    assert swing.verdict == "rejected" and "it has no name and explains less" in swing.sentence
 
 
 def test_a_swing_between_the_regular_frequencies_is_found_in_a_long_trial():

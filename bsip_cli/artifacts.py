@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from bsip_cli.errors import BadDataError, not_writable
+from bsip_cli.provenance import file_hash
 from bsip_cli.schemas import SCHEMAS, Schema
 
 _TYPES = {"float": pa.float64(), "int": pa.int64(), "bool": pa.bool_(), "text": pa.string()}
@@ -164,6 +165,18 @@ def read_header(path: Path, kind: str | None = None) -> dict[str, Any]:
     if kind is not None:
         _check_kind(found, SCHEMAS[kind], path)
     return found
+
+
+def is_made_from(path: Path, source: Path) -> bool:
+    """Whether an artifact was made from an input as it stands now.
+
+    Raises
+    ------
+    BadDataError
+        ``path`` is missing or is not an artifact.
+    """
+    known = read_header(path)["provenance"]["made_by"]["inputs"]
+    return source.exists() and known.get(source.name) == file_hash(source)
 
 
 def _header_in(schema: pa.Schema) -> dict[str, Any]:

@@ -23,8 +23,8 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 def cli() -> None:
     """Find a person's body segment inertial parameters from motion capture and force plates.
 
-    Exit codes: 0 done; 2 usage or configuration; 3 bad data (the rest is done); 4 numerical
-    failure; 1 a bug.
+    Exit codes: 0 done; 2 usage or configuration, or results cannot be written; 3 bad data (the rest
+    is done); 4 numerical failure; 1 a bug.
     """
 
 

@@ -160,6 +160,7 @@ STAGES = (
             "marker-positions",
             "regression",
             "bsip",
+            "identification",
             "used-blocks",
         ),
         writes=("extended-bsip", "bsip-change", "extended-skeleton"),

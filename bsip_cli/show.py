@@ -9,7 +9,7 @@ from textwrap import fill
 
 import pandas as pd
 
-from bsip_cli.artifacts import read_artifact
+from bsip_cli.artifacts import is_made_from, read_artifact
 from bsip_cli.errors import UsageError
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
@@ -75,8 +75,12 @@ def _wrapped(text: str, width: int, first: str = "") -> str:
 
 
 def _table(folder: Path, kind: str) -> pd.DataFrame | None:
-    path = folder / f"{folder.name}_{SCHEMAS[kind].file_name}.parquet"
+    path = _path(folder, kind)
     return read_artifact(path, kind) if path.exists() else None
+
+
+def _path(folder: Path, kind: str) -> Path:
+    return folder / f"{folder.name}_{SCHEMAS[kind].file_name}.parquet"
 
 
 def _marker_events(folder: Path) -> list[tuple[str, pd.DataFrame]]:
@@ -87,5 +91,9 @@ def _marker_events(folder: Path) -> list[tuple[str, pd.DataFrame]]:
 
 
 def _extended(folder: Path, kind: str) -> pd.DataFrame | None:
+    """A table of ``extend`` with all causes in the model; nothing of an earlier diagnosis."""
+    changes, diagnosis = (_path(folder, name) for name in ("bsip-change", "overall-diagnosis"))
+    if not changes.exists() or not is_made_from(changes, diagnosis):
+        return None
     table = _table(folder, kind)
     return None if table is None else with_all_causes(table)

@@ -20,7 +20,8 @@ class Cause:
     ----------
     trials : stems of the trials that it concerns.
     values : (k,) all parameters, in the effect's order, from all data.
-    folds : (f, k) the same, estimated without the blocks of each fold.
+    folds : (f, k) the same; the free parameters estimated without the blocks of each fold, moments,
+        windows and frequencies from all data.
     """
 
     effect: Effect

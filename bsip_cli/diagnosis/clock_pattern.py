@@ -40,7 +40,7 @@ class ClockJump(Delay, Pattern):
         seen = min(before, after) >= least or (unseen and after >= least)
         return super().possible(scene, target, values) and bool(seen)
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return f"without a known cause, {self.goes_along_with(target, values)}"
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:

@@ -79,6 +79,10 @@ class Explanation:
         """Name, unit and value of what the diagnosis prints."""
         return self.effect.reported(self.scene(evidence), self.target, self.values)
 
+    def sentence(self, evidence: Evidence) -> str:
+        """What a person should read, without interval."""
+        return self.effect.sentence(self.scene(evidence), self.target, self.values)
+
     @property
     def effect(self) -> Effect:
         return self.place.candidate.effect

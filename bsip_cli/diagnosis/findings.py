@@ -94,7 +94,7 @@ def _without_name(selection: Selection, told: set[int]) -> Iterator[Finding]:
 
 def _drowned(evidence: Evidence, tried: Tried, trials: tuple[int, ...]) -> Finding:
     one = tried.explanation
-    sentence = one.effect.sentence(one.target, one.values)
+    sentence = one.sentence(evidence)
     if one.effect.name != UNEXPLAINED:
         sentence = (
             "something without a name; the nearest cause explains less than it leaves over "
@@ -144,7 +144,7 @@ def _finding(
     number = number % len(tried.fit.explanations)
     draws = drawn_explanations(evidence, tried.fit, number, rng)
     numbers = _numbers(evidence, one, draws)
-    sentence = one.effect.sentence(one.target, one.values) + interval_words(numbers)
+    sentence = one.sentence(evidence) + interval_words(numbers)
     verdict: Verdict = "ambiguous" if class_id else "named"
     if class_id:
         sentence += f"; other causes look alike here: to tell them apart, {remedy}"
@@ -167,7 +167,7 @@ def _rejected(evidence: Evidence, tried: Tried) -> Finding:
         if tried.is_good
         else "on data held out it does not help, or hardly"
     )
-    sentence = f"not so: {one.effect.sentence(one.target, one.values)} ({why})"
+    sentence = f"not so: {one.sentence(evidence)} ({why})"
     return _with(evidence, tried, "rejected", "", numbers, sentence)
 
 

@@ -87,7 +87,8 @@ def gain_of(
 
 
 def values_without(evidence: Evidence, fit: Fit) -> list[list[list[float]]]:
-    """Per explanation and fold, all its parameters as estimated without the fold's blocks."""
+    """Per explanation and fold, all its parameters, the free ones estimated without the fold's
+    blocks."""
     fold = evidence.blocks() % FOLDS
     kept: list[list[list[float]]] = [[] for _ in fit.explanations]
     for number in range(FOLDS):

@@ -86,7 +86,7 @@ class Proof:
         reported = self.effect.reported(scene, self.target, self.values)
         drawn = [self.effect.reported(scene, self.target, one) for one in self.draws]
         numbers = numbers_of(reported, drawn)
-        told = self.effect.sentence(self.target, self.values) + interval_words(numbers)
+        told = self.effect.sentence(scene, self.target, self.values) + interval_words(numbers)
         whose = "the markers leave" if self.effect.name != SLIP else "the marker leaves"
         sentence = f"{told}; this is {100 * self.share:.0f} % of what {whose}"
         if not gain.is_real():

@@ -28,7 +28,7 @@ class Pattern(Effect):
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
         """With what, and how large it is, for a sentence."""
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return f"something without a name goes along with {self.goes_along_with(target, values)}"
 
 

@@ -42,9 +42,9 @@ def agreed_share(evidence: Evidence) -> float | None:
     return share
 
 
-def weight_round(evidence: Evidence, share: float, channel: str) -> Round:
+def weight_round(evidence: Evidence, share: float, channel: str) -> Round | None:
     """A gain of the vertical channel of the only plate that carries the person, in all trials, and
-    an offset beside it.
+    an offset beside it; nothing where no plate's gain is that far off.
 
     share : of body weight, from ``agreed_share``.
     """
@@ -52,7 +52,8 @@ def weight_round(evidence: Evidence, share: float, channel: str) -> Round:
     weight = share * evidence.trials[0].scene.mass_kg * GRAVITY_M_S2
     gain = _tried(evidence, PlateGain(), channel, share, p_value)
     offset = _tried(evidence, PlateZero(), channel, weight, p_value)
-    return Round(evidence, (gain, offset), gain, None)
+    possible = gain.explanation.is_possible(evidence)
+    return Round(evidence, (gain, offset), gain, None) if possible else None
 
 
 def _tried(

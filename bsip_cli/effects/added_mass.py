@@ -62,7 +62,7 @@ class AddedMass(Effect):
         within = super().possible(scene, target, values) and values[0] >= self.least_named["mass"]
         return bool(within and np.linalg.norm(values[1:]) <= REACH_M * values[0])
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return f"{values[0]:.2f} kg that the model does not know move with the {in_words(target)}"
 
 

@@ -60,7 +60,7 @@ class Breathing(Effect):
             ("frequency", "Hz", float(values[2])),
         )
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return (
             f"breathing moves the trunk {values[2]:.2f} times per second (mass times amplitude "
             f"{np.hypot(values[0], values[1]):.3f} kg m)"

@@ -25,6 +25,6 @@ class ClockDrift(Delay):
     def late_s(self, scene: Scene, values: np.ndarray) -> np.ndarray:
         return values[0] * (scene.times_s - scene.times_s[0])
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         order = "slower" if values[0] > 0 else "faster"
         return f"the plates' clock runs {1e6 * abs(values[0]):.0f} ppm {order} than the cameras'"

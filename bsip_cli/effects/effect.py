@@ -80,7 +80,7 @@ class Effect(ABC):
         """(N, 6) what it adds to the simulated wrench, about the world's origin [N, N m]."""
 
     @abstractmethod
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         """What a person should read, without interval."""
 
     def marker_change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray | None:

@@ -39,5 +39,5 @@ class GravityTilt(Effect):
         parts = super().reported(scene, target, values)
         return (("angle", "rad", float(np.hypot(*values))), *parts)
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return f"the lab's Z axis is {np.degrees(np.hypot(*values)):.2f} degrees off the vertical"

@@ -48,7 +48,7 @@ class JointCentre(Effect):
         """No further than palpated or regressed centres lie off."""
         return super().possible(scene, target, values) and bool(np.linalg.norm(values) < MOST_M)
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return (
             f"the centre of {the_joint(target)} lies {1000 * np.linalg.norm(values):.0f} mm from "
             "where the model has it"

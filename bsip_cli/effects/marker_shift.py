@@ -83,8 +83,9 @@ class MarkerShift(Effect):
             ("from_time", "s", max(float(values[3]), float(scene.times_s[0]))),
         )
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
-        since = f"from {values[3]:.1f} s on" if values[3] > 0 else "throughout"
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+        late = values[3] > scene.times_s[0]
+        since = f"from {values[3]:.1f} s on" if late else "throughout"
         size = 1000 * np.linalg.norm(values[:3])
         return f"marker {target} sits {size:.0f} mm from its place {since}"
 

@@ -61,7 +61,7 @@ class MarkerSwap(Effect):
     ) -> tuple[tuple[str, str, float], ...]:
         return (("start", "s", float(values[1])), ("end", "s", float(values[2])))
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         first, second = target.split("+")
         return (
             f"markers {first} and {second} bear each other's labels from {values[1]:.2f} to "

@@ -92,7 +92,7 @@ class MissingJoint(Effect):
         asked = np.where(self.is_told(scene, target), values, 0.0)
         return super().possible(scene, target, asked)
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         shares = dict(zip(AXES, values.tolist(), strict=True))
         told = {axis: x for axis, x in shares.items() if abs(x) >= _WORTH_A_WORD} or shares
         parts = ", ".join(f"{100 * x:.0f} % of its {_MOVEMENTS[axis]}" for axis, x in told.items())

@@ -57,7 +57,7 @@ class OverSmoothing(Effect):
     ) -> tuple[tuple[str, str, float], ...]:
         return (("cutoff", "Hz", float(effective_cutoff_hz(values))),)
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return (
             f"the markers were smoothed at about {effective_cutoff_hz(values):.1f} Hz before they "
             "were delivered"

@@ -34,7 +34,7 @@ class PlateCrosstalk(Effect):
         change[:, sink] = values[0] * reading[:, source]
         return in_world(plate, change)
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         name, pair = target.rsplit(" ", 1)
         source, sink = pair.split(">")
         return (

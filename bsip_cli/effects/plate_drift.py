@@ -33,7 +33,7 @@ class PlateDrift(Effect):
         reading[:, CHANNELS.index(channel)] = values[0] * (scene.times_s - scene.times_s[0])
         return in_world(plate_of(scene, name), reading)
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         name, channel = target.rsplit(" ", 1)
         return (
             f"plate {name} reads {OF_A_PLATE[channel]} with a drift of {values[0]:+.2f} "

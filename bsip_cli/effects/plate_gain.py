@@ -33,7 +33,7 @@ class PlateGain(Effect):
         change[:, k] = reading[:, k] * values[0] / (1 + values[0])
         return in_world(plate, change)
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         name, channel = target.rsplit(" ", 1)
         order = "large" if values[0] > 0 else "small"
         return f"plate {name} reads {OF_A_PLATE[channel]} {100 * abs(values[0]):.1f} % too {order}"

@@ -35,7 +35,7 @@ class PlateRotation(Effect):
         dforce, dmoment = force - true.apply(force), moment - true.apply(moment)
         return np.hstack([dforce, dmoment + np.cross(centre, dforce)])
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         x, y, yaw = np.degrees(values)
         turned = f"turned by {yaw:+.1f} degrees about the vertical"
         tilted = f"tilted by {np.hypot(x, y):.1f} degrees"

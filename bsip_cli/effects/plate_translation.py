@@ -36,7 +36,7 @@ class PlateTranslation(Effect):
         force = np.nan_to_num(plate_of(scene, target).wrench[:, :3])
         return np.hstack([np.zeros_like(force), -np.cross(values, force)])
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         x, y, z = 1000 * values
         return (
             f"plate {target} lies {np.hypot(x, y):.0f} mm sideways from where the file says (lab "

@@ -30,7 +30,7 @@ class PlateZero(Effect):
         reading[:, CHANNELS.index(channel)] = values[0]
         return in_world(plate_of(scene, name), reading)
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         name, channel = target.rsplit(" ", 1)
         return (
             f"plate {name} reads {OF_A_PLATE[channel]} with a constant offset of {values[0]:+.1f} "

@@ -44,7 +44,7 @@ class ReleasedObject(Effect):
         seconds = [float((part & scene.valid).sum()) / scene.rate_hz for part in (before, ~before)]
         return super().possible(scene, target, values) and min(seconds) >= SEEN_S
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return f"the {in_words(target)} holds {values[0]:.2f} kg and lets go at {values[1]:.2f} s"
 
 

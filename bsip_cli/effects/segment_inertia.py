@@ -56,7 +56,7 @@ class SegmentInertia(Effect):
         cop = _share(measured, before, now, scene.valid)
         return (("share", "1", wrench), ("cop_share", "1", cop))
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return (
             f"the {in_words(target)} has other inertial parameters than simulated with "
             f"({values[0]:+.2f} kg)"

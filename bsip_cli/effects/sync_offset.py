@@ -22,6 +22,6 @@ class SyncOffset(Delay):
     def late_s(self, scene: Scene, values: np.ndarray) -> np.ndarray:
         return np.full(len(scene.times_s), values[0])
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         order = "after" if values[0] > 0 else "before"
         return f"the forces were recorded {1000 * abs(values[0]):.1f} ms {order} the markers"

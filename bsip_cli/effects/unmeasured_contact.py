@@ -100,7 +100,7 @@ class UnmeasuredContact(Effect):
         seconds = float((touching & scene.valid).sum()) / scene.rate_hz
         return super().possible(scene, target, values) and seconds >= SHORTEST_S
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         start, end = values[3] - values[4] / 2, values[3] + values[4] / 2
         return (
             f"from {start:.2f} to {end:.2f} s something beside the plates pushes on the "

@@ -48,7 +48,7 @@ class WobblingMass(Effect):
         key = (self.name, target, float(frequency), float(damping))
         return mass * scene.once(key, lambda: _swing(scene, target, frequency, damping))
 
-    def sentence(self, target: str, values: np.ndarray) -> str:
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return (
             f"{values[0]:.1f} kg of soft tissue of the {in_words(target)} swing against the bone, "
             f"{values[1]:.1f} times per second (damping ratio {values[2]:.2f})"

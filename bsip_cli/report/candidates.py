@@ -23,6 +23,7 @@ from bsip_cli.report.words import listing, number, trial_label
 NOTHING = "none"
 UNNAMED = "unexplained"
 _INTERVAL = re.compile(r" \([^()]*: 95 % interval .*$")  # what follows it the report says itself
+_REMARK = re.compile(r"; this is [^;]*")  # what markers prove by themselves
 _REASON = re.compile(r" \(([^()]*)\)$")  # why a candidate was rejected
 _MINUS = re.compile(r"(?<![\w.)])-(?=\d)")
 _SIGNED = re.compile(r"[+−]\d")
@@ -92,14 +93,16 @@ class Candidate:
         return re.sub(_MINUS, "−", text)
 
     def told(self) -> str:
-        """Its sentence with the interval of its main number."""
+        """Its sentence with the interval of its main number, and what the markers alone say."""
         main, what = self.main_number(), self.what()
+        found = _REMARK.search(self.sentence)
+        remark = found[0] if found else ""
         interval = main.interval(bool(_SIGNED.search(what))) if main else ""
         if main is None or not interval:
-            return what
+            return what + remark
         name = parameter_label(self.effect, main.name)
         name = "" if name in what else name
-        return f"{what} ({name}{': ' if name else ''}95 % interval {interval})"
+        return f"{what} ({name}{': ' if name else ''}95 % interval {interval}){remark}"
 
     def main_number(self) -> Number | None:
         """The number that the effect is about; of several alike, the one that is known best."""

@@ -17,6 +17,7 @@ _EXAMPLES = (  # effects whose limits are told in the sentence
     ("plate_gain", "fz", "a vertical gain wrong"),
     ("added_mass", "hand_l", "a mass on the left hand"),
 )
+OF_THE_WEIGHT = "W"  # class of what quiet standing tells
 _BY = ("plate_translation", "plate_gain")  # shifted *by* less than, but a delay *under*
 
 
@@ -65,7 +66,8 @@ def limits_of(
 
 
 def limits_sentence(limits: Sequence[Limit]) -> str:
-    """``A delay ... under 2.5 ms or ... could not have been seen.``; empty without examples."""
+    """``A delay ... under 2.5 ms or ... might have gone unseen.``: of plates and axes the worst
+    one; empty without examples."""
     parts = []
     for effect, ends, words in _EXAMPLES:
         of_it = [
@@ -82,9 +84,11 @@ def limits_sentence(limits: Sequence[Limit]) -> str:
     if not parts:
         return ""
     text = " or ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
-    return f"{text[0].upper()}{text[1:]} could not have been seen in these recordings."
+    return f"{text[0].upper()}{text[1:]} might have gone unseen in these recordings."
 
 
-def looked_at(detection: pd.DataFrame) -> tuple[str, ...]:
-    """Stems of the recordings that were diagnosed."""
-    return tuple(dict.fromkeys(s for t in detection["trials"] for s in str(t).split(", ")))
+def looked_at(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[str, ...]:
+    """Stems of the moving recordings that were diagnosed, those of which something was told before
+    the search too."""
+    told = diagnosis.loc[diagnosis["class_id"] != OF_THE_WEIGHT, "trials"]
+    return tuple(sorted({s for t in (*detection["trials"], *told) for s in str(t).split(", ")}))

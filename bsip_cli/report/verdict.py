@@ -41,7 +41,7 @@ class Verdict:
     causes : a text per cause or class of rivals.
     results : what the causes do to forces and parameters.
     advice : what follows for the reader.
-    limits : what could not have been seen; empty where that is not known.
+    limits : what might have gone unseen; empty where that is not known.
     """
 
     headline: str
@@ -66,7 +66,7 @@ def verdict_of(
     """From the artifacts ``diagnosis`` and ``detection``, and of ``extend`` where it has run
     ``gain`` and ``bsip-change``, with one method each."""
     causes = causes_of(candidates_of(diagnosis))
-    everywhere = looked_at(detection)
+    everywhere = looked_at(detection, diagnosis)
     return Verdict(
         headline(diagnosis),
         bool(causes),
@@ -169,18 +169,18 @@ def gain_sentence(gains: pd.DataFrame) -> str:
     """
     whole = gains[np.isfinite(gains["gain_percent"]) & (gains["component"] != "fz")]
     best = whole[whole["gain_percent"] > 0].nlargest(_MOST_GAINS, "gain_percent")
+    worse = [component_label(c) for c in whole.loc[whole["ci_high"] < 0, "component"]]
+    rises = f" The error rises in {listing(worse)}." if worse else ""
+    if whole.empty:
+        return ""
     if best.empty:
-        return (
-            "" if whole.empty else "With what was found in the model, no component follows better."
-        )
+        return f"With what was found in the model, no component follows better.{rises}"
     parts = [
         f"{component_label(r['component'])} {number(r['rmse_before'], 2)} → "
         f"{number(r['rmse_after'], 2)} {r['unit']} ({number(r['gain_percent'], 0)} % less, "
         f"{number(r['ci_low'], 0)} to {number(r['ci_high'], 0)} %)"
         for r in best.to_dict("records")
     ]
-    worse = [component_label(c) for c in whole.loc[whole["ci_high"] < 0, "component"]]
-    rises = f" It rises in {listing(worse)}." if worse else ""
     return (
         "What it does to the forces: with what was found in the model, the error on data that did "
         f"not size it falls — {'; '.join(parts)}.{rises}"

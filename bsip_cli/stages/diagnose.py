@@ -213,14 +213,15 @@ def _weighed(unit: Unit, standing: tuple[str, Scene] | None) -> tuple[Finding, .
 
 def _weighed_moving(evidence: Evidence) -> tuple[Round | None, tuple[Finding, ...]]:
     """What moving trials say of the stated mass: a cause to begin with where one plate carries the
-    person, else a class of causes."""
+    person and its gain may be off as much, else a class of causes."""
     share = agreed_share(evidence)
     if share is None:
         return None, ()
     scenes = [one.scene for one in evidence.trials]
     channel = loaded_channel(scenes)
-    if not channel.startswith("all "):
-        return weight_round(evidence, share, channel), ()
+    only_one = not channel.startswith("all ")
+    if only_one and (first := weight_round(evidence, share, channel)):
+        return first, ()
     names = tuple(one.name for one in evidence.trials)
     return None, stated_mass_findings(share, scenes[0].mass_kg, channel, names, "in motion")
 

@@ -65,7 +65,7 @@ def _extended(
 ) -> pd.DataFrame:
     """Rows of ``bsip`` per number of causes in the model."""
     methods, parameters = parameters_of(bsip, person)
-    phi = parameters[:, methods.index("OM")]
+    phi = parameters[:, methods.index("RM")]  # beside which the diagnosis has sized the causes
     concerned = {stem for cause in causes for stem in cause.trials}
     scenes = {t.stem: scene_of(unit, person, phi, t) for t in trials if t.stem in concerned}
     rows = bsip[bsip["method"] == "OM"]
@@ -89,8 +89,14 @@ def _identified(
     prior = prior_from(unit, unit.read("regression"), person)
     recordings, _ = recordings_of(unit, person, trials, changes)
     problem, _ = problem_of(unit, person, prior, recordings)
-    found = readable(estimate_by(unit.config.identify.estimators[0], problem), prior)
+    found = readable(estimate_by(_estimator(unit), problem), prior)
     return bsip_table("OM", person.skeleton.segments, found.values, found.sd, found.share)
+
+
+def _estimator(unit: Unit) -> str:
+    """The one that identified OM, whatever is configured now."""
+    known = unit.read("identification").set_index("method")["estimator"]
+    return str(known["OM"])
 
 
 # --- what the causes had done -----------------------------------------------------------------

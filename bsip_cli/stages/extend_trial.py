@@ -49,11 +49,14 @@ def run(unit: Unit) -> None:
     blocks = blocks_of(unit, unit.trial.stem)
     scene, parameters = _scene(unit, person, extended)
     fold = blocks.fold_of(judgement.times_s)
-    raw: Wrenches = {MEASURED: measured[WRENCH].to_numpy(), "OM": scene.predicted}
+    raw: Wrenches = {
+        MEASURED: measured[WRENCH].to_numpy(),
+        "OM": scene.wrench_of(parameters["OM"]),
+    }
     for place, k in enumerate(own):
         among = [causes[j] for j in own[: place + 1]]
-        body = replace(scene, phi=parameters[method_of(causes[: k + 1])])
-        raw[method_of(among)] = body.predicted + unseen_change_by(among, body, fold)
+        predicted = scene.wrench_of(parameters[method_of(causes[: k + 1])])
+        raw[method_of(among)] = predicted + unseen_change_by(among, scene, fold)
     wrenches = {name: judgement.filtered(wrench) for name, wrench in raw.items()}
     signals = {name: judgement.signals(wrench) for name, wrench in wrenches.items()}
     _amend(unit, judgement, wrenches, signals)
@@ -64,7 +67,7 @@ def run(unit: Unit) -> None:
         gain_rows(errors, last, _held_out(unit, judgement), crc32(unit.name.encode())),
         facts=_facts(errors, last, judgement),
     )
-    unit.write("corrected-wrench", _corrected(body, measured, [causes[k] for k in own]))
+    unit.write("corrected-wrench", _corrected(scene, measured, [causes[k] for k in own]))
 
 
 def _nothing(unit: Unit) -> None:
@@ -78,12 +81,12 @@ def _nothing(unit: Unit) -> None:
 def _scene(
     unit: Unit, person: Person, extended: pd.DataFrame
 ) -> tuple[Scene, dict[str, np.ndarray]]:
-    """The trial with OM's parameters; those (10 n,) of each extended model, loads included."""
-    methods, phi = parameters_of(unit.read("bsip"), person)
-    names, steps = parameters_of(extended, person)
-    steps = steps + load_phi(unit, person)[:, None]
-    scene = scene_of(unit, person, phi[:, methods.index("OM")])
-    return scene, dict(zip(names, steps.T, strict=True))
+    """The trial with RM's parameters, beside which the diagnosis has sized the causes; those
+    (10 n,) of OM and of each extended model, loads included."""
+    methods, phi = parameters_of(pd.concat([unit.read("bsip"), extended]), person)
+    scene = scene_of(unit, person, phi[:, methods.index("RM")])
+    carried = phi + load_phi(unit, person)[:, None]
+    return scene, dict(zip(methods, carried.T, strict=True))
 
 
 def _amend(unit: Unit, judgement: Judgement, wrenches: Wrenches, signals: Signals) -> None:
@@ -121,8 +124,15 @@ def _held_out(unit: Unit, judgement: Judgement) -> str:
         f"blocks of {facts['block_s']:g} s, in {facts['folds']} folds, each judged with the sizes "
         "of the causes that the other folds gave"
     )
-    identified = "held out of" if judgement.data == "held_out" else "used in"
-    return f"{judgement.data}: {sizes}; the trial was {identified} the identification"
+    return f"{judgement.data}: {sizes}; {_identified_by(judgement)}"
+
+
+def _identified_by(judgement: Judgement) -> str:
+    if judgement.data != "held_out":
+        return "the trial was used in the identification"
+    if judgement.used.any():
+        return "the judged seconds were held out of the identification, others of the trial not"
+    return "the trial was held out of the identification"
 
 
 def _facts(errors: dict[str, BlockErrors], method: str, judgement: Judgement) -> dict:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from bsip_cli.artifacts import read_artifact, read_header, write_atomically
+from bsip_cli.artifacts import is_made_from, read_artifact, read_header, write_atomically
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.provenance import file_hash
 from bsip_cli.report.blocks import Document
@@ -118,8 +118,12 @@ def record_of(unit: Unit) -> ParticipantRecord:
 
 
 def _extended(unit: Unit, kind: str) -> pd.DataFrame | None:
-    """A table of ``extend`` with all causes in the model; None where it has not run."""
-    return with_all_causes(unit.read(kind)) if unit.has(kind) else None
+    """A table of ``extend`` with all causes in the model; None where it has not run on this
+    diagnosis."""
+    there = unit.has("bsip-change") and unit.has(kind)
+    if not there or not is_made_from(unit.path("bsip-change"), unit.path("overall-diagnosis")):
+        return None
+    return with_all_causes(unit.read(kind))
 
 
 def _loads(unit: Unit) -> tuple[tuple[str, str], ...]:

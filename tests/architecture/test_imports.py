@@ -16,7 +16,7 @@ ALLOWED = {
     "config": "errors",
     "study": "errors",
     "schemas": "",
-    "artifacts": "errors schemas",
+    "artifacts": "errors provenance schemas",
     "provenance": "__init__",
     "pipeline": "schemas",
     "standing": "pipeline",

@@ -6,16 +6,23 @@ import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
+from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import load_config
+from bsip_cli.effects.added_mass import AddedMass
 from bsip_cli.pipeline import STAGES
 from bsip_cli.runner import Outcome, perform
 from bsip_cli.schemas import SCHEMAS
+from bsip_cli.show import shown
 from bsip_cli.simulate.options import Asked, Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
+from bsip_cli.stages.frames import person_from
+from bsip_cli.stages.reconstructed import parameters_of
+from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study import load_study
 from bsip_cli.unit import Unit
 
@@ -52,12 +59,15 @@ class Run:
         return {path.name: path.read_bytes() for path in self.out.rglob("*.parquet")}
 
     def perform(self, label: str, stem: str = "") -> Outcome:
+        return perform(self.unit(label, stem))
+
+    def unit(self, label: str, stem: str = "") -> Unit:
         config = load_config([self.study / "study.toml"])
         study, _ = load_study(self.study, config.roles.model_dump())
         person = study.participants[0]
         trial = next((trial for trial in person.trials if trial.stem == stem), None)
         stage = next(each for each in STAGES if each.label == label)
-        return perform(Unit(stage, study, self.out, config, person, trial))
+        return Unit(stage, study, self.out, config, person, trial)
 
 
 def run_of(options: StudyOptions, folder: Path, bsip) -> Run:
@@ -233,6 +243,54 @@ def test_a_cause_of_one_held_out_trial_leaves_the_parameters(run):
     assert run.read("gain", SEQUENCE).empty
     corrected, measured = run.read("corrected-wrench", SQUAT), run.read("wrench", SQUAT)
     assert (measured["fz_N"] - corrected["fz_N"]).to_numpy() == pytest.approx(300.0)
+
+
+def test_a_mass_sits_where_the_diagnosis_found_it(run):
+    """Its place is told from the segment's centre in RM, not from where OM has put that."""
+    mass_kg, target = 5.0, "upper_torso"
+    diagnose_instead(run, cause("added_mass", target, [mass_kg, 0.0, 0.0, 0.0], SQUAT))
+    table = run.read("reconstruction", SQUAT)
+    om, extended_om = (
+        table[table["method"] == name].set_index("time_s") for name in ("OM", "OM+added_mass")
+    )
+    unit = run.unit(EXTEND[1], SQUAT)
+    person = person_from(
+        unit.read("skeleton"), unit.read("marker-positions"), load_skeleton(unit.config.skeleton)
+    )
+    methods, phi = parameters_of(unit.read("bsip"), person)
+    change = {
+        method: AddedMass().change(
+            scene_of(unit, person, phi[:, methods.index(method)]),
+            target,
+            np.array([mass_kg, 0.0, 0.0, 0.0]),
+        )
+        for method in ("RM", "OM")
+    }
+    kept = om["valid"].to_numpy()
+    moment = (extended_om["my_Nm"] - om["my_Nm"]).to_numpy()[kept].mean()
+    expected, other = (change[method][kept, 4].mean() for method in ("RM", "OM"))
+    assert abs(expected - other) > 0.2
+    assert moment == pytest.approx(expected, abs=0.05)
+
+
+def test_om_is_extended_by_the_estimator_that_made_it(run):
+    before = run.read("extended-bsip")
+    configured = run.study / "study.toml"
+    configured.write_text(
+        configured.read_text() + '\n[identify]\nestimators = ["hansen2017", "consistent"]\n'
+    )
+    assert run.perform(EXTEND[0]).state == "done"
+    pd.testing.assert_frame_equal(run.read("extended-bsip"), before)
+
+
+def test_nothing_of_an_earlier_diagnosis_is_told(run):
+    told = "\n".join(shown(run.out))
+    assert "What it does to the forces" in told
+    path = run.path("overall-diagnosis")
+    table, notes = run.read("overall-diagnosis"), read_header(path)["provenance"]
+    write_artifact(path, "overall-diagnosis", table.assign(p_value=2e-4), notes)
+    told = "\n".join(shown(run.out))
+    assert "What it does to the forces" not in told and "run `bsip extend`" in told
 
 
 def test_causes_are_added_in_their_order(run):

@@ -83,6 +83,13 @@ def test_moving_trials_on_one_plate_give_its_gain_to_begin_with():
     assert offset.explanation.values[0] == pytest.approx(share * MASS_KG * 9.81, rel=0.3)
 
 
+def test_no_plate_s_gain_is_off_by_a_quarter():
+    evidence = all_of(on_one_plate(0.25, 0), on_one_plate(0.25, 4))
+    share = agreed_share(evidence)
+    assert share == pytest.approx(0.2, abs=0.01)
+    assert weight_round(evidence, share, "1 fz") is None
+
+
 @pytest.mark.parametrize("gains", [(0.05, -0.05), (0.01, 0.01)])
 def test_moving_trials_that_disagree_or_are_near_say_nothing(gains):
     evidence = all_of(on_one_plate(gains[0], 0), on_one_plate(gains[1], 4))

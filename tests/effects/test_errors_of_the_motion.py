@@ -104,6 +104,18 @@ def test_a_shifted_marker(marker):
     assert effect.parameters(seen, marker)[3].scan[-1] == pytest.approx(start, abs=0.1)
 
 
+def test_a_shift_is_throughout_on_every_clock():
+    for first_s in (0.0, 5.0, -5.0):
+        scene = replace(moving(), times_s=moving().times_s + first_s)
+        throughout = MarkerShift().parameters(scene, "RKNEL")[3].scan[0]
+        said = [
+            MarkerShift().sentence(scene, "RKNEL", np.array([0.02, 0.0, 0.0, start, 0.0]))
+            for start in (throughout, first_s + 2.0)
+        ]
+        assert said[0].endswith("throughout")
+        assert said[1].endswith(f"from {first_s + 2.0:.1f} s on")
+
+
 def test_a_shift_that_scaling_has_taken_half():
     """Half a shift throughout, less than the whole one from a moment on."""
     scene, shift = moving(), np.array([0.01, 0.0, 0.02])

@@ -105,7 +105,7 @@ def test_an_offset_in_fz_makes_everybody_heavier():
     scene = scene_with(lambda r: r)[0]
     change = PlateZero().change(scene, "1 fz", np.array([9.80665]))
     np.testing.assert_allclose(change[:, 2], 9.80665)
-    assert "+9.8 N" in PlateZero().sentence("1 fz", np.array([9.80665]))
+    assert "+9.8 N" in PlateZero().sentence(scene, "1 fz", np.array([9.80665]))
 
 
 def test_a_shifted_plate_shows_the_pressure_short_of_the_shift():
@@ -183,9 +183,10 @@ def test_what_the_motion_does_wrong_makes_no_delay_smaller():
 
 
 def test_words_for_the_order_of_clocks():
-    assert SyncOffset().sentence("", np.array([0.01])).endswith("10.0 ms after the markers")
-    assert SyncOffset().sentence("", np.array([-0.01])).endswith("10.0 ms before the markers")
-    assert "1000 ppm slower" in ClockDrift().sentence("", np.array([1e-3]))
+    scene, delay = standing_still(), SyncOffset()
+    assert delay.sentence(scene, "", np.array([0.01])).endswith("10.0 ms after the markers")
+    assert delay.sentence(scene, "", np.array([-0.01])).endswith("10.0 ms before the markers")
+    assert "1000 ppm slower" in ClockDrift().sentence(scene, "", np.array([1e-3]))
 
 
 def test_a_standing_person_weighs_what_the_scene_says():

@@ -55,6 +55,28 @@ def test_the_verdict_says_what_how_large_how_sure_and_where(found):
     assert "Causes 1 and 2: The measured forces" in text_of(rivals, detection(TRIALS))
 
 
+def test_what_only_the_markers_prove_says_so(found):
+    proof = found[found["rank"] == 1].assign(
+        effect="missing_joint",
+        target="upper_torso",
+        parameter="flexion",
+        gain_percent=np.nan,
+        sentence="the trunk bends twice (flexion: 95 % interval 0.3 to 0.4 rad); this is 40 % of "
+        "what the markers leave, and the forces do not show it",
+    )
+    text = text_of(proof, detection(TRIALS))
+    assert "); this is 40 % of what the markers leave, and the forces do not show it, in" in text
+
+
+def test_a_trial_of_which_something_was_told_before_is_looked_at_too(found):
+    leaning = found[found["rank"] == 1].assign(trials="sub-01_task-stairs", rank=9)
+    text = text_of(pd.concat([found, leaning]), detection(TRIALS))
+    assert "Looked at: basketball (run 1), sequence (run 1) and stairs." in text
+    assert "only in sequence (run 1) and basketball (run 1)" in text
+    standing = leaning.assign(class_id="W")
+    assert "stairs" not in text_of(pd.concat([found, standing]), detection(TRIALS))[-400:]
+
+
 def test_a_gain_that_may_be_none_is_weak(found):
     text = text_of(found.assign(gain_ci_low=-1.0), detection(TRIALS))
     assert "Weak (chance 0.5 %): explains 8.0 % (−1.0 to 12.0 %)" in text
@@ -94,7 +116,7 @@ def test_nothing_wrong(found):
     assert not said.found
     assert said.headline == "Nothing is wrong above the noise."
     assert said.paragraphs()[1] == "Looked at: basketball (run 1) and sequence (run 1)."
-    assert said.paragraphs()[2].endswith("could not have been seen in these recordings.")
+    assert said.paragraphs()[2].endswith("might have gone unseen in these recordings.")
 
 
 def test_something_that_cannot_be_named(found):
@@ -183,8 +205,8 @@ def test_limits_in_a_sentence(found):
     nothing = found[found["verdict"] == "rejected"]
     assert limits_sentence(limits_of(detection(TRIALS), nothing)) == (
         "A delay between forces and markers under 2.5 ms, a plate shifted by less than 6.0 mm, a "
-        "vertical gain wrong by less than 1.1 % or a mass on the left hand under 0.95 kg could not "
-        "have been seen in these recordings."
+        "vertical gain wrong by less than 1.1 % or a mass on the left hand under 0.95 kg might "
+        "have gone unseen in these recordings."
     )
     assert limits_sentence(()) == ""
 
@@ -235,10 +257,12 @@ def test_gains_lead_with_what_improves():
     text = gain_sentence(gains())
     assert "COP, anterior-posterior 12.00 → 6.00 mm (50 % less, 40 to 60 %)" in text
     worse = gains().assign(component=["cop_ap", "mz"], ci_high=[60.0, -1.0])
-    assert gain_sentence(worse).endswith("It rises in moment, lab Z (up).")
-    assert gain_sentence(worse[1:]).endswith("in the model, no component follows better.")
+    assert gain_sentence(worse).endswith("The error rises in moment, lab Z (up).")
+    assert gain_sentence(worse[1:]).endswith(
+        "no component follows better. The error rises in moment, lab Z (up)."
+    )
     where, grid = gain_blocks(gains())
-    assert where.text.endswith("in basketball (run 1) (that identified no parameter).")
+    assert where.text.endswith("in basketball (run 1) (seconds that identified no parameter).")
     assert [row[3].mark for row in grid.cells()] == ["better", ""]
 
 

@@ -183,6 +183,29 @@ def test_what_a_file_does_not_have_is_said_of_that_file(tmp_path, recorded, name
     assert not (tmp_path / "x.c3d").exists()
 
 
+def test_a_mot_file_without_points_where_nobody_stands(tmp_path, trc):
+    """As OpenSim writes them; a delay moves the forces over these rows."""
+    source = tmp_path / "in" / trc.name
+    source.parent.mkdir()
+    source.write_text(trc.read_text())
+    *head, last = trc.with_suffix(".mot").read_text().splitlines()
+    start = head.index("endheader") + 2
+    rows = [line.split() for line in (*head[start:], last)]
+    for row in rows[:50]:
+        row[1:] = ["0"] * 3 + ["NaN"] * 3 + ["0"] * 3
+    text = "\n".join([*head[:start], *("\t".join(row) for row in rows)])
+    source.with_suffix(".mot").write_text(text + "\n")
+    copy = tmp_path / "out" / trc.name
+    copy.parent.mkdir()
+    inject_recording(source, copy, [effect_of("sync_offset", -0.033)])
+    (plate,) = read_recording(copy).plates
+    assert np.isfinite(plate.force_N).all() and np.isfinite(plate.moment_Nm).all()
+    loaded = plate.force_N[:, 2] > 100
+    assert loaded[48:60].all()
+    height_m = plate.moment_Nm[loaded, 0] / plate.force_N[loaded, 2]
+    assert np.ptp(height_m) < 0.5  # the centre of pressure stays under the feet
+
+
 def test_a_mot_file_s_plates_feel_under_the_feet(tmp_path, trc):
     """What leaks into a channel acts where the feet stand, not at the lab's origin."""
     before, after = injected(trc, tmp_path, effect_of("plate_crosstalk", 0.02, "fy:fx"))

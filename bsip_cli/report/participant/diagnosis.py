@@ -85,7 +85,7 @@ def section(record: ParticipantRecord) -> Section:
         if record.changes is not None and len(record.changes):
             blocks += [Heading("What the body's parameters become"), *change_blocks(record)]
         blocks += [
-            Heading("What could not have been seen"),
+            Heading("What might have gone unseen"),
             *detection.blocks(record.detection, record.diagnosis),
         ]
     blocks += [*residual.blocks(record), *attribution.blocks(record)]
@@ -180,8 +180,8 @@ def gain_blocks(gains: pd.DataFrame) -> list[Block]:
 def _data_words(gains: pd.DataFrame) -> str:
     """On which recordings, from ``held_out: a, b; identification: c``."""
     kinds = {
-        "held_out": "that identified no parameter",
-        "identification": "that identified the parameters too",
+        "held_out": "seconds that identified no parameter",
+        "identification": "seconds that identified the parameters too",
     }
     parts = [text.partition(": ") for data in gains["data"].unique() for text in data.split("; ")]
     said = [f"{labelled(stems)} ({kinds.get(kind, kind)})" for kind, _, stems in parts]

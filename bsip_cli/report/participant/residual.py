@@ -66,8 +66,8 @@ def _concerned(record: ParticipantRecord, able: Sequence[TrialRecord]) -> list[T
     if record.diagnosis is not None:
         causes = causes_of(candidates_of(record.diagnosis))
         stems = {stem for cause in causes for one in cause for stem in one.trials}
-    if not stems and record.detection is not None:
-        stems = set(looked_at(record.detection))
+        if not stems and record.detection is not None:
+            stems = set(looked_at(record.detection, record.diagnosis))
     return [trial for trial in able if trial.stem in stems] or list(able)
 
 

@@ -191,8 +191,14 @@ def _plate(values: np.ndarray, each: ForceSet) -> SensingPlate:
 def _reading(values: np.ndarray, each: ForceSet, plate: SensingPlate) -> np.ndarray:
     """(N, 6) force and its moment about the sensor."""
     force = values[:, each.force]
-    moment = np.cross(values[:, each.point], force) + values[:, each.torque]
+    moment = np.cross(_points_m(values, each, plate), force) + np.nan_to_num(values[:, each.torque])
     return plate.reading(force, moment, np.zeros(3))
+
+
+def _points_m(values: np.ndarray, each: ForceSet, plate: SensingPlate) -> np.ndarray:
+    """(N, 3) where the force acts; at the sensor in rows that do not say where."""
+    point = values[:, each.point]
+    return np.where(np.isfinite(point), point, plate.sensor_m)
 
 
 def _with_reading(
@@ -203,7 +209,7 @@ def _with_reading(
     The torque keeps its horizontal parts; below LOADED_N the point stays where it was.
     """
     force, moment = plate.lab_wrench(reading, np.zeros(3))
-    point, torque = values[:, each.point], values[:, each.torque]
+    point, torque = _points_m(values, each, plate), np.nan_to_num(values[:, each.torque])
     level = np.eye(3) - np.outer(up, up)
     upward = force @ up
     rest = moment - np.cross(point, force) - torque @ level
@@ -227,7 +233,7 @@ def _new_trc(table: Table, before: Instruments, after: Instruments, scale: float
     pairs = zip(names, facts, strict=False)
     facts = [str(frames) if name == "NumFrames" else fact for name, fact in pairs]
     head[2] = "\t".join(facts)
-    rows = ["\t".join([f"{row[0]:.0f}", *map(_number, row[1:])]) for row in values]
+    rows = ["\t".join([f"{row[0]:.0f}", *map(_cell, row[1:])]) for row in values]
     return "\n".join([*head, *rows]) + "\n"
 
 
@@ -239,11 +245,11 @@ def _new_mot(table: Table, sets: list[ForceSet], before: Instruments, after: Ins
             values, each, plate, reading, after.up
         )
     head = [re.sub(r"(?i)^nRows=.*", f"nRows={len(values)}", line) for line in table.head]
-    rows = ["\t".join(map(_number, row)) for row in values]
+    rows = ["\t".join(f"{x:.9g}" for x in row) for row in values]
     return "\n".join([*head, *rows]) + "\n"
 
 
-def _number(value: float) -> str:
+def _cell(value: float) -> str:
     return "" if np.isnan(value) else f"{value:.9g}"
 
 

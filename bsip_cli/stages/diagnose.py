@@ -132,7 +132,7 @@ def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial, class_id:
     if measured_s < _SHORTEST_S:
         return LookedAt(
             left_out=f"{trial.stem}: has no part in the diagnosis: every contact is on a plate for "
-            f"{measured_s:.1f} s only, {_SHORTEST_S:g} s are needed"
+            f"{measured_s:.2f} s only, {_SHORTEST_S:g} s are needed"
         )
     fewer = slow(scene)
     held = support_of(fewer)

@@ -132,10 +132,14 @@ def signals_of(reconstruction: pd.DataFrame, column: str) -> dict[str, np.ndarra
     """Label of the method -> values over time; ``measured`` first, all on its clock."""
     methods = sorted(reconstruction["method"].unique(), key=_rank)
     clock = clock_of(reconstruction)
-    rows = {name: reconstruction[reconstruction["method"] == name] for name in methods}
+    courses = reconstruction[["method", "time_s", column]].groupby("method")
     return {
-        name: frame.drop_duplicates("time_s").set_index("time_s")[column].reindex(clock).to_numpy()
-        for name, frame in rows.items()
+        name: courses.get_group(name)
+        .drop_duplicates("time_s")
+        .set_index("time_s")[column]
+        .reindex(clock)
+        .to_numpy()
+        for name in methods
     }
 
 

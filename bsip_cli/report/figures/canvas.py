@@ -22,6 +22,7 @@ LONGEST_LABEL = 16
 MOST_POINTS = 1200  # of one curve: more than a page can show
 MANY_PEOPLE = 200  # from here on dots and lines are drawn as pixels: files stay small
 _MM = 1.0 / 25.4
+_QUICKLY = {"compress_level": 3}  # files a few percent larger in half the time
 _RC: dict[Any, Any] = {
     "svg.hashsalt": "bsip",
     "svg.fonttype": "path",
@@ -125,13 +126,21 @@ def to_svg(figure: Figure) -> bytes:
 
 def to_png(figure: Figure) -> bytes:
     """The figure as PNG of 200 dots per inch; the same figure gives the same bytes."""
-    return _save(figure, "png", metadata={"Software": None}, dpi=200)
+    return _save(figure, "png", metadata={"Software": None}, dpi=200, pil_kwargs=_QUICKLY)
 
 
 def _save(figure: Figure, form: str, **options) -> bytes:
     buffer = io.BytesIO()
     with house_style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a label in a script the font lacks
+        lay_out(figure)
         figure.savefig(buffer, format=form, **options)
-    figure.set_layout_engine(None)  # laid out once; the next file keeps it
     return buffer.getvalue()
+
+
+def lay_out(figure: Figure) -> None:
+    """Once for all files, and without the drawing that matplotlib would do for it."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine(None)

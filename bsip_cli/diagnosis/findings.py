@@ -162,7 +162,7 @@ def _rejected(evidence: Evidence, tried: Tried) -> Finding:
         else "more than it explains remains without a cause"
         if tried.is_drowned
         else f"it has no name and explains less than {100 * NAMELESS_WORTH:.0f} %, as skin may"
-        if tried.is_slight
+        if tried.is_good and tried.is_slight
         else "another cause explains it better"
         if tried.is_good
         else "on data held out it does not help, or hardly"

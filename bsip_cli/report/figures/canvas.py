@@ -133,14 +133,6 @@ def _save(figure: Figure, form: str, **options) -> bytes:
     buffer = io.BytesIO()
     with house_style(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # a label in a script the font lacks
-        lay_out(figure)
         figure.savefig(buffer, format=form, **options)
+    figure.set_layout_engine(None)  # laid out once; the next file keeps it
     return buffer.getvalue()
-
-
-def lay_out(figure: Figure) -> None:
-    """Once for all files, and without the drawing that matplotlib would do for it."""
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        engine.execute(figure)
-        figure.set_layout_engine(None)

@@ -82,9 +82,8 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
 def _without_name(selection: Selection, told: set[int]) -> Iterator[Finding]:
     """Trials of which nothing else is told, though a cause was found there that did not stand out:
     what is wrong has no name. Each trial once, with the cause that came nearest."""
-    worth = 100 * NAMELESS_WORTH
     tried_in_all = (t for one in selection.rounds for t in one.tried)
-    drowned = [t for t in tried_in_all if t.is_drowned and t.gain.percent >= worth]
+    drowned = [t for t in tried_in_all if t.is_drowned and not t.is_too_little_unnamed]
     for tried in sorted(drowned, key=lambda t: -t.score):
         left = tuple(t for t in tried.trials if t not in told)
         if left:

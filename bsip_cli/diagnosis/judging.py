@@ -43,10 +43,14 @@ class Tried:
         return self.explanation.place.trials
 
     @property
+    def is_too_little_unnamed(self) -> bool:
+        """Whether it explains too little to be told without a name."""
+        return self.gain.percent < 100 * NAMELESS_WORTH
+
+    @property
     def is_slight(self) -> bool:
         """Whether it has no name and explains too little to be told."""
-        nameless = self.explanation.effect.name == UNEXPLAINED
-        return nameless and self.gain.percent < 100 * NAMELESS_WORTH
+        return self.explanation.effect.name == UNEXPLAINED and self.is_too_little_unnamed
 
     @property
     def is_good(self) -> bool:

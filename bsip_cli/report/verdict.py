@@ -168,11 +168,11 @@ def gain_sentence(gains: pd.DataFrame) -> str:
     has twice, counts once.
     """
     whole = gains[np.isfinite(gains["gain_percent"]) & (gains["component"] != "fz")]
+    if whole.empty:
+        return ""
     best = whole[whole["gain_percent"] > 0].nlargest(_MOST_GAINS, "gain_percent")
     worse = [component_label(c) for c in whole.loc[whole["ci_high"] < 0, "component"]]
     rises = f" The error rises in {listing(worse)}." if worse else ""
-    if whole.empty:
-        return ""
     if best.empty:
         return f"With what was found in the model, no component follows better.{rises}"
     parts = [

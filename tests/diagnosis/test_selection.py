@@ -251,9 +251,9 @@ def test_what_turns_out_to_be_no_cause_does_not_hide_another_trial(monkeypatch):
     assert [(one.effect, one.trials) for one in said_of(chosen)] == [("plate_zero", ("a",))]
 
 
-def swinging(hertz: float, newtons: float = 20.0) -> Scene:
+def swinging(hertz: float) -> Scene:
     scene = part_of_moving(0, 12)
-    swing = newtons * np.sin(2 * np.pi * hertz * scene.times_s)[:, None] * np.eye(6)[2]
+    swing = 20.0 * np.sin(2 * np.pi * hertz * scene.times_s)[:, None] * np.eye(6)[2]
     return noisy(shown(scene, swing), 6)
 
 

@@ -22,7 +22,7 @@ LONGEST_LABEL = 16
 MOST_POINTS = 1200  # of one curve: more than a page can show
 MANY_PEOPLE = 200  # from here on dots and lines are drawn as pixels: files stay small
 _MM = 1.0 / 25.4
-_QUICKLY = {"compress_level": 3}  # files a few percent larger in half the time
+_QUICKLY = {"compress_level": 3}  # figures take 2 % more room
 _RC: dict[Any, Any] = {
     "svg.hashsalt": "bsip",
     "svg.fonttype": "path",

@@ -42,12 +42,13 @@ def agreed_share(evidence: Evidence) -> float | None:
     return share
 
 
-def weight_round(evidence: Evidence, share: float, channel: str) -> Round | None:
+def weight_round(evidence: Evidence, share: float, plate: str) -> Round | None:
     """A gain of the vertical channel of the only plate that carries the person, in all trials, and
     an offset beside it; nothing where no plate's gain is that far off.
 
     share : of body weight, from ``agreed_share``.
     """
+    channel = f"{plate} fz"
     p_value = float(2 * norm.sf(abs(share) / TRUSTED))
     weight = share * evidence.trials[0].scene.mass_kg * GRAVITY_M_S2
     gain = _tried(evidence, PlateGain(), channel, share, p_value)

@@ -29,10 +29,10 @@ LOADED = 0.05  # of body weight: a plate that carries less is not stood upon
 _UNKNOWN = (np.nan, np.nan, np.nan)
 
 
-def loaded_channel(scenes: Iterable[Scene]) -> str:
-    """The vertical channel of the plate that carries the person; of ``all`` where several do."""
+def loaded_plate(scenes: Iterable[Scene]) -> str | None:
+    """The plate that alone carries the person; None where several do."""
     loaded = {name for scene in scenes for name in _loaded_plates(scene)}
-    return f"{loaded.pop() if len(loaded) == 1 else 'all'} fz"
+    return loaded.pop() if len(loaded) == 1 else None
 
 
 def _loaded_plates(scene: Scene) -> list[str]:
@@ -42,12 +42,12 @@ def _loaded_plates(scene: Scene) -> list[str]:
 
 
 def stated_mass_findings(
-    share: float, mass_kg: float, channel: str, trials: tuple[str, ...], manner: str
+    share: float, mass_kg: float, plate: str | None, trials: tuple[str, ...], manner: str
 ) -> tuple[Finding, ...]:
     """The class of causes if the plates differ from the stated mass by more than NOTICED.
 
-    share : of the stated mass, from ``weight_share`` or ``agreed_share``. channel : from
-    ``loaded_channel``. trials : the recordings that tell. manner : how they were read, in words.
+    share : of the stated mass, from ``weight_share`` or ``agreed_share``. plate : from
+    ``loaded_plate``. trials : the recordings that tell. manner : how they were read, in words.
     """
     if abs(share) < NOTICED:
         return ()
@@ -69,7 +69,7 @@ def stated_mass_findings(
     return tuple(
         Finding(
             effect,
-            "" if effect == AddedMass.name else channel,
+            "" if effect == AddedMass.name else f"{plate or 'all'} fz",
             trials,
             "ambiguous",
             CLASS,

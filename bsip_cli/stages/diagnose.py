@@ -23,7 +23,7 @@ from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.diagnosis.scale_mass import agreed_share, weight_round, weight_share
 from bsip_cli.diagnosis.selection import Round, Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
-from bsip_cli.diagnosis.stated_mass import loaded_channel, stated_mass_findings
+from bsip_cli.diagnosis.stated_mass import loaded_plate, stated_mass_findings
 from bsip_cli.diagnosis.support import support_of
 from bsip_cli.diagnosis.together import BLOCK_S, Evidence, together
 from bsip_cli.effects.catalogue import CATALOGUE
@@ -207,8 +207,8 @@ def _weighed(unit: Unit, standing: tuple[str, Scene] | None) -> tuple[Finding, .
     if standing is None or not _is_weighed(unit):
         return ()
     name, scene = standing
-    share, channel = weight_share(scene), loaded_channel([scene])
-    return stated_mass_findings(share, scene.mass_kg, channel, (name,), "in quiet standing")
+    share, plate = weight_share(scene), loaded_plate([scene])
+    return stated_mass_findings(share, scene.mass_kg, plate, (name,), "in quiet standing")
 
 
 def _weighed_moving(evidence: Evidence) -> tuple[Round | None, tuple[Finding, ...]]:
@@ -218,12 +218,11 @@ def _weighed_moving(evidence: Evidence) -> tuple[Round | None, tuple[Finding, ..
     if share is None:
         return None, ()
     scenes = [one.scene for one in evidence.trials]
-    channel = loaded_channel(scenes)
-    only_one = not channel.startswith("all ")
-    if only_one and (first := weight_round(evidence, share, channel)):
+    plate = loaded_plate(scenes)
+    if plate and (first := weight_round(evidence, share, plate)):
         return first, ()
     names = tuple(one.name for one in evidence.trials)
-    return None, stated_mass_findings(share, scenes[0].mass_kg, channel, names, "in motion")
+    return None, stated_mass_findings(share, scenes[0].mass_kg, plate, names, "in motion")
 
 
 def _trials_of(findings: tuple[Finding, ...]) -> list[str]:

@@ -31,15 +31,24 @@ def methods_beside_each_other(
     table : shape (participants, methods), in the topic's unit.
     """
     complete = table[np.isfinite(table).all(axis=1)]
-    n, names = len(complete), " / ".join(methods)
-    groups = one_way_anova(list(complete.T), alpha)
-    normality = [lilliefors_test(column, alpha) for column in complete.T]
-    published = Comparison(
+    return (
+        *_as_published(topic, complete, methods, alpha),
+        *_of_the_same_people(topic, complete, methods, alpha),
+    )
+
+
+def _as_published(
+    topic: Topic, table: NDArray[np.float64], methods: Sequence[str], alpha: float
+) -> tuple[Comparison, ...]:
+    """The one-way ANOVA, which takes the methods for groups of different people."""
+    groups = one_way_anova(list(table.T), alpha)
+    normality = [lilliefors_test(column, alpha) for column in table.T]
+    anova = Comparison(
         topic,
         "one_way_anova",
         "published",
-        names,
-        n=n,
+        " / ".join(methods),
+        n=len(table),
         statistic=groups.f,
         df1=groups.df_between,
         df2=groups.df_within,
@@ -49,13 +58,30 @@ def methods_beside_each_other(
         lilliefors_p=_smallest(test.p_value for test in normality),
         reason=groups.reason or joined(*(test.reason for test in normality)),
     )
-    same = repeated_measures_anova(complete, alpha)
-    added = Comparison(
+    return anova, *_post_hoc(
+        topic,
+        "bonferroni_t",
+        "published",
+        table,
+        methods,
+        groups.post_hoc,
+        groups.reason,
+        alpha,
+    )
+
+
+def _of_the_same_people(
+    topic: Topic, table: NDArray[np.float64], methods: Sequence[str], alpha: float
+) -> tuple[Comparison, ...]:
+    """The ANOVA of repeated measures, which the design asks for."""
+    same = repeated_measures_anova(table, alpha)
+    pairs = combinations(range(len(methods)), 2)
+    anova = Comparison(
         topic,
         "repeated_measures_anova",
         "added",
-        names,
-        n=n,
+        " / ".join(methods),
+        n=len(table),
         statistic=same.f,
         df1=same.epsilon * same.df_effect,
         df2=same.epsilon * same.df_error,
@@ -63,35 +89,18 @@ def methods_beside_each_other(
         effect_size=same.partial_eta_squared,
         effect_size_name="partial eta squared",
         epsilon=same.epsilon,
-        lilliefors_p=_smallest(
-            _normality_of_difference(complete, i, j, alpha)
-            for i, j in combinations(range(len(methods)), 2)
-        ),
+        lilliefors_p=_smallest(_normality_of_difference(table, i, j, alpha) for i, j in pairs),
         reason=same.reason,
     )
-    return (
-        published,
-        *_post_hoc(
-            topic,
-            "bonferroni_t",
-            "published",
-            complete,
-            methods,
-            groups.post_hoc,
-            groups.reason,
-            alpha,
-        ),
-        added,
-        *_post_hoc(
-            topic,
-            "bonferroni_paired_t",
-            "added",
-            complete,
-            methods,
-            same.post_hoc,
-            same.reason,
-            alpha,
-        ),
+    return anova, *_post_hoc(
+        topic,
+        "bonferroni_paired_t",
+        "added",
+        table,
+        methods,
+        same.post_hoc,
+        same.reason,
+        alpha,
     )
 
 

@@ -12,7 +12,7 @@ from noisy_trial import all_of, noisy, part_of_moving, with_effect
 from bsip_cli.diagnosis.scale_mass import agreed_share, weight_round, weight_share
 from bsip_cli.diagnosis.stated_mass import (
     CLASS,
-    loaded_channel,
+    loaded_plate,
     stated_mass_findings,
 )
 from bsip_cli.effects.catalogue import EFFECTS
@@ -24,7 +24,7 @@ def test_plates_that_read_otherwise_make_a_class(share):
     scene = standing_still()
     scene = replace(scene, wrench=(1 + share) * scene.predicted)
     found = stated_mass_findings(
-        weight_share(scene), scene.mass_kg, "all fz", ("standing",), "in quiet standing"
+        weight_share(scene), scene.mass_kg, None, ("standing",), "in quiet standing"
     )
     sizes = {one.effect: one.numbers[0].value for one in found}
     assert abs(sizes["plate_gain"] - share) < 1e-9
@@ -43,19 +43,18 @@ def test_plates_that_agree_say_nothing():
     scene = replace(scene, wrench=1.01 * scene.predicted)
     share = weight_share(scene)
     assert (
-        stated_mass_findings(share, scene.mass_kg, "all fz", ("standing",), "in quiet standing")
-        == ()
+        stated_mass_findings(share, scene.mass_kg, None, ("standing",), "in quiet standing") == ()
     )
 
 
-def test_the_channel_is_that_of_the_plates_stood_upon():
+def test_only_one_plate_carries_the_person_or_none_does_alone():
     scene = standing_still()
-    assert loaded_channel([scene]) == "all fz"
+    assert loaded_plate([scene]) is None
     first, second = scene.plates
     alone = replace(second, wrench=0 * second.wrench)
     on_one = replace(scene, plates=(first, alone))
-    assert loaded_channel([on_one, on_one]) == "1 fz"
-    assert loaded_channel([on_one, scene]) == "all fz"
+    assert loaded_plate([on_one, on_one]) == "1"
+    assert loaded_plate([on_one, scene]) is None
 
 
 def on_one_plate(gain: float, first_s: float) -> Scene:
@@ -74,7 +73,7 @@ def test_moving_trials_on_one_plate_give_its_gain_to_begin_with():
     evidence = all_of(on_one_plate(0.05, 0), on_one_plate(0.05, 4))
     share = agreed_share(evidence)
     assert share == pytest.approx(0.05 / 1.05, abs=0.003)
-    begun = weight_round(evidence, share, "1 fz")
+    begun = weight_round(evidence, share, "1")
     gain, offset = begun.tried
     assert begun.kept is gain
     assert gain.explanation.place.trials == (0, 1)
@@ -87,7 +86,7 @@ def test_no_plate_s_gain_is_off_by_a_quarter():
     evidence = all_of(on_one_plate(0.25, 0), on_one_plate(0.25, 4))
     share = agreed_share(evidence)
     assert share == pytest.approx(0.2, abs=0.01)
-    assert weight_round(evidence, share, "1 fz") is None
+    assert weight_round(evidence, share, "1") is None
 
 
 @pytest.mark.parametrize("gains", [(0.05, -0.05), (0.01, 0.01)])

@@ -1,4 +1,4 @@
-"""What the markers prove by themselves: a slip, a second bend of the trunk.
+"""What the markers prove by themselves: one that slips or sits wrong, a second bend of the trunk.
 
 The pose is the best that the model can do; what a cause leaves of the markers is linear in its
 sizes like the wrench, and far sharper: the skin slides by millimetres. What is proven here is no
@@ -23,6 +23,7 @@ from bsip_cli.dynamics.lowpass import stride_to
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Scene
+from bsip_cli.motion.marker_fit import MEDIAN_LENGTH
 
 ENOUGH_HZ = 10.0  # for a course of many seconds
 # Of the markers' squared residuals, their means left out: skin that follows the bending of the
@@ -36,7 +37,8 @@ SLIP, BEND, CENTRE = "marker_shift", "missing_joint", "joint_centre"
 
 @dataclass(frozen=True)
 class Slip:
-    """A level that a marker's residual changes to; unlikeliness in standard deviations."""
+    """A marker off its place from a moment on, before the trial for throughout; unlikeliness in
+    standard deviations."""
 
     marker: str
     start_s: float
@@ -125,11 +127,12 @@ def proofs_of(scene: Scene, slips: Sequence[Slip], rng: np.random.Generator) -> 
 
 
 def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:
-    """Part of the squared residual of the marker that slips, its mean left out."""
+    """Part of the squared residual of the marker that is off."""
     m = scene.person.markers.index(one.target)
     own = residual_m[:, m : m + 1]
     change = _left(one.effect, scene, one.target, one.values)[:, m : m + 1]
-    columns, course, _ = _in_rows(scene, change[..., None], own)
+    rows = _in_rows(scene, change[..., None], own, with_means=_is_throughout(scene, one.values[3]))
+    columns, course, _ = rows
     return 1 - float(((course - columns[:, 0]) ** 2).sum() / (course @ course))
 
 
@@ -168,8 +171,10 @@ def _sized(
 ) -> Proof:
     """The effect's free parameters from the markers' residuals (N, m, 3), scanned ones given.
 
-    Stretches of BLOCK_S are taken for independent: so much noise is laid on each frame that all
-    frames together say no more, and the sizes have their typical spread before the data.
+    What lasts throughout shows in the means of the residuals alone, which are as sure as the
+    markers' places in the model. Stretches of BLOCK_S are taken for independent: so much noise is
+    laid on each frame that all frames together say no more, and the sizes have their typical
+    spread before the data.
     """
     candidate = Candidate(effect, target, scanned)
     parameters = candidate.free(scene)
@@ -178,7 +183,8 @@ def _sized(
         _left(effect, scene, target, candidate.values(scene, one)) for one in np.diag(typical)
     ]
     told = np.stack(shapes, axis=-1) * effect.is_told(scene, target)
-    columns, course, block = _in_rows(scene, told, residual_m)
+    lasts = bool(scanned) and _is_throughout(scene, scanned[0])
+    columns, course, block = _in_rows(scene, told, residual_m, with_means=lasts)
     grams, rights = _sums(columns, course, block)
     least = np.linalg.lstsq(grams.sum(axis=0), rights.sum(axis=0), rcond=None)[0]
     noise = float(((course - columns @ least) ** 2).mean()) * BLOCK_S * scene.rate_hz
@@ -187,9 +193,10 @@ def _sized(
     left = course - columns @ size
     known_to = np.array([p.known_to / p.typical for p in parameters])
     spread = np.hypot(known_to, SCALE_ERROR * size)
+    misplaced = _misplaced(told, residual_m, rng) if lasts else np.zeros((DRAWS, len(size)))
     draws = [
         candidate.values(scene, typical * (one + spread * rng.standard_normal(len(size))))
-        for one in _bootstrap(grams, rights, prior, rng)
+        for one in _bootstrap(grams, rights, prior, misplaced, rng)
     ]
     return Proof(
         effect,
@@ -208,15 +215,29 @@ def _left(effect: Effect, scene: Scene, target: str, values: np.ndarray) -> np.n
     return change
 
 
+def _is_throughout(scene: Scene, from_s: float) -> bool:
+    return from_s < scene.times_s[0]
+
+
+def _misplaced(told: np.ndarray, residual_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """(DRAWS, k) what markers that sit elsewhere than the model has them, as far as these usually
+    do, add to the right-hand side of shapes (N, m, 3, k)."""
+    usual = np.nanmedian(np.linalg.norm(np.nanmean(residual_m, axis=0), axis=1)) / MEDIAN_LENGTH
+    known = np.isfinite(residual_m)[..., None] & np.isfinite(told)
+    total = np.where(known, told, 0.0).sum(axis=0).reshape(-1, told.shape[-1])
+    return usual * rng.standard_normal((DRAWS, len(total))) @ total
+
+
 def _in_rows(
-    scene: Scene, shapes_m: np.ndarray, residual_m: np.ndarray
+    scene: Scene, shapes_m: np.ndarray, residual_m: np.ndarray, with_means: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Shapes (r, k), residual (r,) and number of the stretch (r,) where both are known, without
-    the mean of each marker and direction."""
+    the mean of each marker and direction or with it."""
     known = np.isfinite(residual_m).all(axis=2) & np.isfinite(shapes_m).all(axis=(2, 3))
     block = ((scene.times_s - scene.times_s[0]) / BLOCK_S).astype(int)
     blocks = np.repeat(np.broadcast_to(block[:, None], known.shape)[known], 3)
-    columns, course = (_centred(x, known)[known] for x in (shapes_m, residual_m[..., None]))
+    both = (shapes_m, residual_m[..., None])
+    columns, course = (x[known] if with_means else _centred(x, known)[known] for x in both)
     return columns.reshape(-1, shapes_m.shape[-1]), course.ravel(), blocks
 
 
@@ -237,16 +258,21 @@ def _sums(
 
 
 def _bootstrap(
-    grams: np.ndarray, rights: np.ndarray, prior: np.ndarray, rng: np.random.Generator
+    grams: np.ndarray,
+    rights: np.ndarray,
+    prior: np.ndarray,
+    misplaced: np.ndarray,
+    rng: np.random.Generator,
 ) -> list[np.ndarray]:
-    """DRAWS of the sizes (k,), stretches drawn with replacement; what the markers hardly tell is
-    drawn nearer to zero, by the prior, than it may be, and scatters by as much."""
+    """DRAWS of the sizes (k,), stretches drawn with replacement, ``misplaced`` (DRAWS, k) added to
+    the right-hand side; what the markers hardly tell is drawn nearer to zero, by the prior, than
+    it may be, and scatters by as much."""
     count, told = len(grams), grams.sum(axis=0) + prior
     drawn = rng.integers(count, size=(DRAWS, count))
     untold = prior @ np.linalg.solve(told, rng.standard_normal((len(prior), DRAWS)))
     return [
-        np.linalg.solve(grams[one].sum(axis=0) + prior, rights[one].sum(axis=0)) + apart
-        for one, apart in zip(drawn, untold.T, strict=True)
+        np.linalg.solve(grams[one].sum(axis=0) + prior, rights[one].sum(axis=0) + more) + apart
+        for one, more, apart in zip(drawn, misplaced, untold.T, strict=True)
     ]
 
 

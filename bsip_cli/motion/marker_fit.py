@@ -15,7 +15,7 @@ from bsip_cli.motion.jacobian import model_markers, pose_columns, subtrees
 _RESPONSE_FRAMES = 16
 _POSTURE_SD_RAD = 3.0
 # Median length of a three-dimensional normal vector of unit spread.
-_MEDIAN_LENGTH = 1.538
+MEDIAN_LENGTH = 1.538
 _USUAL_M = 0.03  # how far a displaced marker moves, before the data speak
 
 
@@ -60,7 +60,7 @@ class MarkerFit:
         """Noise of a marker, each direction: from second differences of the residuals."""
         bends = np.linalg.norm(np.diff(self.residual_m, n=2, axis=0), axis=2)
         bends = bends[np.isfinite(bends)]
-        return float(np.median(bends)) / _MEDIAN_LENGTH / 6**0.5 if len(bends) else 0.0
+        return float(np.median(bends)) / MEDIAN_LENGTH / 6**0.5 if len(bends) else 0.0
 
     def step_s(self) -> float:
         """Time between two frames."""

@@ -8,14 +8,12 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from bsip_cli.motion.marker_events import BEYOND, MarkerEvent, event, pieces
-from bsip_cli.motion.marker_fit import MarkerFit, best_source
+from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit, best_source
 
 _WINDOW_S = 0.5  # of the running median: a jump lasts at most half of it
 _JUMP = 8.0  # spreads
 _LEAST_FRAMES = 5
 _SAME = 0.7  # a jump that another one explains to 30 % is the pose's
-# Median length of a three-dimensional normal vector of unit spread.
-_MEDIAN_LENGTH = 1.538
 
 
 @dataclass(frozen=True)
@@ -38,8 +36,8 @@ def jumps(
     astray = np.zeros(distance.shape, dtype=bool)
     if not np.isfinite(distance).any():
         return [], astray
-    own = _median(distance, 0)[None] / _MEDIAN_LENGTH
-    frame = _median(distance, 1)[:, None] / _MEDIAN_LENGTH
+    own = _median(distance, 0)[None] / MEDIAN_LENGTH
+    frame = _median(distance, 1)[:, None] / MEDIAN_LENGTH
     spread = np.maximum(np.maximum(own, frame), fit.noise_m())
     with np.errstate(invalid="ignore"):
         beyond = distance > np.maximum(_JUMP * spread, BEYOND * fit.trusted_m)

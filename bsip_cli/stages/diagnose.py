@@ -27,6 +27,7 @@ from bsip_cli.diagnosis.stated_mass import loaded_plate, stated_mass_findings
 from bsip_cli.diagnosis.support import support_of
 from bsip_cli.diagnosis.together import BLOCK_S, Evidence, together
 from bsip_cli.effects.catalogue import CATALOGUE
+from bsip_cli.effects.marker_shift import BEFORE_S
 from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.prior import Prior
 from bsip_cli.report.verdict import verdict_of
@@ -38,6 +39,8 @@ from bsip_cli.study import Trial
 from bsip_cli.unit import Unit
 
 _SHORTEST_S = 2.0
+# Of the spreads an offset is judged against: 17 mm for a marker that is trusted to 5.
+_FAR_OFF = 3.5
 _ATTRIBUTED = "segment_inertia"  # not a cause beside the parameters: they are projected out
 ASKED = (*(effect for effect in CATALOGUE if effect.name != _ATTRIBUTED), *PATTERNS)
 
@@ -166,11 +169,17 @@ def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial, class_id:
 
 
 def _slips(unit: Unit, trial: Trial) -> list[Slip]:
-    """That the inverse kinematics has found."""
+    """Markers off their places that the inverse kinematics has found, a slip's before those of
+    the whole trial."""
     events = unit.read("marker-events", trial)
-    slips = events[events["kind"] == "slip"]
-    columns = (slips[name] for name in ("marker", "start_s", "statistic"))
-    return [Slip(str(m), float(t), float(z)) for m, t, z in zip(*columns, strict=True)]
+    slips = events["kind"] == "slip"
+    throughout = (events["kind"] == "offset") & (events["statistic"] > _FAR_OFF)
+    return [*_off(events[slips]), *_off(events[throughout], before_s=BEFORE_S)]
+
+
+def _off(events: pd.DataFrame, before_s: float = 0.0) -> list[Slip]:
+    columns = (events[name] for name in ("marker", "start_s", "statistic"))
+    return [Slip(str(m), float(t) - before_s, float(z)) for m, t, z in zip(*columns, strict=True)]
 
 
 def _proven(one: Proof, trial: Trial) -> dict:

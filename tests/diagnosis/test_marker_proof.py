@@ -63,6 +63,21 @@ def test_a_slip_has_the_size_that_the_markers_show():
     assert found.p_value < 1e-12
 
 
+def test_a_marker_that_sits_wrong_throughout_has_its_size():
+    before = Slip(SLIP.marker, -1.0, 5.0)
+    scene = seen("marker_shift", before.marker, 0.02, 0.0, -0.015, before.start_s, 0.0)
+    misplaced = 0.001 * np.random.default_rng(7).standard_normal(scene.residual_m.shape[1:])
+    scene = replace(scene, residual_m=scene.residual_m + misplaced)
+    (found,) = proofs(scene, before)
+    low, size, high = numbers(scene, found)["shift"]
+    assert low < 0.025 < high and size == pytest.approx(0.025, abs=0.004)
+    assert "throughout" in found.effect.sentence(scene, found.target, found.values)
+
+
+def test_places_as_usual_are_no_marker_that_sits_wrong():
+    assert proofs(seen(), Slip(SLIP.marker, -1.0, 5.0)) == ()
+
+
 def test_a_second_bend_of_the_trunk_is_no_joint_centre():
     scene = bent()
     (found,) = proofs(scene)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from swinging_markers import MARKERS, PERSON, events_of, recording
+from swinging_markers import MARKERS, PERSON, events_of, fitted, recording
 
 from bsip_cli.motion.marker_events import MarkerEvent, summaries
+from bsip_cli.motion.marker_offsets import offsets
 
 START, STOP = 160, 175  # frames: 3.2 to 3.5 s
 
@@ -76,6 +77,22 @@ def test_an_offset_of_25_mm(label):
     assert (event.start_s, event.end_s) == pytest.approx((0.0, 7.98))
     assert event.size_m == pytest.approx(0.025, abs=0.006)
     assert "throughout the trial" in event.sentence
+
+
+@pytest.mark.parametrize("label", ["RMT2", "LCAL"])
+def test_an_offset_that_the_pose_takes_up(label):
+    """Heel and toe alone turn the foot with one of them."""
+    event = only(events_of(*moved(3, label, 0.03, slice(None), (0.0, 1.0, 0.0))))
+    assert (event.kind, event.marker) == ("offset", label)
+    assert event.size_m == pytest.approx(0.03, abs=0.006)
+
+
+def test_an_offset_that_begins_in_the_trial_is_a_slip():
+    times, markers = moved(1, "LMALL", 0.03, slice(START, None))
+    fit = fitted(markers, times)
+    event = only(tuple(offsets(fit, fit.residual_m)))
+    assert (event.kind, event.marker) == ("slip", "LMALL")
+    assert event.start_s == pytest.approx(3.2, abs=0.06)
 
 
 PAIRS = [("RKNEL", "RKNEM"), ("LWRR", "LWRU"), ("RELB", "LELB")]

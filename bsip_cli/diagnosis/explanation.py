@@ -99,6 +99,11 @@ class Explanation:
         """(k,) typical sizes of the free parameters."""
         return self.all_typical(evidence)[self.is_free(evidence)]
 
+    def known_to(self, evidence: Evidence) -> np.ndarray:
+        """(k,) standard deviations that no recording betters, of the free parameters [typical]."""
+        known = np.array([p.known_to for p in self.parameters(evidence)])
+        return known[self.is_free(evidence)] / self.typical(evidence)
+
     def moved_freely(self, evidence: Evidence, step: np.ndarray) -> Explanation:
         """With the free parameters changed by ``step`` (k,) typical sizes."""
         values = self.values.copy()

@@ -14,8 +14,10 @@ from bsip_cli.diagnosis.together import Evidence
 
 ALPHA = 0.01  # in every round; with the chance's own errors one null in twenty has an alarm
 BEYOND_DOUBT = 1e-6  # so rare by chance that a gain above its standard error is enough
-WORTH = 0.01  # of the squared residual of its trials: what takes less changes no result
-NAMELESS_WORTH = 0.1  # of what has no name: skin alone brings regularities of some percent
+# Of the squared residual of its trials: skin, and a body unlike the table's, go along with the
+# movement and bring some percent.
+WORTH = 0.03
+NAMELESS_WORTH = 0.1  # of what has no name
 # What a large cause leaves behind, since no model of it is exact, is no other cause.
 LEFTOVER = 0.005  # of the squared residual that earlier causes took from the same trials
 

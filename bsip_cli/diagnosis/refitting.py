@@ -13,8 +13,8 @@ from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.statistics.chi_square import minus_log_p
 
 SUPPORT = 8.0  # squared white residual that a trial must save to share a cause
-# Of what a cause explains in a trial: so much is lost where its size is a fifth off.
-OTHER_SIZE = 0.04
+# Of what a cause explains in a trial: so much is lost where its size is a quarter off.
+OTHER_SIZE = 0.0625
 
 
 class Refitted(NamedTuple):
@@ -79,19 +79,28 @@ def _supported(evidence: Evidence, before: Fit, fit: Fit) -> Fit:
 
 
 def _agreeing(evidence: Evidence, fit: Fit, saved: np.ndarray) -> tuple[int, ...]:
-    """Trials of the last cause but the one, if any, that a size of its own fits far better."""
-    trials = fit.explanations[-1].place.trials
+    """Trials of the last cause but the one, if any, that a size of its own fits far better, beyond
+    what sizes are known to."""
+    one = fit.explanations[-1]
+    trials = one.place.trials
     mine = fit.columns(len(fit.explanations) - 1, evidence)
+    known_to = one.known_to(evidence)
     shares = {}
     for t in trials:
         rows = evidence.rows(t)
         tangent, residual = fit.tangent[rows, mine], fit.residual[rows]
-        step = np.linalg.lstsq(tangent, residual, rcond=None)[0]
-        more = float(residual @ tangent @ step)
+        own = np.linalg.lstsq(tangent, residual, rcond=None)[0]
+        more = float(residual @ tangent @ own) - _saved_by_small(tangent * known_to, residual)
         whole = more + float(saved[rows].sum())
         shares[t] = more / max(whole, SUPPORT / OTHER_SIZE)
     odd = max(trials, key=lambda t: shares[t])
     return tuple(t for t in trials if t != odd or shares[t] < OTHER_SIZE)
+
+
+def _saved_by_small(tangent: np.ndarray, residual: np.ndarray) -> float:
+    """Squared residual that sizes of unit spread before the data save, less what they cost."""
+    right = tangent.T @ residual
+    return float(right @ np.linalg.solve(tangent.T @ tangent + np.eye(len(right)), right))
 
 
 def score_of(before: Fit, after: Fit, free: int) -> float:

@@ -84,13 +84,13 @@ def _fitted_in_the_end(
 
 def _standing_out(selection: Selection) -> Selection:
     """Without the causes, the weakest first, that explain less than remains beside all of them."""
-    shares = {
-        number: one.kept.score / selection.background[group_of(one.kept.trials)]
+    left = {
+        number: selection.background.get(group_of(one.kept.trials), 0.0) / one.kept.score
         for number, one in enumerate(selection.rounds)
         if one.kept is not None and one.chance is not None
     }
-    weakest = min(shares, key=shares.__getitem__, default=None)
-    if weakest is None or shares[weakest] > 1:
+    weakest = max(left, key=left.__getitem__, default=None)
+    if weakest is None or left[weakest] < 1:
         return selection
     kept = [number for number, one in enumerate(selection.rounds) if one.kept is not None]
     explanations = zip(kept, selection.fit.explanations, strict=True)

@@ -28,8 +28,8 @@ class Breathing(Effect):
         apart = 0.5 / max(float(np.ptp(scene.times_s)), 1.0)
         paces = tuple(float(f) for f in np.arange(_slowest_hz(scene), FASTEST_HZ, apart))
         return (
-            Parameter("cosine", "kg m", -1.0, 1.0, 0.05),
-            Parameter("sine", "kg m", -1.0, 1.0, 0.05),
+            Parameter("cosine", "kg m", -1.0, 1.0, 0.2),
+            Parameter("sine", "kg m", -1.0, 1.0, 0.2),
             Parameter("frequency", "Hz", _slowest_hz(scene), 0.7, apart, paces, known_to=PACE_HZ),
         )
 

@@ -134,7 +134,6 @@ MAIN_NUMBERS = {
     "breathing": ("amplitude",),
     "gravity_tilt": ("angle",),
     "unmeasured_contact": ("force",),
-    "plate_translation": ("x", "y"),
     "unexplained": ("amplitude", "stiffness", "curvature", "play"),
 }
 _PARTS = {  # of a size with several parts: which one the interval is of

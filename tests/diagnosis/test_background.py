@@ -78,6 +78,12 @@ def test_a_cause_that_stands_out_is_named():
     assert [one.effect for one in named_in(chosen)] == ["sync_offset"]
 
 
+@pytest.mark.parametrize("rest", [{}, {(0,): 0.0, (1,): 0.0, (): 0.0}])
+def test_where_nothing_remains_a_cause_stands_out(monkeypatch, rest):
+    monkeypatch.setattr(selection, "background_of", in_groups(rest))
+    assert [one.effect for one in named_in(select(signatures(), rng()))] == ["sync_offset"]
+
+
 def test_what_does_not_stand_out_has_no_name(monkeypatch):
     monkeypatch.setattr(selection, "background_of", remaining(1e4))
     chosen = select(signatures(), rng())

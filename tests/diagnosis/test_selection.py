@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
 
-from bsip_cli.diagnosis import judging, selection
+from bsip_cli.diagnosis import detection, judging, selection
 from bsip_cli.diagnosis.channel_patterns import with_play
 from bsip_cli.diagnosis.detection import Limit, limits_of
 from bsip_cli.diagnosis.explanation import NEGLIGIBLE
@@ -391,11 +391,10 @@ def test_a_joint_does_not_lie_elsewhere_in_one_trial_alone():
     assert trials == {"joint_centre": {(0, 1)}, "added_mass": {(0,), (1,), (0, 1)}}
 
 
-def test_longer_recordings_show_smaller_causes():
-    """Down to what is too small to matter; least where the parameters do much the same.
-
-    Beyond some 12 s the share of the residual that is worth a name sets most limits, not chance.
-    """
+def test_longer_recordings_show_smaller_causes(monkeypatch):
+    """Down to what is too small to matter; least where the parameters do much the same. Where the
+    share of the residual that is worth a name sets the limits, and not chance, they stay."""
+    monkeypatch.setattr(detection, "WORTH", 0.0)
     short, long = (
         in_typical_sizes(
             nothing_else_in(selection_of(noisy(late(part_of_moving(0, seconds), DELAY_S), 3)))
@@ -412,7 +411,17 @@ def test_longer_recordings_show_smaller_causes():
     assert max(ratios) < 1.0
 
 
-def test_what_remains_hides_as_much():
+def test_what_is_not_worth_a_name_goes_unseen(monkeypatch):
+    monkeypatch.setattr(detection, "WORTH", 0.0)
+    by_chance = in_typical_sizes(nothing_else_in(null()))
+    monkeypatch.setattr(detection, "WORTH", 0.5)
+    not_worth = in_typical_sizes(nothing_else_in(null()))
+    ratios = [not_worth[key] / size for key, size in by_chance.items() if np.isfinite(size)]
+    assert min(ratios) >= 1 and max(ratios) > 2
+
+
+def test_what_remains_hides_as_much(monkeypatch):
+    monkeypatch.setattr(detection, "WORTH", 0.0)
     selection = null()
     alone = in_typical_sizes(nothing_else_in(selection))
     beside = in_typical_sizes(replace(selection, background=dict.fromkeys([(0,), ()], 1e3)))

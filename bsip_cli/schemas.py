@@ -347,7 +347,8 @@ SCHEMAS = {
                     "float",
                     "1",
                     "jump, offset: size over the spread it is judged against; slip: unlikeliness "
-                    "as a number of standard deviations; swap: residual as labelled over exchanged",
+                    "as a number of standard deviations, or as of an offset if the pose follows "
+                    "it; swap: residual as labelled over exchanged",
                 ),
                 _text("sentence", "the same in words"),
                 Column(

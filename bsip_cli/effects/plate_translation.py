@@ -8,9 +8,9 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.plate_frame import loaded_plates, plate_of
 from bsip_cli.effects.scene import Scene
 
-# Feet deform where they press; the height shows only where forces point sideways, and there arms
-# and trunk that are heavier than the model's look alike.
-KNOWN_TO_M = (0.0003, 0.0003, 0.015)
+# Feet deform where they press, and a body whose mass lies ahead of the model's looks alike; the
+# height shows only where forces point sideways, and there arms heavier than the model's do.
+KNOWN_TO_M = (0.001, 0.001, 0.015)
 # Far away is a plate that was moved; its height is off by the depth of its sensors, if by anything.
 MOST_M = (0.3, 0.3, 0.1)
 

@@ -30,9 +30,10 @@ class MarkerEvent:
     start_s, end_s : a slip lasts until the trial's end, an offset fills the trial.
     size_m : length of the jump, the slip or the offset on the segment; of a swap the distance
         between the two places.
-    statistic : residual over the spread it is judged against (jump, offset), unlikeliness as the
-        length of a normal vector (slip), residual as labelled over residual exchanged, or the line
-        between the two over what it lacks of an exact reversal (swap).
+    statistic : residual over the spread it is judged against (jump, offset, a slip found as one),
+        unlikeliness as the length of a normal vector (other slips), residual as labelled over
+        residual exchanged, or the line between the two over what it lacks of an exact reversal
+        (swap).
     put_right : the labels of a swap were exchanged back before the poses were fitted.
     """
 

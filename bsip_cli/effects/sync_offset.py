@@ -8,7 +8,7 @@ from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.effect import Parameter
 from bsip_cli.effects.scene import Scene
 
-KNOWN_TO_S = 0.0004  # filters of plates and cameras delay a little too
+KNOWN_TO_S = 0.0002  # filters of plates and cameras delay a little too
 
 
 class SyncOffset(Delay):

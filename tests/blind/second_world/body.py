@@ -1,0 +1,270 @@
+"""A person: lengths, joints and inertial parameters after de Leva 1996, each a little off.
+
+A segment's frame sits at its proximal joint, the pelvis' between the hips; in anatomical standing
+its axes are the lab's (x ahead, y to the left, z up).
+
+De Leva gives centres of mass along the segments only, hence on the line between the joints; Dumas
+2007, the table of bsip's RM, has those of thighs, shanks and trunk 7 to 29 mm behind that line. On
+average over six people, drawn before the trunk's were put onto the line of its joints, the whole
+body's centre of mass lay 17 mm ahead of RM's in standing: 10 for trunk and head, 5 for the thighs,
+2 for the shanks; the joints themselves agreed to a few millimetres. Putting the trunk's onto the
+line takes 4 mm off on average. What is left is a difference between two tables and the people's own
+deviations from theirs, not a fault of a recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+SIDES = {"r": -1.0, "l": 1.0}  # and where it lies along y
+LIMBS = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
+SEGMENTS = (
+    "pelvis",
+    "torso",
+    "head",
+    *(f"{limb}_{side}" for side in SIDES for limb in LIMBS),
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """Of de Leva's table 4. mass, com (from the proximal end), radii of gyration: percent.
+
+    radii : about the sagittal, the transverse and the longitudinal axis.
+    """
+
+    mass: float
+    com: float
+    radii: tuple[float, float, float]
+    length_mm: float
+
+
+STATURE_M = {"M": 1.741, "F": 1.735}
+TABLE = {
+    "M": {
+        "head": Row(6.94, 50.02, (30.3, 31.5, 26.1), 242.9),
+        "upper_trunk": Row(15.96, 29.99, (71.6, 45.4, 65.9), 170.7),
+        "middle_trunk": Row(16.33, 45.02, (48.2, 38.3, 46.8), 215.5),
+        "lower_trunk": Row(11.17, 61.15, (61.5, 55.1, 58.7), 145.7),
+        "upper_arm": Row(2.71, 57.72, (28.5, 26.9, 15.8), 281.7),
+        "forearm": Row(1.62, 45.74, (27.6, 26.5, 12.1), 268.9),
+        "hand": Row(0.61, 79.00, (62.8, 51.3, 40.1), 86.2),
+        "thigh": Row(14.16, 40.95, (32.9, 32.9, 14.9), 422.2),
+        "shank": Row(4.33, 43.95, (25.1, 24.6, 10.2), 440.3),
+        "foot": Row(1.37, 44.15, (25.7, 24.5, 12.4), 258.1),
+    },
+    "F": {
+        "head": Row(6.68, 48.41, (27.1, 29.5, 26.1), 243.7),
+        "upper_trunk": Row(15.45, 20.77, (74.6, 50.2, 71.8), 146.5),
+        "middle_trunk": Row(14.65, 45.12, (43.3, 35.4, 41.5), 211.0),
+        "lower_trunk": Row(12.47, 49.20, (43.3, 40.2, 44.4), 187.0),
+        "upper_arm": Row(2.55, 57.54, (27.8, 26.0, 14.8), 275.1),
+        "forearm": Row(1.38, 45.59, (26.1, 25.7, 9.4), 264.3),
+        "hand": Row(0.56, 74.74, (53.1, 45.4, 33.5), 78.0),
+        "thigh": Row(14.78, 38.0, (35.0, 34.5, 15.6), 390.0),
+        "shank": Row(4.81, 43.52, (26.7, 26.3, 9.2), 438.6),
+        "foot": Row(1.29, 40.14, (29.9, 27.9, 13.9), 228.3),
+    },
+}
+# Of a person of the table's stature [m].
+_ANKLE_HEIGHT = 0.073
+_NECK_BELOW_VERTEX = 0.249
+_HALF_HIPS = {"M": 0.084, "F": 0.087}
+HALF_SHOULDERS = {"M": 0.176, "F": 0.160}
+_LUMBAR = (-0.022, 0.0, 0.108)  # the one joint of the trunk, about L4/L5, from between the hips
+_NECK_AHEAD = -0.012
+_HEAD_AHEAD = 0.018
+# Standard deviations of people about the table [m], [rad] and of logarithms.
+_COM_SD_M = {
+    "pelvis": 0.011,
+    "torso": 0.012,
+    "head": 0.008,
+    "upper_arm": 0.006,
+    "forearm": 0.005,
+    "hand": 0.003,
+    "thigh": 0.010,
+    "shank": 0.007,
+    "foot": 0.004,
+}
+_LENGTH_SD, _MASS_SD, _MASS_SIDE_SD, _INERTIA_SD, _INERTIA_SIDE_SD = 0.02, 0.09, 0.03, 0.13, 0.04
+_INERTIA_TURN_RAD = 0.08
+
+
+@dataclass(frozen=True)
+class Body:
+    """One person.
+
+    scale : stature over that of the table. lengths_m : by row of the table. joints_m : (3,) by name
+    (``lumbar``, ``neck``, ``hip_r``, ``shoulder_r``, ...) in the frame of the segment above it
+    (hips, lumbar: pelvis; neck, shoulders: torso). masses_kg, coms_m (3,), inertias_kgm2 (3, 3)
+    about the centre of mass: by segment, in its frame.
+    """
+
+    sex: str
+    mass_kg: float
+    height_m: float
+    scale: float
+    lengths_m: dict[str, float]
+    joints_m: dict[str, np.ndarray]
+    masses_kg: dict[str, float]
+    coms_m: dict[str, np.ndarray]
+    inertias_kgm2: dict[str, np.ndarray]
+
+    @property
+    def ankle_height_m(self) -> float:
+        return _ANKLE_HEIGHT * self.scale
+
+    @property
+    def foot_centre_m(self) -> np.ndarray:
+        """Middle of the foot's support, from the ankle in the foot's frame (3,)."""
+        return np.array([0.048 * self.scale, 0.0, -self.ankle_height_m])
+
+    @property
+    def ball_m(self) -> np.ndarray:
+        """What the foot turns about when the heel rises, from the ankle in its frame (3,)."""
+        return np.array([0.135 * self.scale, 0.0, -self.ankle_height_m])
+
+    @property
+    def leg_m(self) -> float:
+        return self.lengths_m["thigh"] + self.lengths_m["shank"]
+
+
+def kind_of(segment: str) -> str:
+    """``thigh`` of ``thigh_r``."""
+    return segment[:-2] if segment[-2:] in ("_r", "_l") else segment
+
+
+def draw_body(sex: str, mass_kg: float, height_m: float, rng: np.random.Generator) -> Body:
+    """A person of that mass and stature, off the table mostly alike on both sides."""
+    scale = height_m / STATURE_M[sex]
+    table = TABLE[sex]
+    lengths = {
+        name: row.length_mm / 1000.0 * scale * (1.0 + rng.normal(0.0, _LENGTH_SD))
+        for name, row in table.items()
+    }
+    joints = _joints(sex, height_m, scale, lengths, rng)
+    masses, coms, inertias = _inertial_parameters(sex, scale, lengths, joints)
+    _vary(masses, coms, inertias, rng)
+    factor = mass_kg / sum(masses.values())
+    for segment in SEGMENTS:
+        masses[segment] *= factor
+        inertias[segment] *= factor
+    return Body(sex, mass_kg, height_m, scale, lengths, joints, masses, coms, inertias)
+
+
+def suprasternale_m(lengths_m: dict[str, float]) -> float:
+    """Height above the hips, standing."""
+    return lengths_m["lower_trunk"] + lengths_m["middle_trunk"] + lengths_m["upper_trunk"]
+
+
+def usual_neck_m(height_m: float, scale: float, lengths_m: dict[str, float]) -> float:
+    """Height of the neck joint above the hips, standing, before a person deviates from it."""
+    hips = _ANKLE_HEIGHT * scale + lengths_m["shank"] + lengths_m["thigh"]
+    return height_m - hips - _NECK_BELOW_VERTEX * scale
+
+
+def _joints(
+    sex: str, height_m: float, scale: float, lengths: dict[str, float], rng: np.random.Generator
+) -> dict[str, np.ndarray]:
+    nearly_central = np.array([1.0, 0.2, 1.0])
+    lumbar = np.array(_LUMBAR) * scale + rng.normal(0.0, 0.008, 3) * nearly_central
+    neck = np.array([_NECK_AHEAD * scale, 0.0, usual_neck_m(height_m, scale, lengths)])
+    neck += rng.normal(0.0, 0.006, 3) * nearly_central
+    joints = {"lumbar": lumbar, "neck": neck - lumbar}
+    shoulders = suprasternale_m(lengths) - 0.042 * scale
+    for side, sign in SIDES.items():
+        hip = np.array([0.0, sign * _HALF_HIPS[sex] * scale, 0.0])
+        joints[f"hip_{side}"] = hip + rng.normal(0.0, 0.004, 3)
+        shoulder = np.array([_NECK_AHEAD * scale, sign * HALF_SHOULDERS[sex] * scale, shoulders])
+        joints[f"shoulder_{side}"] = shoulder + rng.normal(0.0, 0.006, 3) - lumbar
+    return joints
+
+
+Parameters = tuple[dict[str, float], dict[str, np.ndarray], dict[str, np.ndarray]]
+
+
+def _inertial_parameters(
+    sex: str, scale: float, lengths: dict[str, float], joints: dict[str, np.ndarray]
+) -> Parameters:
+    """The table's masses [percent], centres of mass and inertias, per segment."""
+    table = TABLE[sex]
+    masses: dict[str, float] = {}
+    coms: dict[str, np.ndarray] = {}
+    inertias: dict[str, np.ndarray] = {}
+
+    def put(segment: str, row: str, com: Sequence[float], order: Sequence[int] = (0, 1, 2)) -> None:
+        masses[segment], coms[segment] = table[row].mass, np.array(com, float)
+        inertias[segment] = _inertia(table[row], lengths[row], order)
+
+    lumbar = joints["lumbar"]
+    pelvis_up = lengths["lower_trunk"] * (1.0 - table["lower_trunk"].com / 100.0)
+    put("pelvis", "lower_trunk", [lumbar[0] * pelvis_up / lumbar[2], 0.0, pelvis_up])
+    head_up = _NECK_BELOW_VERTEX * scale - lengths["head"] * table["head"].com / 100.0
+    put("head", "head", [_HEAD_AHEAD * scale, 0.0, head_up])
+    for side in SIDES:
+        for limb in ("upper_arm", "forearm", "hand", "thigh", "shank"):
+            put(f"{limb}_{side}", limb, [0.0, 0.0, -lengths[limb] * table[limb].com / 100.0])
+        ahead = -0.06 * scale + lengths["foot"] * table["foot"].com / 100.0
+        put(f"foot_{side}", "foot", [ahead, 0.0, -0.038 * scale], order=(2, 1, 0))
+    masses["torso"], coms["torso"], inertias["torso"] = _torso(table, lengths, joints)
+    return masses, coms, inertias
+
+
+def _inertia(row: Row, length_m: float, order: Sequence[int] = (0, 1, 2)) -> np.ndarray:
+    """About the centre of mass, for a mass in percent; order : which radius belongs to x, y, z."""
+    radii = np.array(row.radii)[list(order)] / 100.0 * length_m
+    return row.mass * np.diag(radii**2)
+
+
+def _torso(
+    table: dict[str, Row], lengths: dict[str, float], joints: dict[str, np.ndarray]
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Upper and middle trunk as one, both on the line from the lumbar joint to the neck."""
+    line = joints["neck"] / joints["neck"][2]  # ahead and up per metre up
+    top = suprasternale_m(lengths)
+    bottom = joints["lumbar"][2]
+    parts = []
+    for name in ("upper_trunk", "middle_trunk"):
+        above_hips = top - lengths[name] * table[name].com / 100.0
+        parts.append((table[name], lengths[name], line * (above_hips - bottom)))
+        top -= lengths[name]
+    mass = sum(row.mass for row, _, _ in parts)
+    com = sum(row.mass * place for row, _, place in parts) / mass
+    inertia = np.zeros((3, 3))
+    for row, length, place in parts:
+        d = place - com
+        inertia += _inertia(row, length) + row.mass * (d @ d * np.eye(3) - np.outer(d, d))
+    return mass, com, inertia
+
+
+def _vary(
+    masses: dict[str, float],
+    coms: dict[str, np.ndarray],
+    inertias: dict[str, np.ndarray],
+    rng: np.random.Generator,
+) -> None:
+    """Take a person off the table, in place."""
+    common: dict[str, tuple[float, np.ndarray, np.ndarray]] = {}
+    for segment in SEGMENTS:
+        kind = kind_of(segment)
+        if kind not in common:
+            common[kind] = (
+                rng.normal(0.0, _MASS_SD),
+                rng.normal(0.0, 1.0, 3),
+                rng.normal(0.0, _INERTIA_SD, 3),
+            )
+        heavier, off, larger = common[kind]
+        paired = segment != kind
+        if paired:
+            heavier += rng.normal(0.0, _MASS_SIDE_SD)
+        masses[segment] *= np.exp(heavier)
+        mirrored = 0.3 if not paired else (-1.0 if segment.endswith("_l") else 1.0)
+        own = 0.35 * rng.normal(0.0, 1.0, 3) * [1.0, 1.0 if paired else 0.3, 1.0]
+        coms[segment] = coms[segment] + _COM_SD_M[kind] * (0.9 * off * [1.0, mirrored, 1.0] + own)
+        stretch = np.exp((larger + rng.normal(0.0, _INERTIA_SIDE_SD, 3)) / 2.0)
+        Q = Rotation.from_rotvec(rng.normal(0.0, _INERTIA_TURN_RAD, 3)).as_matrix()
+        inertias[segment] = Q @ (inertias[segment] * np.outer(stretch, stretch)) @ Q.T

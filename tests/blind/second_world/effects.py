@@ -1,0 +1,237 @@
+"""What may be hidden in a trial: how it changes the clock, plates, markers or loads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.signal import butter, sosfilt
+
+from second_world.balance import GRAVITY, Load
+from second_world.body import SIDES
+from second_world.motion import Motion
+from second_world.smooth import window
+
+HAND_M = np.array([0.02, 0.0, -0.07])  # where a hand holds something, in its frame
+WAIST_M = np.array([-0.1, 0.0, 0.05])  # where a tether pulls, in the pelvis' frame
+_CHANGES_AT = 0.45  # of a trial, where something happens within it
+_CONTACT = (3.0, 5.5, 0.5)  # start, length and ramp [s] of a hand's touch
+_STILL = (2.0, 7.5, 0.9)  # of the arm about it
+FZ = 2  # column of a plate's wrench
+
+# wrench (n, 6) in the plate's axes, whose z points down; times (n,) [s]; plate from 0; full [N] is
+# the load on the plate of somebody who stands still.
+Channels = Callable[[np.ndarray, np.ndarray, int, float], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """What is hidden: size in SI units and degrees; task : in which trials, None for all."""
+
+    effect: str
+    size: Any
+    target: Any = None
+    task: str | None = None
+
+    def is_in(self, task: str) -> bool:
+        return self.task in (None, task)
+
+    def in_words(self) -> str:
+        target = f" at {self.target}" if self.target is not None else ""
+        return f"{self.effect} {self.size}{target}, {self.task or 'all trials'}"
+
+
+@dataclass(frozen=True)
+class Changes:
+    """delay_s : of the forces behind the markers. shift_m, yaw_rad : of where the file says the
+    plates are. channels : on a plate's signals. moved : offsets of labels. loads : on the ground.
+    """
+
+    delay_s: float = 0.0
+    shift_m: tuple[float, float] = (0.0, 0.0)
+    yaw_rad: float = 0.0
+    channels: Channels | None = None
+    moved: dict[str, Callable[[np.ndarray], np.ndarray]] = field(default_factory=dict)
+    loads: tuple[Load, ...] = ()
+
+
+@dataclass(frozen=True)
+class Mass:
+    """A point mass that is carried, until a time if one is told."""
+
+    segment: str
+    place_m: np.ndarray
+    mass_kg: float
+    until_s: float = np.inf
+
+    def on_ground(self, times_s: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        acceleration = np.gradient(velocity, times_s[1] - times_s[0], axis=0, edge_order=2)
+        carried = self.mass_kg * (times_s < self.until_s)
+        return (acceleration + GRAVITY) * carried[:, None]
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A hand leans on something that lifts it by force_n: the ground carries less."""
+
+    segment: str
+    place_m: np.ndarray
+    force_n: float
+
+    def on_ground(self, times_s: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        return np.outer(-self.force_n * window(times_s, *_CONTACT), [0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Tether:
+    """A damped rope, less so up and down; damping_ns_m : force per speed [N s/m]."""
+
+    segment: str
+    place_m: np.ndarray
+    damping_ns_m: float
+
+    def on_ground(self, times_s: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        return self.damping_ns_m * velocity * [1.0, 1.0, 0.3]
+
+
+def changes_of(hidden: Hidden, motion: Motion) -> Changes:
+    """What a hidden effect changes in a trial; a touch also keeps the motion's arm still."""
+    if hidden.effect in _CHANNELS:
+        return Changes(channels=_CHANNELS[hidden.effect](hidden))
+    return _OTHERS[hidden.effect](hidden, motion)
+
+
+def _delay(hidden: Hidden, motion: Motion) -> Changes:
+    return Changes(delay_s=hidden.size)
+
+
+def _shift(hidden: Hidden, motion: Motion) -> Changes:
+    return Changes(shift_m=hidden.size)
+
+
+def _yaw(hidden: Hidden, motion: Motion) -> Changes:
+    return Changes(yaw_rad=np.radians(hidden.size))
+
+
+def _marker(hidden: Hidden, motion: Motion) -> Changes:
+    return Changes(moved={hidden.target: lambda t: np.tile(hidden.size, (len(t), 1))})
+
+
+def _slip(hidden: Hidden, motion: Motion) -> Changes:
+    since_s = _middle_s(motion)
+    return Changes(moved={hidden.target: lambda t: np.outer(t > since_s, hidden.size)})
+
+
+def _worn(hidden: Hidden, motion: Motion) -> Changes:
+    segment, place = hidden.target
+    return Changes(loads=(Mass(segment, np.array(place), hidden.size),))
+
+
+def _dropped(hidden: Hidden, motion: Motion) -> Changes:
+    return Changes(loads=(Mass(hidden.target, HAND_M, hidden.size, _middle_s(motion)),))
+
+
+def _touch(hidden: Hidden, motion: Motion) -> Changes:
+    side, still = hidden.target[-1], window(motion.t, *_STILL)
+    assert side in SIDES
+    for name in ("flexion", "abduction", "rotation", "elbow", "pronation"):
+        course = motion.q[f"{name}_{side}"]
+        motion.q[f"{name}_{side}"] = course + 0.95 * still * (course[0] - course)
+    motion.add(f"elbow_{side}", 0.9 * still)
+    return Changes(loads=(Touch(hidden.target, HAND_M, hidden.size),))
+
+
+def _tether(hidden: Hidden, motion: Motion) -> Changes:
+    return Changes(loads=(Tether("pelvis", WAIST_M, hidden.size),))
+
+
+def _middle_s(motion: Motion) -> float:
+    return _CHANGES_AT * len(motion.t) / motion.rate_hz
+
+
+def _gain(hidden: Hidden) -> Channels:
+    """On the vertical force alone."""
+
+    def change(wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float) -> np.ndarray:
+        return _with_column(wrench, FZ, wrench[:, FZ] * (1.0 + hidden.size))
+
+    return change
+
+
+def _crosstalk(hidden: Hidden) -> Channels:
+    """Of the vertical force, into the target's column."""
+
+    def change(wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float) -> np.ndarray:
+        column = wrench[:, hidden.target] + hidden.size * wrench[:, FZ]
+        return _with_column(wrench, hidden.target, column)
+
+    return change
+
+
+def _drift(hidden: Hidden) -> Channels:
+    """Of the first plate's vertical force, over the trial [N]."""
+
+    def change(wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float) -> np.ndarray:
+        grown = hidden.size * times_s / times_s[-1] if plate == 0 else 0.0
+        return _with_column(wrench, FZ, wrench[:, FZ] - grown)
+
+    return change
+
+
+def _lowpass(hidden: Hidden) -> Channels:
+    """Butterworth of second order, forward only, on every channel [Hz]."""
+
+    def change(wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float) -> np.ndarray:
+        rate_hz = 1.0 / (times_s[1] - times_s[0])
+        sections = butter(2, hidden.size, fs=rate_hz, output="sos")
+        return sosfilt(sections, wrench - wrench[0], axis=0) + wrench[0]
+
+    return change
+
+
+def _nonlinear(hidden: Hidden) -> Channels:
+    """A gain of the vertical force that grows with it, 1 at rest."""
+
+    def change(wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float) -> np.ndarray:
+        gain = 1.0 + hidden.size * (-wrench[:, FZ] / full_n - 1.0)
+        return _with_column(wrench, FZ, wrench[:, FZ] * gain)
+
+    return change
+
+
+def _clipped(hidden: Hidden) -> Channels:
+    """The vertical force ends at so many times its value at rest."""
+
+    def change(wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float) -> np.ndarray:
+        return _with_column(wrench, FZ, np.maximum(wrench[:, FZ], -hidden.size * full_n))
+
+    return change
+
+
+def _with_column(wrench: np.ndarray, column: int, course: np.ndarray) -> np.ndarray:
+    changed = wrench.copy()
+    changed[:, column] = course
+    return changed
+
+
+_CHANNELS: dict[str, Callable[[Hidden], Channels]] = {
+    "gain": _gain,
+    "crosstalk": _crosstalk,
+    "drift": _drift,
+    "lowpass": _lowpass,
+    "nonlinear": _nonlinear,
+    "clipped": _clipped,
+}
+_OTHERS: dict[str, Callable[[Hidden, Motion], Changes]] = {
+    "delay": _delay,
+    "shift": _shift,
+    "yaw": _yaw,
+    "marker": _marker,
+    "slip": _slip,
+    "worn": _worn,
+    "dropped": _dropped,
+    "touch": _touch,
+    "tether": _tether,
+}

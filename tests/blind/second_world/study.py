@@ -1,0 +1,59 @@
+"""A case as a study that a lab would hand over."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from second_world.balance import balanced
+from second_world.body import draw_body
+from second_world.c3d_file import write_c3d
+from second_world.effects import Changes, changes_of
+from second_world.lab import Lab
+from second_world.landmarks import place_landmarks
+from second_world.movements import moving
+from second_world.people import Case
+from second_world.skin import Skin
+
+PERSON = "sub-01"
+_JOLTING = 0.9
+_SCALES_SD_KG = 0.15
+
+
+def write_study(folder: Path, case: Case) -> None:
+    """A study of one person; nothing in it tells what is hidden."""
+    somebody, equipment = case.somebody, case.equipment
+    rng = np.random.default_rng(somebody.seed)
+    body = draw_body(somebody.sex, somebody.mass_kg, somebody.height_m, rng)
+    landmarks = place_landmarks(body, rng)
+    lab = Lab(
+        equipment.marker_set,
+        equipment.rate_hz,
+        10 * equipment.rate_hz,
+        equipment.plate_type,
+        equipment.two_plates,
+        rng,
+    )
+    skin = Skin(landmarks, lab.labels, rng, jolting=_JOLTING if case.jolting else 0.0)
+    for task in ("static", "sequence", *case.tasks):
+        motion = moving(task, body, lab.fine_hz, rng, wide=equipment.two_plates)
+        touched = case.hidden is not None and case.hidden.is_in(task)
+        changes = changes_of(case.hidden, motion) if touched else Changes()
+        found = balanced(motion, changes.loads)
+        if task == "static":
+            skin.rest(found.poses)
+        run = "" if task == "static" else "_run-1"
+        path = folder / PERSON / f"{PERSON}_task-{task}{run}.c3d"
+        write_c3d(path, lab.record(found, skin, changes, rng), equipment.plate_type)
+    weighed_kg = somebody.mass_kg + rng.normal(0.0, _SCALES_SD_KG)
+    _write_participants(folder, case, weighed_kg)  # last: with it, a study is complete
+
+
+def _write_participants(folder: Path, case: Case, weighed_kg: float) -> None:
+    who = case.somebody
+    lines = (
+        "participant_id\tsex\tmass_kg\theight_m",
+        f"{PERSON}\t{who.sex}\t{weighed_kg:.1f}\t{who.height_m:.2f}",
+    )
+    (folder / "participants.tsv").write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -1,0 +1,139 @@
+"""The second simulated world: its files hold what physics and its own truth demand."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import ezc3d
+import numpy as np
+import pytest
+from second_world.balance import GRAVITY, Balanced, balanced
+from second_world.body import SEGMENTS, Body, draw_body
+from second_world.c3d_file import TYPES, write_c3d
+from second_world.effects import Changes, Hidden, changes_of
+from second_world.lab import Lab, Recorded
+from second_world.landmarks import place_landmarks
+from second_world.movements import moving
+from second_world.people import CASES
+from second_world.skin import Skin
+
+LENGTH_S, SEED = 3.0, 11
+FOLDER = Path(__file__).parent / "second_world"
+
+
+@pytest.fixture(scope="module")
+def body() -> Body:
+    return draw_body("F", 62.0, 1.68, np.random.default_rng(SEED))
+
+
+@pytest.fixture(scope="module")
+def found(body: Body) -> Balanced:
+    """Three seconds of sway on two plates."""
+    return balanced(moving("sway", body, 500.0, np.random.default_rng(SEED), True, LENGTH_S))
+
+
+def lab_of(plate_type: int = 2) -> Lab:
+    return Lab("hansen2017", 100, 1000, plate_type, True, np.random.default_rng(SEED))
+
+
+def recorded(body: Body, found: Balanced, lab: Lab, changes: Changes) -> Recorded:
+    """The same noise and skin every time."""
+    rng = np.random.default_rng(SEED)
+    skin = Skin(place_landmarks(body, rng), lab.labels, rng)
+    skin.rest(found.poses)
+    return lab.record(found, skin, changes, rng)
+
+
+def total_in_file(path: Path, lab: Lab) -> tuple[np.ndarray, np.ndarray]:
+    """Force [N] and moment [N m] about the feet's middle, (N, 3) each, as ezc3d has them."""
+    platforms = ezc3d.c3d(str(path), extract_forceplat_data=True)["data"]["platform"]
+    force = sum(plate["force"].T for plate in platforms)
+    moment = np.zeros_like(force)
+    for plate in platforms:
+        centre = plate["corners"].mean(axis=1) / 1000.0 - lab.feet_m
+        moment += plate["moment"].T / 1000.0 + np.cross(centre, plate["force"].T)
+    return force, moment
+
+
+def test_the_body_weighs_what_it_should(body):
+    assert sum(body.masses_kg.values()) == pytest.approx(62.0)
+    for segment in SEGMENTS:
+        moments = np.linalg.eigvalsh(body.inertias_kgm2[segment])
+        assert moments[0] > 0.0 and moments[0] + moments[1] > 0.95 * moments[2]
+
+
+def test_weight_is_carried(body, found):
+    assert found.force_n[:, 2].mean() == pytest.approx(body.mass_kg * GRAVITY[2], rel=0.005)
+
+
+def test_the_centre_of_pressure_stays_within_the_feet(body, found):
+    middle = np.mean(list(found.centres_m.values()), axis=0)
+    half_foot = 0.5 * body.lengths_m["foot"]
+    assert np.abs(found.cop_m - middle)[:, 0].max() < half_foot
+    assert found.cop_m[:, 1].min() > found.centres_m["r"][:, 1].min()
+    assert found.cop_m[:, 1].max() < found.centres_m["l"][:, 1].max()
+
+
+@pytest.mark.parametrize("plate_type", TYPES)
+def test_a_file_holds_the_wrench_that_the_motion_needs(tmp_path, body, found, plate_type):
+    """But for the lab's usual errors: noise, offsets, plates a millimetre beside their place."""
+    lab, path = lab_of(plate_type), tmp_path / "null.c3d"
+    write_c3d(path, recorded(body, found, lab, Changes()), plate_type)
+    force, moment = total_in_file(path, lab)
+    times = np.arange(len(force)) / lab.analog_hz
+    true = np.hstack([found.force_n, found.moment_nm])
+    true = np.column_stack([np.interp(times, found.motion.t, column) for column in true.T])
+    off = np.hstack([force, moment]) - true
+    weight = body.mass_kg * GRAVITY[2]
+    assert force[:, 2].mean() == pytest.approx(weight, rel=0.005)
+    assert np.abs(off.mean(axis=0)).max() < 4.0
+    assert off[:, :3].std(axis=0).max() < 3.0
+    assert off[:, 3:].std(axis=0).max() < 1.0
+
+
+def test_markers_come_back_from_the_file(tmp_path, body, found):
+    lab, path = lab_of(), tmp_path / "null.c3d"
+    made = recorded(body, found, lab, Changes())
+    write_c3d(path, made, 2)
+    points = ezc3d.c3d(str(path))["data"]["points"]
+    courses = np.stack(list(made.markers_m.values())).transpose(2, 0, 1)
+    assert points.shape[2] == LENGTH_S * lab.rate_hz
+    np.testing.assert_allclose(points[:3] / 1000.0, courses, atol=1e-6)
+
+
+def test_a_turned_plate_changes_its_corners_alone(body, found):
+    hidden = changes_of(Hidden("yaw", 3.0), found.motion)
+    null, turned = (recorded(body, found, lab_of(), one) for one in (Changes(), hidden))
+    for label, course in null.markers_m.items():
+        np.testing.assert_array_equal(turned.markers_m[label], course)
+    for k, corners in enumerate(null.corners_m):
+        np.testing.assert_array_equal(turned.wrenches[k], null.wrenches[k])
+        edge, after = corners[0] - corners[1], turned.corners_m[k][0] - turned.corners_m[k][1]
+        angle = np.arctan2(np.cross(edge, after)[2], edge @ after)
+        assert np.degrees(angle) == pytest.approx(3.0)
+        np.testing.assert_allclose(turned.corners_m[k].mean(axis=0), corners.mean(axis=0))
+
+
+def test_a_carried_mass_weighs_on_the_ground(body):
+    motion = moving("sway", body, 500.0, np.random.default_rng(SEED), True, LENGTH_S)
+    changes = changes_of(Hidden("worn", 1.5, ("shank_r", (0.0, 0.0, -0.2))), motion)
+    force = balanced(motion, changes.loads).force_n
+    assert force[:, 2].mean() == pytest.approx((body.mass_kg + 1.5) * GRAVITY[2], rel=0.005)
+
+
+def test_cases_have_names_and_seeds_of_their_own():
+    assert (
+        len({case.name for case in CASES})
+        == len({case.somebody.seed for case in CASES})
+        == len(CASES)
+    )
+
+
+@pytest.mark.parametrize("file", sorted(FOLDER.glob("*.py")), ids=lambda file: file.stem)
+def test_imports_nothing_of_bsip(file):
+    """Or an error that simulator and diagnosis have in common would not show."""
+    nodes = list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
+    names = [alias.name for n in nodes if isinstance(n, ast.Import) for alias in n.names]
+    names += [str(node.module) for node in nodes if isinstance(node, ast.ImportFrom)]
+    assert not [name for name in names if name.startswith(("bsip_cli", "blind_"))]

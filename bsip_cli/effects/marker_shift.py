@@ -7,6 +7,7 @@ import numpy as np
 from bsip_cli.effects.effect import Effect, Parameter, explained_share
 from bsip_cli.effects.marker_course import during, step, wrench_parts
 from bsip_cli.effects.scene import Scene
+from bsip_cli.motion.level_change import two_levels
 
 APART_S = 0.5
 BEFORE_S = 1.0
@@ -138,9 +139,4 @@ def _level_change(residual_m: np.ndarray, rate_hz: float) -> int | None:
     least = round(APART_S * rate_hz)
     if len(seen) < 2 * least + 1:
         return None
-    known = residual_m[seen]
-    before = np.arange(1, len(known))[:, None]
-    left = np.cumsum(known, axis=0)[:-1]
-    right = known.sum(axis=0) - left
-    between = (left**2 / before + right**2 / (len(known) - before)).sum(axis=1)
-    return int(seen[1 + least + np.argmax(between[least : len(known) - least])])
+    return int(seen[two_levels(residual_m[seen], least + 1, least)])

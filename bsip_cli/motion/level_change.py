@@ -78,6 +78,19 @@ class _Problem:
         return self.penalised * (error / self.coefficient_sd) ** 2
 
 
+def two_levels(y: np.ndarray, before: int, after: int) -> int:
+    """Number of first samples of y (n, d) that differ most from the others, by least squares.
+
+    before, after : samples at least on either side; n must be as many.
+    """
+    n = len(y)
+    sizes = np.arange(before, n - after + 1)
+    first = np.cumsum(y, axis=0)[sizes - 1]
+    rest = y.sum(axis=0) - first
+    between = (first**2 / sizes[:, None] + rest**2 / (n - sizes)[:, None]).sum(axis=1)
+    return int(sizes[np.argmax(between)])
+
+
 def find_level_change(
     y: np.ndarray,
     columns: np.ndarray,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bsip_cli.motion.level_change import two_levels
 from bsip_cli.motion.marker_events import BEYOND, Kind, MarkerEvent, event
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit, best_source
 
@@ -64,9 +65,6 @@ def _leaves_its_place(residual: np.ndarray, level: np.ndarray, least: int) -> in
     if len(seen) < 2 * least:
         return 0
     x = along[seen]
-    splits = np.arange(least, len(x) - least + 1)
-    before = np.cumsum(x)[splits - 1] / splits
-    after = (x.sum() - before * splits) / (len(x) - splits)
-    best = int(np.argmax((after - before) ** 2 * splits * (len(x) - splits)))
-    in_place = abs(before[best]) < _IN_PLACE * after[best]
-    return int(seen[splits[best]]) if in_place else 0
+    split = two_levels(x[:, None], least, least)
+    in_place = abs(x[:split].mean()) < _IN_PLACE * x[split:].mean()
+    return int(seen[split]) if in_place else 0

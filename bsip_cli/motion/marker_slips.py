@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.motion.level_change import LevelChange, find_level_change
+from bsip_cli.motion.level_change import LevelChange, find_level_change, two_levels
 from bsip_cli.motion.marker_events import BEYOND, MarkerEvent, event
 from bsip_cli.motion.marker_fit import MarkerFit, best_source
 
@@ -109,9 +109,7 @@ class _Search:
         near = near[np.isfinite(along[near])]
         if len(near) < 3:
             return middle
-        x = along[near]
-        costs = [np.var(x[:k]) * k + np.var(x[k:]) * (len(x) - k) for k in range(1, len(x))]
-        return int(near[1 + int(np.argmin(costs))])
+        return int(near[two_levels(along[near][:, None], 1, 1)])
 
 
 def slips(fit: MarkerFit, residual: np.ndarray) -> tuple[list[MarkerEvent], np.ndarray]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.signal import butter, sosfilt
 
-from second_world.balance import GRAVITY, Load
+from second_world.balance import GRAVITY, Load, rate_of
 from second_world.body import SIDES
 from second_world.motion import Motion
 from second_world.smooth import window
@@ -67,9 +68,8 @@ class Mass:
     until_s: float = np.inf
 
     def on_ground(self, times_s: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        acceleration = np.gradient(velocity, times_s[1] - times_s[0], axis=0, edge_order=2)
         carried = self.mass_kg * (times_s < self.until_s)
-        return (acceleration + GRAVITY) * carried[:, None]
+        return (rate_of(velocity, times_s) + GRAVITY) * carried[:, None]
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Tether:
 def changes_of(hidden: Hidden, motion: Motion) -> Changes:
     """What a hidden effect changes in a trial; a touch also keeps the motion's arm still."""
     if hidden.effect in _CHANNELS:
-        return Changes(channels=_CHANNELS[hidden.effect](hidden))
+        return Changes(channels=partial(_CHANNELS[hidden.effect], hidden))
     return _OTHERS[hidden.effect](hidden, motion)
 
 
@@ -151,63 +151,51 @@ def _middle_s(motion: Motion) -> float:
     return _CHANGES_AT * len(motion.t) / motion.rate_hz
 
 
-def _gain(hidden: Hidden) -> Channels:
+def _gain(
+    hidden: Hidden, wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float
+) -> np.ndarray:
     """On the vertical force alone."""
-
-    def change(wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float) -> np.ndarray:
-        return _with_column(wrench, FZ, wrench[:, FZ] * (1.0 + hidden.size))
-
-    return change
+    return _with_column(wrench, FZ, wrench[:, FZ] * (1.0 + hidden.size))
 
 
-def _crosstalk(hidden: Hidden) -> Channels:
+def _crosstalk(
+    hidden: Hidden, wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float
+) -> np.ndarray:
     """Of the vertical force, into the target's column."""
-
-    def change(wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float) -> np.ndarray:
-        column = wrench[:, hidden.target] + hidden.size * wrench[:, FZ]
-        return _with_column(wrench, hidden.target, column)
-
-    return change
+    column = wrench[:, hidden.target] + hidden.size * wrench[:, FZ]
+    return _with_column(wrench, hidden.target, column)
 
 
-def _drift(hidden: Hidden) -> Channels:
+def _drift(
+    hidden: Hidden, wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float
+) -> np.ndarray:
     """Of the first plate's vertical force, over the trial [N]."""
-
-    def change(wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float) -> np.ndarray:
-        grown = hidden.size * times_s / times_s[-1] if plate == 0 else 0.0
-        return _with_column(wrench, FZ, wrench[:, FZ] - grown)
-
-    return change
+    grown = hidden.size * times_s / times_s[-1] if plate == 0 else 0.0
+    return _with_column(wrench, FZ, wrench[:, FZ] - grown)
 
 
-def _lowpass(hidden: Hidden) -> Channels:
+def _lowpass(
+    hidden: Hidden, wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float
+) -> np.ndarray:
     """Butterworth of second order, forward only, on every channel [Hz]."""
-
-    def change(wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float) -> np.ndarray:
-        rate_hz = 1.0 / (times_s[1] - times_s[0])
-        sections = butter(2, hidden.size, fs=rate_hz, output="sos")
-        return sosfilt(sections, wrench - wrench[0], axis=0) + wrench[0]
-
-    return change
+    rate_hz = 1.0 / (times_s[1] - times_s[0])
+    sections = butter(2, hidden.size, fs=rate_hz, output="sos")
+    return sosfilt(sections, wrench - wrench[0], axis=0) + wrench[0]
 
 
-def _nonlinear(hidden: Hidden) -> Channels:
+def _nonlinear(
+    hidden: Hidden, wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float
+) -> np.ndarray:
     """A gain of the vertical force that grows with it, 1 at rest."""
-
-    def change(wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float) -> np.ndarray:
-        gain = 1.0 + hidden.size * (-wrench[:, FZ] / full_n - 1.0)
-        return _with_column(wrench, FZ, wrench[:, FZ] * gain)
-
-    return change
+    gain = 1.0 + hidden.size * (-wrench[:, FZ] / full_n - 1.0)
+    return _with_column(wrench, FZ, wrench[:, FZ] * gain)
 
 
-def _clipped(hidden: Hidden) -> Channels:
+def _clipped(
+    hidden: Hidden, wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float
+) -> np.ndarray:
     """The vertical force ends at so many times its value at rest."""
-
-    def change(wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float) -> np.ndarray:
-        return _with_column(wrench, FZ, np.maximum(wrench[:, FZ], -hidden.size * full_n))
-
-    return change
+    return _with_column(wrench, FZ, np.maximum(wrench[:, FZ], -hidden.size * full_n))
 
 
 def _with_column(wrench: np.ndarray, column: int, course: np.ndarray) -> np.ndarray:
@@ -216,7 +204,7 @@ def _with_column(wrench: np.ndarray, column: int, course: np.ndarray) -> np.ndar
     return changed
 
 
-_CHANNELS: dict[str, Callable[[Hidden], Channels]] = {
+_CHANNELS: dict[str, Callable[..., np.ndarray]] = {
     "gain": _gain,
     "crosstalk": _crosstalk,
     "drift": _drift,

@@ -8,6 +8,7 @@ from bsip_cli.diagnosis.geometry import joint_errors, posture_errors
 from bsip_cli.diagnosis.skin import skin_draws, skin_inertia
 from bsip_cli.diagnosis.slack import slack
 from bsip_cli.diagnosis.smoothing_bias import smoothing_bias
+from bsip_cli.diagnosis.wander import wander
 from bsip_cli.dynamics.regressor import wrench_regressor
 from bsip_cli.effects.scene import Scene
 
@@ -19,10 +20,11 @@ def own_nuisances(
 ) -> np.ndarray:
     """(N, 6, m) of one trial: skin, the smoothing of the motion, small faults of the instruments.
 
-    skin_factor : skin slides this many times as far as the residuals of its markers show.
+    skin_factor : the skin of a segment slides as a whole this many times as far as the residuals
+        of its markers show.
     """
-    size = skin_factor * _marker_rms_m(scene) / np.sqrt(draws)
-    columns = [skin_draws(scene, size, draws, rng), smoothing_bias(scene), slack(scene)]
+    skin = skin_draws(scene, _marker_rms_m(scene) / np.sqrt(draws), skin_factor, draws, rng)
+    columns = [skin, wander(scene), smoothing_bias(scene), slack(scene)]
     return np.concatenate(columns, axis=2)
 
 

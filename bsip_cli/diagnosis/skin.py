@@ -1,9 +1,10 @@
 """What skin that slides over the bones can do to the simulated wrench.
 
 Skin moves with the pose: a marker's error is taken as a random linear function of the angles of the
-joints beside its segment, as large as the residual that the marker itself shows. Each draw of such
-functions bends the pose, and the pose bends the wrench. The draws span what no diagnosis may take
-for an effect.
+joints beside its segment, as large as the residual that the marker itself shows. What all markers
+of a segment share leaves no residual, and is larger: skin moves over the bone as a whole rather
+than being deformed (Andersen 2012, J Biomech 45). Each draw of such functions bends the pose, and
+the pose bends the wrench. The draws span what no diagnosis may take for an effect.
 """
 
 from __future__ import annotations
@@ -21,19 +22,20 @@ _FRAMES_AT_ONCE = 200_000  # of all draws together: bounds the memory
 
 
 def skin_draws(
-    scene: Scene, marker_rms_m: np.ndarray, count: int, rng: np.random.Generator
+    scene: Scene, marker_rms_m: np.ndarray, shared: float, count: int, rng: np.random.Generator
 ) -> np.ndarray:
     """(N, 6, count) changes of the wrench, one per draw of all markers' errors.
 
-    marker_rms_m (m,) : how far each marker slides, root mean square.
+    marker_rms_m (m,) : how far each marker slides against the others, root mean square.
+    shared : how many times as far all markers of a segment slide together.
     """
     nearby = _nearby(scene)
-    mixing = [rng.normal(size=(3, angles.shape[1], count)) for angles in nearby]
+    mixing = _mixing(scene.person.marker_segments, nearby, marker_rms_m, shared, count, rng)
     at_once = max(1, _FRAMES_AT_ONCE // len(scene.q))
     parts = []
     for first in range(0, count, at_once):
         some = [one[..., first : first + at_once] for one in mixing]
-        errors = _marker_errors(scene, nearby, some, marker_rms_m)
+        errors = _marker_errors(scene, nearby, some)
         parts.append(scene.response.of(scene.pose_response.of(errors)))
     return np.concatenate(parts, axis=2)
 
@@ -67,18 +69,35 @@ def _nearby(scene: Scene) -> list[np.ndarray]:
     return found
 
 
-def _marker_errors(
-    scene: Scene,
+def _mixing(
+    segments: np.ndarray,
     nearby: Sequence[np.ndarray],
-    mixing: Sequence[np.ndarray],
     marker_rms_m: np.ndarray,
+    shared: float,
+    count: int,
+    rng: np.random.Generator,
+) -> list[np.ndarray]:
+    """(3, j, count) per marker: by how far each angle beside its segment moves it [m]."""
+    together = {}
+    for segment in np.unique(segments):
+        (mine,) = np.nonzero(segments == segment)
+        far = shared * np.sqrt((marker_rms_m[mine] ** 2).mean())
+        together[segment] = far * rng.normal(size=(3, nearby[mine[0]].shape[1], count))
+    return [
+        together[segment] + rms * rng.normal(size=(3, angles.shape[1], count))
+        for segment, angles, rms in zip(segments, nearby, marker_rms_m, strict=True)
+    ]
+
+
+def _marker_errors(
+    scene: Scene, nearby: Sequence[np.ndarray], mixing: Sequence[np.ndarray]
 ) -> np.ndarray:
     """(N, m, 3, k) [m] in the world, of k draws: mixing (3, j, k) of each marker."""
     rotation, draws = scene.motion.rotation, mixing[0].shape[2]
     errors = np.empty((len(scene.q), len(mixing), 3, draws))
     for m, segment in enumerate(scene.person.marker_segments):
         local = np.einsum("fj,xjc->fxc", nearby[m], mixing[m])
-        errors[:, m] = marker_rms_m[m] * (rotation[:, segment] @ local)
+        errors[:, m] = rotation[:, segment] @ local
     return errors
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from bsip_cli.effects.scene import Plate, Scene
 
 CHANNELS = ("fx", "fy", "fz", "mx", "my", "mz")
+ALL = "all"  # every plate alike: one amplifier, or one lab whose origin is not where it is said
 
 
 def plate_of(scene: Scene, name: str) -> Plate:
@@ -25,6 +26,23 @@ def loaded_plates(scene: Scene, least_N: float = 50.0) -> tuple[str, ...]:
         for plate in scene.plates
         if scene.valid.any() and np.nanmax(plate.wrench[scene.valid, 2]) > least_N
     )
+
+
+def loaded_alone_or_all(scene: Scene) -> tuple[str, ...]:
+    """The plates that carry something, and where they are several, all of them together."""
+    loaded = loaded_plates(scene)
+    return (*loaded, ALL) if len(loaded) > 1 else loaded
+
+
+def plates_of(scene: Scene, name: str) -> tuple[Plate, ...]:
+    """The plate of a name; those that carry something for ``all``."""
+    names = loaded_plates(scene) if name == ALL else (name,)
+    return tuple(plate_of(scene, one) for one in names)
+
+
+def plates_that(name: str, does: str, do: str) -> str:
+    """``plate 1 does`` or ``all plates do``."""
+    return f"all plates {do}" if name == ALL else f"plate {name} {does}"
 
 
 def in_plate(plate: Plate, wrench: np.ndarray) -> np.ndarray:

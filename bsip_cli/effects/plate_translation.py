@@ -1,11 +1,11 @@
-"""A force plate that lies elsewhere than the file says."""
+"""Force plates that lie elsewhere than the file says."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from bsip_cli.effects.effect import Effect, Parameter
-from bsip_cli.effects.plate_frame import loaded_plates, plate_of
+from bsip_cli.effects.plate_frame import loaded_alone_or_all, plates_of, plates_that
 from bsip_cli.effects.scene import Scene
 
 # Feet deform where they press, and a body whose mass lies ahead of the model's looks alike; the
@@ -16,8 +16,8 @@ MOST_M = (0.3, 0.3, 0.1)
 
 
 class PlateTranslation(Effect):
-    """The plate truly lies at its stated place plus the shift: the measured moment lacks
-    shift x force."""
+    """The plate, or every plate, truly lies at its stated place plus the shift: the measured moment
+    lacks shift x force."""
 
     name = "plate_translation"
     of_the_lab = True
@@ -25,7 +25,7 @@ class PlateTranslation(Effect):
     remedy = "stand on the plate with both feet, then turn by 90 degrees and stand again"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
-        return loaded_plates(scene)
+        return loaded_alone_or_all(scene)
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         return tuple(
@@ -34,12 +34,13 @@ class PlateTranslation(Effect):
         )
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        force = np.nan_to_num(plate_of(scene, target).wrench[:, :3])
+        loads = [np.nan_to_num(plate.wrench[:, :3]) for plate in plates_of(scene, target)]
+        force = np.sum(loads, axis=0)
         return np.hstack([np.zeros_like(force), -np.cross(values, force)])
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         x, y, z = 1000 * values
         return (
-            f"plate {target} lies {np.hypot(x, y):.0f} mm sideways from where the file says (lab "
-            f"X {x:+.0f} mm, Y {y:+.0f} mm, height {z:+.0f} mm)"
+            f"{plates_that(target, 'lies', 'lie')} {np.hypot(x, y):.0f} mm sideways from where the "
+            f"file says (lab X {x:+.0f} mm, Y {y:+.0f} mm, height {z:+.0f} mm)"
         )

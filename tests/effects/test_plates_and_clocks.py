@@ -137,6 +137,33 @@ def test_an_unloaded_plate_is_no_candidate():
     assert set(PlateGain().targets(alone)) == {"1 fx", "1 fy", "1 fz"}
 
 
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [(PlateTranslation(), [0.02, -0.01, 0.0]), (PlateRotation(), [0.0, 0.0, 0.03])],
+    ids=lambda one: getattr(one, "name", None),
+)
+def test_two_plates_err_together_as_one_plate_under_both_feet(effect, values):
+    scene = moving()
+    centre = np.mean([plate.centre_m() for plate in scene.plates], axis=0)
+    whole = sum(np.nan_to_num(plate.wrench) for plate in scene.plates)
+    corners = scene.plates[0].corners_m
+    one = Plate("1", corners - corners.mean(axis=0) + centre, whole)
+    alone = replace(scene, plates=(one,))
+    together = effect.change(scene, "all", np.array(values))
+    np.testing.assert_allclose(together, effect.change(alone, "1", np.array(values)), atol=1e-8)
+    assert effect.sentence(scene, "all", np.array(values)).startswith("all plates ")
+    assert "all" in effect.targets(scene) and "all" not in effect.targets(alone)
+
+
+def test_a_gain_of_all_plates_is_that_of_each():
+    scene, effect, gain = moving(), PlateGain(), np.array([0.03])
+    each = [effect.change(scene, f"{plate.name} fz", gain) for plate in scene.plates]
+    np.testing.assert_allclose(effect.change(scene, "all fz", gain), sum(each), atol=1e-8)
+    assert effect.sentence(scene, "all fz", gain) == (
+        "all plates read the vertical force 3.0 % too large"
+    )
+
+
 @pytest.mark.parametrize("tilt", [[0.02, 0.0], [-0.05, 0.1]])
 def test_a_tilted_lab_is_a_simulation_with_another_gravity(tilt):
     scene = moving()

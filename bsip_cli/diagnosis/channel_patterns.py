@@ -17,6 +17,8 @@ from bsip_cli.effects.scene import Scene
 _SIZE = {"N": 40.0, "N m": 20.0}
 _SMALL = {"N": 10.0, "N m": 5.0}
 _PLAYS = {"N": (4.0, 8.0, 16.0), "N m": (2.0, 4.0, 8.0)}
+_HARDLY_EVER = 99.0  # percent of the frames lie below
+_MUCH = 1.2  # times the body weight: in squats
 _FASTEST_HZ = 8.0  # beyond it the low-pass leaves nothing but its own edge
 _LINE, _AROUND_HZ, _MOST_LINES = 30.0, 0.75, 3  # of noise one in 10^9 frequencies is as high
 
@@ -92,14 +94,80 @@ class Curve(ChannelPattern):
         return (Parameter("curvature", unit, -1e3, 1e3, _SIZE[unit]),)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        load = scene.predicted[:, 2] / (scene.mass_kg * GRAVITY_M_S2)
-        return in_channel(scene, target, values[0] * load**2)
+        return in_channel(scene, target, values[0] * _load(scene) ** 2)
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
         return (
             f"a part of {OF_THE_LAB[target]} that grows with the square of the load "
             f"({values[0]:+.1f} {unit_of(target)} at body weight)"
         )
+
+
+class Bend(Curve):
+    """The same of a component that is right in standing: plates are checked with people on them."""
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        load = _load(scene)
+        return in_channel(scene, target, values[0] * load * (load - 1))
+
+    def goes_along_with(self, target: str, values: np.ndarray) -> str:
+        return (
+            f"an error of {OF_THE_LAB[target]} that is not in proportion to the load "
+            f"({self._error(values):+.1f} {unit_of(target)} at {_MUCH:g} times the body weight, "
+            "none in standing)"
+        )
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        return (("nonlinearity", unit_of(target), self._error(values)),)
+
+    def _error(self, values: np.ndarray) -> float:
+        return float(values[0] * _MUCH * (_MUCH - 1))
+
+
+def _load(scene: Scene) -> np.ndarray:
+    """(N,) vertical force over body weight."""
+    return scene.predicted[:, 2] / (scene.mass_kg * GRAVITY_M_S2)
+
+
+class Ceiling(Pattern):
+    """A vertical force that is never shown above what it reaches in the trial: a channel at its
+    limit. At 1 all of what the motion needs beyond is lost."""
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        return ("fz",) if _beyond(scene).any() else ()
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        return (Parameter("lost", "1", 0.0, 3.0, 1.0),)
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        return in_channel(scene, target, -values[0] * _beyond(scene))
+
+    def goes_along_with(self, target: str, values: np.ndarray) -> str:
+        return f"what the motion needs beyond the largest {OF_THE_LAB[target]} that is shown"
+
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+        ((_, unit, lacking),) = self.reported(scene, target, values)
+        return (
+            f"something without a name keeps {OF_THE_LAB[target]} below {_ceiling(scene):.0f} N "
+            f"where the motion needs up to {lacking:.0f} {unit} more, as of a channel at its limit"
+        )
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        return (("lacking", "N", float(values[0] * _beyond(scene).max())),)
+
+
+def _ceiling(scene: Scene) -> float:
+    """Vertical force that is hardly ever exceeded [N]."""
+    return float(np.percentile(scene.measured[scene.valid, 2], _HARDLY_EVER))
+
+
+def _beyond(scene: Scene) -> np.ndarray:
+    """(N,) what the motion needs above it [N]."""
+    return np.where(scene.valid, np.maximum(scene.predicted[:, 2] - _ceiling(scene), 0.0), 0.0)
 
 
 class Play(ChannelPattern):

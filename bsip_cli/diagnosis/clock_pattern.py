@@ -10,6 +10,7 @@ from bsip_cli.effects.effect import Parameter
 from bsip_cli.effects.scene import Scene
 
 LEAST_S = 1.0
+UNSEEN_S = 0.1  # as good as nothing
 _APART_S, _MOST = 0.5, 40
 
 
@@ -36,7 +37,7 @@ class ClockJump(Delay, Pattern):
         later = scene.times_s >= values[1]
         least = LEAST_S * scene.rate_hz
         before, after = ((scene.valid & side).sum() for side in (~later, later))
-        unseen = before == 0 and (~later).sum() >= least
+        unseen = before <= UNSEEN_S * scene.rate_hz and (~later).sum() >= least
         seen = min(before, after) >= least or (unseen and after >= least)
         return super().possible(scene, target, values) and bool(seen)
 

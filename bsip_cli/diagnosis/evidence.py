@@ -18,6 +18,7 @@ from scipy import sparse
 from scipy.linalg import eigh, solve_toeplitz
 from scipy.ndimage import median_filter
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.dynamics.lowpass import lowpass_operator, stride_to
 from bsip_cli.effects.scene import Scene, standing_place_m
 from bsip_cli.identification.equations import ResidualSeries
@@ -30,6 +31,8 @@ _SMOOTH_HZ = 0.75  # half-width of the median over the spectrum
 _ROUNDS = 3
 FLOOR = 1e-6  # of the noise's power, taken for white
 _MATTERS = 1e-3  # by which a direction is shrunk, at least
+# Noise that no lab goes below: parts of body weight, and arms of it (half a millimetre) [m].
+LEAST = np.array([0.0003, 0.0003, 0.0005, 0.0005, 0.0005, 0.0001])
 
 
 @dataclass(frozen=True)
@@ -103,13 +106,14 @@ class Whitening:
 @dataclass(frozen=True)
 class Filtered:
     """What has passed the filter: residual (n, 6), the trial's own nuisances (n, 6, m) and those it
-    shares (n, 6, p), noise level of the accelerations (n,)."""
+    shares (n, 6, p), noise level of the accelerations (n,); noise that is always there (6,)."""
 
     filter: Filter
     residual: np.ndarray
     own: np.ndarray
     shared: np.ndarray
     level: np.ndarray
+    least: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -166,7 +170,8 @@ def trial_evidence(
     filter_ = filter_of(fewer, cutoff_hz)
     residual = _residual(scene, filter_, stride, cutoff_hz)
     level = noise_level[::stride][filter_.frames]
-    filtered = Filtered(filter_, residual, filter_(own), filter_(shared), level)
+    least = LEAST * scene.mass_kg * GRAVITY_M_S2
+    filtered = Filtered(filter_, residual, filter_(own), filter_(shared), level, least)
     return _evidence(name, fewer, filtered, np.zeros_like(residual))
 
 
@@ -189,7 +194,10 @@ def _residual(scene: Scene, filter_: Filter, stride: int, cutoff_hz: float) -> n
 
 def _whitening(filtered: Filtered, beside: np.ndarray, floor: float) -> Whitening:
     """Noise of what a known change (n, 6) and all nuisances leave of the residual, and the own
-    nuisances in the coordinates of that noise."""
+    nuisances in the coordinates of that noise.
+
+    Nuisances take up a part of the noise too: only ``kept`` of its power is seen beside them.
+    """
     filter_, level = filtered.filter, filtered.level
     nuisances = np.concatenate([filtered.own, filtered.shared], axis=2)
     left_over = filtered.residual - beside
@@ -199,13 +207,15 @@ def _whitening(filtered: Filtered, beside: np.ndarray, floor: float) -> Whitenin
     for _ in range(_ROUNDS):
         flat = _innovations((left_over / spread)[..., None], recursion, filter_)
         inner = known.T @ known + np.eye(known.shape[1])
-        explained = nuisances @ np.linalg.solve(inner, known.T @ flat[:, 0])
-        remaining = left_over - explained
+        sizes = np.linalg.solve(inner, np.column_stack([known.T @ flat, known.T]))
+        remaining = left_over - nuisances @ sizes[:, 0]
+        kept = 1 - (known * sizes[:, 1:].T).sum(axis=1).reshape(-1, 6).mean(axis=0)
         spread = _course(remaining, level)
         series = (remaining / spread).T
         recursion = np.stack([_recursion(x, filter_.rate_hz, floor) for x in series])
         innovations = _innovations((remaining / spread)[..., None], recursion, filter_)
-        spread = spread * innovations.reshape(-1, 6).std(axis=0)
+        size = innovations.reshape(-1, 6).std(axis=0) / np.sqrt(kept)
+        spread = spread * size * np.maximum(1.0, filtered.least / remaining.std(axis=0))
         known = _innovations(nuisances / spread[..., None], recursion, filter_)
     return Whitening(filter_, spread, recursion, *shrunk(known[:, : filtered.own.shape[2]]))
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from bsip_cli.diagnosis.explanation import Explanation
 from bsip_cli.diagnosis.intervals import drawn_explanations
-from bsip_cli.diagnosis.judging import ALPHA, NAMELESS_WORTH, Tried
+from bsip_cli.diagnosis.judging import ALPHA, NAMELESS_LEAST, NAMELESS_WORTH, Tried
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.rivals import rivals_of
 from bsip_cli.diagnosis.selection import Round, Selection
@@ -150,22 +150,28 @@ def _finding(
     return _with(evidence, tried, verdict, class_id, numbers, sentence)
 
 
+def _why_not(tried: Tried) -> str:
+    """Why a candidate is not told."""
+    if tried.p_value > ALPHA:
+        return f"chance brings as much in {100 * tried.p_value:.0f} % of cases"
+    if tried.is_leftover:
+        return "it is no more than what a larger cause leaves behind"
+    if tried.is_drowned:
+        return "more than it explains remains without a cause"
+    if not tried.is_good:
+        return "on data held out it does not help, or hardly"
+    if tried.is_slight and tried.is_tiny:
+        least = 100 * NAMELESS_LEAST
+        return f"it has no name and changes the forces by less than {least:g} % of body weight"
+    if tried.is_slight:
+        return f"it has no name and explains less than {100 * NAMELESS_WORTH:.0f} %, as skin may"
+    return "another cause explains it better"
+
+
 def _rejected(evidence: Evidence, tried: Tried) -> Finding:
     one = tried.explanation
     numbers = tuple(Number(n, u, x, np.nan, np.nan) for n, u, x in one.reported(evidence))
-    why = (
-        f"chance brings as much in {100 * tried.p_value:.0f} % of cases"
-        if tried.p_value > ALPHA
-        else "it is no more than what a larger cause leaves behind"
-        if tried.is_leftover
-        else "more than it explains remains without a cause"
-        if tried.is_drowned
-        else f"it has no name and explains less than {100 * NAMELESS_WORTH:.0f} %, as skin may"
-        if tried.is_good and tried.is_slight
-        else "another cause explains it better"
-        if tried.is_good
-        else "on data held out it does not help, or hardly"
-    )
+    why = _why_not(tried)
     sentence = f"not so: {one.sentence(evidence)} ({why})"
     return _with(evidence, tried, "rejected", "", numbers, sentence)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.chance import Chance
 from bsip_cli.diagnosis.explanation import Explanation, Fit
 from bsip_cli.diagnosis.held_out import Gain, gain_of
@@ -18,6 +19,8 @@ BEYOND_DOUBT = 1e-6  # so rare by chance that a gain above its standard error is
 # movement and bring some percent.
 WORTH = 0.03
 NAMELESS_WORTH = 0.1  # of what has no name
+# Of body weight, moments at an arm of ARM_M: what has no name is larger, root mean square.
+NAMELESS_LEAST, ARM_M = 0.003, 0.3
 # What a large cause leaves behind, since no model of it is exact, is no other cause.
 LEFTOVER = 0.005  # of the squared residual that earlier causes took from the same trials
 
@@ -26,8 +29,8 @@ LEFTOVER = 0.005  # of the squared residual that earlier causes took from the sa
 class Tried:
     """A candidate that was refitted in full, beside the causes found before it.
 
-    is_first : none of its trials holds one of them. is_drowned : in the end, more remains beside
-    all causes than it explains.
+    is_first : none of its trials holds one of them. is_tiny : it hardly changes the forces.
+    is_drowned : in the end, more remains beside all causes than it explains.
     """
 
     explanation: Explanation
@@ -37,6 +40,7 @@ class Tried:
     fit: Fit
     is_leftover: bool
     is_first: bool
+    is_tiny: bool
     is_drowned: bool = False
 
     @property
@@ -46,8 +50,8 @@ class Tried:
 
     @property
     def is_too_little_unnamed(self) -> bool:
-        """Whether it explains too little to be told without a name."""
-        return self.gain.percent < 100 * NAMELESS_WORTH
+        """Whether it explains or changes too little to be told without a name."""
+        return self.is_tiny or self.gain.percent < 100 * NAMELESS_WORTH
 
     @property
     def is_slight(self) -> bool:
@@ -85,7 +89,23 @@ def judged_by(
     leftover = _is_leftover(evidence, trials, before.residual, fit.residual)
     touched = {t for e in before.explanations for t in e.place.trials}
     first = touched.isdisjoint(trials)
-    return Tried(found, score, chance.p_value(score, trials), gain, fit, leftover, first)
+    tiny = _largest_change(evidence, found) < NAMELESS_LEAST
+    return Tried(found, score, chance.p_value(score, trials), gain, fit, leftover, first, tiny)
+
+
+def _largest_change(evidence: Evidence, found: Explanation) -> float:
+    """Root mean square of the change in the component and trial where it is largest, over body
+    weight."""
+    arms = np.repeat([1.0, ARM_M], 3)
+    return max(
+        float((_rms(one.filtered.filter.one(found.wrench(one.scene))) / arms).max())
+        / (one.scene.mass_kg * GRAVITY_M_S2)
+        for one in (evidence.trials[t] for t in found.place.trials)
+    )
+
+
+def _rms(course: np.ndarray) -> np.ndarray:
+    return np.sqrt((course**2).mean(axis=0))
 
 
 def _is_leftover(

@@ -19,6 +19,7 @@ from bsip_cli.diagnosis.evidence import TrialEvidence
 from bsip_cli.diagnosis.explanation import changes_of
 from bsip_cli.diagnosis.findings import Finding, Number, interval_words
 from bsip_cli.diagnosis.held_out import Z95
+from bsip_cli.diagnosis.judging import ARM_M
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.selection import Selection
 from bsip_cli.effects.channel_words import OF_THE_LAB, unit_of
@@ -29,7 +30,7 @@ from bsip_cli.statistics.effective_samples import effective_samples
 
 LOUDER = 12.0  # times the median of the components
 # Of body weight, moments at an arm of ARM_M: sensors and labs differ below it.
-LEAST, ARM_M = 0.008, 0.3
+LEAST = 0.008
 # Natural logarithm of how much louder the loudest is: 1.2 to 2.9 times in clean simulated trials,
 # 3 to 8 times in recordings of three laboratories.
 USUAL, SPREAD = 0.8, 0.55

@@ -69,4 +69,5 @@ def _tried(
     fit = fit_together(evidence, (found,))
     gain = gain_of(evidence, trials, before.residual, fit.residual, fit.tangent)
     score = score_of(before, fit, 1)
-    return Tried(fit.explanations[0], score, p_value, gain, fit, is_leftover=False, is_first=True)
+    marks = {"is_leftover": False, "is_first": True, "is_tiny": False}
+    return Tried(fit.explanations[0], score, p_value, gain, fit, **marks)

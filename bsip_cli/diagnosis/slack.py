@@ -14,6 +14,9 @@ from bsip_cli.effects.scene import Scene, standing_place_m
 
 SHARE = 0.02  # of the size that labs meet
 HORIZONTAL = 0.7  # the same for the gain of horizontal forces
+# The same for a plate's place: bodies of another table's segments look some centimetres higher or
+# lower, as far as horizontal forces tell a height.
+PLACE = (SHARE, SHARE, 1.0)
 # The spline of `ik` takes as much as a low-pass at this cut-off, with a softer edge.
 SPLINE_HZ, EDGE = 11.0, 3
 BLUR_S = 0.015  # standard deviation of a Gaussian that the one passed and the other did not
@@ -48,9 +51,15 @@ def _is_of_instruments(effect: Effect) -> bool:
     return effect.of_the_plates or isinstance(effect, (Delay, GravityTilt))
 
 
-def _share(candidate: Candidate) -> float:
-    """Horizontal forces are all motion, so what the motion's amplitude errs by is their gain."""
-    if candidate.effect.name == "over_smoothing":
-        return (candidate.scanned[0] / SPLINE_HZ) ** EDGE
-    horizontal = candidate.target.endswith((" fx", " fy"))
-    return HORIZONTAL if candidate.effect.name == "plate_gain" and horizontal else SHARE
+def _share(candidate: Candidate) -> np.ndarray:
+    """(k,) or (1,) of the free parameters' typical sizes.
+
+    Horizontal forces are all motion, so what the motion's amplitude errs by is their gain.
+    """
+    effect, target = candidate.effect.name, candidate.target
+    if effect == "over_smoothing":
+        return np.array([(candidate.scanned[0] / SPLINE_HZ) ** EDGE])
+    if effect == "plate_translation":
+        return np.array(PLACE)
+    horizontal = effect == "plate_gain" and target.endswith((" fx", " fy"))
+    return np.array([HORIZONTAL if horizontal else SHARE])

@@ -11,6 +11,8 @@ SLOWEST_HZ, FASTEST_HZ = 0.12, 0.6
 # The breastbone moves ahead and up; torso axes.
 OUTWARD = np.array([0.8, 0.6, 0.0])
 LEAST_BREATHS = 3
+# A quarter of it is not told: as much is where the markers of the chest breathe and no mass does.
+TYPICAL_KG_M = 0.3
 PACE_HZ = 3e-4  # to which a pace is known: nobody breathes like a clock
 
 
@@ -28,8 +30,8 @@ class Breathing(Effect):
         apart = 0.5 / max(float(np.ptp(scene.times_s)), 1.0)
         paces = tuple(float(f) for f in np.arange(_slowest_hz(scene), FASTEST_HZ, apart))
         return (
-            Parameter("cosine", "kg m", -1.0, 1.0, 0.2),
-            Parameter("sine", "kg m", -1.0, 1.0, 0.2),
+            Parameter("cosine", "kg m", -1.0, 1.0, TYPICAL_KG_M),
+            Parameter("sine", "kg m", -1.0, 1.0, TYPICAL_KG_M),
             Parameter("frequency", "Hz", _slowest_hz(scene), 0.7, apart, paces, known_to=PACE_HZ),
         )
 

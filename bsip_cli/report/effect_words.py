@@ -110,7 +110,9 @@ def _plate_label(target: str) -> str:
 _UNNAMED = {  # first number of a regularity without a name: what it is
     "amplitude": "swing",
     "curvature": "square of the load",
-    "play": "play or friction",
+    "error": "play or friction",
+    "lacking": "channel at its limit",
+    "nonlinearity": "not in proportion to the load",
     "stiffness": "pull on the pelvis",
 }
 
@@ -134,7 +136,7 @@ MAIN_NUMBERS = {
     "breathing": ("amplitude",),
     "gravity_tilt": ("angle",),
     "unmeasured_contact": ("force",),
-    "unexplained": ("amplitude", "stiffness", "curvature", "play"),
+    "unexplained": ("amplitude", "stiffness", "curvature", "error", "nonlinearity", "lacking"),
 }
 _PARTS = {  # of a size with several parts: which one the interval is of
     "x": "along the lab's X axis",

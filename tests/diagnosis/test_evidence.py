@@ -25,7 +25,7 @@ def drawn(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return noise * level[:, None] + slow @ rng.normal(size=5), slow, level
 
 
-def scene_of(measured: np.ndarray, rate_hz: float = RATE_HZ):
+def scene_of(measured: np.ndarray, rate_hz: float = RATE_HZ, mass_kg: float = 1.0):
     """As much of a scene as the evidence looks at: nobody moves, and a gap is not valid."""
     count = len(measured)
     valid = np.ones(count, dtype=bool)
@@ -37,17 +37,18 @@ def scene_of(measured: np.ndarray, rate_hz: float = RATE_HZ):
         q=np.zeros((count, 7)),
         measured=measured,
         predicted=np.zeros((count, 6)),
+        mass_kg=mass_kg,
     )
     scene.every = lambda stride: scene
     scene.once = lambda key, make: make()
     return scene
 
 
-def evidence(seed: int, more: np.ndarray | float = 0.0) -> TrialEvidence:
+def evidence(seed: int, more: np.ndarray | float = 0.0, mass_kg: float = 1.0) -> TrialEvidence:
     """Three of the nuisances are the trial's own, two are shared."""
     null, nuisances, level = drawn(seed)
     own, shared = nuisances[..., :3], nuisances[..., 3:]
-    return trial_evidence("a", scene_of(null + more), own, shared, level, 8.0)
+    return trial_evidence("a", scene_of(null + more, mass_kg=mass_kg), own, shared, level, 8.0)
 
 
 def without_shared(one: TrialEvidence) -> np.ndarray:
@@ -140,6 +141,27 @@ def test_moments_are_about_where_the_person_stands():
     own, shared = moved(nuisances[..., :3]), moved(nuisances[..., 3:])
     again = trial_evidence("a", scene, own, shared, level, 8.0)
     np.testing.assert_allclose(again.residual, evidence(3).residual, atol=1e-8)
+
+
+def test_noise_is_never_taken_for_less_than_labs_have():
+    """Beside somebody of 40 t, whose plates may err by 200 N, this noise is nothing."""
+    light, heavy = evidence(1), evidence(1, mass_kg=40_000.0)
+    assert heavy.residual.std() < 0.1 * light.residual.std()
+    signature = np.ones((COUNT, 6, 1))
+    assert np.linalg.norm(heavy.white(signature)) < 0.1 * np.linalg.norm(light.white(signature))
+
+
+def test_many_nuisances_do_not_make_the_noise_look_small():
+    """What they take off white noise is their number, and the rest keeps its size."""
+    rng = np.random.default_rng(4)
+    count, many = 600, 900
+    noise, level = rng.normal(size=(count, 6)), np.ones(count)
+    scene = scene_of(noise)
+    scene.valid[:] = True
+    nuisances = 10.0 * rng.normal(size=(count, 6, many))
+    one = trial_evidence("a", scene, nuisances, np.zeros((count, 6, 1)), level, 20.0)
+    left = 1 - many / len(one.residual)
+    assert (one.residual**2).mean() == pytest.approx(left, rel=0.1)
 
 
 def test_a_fast_recording_is_filtered_before_frames_are_left_out():

@@ -14,14 +14,13 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import pandas as pd
-from blind_running import ROOT, STAGES, CommandError, run_pipeline, write_atomically
-from blind_scoring import PERSON as ALL_TRIALS
-from blind_scoring import read_answer
-from blind_tables import markdown
+from blind_running import DOCUMENT, ROOT, STAGES, CommandError, run_pipeline
+from blind_tables import between_marks, markdown
 from second_world.people import CASES, Case
 from second_world.study import PERSON, write_study
 from tqdm import tqdm
 
+MARK = "tests/blind/second_world_run.py"
 NOTHING = "nothing"
 
 
@@ -35,8 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         asked = [(case, options.results / case.name) for case in cases]
         problems = list(tqdm(pool.map(answer, asked), total=len(asked), unit="case"))
     table = pd.DataFrame(row for case in CASES for row in rows_of(case, options.results))
-    write_atomically(options.results / "second_world.md", markdown(table))
-    print(markdown(table))
+    between_marks(options.document, MARK, markdown(table))
     if said := [problem for problem in problems if problem]:
         raise SystemExit("\n".join(said))
 
@@ -45,6 +43,7 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     add = parser.add_argument
     add("--results", type=Path, default=ROOT / "out" / "second_world", help="folder of results")
+    add("--document", type=Path, default=DOCUMENT, help="Markdown file that gets the table")
     add("--jobs", type=int, default=1, help="cases at once")
     add("--only", action="append", default=[], metavar="NAME", help="a case; may be repeated")
     return parser.parse_args(arguments)
@@ -68,41 +67,30 @@ def diagnosis_of(folder: Path) -> Path:
 
 
 def rows_of(case: Case, results: Path) -> list[dict[str, str]]:
-    """What the diagnosis says of all trials together, and of each alone; [] without an answer."""
-    whole = diagnosis_of(results / case.name)
-    if not whole.is_file():
+    """One row per cause or class that is told of a person; [] without an answer."""
+    path = diagnosis_of(results / case.name)
+    if not path.is_file():
         return []
     hidden = case.hidden.in_words() if case.hidden else NOTHING
-    files = {ALL_TRIALS: whole}
-    for path in sorted(whole.parent.glob(f"{PERSON}_task-*_diagnosis.parquet")):
-        files[path.stem.removeprefix(f"{PERSON}_").removesuffix("_diagnosis")] = path
-    said = {source: what_is_said(path, source) for source, path in files.items()}
+    found = pd.read_parquet(path)
+    said = found[found["verdict"].isin(["named", "ambiguous"])]
+    causes = said["class_id"].where(said["class_id"] != "", said["rank"].astype(str))
     return [
-        {"case": case.name, "hidden": hidden, "asked": source, **words}
-        for source, words in said.items()
-        if source == ALL_TRIALS or any(words.values())
+        {"case": case.name, "hidden": hidden, **in_words(rows)}
+        for _, rows in said.groupby(causes, sort=False)
     ]
 
 
-def what_is_said(path: Path, source: str) -> dict[str, str]:
-    """Causes named with sizes and intervals, and classes that cannot be told apart."""
-    found = read_answer(path, source)
-    rows = found.rows[found.rows["verdict"] == "named"]
-    classes = (
-        " or ".join(f"{effect} {target}".strip() for effect, target in members)
-        for members in found.classes
-    )
-    named = (f"{effect} {target}".strip() for effect, target in found.named)
-    sizes = [
+def in_words(rows: pd.DataFrame) -> dict[str, str]:
+    """A cause with its numbers, or the members of a class."""
+    members = dict.fromkeys(f"{row.effect} {row.target or ''}".strip() for row in rows.itertuples())
+    numbers = [
         f"{row.parameter} {row.estimate:.3g} {row.unit} ({row.ci_low:.3g} to {row.ci_high:.3g})"
         for row in rows.itertuples()
-        if pd.notna(row.estimate)
+        if len(members) == 1 and pd.notna(row.estimate)
     ]
-    return {
-        "named": "; ".join(named),
-        "sizes": "; ".join(sizes),
-        "classes": "; ".join(classes),
-    }
+    trials = str(rows["trials"].iloc[0]).replace(f"{PERSON}_task-", "").replace("_run-1", "")
+    return {"told": " or ".join(members), "numbers": "; ".join(numbers), "in": trials}
 
 
 if __name__ == "__main__":

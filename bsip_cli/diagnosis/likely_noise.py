@@ -19,9 +19,9 @@ from bsip_cli.diagnosis.signatures import Signatures
 
 MOST = 3  # candidates in one trial
 SURE = 20.0  # -log p of a candidate that is taken off
-# While causes are looked for, this part of the noise's power counts as white: else the slow course
-# of a hand that leans on something would pass for noise.
-LOOKING = 0.1
+# While causes are looked for, the noise is taken to have this many times its power in white noise
+# besides: else the slow course of a hand that leans on something would pass for noise.
+LOOKING = 1.0
 
 
 def with_likely_noise(signatures: Signatures, before: Fit) -> tuple[Signatures, Fit]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from bsip_cli.diagnosis.explanation import Explanation
 from bsip_cli.diagnosis.intervals import drawn_explanations
-from bsip_cli.diagnosis.judging import ALPHA, NAMELESS_LEAST, NAMELESS_WORTH, Tried
+from bsip_cli.diagnosis.judging import NAMELESS_LEAST, NAMELESS_WORTH, Tried
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.rivals import rivals_of
 from bsip_cli.diagnosis.selection import Round, Selection
@@ -152,8 +152,10 @@ def _finding(
 
 def _why_not(tried: Tried) -> str:
     """Why a candidate is not told."""
-    if tried.p_value > ALPHA:
-        return f"chance brings as much in {100 * tried.p_value:.0f} % of cases"
+    if not tried.is_rare:
+        percent = 100 * tried.p_value
+        often = f"{percent:.0f}" if percent >= 1 else f"{percent:.1g}"
+        return f"chance brings as much in {often} % of cases"
     if tried.is_leftover:
         return "it is no more than what a larger cause leaves behind"
     if tried.is_drowned:

@@ -14,6 +14,7 @@ from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.together import Evidence
 
 ALPHA = 0.01  # in every round; with the chance's own errors one null in twenty has an alarm
+ALPHA_BESIDE = 0.001  # beside another cause in the same trial, since no model of a cause is exact
 BEYOND_DOUBT = 1e-6  # so rare by chance that a gain above its standard error is enough
 # Of the squared residual of its trials: skin, and a body unlike the table's, go along with the
 # movement and bring some percent.
@@ -49,6 +50,11 @@ class Tried:
         return self.explanation.place.trials
 
     @property
+    def is_rare(self) -> bool:
+        """Whether chance hardly ever brings as much."""
+        return self.p_value <= (ALPHA if self.is_first else ALPHA_BESIDE)
+
+    @property
     def is_too_little_unnamed(self) -> bool:
         """Whether it explains or changes too little to be told without a name."""
         return self.is_tiny or self.gain.percent < 100 * NAMELESS_WORTH
@@ -60,10 +66,10 @@ class Tried:
 
     @property
     def is_good(self) -> bool:
-        """Rarer by chance than ALPHA, better on what it has not seen, worth a name, not what is
-        left over of a larger cause, and more than what remains. What has no name, comes after
-        another cause, or is not far beyond chance, must be better for sure."""
-        if self.p_value > ALPHA or self.is_leftover or self.is_drowned:
+        """Rare by chance, better on what it has not seen, worth a name, not what is left over of a
+        larger cause, and more than what remains. What has no name, comes after another cause, or is
+        not far beyond chance, must be better for sure."""
+        if not self.is_rare or self.is_leftover or self.is_drowned:
             return False
         if self.gain.percent < 100 * WORTH:
             return False

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together, refined
-from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.signatures import Place, Signatures
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.statistics.chi_square import minus_log_p
@@ -37,33 +36,24 @@ def refitted(
 ) -> Refitted | None:
     """In full, beside the causes found before; nothing if it turns out impossible.
 
-    Where the best moment or window of a cause would be impossible, it is the one that was scanned.
+    What lasts is tried in all trials too, and given up in those that do not support it, or
+    with another size.
     """
     evidence = signatures.evidence
-    start = start_at(evidence, place, sizes)
-    best = refined(evidence, start, before)
-    for one in (best,) if start.effect.name == UNEXPLAINED else (best, start):
-        fit = _in_its_trials(signatures, before, one, open_trials)
-        found = fit.explanations[-1]
-        if found.is_possible(evidence):
-            told = not found.is_negligible(evidence) and found.agrees_with_markers(evidence)
-            return Refitted(found, fit, score_of(before, fit, len(sizes))) if told else None
-    return None
-
-
-def _in_its_trials(
-    signatures: Signatures, before: Fit, start: Explanation, open_trials: set[int]
-) -> Fit:
-    """What lasts is tried in all trials too, and given up in those that do not support it, or with
-    another size."""
-    evidence, place = signatures.evidence, start.place
+    start = refined(evidence, start_at(evidence, place, sizes), before)
     known = {t for e in before.explanations if _alike(e, start) for t in e.place.trials}
     everywhere = signatures.trials_of(place.candidate) & open_trials - known
     fits = [fit_together(evidence, (*before.explanations, start))]
     if place.candidate.effect.lasts and everywhere > set(place.trials):
         wider = replace(start, place=replace(place, trials=tuple(sorted(everywhere))))
         fits.append(fit_together(evidence, (*before.explanations, wider)))
-    return min((_supported(evidence, before, one) for one in fits), key=_squares)
+    fit = min((_supported(evidence, before, one) for one in fits), key=_squares)
+    found = fit.explanations[-1]
+    if not found.is_possible(evidence) or found.is_negligible(evidence):
+        return None
+    if not found.agrees_with_markers(evidence):
+        return None
+    return Refitted(found, fit, score_of(before, fit, len(sizes)))
 
 
 def _alike(one: Explanation, other: Explanation) -> bool:

@@ -57,9 +57,13 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
     evidence = selection.signatures.evidence
     kept = list(_kept(evidence, selection))
     said = {_key(cause.explanation) for _, cause, _ in kept}
-    findings = []
+    findings, without_size = [], []
     names = (a + b for a, b in product(("", *_LETTERS), _LETTERS))  # A, B, ... Z, AA, AB ...
     for one, cause, number in kept:
+        numbers = _numbers(evidence, cause, number, rng)
+        if not _has_size(numbers):
+            without_size.append(_rejected(evidence, cause, numbers, "its size may as well be none"))
+            continue
         rivals = []
         for rival in rivals_of(one):
             if _key(rival.explanation) not in said and not _same(rival, cause):
@@ -67,15 +71,17 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
                 said.add(_key(rival.explanation))
         class_id = next(names) if rivals else ""
         remedy = cause.explanation.effect.remedy
-        findings.append(_finding(evidence, cause, number, class_id, remedy, rng))
+        findings.append(_finding(evidence, cause, numbers, class_id, remedy))
         for rival in rivals:
-            findings.append(_finding(one.evidence, rival, -1, class_id, remedy, rng))
+            its = _numbers(one.evidence, rival, -1, rng)
+            findings.append(_finding(one.evidence, rival, its, class_id, remedy))
     findings += _without_name(selection, {t for _, one, _ in kept for t in one.trials})
+    findings += without_size
     for one in selection.rounds:
         for tried in one.tried:
             if _key(tried.explanation) not in said:
                 said.add(_key(tried.explanation))
-                findings.append(_rejected(evidence, tried))
+                findings.append(_rejected(evidence, tried, _bare(evidence, tried), _why_not(tried)))
     return tuple(findings)
 
 
@@ -130,24 +136,28 @@ def _same(one: Tried, other: Tried) -> bool:
     return (mine.effect, mine.target) == (theirs.effect, theirs.target) and bool(shared)
 
 
+def _has_size(numbers: tuple[Number, ...]) -> bool:
+    """Whether any of them is not zero for sure."""
+    return any(one.low > 0 or one.high < 0 for one in numbers)
+
+
 def _finding(
     evidence: Evidence,
     tried: Tried,
-    number: int,
+    numbers: tuple[Number, ...],
     class_id: str,
     remedy: str,
-    rng: np.random.Generator,
 ) -> Finding:
-    """A cause that is kept, or with a ``class_id`` one of several; ``number`` in its fit."""
-    one = tried.explanation.alike(evidence)[0]
-    number = number % len(tried.fit.explanations)
-    draws = drawn_explanations(evidence, tried.fit, number, rng)
-    numbers = _numbers(evidence, one, draws)
-    sentence = one.sentence(evidence) + interval_words(numbers)
+    """A cause that is kept, or with a ``class_id`` one of several."""
+    sentence = _plainest(evidence, tried).sentence(evidence) + interval_words(numbers)
     verdict: Verdict = "ambiguous" if class_id else "named"
     if class_id:
         sentence += f"; other causes look alike here: to tell them apart, {remedy}"
     return _with(evidence, tried, verdict, class_id, numbers, sentence)
+
+
+def _plainest(evidence: Evidence, tried: Tried) -> Explanation:
+    return tried.explanation.alike(evidence)[0]
 
 
 def _why_not(tried: Tried) -> str:
@@ -170,11 +180,8 @@ def _why_not(tried: Tried) -> str:
     return "another cause explains it better"
 
 
-def _rejected(evidence: Evidence, tried: Tried) -> Finding:
-    one = tried.explanation
-    numbers = tuple(Number(n, u, x, np.nan, np.nan) for n, u, x in one.reported(evidence))
-    why = _why_not(tried)
-    sentence = f"not so: {one.sentence(evidence)} ({why})"
+def _rejected(evidence: Evidence, tried: Tried, numbers: tuple[Number, ...], why: str) -> Finding:
+    sentence = f"not so: {tried.explanation.sentence(evidence)} ({why})"
     return _with(evidence, tried, "rejected", "", numbers, sentence)
 
 
@@ -201,8 +208,19 @@ def _with(
     )
 
 
-def _numbers(evidence: Evidence, one: Explanation, draws: list[Explanation]) -> tuple[Number, ...]:
-    return numbers_of(one.reported(evidence), [draw.reported(evidence) for draw in draws])
+def _numbers(
+    evidence: Evidence, tried: Tried, number: int, rng: np.random.Generator
+) -> tuple[Number, ...]:
+    """What is reported of a cause, the explanation with that number in its fit, with intervals."""
+    draws = drawn_explanations(evidence, tried.fit, number % len(tried.fit.explanations), rng)
+    reported = _plainest(evidence, tried).reported(evidence)
+    return numbers_of(reported, [draw.reported(evidence) for draw in draws])
+
+
+def _bare(evidence: Evidence, tried: Tried) -> tuple[Number, ...]:
+    """What is reported of it, without intervals."""
+    reported = tried.explanation.reported(evidence)
+    return tuple(Number(name, unit, x, np.nan, np.nan) for name, unit, x in reported)
 
 
 Reported = tuple[tuple[str, str, float], ...]

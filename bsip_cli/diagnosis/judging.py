@@ -24,6 +24,7 @@ NAMELESS_WORTH = 0.1  # of what has no name
 NAMELESS_LEAST, ARM_M = 0.003, 0.3
 # What a large cause leaves behind, since no model of it is exact, is no other cause.
 LEFTOVER = 0.005  # of the squared residual that earlier causes took from the same trials
+BESIDE = 0.75  # of what a cause explains, that another one in another trial does not
 
 
 @dataclass(frozen=True)
@@ -114,11 +115,28 @@ def _rms(course: np.ndarray) -> np.ndarray:
     return np.sqrt((course**2).mean(axis=0))
 
 
+def stands_beside(one: Tried, other: Tried, before: Fit) -> bool:
+    """Whether hardly any of what a cause explains is explained by another trial's as well. Trials
+    share a body: what is too heavy in one of them passes for too light in the others.
+
+    before : fit without either.
+    """
+    left = other.fit.residual
+    both = np.column_stack([other.fit.tangent, one.fit.tangent])
+    step = np.linalg.lstsq(both, left, rcond=None)[0]
+    beside = _squares(left) - _squares(left - both @ step)
+    return beside > BESIDE * (_squares(before.residual) - _squares(one.fit.residual))
+
+
+def _squares(residual: np.ndarray) -> float:
+    return float((residual**2).sum())
+
+
 def _is_leftover(
     evidence: Evidence, trials: tuple[int, ...], before: np.ndarray, after: np.ndarray
 ) -> bool:
     rows = np.concatenate([np.arange(len(before))[evidence.rows(t)] for t in trials])
     nothing, without, beside = (
-        float((residual[rows] ** 2).sum()) for residual in (evidence.residual, before, after)
+        _squares(residual[rows]) for residual in (evidence.residual, before, after)
     )
     return without - beside < LEFTOVER * (nothing - without)

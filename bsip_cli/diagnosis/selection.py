@@ -12,7 +12,7 @@ import numpy as np
 from bsip_cli.diagnosis.background import Background, background_of, new_places
 from bsip_cli.diagnosis.chance import Chance, chance_of, flipped, group_of
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together
-from bsip_cli.diagnosis.judging import ALPHA, Tried, judged_by
+from bsip_cli.diagnosis.judging import ALPHA, Tried, judged_by, stands_beside
 from bsip_cli.diagnosis.likely_noise import likely_columns, noise_beside_fit, with_likely_noise
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.refitting import Refitted, refitted, start_at
@@ -25,6 +25,7 @@ SHOWN = 3  # that are looked at even where nothing stands out
 WORTH_A_TRY = 0.5  # of the best score
 # A cause from the catalogue is named though a regularity without a name explains a bit more.
 NAMED_AT = 0.95
+OVERSHADOWS = 2.0  # so many times the score
 AGAIN = 1.25  # how much more an effect counts that another trial shows already
 
 
@@ -208,15 +209,32 @@ def _in_vain(judged: list[Tried]) -> set[int]:
 
 
 def _kept(judged: list[Tried], before: Fit) -> Tried | None:
-    """The cause that explains most. Where that is a slight thing without a name nothing is told: a
-    cause of the catalogue that explains even less would be the wrong name."""
+    """The cause that explains most. Where that is a slight thing without a name, or what explains
+    far more is no cause, nothing is told: what explains even less would be the wrong name."""
     good = [one for one in judged if one.is_good]
     while good:
         first = _foremost(good, before)
-        if not first.is_slight:
+        if first.is_slight:
+            elsewhere = (one for one in good if set(one.trials).isdisjoint(first.trials))
+            good = [one for one in elsewhere if stands_beside(one, first, before)]
+        elif _is_overshadowed(first, judged, before):
+            good = [one for one in good if one is not first]
+        else:
             return first
-        good = [one for one in good if set(one.trials).isdisjoint(first.trials)]
     return None
+
+
+def _is_overshadowed(one: Tried, judged: list[Tried], before: Fit) -> bool:
+    """Whether it goes along with what explains far more of one of its trials, hardly ever brought
+    by chance, and yet no cause."""
+    return any(
+        other.p_value <= ALPHA
+        and not other.is_good
+        and other.score > OVERSHADOWS * one.score
+        and not set(one.trials).isdisjoint(other.trials)
+        and not stands_beside(one, other, before)
+        for other in judged
+    )
 
 
 def _foremost(good: list[Tried], before: Fit) -> Tried:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
 
-from bsip_cli.diagnosis import detection, judging, selection
+from bsip_cli.diagnosis import detection, intervals, judging, selection
 from bsip_cli.diagnosis.channel_patterns import with_play
 from bsip_cli.diagnosis.detection import Limit, limits_of
 from bsip_cli.diagnosis.explanation import NEGLIGIBLE
@@ -95,6 +95,15 @@ def test_a_second_cause_in_the_same_trial_is_found_too():
     assert delay == pytest.approx(DELAY_S, abs=2e-4)
     assert found["plate_zero"].target == "1 fx"
     assert offset == pytest.approx(OFFSET_N, abs=0.5)
+
+
+def test_what_may_as_well_have_no_size_is_not_told(monkeypatch):
+    chosen = late_with_offset()
+    monkeypatch.setattr(intervals, "SCALE_ERROR", 2.0)
+    assert said_of(chosen) == []
+    findings = findings_of(chosen, np.random.default_rng(1))
+    assert [one.effect for one in findings[:2]] == ["sync_offset", "plate_zero"]
+    assert all("its size may as well be none" in one.sentence for one in findings[:2])
 
 
 def test_what_a_large_cause_leaves_behind_is_no_other_cause():
@@ -249,6 +258,20 @@ def test_what_turns_out_to_be_no_cause_does_not_hide_another_trial(monkeypatch):
     assert first.tried[0].explanation.place.trials == (1,) and first.tried[0].p_value <= ALPHA
     assert first.kept.score < selection.WORTH_A_TRY * first.tried[0].score
     assert [(one.effect, one.trials) for one in said_of(chosen)] == [("plate_zero", ("a",))]
+
+
+def test_what_goes_along_with_far_more_that_is_no_cause_is_not_named(monkeypatch):
+    """The delay is let be no cause; less of it is explained by others, by which it is not named."""
+    true = judging.Tried.is_good.fget
+
+    def good_but_for_delays(tried):
+        return tried.explanation.effect.name != "sync_offset" and true(tried)
+
+    monkeypatch.setattr(judging.Tried, "is_good", property(good_but_for_delays))
+    scene = noisy(late(part_of_moving(0, 12), 3 * DELAY_S), 3)
+    assert said_of(selection_of(scene)) == []
+    monkeypatch.setattr(selection, "OVERSHADOWS", np.inf)
+    assert said_of(selection_of(scene)) != []
 
 
 def swinging(hertz: float) -> Scene:

@@ -1,0 +1,43 @@
+"""Whether what is found in one trial is the image of what another shows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bsip_cli.diagnosis.explanation import Fit
+from bsip_cli.diagnosis.held_out import Gain
+from bsip_cli.diagnosis.judging import Tried, stands_beside
+
+ROWS = 400
+NO_GAIN = Gain(np.zeros(1), np.ones(1, dtype=bool), 1.0)
+
+
+def course(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal(ROWS)
+
+
+def with_course(known: np.ndarray, residual: np.ndarray) -> Tried:
+    """A cause whose change of the residual goes along with ``known``."""
+    size = residual @ known / (known @ known)
+    fit = Fit((), residual - size * known, known[:, None])
+    return Tried(None, 1.0, 0.0, NO_GAIN, fit, is_leftover=False, is_first=True, is_tiny=False)
+
+
+@pytest.mark.parametrize(("likeness", "stands"), [(0.0, True), (0.1, True), (0.9, False)])
+def test_a_cause_stands_beside_what_explains_little_of_it(likeness, stands):
+    """The residual is that of both; likeness : cosine between their courses."""
+    slight = course(1)
+    cause = likeness * slight + np.sqrt(1 - likeness**2) * course(2)
+    residual = slight + cause + 0.1 * course(3)
+    one, other = with_course(cause, residual), with_course(slight, residual)
+    assert stands_beside(one, other, Fit((), residual, np.zeros((ROWS, 0)))) == stands
+
+
+def test_the_image_of_a_cause_does_not_stand_beside_it():
+    """Nothing but the slight one is there; the other one goes along with it."""
+    slight = course(1)
+    residual = slight + 0.1 * course(3)
+    image = with_course(slight + course(2), residual)
+    before = Fit((), residual, np.zeros((ROWS, 0)))
+    assert not stands_beside(image, with_course(slight, residual), before)

@@ -11,7 +11,18 @@ from pathlib import Path
 
 from bsip_cli import __version__
 
-_LIBRARIES = ("ezc3d", "numpy", "scipy", "pin", "pyarrow", "statsmodels")
+_LIBRARIES = (
+    "clarabel",
+    "ezc3d",
+    "matplotlib",
+    "numba",
+    "numpy",
+    "pandas",
+    "pin",
+    "pyarrow",
+    "scipy",
+    "statsmodels",
+)
 
 
 def file_hash(path: Path) -> str:
@@ -34,7 +45,7 @@ def hash_of_files(files: Mapping[str, Path]) -> str:
 
 @lru_cache(maxsize=1)
 def library_versions() -> dict[str, str]:
-    """Versions of the libraries that numbers depend on."""
+    """Versions of the libraries that numbers and figures depend on."""
     return {name: version(name) for name in _LIBRARIES}
 
 

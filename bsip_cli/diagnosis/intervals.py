@@ -9,7 +9,7 @@ from bsip_cli.diagnosis.together import Evidence
 
 DRAWS = 200
 DIFFERENCE = 1e-3  # of the typical size
-SCALE_ERROR = 0.025  # of every size: the simulated motion is neither free of noise nor unsmoothed
+SCALE_ERROR = 0.03  # of every size: the simulated motion is neither free of noise nor unsmoothed
 
 
 def drawn_explanations(

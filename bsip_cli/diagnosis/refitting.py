@@ -41,7 +41,7 @@ def refitted(
     """
     evidence = signatures.evidence
     start = refined(evidence, start_at(evidence, place, sizes), before)
-    known = {t for e in before.explanations if _alike(e, start) for t in e.place.trials}
+    known = {t for e in before.explanations if alike(e, start) for t in e.place.trials}
     everywhere = signatures.trials_of(place.candidate) & open_trials - known
     fits = [fit_together(evidence, (*before.explanations, start))]
     if place.candidate.effect.lasts and everywhere > set(place.trials):
@@ -56,7 +56,8 @@ def refitted(
     return Refitted(found, fit, score_of(before, fit, len(sizes)))
 
 
-def _alike(one: Explanation, other: Explanation) -> bool:
+def alike(one: Explanation, other: Explanation) -> bool:
+    """Whether they are the same effect at the same place."""
     return (one.effect, one.target) == (other.effect, other.target)
 
 
@@ -71,14 +72,14 @@ def _supported(evidence: Evidence, before: Fit, fit: Fit) -> Fit:
     saved = before.residual**2 - fit.residual**2
     trials = tuple(t for t in one.place.trials if saved[evidence.rows(t)].sum() > SUPPORT)
     if trials == one.place.trials and len(trials) > 1:
-        trials = _agreeing(evidence, fit, saved)
+        trials = agreeing(evidence, fit, saved)
     if not trials or trials == one.place.trials:
         return fit
     fewer = replace(one, place=replace(one.place, trials=trials))
     return _supported(evidence, before, fit_together(evidence, (*fit.explanations[:-1], fewer)))
 
 
-def _agreeing(evidence: Evidence, fit: Fit, saved: np.ndarray) -> tuple[int, ...]:
+def agreeing(evidence: Evidence, fit: Fit, saved: np.ndarray) -> tuple[int, ...]:
     """Trials of the last cause but the one, if any, that a size of its own fits far better, beyond
     what sizes are known to."""
     one = fit.explanations[-1]

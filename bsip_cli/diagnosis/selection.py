@@ -12,6 +12,7 @@ import numpy as np
 from bsip_cli.diagnosis.background import Background, background_of, new_places
 from bsip_cli.diagnosis.chance import Chance, chance_of, flipped, group_of
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together
+from bsip_cli.diagnosis.joining import Kept, joined
 from bsip_cli.diagnosis.judging import ALPHA, Tried, judged_by, stands_beside
 from bsip_cli.diagnosis.likely_noise import likely_columns, noise_beside_fit, with_likely_noise
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
@@ -71,7 +72,25 @@ def select(
         if one.kept is None:
             break
         found = one.kept.fit.explanations
-    return _standing_out(_fitted_in_the_end(signatures, tuple(rounds), found))
+    return _standing_out(_fitted_in_the_end(signatures, *_told_once(signatures, rounds, found)))
+
+
+def _told_once(
+    signatures: Signatures, rounds: Sequence[Round], found: tuple[Explanation, ...]
+) -> tuple[tuple[Round, ...], tuple[Explanation, ...]]:
+    """What lasts, and was found by several rounds in trials of their own, in the first of them."""
+    judged = (one.kept for one in rounds if one.kept is not None)
+    left = joined(signatures.evidence, list(zip(judged, found, strict=True)))
+    causes = iter(left)
+    told = tuple(one if one.kept is None else _with(one, next(causes)) for one in rounds)
+    return told, tuple(one[1] for one in left if one is not None)
+
+
+def _with(one: Round, cause: Kept | None) -> Round:
+    """A round that kept something else, or nothing any more."""
+    now = None if cause is None else cause[0]
+    tried = (t if t is not one.kept else now for t in one.tried)
+    return replace(one, tried=tuple(t for t in tried if t is not None), kept=now)
 
 
 def _fitted_in_the_end(

@@ -9,6 +9,8 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.plate_frame import CHANNELS, in_plate, in_world, loaded_plates, plate_of
 from bsip_cli.effects.scene import Scene
 
+MOST = 0.08  # makers state 1 to 3 %; what leaks more is no crosstalk
+
 
 class PlateCrosstalk(Effect):
     """A horizontal force channel also shows a part of another force channel."""
@@ -23,7 +25,7 @@ class PlateCrosstalk(Effect):
         return tuple(f"{p} {a}>{b}" for p in loaded_plates(scene) for a, b in pairs)
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        return (Parameter("coefficient", "1", -0.3, 0.3, 0.02),)
+        return (Parameter("coefficient", "1", -MOST, MOST, 0.02),)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         name, pair = target.rsplit(" ", 1)

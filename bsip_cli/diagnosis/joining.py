@@ -1,0 +1,63 @@
+"""One cause told once: what lasts may be found in some trials first and in others later."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+from bsip_cli.diagnosis.explanation import Explanation, fit_together
+from bsip_cli.diagnosis.held_out import Gain
+from bsip_cli.diagnosis.judging import Tried
+from bsip_cli.diagnosis.refitting import agreeing, alike
+from bsip_cli.diagnosis.together import Evidence
+
+Kept = tuple[Tried, Explanation]
+"""A cause as it was judged, and as it was fitted last."""
+
+
+def joined(evidence: Evidence, kept: Sequence[Kept]) -> list[Kept | None]:
+    """None for the later one of two that are the same and agree on their size; the former is then
+    in the trials of both."""
+    left: list[Kept | None] = list(kept)
+    for first, later in combinations(range(len(kept)), 2):
+        one, other = left[first], left[later]
+        if one is None or other is None or not _may_be_one(one[1], other[1]):
+            continue
+        both = _in_all(one[1], other[1])
+        rest = [k[1] for n, k in enumerate(left) if k is not None and n not in (first, later)]
+        if _agree(evidence, rest, both):
+            left[first], left[later] = (_of_both(one[0], other[0], both), both), None
+    return left
+
+
+def _may_be_one(one: Explanation, other: Explanation) -> bool:
+    return one.effect.lasts and alike(one, other)
+
+
+def _in_all(one: Explanation, other: Explanation) -> Explanation:
+    trials = tuple(sorted({*one.place.trials, *other.place.trials}))
+    return replace(one, place=replace(one.place, trials=trials))
+
+
+def _agree(evidence: Evidence, rest: Sequence[Explanation], both: Explanation) -> bool:
+    """Whether no trial wants a size of its own, beside all other causes."""
+    before = fit_together(evidence, tuple(rest))
+    fit = fit_together(evidence, (*rest, both))
+    saved = before.residual**2 - fit.residual**2
+    return agreeing(evidence, fit, saved) == both.place.trials
+
+
+def _of_both(one: Tried, other: Tried, both: Explanation) -> Tried:
+    gain = Gain(
+        one.gain.blocks + other.gain.blocks,
+        one.gain.concerned | other.gain.concerned,
+        one.gain.before + other.gain.before,
+    )
+    return replace(
+        one,
+        explanation=both,
+        score=one.score + other.score,
+        p_value=min(one.p_value, other.p_value),
+        gain=gain,
+    )

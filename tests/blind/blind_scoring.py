@@ -44,6 +44,10 @@ class Answer:
         pairs = [*self.named, *(pair for members in self.classes for pair in members)]
         return {target for name, target in pairs if name == effect}
 
+    def told(self, effect: str) -> pd.DataFrame:
+        """Rows of the effect where it is named or in a class."""
+        return self.rows[(self.rows["effect"] == effect) & (self.rows["verdict"] != "rejected")]
+
     def alarms(self) -> list[str]:
         """Everything that it takes to be wrong."""
         return sorted({name for name, _ in self.named} | {_joined(c) for c in self.classes})
@@ -178,8 +182,8 @@ def _score_of(
     out: Path, recorded: Recorded, record: Record, answers: list[Answer], size: float
 ) -> Score:
     trials = recorded.truth["trials"]
-    sought = {a.source: expected(record, _trial_of(trials, a.source)) for a in answers}
-    aim = expected(record, _trial_of(trials, PERSON))
+    sought = {a.source: expected(record, _trial_of(trials, a, record["effect"])) for a in answers}
+    aim = expected(record, _longest(trials.values()))
     present = {other["effect"] for other in recorded.truth["effects"]}
     wrong = _wrong(recorded, answers)
     verdict, says = _verdict(aim.effect, present, _twin(record, recorded, answers), answers)
@@ -210,9 +214,17 @@ def _score_of(
     )
 
 
-def _trial_of(trials: dict[str, Record], source: str) -> Record:
-    """The trial's own truth; for the person that of the longest recording."""
-    return trials.get(source) or max(trials.values(), key=lambda trial: trial["duration_s"])
+def _trial_of(trials: dict[str, Record], answer: Answer, effect: str) -> Record:
+    """The trial's own truth; for the person that of the longest recording in which the effect is
+    told, as the diagnosis prints numbers that hang on the movement."""
+    if answer.source in trials:
+        return trials[answer.source]
+    told = {stem for text in answer.told(effect)["trials"] for stem in text.split(", ")}
+    return _longest([trials[stem] for stem in told & set(trials)] or trials.values())
+
+
+def _longest(trials: Iterable[Record]) -> Record:
+    return max(trials, key=lambda trial: trial["duration_s"])
 
 
 def _tasks(answer: Answer, recorded: Recorded) -> set[str]:
@@ -272,9 +284,7 @@ def _where(answer: Answer) -> str:
 
 
 def _estimates(out: Path, recorded: Recorded, answer: Answer, sought: Expected) -> list[Estimate]:
-    rows = answer.rows[
-        (answer.rows["effect"] == sought.effect) & (answer.rows["verdict"] != "rejected")
-    ]
+    rows = answer.told(sought.effect)
     rows = rows[[sought.same_target(target) for target in rows["target"]]]
     rows = rows.drop_duplicates("parameter").set_index("parameter")
     values = sought.of_the_session() if answer.source == PERSON else sought.values
@@ -309,9 +319,7 @@ def _bounds(folder: Path, answer: Answer, sought: Expected) -> dict[str, float]:
 def _gain(answer: Answer | None, effect: str) -> float | None:
     if answer is None:
         return None
-    rows = answer.rows
-    said = (rows["effect"] == effect) & (rows["verdict"] != "rejected")
-    return _mean(rows.loc[said, "gain_percent"])
+    return _mean(answer.told(effect)["gain_percent"])
 
 
 def _held_out_gain(out: Path, recorded: Recorded, answer: Answer | None) -> float | None:

@@ -41,6 +41,7 @@ from blind_tables import (
 COLUMNS = (
     *("rank", "effect", "target", "parameter", "estimate", "unit", "ci_low", "ci_high", "p_value"),
     *("gain_percent", "gain_ci_low", "gain_ci_high", "verdict", "class_id", "sentence"),
+    "trials",
 )
 SQUAT, HOPS = "sub-01_task-squat_run-2", "sub-01_task-hops_run-1"
 TRIAL = {"recorded_from_s": 0.0, "duration_s": 10.0}
@@ -57,7 +58,7 @@ TETHER = {"effect": "outside_elastic_tether", "size": 100.0, "unit": "N/m"}
 
 
 def row(effect: str, verdict: str = "named", **fields) -> dict:
-    texts = dict.fromkeys(("target", "parameter", "unit", "class_id", "sentence"), "")
+    texts = dict.fromkeys(("target", "parameter", "unit", "class_id", "sentence", "trials"), "")
     numbers = dict.fromkeys(COLUMNS, np.nan)
     return {**numbers, **texts, "rank": 1, "effect": effect, "verdict": verdict, **fields}
 
@@ -186,6 +187,18 @@ def test_a_session_is_found_by_the_person_or_by_any_trial(tmp_path):
     assert found.verdict == RIGHT_NAME and found.estimates[0].estimate == 0.012
     diagnosis(tmp_path, "sub-01", row("sync_offset", parameter="delay", estimate=0.0101))
     assert only(score(tmp_path, whole)).estimates[0].estimate == 0.0101
+
+
+def test_what_hangs_on_the_movement_is_that_of_the_longest_recording_told_of(tmp_path):
+    """The second bend is hidden in both trials and found in the shorter one only."""
+    bend = {"effect": "missing_joint", "size": 0.5, "unit": "rad"}
+    whole = hidden(bend, place=SESSION, stems=(SQUAT, HOPS))
+    for stem, seconds, bent in ((SQUAT, 10.0, 0.5), (HOPS, 5.0, 0.2)):
+        whole.truth["trials"][stem] = {"duration_s": seconds, "missing_joint_range_rad": bent}
+    said = {"target": "upper_torso", "parameter": "flexion", "estimate": 0.3}
+    for told, truth in ((HOPS, 0.2), (f"{HOPS}, {SQUAT}", 0.5)):
+        diagnosis(tmp_path, "sub-01", row("missing_joint", **said, trials=told))
+        assert only(score(tmp_path, whole)).estimates[0].truth == truth
 
 
 def test_errors_are_told_in_units_of_the_bound_of_their_recording(tmp_path):

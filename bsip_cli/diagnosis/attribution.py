@@ -14,13 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsip_cli.body.inertia import SYMMETRIC, Inertia
-from bsip_cli.body.names import in_words
 from bsip_cli.dynamics.cop import anterior_and_right, centre_of_pressure
 from bsip_cli.dynamics.regressor import move_moments
 
 GROUPS = ("mass", "centre_of_mass", "inertia")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
-_BESIDE = 0.5  # of the largest coordinate of a shift: smaller ones are not put into words
 
 
 @dataclass(frozen=True)
@@ -148,51 +146,3 @@ def _cop_parts(
         name: (error, shift)
         for name, error, shift in zip(COMPONENTS[6:], errors, shifts, strict=True)
     }
-
-
-# --- in words -----------------------------------------------------------------------------------
-
-
-def difference(group: str, table: Inertia, found: Inertia) -> tuple[float, str]:
-    """How far the table lies from what was identified in one group, and the unit."""
-    if group == "mass":
-        return table.mass_kg - found.mass_kg, "kg"
-    if group == "centre_of_mass":
-        return float(np.linalg.norm(table.com_m - found.com_m)), "m"
-    return float(np.linalg.norm(table.tensor_kgm2 - found.tensor_kgm2)), "kg m2"
-
-
-def whose(segment: str, group: str, table: Inertia, found: Inertia) -> str:
-    """``head's mass, of which the table has 0.40 kg too little``."""
-    owner = f"{in_words(segment)}'s {group.replace('_', ' ')}"
-    size, unit = difference(group, table, found)
-    if group == "mass":
-        kind = "too much" if size > 0 else "too little"
-        return f"{owner}, of which the table has {abs(size):.2f} kg {kind}"
-    if group == "centre_of_mass":
-        return (
-            f"{owner}, which the table puts {_shift_in_words(segment, table.com_m - found.com_m)}"
-        )
-    return f"{owner}, which differs from the table's by {size:.2g} {unit}"
-
-
-def sentence(share: float, error: str, source: str) -> str:
-    """``68 % of the squared error in COP AP comes from the head's mass, of which ...``."""
-    if share < 0:
-        return f"the {source}, adds {-100 * share:.0f} % to the squared error in {error}"
-    return f"{100 * share:.0f} % of the squared error in {error} comes from the {source}"
-
-
-def _shift_in_words(segment: str, shift_m: np.ndarray) -> str:
-    """``21 mm too far back`` of a shift (3,) in segment axes, as the person stands upright."""
-    side = segment[-2:]
-    across = {"_r": ("outward", "inward"), "_l": ("inward", "outward")}.get(side, ("right", "left"))
-    words = (
-        ("too far forward", "too far back"),
-        ("too high", "too low"),
-        (f"too far {across[0]}", f"too far {across[1]}"),
-    )
-    sizes = np.abs(shift_m)
-    order = [k for k in np.argsort(-sizes) if sizes[k] >= _BESIDE * sizes.max()]
-    parts = [f"{1000 * sizes[k]:.0f} mm {words[k][int(shift_m[k] < 0)]}" for k in order]
-    return " and ".join(parts)

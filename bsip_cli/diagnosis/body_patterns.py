@@ -91,7 +91,7 @@ class Drag(Pattern):
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
         order = "against" if values[0] > 0 else "with"
-        size = f"{abs(values[0]):.0f} N per metre and second"
+        size = f"{abs(values[0]):.0f} N per m/s"
         return f"a force on the pelvis {order} its velocity {_ALONG[target]}: {size}"
 
 

@@ -38,8 +38,6 @@ def limits_of(selection: Selection) -> Iterator[Limit]:
     signatures = selection.signatures
     fit = selection.fit
     chances = [one.chance for one in selection.rounds if one.chance is not None]
-    if not chances:
-        return
     last = chances[-1]
     scores = zip(signatures.places, signatures.information(fit.tangent), strict=True)
     found: dict[tuple, Limit] = {}

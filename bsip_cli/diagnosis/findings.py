@@ -14,11 +14,11 @@ from bsip_cli.diagnosis.explanation import Explanation
 from bsip_cli.diagnosis.intervals import drawn_explanations
 from bsip_cli.diagnosis.judging import NAMELESS_LEAST, NAMELESS_WORTH, Tried
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
-from bsip_cli.diagnosis.rivals import rivals_of
 from bsip_cli.diagnosis.selection import Round, Selection
 from bsip_cli.diagnosis.together import Evidence
 
 Verdict = Literal["named", "ambiguous", "rejected"]
+_MOMENTS = {"start", "end", "from_time", "release_time"}
 _LETTERS = ascii_uppercase.replace("W", "")  # W is the class of the stated mass
 
 
@@ -58,24 +58,27 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
     kept = list(_kept(evidence, selection))
     said = {_key(cause.explanation) for _, cause, _ in kept}
     findings, without_size = [], []
+    told: set[int] = set()
     names = (a + b for a, b in product(("", *_LETTERS), _LETTERS))  # A, B, ... Z, AA, AB ...
     for one, cause, number in kept:
-        numbers = _numbers(evidence, cause, number, rng)
-        if not _has_size(numbers):
+        draws = _draws(evidence, cause, number, rng)
+        numbers = _numbers(evidence, cause, draws)
+        if not _has_size(evidence, draws):
             without_size.append(_rejected(evidence, cause, numbers, "its size may as well be none"))
             continue
         rivals = []
-        for rival in rivals_of(one):
+        for rival in cause.rivals:
             if _key(rival.explanation) not in said and not _same(rival, cause):
                 rivals.append(rival)
                 said.add(_key(rival.explanation))
         class_id = next(names) if rivals else ""
         remedy = cause.explanation.effect.remedy
         findings.append(_finding(evidence, cause, numbers, class_id, remedy))
+        told.update(cause.trials)
         for rival in rivals:
-            its = _numbers(one.evidence, rival, -1, rng)
+            its = _numbers(one.evidence, rival, _draws(one.evidence, rival, -1, rng))
             findings.append(_finding(one.evidence, rival, its, class_id, remedy))
-    findings += _without_name(selection, {t for _, one, _ in kept for t in one.trials})
+    findings += _without_name(selection, told)
     findings += without_size
     for one in selection.rounds:
         for tried in one.tried:
@@ -136,9 +139,11 @@ def _same(one: Tried, other: Tried) -> bool:
     return (mine.effect, mine.target) == (theirs.effect, theirs.target) and bool(shared)
 
 
-def _has_size(numbers: tuple[Number, ...]) -> bool:
-    """Whether any of them is not zero for sure."""
-    return any(one.low > 0 or one.high < 0 for one in numbers)
+def _has_size(evidence: Evidence, draws: list[Explanation]) -> bool:
+    """Whether any of the sizes is not zero for sure; a moment or a frequency is no size."""
+    free = draws[0].is_free(evidence)
+    low, high = np.percentile([one.values[free] for one in draws], [2.5, 97.5], axis=0)
+    return bool(((low > 0) | (high < 0)).any())
 
 
 def _finding(
@@ -208,11 +213,15 @@ def _with(
     )
 
 
-def _numbers(
+def _draws(
     evidence: Evidence, tried: Tried, number: int, rng: np.random.Generator
-) -> tuple[Number, ...]:
-    """What is reported of a cause, the explanation with that number in its fit, with intervals."""
-    draws = drawn_explanations(evidence, tried.fit, number % len(tried.fit.explanations), rng)
+) -> list[Explanation]:
+    """The explanation with that number in its fit, as it might as well be."""
+    return drawn_explanations(evidence, tried.fit, number % len(tried.fit.explanations), rng)
+
+
+def _numbers(evidence: Evidence, tried: Tried, draws: list[Explanation]) -> tuple[Number, ...]:
+    """What is reported of a cause, with intervals."""
     reported = _plainest(evidence, tried).reported(evidence)
     return numbers_of(reported, [draw.reported(evidence) for draw in draws])
 
@@ -237,10 +246,17 @@ def numbers_of(reported: Reported, drawn: Sequence[Reported]) -> tuple[Number, .
 
 
 def interval_words(numbers: tuple[Number, ...]) -> str:
-    """Of the surest number, with the digits that its interval deserves."""
-    first = max(numbers, key=lambda x: abs(x.value) / max(x.high - x.low, 1e-12))
+    """Of the surest size, with the digits that its interval deserves."""
+    first = max(_sizes(numbers), key=lambda x: abs(x.value) / max(x.high - x.low, 1e-12))
     width = max(first.high - first.low, 1e-12)
     digits = max(0, int(np.ceil(1 - np.log10(width))))
     unit = "" if first.unit == "1" else f" {first.unit}"
     low, high = (f"{x:.{digits}f}" for x in (first.low, first.high))
     return f" ({first.name.replace('_', ' ')}: 95 % interval {low} to {high}{unit})"
+
+
+def _sizes(numbers: tuple[Number, ...]) -> list[Number]:
+    """Those that are neither moments nor parts of another one; all where nothing else is told."""
+    names = {one.name for one in numbers}
+    parts = {f"{name}_{axis}" for name in names for axis in "xyz"}
+    return [one for one in numbers if one.name not in _MOMENTS | parts] or list(numbers)

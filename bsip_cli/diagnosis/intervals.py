@@ -17,8 +17,9 @@ def drawn_explanations(
 ) -> list[Explanation]:
     """The explanation as it might as well be: DRAWS of all parameters of all explanations.
 
-    Stretches of time are drawn with replacement and everything is fitted anew; to that is added
-    what the nuisances leave open, which is the same in every stretch.
+    Stretches of time are drawn with replacement and everything is fitted anew. The spread is never
+    less than what the nuisances leave open, which is the same in every stretch, together with
+    what no recording betters.
     """
     tangent, mine = _tangent(evidence, fit), _columns(fit, number)
     steps = _bootstrap(evidence, fit.residual, tangent, rng)[:, mine]

@@ -49,6 +49,7 @@ def _agree(evidence: Evidence, rest: Sequence[Explanation], both: Explanation) -
 
 
 def _of_both(one: Tried, other: Tried, both: Explanation) -> Tried:
+    """Whose rivals are those of both: what either tells from it is told."""
     gain = Gain(
         one.gain.blocks + other.gain.blocks,
         one.gain.concerned | other.gain.concerned,
@@ -60,4 +61,9 @@ def _of_both(one: Tried, other: Tried, both: Explanation) -> Tried:
         score=one.score + other.score,
         p_value=min(one.p_value, other.p_value),
         gain=gain,
+        rivals=tuple(r for r in one.rivals if any(_same(r, s) for s in other.rivals)),
     )
+
+
+def _same(one: Tried, other: Tried) -> bool:
+    return alike(one.explanation, other.explanation)

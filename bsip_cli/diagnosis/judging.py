@@ -32,7 +32,8 @@ class Tried:
     """A candidate that was refitted in full, beside the causes found before it.
 
     is_first : none of its trials holds one of them. is_tiny : it hardly changes the forces.
-    is_drowned : in the end, more remains beside all causes than it explains.
+    is_drowned : in the end, more remains beside all causes than it explains. rivals : of a cause
+    that is kept, what cannot be told from it.
     """
 
     explanation: Explanation
@@ -44,6 +45,7 @@ class Tried:
     is_first: bool
     is_tiny: bool
     is_drowned: bool = False
+    rivals: tuple[Tried, ...] = ()
 
     @property
     def trials(self) -> tuple[int, ...]:
@@ -93,9 +95,9 @@ def judged_by(
     """
     trials = found.place.trials
     gain = gain_of(evidence, trials, before.residual, fit.residual, fit.tangent)
-    leftover = _is_leftover(evidence, trials, before.residual, fit.residual)
     touched = {t for e in before.explanations for t in e.place.trials}
     first = touched.isdisjoint(trials)
+    leftover = not first and _is_leftover(evidence, trials, before.residual, fit.residual)
     tiny = _largest_change(evidence, found) < NAMELESS_LEAST
     return Tried(found, score, chance.p_value(score, trials), gain, fit, leftover, first, tiny)
 

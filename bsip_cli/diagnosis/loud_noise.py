@@ -19,7 +19,7 @@ from bsip_cli.diagnosis.evidence import TrialEvidence
 from bsip_cli.diagnosis.explanation import changes_of
 from bsip_cli.diagnosis.findings import Finding, Number, interval_words
 from bsip_cli.diagnosis.held_out import Z95
-from bsip_cli.diagnosis.judging import ARM_M
+from bsip_cli.diagnosis.judging import ARM_M, NAMELESS_WORTH
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.selection import Selection
 from bsip_cli.effects.channel_words import OF_THE_LAB, unit_of
@@ -41,7 +41,8 @@ _UNKNOWN = (np.nan, np.nan, np.nan)
 
 @dataclass(frozen=True)
 class Loud:
-    """A component of one trial: its noise [N or N m], and how many times louder it is."""
+    """A component of one trial: its noise and the standard error of that [N or N m], and how many
+    times louder it is."""
 
     trial: str
     channel: str
@@ -50,9 +51,14 @@ class Loud:
     louder: float
 
 
-def loud_findings(selection: Selection, found: Sequence[Finding]) -> tuple[Finding, ...]:
-    """One per component, for all trials in which it is too loud and nothing was found."""
-    named = {trial for one in found if one.verdict != "rejected" for trial in one.trials}
+def with_loud_noise(selection: Selection, found: Sequence[Finding]) -> tuple[Finding, ...]:
+    """The findings, and one per component for all trials in which it is too loud.
+
+    Asked are trials in which nothing explains as much as what has no name must; what explains less
+    of one that is loud is rejected, since it would be the wrong name.
+    """
+    told = [one for one in found if one.verdict != "rejected" and not _is_slight(one)]
+    named = {trial for one in told for trial in one.trials}
     evidence = selection.signatures.evidence
     changes = changes_of(evidence, selection.fit.explanations)
     asked = (
@@ -61,8 +67,24 @@ def loud_findings(selection: Selection, found: Sequence[Finding]) -> tuple[Findi
         if one.name not in named
     )
     loud = [one for one in asked if one is not None]
+    trials = {one.trial for one in loud}
     channels = dict.fromkeys(one.channel for one in loud)
-    return tuple(_finding([one for one in loud if one.channel == c]) for c in channels)
+    return (
+        *(
+            _rejected(one) if _is_slight(one) and trials.issuperset(one.trials) else one
+            for one in found
+        ),
+        *(_finding([one for one in loud if one.channel == c]) for c in channels),
+    )
+
+
+def _is_slight(one: Finding) -> bool:
+    return one.verdict != "rejected" and one.gain[0] < 100 * NAMELESS_WORTH
+
+
+def _rejected(one: Finding) -> Finding:
+    sentence = f"not so: {one.sentence} (a component of the force errs by far more)"
+    return replace(one, verdict="rejected", class_id="", sentence=sentence)
 
 
 def loudest(one: TrialEvidence, change: np.ndarray) -> Loud | None:

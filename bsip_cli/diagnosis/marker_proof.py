@@ -89,8 +89,8 @@ class Proof:
         drawn = [self.effect.reported(scene, self.target, one) for one in self.draws]
         numbers = numbers_of(reported, drawn)
         told = self.effect.sentence(scene, self.target, self.values) + interval_words(numbers)
-        whose = "the markers leave" if self.effect.name != SLIP else "the marker leaves"
-        sentence = f"{told}; this is {100 * self.share:.0f} % of what {whose}"
+        whose = "the marker's" if self.effect.name == SLIP else "all markers'"
+        sentence = f"{told}; this is {100 * self.share:.0f} % of {whose} squared residual"
         if not gain.is_real():
             sentence += ", and the forces do not show it"
         if not self.is_alone:

@@ -2,35 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bsip_cli.diagnosis.held_out import standard_error
 from bsip_cli.diagnosis.judging import Tried
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
-from bsip_cli.diagnosis.selection import Round
 from bsip_cli.diagnosis.together import Evidence
 
 ALIKE = 0.9  # part of a signature that another explains
 
 
-def rivals_of(one: Round) -> tuple[Tried, ...]:
+def rivals_of(evidence: Evidence, kept: Tried, tried: Sequence[Tried]) -> tuple[Tried, ...]:
     """What explains the same as the kept cause, or pays off as well on data it has not seen.
 
     Only causes that have a name: another regularity would not say more.
     """
-    kept = one.kept
-    if kept is None:
-        return ()
     mine = set(kept.trials)
     others = (
         t
-        for t in one.tried
+        for t in tried
         if t is not kept
         and t.is_good
         and t.explanation.effect.name != UNEXPLAINED
         and mine & set(t.trials)
     )
-    return tuple(t for t in others if _is_rival(one.evidence, kept, t))
+    return tuple(t for t in others if _is_rival(evidence, kept, t))
 
 
 def _is_rival(evidence: Evidence, kept: Tried, other: Tried) -> bool:

@@ -6,6 +6,8 @@ the plates in all trials shows against the stated mass only.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.stats import norm
 
@@ -15,9 +17,12 @@ from bsip_cli.diagnosis.explanation import Explanation, fit_together
 from bsip_cli.diagnosis.held_out import gain_of
 from bsip_cli.diagnosis.judging import Tried
 from bsip_cli.diagnosis.refitting import score_of
+from bsip_cli.diagnosis.rivals import rivals_of
 from bsip_cli.diagnosis.selection import Round
 from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence
+from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.plate_gain import PlateGain
 from bsip_cli.effects.plate_zero import PlateZero
 from bsip_cli.effects.scene import Scene
@@ -51,15 +56,15 @@ def weight_round(evidence: Evidence, share: float, plate: str) -> Round | None:
     channel = f"{plate} fz"
     p_value = float(2 * norm.sf(abs(share) / TRUSTED))
     weight = share * evidence.trials[0].scene.mass_kg * GRAVITY_M_S2
-    gain = _tried(evidence, PlateGain(), channel, share, p_value)
-    offset = _tried(evidence, PlateZero(), channel, weight, p_value)
-    possible = gain.explanation.is_possible(evidence)
-    return Round(evidence, (gain, offset), gain, None) if possible else None
+    gain = _tried(evidence, EFFECTS[PlateGain.name], channel, share, p_value)
+    offset = _tried(evidence, EFFECTS[PlateZero.name], channel, weight, p_value)
+    if not gain.explanation.is_possible(evidence):
+        return None
+    kept = replace(gain, rivals=rivals_of(evidence, gain, (gain, offset)))
+    return Round(evidence, (kept, offset), kept, None)
 
 
-def _tried(
-    evidence: Evidence, effect: PlateGain | PlateZero, target: str, size: float, p_value: float
-) -> Tried:
+def _tried(evidence: Evidence, effect: Effect, target: str, size: float, p_value: float) -> Tried:
     trials = tuple(
         t for t, one in enumerate(evidence.trials) if target in effect.targets(one.scene)
     )
@@ -69,5 +74,13 @@ def _tried(
     fit = fit_together(evidence, (found,))
     gain = gain_of(evidence, trials, before.residual, fit.residual, fit.tangent)
     score = score_of(before, fit, 1)
-    marks = {"is_leftover": False, "is_first": True, "is_tiny": False}
-    return Tried(fit.explanations[0], score, p_value, gain, fit, **marks)
+    return Tried(
+        fit.explanations[0],
+        score,
+        p_value,
+        gain,
+        fit,
+        is_leftover=False,
+        is_first=True,
+        is_tiny=False,
+    )

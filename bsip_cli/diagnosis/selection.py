@@ -17,6 +17,7 @@ from bsip_cli.diagnosis.judging import ALPHA, Tried, judged_by, stands_beside
 from bsip_cli.diagnosis.likely_noise import likely_columns, noise_beside_fit, with_likely_noise
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.refitting import Refitted, refitted, start_at
+from bsip_cli.diagnosis.rivals import rivals_of
 from bsip_cli.diagnosis.signatures import Signatures
 from bsip_cli.diagnosis.together import Evidence
 
@@ -150,7 +151,11 @@ def _round(
         more = _tried(signatures, before, scored, open_trials, rough)
         judged += [judged_by(evidence, before, *one, chance) for one in more]
     judged.sort(key=lambda t: -t.score)
-    return Round(evidence, tuple(judged), _kept(judged, before), chance)
+    kept = _kept(judged, before)
+    if kept is None:
+        return Round(evidence, tuple(judged), None, chance)
+    named = replace(kept, rivals=rivals_of(evidence, kept, judged))
+    return Round(evidence, tuple(named if t is kept else t for t in judged), named, chance)
 
 
 def _tried(

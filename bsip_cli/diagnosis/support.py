@@ -157,5 +157,5 @@ def _gain(missing: np.ndarray, times_s: np.ndarray) -> Gain:
         if test.any() and not test.all():
             mean = missing[~test].mean(axis=0)
             saved[test] = (missing[test] ** 2 - (missing[test] - mean) ** 2).sum(axis=1)
-    blocks = np.bincount(numbers, weights=saved)
+    blocks = np.bincount(np.unique(numbers, return_inverse=True)[1], weights=saved)
     return Gain(blocks, np.ones(len(blocks), dtype=bool), float((missing**2).sum()))

@@ -51,14 +51,6 @@ class Evidence:
             columns[self.rows(trial)] += part
         return columns
 
-    def log_likelihood(self, residual: np.ndarray) -> float:
-        """Of all trials' measurements, but for a constant, for what a fit leaves (R,)."""
-        terms = [float(np.log1p(-self.shrink).sum()) - 0.5 * float((residual**2).sum())]
-        for one in self.trials:
-            whitening = one.whitening
-            terms.append(float(np.log1p(-whitening.shrink).sum() - np.log(whitening.spread).sum()))
-        return sum(terms)
-
     def first_block(self, trial: int) -> int:
         """The number of a trial's first stretch in ``blocks``."""
         return int(self.blocks()[self.rows(trial)].min())

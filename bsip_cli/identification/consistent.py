@@ -38,12 +38,12 @@ def estimate(problem: Problem) -> Estimate:
 
 
 def _note(fit: Fit, terms: Terms) -> str:
-    masses, centres, *tensors = 100 / np.sqrt(fit.weights.spread)
+    masses, centres, *tensors = 1 / np.sqrt(fit.weights.spread)
     note = (
         f"the data decide {fit.decided:.0f} of {terms.table.size} parameters, the table the rest; "
-        "of what people usually differ from the table, this person's masses differ "
-        f"{masses:.0f} %, centres of mass {centres:.0f} %, inertias {min(tensors):.0f} to "
-        f"{max(tensors):.0f} %"
+        "distance from the table in standard deviations among people: masses "
+        f"{masses:.2f}, centres of mass {centres:.2f}, inertias "
+        f"{min(tensors):.2f} to {max(tensors):.2f}"
     )
     if fit.decided < _LITTLE:
         note += (

@@ -23,6 +23,7 @@ from bsip_cli.report.words import listing, number, trial_label
 NOTHING = "none"
 UNNAMED = "unexplained"
 _INTERVAL = re.compile(r" \([^()]*: 95 % interval .*$")  # what follows it the report says itself
+_ADVICE = re.compile(r"; (other causes look alike here: )?to tell them apart, .*$")
 _REMARK = re.compile(r"; this is [^;]*")  # what markers prove by themselves
 _REASON = re.compile(r" \(([^()]*)\)$")  # why a candidate was rejected
 _MINUS = re.compile(r"(?<![\w.)])-(?=\d)")
@@ -88,7 +89,7 @@ class Candidate:
 
     def what(self) -> str:
         """Its sentence without interval, advice and reason."""
-        text = re.sub(_INTERVAL, "", self.sentence).removeprefix("not so: ")
+        text = re.sub(_ADVICE, "", re.sub(_INTERVAL, "", self.sentence)).removeprefix("not so: ")
         text = re.sub(_REASON, "", text) if self.verdict == "rejected" else text
         return re.sub(_MINUS, "−", text)
 

@@ -11,6 +11,11 @@ _FORCES = (
     "The measured forces are not the true ones, and everything identified from them inherits the "
     "error: put it right in the lab or in the file, and run again."
 )
+_CLOCKS = (
+    "Forces and markers are not of the same moments, and everything identified from them inherits "
+    "the error: put it right in the lab or in the file, and run again. A filter that only the "
+    "forces have gone through delays them too."
+)
 _MOTION = (
     "The motion is not the true one, and the simulated forces with it: put the markers right, and "
     "run again."
@@ -39,8 +44,8 @@ class EffectWords:
 
 
 EFFECT_WORDS = {
-    "sync_offset": EffectWords("forces and markers out of step", _FORCES),
-    "clock_drift": EffectWords("clocks of forces and markers run apart", _FORCES),
+    "sync_offset": EffectWords("forces and markers out of step", _CLOCKS),
+    "clock_drift": EffectWords("clocks of forces and markers run apart", _CLOCKS),
     "plate_translation": EffectWords("force plate not where the file says", _FORCES),
     "plate_rotation": EffectWords("force plate turned or tilted", _FORCES),
     "plate_gain": EffectWords("wrong gain of a plate's channel", _FORCES),
@@ -136,6 +141,7 @@ MAIN_NUMBERS = {
     "breathing": ("amplitude",),
     "gravity_tilt": ("angle",),
     "unmeasured_contact": ("force",),
+    "marker_shift": ("shift",),
     "unexplained": ("amplitude", "stiffness", "curvature", "error", "nonlinearity", "lacking"),
 }
 _PARTS = {  # of a size with several parts: which one the interval is of

@@ -127,7 +127,7 @@ def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
         return (
             "in both recordings" if len(everywhere) == 2 else f"in all {len(everywhere)} recordings"
         )
-    return f"{'only ' if len(everywhere) > len(trials) else ''}in {listing(names)}"
+    return f"{'only ' if set(trials) < set(everywhere) else ''}in {listing(names)}"
 
 
 def how_sure(one: Candidate) -> str:

@@ -16,7 +16,7 @@ from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import FOLDS, values_without
 from bsip_cli.diagnosis.intervals import bounds
-from bsip_cli.diagnosis.loud_noise import loud_findings
+from bsip_cli.diagnosis.loud_noise import with_loud_noise
 from bsip_cli.diagnosis.marker_proof import Proof, Slip, proofs_of
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.patterns import PATTERNS
@@ -84,7 +84,7 @@ def _asked(
     first, weighed = _weighed_moving(evidence) if only_motion_weighs else (None, ())
     selection = select(signatures_of(evidence, ASKED), rng, first)
     found = findings_of(selection, rng)
-    findings = (*found, *loud_findings(selection, found), *weighed)
+    findings = (*with_loud_noise(selection, found), *weighed)
     findings = tuple(sorted(findings, key=lambda one: one.verdict == "rejected"))
     facts = _facts(selection, findings)
     facts["trials"] = list(dict.fromkeys([*facts["trials"], *_trials_of(told)]))
@@ -239,7 +239,7 @@ def _trials_of(findings: tuple[Finding, ...]) -> list[str]:
 
 
 def _facts(selection: Selection, findings: tuple[Finding, ...]) -> dict:
-    """How large a score had to be in each round, what was reached, and the causes in full: their
+    """The best score of each round and whether it was a cause, and the causes in full: their
     values from all data and from each fold's training blocks, for ``extend``, and the bound of
     Cramér and Rao on what is reported."""
     evidence = selection.signatures.evidence

@@ -14,11 +14,9 @@ from bsip_cli.diagnosis.attribution import (
     Attribution,
     Ground,
     attributions,
-    difference,
     parameter_steps,
-    sentence,
-    whose,
 )
+from bsip_cli.diagnosis.attribution_words import Bodies, difference, sentence, whose
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.report.words import component_label
@@ -38,6 +36,7 @@ _NEEDED = (
     "marker-positions",
     "person",
 )
+_COM_SD = ["com_x_m_sd", "com_y_m_sd", "com_z_m_sd"]
 
 
 def run(unit: Unit) -> None:
@@ -72,7 +71,8 @@ def _write_diagnosis(unit: Unit) -> None:
 def _attribution(unit: Unit) -> pd.DataFrame:
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    methods, phi = parameters_of(unit.read("bsip"), person)
+    bsip = unit.read("bsip")
+    methods, phi = parameters_of(bsip, person)
     if not {"RM", "OM"} <= set(methods):
         return empty_table("attribution")
     table, found = (phi[:, methods.index(name)] for name in ("RM", "OM"))
@@ -84,13 +84,24 @@ def _attribution(unit: Unit) -> pd.DataFrame:
     ground = Ground(judgement.surface_height_m, judgement.anterior, judgement.min_force_N)
     measured = judgement.filtered(wrench[WRENCH].to_numpy())
     parts = attributions(measured, simulated[..., 0], simulated[..., 1:], judgement.judged, ground)
-    lines = [line for one in parts for line in _lines(one, person, rm, om, judgement.data)]
+    bodies = _compared(rm, om, bsip[bsip["method"] == "OM"].set_index("segment"), person)
+    lines = [line for one in parts for line in _lines(one, bodies, judgement.data)]
     return pd.DataFrame(lines) if lines else empty_table("attribution")
 
 
 def _bodies(phi: np.ndarray) -> tuple[Inertia, ...]:
     """The segments of parameters (10 n,), about their joint centres."""
     return tuple(from_phi(part) for part in phi.reshape(-1, 10))
+
+
+def _compared(
+    rm: tuple[Inertia, ...], om: tuple[Inertia, ...], found: pd.DataFrame, person: Person
+) -> list[Bodies]:
+    """Every segment by both methods, with the standard deviations of OM's rows by segment."""
+    segments = list(person.skeleton.segments)
+    masses = found.loc[segments, "mass_kg_sd"].tolist()
+    centres = found.loc[segments, _COM_SD].to_numpy(dtype=float)
+    return [Bodies(*one) for one in zip(segments, rm, om, masses, centres, strict=True)]
 
 
 def _simulated(
@@ -102,18 +113,16 @@ def _simulated(
     return judgement.filtered(raw.reshape(len(raw), -1)).reshape(raw.shape)
 
 
-def _lines(
-    one: Attribution, person: Person, rm: tuple[Inertia, ...], om: tuple[Inertia, ...], data: str
-) -> list[dict]:
+def _lines(one: Attribution, bodies: list[Bodies], data: str) -> list[dict]:
     factor, rmse_unit = scale_of(one.component)
     error = component_label(one.component)
     lines = []
-    for i, segment in enumerate(person.skeleton.segments):
-        for group, share in zip(GROUPS, one.shares[i].tolist(), strict=True):
-            size, unit = difference(group, rm[i], om[i])
-            source = whose(segment, group, rm[i], om[i])
+    for both, shares in zip(bodies, one.shares.tolist(), strict=True):
+        for group, share in zip(GROUPS, shares, strict=True):
+            size, unit = difference(group, both)
+            source = whose(group, both)
             said = sentence(share, error, source)
-            lines.append(_line(segment, group, share, size, unit, source, said))
+            lines.append(_line(both.segment, group, share, size, unit, source, said))
     rest = f"{100 * one.rest:.0f} % of the squared error in {error} stays with OM's parameters"
     lines.append(_line("", "rest", one.rest, np.nan, "", "", rest))
     common = {

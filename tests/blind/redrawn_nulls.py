@@ -23,7 +23,7 @@ from blind_tables import between_marks, wilson
 
 from bsip_cli.diagnosis.evidence import TrialEvidence
 from bsip_cli.diagnosis.findings import findings_of
-from bsip_cli.diagnosis.loud_noise import loud_findings, noise_of
+from bsip_cli.diagnosis.loud_noise import noise_of, with_loud_noise
 from bsip_cli.diagnosis.selection import select
 from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.diagnosis.together import together
@@ -77,7 +77,7 @@ def redrawn_alarms(signatures: Signatures, rng: np.random.Generator) -> list[str
     drawn = together(tuple(redrawn(one, shared, rng) for one in trials))
     selection = select(signatures.on(drawn), rng)
     found = findings_of(selection, rng)
-    findings = (*found, *loud_findings(selection, found))
+    findings = with_loud_noise(selection, found)
     return [
         f"{one.effect} {one.target} ({len(one.trials)} trials)"
         for one in findings

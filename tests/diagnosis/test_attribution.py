@@ -1,7 +1,5 @@
 """Shares of RM's error: they add up, and find the segment that was made wrong."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from moving_scene import moving
@@ -13,8 +11,6 @@ from bsip_cli.diagnosis.attribution import (
     Ground,
     attributions,
     parameter_steps,
-    sentence,
-    whose,
 )
 from bsip_cli.dynamics.cop import centre_of_pressure
 from bsip_cli.dynamics.regressor import predicted_wrench
@@ -150,18 +146,3 @@ def test_moments_do_not_hang_on_the_worlds_origin(scene, people):
     again = attributions(moved(measured), moved(table), moved(steps), judged, GROUND)
     for one, other in zip(found, again, strict=True):
         np.testing.assert_allclose(one.shares, other.shares, atol=1e-8)
-
-
-def test_words():
-    table = Inertia(11.0, np.array([-0.02, 0.1, 0.0]), 0.1 * np.eye(3))
-    found = Inertia(10.6, np.array([0.001, 0.1, 0.004]), 0.1 * np.eye(3))
-    centre = whose("lower_torso", "centre_of_mass", table, found)
-    assert centre == "lower torso's centre of mass, which the table puts 21 mm too far back"
-    assert "0.40 kg too much" in whose("lower_torso", "mass", table, found)
-    assert sentence(0.683, "COP AP", centre).startswith("68 % of the squared error in COP AP comes")
-    assert "adds 7 % to" in sentence(-0.07, "COP AP", centre)
-    right = replace(table, com_m=found.com_m + np.array([0.0, -0.012, 0.02]))
-    assert whose("thigh_r", "centre_of_mass", right, found).endswith(
-        "20 mm too far outward and 12 mm too low"
-    )
-    assert "20 mm too far inward" in whose("thigh_l", "centre_of_mass", right, found)

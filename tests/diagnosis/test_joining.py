@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from noisy_trial import all_of, late, noisy, part_of_moving, with_effect
@@ -38,6 +40,23 @@ def test_trials_that_agree_share_one_cause():
     assert tried.explanation is both and both.place.trials == (0, 1)
     assert tried.gain.concerned.all() and tried.score == 200.0
     assert tried.gain.blocks == pytest.approx(sum(one.gain.blocks for one, _ in found))
+
+
+@pytest.mark.parametrize(("in_second", "left"), [(True, 1), (False, 0)])
+def test_what_one_trial_tells_from_it_is_no_rival_in_both(in_second, left):
+    evidence = trials_late_by(0.008, 0.008)
+    found = [kept(evidence, delay_in(evidence, t, 0.008)) for t in (0, 1)]
+    drift = EFFECTS["clock_drift"]
+    rivals = [
+        kept(evidence, explanation_of(drift, "", np.array([1e-4]), one.scene, (t,)))[0]
+        for t, one in enumerate(evidence.trials)
+    ]
+    first, second = (
+        (replace(tried, rivals=(rival,) if has else ()), one)
+        for (tried, one), rival, has in zip(found, rivals, (True, in_second), strict=True)
+    )
+    (tried, _), _ = joined(evidence, [first, second])
+    assert len(tried.rivals) == left
 
 
 def test_trials_that_differ_keep_theirs():

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from noisy_trial import all_of, noisy, part_of_moving, shown
 from scipy.ndimage import gaussian_filter1d
 
-from bsip_cli.diagnosis.loud_noise import loud_findings, loudest, usual_noise
+from bsip_cli.diagnosis.findings import Finding, Number
+from bsip_cli.diagnosis.loud_noise import loudest, usual_noise, with_loud_noise
 from bsip_cli.diagnosis.selection import select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
@@ -67,9 +70,27 @@ def test_noise_of_markers_shakes_all_components():
 def test_a_trial_without_a_name_for_it_is_unexplained():
     effects = [EFFECTS[name] for name in ("sync_offset", "plate_gain")]
     signatures = signatures_of(all_of(noisy(part_of_moving(0, 12), 3), wandering(2)), effects)
-    (one,) = loud_findings(select(signatures, np.random.default_rng(0)), ())
+    (one,) = with_loud_noise(select(signatures, np.random.default_rng(0)), ())
     assert (one.effect, one.target, one.trials) == ("unexplained", "fz", ("b",))
     assert one.verdict == "named" and "standard deviation" in one.sentence
     (number,) = one.numbers
     assert number.low < number.value < number.high and number.unit == "N"
     assert one.p_value < 0.01
+
+
+@pytest.mark.parametrize(("gain", "verdict"), [(5.0, "rejected"), (20.0, "named")])
+def test_a_slight_cause_is_no_name_for_what_is_loud(gain, verdict):
+    effects = [EFFECTS["sync_offset"]]
+    signatures = signatures_of(all_of(noisy(part_of_moving(0, 12), 3), wandering(2)), effects)
+    numbers = (Number("delay", "s", 0.01, 0.009, 0.011),)
+    slight = Finding(
+        "sync_offset", "", ("b",), "named", "", 1e-9, (gain, 1.0, 30.0), numbers, "it is late"
+    )
+    elsewhere = replace(slight, trials=("a", "b"))
+    selection = select(signatures, np.random.default_rng(0))
+    first, both, *loud = with_loud_noise(selection, (slight, elsewhere))
+    assert (first.verdict, both.verdict) == (verdict, "named")
+    assert len(loud) == (verdict == "rejected")
+    assert verdict == "named" or first.sentence == (
+        "not so: it is late (a component of the force errs by far more)"
+    )

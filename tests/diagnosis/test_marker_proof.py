@@ -105,7 +105,10 @@ def test_a_sentence_says_how_much_of_the_residuals_it_is():
     scene = bent()
     (found,) = proofs(scene)
     said = found.finding(scene, "a", "M1", found.gain(all_of(scene))).sentence
-    assert "second joint" in said and f"{100 * found.share:.0f} % of what the markers leave" in said
+    assert (
+        "second joint" in said
+        and f"{100 * found.share:.0f} % of all markers' squared residual" in said
+    )
 
 
 def test_what_explains_as_much_makes_a_class():

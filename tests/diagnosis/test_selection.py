@@ -97,6 +97,32 @@ def test_a_second_cause_in_the_same_trial_is_found_too():
     assert offset == pytest.approx(OFFSET_N, abs=0.5)
 
 
+@cache
+def pushed() -> Selection:
+    push = np.array([0.0, 0.0, 300.0, 6.0, 4.0])
+    effect = EFFECTS["unmeasured_contact"]
+    scene = part_of_moving(0, 12)
+    change = effect.change(scene, "hand_r", push)
+    return select(signatures_of(all_of(noisy(shown(scene, change), 4)), [effect]), rng())
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+def test_nothing_is_left_over_of_no_cause():
+    """Whatever the largest residuals are cut to."""
+    first = pushed().rounds[0]
+    assert first.kept is not None and not any(one.is_leftover for one in first.tried)
+
+
+def test_a_moment_is_no_size(monkeypatch):
+    (one,) = said_of(pushed())
+    assert one.effect == "unmeasured_contact"
+    monkeypatch.setattr(intervals, "SCALE_ERROR", 2.0)
+    assert said_of(pushed()) == []
+
+
 def test_what_may_as_well_have_no_size_is_not_told(monkeypatch):
     chosen = late_with_offset()
     monkeypatch.setattr(intervals, "SCALE_ERROR", 2.0)

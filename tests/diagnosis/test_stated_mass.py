@@ -76,6 +76,7 @@ def test_moving_trials_on_one_plate_give_its_gain_to_begin_with():
     begun = weight_round(evidence, share, "1")
     gain, offset = begun.tried
     assert begun.kept is gain
+    assert gain.explanation.effect is EFFECTS["plate_gain"]  # else the search finds it again
     assert gain.explanation.place.trials == (0, 1)
     assert gain.explanation.values[0] == pytest.approx(share, rel=0.02)
     assert gain.p_value < 1e-6

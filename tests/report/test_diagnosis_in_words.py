@@ -95,6 +95,29 @@ def test_rivals_come_with_what_tells_them_apart(found):
     assert "pray" not in text  # the sentence's own advice names one of the rivals' only
 
 
+def test_what_quiet_standing_tells_gives_its_advice_once(found):
+    """The static recording is none of those that were searched."""
+    told = "the plates read 60.0 kg, 2.6 kg less than stated: a gain; to tell them apart, weigh it"
+    rows = found[found["class_id"] != ""].assign(
+        class_id="W", trials="sub-01_task-static", sentence=told
+    )
+    text = text_of(rows, detection(TRIALS))
+    assert "cannot tell apart, in static: (a) the plates read 60.0 kg" in text
+    assert "weigh it" not in text and text.count("tell them apart") == 1
+
+
+def test_a_marker_has_the_interval_of_its_distance(found):
+    one = found[found["rank"] == 1].assign(effect="marker_shift", target="LASI", unit="m")
+    sizes = {"shift": (0.026, 0.02, 0.03), "shift_z": (0.014, 0.0139, 0.0141)}
+    parts = [
+        one.assign(parameter=name, estimate=x, ci_low=low, ci_high=high)
+        for name, (x, low, high) in sizes.items()
+    ]
+    rows = pd.concat(parts).assign(sentence="marker LASI sits 26 mm from its place throughout")
+    said = text_of(rows, detection(TRIALS))
+    assert "26 mm from its place throughout (95 % interval 20 to 30 mm)" in said
+
+
 def test_what_tells_rivals_apart_depends_on_all_of_them():
     hands = [("added_mass", "hand_l"), ("added_mass", "hand_r")]
     assert separating_recording(hands).endswith("one at a time: left hand and right hand")
@@ -246,6 +269,9 @@ def test_what_no_recording_shows_at_all_is_said(found):
     blind.loc[blind["effect"] == "plate_gain", "limit"] = np.inf
     said = [one.text for one in limits_section.blocks(blind, found) if isinstance(one, Paragraph)]
     assert f"at any size that can be true: {EFFECT_WORDS['plate_gain'].title}." in " ".join(said)
+    named = pd.concat([found, found[found["rank"] == 1].assign(effect="plate_gain", rank=9)])
+    said = [one.text for one in limits_section.blocks(blind, named) if isinstance(one, Paragraph)]
+    assert "at any size" not in " ".join(said)
     usual = limits_section.blocks(detection(TRIALS), found)
     assert "at any size" not in " ".join(one.text for one in usual if isinstance(one, Paragraph))
 

@@ -39,9 +39,10 @@ def blocks(record: ParticipantRecord) -> list[Block]:
             "differences makes the simulated force follow better? Each gets the share of RM's "
             "squared error that goes when its parameters become OM's, averaged over all orders in "
             "which they may be exchanged; a share below zero makes the error larger, and the shares "
-            "of neighbours may cancel. What OM leaves is the rest; all together are 100 %. “Too” "
-            "means: by OM's reckoning, which splits a segment from its neighbour partly by the "
-            "table."
+            "of neighbours may cancel. What OM leaves is the rest; all together are 100 %. The "
+            "differences stand with OM's 95 % intervals, and “too much” or “too far” only where "
+            "they exceed them; OM splits a segment from its neighbour partly by the table, and "
+            "inherits what is wrong with the recordings."
         ),
         Bullets(_sentences(pooled)),
         _bars(pooled, list(chosen)),

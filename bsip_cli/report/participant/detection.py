@@ -30,22 +30,28 @@ def blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
     said.append(
         Paragraph(
             "Each limit is the size that would be found in 95 of 100 recordings like these, while "
-            "the inertial parameters and the cause's other numbers stay free. Smaller errors may be "
-            "there. Causes that were found have no limit; exchanged labels and smoothed markers have "
+            "the inertial parameters and the cause's other numbers stay free; none is below a "
+            "quarter of the cause's typical size, since nothing smaller is named. Smaller errors "
+            "may be there. Causes that were found have no limit; exchanged labels and smoothed markers have "
             "none in a unit that could be told.",
             "note",
         )
     )
-    said += [*_never_seen(detection), *_usual_figure(together), *_mass_figure(together, alone)]
+    said += [
+        *_never_seen(detection, diagnosis),
+        *_usual_figure(together),
+        *_mass_figure(together, alone),
+    ]
     rows = tuple(row for effect in USUAL for row in _rows(effect, together, alone))
     head = ("cause", "in all recordings", "in one alone", "shows best at", "usual in labs")
     caption = "Least size that would be found, from the best place or direction to the worst"
     return [*said, Grid(head, rows, caption, words=5)]
 
 
-def _never_seen(detection: pd.DataFrame) -> list[Block]:
-    """Causes that these recordings do not show at all."""
+def _never_seen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
+    """Causes that these recordings do not show at all; what was found has no limit either."""
     seen = set(detection["effect"][np.isfinite(detection["limit"].astype(float))])
+    seen |= set(diagnosis["effect"][diagnosis["verdict"] != "rejected"])
     never = [e for e in dict.fromkeys(detection["effect"]) if e not in seen]
     if not never:
         return []

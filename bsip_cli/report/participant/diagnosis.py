@@ -117,8 +117,9 @@ def ranking(candidates: Sequence[Candidate]) -> list[Block]:
             "The causes that were fitted in full, in the order of the diagnosis: how much of the "
             "squared difference between measured and simulated forces (in units of its noise) each "
             "removes in seconds that it was not fitted to, with 95 % interval. An interval that "
-            "reaches below zero may be no gain at all; an arrow: it runs on. Letters in brackets: "
-            "rivals of one class."
+            "reaches below zero may be no gain at all; an arrow: it runs on. Each was tried beside "
+            "the causes named before it, and the one was kept that stands out most from chance; that "
+            "need not be the one that removes most. Letters in brackets: rivals of one class."
         )
         blocks.append(Picture(figure, caption, "Dots: gain of each cause.", "diagnosis_causes"))
     rows = tuple(_row(k, one) for k, one in numbered)

@@ -119,8 +119,9 @@ def _curves(trial: TrialRecord) -> Picture:
     what = "before and after the causes are in the model" if len(labels) > 1 else "with OM"
     caption = (
         f"{trial.label}: measured less simulated {what}, over time (left) and as an amplitude "
-        "spectrum (right). Noise is a flat, structureless band; slow waves, steps or a peak at the "
-        "pace of the movement are structure that something must cause."
+        "spectrum (right). Noise of the plates is a flat, structureless band; that of the markers "
+        "grows with frequency, up to the cut-off, and with the speed of the movement. Slow waves, "
+        "steps or a peak at the pace of the movement are neither."
     )
     return Picture(figure, caption, "Curves: residual over time and frequency.", "residual")
 
@@ -146,9 +147,9 @@ def _phases(trials: Sequence[TrialRecord], body_weight_N: float) -> list[Block]:
     where = listing([trial.label for trial in trials]) if len(trials) < 4 else ""
     over = where or count(len(trials), "recording")
     caption = (
-        f"Root mean square of the residual in each phase of the movement, over {over}. An error "
-        "that grows in one phase tells of its cause: with the load, a plate; with every landing, "
-        "soft tissue; standing still, an offset."
+        f"Root mean square of the residual in each phase of the movement, over {over}. Errors of "
+        "the markers and skin grow with acceleration, and are largest in landings. What is as large "
+        "in standing still is none of them: an offset, or a plate out of its place."
     )
     return [
         Picture(figure, caption, "Dots: residual by phase.", "residual_phases"),

@@ -70,14 +70,16 @@ def _who(record: ParticipantRecord) -> str:
 def _trials(record: ParticipantRecord) -> str:
     used = record.identification_trials()
     held_out = [t for t in record.trials if _has_held_out(t)]
+    tested = listing([t.label for t in held_out])
     seconds = record.identification["duration_s"].max() if len(record.identification) else np.nan
     calibration = trial_label(str(record.facts["calibration_trial"]))
     sentences = [
         f"The skeleton was calibrated on {calibration}.",
         f"The parameters were identified from {listing([t.label for t in used])}"
         + (f" ({number(seconds, 1)} s of it used)." if np.isfinite(seconds) else "."),
-        "They were tested on data that the identification had not seen in "
-        f"{listing([t.label for t in held_out], 'no trial')}.",
+        f"They were tested on data that the identification had not seen in {tested}."
+        if tested
+        else "There was no other data to test them on.",
     ]
     return " ".join(sentences)
 
@@ -185,7 +187,8 @@ def _verdict(means: tuple[MeanGain, ...], held_out: bool) -> Paragraph:
     worse = [component_label(m.component) for m in counted if m.change() > SAME_WITHIN]
     text = (
         f"{where}, OM has the smaller mean error in {len(better)} of "
-        f"{count(len(counted), 'component')}, RM in {listing(worse)}."
+        f"{count(len(counted), 'component')} (the vertical force counts once), RM in "
+        f"{listing(worse)}."
     )
     if parts:
         text += f" Mean error (RMSE) — {'; '.join(parts)}."

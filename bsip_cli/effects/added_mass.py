@@ -11,7 +11,7 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
 REACH_M = 0.6
-MOMENT_KG_M = 0.02  # a few centimetres: the segment's own frame is known to no less
+MOMENT_KG_M = 0.05  # a few centimetres: the segment's own frame is known to no less
 
 
 class AddedMass(Effect):

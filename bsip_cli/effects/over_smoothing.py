@@ -9,7 +9,7 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
 CUTOFFS_HZ = (1.0, 1.3, 1.6, 2.0, 2.5, 3.0, 3.7, 4.5, 5.5, 7.0, 9.0)
-FILTERS_HZ = 0.05  # to which a cut-off says what a filter does: labs use more kinds than one
+FILTERS_HZ = 0.08  # to which a cut-off says what a filter does: labs use more kinds than one
 ROUNDS = 4  # of restoring what a low-pass took; more restore what is no longer there
 # Two passes of order two: each cuts at this multiple of where both together pass 1/sqrt(2).
 CORNER = (np.sqrt(2.0) - 1.0) ** -0.25

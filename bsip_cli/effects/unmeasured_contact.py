@@ -14,7 +14,7 @@ from bsip_cli.effects.scene import Scene
 WINDOWS_S = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0, 64.0)
 SHORTEST_S = 0.7
 RAMP_S = 0.3  # in which a person leans on something, or lets go
-EDGE_S = 0.05  # to which it is known when that begins and ends: nobody does it along a ramp
+EDGE_S = 0.07  # to which it is known when that begins and ends: nobody does it along a ramp
 ALIKE = 21  # windows that differ only where nothing is measured
 STEADY_N = 1.0  # to which a mean force is known: nobody leans steadily
 MOST_WINDOWS = 30  # side by side; shorter contacts are found in part of a window, and refined

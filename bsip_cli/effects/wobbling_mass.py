@@ -14,7 +14,7 @@ IMPACT = 1.8  # peak of the vertical force over body weight
 FREQUENCIES_HZ = (2.5, 3.0, 3.5, 4.0, 5.0, 6.5)
 DAMPING = (0.1, 0.2, 0.4)
 # Soft tissue is no point on one spring: its numbers are known to these standard deviations.
-MASS_KG, FREQUENCY_HZ, DAMPING_RATIO = 0.4, 0.05, 0.02
+MASS_KG, FREQUENCY_HZ, DAMPING_RATIO = 0.5, 0.05, 0.02
 
 
 class WobblingMass(Effect):

@@ -70,7 +70,12 @@ def _gain(record: CohortRecord) -> list[Block]:
             "warning",
         )
         if worse
-        else Paragraph("OM follows better on the whole in every component.", "good")
+        else Paragraph(
+            "OM follows better in every component, by the typical change and in the number of "
+            "participants. What of that could be chance stands in tables 4 and 5, after Holm's "
+            "correction for the number of tests.",
+            "good",
+        )
     )
     blocks.append(
         Grid(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,13 +15,17 @@ SAME_WITHIN = 0.01  # errors that differ by less count as equal
 
 @dataclass(frozen=True)
 class Gain:
-    """Errors of RM and OM in one component of one trial; ``held_out``: OM had not seen the data."""
+    """Errors (RMSE) of RM and OM in one component of one trial.
+
+    frames : that they rest on. held_out : OM had not seen the data.
+    """
 
     trial: str
     component: str
     unit: str
     rm: float
     om: float
+    frames: int
     held_out: bool
 
     def change(self) -> float:
@@ -37,8 +41,9 @@ class Gain:
 
 
 @dataclass(frozen=True)
-class MeanGain:
-    """One component over n trials: mean errors, and in how many of them each method leads."""
+class PooledGain:
+    """One component over n trials: errors over all their frames, and in how many trials each method
+    leads."""
 
     component: str
     unit: str
@@ -68,6 +73,7 @@ def gains_of(trial: str, fit: pd.DataFrame) -> tuple[Gain, ...]:
                 unit,
                 float(rm[column]),
                 float(om[column]),
+                int(min(rm["n"], om["n"])),
                 om["data"] == "held_out",
             )
         )
@@ -80,22 +86,28 @@ def _measure(component: str, row: pd.Series) -> tuple[str, str]:
     return "rmse", str(row["unit"])
 
 
-def mean_gains(gains: Iterable[Gain]) -> tuple[MeanGain, ...]:
-    """Means over the trials, component by component; those without numbers are left out."""
+def pooled_gains(gains: Iterable[Gain]) -> tuple[PooledGain, ...]:
+    """Over all frames of the trials, component by component, so that a stride of 0.2 s counts for
+    no more than it is; trials without numbers are left out."""
     known = [gain for gain in gains if np.isfinite(gain.rm) and np.isfinite(gain.om)]
-    means = []
+    pooled = []
     for component in COMPONENTS:
         of_it = [gain for gain in known if gain.component == component]
         if of_it:
-            means.append(
-                MeanGain(
+            pooled.append(
+                PooledGain(
                     component,
                     of_it[0].unit,
                     len(of_it),
-                    float(np.mean([gain.rm for gain in of_it])),
-                    float(np.mean([gain.om for gain in of_it])),
+                    _pooled([gain.rm for gain in of_it], [gain.frames for gain in of_it]),
+                    _pooled([gain.om for gain in of_it], [gain.frames for gain in of_it]),
                     sum(gain.better() == "OM" for gain in of_it),
                     sum(gain.better() == "RM" for gain in of_it),
                 )
             )
-    return tuple(means)
+    return tuple(pooled)
+
+
+def _pooled(errors: Sequence[float], frames: Sequence[int]) -> float:
+    """Root mean square over all frames, of those of stretches of so many frames."""
+    return float(np.sqrt(np.average(np.square(errors), weights=frames)))

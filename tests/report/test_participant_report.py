@@ -85,7 +85,7 @@ def test_numbers_are_those_of_the_artifacts(reports, text):
 
 def test_summary_tells_where_the_table_is_better(text):
     assert (
-        "OM has the smaller mean error in 7 of 8 components (the vertical force counts once), RM "
+        "OM has the smaller error in 7 of 8 components (the vertical force counts once), RM "
         "in moment, lab Z (up)." in text
     )
     assert "basketball (run 1): moment, lab Z (up) 9.00 → 15.30 N m (+70 %)" in text

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from bsip_cli.report.figures.canvas import plain, runs, thinned
-from bsip_cli.report.gains import gains_of, mean_gains
+from bsip_cli.report.gains import Gain, gains_of, pooled_gains
 from bsip_cli.report.page import _tied
 from bsip_cli.report.windows import hull_of, middle_of_longest
 from bsip_cli.report.words import (
@@ -107,6 +107,7 @@ def test_gains():
                 "rmse": rmse,
                 "unit": "N",
                 "rmse_percent_bw": 0.1 * rmse,
+                "n": 100,
                 "data": "held_out",
             }
             for method, component, rmse in (
@@ -125,5 +126,14 @@ def test_gains():
     assert (gains["fx"].better(), gains["fz"].better()) == ("OM", "")
     assert gains["fx"].change() == pytest.approx(-0.4)
     assert (gains["grf_vertical"].unit, gains["grf_vertical"].rm) == ("% BW", 1.0)
-    means = mean_gains([*gains.values(), *gains.values()])
+    means = pooled_gains([*gains.values(), *gains.values()])
     assert [m.trials for m in means] == [2, 2, 2]
+    assert means[0].change() == pytest.approx(-0.4)
+
+
+def test_every_frame_counts_once():
+    long = Gain("long", "fx", "N", 10.0, 8.0, 300, True)
+    short = Gain("short", "fx", "N", 20.0, 2.0, 100, True)
+    (both,) = pooled_gains([long, short])
+    assert both.rm == pytest.approx(np.sqrt((3 * 10.0**2 + 20.0**2) / 4))
+    assert both.om == pytest.approx(np.sqrt((3 * 8.0**2 + 2.0**2) / 4))

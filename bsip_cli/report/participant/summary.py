@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Heading, Mark, Paragraph, Section
-from bsip_cli.report.gains import SAME_WITHIN, Gain, MeanGain, gains_of, mean_gains
+from bsip_cli.report.gains import SAME_WITHIN, Gain, PooledGain, gains_of, pooled_gains
 from bsip_cli.report.participant.diagnosis import verdict
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, messages
 from bsip_cli.report.words import (
@@ -135,7 +135,7 @@ def _gain(record: ParticipantRecord) -> list[Block]:
             )
         ]
     chosen = held_out or list(gains)
-    means = mean_gains(chosen)
+    means = pooled_gains(chosen)
     if not means:
         return [
             Paragraph(
@@ -170,7 +170,7 @@ def _gain(record: ParticipantRecord) -> list[Block]:
     return blocks
 
 
-def _verdict(means: tuple[MeanGain, ...], held_out: bool) -> Paragraph:
+def _verdict(means: tuple[PooledGain, ...], held_out: bool) -> Paragraph:
     by_name = {mean.component: mean for mean in means}
     parts = []
     for component in ("cop_ap", "cop_ml", "grf_vertical"):
@@ -186,16 +186,16 @@ def _verdict(means: tuple[MeanGain, ...], held_out: bool) -> Paragraph:
     better = [m for m in counted if m.change() < -SAME_WITHIN]
     worse = [component_label(m.component) for m in counted if m.change() > SAME_WITHIN]
     text = (
-        f"{where}, OM has the smaller mean error in {len(better)} of "
+        f"{where}, OM has the smaller error in {len(better)} of "
         f"{count(len(counted), 'component')} (the vertical force counts once), RM in "
         f"{listing(worse)}."
     )
     if parts:
-        text += f" Mean error (RMSE) — {'; '.join(parts)}."
+        text += f" RMSE over all of its frames — {'; '.join(parts)}."
     return Paragraph(text, "good" if held_out and len(better) > len(counted) / 2 else "warning")
 
 
-def _mean_grid(means: tuple[MeanGain, ...], held_out: bool) -> Grid:
+def _mean_grid(means: tuple[PooledGain, ...], held_out: bool) -> Grid:
     rows = tuple(
         (
             component_label(m.component),
@@ -213,8 +213,8 @@ def _mean_grid(means: tuple[MeanGain, ...], held_out: bool) -> Grid:
     return Grid(
         ("component", "unit", "RM", "OM", "change [%]", "OM better", "RM better", "all"),
         rows,
-        f"Mean RMSE over the trials, {data}; ✓ marks the smaller error",
-        groups=(("", 2), ("mean RMSE", 3), ("number of trials", 3)),
+        f"RMSE over all frames, {data}; ✓ marks the smaller error",
+        groups=(("", 2), ("RMSE", 3), ("number of trials", 3)),
         words=2,
     )
 

@@ -59,12 +59,14 @@ def stated_mass_findings(
         f"{'more' if extra > 0 else 'less'} than stated"
     )
     weight, weight_error = extra * GRAVITY_M_S2, error * GRAVITY_M_S2
+    gain = f"the plates' vertical gain is off by {100 * share:+.1f} %"
+    zero = f"the plates' zero is off by {weight:+.0f} N"
     causes = [
-        (PlateGain.name, "gain", "1", share, TRUSTED, "the plates' vertical gain is off"),
-        (PlateZero.name, "offset", "N", weight, weight_error, "the plates' zero is off"),
+        (PlateGain.name, "gain", "1", share, TRUSTED, gain),
+        (PlateZero.name, "offset", "N", weight, weight_error, zero),
     ]
     if extra > 0:
-        cause = "something is worn or carried that the stated mass leaves out"
+        cause = f"{extra:.1f} kg are worn or carried that the stated mass leaves out"
         causes.insert(0, (AddedMass.name, "mass", "kg", extra, error, cause))
     return tuple(
         Finding(

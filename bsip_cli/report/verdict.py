@@ -10,7 +10,7 @@ import pandas as pd
 
 from bsip_cli.report.candidates import UNNAMED, Candidate, candidates_of, causes_of
 from bsip_cli.report.effect_words import EFFECT_WORDS
-from bsip_cli.report.limits import limits_of, limits_sentence, looked_at
+from bsip_cli.report.limits import OF_THE_WEIGHT, limits_of, limits_sentence, looked_at
 from bsip_cli.report.separating import separating_recording
 from bsip_cli.report.words import (
     capital,
@@ -114,6 +114,8 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
         return f"{capital(first.told())}, {where}. {sure}"
     rivals = "; ".join(f"({chr(ord('a') + k)}) {one.told()}" for k, one in enumerate(cause))
     apart = separating_recording([(one.effect, one.target) for one in cause])
+    if first.class_id == OF_THE_WEIGHT:
+        apart = f"weigh the person as recorded; {apart}"
     return (
         f"One of these, which these recordings cannot tell apart, {where}: {rivals}. {sure} To tell "
         f"them apart: {apart}."

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bsip_cli.diagnosis.background import new_places
 from bsip_cli.diagnosis.candidates import Candidate
 from bsip_cli.diagnosis.evidence import FLOOR
 from bsip_cli.diagnosis.explanation import Fit, fit_together, with_noise_beside
@@ -47,16 +48,24 @@ def likely_columns(signatures: Signatures, fit: Fit) -> np.ndarray:
 
 
 def _likely_changes(signatures: Signatures, before: Fit) -> list[np.ndarray]:
-    """(n, 6) of each trial, filtered: what its own likeliest candidates change."""
+    """(n, 6) of each trial, filtered: what its own likeliest candidates change, and what the known
+    causes change as they give way to them."""
     chosen, columns = _chosen(signatures, before)
+    evidence = signatures.evidence
     known = np.column_stack([before.tangent, columns])
-    sizes = np.linalg.lstsq(known, before.residual, rcond=None)[0][before.tangent.shape[1] :]
-    changes = [np.zeros_like(one.filtered.residual) for one in signatures.evidence.trials]
+    sizes = np.linalg.lstsq(known, before.residual, rcond=None)[0]
+    changes = [np.zeros_like(one.filtered.residual) for one in evidence.trials]
+    for cause in before.explanations:
+        step, sizes = np.split(sizes, [len(cause.typical(evidence))])
+        for t in cause.place.trials:
+            one = evidence.trials[t]
+            change = cause.effect.tangent(one.scene, cause.target, cause.values)
+            changes[t] += one.filtered.filter.one(change @ (step * cause.typical(evidence)))
     for t, candidate in chosen:
         mine = signatures.filtered[t]
         part = mine.columns[..., mine.parts[candidate]]
-        changes[t] += part @ sizes[: part.shape[2]]
-        sizes = sizes[part.shape[2] :]
+        step, sizes = np.split(sizes, [part.shape[2]])
+        changes[t] += part @ step
     return changes
 
 
@@ -65,9 +74,10 @@ def _chosen(signatures: Signatures, before: Fit) -> tuple[list[tuple[int, Candid
     evidence = signatures.evidence
     columns = np.zeros((len(before.residual), 0))
     chosen: list[tuple[int, Candidate]] = []
+    asked = new_places(signatures, before)
     for _ in range(MOST):
         known = np.column_stack([before.tangent, columns])
-        new = _likeliest(signatures, before.residual, known)
+        new = _likeliest(signatures, asked, before.residual, known)
         if not new:
             break
         for t, candidate in new:
@@ -78,12 +88,13 @@ def _chosen(signatures: Signatures, before: Fit) -> tuple[list[tuple[int, Candid
 
 
 def _likeliest(
-    signatures: Signatures, residual: np.ndarray, known: np.ndarray
+    signatures: Signatures, asked: Sequence[int], residual: np.ndarray, known: np.ndarray
 ) -> list[tuple[int, Candidate]]:
     """The best candidate of each trial, if it is a sure one."""
     scores, _ = signatures.scores(residual[:, None], known)
     best: dict[int, int] = {}
-    for k, place in enumerate(signatures.places):
+    for k in asked:
+        place = signatures.places[k]
         if len(place.trials) == 1 and scores[k, 0] > SURE:
             (t,) = place.trials
             if t not in best or scores[k, 0] > scores[best[t], 0]:

@@ -15,6 +15,8 @@ from bsip_cli.statistics.chi_square import minus_log_p
 SUPPORT = 8.0  # squared white residual that a trial must save to share a cause
 # Of what a cause explains in a trial: so much is lost where its size is a quarter off.
 OTHER_SIZE = 0.0625
+# Standard deviations of the stated mass, by which a cause takes the body away from it at most.
+FURTHER = 3.0
 
 
 class Refitted(NamedTuple):
@@ -51,9 +53,15 @@ def refitted(
     found = fit.explanations[-1]
     if not found.is_possible(evidence) or found.is_negligible(evidence):
         return None
-    if not found.agrees_with_markers(evidence):
+    if not found.agrees_with_markers(evidence) or needs_another_mass(evidence, before, fit):
         return None
     return Refitted(found, fit, score_of(before, fit, len(sizes)))
+
+
+def needs_another_mass(evidence: Evidence, before: Fit, fit: Fit) -> bool:
+    """Whether a cause is true only of somebody whom the scale shows to be someone else."""
+    without, beside = (abs(evidence.beyond_stated(one.residual)) for one in (before, fit))
+    return beside > without + FURTHER
 
 
 def alike(one: Explanation, other: Explanation) -> bool:

@@ -20,6 +20,7 @@ from bsip_cli.statistics.chi_square import minus_log_p
 
 _RIDGE = 1e-6  # of the information: as much is rounding
 _BATCH = 60  # candidates at a time
+_OF_ITS_OWN = 0.2  # of the square of a signature, that what is known leaves of it at least
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,8 @@ class Signatures:
         self, residuals: np.ndarray, known: np.ndarray
     ) -> tuple[np.ndarray, list[np.ndarray]]:
         """-log p (K, f) of every place for residuals (R, f), and the likeliest sizes of the first
-        [typical]. What the columns ``known`` (R, q) can explain is taken off both."""
+        [typical]. What the columns ``known`` (R, q) can explain is taken off both; 0 where hardly
+        anything of a signature is left, as of a jump of the clock beside a delay."""
         basis, _ = np.linalg.qr(known)
         left = residuals - basis @ (basis.T @ residuals)
         products = self._products(np.column_stack([left, basis]))
@@ -108,7 +110,8 @@ class Signatures:
             whole += _RIDGE * _diagonal(batch.information)
             likeliest = np.linalg.solve(whole, right)
             lost = np.einsum("nkf,nkf->nf", right, likeliest)
-            logs[batch.numbers] = minus_log_p(lost, right.shape[1])
+            alone = np.einsum("nkf,nkf->nf", likeliest, batch.information @ likeliest)
+            logs[batch.numbers] = minus_log_p(lost, right.shape[1]) * (lost > _OF_ITS_OWN * alone)
             for k, size in zip(batch.numbers, likeliest[..., 0], strict=True):
                 sizes[k] = size
         return logs, sizes

@@ -51,6 +51,13 @@ class Evidence:
             columns[self.rows(trial)] += part
         return columns
 
+    def beyond_stated(self, residual: np.ndarray) -> float:
+        """By how many standard deviations of the stated mass the likeliest body is heavier, given
+        what is left (R,) beside some causes."""
+        shared = np.concatenate([one.shared for one in self.trials])
+        sizes = shared.T @ self.turned(residual[:, None])[:, 0]
+        return float(self.trials[0].filtered.heavier @ sizes)
+
     def first_block(self, trial: int) -> int:
         """The number of a trial's first stretch in ``blocks``."""
         return int(self.blocks()[self.rows(trial)].min())

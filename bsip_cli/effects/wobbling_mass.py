@@ -13,8 +13,9 @@ from bsip_cli.effects.scene import Scene
 IMPACT = 1.8  # peak of the vertical force over body weight
 FREQUENCIES_HZ = (2.5, 3.0, 3.5, 4.0, 5.0, 6.5)
 DAMPING = (0.1, 0.2, 0.4)
-# Soft tissue is no point on one spring: its numbers are known to these standard deviations.
-MASS_KG, FREQUENCY_HZ, DAMPING_RATIO = 0.5, 0.05, 0.02
+# Soft tissue is no point on one spring: its numbers are known to these standard deviations. The skin
+# of a limb slides beneath the markers, and the mass that swings there is told too low.
+MASS_KG, LIMB_MASS_KG, FREQUENCY_HZ, DAMPING_RATIO = 0.5, 0.8, 0.05, 0.02
 
 
 class WobblingMass(Effect):
@@ -37,8 +38,9 @@ class WobblingMass(Effect):
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         i = scene.person.skeleton.index(target)
         most = max(0.8 * float(scene.phi[10 * i]), 0.1)
+        known_to = MASS_KG if target.endswith("torso") else LIMB_MASS_KG
         return (
-            Parameter("mass", "kg", 0.0, most, 4.0, known_to=MASS_KG),
+            Parameter("mass", "kg", 0.0, most, 4.0, known_to=known_to),
             Parameter("frequency", "Hz", 2.0, 8.0, 1.0, FREQUENCIES_HZ, known_to=FREQUENCY_HZ),
             Parameter("damping_ratio", "1", 0.02, 1.0, 0.1, DAMPING, known_to=DAMPING_RATIO),
         )

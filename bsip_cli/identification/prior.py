@@ -33,8 +33,8 @@ class Prior:
     readable_sd : (n, 10) the same spread for mass, centre of mass and tensor.
     spread_sd : (n, 10) spread of each on its own, before the masses' sum is known to
         total_mass_sd_kg.
-    fixed : (n,) segments whose motion no markers show: they keep the table's values, and the scale
-        tells about the others.
+    fixed : (n,) segments that keep the table's values, as those do whose motion no markers show;
+        the scale tells about the others.
     """
 
     inertias: tuple[Inertia, ...]
@@ -51,8 +51,16 @@ class Prior:
         return np.repeat(self.fixed, 10)
 
 
-def prior_of(inertias: tuple[Inertia, ...], person: Person, spread: Spread) -> Prior:
-    """Build the prior: parameters spread independently, but the masses sum to the scale's."""
+def prior_of(
+    inertias: tuple[Inertia, ...],
+    person: Person,
+    spread: Spread,
+    fixed: np.ndarray | None = None,
+) -> Prior:
+    """Build the prior: parameters spread independently, but the free masses sum to the scale's.
+
+    fixed : (n,) segments that keep the table's values; by default those whose motion is unknown.
+    """
     origins = person.origin_in_joint_m
     n = len(inertias)
     phi, root = np.empty(10 * n), np.zeros((10 * n, 10 * n))
@@ -63,7 +71,7 @@ def prior_of(inertias: tuple[Inertia, ...], person: Person, spread: Spread) -> P
         spread_sd[i] = _readable_sd(inertia, spread)
         root[block, block] = np.linalg.solve(readable_jacobian(phi[block]), np.diag(spread_sd[i]))
     total_mass_sd_kg = spread.total_mass_sd_percent / 100 * float(phi[::10].sum())
-    fixed = person.without_data()
+    fixed = person.without_data() if fixed is None else fixed
     root = _with_total_mass(root, total_mass_sd_kg, ~fixed)
     readable_sd = np.empty((n, 10))
     for i in range(n):

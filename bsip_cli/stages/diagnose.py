@@ -123,9 +123,12 @@ def moving_trials(unit: Unit, person: Person, prior: Prior) -> tuple[LookedAt, .
 
 
 def prior_of(unit: Unit, person: Person) -> Prior:
-    """Of the parameters; the plates' gain shows against a mass that a scale has told."""
-    known = {"total_mass_sd_percent": unit.config.diagnosis.stated_mass_sd_percent}
-    return prior_from(unit, unit.read("regression"), person, **(known if _is_weighed(unit) else {}))
+    """Of the parameters, none of which is taken for known; the plates' gain shows against a mass
+    that a scale has told."""
+    stated = {"total_mass_sd_percent": unit.config.diagnosis.stated_mass_sd_percent}
+    known = stated if _is_weighed(unit) else {}
+    none = np.zeros(len(person.skeleton.segments), dtype=bool)
+    return prior_from(unit, unit.read("regression"), person, none, **known)
 
 
 def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial, class_id: str) -> LookedAt:
@@ -145,10 +148,13 @@ def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial, class_id:
     rng = np.random.default_rng(crc32(trial.stem.encode()))
     own = own_nuisances(fewer, options.skin_factor, options.skin_draws, rng)
     shared = shared_nuisances(fewer, prior.root, options.marker_sd_m)
+    heavier = _heavier(prior, shared.shape[2]) if _is_weighed(unit) else None
     level = acceleration_noise(unit.read("kinematics", trial), person.skeleton)
 
     def evidence_with(nuisances: np.ndarray) -> TrialEvidence:
-        return trial_evidence(trial.stem, scene, nuisances, shared, level, options.cutoff_hz)
+        return trial_evidence(
+            trial.stem, scene, nuisances, shared, level, options.cutoff_hz, heavier
+        )
 
     proofs = proofs_of(fewer, _slips(unit, trial), rng)
     if not proofs:
@@ -166,6 +172,13 @@ def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial, class_id:
         if gain.is_real() and not one.is_rival
     )
     return LookedAt(evidence_with(beside), told, causes)
+
+
+def _heavier(prior: Prior, count: int) -> np.ndarray:
+    """(count,) how many standard deviations of the stated mass shared nuisances of unit variance,
+    the parameters first, make the body heavier."""
+    masses = prior.root[::10].sum(axis=0) / prior.total_mass_sd_kg
+    return np.pad(masses, (0, count - len(masses)))
 
 
 def _slips(unit: Unit, trial: Trial) -> list[Slip]:

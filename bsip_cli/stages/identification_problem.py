@@ -29,14 +29,20 @@ _FIRST_NOISE = np.array([10.0, 10.0, 10.0, 5.0, 5.0, 5.0])
 _WEIGHT_ROUNDS = 3
 
 
-def prior_from(unit: Unit, regression: pd.DataFrame, person: Person, **other: float) -> Prior:
+def prior_from(
+    unit: Unit,
+    regression: pd.DataFrame,
+    person: Person,
+    fixed: np.ndarray | None = None,
+    **other: float,
+) -> Prior:
     """What is known of a person before the data, from the rows of ``regression``.
 
-    other : standard deviations that stand for the configured ones.
+    fixed : as of :func:`prior_of`. other : standard deviations that stand for the configured ones.
     """
     rows = regression[list(bsip_names())].to_numpy()
     spread = Spread(**{**unit.config.prior.model_dump(), **other})
-    return prior_of(tuple(from_readable(row) for row in rows), person, spread)
+    return prior_of(tuple(from_readable(row) for row in rows), person, spread, fixed)
 
 
 def usable_frames(unit: Unit, trial: Trial) -> np.ndarray:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from noisy_trial import all_of, late, noisy, part_of_moving, with_effect
 
-from bsip_cli.diagnosis.explanation import Fit, fit_together
+from bsip_cli.diagnosis.candidates import Candidate
+from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together
 from bsip_cli.diagnosis.likely_noise import likely_columns, noise_beside_fit, with_likely_noise
 from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
@@ -64,3 +65,18 @@ def test_what_is_likely_explains_the_residual():
     columns, residual = likely_columns(signatures, fit), signatures.evidence.residual
     size = np.linalg.lstsq(columns, residual, rcond=None)[0]
     assert np.std(residual - columns @ size) < 0.5 * np.std(residual)
+
+
+def test_a_known_cause_gives_way_to_what_is_likely():
+    """An offset is known where a channel drifts: too large at first, and then too small."""
+    scene, channel = part_of_moving(0, 10), "1 fx"
+    effects = [EFFECTS[name] for name in ("plate_zero", "plate_drift")]
+    drifting = noisy(with_effect(scene, EFFECTS["plate_drift"], channel, 3.0), 1)
+    signatures = signatures_of(all_of(drifting), effects)
+    place = next(p for p in signatures.places if p.candidate == Candidate(effects[0], channel, ()))
+    fit = fit_together(signatures.evidence, (Explanation(place, np.array([10.0])),))
+    expected = spread_of(signatures_of(all_of(noisy(scene, 1)), effects), 0)
+    alone, _ = noise_beside_fit(signatures, fit)
+    found, _ = with_likely_noise(signatures, fit)
+    before, after = (spread_of(one, 0)[0] / expected[0] for one in (alone, found))
+    assert before > 1.5 and after < 1.15

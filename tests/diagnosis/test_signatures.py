@@ -54,6 +54,19 @@ def test_scores_and_sizes_are_those_of_least_squares(name):
         assert logs[k, 1] == pytest.approx(-chi2.logsf(4 * lost, free), rel=1e-3, abs=1e-3)
 
 
+@pytest.mark.parametrize(("of_its_own", "is_asked"), [(0.15, False), (0.25, True)])
+def test_what_is_known_almost_explains_is_not_asked(of_its_own, is_asked):
+    found = signatures()
+    (k, *_) = places_of(found, "sync_offset")
+    column = column_of(found, found.places[k])[:, 0]
+    other = np.random.default_rng(4).normal(size=len(column))
+    other -= column * (column @ other) / (column @ column)
+    other *= np.linalg.norm(column) / np.linalg.norm(other)
+    known = np.sqrt(1 - of_its_own) * column + np.sqrt(of_its_own) * other
+    scores, _ = found.scores(found.evidence.residual[:, None], known[:, None])
+    assert bool(scores[k, 0] > 0) == is_asked
+
+
 def test_information_is_the_gram_matrix():
     found = signatures()
     known = np.zeros((len(found.evidence.residual), 0))

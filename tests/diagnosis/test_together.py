@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from noisy_trial import SEGMENTS, all_of, noisy, part_of_moving, with_effect
+from noisy_trial import MASS_SD_KG, SEGMENTS, all_of, noisy, part_of_moving, with_effect
 
-from bsip_cli.diagnosis.together import clipped
+from bsip_cli.diagnosis.together import Evidence, clipped, together
 from bsip_cli.effects.segment_inertia import SegmentInertia
 
 
@@ -15,6 +17,16 @@ def trials(extra_kg: float = 0.0):
     scenes = (noisy(part_of_moving(0, 6), 1), noisy(part_of_moving(6, 8), 2))
     values = np.array([extra_kg, *[0.0] * 9])
     return all_of(*(with_effect(s, SegmentInertia(), "thigh_r", *values) for s in scenes))
+
+
+def weighed(evidence: Evidence, sd_kg: float) -> Evidence:
+    """The same of a person whose mass a scale has told to a standard deviation."""
+    heavier = np.full(len(SEGMENTS), MASS_SD_KG / sd_kg)
+    return together(
+        tuple(
+            replace(one, filtered=replace(one.filtered, heavier=heavier)) for one in evidence.trials
+        )
+    )
 
 
 def test_rows_follow_one_another():
@@ -49,6 +61,13 @@ def test_the_same_nuisance_in_both_trials_goes():
     turned = evidence.turned(column[:, None])[:, 0]
     assert abs(turned @ evidence.residual) / np.linalg.norm(turned) < 6
     assert evidence.residual.std() == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("extra_kg", [0.0, 2.0])
+def test_how_far_the_likeliest_body_is_from_the_stated_mass(extra_kg):
+    evidence = weighed(trials(extra_kg), 0.25)
+    assert evidence.beyond_stated(evidence.residual) == pytest.approx(4 * extra_kg, abs=0.8)
+    assert trials(extra_kg).beyond_stated(evidence.residual) == 0.0
 
 
 def test_what_differs_between_the_trials_stays():

@@ -128,3 +128,14 @@ def test_the_scale_tells_of_the_others():
     free = masses[~prior.fixed].sum(axis=0)
     assert 0.8 < np.linalg.norm(free) / prior.total_mass_sd_kg <= 1.0
     assert masses[head()] @ free == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("fixed", [True, False])
+def test_the_scale_tells_about_all_that_is_free(fixed):
+    person = without("RTEM", "LTEM", "FHEAD")
+    known = None if fixed else np.zeros(len(person.skeleton.segments), dtype=bool)
+    prior = prior_of(world().prior.inertias, person, SPREAD, known)
+    free = np.delete(np.arange(len(prior.fixed)), head()) if fixed else np.arange(len(prior.fixed))
+    assert prior.fixed[head()] == fixed
+    sd_kg = np.linalg.norm(prior.root[::10][free].sum(axis=0))
+    assert 0.9 * prior.total_mass_sd_kg < sd_kg <= prior.total_mass_sd_kg

@@ -13,8 +13,8 @@ from bsip_cli.effects.scene import Scene
 IMPACT = 1.8  # peak of the vertical force over body weight
 FREQUENCIES_HZ = (2.5, 3.0, 3.5, 4.0, 5.0, 6.5)
 DAMPING = (0.1, 0.2, 0.4)
-# Soft tissue is no point on one spring: its numbers are known to these standard deviations. The skin
-# of a limb slides beneath the markers, and the mass that swings there is told too low.
+# Soft tissue is no point on one spring: its numbers are known to these standard deviations. Beneath
+# the markers of a limb the skin slides, and the mass that swings there is told too low.
 MASS_KG, LIMB_MASS_KG, FREQUENCY_HZ, DAMPING_RATIO = 0.5, 0.8, 0.05, 0.02
 
 

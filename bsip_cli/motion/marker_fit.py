@@ -31,6 +31,7 @@ class MarkerFit:
     residual_m : (N, m, 3) measured less model, in the axes of the marker's segment.
     place_m : (m, 3) where the markers sit in their segments.
     trusted_m : (m,) what a marker's position is trusted to, as in the inverse kinematics.
+    parents : of every segment but the root, the one that carries it.
     pose : segment to (N, k) columns, the angles of its own joint and of those it carries.
     respond : computes ``response``, which a fit that is only compared does not need.
     """
@@ -43,6 +44,7 @@ class MarkerFit:
     residual_m: np.ndarray
     place_m: np.ndarray
     trusted_m: np.ndarray
+    parents: dict[str, str]
     pose: dict[str, np.ndarray]
     respond: Callable[[], np.ndarray]
 
@@ -85,6 +87,7 @@ def marker_fit(
     turns = R[:, person.marker_segments]
     residual = np.einsum("fmji,fmj->fmi", turns, markers_m - model)
     names = person.skeleton.segments
+    carried = {s: names[k] for s, k in zip(names, person.skeleton.parents, strict=True) if k >= 0}
     return MarkerFit(
         person.markers,
         tuple(names[k] for k in person.marker_segments),
@@ -94,6 +97,7 @@ def marker_fit(
         residual,
         person.marker_positions_m,
         marker_sd_m / np.sqrt(np.maximum(person.marker_weights, 1e-6)),
+        carried,
         {names[k]: _pose(person, q, int(k)) for k in np.unique(person.marker_segments)},
         partial(_response, person, residual, R, p, model, marker_sd_m, robust_limit_m),
     )

@@ -70,7 +70,7 @@ def _suspects(fit: MarkerFit) -> list[_Pair]:
     astray = own > far
     paths = np.ascontiguousarray(np.moveaxis(fit.measured_m, 1, 0))
     found = []
-    for a, b in _pairs(fit.segments):
+    for a, b in _pairs(fit):
         hit = astray[:, a] & astray[:, b]
         if len(frames := np.flatnonzero(hit)):
             hit[frames] = (_nearness(fit, own, a, b, frames) > 1.0 / _NEARER).all(axis=1)
@@ -90,10 +90,13 @@ def _nearness(fit: MarkerFit, own: np.ndarray, a: int, b: int, frames: np.ndarra
     return own[frames][:, [a, b]] / np.maximum(across, 1e-4)
 
 
-def _pairs(segments: tuple[str, ...]) -> Iterator[tuple[int, int]]:
+def _pairs(fit: MarkerFit) -> Iterator[tuple[int, int]]:
+    """Markers of one segment, of the same one on both sides, or of two that share a joint."""
+    segments, parents = fit.segments, fit.parents
     for a, first in enumerate(segments):
+        near = {first, mirrored(first), parents.get(first)}
         for b in range(a + 1, len(segments)):
-            if segments[b] in (first, mirrored(first)):
+            if segments[b] in near or parents.get(segments[b]) == first:
                 yield a, b
 
 
@@ -110,14 +113,7 @@ def _between_reversals(
     # Most pairs never turn by a right angle between two frames: nothing to look at.
     if len(seen) < 4 or not (np.einsum("ni,ni->n", d[1:], d[:-1]) < 0).any():
         return hit, 0.0
-    length = np.linalg.norm(d, axis=1)
-    change = np.linalg.norm(np.diff(d, axis=0), axis=1)
-    lacking = np.linalg.norm(d[1:] + d[:-1], axis=1)
-    turned = lacking < 0.5 * length[1:]
-    turned &= (length[1:] > far) & (np.diff(times_s[seen]) < _UNSEEN_S)
-    calm = np.ones(len(turned), dtype=bool)  # the line moves little before it reverses
-    calm[1:] = (change[:-1] < 0.5 * length[1:-1]) | turned[:-1]
-    flips = np.flatnonzero(turned & calm) + 1
+    flips, sharp = _reversals(d, times_s[seen], far)
     if not len(flips):
         return hit, 0.0
     state = np.zeros(len(seen), dtype=int)
@@ -134,5 +130,28 @@ def _between_reversals(
         wrong = int((state == 1).mean() < 0.5)
     between = np.zeros(len(hit), dtype=bool)
     between[seen[state == wrong]] = True
-    sharp = float(np.median(length[flips] / np.maximum(lacking[flips - 1], 1e-4)))
-    return between, sharp
+    return between, float(np.median(sharp))
+
+
+def _reversals(line: np.ndarray, times_s: np.ndarray, far: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frames (k,) from which on a line (N, 3) points the other way, having moved little before, and
+    its length over what it lacks of an exact reversal.
+
+    Where samples were interpolated, the frame between may lie anywhere on the way.
+    """
+    length = np.linalg.norm(line, axis=1)
+    calm = np.ones(len(line), dtype=bool)
+    calm[1:] = np.linalg.norm(np.diff(line, axis=0), axis=1) < 0.5 * length[1:]
+    sharp = np.zeros(len(line))
+    for step in (1, 2):
+        lacking = np.linalg.norm(line[step:] + line[:-step], axis=1)
+        turned = (lacking < 0.5 * length[step:]) & (length[step:] > far)
+        turned &= times_s[step:] - times_s[:-step] < _UNSEEN_S
+        if step == 1:
+            calm[1:] |= turned
+        else:
+            turned &= (sharp[1:-1] == 0) & (sharp[2:] == 0)
+        turned &= calm[:-step]
+        sharp[step:] += turned * length[step:] / np.maximum(lacking, 1e-4)
+    flips = np.flatnonzero(sharp)
+    return flips, sharp[flips]

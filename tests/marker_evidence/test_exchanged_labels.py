@@ -43,6 +43,20 @@ def test_a_swap_is_undone(a, b, frames):
     assert np.array_equal(found.markers_m, clean)
 
 
+def test_across_a_joint_at_a_low_rate():
+    """The recording was resampled: at both ends of the swap a frame lies between the two places."""
+    times, clean, _ = recording(4)
+    markers = clean.copy()
+    exchange(markers, "LMALL", "LCAL", slice(160, 205))
+    for edge, other in ((159, 160), (205, 204)):
+        markers[edge] = 0.6 * markers[edge] + 0.4 * markers[other]
+    found = judged(markers, times)
+    (event,) = (one for one in found.events if one.kind == "swap")
+    assert event.put_right
+    inside = slice(160, 205)
+    assert np.array_equal(found.markers_m[inside], clean[inside])
+
+
 def test_swaps_of_any_pair_are_undone_and_none_to_the_worse():
     """Twelve pairs of one segment or of mirrored ones, for a tenth of a second or more."""
     rng = np.random.default_rng(8)

@@ -3,6 +3,8 @@ for something else."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from bsip_cli.diagnosis.candidates import Candidate, candidates_of
@@ -26,7 +28,7 @@ def slack(scene: Scene) -> np.ndarray:
     """(N, 6, k) change of the wrench for one standard deviation of each small imperfection."""
     instruments = [effect for effect in CATALOGUE if _is_of_instruments(effect)]
     columns = [
-        _share(c) * c.signature(scene)
+        _share(c) * c.signature(_source(effect, scene))
         for effect in (*instruments, EFFECTS["over_smoothing"])
         for c in candidates_of(effect, scene)
     ]
@@ -45,6 +47,15 @@ def _blurred(scene: Scene) -> np.ndarray:
     columns = 0.5 * BLUR_S**2 * bent[..., None] * np.eye(6)
     columns[:, 3:] += np.cross(place, columns[:, :3], axisb=1, axisc=1)
     return columns
+
+
+def _source(effect: Effect, scene: Scene) -> Scene:
+    """The trial whose forces come late: as simulated.
+
+    Of the measured ones, with their noise, a slight delay would smooth what a larger one has moved,
+    and make it larger still.
+    """
+    return replace(scene, wrench=scene.predicted) if isinstance(effect, Delay) else scene
 
 
 def _is_of_instruments(effect: Effect) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import resample
+from scipy.signal import butter, resample, sosfiltfilt
 
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
@@ -23,6 +23,7 @@ from bsip_cli.motion.jacobian import model_markers
 from bsip_cli.motion.pose_response import PoseResponse, marker_trust, pose_responses
 
 FINER = 4  # samples per frame of the wrench between frames
+SLOW_ENOUGH = 0.8  # of half the lower rate, when frames are left out
 TRUST_S = 0.05  # standard deviation of what smooths the markers' trust
 
 
@@ -99,7 +100,7 @@ class Scene:
         if stride == 1:
             return self
         part = slice(None, None, stride)
-        plates = tuple(replace(plate, wrench=plate.wrench[part]) for plate in self.plates)
+        plates = tuple(replace(p, wrench=without_fast(p.wrench, stride)[part]) for p in self.plates)
         residual = None if self.residual_m is None else self.residual_m[part]
         return replace(
             self,
@@ -110,7 +111,7 @@ class Scene:
             plates=plates,
             valid=self.valid[part],
             residual_m=residual,
-            wrench=None if self.wrench is None else self.wrench[part],
+            wrench=None if self.wrench is None else without_fast(self.wrench, stride)[part],
         )
 
     @cached_property
@@ -255,6 +256,16 @@ class Scene:
                 total += own * np.stack([point.position_m, point.acceleration_m_s2])
                 mass += own
         return mass, Point(*(total / mass))
+
+
+def without_fast(wrench: np.ndarray, stride: int) -> np.ndarray:
+    """(N, 6) without what every ``stride``-th frame would show as something slower; NaN stays.
+
+    Noise that turned up among the slow changes would make every shift in time seem smaller.
+    """
+    sections = butter(4, SLOW_ENOUGH / stride, output="sos")
+    slow = sosfiltfilt(sections, np.nan_to_num(wrench), axis=0)
+    return np.where(np.isnan(wrench), np.nan, slow)
 
 
 def standing_place_m(scene: Scene) -> np.ndarray:

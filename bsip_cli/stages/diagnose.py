@@ -20,7 +20,7 @@ from bsip_cli.diagnosis.loud_noise import with_loud_noise
 from bsip_cli.diagnosis.marker_proof import Proof, Slip, proofs_of
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.patterns import PATTERNS
-from bsip_cli.diagnosis.scale_mass import agreed_share, weight_round, weight_share
+from bsip_cli.diagnosis.scale_mass import NOTICED, agreed_share, weight_round, weight_share
 from bsip_cli.diagnosis.selection import Round, Selection, select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.diagnosis.stated_mass import loaded_plate, stated_mass_findings
@@ -31,6 +31,7 @@ from bsip_cli.effects.marker_shift import BEFORE_S
 from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.prior import Prior
 from bsip_cli.report.verdict import verdict_of
+from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.diagnosis_rows import rows_of
 from bsip_cli.stages.frames import acceleration_noise, person_from
 from bsip_cli.stages.identification_problem import prior_from
@@ -41,6 +42,8 @@ from bsip_cli.unit import Unit
 _SHORTEST_S = 2.0
 # Of the spreads an offset is judged against: 17 mm for a marker that is trusted to 5.
 _FAR_OFF = 3.5
+_ALIKE = 0.5  # part of the difference to the stated mass
+_READ_TO_PERCENT = 0.3  # standard deviation of what the same plates read in another trial
 _ATTRIBUTED = "segment_inertia"  # not a cause beside the parameters: they are projected out
 ASKED = (*(effect for effect in CATALOGUE if effect.name != _ATTRIBUTED), *PATTERNS)
 
@@ -50,16 +53,16 @@ def run(unit: Unit) -> None:
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     prior = prior_of(unit, person)
-    looked_at = moving_trials(unit, person, prior)
-    trials = tuple(one.evidence for one in looked_at if one.evidence is not None)
     standing = _standing(unit, person, prior)
-    told = (*(f for one in looked_at for f in one.told), *_weighed(unit, standing))
-    for sentence in filter(None, (one.left_out for one in looked_at)):
+    asked = _asked(unit, moving_trials(unit, person, prior), standing)
+    if asked.selection and standing and _agrees(asked.selection, prior, standing[1]):
+        as_read = prior_of(unit, person, weight_share(standing[1]))
+        asked = _asked(unit, moving_trials(unit, person, as_read), standing)
+    told = (*(f for one in asked.looked_at for f in one.told), *_weighed(unit, standing))
+    for sentence in filter(None, (one.left_out for one in asked.looked_at)):
         unit.warn(sentence)
-    if trials:
-        proven = [cause for one in looked_at for cause in one.causes]
-        only_motion_weighs = _is_weighed(unit) and standing is None
-        _write(unit, *_asked(unit, trials, told, proven, only_motion_weighs))
+    if asked.selection:
+        _write(unit, *_answer(asked, asked.selection, told))
         return
     if not told:
         unit.warn(
@@ -70,27 +73,55 @@ def run(unit: Unit) -> None:
     _write(unit, rows_of(told, tuple(names)), empty_table("detection"), {"trials": names})
 
 
+@dataclass(frozen=True)
+class Asked:
+    """Trials that move, what the selection made of their evidence, if there is any, and what they
+    say of the stated mass; the generator goes on from there."""
+
+    looked_at: tuple[LookedAt, ...]
+    selection: Selection | None
+    weighed: tuple[Finding, ...]
+    rng: np.random.Generator
+
+
 def _asked(
-    unit: Unit,
-    trials: tuple[TrialEvidence, ...],
-    told: tuple[Finding, ...],
-    proven: list[dict],
-    only_motion_weighs: bool,
-) -> tuple[pd.DataFrame, pd.DataFrame, dict]:
-    """Diagnosis, detection limits and facts, of the moving trials and of what is told already;
-    whether the stated mass can be compared with moving trials only."""
+    unit: Unit, looked_at: tuple[LookedAt, ...], standing: tuple[str, Scene] | None
+) -> Asked:
     rng = np.random.default_rng(crc32(unit.name.encode()))
+    trials = tuple(one.evidence for one in looked_at if one.evidence is not None)
+    if not trials:
+        return Asked(looked_at, None, (), rng)
     evidence = together(trials)
+    only_motion_weighs = _is_weighed(unit) and standing is None
     first, weighed = _weighed_moving(evidence) if only_motion_weighs else (None, ())
-    selection = select(signatures_of(evidence, ASKED), rng, first)
-    found = findings_of(selection, rng)
-    findings = (*with_loud_noise(selection, found), *weighed)
+    return Asked(looked_at, select(signatures_of(evidence, ASKED), rng, first), weighed, rng)
+
+
+def _agrees(selection: Selection, prior: Prior, standing: Scene) -> bool:
+    """Whether beside all causes that are found the moving person is as much heavier or lighter than
+    stated as the plates read in quiet standing.
+
+    Then no trial is judged against the stated mass, which would make one of them seem the odd one.
+    """
+    share = weight_share(standing)
+    beyond = selection.signatures.evidence.beyond_stated(selection.fit.residual)
+    moving = beyond * prior.total_mass_sd_kg / standing.mass_kg
+    return abs(share) >= NOTICED and abs(moving - share) < _ALIKE * abs(share)
+
+
+def _answer(
+    asked: Asked, selection: Selection, told: tuple[Finding, ...]
+) -> tuple[pd.DataFrame, pd.DataFrame, dict]:
+    """Diagnosis, detection limits and facts, of the moving trials and of what is told already."""
+    found = findings_of(selection, asked.rng)
+    findings = (*with_loud_noise(selection, found), *asked.weighed)
     findings = tuple(sorted(findings, key=lambda one: one.verdict == "rejected"))
     facts = _facts(selection, findings)
     facts["trials"] = list(dict.fromkeys([*facts["trials"], *_trials_of(told)]))
+    proven = [cause for one in asked.looked_at for cause in one.causes]
     facts["causes"] = [*proven, *facts["causes"]]
-    rows = rows_of((*told, *findings), tuple(one.name for one in trials))
-    return rows, _detection(selection), facts
+    names = tuple(one.name for one in selection.signatures.evidence.trials)
+    return rows_of((*told, *findings), names), _detection(selection), facts
 
 
 def _write(unit: Unit, diagnosis: pd.DataFrame, limits: pd.DataFrame, facts: dict) -> None:
@@ -122,13 +153,19 @@ def moving_trials(unit: Unit, person: Person, prior: Prior) -> tuple[LookedAt, .
     )
 
 
-def prior_of(unit: Unit, person: Person) -> Prior:
+def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:
     """Of the parameters, none of which is taken for known; the plates' gain shows against a mass
-    that a scale has told."""
-    stated = {"total_mass_sd_percent": unit.config.diagnosis.stated_mass_sd_percent}
-    known = stated if _is_weighed(unit) else {}
+    that a scale has told.
+
+    share : by what part of the stated mass the plates read more, where they are believed instead.
+    """
+    stated_sd = unit.config.diagnosis.stated_mass_sd_percent
+    sd_percent = stated_sd if share is None else _READ_TO_PERCENT
+    known = {"total_mass_sd_percent": sd_percent} if _is_weighed(unit) else {}
+    table = unit.read("regression").copy()
+    table[[name for name in bsip_names() if not name.startswith("com")]] *= 1 + (share or 0.0)
     none = np.zeros(len(person.skeleton.segments), dtype=bool)
-    return prior_from(unit, unit.read("regression"), person, none, **known)
+    return prior_from(unit, table, person, none, **known)
 
 
 def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial, class_id: str) -> LookedAt:

@@ -27,7 +27,7 @@ from bsip_cli.config import Config, load_config
 from bsip_cli.lock import held_alone
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.runner import Outcome, perform
-from bsip_cli.schemas import SCHEMAS
+from bsip_cli.schemas import SCHEMAS, bsip_names
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages import diagnose
@@ -580,6 +580,40 @@ def test_a_static_trial_off_the_plates_weighs_nobody(run):
     write_artifact(path, "wrench", wrench.assign(valid=False), notes)
     unit = unit_of(run, "diagnose", f"sub-01_{TRIALS[1]}")
     assert diagnose._standing(unit, person, diagnose.prior_of(unit, person)) is None
+
+
+@pytest.fixture
+def judged_by(monkeypatch) -> list[float | None]:
+    """By what part of the stated mass the one differs against which a diagnosis judges; nothing
+    for the stated mass."""
+    shares: list[float | None] = []
+    prior_of = diagnose.prior_of
+
+    def noted(unit, person, share=None):
+        shares.append(share)
+        return prior_of(unit, person, share)
+
+    monkeypatch.setattr(diagnose, "prior_of", noted)
+    return shares
+
+
+def test_a_mass_that_all_trials_contradict_makes_none_of_them_odd(run, judged_by):
+    """The table's body is 5 % heavier than the person on the plates."""
+    path = run.path("regression")
+    table, notes = read_artifact(path, "regression"), read_header(path)["provenance"]
+    table[[name for name in bsip_names() if not name.startswith("com")]] *= 1.05
+    write_artifact(path, "regression", table, notes)
+    run.path("diagnosis").unlink()
+    assert run.perform("diagnose").state == "done"
+    assert judged_by == [None, pytest.approx(1 / 1.05 - 1, abs=0.004)]
+    told = read_artifact(run.path("diagnosis"), "overall-diagnosis")
+    assert set(told[told["verdict"] != "rejected"]["class_id"]) == {"W"}
+
+
+def test_who_weighs_what_is_stated_is_judged_by_that(run, judged_by):
+    run.path("diagnosis").unlink()
+    assert run.perform("diagnose").state == "done"
+    assert judged_by == [None]
 
 
 def test_exchanged_labels_are_put_right_before_the_poses(run):

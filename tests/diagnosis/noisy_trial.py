@@ -38,10 +38,10 @@ def shown(scene: Scene, change: np.ndarray | float) -> Scene:
     return replace(scene, plates=(replace(first, wrench=first.wrench + change), *others))
 
 
-def noisy(scene: Scene, seed: int) -> Scene:
-    """White noise in the plates."""
+def noisy(scene: Scene, seed: int, times: float = 1.0) -> Scene:
+    """White noise in the plates, so many times as large as usual."""
     drawn = np.random.default_rng(seed).normal(size=scene.predicted.shape)
-    return shown(scene, NOISE * drawn)
+    return shown(scene, times * NOISE * drawn)
 
 
 def late(scene: Scene, delay_s: float) -> Scene:

@@ -35,15 +35,20 @@ def diagnosis_of(study: Path, out: Path) -> pd.DataFrame:
     return table[table["verdict"] != "rejected"]
 
 
-def test_an_offset_hidden_in_a_real_recording_is_found_with_its_size(tmp_path):
-    """15 N sideways in squats on two plates; in the file, whose y is up, sideways is z."""
+def study_on_two_plates(folder: Path, **names: str) -> Path:
+    """Trials of one person; in the files y is up and z sideways."""
     files = {
         f"sub-01_task-{task}.{ending}": f"opencap_subject4/{name}{suffix}.{ending}"
-        for task, name in (("static", "static1"), ("squats", "squats1"))
+        for task, name in names.items()
         for ending, suffix in (("trc", ""), ("mot", "_grf"))
     }
     options = '[roles]\nsequence = ["squats"]\n'
-    study = make_study(tmp_path / "study", ["sub-01\tM\t62.6\t1.68"], options, files)
+    return make_study(folder, ["sub-01\tM\t62.6\t1.68"], options, files)
+
+
+def test_an_offset_hidden_in_a_real_recording_is_found_with_its_size(tmp_path):
+    """15 N sideways in squats."""
+    study = study_on_two_plates(tmp_path / "study", static="static1", squats="squats1")
     hidden = ("--effect", "plate_zero", "--size", "15", "--target", "fz,plate=1")
     bsip("inject", study, tmp_path / "copy", *hidden, "--effect-tasks", "squats")
     found = diagnosis_of(tmp_path / "copy", tmp_path / "out").set_index(["effect", "target"])
@@ -52,6 +57,19 @@ def test_an_offset_hidden_in_a_real_recording_is_found_with_its_size(tmp_path):
     # The plates read 4 % less than the stated mass in quiet standing.
     gain = found.loc[("plate_gain", "all fz"), "estimate"].item()
     assert abs(gain + 0.0406) < 0.003
+
+
+def test_a_mass_hidden_in_one_recording_is_not_told_of_the_other(tmp_path):
+    """1 kg in squats, where plates read 2.6 kg less than stated in all trials."""
+    names = {"static": "static1", "squats": "squats1", "sitstand": "STS1"}
+    study = study_on_two_plates(tmp_path / "study", **names)
+    hidden = ("--effect", "added_mass", "--size", "1", "--target", "forearm_r")
+    bsip("inject", study, tmp_path / "copy", *hidden, "--effect-tasks", "squats")
+    found = diagnosis_of(tmp_path / "copy", tmp_path / "out")
+    assert "unmeasured_contact" not in set(found["effect"])
+    masses = found[(found["effect"] == "added_mass") & (found["parameter"] == "mass")]
+    assert set(masses["trials"]) == {"sub-01_task-squats"}
+    assert (masses["ci_low"] < 1.0).all() and (masses["ci_high"] > 1.0).all()
 
 
 def test_hands_on_a_rail_are_the_missing_kilograms(tmp_path):

@@ -10,6 +10,7 @@ from bsip_cli.body.names import in_words
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
+UPRIGHT = np.array([0.0, 0.0, 1.0])
 IMPACT = 1.8  # peak of the vertical force over body weight
 FREQUENCIES_HZ = (2.5, 3.0, 3.5, 4.0, 5.0, 6.5)
 DAMPING = (0.1, 0.2, 0.4)
@@ -19,9 +20,11 @@ MASS_KG, LIMB_MASS_KG, FREQUENCY_HZ, DAMPING_RATIO = 0.5, 0.8, 0.05, 0.02
 
 
 class WobblingMass(Effect):
-    """A mass on a spring and a damper at the segment's centre of mass, free in all directions.
+    """A mass on a spring and a damper at the segment's centre of mass.
 
-    Looked for only where an impact sets it swinging: in slow movement it is a heavier segment.
+    Looked for only where an impact sets it swinging: in slow movement it is a heavier segment. It
+    need not swing to the sides as it does up and down: how much of it seems to is a number of its
+    own, which is not told.
     """
 
     name = "wobbling_mass"
@@ -43,12 +46,20 @@ class WobblingMass(Effect):
             Parameter("mass", "kg", 0.0, most, 4.0, known_to=known_to),
             Parameter("frequency", "Hz", 2.0, 8.0, 1.0, FREQUENCIES_HZ, known_to=FREQUENCY_HZ),
             Parameter("damping_ratio", "1", 0.02, 1.0, 0.1, DAMPING, known_to=DAMPING_RATIO),
+            Parameter("mass_sideways", "kg", -most, most, 4.0),
         )
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        mass, frequency, damping = values
+        mass, frequency, damping, sideways = values
         key = (self.name, target, float(frequency), float(damping))
-        return mass * scene.once(key, lambda: _swing(scene, target, frequency, damping))
+        upright, aside = scene.once(key, lambda: _swings(scene, target, frequency, damping))
+        return mass * upright + sideways * aside
+
+    def reported(
+        self, scene: Scene, target: str, values: np.ndarray
+    ) -> tuple[tuple[str, str, float], ...]:
+        """Without what seems to swing to the sides."""
+        return super().reported(scene, target, values)[:3]
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return (
@@ -57,15 +68,24 @@ class WobblingMass(Effect):
         )
 
 
-def _swing(scene: Scene, target: str, frequency_hz: float, damping: float) -> np.ndarray:
-    """(N, 6) what 1 kg adds to the wrench by swinging instead of staying in its segment."""
+def _swings(
+    scene: Scene, target: str, frequency_hz: float, damping: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 6) each : what 1 kg adds to the wrench by swinging instead of staying in its segment, up
+    and down and to the sides."""
     point = scene.point(target, scene.centre_of(target))
     ground, pace = point.acceleration_m_s2, 2 * np.pi * frequency_hz
     travel = _response([-1.0], ground, scene.rate_hz, pace, damping)
     force = _response([-1.0, 0.0, 0.0], ground, scene.rate_hz, pace, damping)
-    carried = ground + force - scene.model.gravity.linear
-    moment = np.cross(point.position_m, force) + np.cross(travel, carried)
-    return np.hstack([force, moment])
+
+    def swinging(axes: np.ndarray) -> np.ndarray:
+        own, stretch = force * axes, travel * axes
+        carried = ground + own - scene.model.gravity.linear
+        moment = np.cross(point.position_m, own) + np.cross(stretch, carried)
+        return np.hstack([own, moment])
+
+    upright = swinging(UPRIGHT)
+    return upright, swinging(np.ones(3)) - upright
 
 
 def _response(

@@ -71,7 +71,7 @@ def rows_of(case: Case, results: Path) -> list[dict[str, str]]:
     path = diagnosis_of(results / case.name)
     if not path.is_file():
         return []
-    hidden = case.hidden.in_words() if case.hidden else NOTHING
+    hidden = " and ".join(one.in_words() for one in case.hidden) or NOTHING
     found = pd.read_parquet(path)
     said = found[found["verdict"].isin(["named", "ambiguous"])]
     causes = said["class_id"].where(said["class_id"] != "", said["rank"].astype(str))

@@ -11,7 +11,7 @@ import pytest
 from second_world.balance import GRAVITY, Balanced, balanced
 from second_world.body import SEGMENTS, Body, draw_body
 from second_world.c3d_file import TYPES, write_c3d
-from second_world.effects import Changes, Hidden, changes_of
+from second_world.effects import Changes, Hidden, Wobble, changes_of
 from second_world.lab import Lab, Recorded
 from second_world.landmarks import place_landmarks
 from second_world.movements import moving
@@ -19,6 +19,7 @@ from second_world.people import CASES
 from second_world.skin import Skin
 
 LENGTH_S, SEED = 3.0, 11
+_TWO_CAUSES = (("drift", 15.0), ("gain", 0.1))
 FOLDER = Path(__file__).parent / "second_world"
 
 
@@ -120,6 +121,39 @@ def test_a_carried_mass_weighs_on_the_ground(body):
     changes = changes_of(Hidden("worn", 1.5, ("shank_r", (0.0, 0.0, -0.2))), motion)
     force = balanced(motion, changes.loads).force_n
     assert force[:, 2].mean() == pytest.approx((body.mass_kg + 1.5) * GRAVITY[2], rel=0.005)
+
+
+def test_what_wobbles_swings_on_and_weighs_nothing_more(body):
+    """A third of a second after a jolt the ground still feels it, by less and less."""
+    times = np.arange(0.0, 3.0, 0.002)
+    velocity = np.outer(np.where(times > 1.0, -0.5, 0.0), [0.0, 0.0, 1.0])
+    force = Wobble("pelvis", np.zeros(3), 4.0).on_ground(times, velocity)[:, 2]
+    early, later = (np.abs(force[(times > a) & (times < a + 0.25)]).max() for a in (1.05, 1.3))
+    assert 5.0 < later < 0.3 * early
+    assert np.abs(force[times > 2.8]).max() < 0.5
+
+
+def test_a_fast_clock_is_later_and_later(body, found):
+    fast = changes_of(Hidden("clock", 3000), found.motion)
+    null, early = (recorded(body, found, lab_of(), one) for one in (Changes(), fast))
+    lab = lab_of()
+    force, other = (one.wrenches[0][:, 2] for one in (null, early))
+    times = np.arange(len(force)) / lab.analog_hz
+    again = np.interp(times * (1.0 - 0.003), times, force)
+    inner = slice(200, -200)
+    assert np.std((other - again)[inner]) < 0.6 * np.std((other - force)[inner])
+
+
+def test_two_causes_are_hidden_at_once(body, found):
+    motion = found.motion
+    drift, gain = (changes_of(Hidden(name, size), motion) for name, size in _TWO_CAUSES)
+    both = recorded(body, found, lab_of(), drift.with_others(gain)).wrenches[0][:, 2]
+    one, other, null = (
+        recorded(body, found, lab_of(), changes).wrenches[0][:, 2]
+        for changes in (drift, gain, Changes())
+    )
+    np.testing.assert_allclose(both - null, (one - null) * 1.1 + (other - null), atol=1.0)
+    assert np.abs(one - null).max() > 10.0 and np.abs(other - null).max() > 10.0
 
 
 def test_cases_have_names_and_seeds_of_their_own():

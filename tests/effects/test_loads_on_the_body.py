@@ -153,8 +153,11 @@ def test_a_wobbling_mass_is_an_oscillator_on_a_moving_ground(frequency, damping)
     own = ground + swing + UP
     both = np.hstack([own, np.cross(path + u, own)])
     stiff = np.hstack([ground + UP, np.cross(path, ground + UP)])
-    change = WobblingMass().change(scene, "thigh_l", np.array([1.0, frequency, damping]))
+    change = WobblingMass().change(scene, "thigh_l", np.array([1.0, frequency, damping, 1.0]))
     np.testing.assert_allclose(change, both - stiff, atol=2e-3 * np.abs(change).max())
+    upright = WobblingMass().change(scene, "thigh_l", np.array([1.0, frequency, damping, 0.0]))
+    np.testing.assert_array_equal(upright[:, 2], change[:, 2])
+    assert not upright[:, :2].any()
 
 
 def test_breath_moves_a_mass_out_and_back():

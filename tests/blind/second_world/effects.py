@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.signal import butter, sosfilt
+from scipy.signal import butter, lsim, lti, sosfilt
 
 from second_world.balance import GRAVITY, Load, rate_of
 from second_world.body import SIDES
@@ -17,6 +17,7 @@ from second_world.smooth import window
 
 HAND_M = np.array([0.02, 0.0, -0.07])  # where a hand holds something, in its frame
 WAIST_M = np.array([-0.1, 0.0, 0.05])  # where a tether pulls, in the pelvis' frame
+_WOBBLE_HZ, _WOBBLE_DAMPING = 4.0, 0.2
 _CHANGES_AT = 0.45  # of a trial, where something happens within it
 _CONTACT = (3.0, 5.5, 0.5)  # start, length and ramp [s] of a hand's touch
 _STILL = (2.0, 7.5, 0.9)  # of the arm about it
@@ -46,16 +47,30 @@ class Hidden:
 
 @dataclass(frozen=True)
 class Changes:
-    """delay_s : of the forces behind the markers. shift_m, yaw_rad : of where the file says the
-    plates are. channels : on a plate's signals. moved : offsets of labels. loads : on the ground.
+    """delay_s : of the forces behind the markers, fast : part of a second that their clock gains in
+    one. shift_m, yaw_rad : of where the file says the plates are. channels : on a plate's signals,
+    one after the other. moved : offsets of labels. loads : on the ground.
     """
 
     delay_s: float = 0.0
+    fast: float = 0.0
     shift_m: tuple[float, float] = (0.0, 0.0)
     yaw_rad: float = 0.0
-    channels: Channels | None = None
+    channels: tuple[Channels, ...] = ()
     moved: dict[str, Callable[[np.ndarray], np.ndarray]] = field(default_factory=dict)
     loads: tuple[Load, ...] = ()
+
+    def with_others(self, more: Changes) -> Changes:
+        """Both at once."""
+        return Changes(
+            self.delay_s + more.delay_s,
+            self.fast + more.fast,
+            (self.shift_m[0] + more.shift_m[0], self.shift_m[1] + more.shift_m[1]),
+            self.yaw_rad + more.yaw_rad,
+            self.channels + more.channels,
+            self.moved | more.moved,
+            self.loads + more.loads,
+        )
 
 
 @dataclass(frozen=True)
@@ -96,15 +111,34 @@ class Tether:
         return self.damping_ns_m * velocity * [1.0, 1.0, 0.3]
 
 
+@dataclass(frozen=True)
+class Wobble:
+    """A part of the body that swings up and down on it, by itself at 4 Hz and soon still again."""
+
+    segment: str
+    place_m: np.ndarray
+    mass_kg: float
+
+    def on_ground(self, times_s: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        pace = 2.0 * np.pi * _WOBBLE_HZ
+        swing = lti([-1.0, 0.0, 0.0], [1.0, 2.0 * _WOBBLE_DAMPING * pace, pace**2])
+        _, beyond, _ = lsim(swing, rate_of(velocity[:, 2], times_s), times_s)
+        return np.outer(self.mass_kg * beyond, [0.0, 0.0, 1.0])
+
+
 def changes_of(hidden: Hidden, motion: Motion) -> Changes:
     """What a hidden effect changes in a trial; a touch also keeps the motion's arm still."""
     if hidden.effect in _CHANNELS:
-        return Changes(channels=partial(_CHANNELS[hidden.effect], hidden))
+        return Changes(channels=(partial(_CHANNELS[hidden.effect], hidden),))
     return _OTHERS[hidden.effect](hidden, motion)
 
 
 def _delay(hidden: Hidden, motion: Motion) -> Changes:
     return Changes(delay_s=hidden.size)
+
+
+def _clock(hidden: Hidden, motion: Motion) -> Changes:
+    return Changes(fast=1e-6 * hidden.size)
 
 
 def _shift(hidden: Hidden, motion: Motion) -> Changes:
@@ -143,6 +177,10 @@ def _touch(hidden: Hidden, motion: Motion) -> Changes:
     return Changes(loads=(Touch(hidden.target, HAND_M, hidden.size),))
 
 
+def _wobble(hidden: Hidden, motion: Motion) -> Changes:
+    return Changes(loads=(Wobble(hidden.target, np.zeros(3), hidden.size),))
+
+
 def _tether(hidden: Hidden, motion: Motion) -> Changes:
     return Changes(loads=(Tether("pelvis", WAIST_M, hidden.size),))
 
@@ -154,8 +192,9 @@ def _middle_s(motion: Motion) -> float:
 def _gain(
     hidden: Hidden, wrench: np.ndarray, times_s: np.ndarray, plate: int, full_n: float
 ) -> np.ndarray:
-    """On the vertical force alone."""
-    return _with_column(wrench, FZ, wrench[:, FZ] * (1.0 + hidden.size))
+    """On the vertical force alone, of the target or of every plate."""
+    mine = hidden.target in (None, plate)
+    return _with_column(wrench, FZ, wrench[:, FZ] * (1.0 + mine * hidden.size))
 
 
 def _crosstalk(
@@ -214,6 +253,7 @@ _CHANNELS: dict[str, Callable[..., np.ndarray]] = {
 }
 _OTHERS: dict[str, Callable[[Hidden, Motion], Changes]] = {
     "delay": _delay,
+    "clock": _clock,
     "shift": _shift,
     "yaw": _yaw,
     "marker": _marker,
@@ -221,5 +261,6 @@ _OTHERS: dict[str, Callable[[Hidden, Motion], Changes]] = {
     "worn": _worn,
     "dropped": _dropped,
     "touch": _touch,
+    "wobble": _wobble,
     "tether": _tether,
 }

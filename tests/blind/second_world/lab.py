@@ -124,11 +124,12 @@ class Lab:
         wrenches = []
         for number, (force, moment) in enumerate(self._on_plates(found)):
             plate = self.plates[number]
-            late = np.clip(times - self.delay_s - changes.delay_s, 0.0, t[-1])
+            late = times * (1.0 - changes.fast) - self.delay_s - changes.delay_s
+            late = np.clip(late, 0.0, t[-1])
             wrench = at_sensors(plate, CubicSpline(t, np.hstack([force, moment]))(late))
             wrench[:, 2] *= plate.gain
-            if changes.channels is not None:
-                wrench = changes.channels(wrench, times, number, full_n)
+            for channels in changes.channels:
+                wrench = channels(wrench, times, number, full_n)
             mains = np.outer(np.sin(2.0 * np.pi * _MAINS_HZ * times + number), _MAINS)
             wrenches.append(wrench + self._noise(plate, len(times), rng) + mains)
         corners = tuple(self._stated_corners(plate, changes) for plate in self.plates)

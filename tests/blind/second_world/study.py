@@ -38,8 +38,10 @@ def write_study(folder: Path, case: Case) -> None:
     skin = Skin(landmarks, lab.labels, rng, jolting=_JOLTING if case.jolting else 0.0)
     for task in ("static", "sequence", *case.tasks):
         motion = moving(task, body, lab.fine_hz, rng, wide=equipment.two_plates)
-        touched = case.hidden is not None and case.hidden.is_in(task)
-        changes = changes_of(case.hidden, motion) if touched else Changes()
+        changes = Changes()
+        for hidden in case.hidden:
+            if hidden.is_in(task):
+                changes = changes.with_others(changes_of(hidden, motion))
         found = balanced(motion, changes.loads)
         if task == "static":
             skin.rest(found.poses)

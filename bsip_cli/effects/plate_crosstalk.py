@@ -6,14 +6,22 @@ import numpy as np
 
 from bsip_cli.effects.channel_words import OF_A_PLATE
 from bsip_cli.effects.effect import Effect, Parameter
-from bsip_cli.effects.plate_frame import CHANNELS, in_plate, in_world, loaded_plates, plate_of
-from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.plate_frame import (
+    ALL,
+    CHANNELS,
+    in_plate,
+    in_world,
+    loaded_alone_or_all,
+    plates_of,
+)
+from bsip_cli.effects.scene import Plate, Scene
 
 MOST = 0.08  # makers state 1 to 3 %; what leaks more is no crosstalk
 
 
 class PlateCrosstalk(Effect):
-    """A horizontal force channel also shows a part of another force channel."""
+    """A force channel also shows a part of another one, in one plate or, with the same amplifiers
+    and no calibration, in all."""
 
     name = "plate_crosstalk"
     of_the_lab = True
@@ -22,7 +30,7 @@ class PlateCrosstalk(Effect):
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
         pairs = [(a, b) for a in CHANNELS[:3] for b in CHANNELS[:3] if a != b]
-        return tuple(f"{p} {a}>{b}" for p in loaded_plates(scene) for a, b in pairs)
+        return tuple(f"{p} {a}>{b}" for p in loaded_alone_or_all(scene) for a, b in pairs)
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         return (Parameter("coefficient", "1", -MOST, MOST, 0.02),)
@@ -30,16 +38,22 @@ class PlateCrosstalk(Effect):
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         name, pair = target.rsplit(" ", 1)
         source, sink = (CHANNELS.index(c) for c in pair.split(">"))
-        plate = plate_of(scene, name)
-        reading = in_plate(plate, np.nan_to_num(plate.wrench))
-        change = np.zeros_like(reading)
-        change[:, sink] = values[0] * reading[:, source]
-        return in_world(plate, change)
+        leaks = (_leak(plate, source, sink) for plate in plates_of(scene, name))
+        return values[0] * np.sum(list(leaks), axis=0)
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         name, pair = target.rsplit(" ", 1)
         source, sink = pair.split(">")
+        whose = "all plates" if name == ALL else f"plate {name}"
         return (
-            f"{100 * values[0]:+.1f} % of {OF_A_PLATE[source]} of plate {name} leaks into "
+            f"{100 * values[0]:+.1f} % of {OF_A_PLATE[source]} of {whose} leaks into "
             f"{OF_A_PLATE[sink]}"
         )
+
+
+def _leak(plate: Plate, source: int, sink: int) -> np.ndarray:
+    """(N, 6) if all of one channel leaked into another."""
+    reading = in_plate(plate, np.nan_to_num(plate.wrench))
+    change = np.zeros_like(reading)
+    change[:, sink] = reading[:, source]
+    return in_world(plate, change)

@@ -101,6 +101,14 @@ def test_crosstalk(source, sink):
     np.testing.assert_allclose(change, too_much, atol=1e-8)
 
 
+def test_crosstalk_of_all_plates_is_that_of_each():
+    effect, size, scene = PlateCrosstalk(), np.array([0.02]), moving()
+    assert "all fz>fx" in effect.targets(scene)
+    each = [effect.change(scene, f"{plate} fz>fx", size) for plate in (1, 2)]
+    np.testing.assert_allclose(effect.change(scene, "all fz>fx", size), sum(each))
+    assert "of all plates leaks" in effect.sentence(scene, "all fz>fx", size)
+
+
 def test_an_offset_in_fz_makes_everybody_heavier():
     scene = scene_with(lambda r: r)[0]
     change = PlateZero().change(scene, "1 fz", np.array([9.80665]))

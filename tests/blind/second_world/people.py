@@ -183,6 +183,13 @@ LATER = (
         replace(MEDIAL, plate_type=3),
         hidden=(Hidden("yaw", -2.0),),
     ),
+    Case("yaw-of-both", Somebody(412, "M", 78.0, 1.79), TWO, hidden=(Hidden("yaw", 2.5),)),
+    Case(
+        "crosstalk-of-both",
+        Somebody(413, "F", 63.0, 1.68),
+        replace(MEDIAL_TWO, rate_hz=120),
+        hidden=(Hidden("crosstalk", -0.02, 0),),
+    ),
     Case(
         "dropped-by-left",
         Somebody(406, "F", 57.0, 1.62),

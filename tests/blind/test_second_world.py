@@ -133,6 +133,19 @@ def test_what_wobbles_swings_on_and_weighs_nothing_more(body):
     assert np.abs(force[times > 2.8]).max() < 0.5
 
 
+def test_a_bent_spine_moves_the_trunk_less_below(body):
+    motion = moving("squat", body, 500.0, np.random.default_rng(SEED), False, LENGTH_S)
+    straight = balanced(motion, rounds=2).poses
+    changes_of(Hidden("bend", 0.5), motion)
+    bent = balanced(motion, rounds=2).poses
+    for poses, same in ((straight, True), (bent, False)):
+        apart = np.abs(poses.rotations["torso"] - poses.rotations["abdomen"]).max()
+        assert bool(apart < 1e-12) is same
+        spine = body.joints_m["spine"]
+        above, below = (poses.points_m(s, spine) for s in ("torso", "abdomen"))
+        np.testing.assert_allclose(above, below, atol=1e-12)
+
+
 def test_a_fast_clock_is_later_and_later(body, found):
     fast = changes_of(Hidden("clock", 3000), found.motion)
     null, early = (recorded(body, found, lab_of(), one) for one in (Changes(), fast))

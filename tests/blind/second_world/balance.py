@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import solve_banded
 from scipy.ndimage import gaussian_filter1d
 
-from second_world.body import SEGMENTS, Body
+from second_world.body import Body
 from second_world.kinematics import Poses, poses_of
 from second_world.motion import Foot, Motion
 from second_world.smooth import about_z, turned
@@ -82,8 +82,8 @@ def ground_wrench(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Force [N] and moment about the lab's origin [N m], (N, 3) each."""
     momentum, angular, first_moment = (np.zeros((len(times_s), 3)) for _ in range(3))
-    for segment in SEGMENTS:
-        mass, R = body.masses_kg[segment], poses.rotations[segment]
+    for segment, mass in body.masses_kg.items():
+        R = poses.rotations[segment]
         com = poses.points_m(segment, body.coms_m[segment])
         velocity = rate_of(com, times_s)
         inertia = R @ body.inertias_kgm2[segment] @ R.transpose(0, 2, 1)

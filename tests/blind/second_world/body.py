@@ -76,6 +76,7 @@ _NECK_BELOW_VERTEX = 0.249
 _HALF_HIPS = {"M": 0.084, "F": 0.087}
 HALF_SHOULDERS = {"M": 0.176, "F": 0.160}
 _LUMBAR = (-0.022, 0.0, 0.108)  # the one joint of the trunk, about L4/L5, from between the hips
+_SPINE, _BELOW, _WAIST_M = 0.33, 0.13, 0.11  # way to the neck, part of the torso's mass, radius
 _NECK_AHEAD = -0.012
 _HEAD_AHEAD = 0.018
 # Standard deviations of people about the table [m], [rad] and of logarithms.
@@ -100,7 +101,9 @@ class Body:
 
     scale : stature over that of the table. lengths_m : by row of the table. joints_m : (3,) by name
     (``lumbar``, ``neck``, ``hip_r``, ``shoulder_r``, ...) in the frame of the segment above it
-    (hips, lumbar: pelvis; neck, shoulders: torso). masses_kg, coms_m (3,), inertias_kgm2 (3, 3)
+    (hips, lumbar: pelvis; spine, neck, shoulders: torso). The abdomen, from lumbar to spine, is the
+    part of the torso that may turn less; its frame is the torso's while the spine is straight.
+    masses_kg, coms_m (3,), inertias_kgm2 (3, 3)
     about the centre of mass: by segment, in its frame.
     """
 
@@ -153,6 +156,7 @@ def draw_body(sex: str, mass_kg: float, height_m: float, rng: np.random.Generato
     for segment in SEGMENTS:
         masses[segment] *= factor
         inertias[segment] *= factor
+    _split_torso(joints, masses, coms, inertias)
     return Body(sex, mass_kg, height_m, scale, lengths, joints, masses, coms, inertias)
 
 
@@ -239,6 +243,27 @@ def _torso(
         d = place - com
         inertia += _inertia(row, length) + row.mass * (d @ d * np.eye(3) - np.outer(d, d))
     return mass, com, inertia
+
+
+def _split_torso(
+    joints: dict[str, np.ndarray],
+    masses: dict[str, float],
+    coms: dict[str, np.ndarray],
+    inertias: dict[str, np.ndarray],
+) -> None:
+    """The abdomen, a cylinder, and what it leaves of the torso, in place."""
+    joints["spine"] = _SPINE * joints["neck"]
+    whole, mass = coms["torso"], masses["torso"]
+    below, low = _BELOW * mass, 0.5 * joints["spine"]
+    high = (mass * whole - below * low) / (mass - below)
+    long = np.linalg.norm(joints["spine"])
+    across = below * (3.0 * _WAIST_M**2 + long**2) / 12.0
+    own = np.diag([across, across, 0.5 * below * _WAIST_M**2])
+    apart = low - high
+    pair = below * (mass - below) / mass * (apart @ apart * np.eye(3) - np.outer(apart, apart))
+    masses["abdomen"], coms["abdomen"], inertias["abdomen"] = below, low, own
+    masses["torso"], coms["torso"] = mass - below, high
+    inertias["torso"] = inertias["torso"] - own - pair
 
 
 def _vary(

@@ -127,7 +127,7 @@ class Wobble:
 
 
 def changes_of(hidden: Hidden, motion: Motion) -> Changes:
-    """What a hidden effect changes in a trial; a touch also keeps the motion's arm still."""
+    """What a hidden effect changes in a trial; a touch and a bend change the motion itself."""
     if hidden.effect in _CHANNELS:
         return Changes(channels=(partial(_CHANNELS[hidden.effect], hidden),))
     return _OTHERS[hidden.effect](hidden, motion)
@@ -179,6 +179,11 @@ def _touch(hidden: Hidden, motion: Motion) -> Changes:
 
 def _wobble(hidden: Hidden, motion: Motion) -> Changes:
     return Changes(loads=(Wobble(hidden.target, np.zeros(3), hidden.size),))
+
+
+def _bend(hidden: Hidden, motion: Motion) -> Changes:
+    motion.at_spine = hidden.size
+    return Changes()
 
 
 def _tether(hidden: Hidden, motion: Motion) -> Changes:
@@ -262,5 +267,6 @@ _OTHERS: dict[str, Callable[[Hidden, Motion], Changes]] = {
     "dropped": _dropped,
     "touch": _touch,
     "wobble": _wobble,
+    "bend": _bend,
     "tether": _tether,
 }

@@ -40,9 +40,11 @@ def poses_of(motion: Motion, shift_m: np.ndarray) -> Poses:
     feet = {side: foot_pose(body, foot) for side, foot in motion.feet.items()}
     R["pelvis"] = _in_turn(q["pelvis_yaw"], q["pelvis_pitch"], q["pelvis_roll"])
     origins["pelvis"] = _pelvis_course(motion, shift_m, R["pelvis"], feet)
-    bent = about_y(q["trunk_pitch"]) @ about_x(q["trunk_roll"]) @ about_z(q["trunk_yaw"])
-    R["torso"] = R["pelvis"] @ bent
-    origins["torso"] = poses.points_m("pelvis", body.joints_m["lumbar"])
+    R["abdomen"] = R["pelvis"] @ _bent(motion, 1.0 - motion.at_spine)
+    R["torso"] = R["abdomen"] @ _bent(motion, motion.at_spine)
+    origins["abdomen"] = poses.points_m("pelvis", body.joints_m["lumbar"])
+    spine = body.joints_m["spine"]
+    origins["torso"] = poses.points_m("abdomen", spine) - turned(R["torso"], spine)
     R["head"] = R["torso"] @ _in_turn(q["neck_yaw"], q["neck_pitch"], q["neck_roll"])
     origins["head"] = poses.points_m("torso", body.joints_m["neck"])
     for side in SIDES:
@@ -59,6 +61,12 @@ def foot_pose(body: Body, foot: Foot) -> tuple[np.ndarray, np.ndarray]:
     raised = turned(heading @ about_y(foot.heel_rad), body.ball_m)
     ankle = flat + turned(heading, body.ball_m) - raised
     return heading @ about_y(foot.pitch_rad + foot.heel_rad), ankle
+
+
+def _bent(motion: Motion, part: float) -> np.ndarray:
+    """A part of the trunk's turn."""
+    pitch, roll, yaw = (part * motion.q[f"trunk_{name}"] for name in ("pitch", "roll", "yaw"))
+    return about_y(pitch) @ about_x(roll) @ about_z(yaw)
 
 
 def _in_turn(yaw: np.ndarray, pitch: np.ndarray, roll: np.ndarray) -> np.ndarray:

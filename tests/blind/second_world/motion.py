@@ -42,7 +42,8 @@ class Motion:
 
     q : (N,) per name of COORDINATES [m, rad], about standing upright. weight_right : share of the
     weight that the right foot is to carry. ahead_m : of the centre of pressure before the feet's
-    middle. bounce_m : of the pelvis, on top of what the legs allow.
+    middle. bounce_m : of the pelvis, on top of what the legs allow. at_spine : part of the trunk's
+    turn that happens above the waist.
     """
 
     def __init__(
@@ -63,6 +64,7 @@ class Motion:
         self.weight_right = 0.5 + 0.02 * still * self._slow(0.3)
         self.ahead_m = 0.008 * still * self._slow(0.4)
         self.bounce_m = np.zeros(len(self.t))
+        self.at_spine = 0.0
 
     def add(self, name: str, course: np.ndarray) -> None:
         """To a coordinate."""

@@ -210,6 +210,8 @@ LATER = (
         ONE,
         hidden=(Hidden("slip", (0.025, 0.0, 0.0), "LMALL", "squat"),),
     ),
+    Case("second-bend", Somebody(414, "M", 74.0, 1.77), ONE, hidden=(Hidden("bend", 0.5),)),
+    Case("slight-bend", Somebody(415, "F", 66.0, 1.72), MEDIAL_TWO, hidden=(Hidden("bend", 0.3),)),
     Case(
         "delay-and-worn",
         Somebody(409, "M", 85.0, 1.88),

@@ -221,11 +221,10 @@ _ODD = """
 - `figaroh_human`: the forces are late by 7 to 10 ms in every component (9 ms in the vertical one,
   standard error 1 ms; 7, 9, 8, 8 and 10 ms in fifths of the trial), 0.27 of a frame, by regression
   of the measured on the simulated forces and the measured ones' derivative. The diagnosis
-  names 13 ms, half as much again; why is not known. A mean horizontal force of 5.2 N beside a
-  weight of 925 N is a plate or a lab that tilts by 0.3 degrees; the diagnosis says 0.5, of the lab,
-  of the plate, or as an offset of the moment that makes up for it. From 45.6 s on RWRA and RWRB
-  bear each other's labels: `ik` puts them right. Markers smoothed beforehand smear that exchange,
-  and it is told as two that slip.
+  names 9 ms. A mean horizontal force of 5.2 N beside a weight of 925 N is a plate or a lab that
+  tilts by 0.3 degrees; the diagnosis says 0.5, of the lab, of the plate, or as an offset of the
+  moment that makes up for it. From 45.6 s on RWRA and RWRB bear each other's labels: `ik` puts
+  them right. Markers smoothed beforehand smear that exchange, and it is told as two that slip.
 - Recordings that are refused have labels that no shipped marker set knows.
 """
 

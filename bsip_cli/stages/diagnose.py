@@ -57,7 +57,8 @@ def run(unit: Unit) -> None:
     asked = _asked(unit, moving_trials(unit, person, prior), standing)
     if asked.selection and standing and _agrees(asked.selection, prior, standing[1]):
         as_read = prior_of(unit, person, weight_share(standing[1]))
-        asked = _asked(unit, moving_trials(unit, person, as_read), standing)
+        again = _asked(unit, moving_trials(unit, person, as_read), standing)
+        asked = max(again, asked, key=_causes)
     told = (*(f for one in asked.looked_at for f in one.told), *_weighed(unit, standing))
     for sentence in filter(None, (one.left_out for one in asked.looked_at)):
         unit.warn(sentence)
@@ -95,6 +96,10 @@ def _asked(
     only_motion_weighs = _is_weighed(unit) and standing is None
     first, weighed = _weighed_moving(evidence) if only_motion_weighs else (None, ())
     return Asked(looked_at, select(signatures_of(evidence, ASKED), rng, first), weighed, rng)
+
+
+def _causes(asked: Asked) -> int:
+    return len(asked.selection.fit.explanations) if asked.selection else 0
 
 
 def _agrees(selection: Selection, prior: Prior, standing: Scene) -> bool:

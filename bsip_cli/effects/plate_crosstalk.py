@@ -7,11 +7,11 @@ import numpy as np
 from bsip_cli.effects.channel_words import OF_A_PLATE
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.plate_frame import (
-    ALL,
     CHANNELS,
     in_plate,
     in_world,
     loaded_alone_or_all,
+    plates_called,
     plates_of,
 )
 from bsip_cli.effects.scene import Plate, Scene
@@ -44,9 +44,8 @@ class PlateCrosstalk(Effect):
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         name, pair = target.rsplit(" ", 1)
         source, sink = pair.split(">")
-        whose = "all plates" if name == ALL else f"plate {name}"
         return (
-            f"{100 * values[0]:+.1f} % of {OF_A_PLATE[source]} of {whose} leaks into "
+            f"{100 * values[0]:+.1f} % of {OF_A_PLATE[source]} of {plates_called(name)} leaks into "
             f"{OF_A_PLATE[sink]}"
         )
 

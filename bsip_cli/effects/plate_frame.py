@@ -40,9 +40,14 @@ def plates_of(scene: Scene, name: str) -> tuple[Plate, ...]:
     return tuple(plate_of(scene, one) for one in names)
 
 
+def plates_called(name: str) -> str:
+    """``plate 1`` or ``all plates``."""
+    return "all plates" if name == ALL else f"plate {name}"
+
+
 def plates_that(name: str, does: str, do: str) -> str:
     """``plate 1 does`` or ``all plates do``."""
-    return f"all plates {do}" if name == ALL else f"plate {name} {does}"
+    return f"{plates_called(name)} {do if name == ALL else does}"
 
 
 def in_plate(plate: Plate, wrench: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bsip_cli.body.names import SEGMENTS
+from bsip_cli.effects.plate_frame import plates_called
 from bsip_cli.report.words import number, segment_label
 
 _FORCES = (
@@ -108,7 +109,7 @@ def _plate_label(target: str) -> str:
     """Of ``1 fx>fy``, ``1 fz`` or ``1``."""
     name, _, channels = target.rpartition(" ") if " " in target else (target, "", "")
     words = " into ".join(_CHANNELS.get(channel, channel) for channel in channels.split(">"))
-    where = "all plates" if name == "all" else f"plate {name}"
+    where = plates_called(name)
     return f"{where}, {words}" if words else where
 
 

@@ -130,12 +130,14 @@ def test_the_fitted_side_does_not_know_the_simulator():
 def test_stages_do_not_know_each_other():
     """They meet in files; two reports share their writing of files."""
     helpers = {
+        "stages.diagnosis_facts",
         "stages.diagnosis_rows",
         "stages.found_causes",
         "stages.frames",
         "stages.gain_rows",
         "stages.identification_problem",
         "stages.known_loads",
+        "stages.moving_trials",
         "stages.person_values",
         "stages.reconstructed",
         "stages.report",

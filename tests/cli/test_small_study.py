@@ -32,6 +32,7 @@ from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages import diagnose
 from bsip_cli.stages.frames import person_from
+from bsip_cli.stages.moving_trials import prior_of
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study import load_study
 from bsip_cli.unit import Unit
@@ -547,7 +548,7 @@ def test_warnings_are_told_and_kept(run, bsip):
 
 def test_trials_too_short_to_diagnose_are_named(run, monkeypatch):
     """The squat has 3 s, not all of them valid; were 5 needed, the sequence alone would do."""
-    monkeypatch.setattr("bsip_cli.stages.diagnose._SHORTEST_S", 5.0)
+    monkeypatch.setattr("bsip_cli.stages.moving_trials.SHORTEST_S", 5.0)
     run.path("diagnosis").unlink()
     outcome = run.perform("diagnose")
     assert outcome.state == "done"
@@ -557,7 +558,7 @@ def test_trials_too_short_to_diagnose_are_named(run, monkeypatch):
 
 
 def test_where_no_trial_is_long_enough_nobody_says_that_nothing_is_wrong(run, monkeypatch):
-    monkeypatch.setattr("bsip_cli.stages.diagnose._SHORTEST_S", 500.0)
+    monkeypatch.setattr("bsip_cli.stages.moving_trials.SHORTEST_S", 500.0)
     run.path("diagnosis").unlink()
     outcome = run.perform("diagnose")
     assert outcome.state == "done"
@@ -573,13 +574,13 @@ def test_a_static_trial_off_the_plates_weighs_nobody(run):
     unit = unit_of(run, "diagnose", stem)
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    name, scene = diagnose._standing(unit, person, diagnose.prior_of(unit, person))
+    name, scene = diagnose._standing(unit, person, prior_of(unit, person))
     assert name == stem and scene.valid.any()
     path = run.path("wrench", stem)
     wrench, notes = read_artifact(path, "wrench"), read_header(path)["provenance"]
     write_artifact(path, "wrench", wrench.assign(valid=False), notes)
     unit = unit_of(run, "diagnose", f"sub-01_{TRIALS[1]}")
-    assert diagnose._standing(unit, person, diagnose.prior_of(unit, person)) is None
+    assert diagnose._standing(unit, person, prior_of(unit, person)) is None
 
 
 @pytest.fixture
@@ -587,7 +588,6 @@ def judged_by(monkeypatch) -> list[float | None]:
     """By what part of the stated mass the one differs against which a diagnosis judges; nothing
     for the stated mass."""
     shares: list[float | None] = []
-    prior_of = diagnose.prior_of
 
     def noted(unit, person, share=None):
         shares.append(share)
@@ -646,7 +646,7 @@ def residuals_seen(run: Run) -> np.ndarray:
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     (squat,) = (t for t in unit.trials("kinematics") if t.stem == f"sub-01_{TRIALS[1]}")
-    scene = scene_of(unit, person, diagnose.prior_of(unit, person).phi, squat)
+    scene = scene_of(unit, person, prior_of(unit, person).phi, squat)
     assert scene.residual_m is not None
     return scene.residual_m
 

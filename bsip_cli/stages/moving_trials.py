@@ -1,0 +1,148 @@
+"""Moving trials as the diagnosis asks them, and what each tells by itself beforehand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from zlib import crc32
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.body.person import Person
+from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
+from bsip_cli.diagnosis.findings import Finding
+from bsip_cli.diagnosis.held_out import FOLDS
+from bsip_cli.diagnosis.marker_proof import Proof, Slip, proofs_of
+from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
+from bsip_cli.diagnosis.support import support_of
+from bsip_cli.diagnosis.together import together
+from bsip_cli.effects.marker_shift import BEFORE_S
+from bsip_cli.identification.prior import Prior
+from bsip_cli.schemas import bsip_names
+from bsip_cli.stages.frames import acceleration_noise
+from bsip_cli.stages.identification_problem import prior_from
+from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.study import Trial
+from bsip_cli.unit import Unit
+
+SHORTEST_S = 2.0
+# Of the spreads an offset is judged against: 17 mm for a marker that is trusted to 5.
+_FAR_OFF = 3.5
+_READ_TO_PERCENT = 0.3  # standard deviation of what the same plates read in another trial
+
+
+@dataclass(frozen=True)
+class LookedAt:
+    """A moving trial: its evidence, if there is enough to ask; what it tells by itself; of that the
+    causes in full that the forces show too; or why it is left out."""
+
+    evidence: TrialEvidence | None = None
+    told: tuple[Finding, ...] = ()
+    causes: tuple[dict, ...] = ()
+    left_out: str = ""
+
+
+def moving_trials(unit: Unit, person: Person, prior: Prior) -> tuple[LookedAt, ...]:
+    """The evidence of trials that move, and what hands or markers tell of them beforehand."""
+    moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
+    return tuple(
+        _looked_at(unit, person, prior, trial, f"M{k}") for k, trial in enumerate(moving, start=1)
+    )
+
+
+def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:
+    """Of the parameters, none of which is taken for known; the plates' gain shows against a mass
+    that a scale has told.
+
+    share : by what part of the stated mass the plates read more, where they are believed instead.
+    """
+    stated_sd = unit.config.diagnosis.stated_mass_sd_percent
+    sd_percent = stated_sd if share is None else _READ_TO_PERCENT
+    known = {"total_mass_sd_percent": sd_percent} if is_weighed(unit) else {}
+    table = unit.read("regression").copy()
+    table[[name for name in bsip_names() if not name.startswith("com")]] *= 1 + (share or 0.0)
+    none = np.zeros(len(person.skeleton.segments), dtype=bool)
+    return prior_from(unit, table, person, none, **known)
+
+
+def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial, class_id: str) -> LookedAt:
+    """class_id : of what its markers do not tell apart."""
+    scene = scene_of(unit, person, prior.phi, trial)
+    measured_s = float(scene.valid.sum()) / scene.rate_hz
+    if measured_s < SHORTEST_S:
+        return LookedAt(
+            left_out=f"{trial.stem}: has no part in the diagnosis: every contact is on a plate for "
+            f"{measured_s:.2f} s only, {SHORTEST_S:g} s are needed"
+        )
+    fewer = slow(scene)
+    held = support_of(fewer)
+    if held is not None:
+        return LookedAt(told=(held.finding(trial.stem),))
+    options = unit.config.diagnosis
+    rng = np.random.default_rng(crc32(trial.stem.encode()))
+    own = own_nuisances(fewer, options.skin_factor, options.skin_draws, rng)
+    shared = shared_nuisances(fewer, prior.root, options.marker_sd_m)
+    heavier = _heavier(prior, shared.shape[2]) if is_weighed(unit) else None
+    level = acceleration_noise(unit.read("kinematics", trial), person.skeleton)
+
+    def evidence_with(nuisances: np.ndarray) -> TrialEvidence:
+        return trial_evidence(
+            trial.stem, scene, nuisances, shared, level, options.cutoff_hz, heavier
+        )
+
+    proofs = proofs_of(fewer, _slips(unit, trial), rng)
+    if not proofs:
+        return LookedAt(evidence_with(own))
+    alone = together((evidence_with(own),))
+    gains = [one.gain(alone) for one in proofs]
+    told = tuple(
+        one.finding(fewer, trial.stem, class_id, gain)
+        for one, gain in zip(proofs, gains, strict=True)
+    )
+    beside = np.concatenate([own, *(one.columns(fewer) for one in proofs)], axis=2)
+    causes = tuple(
+        _proven(one, trial)
+        for one, gain in zip(proofs, gains, strict=True)
+        if gain.is_real() and not one.is_rival
+    )
+    return LookedAt(evidence_with(beside), told, causes)
+
+
+def _heavier(prior: Prior, count: int) -> np.ndarray:
+    """(count,) how many standard deviations of the stated mass shared nuisances of unit variance,
+    the parameters first, make the body heavier."""
+    masses = prior.root[::10].sum(axis=0) / prior.total_mass_sd_kg
+    return np.pad(masses, (0, count - len(masses)))
+
+
+def _slips(unit: Unit, trial: Trial) -> list[Slip]:
+    """Markers off their places that the inverse kinematics has found, a slip's before those of
+    the whole trial."""
+    events = unit.read("marker-events", trial)
+    slips = events["kind"] == "slip"
+    throughout = (events["kind"] == "offset") & (events["statistic"] > _FAR_OFF)
+    return [*_off(events[slips]), *_off(events[throughout], before_s=BEFORE_S)]
+
+
+def _off(events: pd.DataFrame, before_s: float = 0.0) -> list[Slip]:
+    columns = (events[name] for name in ("marker", "start_s", "statistic"))
+    return [Slip(str(m), float(t) - before_s, float(z)) for m, t, z in zip(*columns, strict=True)]
+
+
+def _proven(one: Proof, trial: Trial) -> dict:
+    """A cause in full, with the same sizes for every fold: no plate helped to find them."""
+    values = one.values.tolist()
+    return {
+        "effect": one.effect.name,
+        "target": one.target,
+        "trials": [trial.stem],
+        "verdict": "named" if one.is_alone else "ambiguous",
+        "values": values,
+        "folds": [values] * FOLDS,
+        "bounds": {},
+    }
+
+
+def is_weighed(unit: Unit) -> bool:
+    assert unit.participant is not None
+    return unit.participant.mass_kg is not None

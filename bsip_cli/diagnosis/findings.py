@@ -16,6 +16,7 @@ from bsip_cli.diagnosis.judging import NAMELESS_LEAST, NAMELESS_WORTH, Tried
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.selection import Round, Selection
 from bsip_cli.diagnosis.together import Evidence
+from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 
 Verdict = Literal["named", "ambiguous", "rejected"]
 _MOMENTS = {"start", "end", "from_time", "release_time"}
@@ -248,11 +249,11 @@ def numbers_of(reported: Reported, drawn: Sequence[Reported]) -> tuple[Number, .
 def interval_words(numbers: tuple[Number, ...]) -> str:
     """Of the surest size, with the digits that its interval deserves."""
     first = max(_sizes(numbers), key=lambda x: abs(x.value) / max(x.high - x.low, 1e-12))
-    width = max(first.high - first.low, 1e-12)
-    digits = max(0, int(np.ceil(1 - np.log10(width))))
-    unit = "" if first.unit == "1" else f" {first.unit}"
-    low, high = (f"{x:.{digits}f}" for x in (first.low, first.high))
-    return f" ({first.name.replace('_', ' ')}: 95 % interval {low} to {high}{unit})"
+    factor, unit = readable_unit(first.name, first.unit)
+    low, high = factor * first.low, factor * first.high
+    digits = digits_of(high - low if high > low else factor * first.value)
+    interval = with_unit(f"{low:.{digits}f} to {high:.{digits}f}", unit)
+    return f" ({first.name.replace('_', ' ')}: 95 % interval {interval})"
 
 
 def _sizes(numbers: tuple[Number, ...]) -> list[Number]:

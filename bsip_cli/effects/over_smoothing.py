@@ -59,8 +59,8 @@ class OverSmoothing(Effect):
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return (
-            f"the markers were smoothed at about {effective_cutoff_hz(values):.1f} Hz before they "
-            "were delivered"
+            "the markers were low-passed with a cut-off near "
+            f"{effective_cutoff_hz(values):.1f} Hz before they were delivered"
         )
 
 

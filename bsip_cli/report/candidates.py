@@ -9,13 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.report.effect_words import (
     MAIN_NUMBERS,
-    digits_of,
     effect_title,
     parameter_label,
     place_label,
-    readable_unit,
     unnamed_label,
 )
 from bsip_cli.report.words import listing, number, trial_label
@@ -50,8 +49,7 @@ class Number:
         if not signed and low * high > 0:
             low, high = sorted((abs(low), abs(high)))
         digits = digits_of(high - low if high > low else factor * self.value)
-        space = "" if unit == "°" else " "
-        return f"{number(low, digits)} to {number(high, digits)}{space}{unit}".strip()
+        return with_unit(f"{number(low, digits)} to {number(high, digits)}", unit)
 
     def certainty(self) -> float:
         """Its size over the width of its interval; 0 where none is known."""

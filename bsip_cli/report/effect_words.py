@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.effects.plate_frame import plates_called
+from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.report.words import number, segment_label
 
 _FORCES = (
@@ -28,6 +29,10 @@ _PERSON = (
 _LOAD = (
     "What is not stated as a load ends up in the masses of the body: state it in study.toml "
     "([[loads]]) or leave it out of the recording, and run again."
+)
+WEIGHT = (
+    "Either the stated mass is wrong or what the plates measure: weigh the person first. Only if a "
+    "scale confirms the stated mass are the plates at fault, or something that is carried."
 )
 _CONTACT = (
     "The plates do not carry all of the ground force: leave these frames out, or record without "
@@ -172,32 +177,8 @@ def parameter_label(effect: str, parameter: str) -> str:
     return _PARTS.get(parameter, "")
 
 
-_SCALES = {"rad": (57.29577951308232, "°"), "m": (1000.0, "mm")}
-_PLAIN_NUMBERS = ("damping_ratio",)
-
-
-def readable_unit(parameter: str, unit: str) -> tuple[float, str]:
-    """Factor and unit in which people read a parameter."""
-    if parameter == "delay":
-        return 1000.0, "ms"
-    if parameter == "rate_error":
-        return 1e6, "ppm"
-    if unit == "1":
-        return (1.0, "") if parameter in _PLAIN_NUMBERS else (100.0, "%")
-    return _SCALES.get(unit, (1.0, unit))
-
-
 def size_words(parameter: str, unit: str, size: float) -> str:
     """``2.5 ms`` with two digits that count."""
     factor, readable = readable_unit(parameter, unit)
     value = factor * size
-    space = "" if readable == "°" else " "
-    return f"{number(value, digits_of(value))}{space}{readable}".strip()
-
-
-def digits_of(width: float) -> int:
-    """Decimals that leave two digits of a number of this size."""
-    if not abs(width) > 0:
-        return 1
-    exponent = int(f"{abs(width):e}".split("e")[1])
-    return max(0, 1 - exponent)
+    return with_unit(number(value, digits_of(value)), readable)

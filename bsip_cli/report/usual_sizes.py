@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bsip_cli.report.effect_words import readable_unit
+from bsip_cli.effects.readable import readable_unit, with_unit
 
 
 @dataclass(frozen=True)
@@ -44,5 +44,4 @@ def usual_words(effect: str) -> str:
     """``5 to 20 ms``."""
     usual = USUAL[effect]
     factor, unit = readable_unit(usual.parameters[0], usual.unit)
-    space = "" if unit == "°" else " "
-    return f"{factor * usual.least:.3g} to {factor * usual.most:.3g}{space}{unit}"
+    return with_unit(f"{factor * usual.least:.3g} to {factor * usual.most:.3g}", unit)

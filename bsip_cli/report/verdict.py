@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.candidates import UNNAMED, Candidate, candidates_of, causes_of
-from bsip_cli.report.effect_words import EFFECT_WORDS
+from bsip_cli.report.effect_words import EFFECT_WORDS, WEIGHT
 from bsip_cli.report.limits import OF_THE_WEIGHT, limits_of, limits_sentence, looked_at
 from bsip_cli.report.separating import separating_recording
 from bsip_cli.report.words import (
@@ -100,7 +100,7 @@ def headline(diagnosis: pd.DataFrame) -> str:
 
 def _seen_in(everywhere: Sequence[str]) -> tuple[str, ...]:
     names = [trial_label(stem) for stem in everywhere]
-    return (f"Looked at: {listing(names)}.",) if names else ()
+    return (f"Movements looked at: {listing(names)}.",) if names else ()
 
 
 # --- a cause ----------------------------------------------------------------------------------
@@ -233,8 +233,7 @@ def consequences(causes: Sequence[Sequence[Candidate]]) -> tuple[str, ...]:
     """What the causes mean for the reader, each once and with the numbers of its causes."""
     numbers: dict[str, list[int]] = {}
     for k, cause in enumerate(causes, start=1):
-        known = (EFFECT_WORDS[one.effect] for one in cause if one.effect in EFFECT_WORDS)
-        for text in dict.fromkeys(words.consequence for words in known):
+        for text in _consequences_of(cause):
             numbers.setdefault(text, []).append(k)
     if len(causes) == 1:
         return tuple(numbers)
@@ -242,6 +241,13 @@ def consequences(causes: Sequence[Sequence[Candidate]]) -> tuple[str, ...]:
         f"{'Cause' if len(of) == 1 else 'Causes'} {listing([str(k) for k in of])}: {text}"
         for text, of in numbers.items()
     )
+
+
+def _consequences_of(cause: Sequence[Candidate]) -> tuple[str, ...]:
+    if cause[0].class_id == OF_THE_WEIGHT:
+        return (WEIGHT,)
+    known = (EFFECT_WORDS[one.effect] for one in cause if one.effect in EFFECT_WORDS)
+    return tuple(dict.fromkeys(words.consequence for words in known))
 
 
 def _named_twice(causes: Sequence[Sequence[Candidate]]) -> str:

@@ -481,7 +481,7 @@ def posturography() -> pd.DataFrame:
 def diagnosis(trials: list[str]) -> pd.DataFrame:
     """A turned plate (named), two rivals in the last trial, and a rejected wobbling mass."""
     everywhere, last = ", ".join(trials), trials[-1]
-    turned = "plate 1 is turned by +2.0 degrees (yaw: 95 % interval 0.0305 to 0.0395 rad)"
+    turned = "plate 1 is turned by +2.0 degrees (yaw: 95 % interval 1.75 to 2.26°)"
     alike = "; other causes look alike here: to tell them apart, pray"
     return pd.DataFrame(
         [

@@ -71,7 +71,7 @@ def test_what_only_the_markers_prove_says_so(found):
 def test_a_trial_of_which_something_was_told_before_is_looked_at_too(found):
     leaning = found[found["rank"] == 1].assign(trials="sub-01_task-stairs", rank=9)
     text = text_of(pd.concat([found, leaning]), detection(TRIALS))
-    assert "Looked at: basketball (run 1), sequence (run 1) and stairs." in text
+    assert "Movements looked at: basketball (run 1), sequence (run 1) and stairs." in text
     assert "only in sequence (run 1) and basketball (run 1)" in text
     standing = leaning.assign(class_id="W")
     assert "stairs" not in text_of(pd.concat([found, standing]), detection(TRIALS))[-400:]
@@ -104,6 +104,8 @@ def test_what_quiet_standing_tells_gives_its_advice_once(found):
     text = text_of(rows, detection(TRIALS))
     assert "cannot tell apart, in static: (a) the plates read 60.0 kg" in text
     assert "weigh it" not in text and text.count("tell them apart") == 1
+    assert "Either the stated mass is wrong or what the plates measure" in text
+    assert "The measured forces are not the true ones" not in text
 
 
 def test_a_marker_has_the_interval_of_its_distance(found):
@@ -138,7 +140,7 @@ def test_nothing_wrong(found):
     said = verdict_of(pd.concat([first, none]), detection(TRIALS))
     assert not said.found
     assert said.headline == "Nothing is wrong above the noise."
-    assert said.paragraphs()[1] == "Looked at: basketball (run 1) and sequence (run 1)."
+    assert said.paragraphs()[1] == "Movements looked at: basketball (run 1) and sequence (run 1)."
     assert said.paragraphs()[2].endswith("might have gone unseen in these recordings.")
 
 
@@ -293,7 +295,7 @@ def test_gains_lead_with_what_improves():
 
 
 def test_the_verdict_tells_gains_where_they_are(found):
-    looked = "Looked at: basketball (run 1) and sequence (run 1)."
+    looked = "Movements looked at: basketball (run 1) and sequence (run 1)."
     told = verdict_of(found, detection(TRIALS), gains()).results
     assert told == (gain_sentence(gains()), looked)
     advice, where = verdict_of(found, detection(TRIALS)).results

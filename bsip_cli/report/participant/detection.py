@@ -32,8 +32,8 @@ def blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
             "Each limit is the size that would be found in 95 of 100 recordings like these, while "
             "the inertial parameters and the cause's other numbers stay free; none is below a "
             "quarter of the cause's typical size, since nothing smaller is named. Smaller errors "
-            "may be there. Causes that were found have no limit; exchanged labels and smoothed markers have "
-            "none in a unit that could be told.",
+            "may be there. Causes that were found have no limit, and none is given "
+            "for exchanged labels and smoothed markers.",
             "note",
         )
     )

@@ -147,7 +147,9 @@ def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
         capital(f"{one.what()}; rejected: {reason}" if reason else one.told()),
         one.where(),
         percent(one.p_value, 1) if one.p_value >= LEAST_TOLD else "< 0.1",
-        f"{number(gain, 1)} ({number(low, 1)} to {number(high, 1)})",
+        f"{number(gain, 1)} ({number(low, 1)} to {number(high, 1)})"
+        if np.isfinite(gain)
+        else "not tested",
     )
 
 

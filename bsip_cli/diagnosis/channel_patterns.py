@@ -7,7 +7,7 @@ from scipy.ndimage import median_filter
 from scipy.signal import find_peaks
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.diagnosis.pattern import UNEXPLAINED, Pattern, in_channel
+from bsip_cli.diagnosis.pattern import UNEXPLAINED, Pattern, course_of, in_channel
 from bsip_cli.effects.channel_words import OF_THE_LAB, unit_of
 from bsip_cli.effects.effect import Parameter
 from bsip_cli.effects.plate_frame import CHANNELS
@@ -72,7 +72,7 @@ def _lines_hz(scene: Scene, channel: str, slowest: float, fastest: float) -> np.
 
 
 def _computed_lines_hz(scene: Scene, channel: str, slowest: float, fastest: float) -> np.ndarray:
-    residual = (scene.measured - scene.predicted)[:, CHANNELS.index(channel)]
+    residual = course_of(scene, scene.measured - scene.predicted, channel)
     course = np.where(scene.valid, np.nan_to_num(residual), 0.0)
     course = np.where(scene.valid, course - course[scene.valid].mean(), 0.0)
     count = 2 * len(course)
@@ -178,14 +178,14 @@ class Play(ChannelPattern):
         widths = _PLAYS[unit]
         return (
             Parameter("error", unit, -1e3, 1e3, _SMALL[unit]),
-            Parameter("play", unit, 0.1 * widths[0], 3 * widths[-1], widths[0], widths),
+            Parameter("play", unit, 0.1 * widths[0], 3 * widths[-1], 0.5 * widths[0], widths),
         )
 
     def spacing(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         return values[1:] / 2
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        course = scene.predicted[:, CHANNELS.index(target)]
+        course = course_of(scene, scene.predicted, target)
         behind = with_play(course, float(values[1])) - course
         return in_channel(scene, target, values[0] * behind / (0.5 * values[1]))
 
@@ -218,7 +218,7 @@ class Lag(ChannelPattern):
         return (Parameter("delay", "s", -0.5, 0.5, 0.02),)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        course = scene.predicted[:, CHANNELS.index(target)]
+        course = course_of(scene, scene.predicted, target)
         return in_channel(scene, target, -values[0] * np.gradient(course) * scene.rate_hz)
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
@@ -233,7 +233,7 @@ class Warming(ChannelPattern):
         return (Parameter("change_of_gain", "1", -1.0, 1.0, 0.04),)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        course = scene.predicted[:, CHANNELS.index(target)]
+        course = course_of(scene, scene.predicted, target)
         return in_channel(scene, target, values[0] * (_through(scene) - 0.5) * course)
 
     def goes_along_with(self, target: str, values: np.ndarray) -> str:

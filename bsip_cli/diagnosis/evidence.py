@@ -47,8 +47,7 @@ class Filter:
 
     def __call__(self, wrench: np.ndarray) -> np.ndarray:
         """(n, 6, k) of world wrenches (N, 6, k) about the origin: moments about the reference."""
-        known = np.nan_to_num(wrench)
-        flat = self.operator @ known.reshape(len(known), -1)
+        flat = self.operator @ wrench.reshape(len(wrench), -1)
         filtered = flat.reshape(len(self.frames), 6, -1)
         filtered[:, 3:] -= np.cross(self.reference_m, filtered[:, :3], axisb=1, axisc=1)
         return filtered

@@ -57,7 +57,8 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
     """All candidates that were looked at in full: those kept first, with their rivals."""
     evidence = selection.signatures.evidence
     kept = list(_kept(evidence, selection))
-    said = {_key(cause.explanation) for _, cause, _ in kept}
+    causes = {_key(cause.explanation) for _, cause, _ in kept}
+    said = set(causes)
     findings, without_size = [], []
     told: set[int] = set()
     names = (a + b for a, b in product(("", *_LETTERS), _LETTERS))  # A, B, ... Z, AA, AB ...
@@ -67,11 +68,12 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
         if not _has_size(evidence, draws):
             without_size.append(_rejected(evidence, cause, numbers, "its size may as well be none"))
             continue
-        rivals = []
-        for rival in cause.rivals:
-            if _key(rival.explanation) not in said and not _same(rival, cause):
-                rivals.append(rival)
-                said.add(_key(rival.explanation))
+        rivals = [
+            rival
+            for rival in cause.rivals
+            if _key(rival.explanation) not in causes and not _same(rival, cause)
+        ]
+        said.update(_key(rival.explanation) for rival in rivals)
         class_id = next(names) if rivals else ""
         remedy = cause.explanation.effect.remedy
         findings.append(_finding(evidence, cause, numbers, class_id, remedy))

@@ -28,7 +28,7 @@ LOOKING = 1.0
 def with_likely_noise(signatures: Signatures, before: Fit) -> tuple[Signatures, Fit]:
     """Signatures and fit in the coordinates of the noise beside a fit and the likeliest else."""
     looking, beside = noise_beside_fit(signatures, before, floor=LOOKING)
-    return noise_beside_fit(signatures, before, _likely_changes(looking, beside))
+    return noise_beside_fit(signatures, beside, _likely_changes(looking, beside))
 
 
 def noise_beside_fit(

@@ -66,7 +66,7 @@ class MissingJoint(Effect):
         return tuple(Parameter(axis, "1", -0.5, 1.5, 0.3, known_to=SHARE) for axis in AXES)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        return scene.once(self.name, lambda: _wrenches(scene, target)) @ values
+        return scene.once((self.name, target), lambda: _wrenches(scene, target)) @ values
 
     def marker_change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         errors = _errors(scene, target) @ values
@@ -79,7 +79,8 @@ class MissingJoint(Effect):
         """Range of the second bend about each axis: its part of the turn that the pose would have
         without it."""
         i = scene.person.skeleton.index(target)
-        turn = _turn(scene, i) - _dragged(scene, target, i) @ values
+        key = (self.name, target, "dragged")
+        turn = _turn(scene, i) - scene.once(key, lambda: _dragged(scene, target, i)) @ values
         ranges = np.ptp(turn[:, list(AXES.values())], axis=0) * values
         return tuple((axis, "rad", float(x)) for axis, x in zip(AXES, ranges, strict=True))
 

@@ -30,9 +30,10 @@ class OverSmoothing(Effect):
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         cutoffs = tuple(f for f in CUTOFFS_HZ if CORNER * f < 0.4 * scene.rate_hz)
+        most = min(12.0, 0.45 * scene.rate_hz / CORNER)
         return (
             Parameter("share", "1", 0.0, 2.0, 1.0),
-            Parameter("cutoff", "Hz", 0.5, 12.0, 0.5, cutoffs, known_to=FILTERS_HZ),
+            Parameter("cutoff", "Hz", 0.5, most, 0.5, cutoffs, known_to=FILTERS_HZ),
         )
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:

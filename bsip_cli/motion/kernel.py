@@ -437,7 +437,8 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
 
 @njit(cache=True)
 def solve_frames(markers, q_first, tree, task, max_steps, q_out, residual_out, sd_out, steps_out):
-    """Least-squares pose of every frame, each started from the last.
+    """Least-squares pose of every frame, each started from the last that shows a marker: without
+    one the prior leads to the neutral pose, from which others may end in a wrong optimum.
 
     markers (N, m, 3) [m], NaN where missing; q_first (nq,). Fills q_out (N, nq), residual_out
     (N, m) [m], sd_out (N, nv) (standard deviation of each coordinate, given those nearer to the
@@ -445,10 +446,13 @@ def solve_frames(markers, q_first, tree, task, max_steps, q_out, residual_out, s
     """
     nv = tree.v_segments.size
     residuals, L = np.empty((task.weights.size, 3)), np.zeros((nv, nv))
-    q = q_first.copy()
+    q, last = q_first.copy(), q_first.copy()
     for frame in range(markers.shape[0]):
         steps_out[frame] = _solve_frame(q, markers[frame], tree, task, max_steps, residuals, L)
         q_out[frame] = q
+        if np.isnan(markers[frame]).all():
+            q[:] = last
+        last[:] = q
         for k in range(nv):
             sd_out[frame, k] = 1.0 / L[k, k]
         for m in range(task.weights.size):

@@ -43,8 +43,9 @@ def run(unit: Unit) -> None:
     standing = _standing(unit, person, prior)
     asked = _asked(unit, moving_trials(unit, person, prior), standing)
     if asked.selection and standing and _agrees(asked.selection, prior, standing[1]):
-        as_read = prior_of(unit, person, weight_share(standing[1]))
-        again = _asked(unit, moving_trials(unit, person, as_read), standing)
+        heavier_by = weight_share(standing[1])
+        as_read = prior_of(unit, person, heavier_by)
+        again = _asked(unit, moving_trials(unit, person, as_read), standing, heavier_by)
         asked = max(again, asked, key=_causes)
     told = (*(f for one in asked.looked_at for f in one.told), *_weighed(unit, standing))
     for sentence in filter(None, (one.left_out for one in asked.looked_at)):
@@ -64,25 +65,33 @@ def run(unit: Unit) -> None:
 @dataclass(frozen=True)
 class Asked:
     """Trials that move, what the selection made of their evidence, if there is any, and what they
-    say of the stated mass; the generator goes on from there."""
+    say of the stated mass; the generator goes on from there.
+
+    heavier_by : part of the stated mass by which the body is taken to be heavier.
+    """
 
     looked_at: tuple[LookedAt, ...]
     selection: Selection | None
     weighed: tuple[Finding, ...]
     rng: np.random.Generator
+    heavier_by: float = 0.0
 
 
 def _asked(
-    unit: Unit, looked_at: tuple[LookedAt, ...], standing: tuple[str, Scene] | None
+    unit: Unit,
+    looked_at: tuple[LookedAt, ...],
+    standing: tuple[str, Scene] | None,
+    heavier_by: float = 0.0,
 ) -> Asked:
     rng = np.random.default_rng(crc32(unit.name.encode()))
     trials = tuple(one.evidence for one in looked_at if one.evidence is not None)
     if not trials:
-        return Asked(looked_at, None, (), rng)
+        return Asked(looked_at, None, (), rng, heavier_by)
     evidence = together(trials)
     only_motion_weighs = is_weighed(unit) and standing is None
     first, weighed = _weighed_moving(evidence) if only_motion_weighs else (None, ())
-    return Asked(looked_at, select(signatures_of(evidence, ASKED), rng, first), weighed, rng)
+    selection = select(signatures_of(evidence, ASKED), rng, first)
+    return Asked(looked_at, selection, weighed, rng, heavier_by)
 
 
 def _causes(asked: Asked) -> int:
@@ -112,6 +121,7 @@ def _answer(
     facts["trials"] = list(dict.fromkeys([*facts["trials"], *_trials_of(told)]))
     proven = [cause for one in asked.looked_at for cause in one.causes]
     facts["causes"] = [*proven, *facts["causes"]]
+    facts["heavier_by"] = asked.heavier_by
     names = tuple(one.name for one in selection.signatures.evidence.trials)
     return rows_of((*told, *findings), names), detection_rows(selection), facts
 

@@ -17,7 +17,9 @@ def rows_of(findings: tuple[Finding, ...], trials: tuple[str, ...]) -> pd.DataFr
     that says so."""
     rows = []
     if trials and all(one.verdict == "rejected" for one in findings):
-        rows.append(nothing(findings[0].p_value if findings else np.nan, trials))
+        rows.append(
+            nothing(pd.Series([one.p_value for one in findings], dtype=float).min(), trials)
+        )
     first = len(rows) + 1
     for rank, one in enumerate(findings, start=first):
         rows += [_row(rank, one, number) for number in one.numbers]

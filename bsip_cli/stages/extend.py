@@ -14,7 +14,7 @@ from bsip_cli.identification.uncertainty import readable
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.verdict import change_sentence
 from bsip_cli.report.words import segment_label
-from bsip_cli.stages.found_causes import causes_of
+from bsip_cli.stages.found_causes import body_beside, causes_of
 from bsip_cli.stages.frames import bsip_table, person_from
 from bsip_cli.stages.identification_problem import (
     estimate_by,
@@ -65,7 +65,7 @@ def _extended(
 ) -> pd.DataFrame:
     """Rows of ``bsip`` per number of causes in the model."""
     methods, parameters = parameters_of(bsip, person)
-    phi = parameters[:, methods.index("RM")]  # beside which the diagnosis has sized the causes
+    phi = body_beside(unit, parameters[:, methods.index("RM")])
     concerned = {stem for cause in causes for stem in cause.trials}
     scenes = {t.stem: scene_of(unit, person, phi, t) for t in trials if t.stem in concerned}
     rows = bsip[bsip["method"] == "OM"]

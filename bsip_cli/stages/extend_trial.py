@@ -15,7 +15,7 @@ from bsip_cli.diagnosis.cause import Blocks, Cause, method_of, unseen_change_by
 from bsip_cli.diagnosis.corrected_wrench import corrected_wrench, is_of_the_forces
 from bsip_cli.diagnosis.error_gain import BlockErrors, block_errors
 from bsip_cli.effects.scene import Scene
-from bsip_cli.stages.found_causes import blocks_of, causes_of
+from bsip_cli.stages.found_causes import blocks_of, body_beside, causes_of
 from bsip_cli.stages.frames import WRENCH, person_from
 from bsip_cli.stages.gain_rows import gain_rows
 from bsip_cli.stages.known_loads import load_phi
@@ -81,10 +81,10 @@ def _nothing(unit: Unit) -> None:
 def _scene(
     unit: Unit, person: Person, extended: pd.DataFrame
 ) -> tuple[Scene, dict[str, np.ndarray]]:
-    """The trial with RM's parameters, beside which the diagnosis has sized the causes; those
-    (10 n,) of OM and of each extended model, loads included."""
+    """The trial with the body beside which the causes were sized; parameters (10 n,) of OM and of
+    each extended model, loads included."""
     methods, phi = parameters_of(pd.concat([unit.read("bsip"), extended]), person)
-    scene = scene_of(unit, person, phi[:, methods.index("RM")])
+    scene = scene_of(unit, person, body_beside(unit, phi[:, methods.index("RM")]))
     carried = phi + load_phi(unit, person)[:, None]
     return scene, dict(zip(methods, carried.T, strict=True))
 

@@ -27,6 +27,12 @@ def causes_of(unit: Unit) -> tuple[Cause, ...]:
     )
 
 
+def body_beside(unit: Unit, phi: np.ndarray) -> np.ndarray:
+    """(10 n,) the body beside which the causes were sized: RM's (10 n,), made as heavy as the
+    plates read where the diagnosis believes them instead of the stated mass."""
+    return phi * (1 + unit.facts("overall-diagnosis")["heavier_by"])
+
+
 def blocks_of(unit: Unit, stem: str) -> Blocks:
     """How the diagnosis cut a trial that it looked at."""
     facts = unit.facts("overall-diagnosis")

@@ -207,11 +207,11 @@ def test_without_what_it_amends_it_waits(run):
 # --- other causes -------------------------------------------------------------------------------
 
 
-def diagnose_instead(run: Run, *causes: dict) -> None:
-    """As if the diagnosis had named these."""
+def diagnose_instead(run: Run, *causes: dict, heavier_by: float = 0.0) -> None:
+    """As if the diagnosis had named these, of a body heavier than stated."""
     path = run.path("overall-diagnosis")
     notes = read_header(path)["provenance"]
-    notes["facts"]["causes"] = list(causes)
+    notes["facts"] |= {"causes": list(causes), "heavier_by": heavier_by}
     write_artifact(path, "overall-diagnosis", run.read("overall-diagnosis"), notes)
     states = [run.perform(EXTEND[0]).state]
     states += [run.perform(EXTEND[1], stem).state for stem in (SEQUENCE, SQUAT, STATIC)]
@@ -271,6 +271,19 @@ def test_a_mass_sits_where_the_diagnosis_found_it(run):
     expected, other = (change[method][kept, 4].mean() for method in ("RM", "OM"))
     assert abs(expected - other) > 0.2
     assert moment == pytest.approx(expected, abs=0.05)
+
+
+def test_a_cause_is_taken_off_the_body_that_the_diagnosis_believed_in(run):
+    """A lab that tilts pulls at one as heavy as the plates read, not as stated."""
+    changes = []
+    for heavier_by in (0.0, 0.1):
+        tilted = cause("gravity_tilt", "", [0.0, 0.02], SQUAT)
+        diagnose_instead(run, tilted, heavier_by=heavier_by)
+        table = run.read("reconstruction", SQUAT)
+        table = table[table["valid"]].groupby("method")["fx_N"].mean()
+        changes.append(table["OM+gravity_tilt"] - table["OM"])
+    assert abs(changes[0]) > 5
+    assert changes[1] / changes[0] == pytest.approx(1.1, rel=1e-3)
 
 
 def test_om_is_extended_by_the_estimator_that_made_it(run):

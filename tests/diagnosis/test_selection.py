@@ -269,6 +269,23 @@ def test_a_fault_of_one_trial_is_not_put_on_the_other():
     assert (one.effect, one.target, one.trials) == ("plate_zero", "2 fx", ("b",))
 
 
+def test_a_rival_of_two_causes_makes_a_class_with_each():
+    """Neither is named for certain because the other's class has told the rival already."""
+    zero = EFFECTS["plate_zero"]
+    offset = with_effect(part_of_moving(0, 8), zero, "1 fx", OFFSET_N)
+    chosen = selection_of(noisy(offset, 0), noisy(late(part_of_moving(8, 8), DELAY_S), 1))
+    causes = {one.kept.explanation.effect for one in chosen.rounds if one.kept is not None}
+    tried = (t for one in chosen.rounds for t in one.tried)
+    rival = next(t for t in tried if t.explanation.effect not in causes)
+    both = (
+        one if one.kept is None else replace(one, kept=replace(one.kept, rivals=(rival,)))
+        for one in chosen.rounds
+    )
+    found = said_of(replace(chosen, rounds=tuple(both)))
+    assert len({one.class_id for one in found}) == 2 and len(found) == 4
+    assert all(one.verdict == "ambiguous" for one in found)
+
+
 def test_what_turns_out_to_be_no_cause_does_not_hide_another_trial(monkeypatch):
     """The delay, which makes far higher scores, is let pay off nowhere: the offset is found."""
 

@@ -38,11 +38,12 @@ SLIP, BEND, CENTRE = "marker_shift", "missing_joint", "joint_centre"
 @dataclass(frozen=True)
 class Slip:
     """A marker off its place from a moment on, before the trial for throughout; unlikeliness in
-    standard deviations."""
+    standard deviations; how far off it must be, once nothing else bends the pose, to be told."""
 
     marker: str
     start_s: float
     statistic: float
+    least_m: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ def proofs_of(scene: Scene, slips: Sequence[Slip], rng: np.random.Generator) -> 
         p_value = float(chi2.sf(slip.statistic**2, 3))
         one = _sized(fewer, left, EFFECTS[SLIP], slip.marker, (slip.start_s, 0.0), rng)
         one = replace(one, p_value=p_value, share=_own_share(fewer, left, one))
-        if one.share < OWN:
+        if one.share < OWN or np.linalg.norm(one.values[:3]) < slip.least_m:
             continue
         found.append(one)
         left = left - _left(one.effect, fewer, one.target, one.values)

@@ -121,12 +121,16 @@ def _slips(unit: Unit, trial: Trial) -> list[Slip]:
     events = unit.read("marker-events", trial)
     slips = events["kind"] == "slip"
     throughout = (events["kind"] == "offset") & (events["statistic"] > _FAR_OFF)
-    return [*_off(events[slips]), *_off(events[throughout], before_s=BEFORE_S)]
+    return [*_off(events[slips]), *_off(events[throughout], BEFORE_S, _FAR_OFF)]
 
 
-def _off(events: pd.DataFrame, before_s: float = 0.0) -> list[Slip]:
-    columns = (events[name] for name in ("marker", "start_s", "statistic"))
-    return [Slip(str(m), float(t) - before_s, float(z)) for m, t, z in zip(*columns, strict=True)]
+def _off(events: pd.DataFrame, before_s: float = 0.0, least: float = 0.0) -> list[Slip]:
+    """``least``: how far off a marker must be, in the spreads that its statistic is in."""
+    columns = (events[name] for name in ("marker", "start_s", "statistic", "size_m"))
+    return [
+        Slip(str(m), float(t) - before_s, float(z), least * float(size) / float(z))
+        for m, t, z, size in zip(*columns, strict=True)
+    ]
 
 
 def _proven(one: Proof, trial: Trial) -> dict:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from zlib import crc32
 
 import numpy as np
@@ -12,7 +12,7 @@ from bsip_cli.body.person import Person
 from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.held_out import FOLDS
-from bsip_cli.diagnosis.marker_proof import Proof, Slip, proofs_of
+from bsip_cli.diagnosis.marker_proof import BEND, Proof, Slip, fitted_to_it, proofs_of
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.support import support_of
 from bsip_cli.diagnosis.together import together
@@ -45,9 +45,17 @@ class LookedAt:
 def moving_trials(unit: Unit, person: Person, prior: Prior) -> tuple[LookedAt, ...]:
     """The evidence of trials that move, and what hands or markers tell of them beforehand."""
     moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
-    return tuple(
+    looked_at = [
         _looked_at(unit, person, prior, trial, f"M{k}") for k, trial in enumerate(moving, start=1)
-    )
+    ]
+    if sum(any(told.effect == BEND for told in one.told) for one in looked_at) > 1:
+        looked_at = [_fitted_to_bends(one) for one in looked_at]
+    return tuple(looked_at)
+
+
+def _fitted_to_bends(one: LookedAt) -> LookedAt:
+    told = (fitted_to_it(told) if told.effect == BEND else told for told in one.told)
+    return replace(one, told=tuple(told))
 
 
 def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:

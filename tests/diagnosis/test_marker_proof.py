@@ -11,7 +11,8 @@ from noisy_trial import all_of, noisy
 from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.diagnosis import marker_proof
-from bsip_cli.diagnosis.marker_proof import Proof, Slip, proofs_of
+from bsip_cli.diagnosis.findings import interval_words
+from bsip_cli.diagnosis.marker_proof import Proof, Slip, fitted_to_it, proofs_of
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
 
@@ -88,6 +89,19 @@ def test_a_second_bend_of_the_trunk_is_no_joint_centre():
     low, _, high = numbers(scene, found)["flexion"]
     true = EFFECTS["missing_joint"].reported(scene, "upper_torso", np.array([0.8, 0.8, 0.8]))
     assert low < true[0][2] < high
+
+
+def test_a_bend_of_several_trials_may_be_twice_as_large():
+    scene = bent()
+    (found,) = proofs(scene)
+    alone = found.finding(scene, "a", "M1", found.gain(all_of(scene)))
+    among_others = fitted_to_it(alone)
+    for one, wider in zip(alone.numbers, among_others.numbers, strict=True):
+        assert (wider.value, wider.high) == (one.value, 2 * one.high)
+        assert wider.low == min(one.low, 2 * one.low)
+    assert interval_words(among_others.numbers) in among_others.sentence
+    assert interval_words(alone.numbers) not in among_others.sentence
+    assert "the bend may be twice as large" in among_others.sentence
 
 
 def bent() -> Scene:

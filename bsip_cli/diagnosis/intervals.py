@@ -18,9 +18,8 @@ def drawn_explanations(
     """The explanation as it might as well be: DRAWS of all parameters of all explanations.
 
     Stretches of time are drawn with replacement and everything is fitted anew by one linear step,
-    beside the same noise. The spread is never
-    less than what the nuisances leave open, which is the same in every stretch, together with
-    what no recording betters.
+    beside the same noise. The spread is never less than what the nuisances leave open, which is the
+    same in every stretch, together with what no recording betters.
     """
     tangent, mine = _tangent(evidence, fit), _columns(fit, number)
     steps = _bootstrap(evidence, fit.residual, tangent, rng)[:, mine]

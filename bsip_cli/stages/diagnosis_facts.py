@@ -61,6 +61,7 @@ def facts_of(selection: Selection, findings: tuple[Finding, ...]) -> dict:
 
 
 def detection_rows(selection: Selection) -> pd.DataFrame:
+    """The ``detection`` artifact: the smallest size of every cause that would have been found."""
     trials = selection.signatures.evidence.trials
     rows = [
         {

@@ -156,5 +156,6 @@ def _proven(one: Proof, trial: Trial) -> dict:
 
 
 def is_weighed(unit: Unit) -> bool:
+    """Whether somebody has stated the person's mass."""
     assert unit.participant is not None
     return unit.participant.mass_kg is not None

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from every_effect import assert_tangent_is_the_derivative, some, values_of
 from noisy_trial import part_of_moving
 
 from bsip_cli.diagnosis.body_patterns import Band, Drag, Spring
 from bsip_cli.diagnosis.channel_patterns import Bow, Curve, Lag, Play, Warming
-from bsip_cli.diagnosis.pattern import Pattern, course_of
+from bsip_cli.diagnosis.pattern import course_of
 from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.effects.scene import Scene, standing_place_m
 
@@ -23,18 +24,6 @@ def scene() -> Scene:
     whole = part_of_moving(0, 6)
     limited = tuple(replace(p, wrench=0.98 * p.wrench) for p in whole.plates)
     return replace(whole, plates=limited)
-
-
-def some(pattern: Pattern, scene: Scene) -> list[str]:
-    targets = pattern.targets(scene)
-    assert targets
-    return sorted({targets[0], targets[len(targets) // 2], targets[-1]})
-
-
-def values_of(pattern: Pattern, scene: Scene, target: str, size: float) -> np.ndarray:
-    """``size`` times typical, at the middle of what is scanned."""
-    parameters = pattern.parameters(scene, target)
-    return np.array([p.scan[len(p.scan) // 2] if p.scan else size * p.typical for p in parameters])
 
 
 @pytest.mark.parametrize("pattern", EVERY)
@@ -50,16 +39,7 @@ def test_nothing_at_the_null_and_more_with_the_size(pattern, scene):
 @pytest.mark.parametrize("pattern", EVERY)
 @pytest.mark.parametrize("size", [0.0, 1.0])
 def test_the_tangent_is_the_derivative(pattern, scene, size):
-    for target in some(pattern, scene):
-        values = values_of(pattern, scene, target, size)
-        tangent = pattern.tangent(scene, target, values)
-        parameters = pattern.parameters(scene, target)
-        for column, k in enumerate(k for k, p in enumerate(parameters) if not p.scan):
-            step = 1e-2 * parameters[k].typical * np.eye(len(values))[k]
-            ahead, behind = (pattern.change(scene, target, values + s * step) for s in (1, -1))
-            expected = (ahead - behind) / (2 * step[k])
-            scale = max(float(np.abs(expected).max()), 1e-9)
-            np.testing.assert_allclose(tangent[..., column], expected, atol=1e-3 * scale)
+    assert_tangent_is_the_derivative(pattern, scene, size)
 
 
 @pytest.mark.parametrize("pattern", EVERY)

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from every_effect import assert_tangent_is_the_derivative, some, values_of
 from moving_scene import moving
 from standing_person import standing
 
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
-from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Scene
 from bsip_cli.effects.wobbling_mass import WobblingMass
 from bsip_cli.motion.jacobian import marker_residuals
@@ -63,19 +63,6 @@ def scene() -> Scene:
     return scene_with_swapped_markers()
 
 
-def some(effect: Effect, scene: Scene) -> list[str]:
-    """First, middle and last target."""
-    targets = effect.targets(scene)
-    assert targets
-    return sorted({targets[0], targets[len(targets) // 2], targets[-1]})
-
-
-def values_of(effect, scene, target, size: float) -> np.ndarray:
-    """``size`` times typical, at the middle of what is scanned."""
-    parameters = effect.parameters(scene, target)
-    return np.array([p.scan[len(p.scan) // 2] if p.scan else size * p.typical for p in parameters])
-
-
 def test_the_catalogue_is_the_vocabulary():
     assert [effect.name for effect in CATALOGUE] == VOCABULARY
     assert list(EFFECTS) == VOCABULARY
@@ -95,22 +82,7 @@ def test_nothing_changes_at_the_null(effect, scene):
 @pytest.mark.parametrize("effect", EVERY)
 @pytest.mark.parametrize("size", [0.0, 1.0])
 def test_the_tangent_is_the_derivative(effect, scene, size):
-    for target in some(effect, scene):
-        values = values_of(effect, scene, target, size)
-        tangent = effect.tangent(scene, target, values)
-        at = [k for k, p in enumerate(effect.parameters(scene, target)) if not p.scan]
-        assert tangent.shape == (*scene.predicted.shape, len(at))
-        for column, k in enumerate(at):
-            step = np.zeros(len(values))
-            step[k] = 1e-2 * effect.parameters(scene, target)[k].typical
-
-            def moved(n, target=target, values=values, step=step):
-                return effect.change(scene, target, values + n * step)
-
-            far, near = moved(2) - moved(-2), moved(1) - moved(-1)
-            expected = (8 * near - far) / (12 * step[k])
-            scale = max(float(np.abs(expected).max()), 1e-9)
-            np.testing.assert_allclose(tangent[..., column], expected, atol=1e-4 * scale)
+    assert_tangent_is_the_derivative(effect, scene, size)
 
 
 @pytest.mark.parametrize("effect", EVERY)
@@ -168,6 +140,7 @@ def test_at_a_bound_it_would_go_beyond(effect, scene):
 
 def test_what_can_last():
     """Faults of the lab and facts of the person are the same in all trials; an event is not."""
+    assert all(effect.lasts == (effect.of_the_lab or effect.of_the_person) for effect in CATALOGUE)
     lasting = {name for name, effect in EFFECTS.items() if effect.lasts}
     assert {"sync_offset", "plate_gain", "added_mass", "joint_centre"} <= lasting
     assert lasting.isdisjoint({"released_object", "unmeasured_contact", "marker_shift"})

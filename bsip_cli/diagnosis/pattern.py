@@ -10,6 +10,7 @@ from abc import abstractmethod
 
 import numpy as np
 
+from bsip_cli.dynamics.regressor import move_moments
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.plate_frame import CHANNELS
 from bsip_cli.effects.scene import Scene, standing_place_m
@@ -36,15 +37,10 @@ def in_channel(scene: Scene, channel: str, course: np.ndarray) -> np.ndarray:
     """(N, 6) a course (N,) in one component of the whole wrench, about where the person stands."""
     wrench = np.zeros((len(course), 6))
     wrench[:, CHANNELS.index(channel)] = course
-    wrench[:, 3:] += np.cross(standing_place_m(scene), wrench[:, :3])
-    return wrench
+    return move_moments(wrench, -standing_place_m(scene))
 
 
 def course_of(scene: Scene, wrench: np.ndarray, channel: str) -> np.ndarray:
     """(N,) one component of a world wrench (N, 6) about the origin, moments about where the person
     stands."""
-    column = CHANNELS.index(channel)
-    if column < 3:
-        return wrench[:, column]
-    moments = wrench[:, 3:] - np.cross(standing_place_m(scene), wrench[:, :3])
-    return moments[:, column - 3]
+    return move_moments(wrench, standing_place_m(scene))[:, CHANNELS.index(channel)]

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bsip_cli.diagnosis.candidates import Candidate, candidates_of
+from bsip_cli.dynamics.regressor import move_moments
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.effect import Effect
@@ -41,8 +42,7 @@ def _blurred(scene: Scene) -> np.ndarray:
     Without it two opposite delays, or a delay and a clock, make up for what the motion lacks.
     """
     place = standing_place_m(scene)
-    course = scene.predicted.copy()
-    course[:, 3:] -= np.cross(place, course[:, :3])
+    course = move_moments(scene.predicted, place)
     bent = np.gradient(np.gradient(course, axis=0), axis=0) * scene.rate_hz**2
     columns = 0.5 * BLUR_S**2 * bent[..., None] * np.eye(6)
     columns[:, 3:] += np.cross(place, columns[:, :3], axisb=1, axisc=1)

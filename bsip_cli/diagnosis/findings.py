@@ -12,7 +12,7 @@ import numpy as np
 
 from bsip_cli.diagnosis.explanation import Explanation
 from bsip_cli.diagnosis.intervals import drawn_explanations
-from bsip_cli.diagnosis.judging import NAMELESS_LEAST, NAMELESS_WORTH, Tried
+from bsip_cli.diagnosis.judging import NAMELESS_LEAST, NAMELESS_WORTH, TINY_WORTH, Tried
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.selection import Round, Selection
 from bsip_cli.diagnosis.together import Evidence
@@ -182,7 +182,9 @@ def _why_not(tried: Tried) -> str:
         return "on data held out it does not help, or hardly"
     if tried.is_slight and tried.is_tiny:
         least = 100 * NAMELESS_LEAST
-        return f"it has no name and changes the forces by less than {least:g} % of body weight"
+        why = f"it has no name, changes the forces by less than {least:g} % of body weight"
+        enough = f"explains less than {100 * TINY_WORTH:.0f} %"
+        return f"{why}, and {enough if tried.is_first else 'another cause is there'}"
     if tried.is_slight:
         return f"it has no name and explains less than {100 * NAMELESS_WORTH:.0f} %, as skin may"
     return "another cause explains it better"

@@ -22,6 +22,8 @@ WORTH = 0.03
 NAMELESS_WORTH = 0.1  # of what has no name
 # Of body weight, moments at an arm of ARM_M: what has no name is larger, root mean square.
 NAMELESS_LEAST, ARM_M = 0.003, 0.3
+# Of the squared residual, from which on it may be smaller: 7 % at most where nothing was wrong.
+TINY_WORTH = 0.2
 # What a large cause leaves behind, since no model of it is exact, is no other cause.
 LEFTOVER = 0.005  # of the squared residual that earlier causes took from the same trials
 BESIDE = 0.75  # of what a cause explains, that another one in another trial does not
@@ -59,8 +61,12 @@ class Tried:
 
     @property
     def is_too_little_unnamed(self) -> bool:
-        """Whether it explains or changes too little to be told without a name."""
-        return self.is_tiny or self.gain.percent < 100 * NAMELESS_WORTH
+        """Whether it explains or changes too little to be told without a name. What hardly changes
+        the forces must explain the more, and never stands beside a cause."""
+        if self.is_tiny and not self.is_first:
+            return True
+        worth = TINY_WORTH if self.is_tiny else NAMELESS_WORTH
+        return self.gain.percent < 100 * worth
 
     @property
     def is_slight(self) -> bool:

@@ -15,7 +15,7 @@ from scipy.stats import chi2
 
 from bsip_cli.diagnosis.candidates import Candidate
 from bsip_cli.diagnosis.explanation import explanation_of
-from bsip_cli.diagnosis.findings import Finding, interval_words, numbers_of
+from bsip_cli.diagnosis.findings import Finding, Number, interval_words, numbers_of
 from bsip_cli.diagnosis.held_out import Gain
 from bsip_cli.diagnosis.intervals import DRAWS, SCALE_ERROR
 from bsip_cli.diagnosis.together import BLOCK_S, Evidence, clipped
@@ -33,7 +33,6 @@ OWN = 0.5  # of a marker's own squared residual: else its skin slides more than 
 RIVAL = 0.9  # of the best one's share: who explains as much cannot be told from it
 # In the simulator the bend is told 0.42 to 0.64 times as large as it is where all trials have it.
 _TAKEN_UP = 2.0
-_RESIDUAL = "squared residual"
 _UNKNOWN = (np.nan, np.nan, np.nan)
 SLIP, BEND, CENTRE = "marker_shift", "missing_joint", "joint_centre"
 
@@ -87,14 +86,23 @@ class Proof:
         blocks = np.bincount(block, saved)
         return Gain(blocks, np.ones(len(numbers), dtype=bool), float((before**2).sum()))
 
-    def finding(self, scene: Scene, trial: str, class_id: str, gain: Gain) -> Finding:
-        """As the diagnosis prints it; the class is that of causes that look alike."""
+    def finding(
+        self, scene: Scene, trial: str, class_id: str, gain: Gain, is_taken_up: bool
+    ) -> Finding:
+        """As the diagnosis prints it; the class is that of causes that look alike.
+
+        is_taken_up : ``scale`` has fitted the body to part of it.
+        """
         reported = self.effect.reported(scene, self.target, self.values)
         drawn = [self.effect.reported(scene, self.target, one) for one in self.draws]
         numbers = numbers_of(reported, drawn)
+        if is_taken_up:
+            numbers = tuple(_wider(one) for one in numbers)
         told = self.effect.sentence(scene, self.target, self.values) + interval_words(numbers)
         whose = "the marker's" if self.effect.name == SLIP else "all markers'"
-        sentence = f"{told}; this is {100 * self.share:.0f} % of {whose} {_RESIDUAL}"
+        sentence = f"{told}; this is {100 * self.share:.0f} % of {whose} squared residual"
+        if is_taken_up:
+            sentence += ", and `scale` has fitted the waist to it: the bend may be twice as large"
         if not gain.is_real():
             sentence += ", and the forces do not show it"
         if not self.is_alone:
@@ -130,18 +138,9 @@ def proofs_of(scene: Scene, slips: Sequence[Slip], rng: np.random.Generator) -> 
     return (*found, *_bends(fewer, left, rng))
 
 
-def fitted_to_it(finding: Finding) -> Finding:
-    """A second bend that several trials show: ``scale`` has put the waist between the two joints,
-    which takes up part of the bend."""
-    wider = tuple(
-        replace(
-            one, low=min(one.low, _TAKEN_UP * one.low), high=max(one.high, _TAKEN_UP * one.high)
-        )
-        for one in finding.numbers
-    )
-    told = finding.sentence.replace(interval_words(finding.numbers), interval_words(wider))
-    why = f"{_RESIDUAL}, and `scale` has fitted the waist to it: the bend may be twice as large"
-    return replace(finding, numbers=wider, sentence=told.replace(_RESIDUAL, why))
+def _wider(one: Number) -> Number:
+    low, high = min(one.low, _TAKEN_UP * one.low), max(one.high, _TAKEN_UP * one.high)
+    return replace(one, low=low, high=high)
 
 
 def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:

@@ -42,10 +42,9 @@ def run(unit: Unit) -> None:
     prior = prior_of(unit, person)
     standing = _standing(unit, person, prior)
     asked = _asked(unit, moving_trials(unit, person, prior), standing)
-    if asked.selection and standing and _agrees(asked.selection, prior, standing[1]):
-        heavier_by = weight_share(standing[1])
-        as_read = prior_of(unit, person, heavier_by)
-        again = _asked(unit, moving_trials(unit, person, as_read), standing, heavier_by)
+    if asked.selection and standing and _agrees(asked.selection, prior, standing):
+        as_read = prior_of(unit, person, standing.share)
+        again = _asked(unit, moving_trials(unit, person, as_read), standing, standing.share)
         asked = max(again, asked, key=_causes)
     told = (*(f for one in asked.looked_at for f in one.told), *_weighed(unit, standing))
     for sentence in filter(None, (one.left_out for one in asked.looked_at)):
@@ -60,6 +59,16 @@ def run(unit: Unit) -> None:
         )
     names = _trials_of(told)
     _write(unit, rows_of(told, tuple(names)), empty_table("detection"), {"trials": names})
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A static trial in which the plates carry the person, and by what part of the stated mass they
+    read more."""
+
+    stem: str
+    scene: Scene
+    share: float
 
 
 @dataclass(frozen=True)
@@ -80,7 +89,7 @@ class Asked:
 def _asked(
     unit: Unit,
     looked_at: tuple[LookedAt, ...],
-    standing: tuple[str, Scene] | None,
+    standing: Standing | None,
     heavier_by: float = 0.0,
 ) -> Asked:
     rng = np.random.default_rng(crc32(unit.name.encode()))
@@ -98,15 +107,15 @@ def _causes(asked: Asked) -> int:
     return len(asked.selection.fit.explanations) if asked.selection else 0
 
 
-def _agrees(selection: Selection, prior: Prior, standing: Scene) -> bool:
+def _agrees(selection: Selection, prior: Prior, standing: Standing) -> bool:
     """Whether beside all causes that are found the moving person is as much heavier or lighter than
     stated as the plates read in quiet standing.
 
     Then no trial is judged against the stated mass, which would make one of them seem the odd one.
     """
-    share = weight_share(standing)
+    share = standing.share
     beyond = selection.signatures.evidence.beyond_stated(selection.fit.residual)
-    moving = beyond * prior.total_mass_sd_kg / standing.mass_kg
+    moving = beyond * prior.total_mass_sd_kg / standing.scene.mass_kg
     return abs(share) >= NOTICED and abs(moving - share) < _ALIKE * abs(share)
 
 
@@ -119,7 +128,7 @@ def _answer(
     findings = tuple(sorted(findings, key=lambda one: one.verdict == "rejected"))
     facts = facts_of(selection, findings)
     facts["trials"] = list(dict.fromkeys([*facts["trials"], *_trials_of(told)]))
-    proven = [cause for one in asked.looked_at for cause in one.causes]
+    proven = [cause for one in asked.looked_at for cause in one.causes()]
     facts["causes"] = [*proven, *facts["causes"]]
     facts["heavier_by"] = asked.heavier_by
     names = tuple(one.name for one in selection.signatures.evidence.trials)
@@ -136,23 +145,24 @@ def _write(unit: Unit, diagnosis: pd.DataFrame, limits: pd.DataFrame, facts: dic
             unit.warn(f"{unit.name}: {sentence}")
 
 
-def _standing(unit: Unit, person: Person, prior: Prior) -> tuple[str, Scene] | None:
-    """Name and scene of the first static trial in which the plates carry the person."""
+def _standing(unit: Unit, person: Person, prior: Prior) -> Standing | None:
+    """The first static trial in which the plates carry the person."""
     for trial in unit.trials("kinematics", "wrench"):
         if trial.role == "static":
             scene = scene_of(unit, person, prior.phi, trial)
             if scene.valid.any():
-                return trial.stem, scene
+                return Standing(trial.stem, scene, weight_share(scene))
     return None
 
 
-def _weighed(unit: Unit, standing: tuple[str, Scene] | None) -> tuple[Finding, ...]:
+def _weighed(unit: Unit, standing: Standing | None) -> tuple[Finding, ...]:
     """What quiet standing says of the stated mass; nothing without the one or the other."""
     if standing is None or not is_weighed(unit):
         return ()
-    name, scene = standing
-    share, plate = weight_share(scene), loaded_plate([scene])
-    return stated_mass_findings(share, scene.mass_kg, plate, (name,), "in quiet standing")
+    plate, mass_kg = loaded_plate([standing.scene]), standing.scene.mass_kg
+    return stated_mass_findings(
+        standing.share, mass_kg, plate, (standing.stem,), "in quiet standing"
+    )
 
 
 def _weighed_moving(evidence: Evidence) -> tuple[Round | None, tuple[Finding, ...]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from zlib import crc32
 
@@ -11,12 +12,13 @@ import pandas as pd
 from bsip_cli.body.person import Person
 from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
 from bsip_cli.diagnosis.findings import Finding
-from bsip_cli.diagnosis.held_out import FOLDS
-from bsip_cli.diagnosis.marker_proof import BEND, Proof, Slip, fitted_to_it, proofs_of
+from bsip_cli.diagnosis.held_out import FOLDS, Gain
+from bsip_cli.diagnosis.marker_proof import BEND, Proof, Slip, proofs_of
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
 from bsip_cli.diagnosis.support import support_of
 from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.marker_shift import BEFORE_S
+from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.prior import Prior
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import acceleration_noise
@@ -32,30 +34,53 @@ _READ_TO_PERCENT = 0.3  # standard deviation of what the same plates read in ano
 
 
 @dataclass(frozen=True)
-class LookedAt:
-    """A moving trial: its evidence, if there is enough to ask; what it tells by itself; of that the
-    causes in full that the forces show too; or why it is left out."""
+class Proven:
+    """What the markers of a trial prove, and what the forces gain by it."""
 
+    proof: Proof
+    scene: Scene
+    gain: Gain
+
+
+@dataclass(frozen=True)
+class LookedAt:
+    """A moving trial: its evidence, if there is enough to ask; what its markers prove; what is told
+    of it beforehand; or why it is left out."""
+
+    trial: Trial
     evidence: TrialEvidence | None = None
+    proven: tuple[Proven, ...] = ()
     told: tuple[Finding, ...] = ()
-    causes: tuple[dict, ...] = ()
     left_out: str = ""
+
+    def causes(self) -> tuple[dict, ...]:
+        """In full, what is proven and the forces show too."""
+        shown = (one.proof for one in self.proven if one.gain.is_real())
+        return tuple(_in_full(one, self.trial) for one in shown if not one.is_rival)
 
 
 def moving_trials(unit: Unit, person: Person, prior: Prior) -> tuple[LookedAt, ...]:
     """The evidence of trials that move, and what hands or markers tell of them beforehand."""
     moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
-    looked_at = [
-        _looked_at(unit, person, prior, trial, f"M{k}") for k, trial in enumerate(moving, start=1)
-    ]
-    if sum(any(told.effect == BEND for told in one.told) for one in looked_at) > 1:
-        looked_at = [_fitted_to_bends(one) for one in looked_at]
-    return tuple(looked_at)
+    looked_at = [_looked_at(unit, person, prior, trial) for trial in moving]
+    bent = sum(any(_is_bend(proven) for proven in one.proven) for one in looked_at)
+    return tuple(
+        replace(one, told=(*one.told, *_told(one, f"M{k}", bent > 1)))
+        for k, one in enumerate(looked_at, start=1)
+    )
 
 
-def _fitted_to_bends(one: LookedAt) -> LookedAt:
-    told = (fitted_to_it(told) if told.effect == BEND else told for told in one.told)
-    return replace(one, told=tuple(told))
+def _told(one: LookedAt, class_id: str, is_everywhere: bool) -> Iterator[Finding]:
+    """What the markers prove. ``class_id``: of what they do not tell apart. ``is_everywhere``:
+    several trials show a second bend, so that ``scale`` has put the waist between two joints."""
+    for proven in one.proven:
+        is_taken_up = is_everywhere and _is_bend(proven)
+        scene, gain = proven.scene, proven.gain
+        yield proven.proof.finding(scene, one.trial.stem, class_id, gain, is_taken_up)
+
+
+def _is_bend(proven: Proven) -> bool:
+    return proven.proof.effect.name == BEND
 
 
 def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:
@@ -73,19 +98,19 @@ def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:
     return prior_from(unit, table, person, none, **known)
 
 
-def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial, class_id: str) -> LookedAt:
-    """class_id : of what its markers do not tell apart."""
+def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial) -> LookedAt:
     scene = scene_of(unit, person, prior.phi, trial)
     measured_s = float(scene.valid.sum()) / scene.rate_hz
     if measured_s < SHORTEST_S:
         return LookedAt(
+            trial,
             left_out=f"{trial.stem}: has no part in the diagnosis: every contact is on a plate for "
-            f"{measured_s:.2f} s only, {SHORTEST_S:g} s are needed"
+            f"{measured_s:.2f} s only, {SHORTEST_S:g} s are needed",
         )
     fewer = slow(scene)
     held = support_of(fewer)
     if held is not None:
-        return LookedAt(told=(held.finding(trial.stem),))
+        return LookedAt(trial, told=(held.finding(trial.stem),))
     options = unit.config.diagnosis
     rng = np.random.default_rng(crc32(trial.stem.encode()))
     own = own_nuisances(fewer, options.skin_factor, options.skin_draws, rng)
@@ -100,20 +125,11 @@ def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial, class_id:
 
     proofs = proofs_of(fewer, _slips(unit, trial), rng)
     if not proofs:
-        return LookedAt(evidence_with(own))
+        return LookedAt(trial, evidence_with(own))
     alone = together((evidence_with(own),))
-    gains = [one.gain(alone) for one in proofs]
-    told = tuple(
-        one.finding(fewer, trial.stem, class_id, gain)
-        for one, gain in zip(proofs, gains, strict=True)
-    )
+    proven = tuple(Proven(one, fewer, one.gain(alone)) for one in proofs)
     beside = np.concatenate([own, *(one.columns(fewer) for one in proofs)], axis=2)
-    causes = tuple(
-        _proven(one, trial)
-        for one, gain in zip(proofs, gains, strict=True)
-        if gain.is_real() and not one.is_rival
-    )
-    return LookedAt(evidence_with(beside), told, causes)
+    return LookedAt(trial, evidence_with(beside), proven)
 
 
 def _heavier(prior: Prior, count: int) -> np.ndarray:
@@ -141,8 +157,8 @@ def _off(events: pd.DataFrame, before_s: float = 0.0, least: float = 0.0) -> lis
     ]
 
 
-def _proven(one: Proof, trial: Trial) -> dict:
-    """A cause in full, with the same sizes for every fold: no plate helped to find them."""
+def _in_full(one: Proof, trial: Trial) -> dict:
+    """A cause with the same sizes for every fold: no plate helped to find them."""
     values = one.values.tolist()
     return {
         "effect": one.effect.name,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bsip_cli.diagnosis.explanation import Fit
 from bsip_cli.diagnosis.held_out import Gain
-from bsip_cli.diagnosis.judging import Tried, stands_beside
+from bsip_cli.diagnosis.judging import NAMELESS_WORTH, TINY_WORTH, Tried, stands_beside
 
 ROWS = 400
 NO_GAIN = Gain(np.zeros(1), np.ones(1, dtype=bool), 1.0)
@@ -41,3 +43,18 @@ def test_the_image_of_a_cause_does_not_stand_beside_it():
     image = with_course(slight + course(2), residual)
     before = Fit((), residual, np.zeros((ROWS, 0)))
     assert not stands_beside(image, with_course(slight, residual), before)
+
+
+@pytest.mark.parametrize("first", [True, False])
+@pytest.mark.parametrize(("tiny", "least"), [(False, NAMELESS_WORTH), (True, TINY_WORTH)])
+def test_what_hardly_changes_the_forces_explains_the_more_and_stands_alone(tiny, least, first):
+    """Without a name."""
+    one = replace(with_course(course(1), course(1)), is_tiny=tiny, is_first=first)
+    gains = (of(factor * least) for factor in (0.99, 1.01))
+    told = [not replace(one, gain=gain).is_too_little_unnamed for gain in gains]
+    assert told == [False, first or not tiny]
+
+
+def of(share: float) -> Gain:
+    """A gain by this share of the squared residual, the same in two blocks."""
+    return Gain(np.array([share, share]) / 2, np.ones(2, dtype=bool), 1.0)

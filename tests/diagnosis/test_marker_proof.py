@@ -11,8 +11,8 @@ from noisy_trial import all_of, noisy
 from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.diagnosis import marker_proof
-from bsip_cli.diagnosis.findings import interval_words
-from bsip_cli.diagnosis.marker_proof import Proof, Slip, fitted_to_it, proofs_of
+from bsip_cli.diagnosis.findings import Finding, interval_words
+from bsip_cli.diagnosis.marker_proof import Proof, Slip, proofs_of
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
 
@@ -42,9 +42,13 @@ def proofs(scene: Scene, *slips: Slip) -> tuple[Proof, ...]:
     return proofs_of(scene, slips, np.random.default_rng(0))
 
 
+def told(proof: Proof, scene: Scene, is_taken_up: bool = False) -> Finding:
+    return proof.finding(scene, "a", "M1", proof.gain(all_of(scene)), is_taken_up)
+
+
 def numbers(scene: Scene, proof: Proof) -> dict[str, tuple[float, float, float]]:
     (alone,) = all_of(scene).trials
-    finding = proof.finding(scene, "a", "M1", proof.gain(all_of(scene)))
+    finding = told(proof, scene)
     assert alone.name == "a" and finding.trials == ("a",)
     return {one.name: (one.low, one.value, one.high) for one in finding.numbers}
 
@@ -94,8 +98,7 @@ def test_a_second_bend_of_the_trunk_is_no_joint_centre():
 def test_a_bend_of_several_trials_may_be_twice_as_large():
     scene = bent()
     (found,) = proofs(scene)
-    alone = found.finding(scene, "a", "M1", found.gain(all_of(scene)))
-    among_others = fitted_to_it(alone)
+    alone, among_others = (told(found, scene, is_taken_up=several) for several in (False, True))
     for one, wider in zip(alone.numbers, among_others.numbers, strict=True):
         assert (wider.value, wider.high) == (one.value, 2 * one.high)
         assert wider.low == min(one.low, 2 * one.low)
@@ -120,7 +123,7 @@ def test_a_waist_that_lies_elsewhere_is_no_second_bend():
 def test_a_sentence_says_how_much_of_the_residuals_it_is():
     scene = bent()
     (found,) = proofs(scene)
-    said = found.finding(scene, "a", "M1", found.gain(all_of(scene))).sentence
+    said = told(found, scene).sentence
     assert (
         "second joint" in said
         and f"{100 * found.share:.0f} % of all markers' squared residual" in said
@@ -130,7 +133,7 @@ def test_a_sentence_says_how_much_of_the_residuals_it_is():
 def test_what_explains_as_much_makes_a_class():
     scene = bent()
     (found,) = proofs(scene)
-    rival = replace(found, is_alone=False).finding(scene, "a", "M1", found.gain(all_of(scene)))
+    rival = told(replace(found, is_alone=False), scene)
     assert (rival.verdict, rival.class_id) == ("ambiguous", "M1")
     assert "to tell them apart" in rival.sentence
 

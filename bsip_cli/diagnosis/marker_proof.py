@@ -26,9 +26,10 @@ from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH
 
 ENOUGH_HZ = 10.0  # for a course of many seconds
-# Of the markers' squared residuals, their means left out: skin that follows the bending of the
-# trunk looks like a second bend for a tenth at most.
-PROVEN = 0.25
+# Of the markers' squared residuals, their means left out. Less than PROVEN is enough where no
+# joint's centre explains a third as much: skin that follows the trunk, by 5 % at most, looks as
+# much like a waist that lies elsewhere.
+PROVEN, CLEAR, CLEARLY = 0.25, 0.06, 3.0
 OWN = 0.5  # of a marker's own squared residual: else its skin slides more than it slips
 RIVAL = 0.9  # of the best one's share: who explains as much cannot be told from it
 # In the simulator the bend is told 0.42 to 0.64 times as large as it is where all trials have it.
@@ -157,9 +158,12 @@ def _bends(scene: Scene, residual_m: np.ndarray, rng: np.random.Generator) -> tu
     """A second bend, with the joints' centres that explain as much; nothing if one explains more:
     scaling may err by that."""
     bend = next(_possible(scene, residual_m, EFFECTS[BEND], rng), None)
-    if bend is None or bend.share < PROVEN:
+    if bend is None or bend.share < CLEAR:
         return ()
-    centres = _possible(scene, residual_m, EFFECTS[CENTRE], rng)
+    centres = list(_possible(scene, residual_m, EFFECTS[CENTRE], rng))
+    is_clear = all(CLEARLY * one.share < bend.share for one in centres)
+    if bend.share < PROVEN and not is_clear:
+        return ()
     rivals = [one for one in centres if one.share > RIVAL * bend.share]
     if any(RIVAL * one.share > bend.share for one in rivals):
         return ()

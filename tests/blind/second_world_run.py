@@ -17,7 +17,7 @@ import pandas as pd
 from blind_running import DOCUMENT, ROOT, STAGES, CommandError, run_pipeline
 from blind_tables import between_marks, markdown
 from second_world.people import CASES, Case
-from second_world.study import PERSON, write_study
+from second_world.study import PERSON, drawn, write_study
 from tqdm import tqdm
 
 MARK = "tests/blind/second_world_run.py"
@@ -72,11 +72,12 @@ def rows_of(case: Case, results: Path) -> list[dict[str, str]]:
     if not path.is_file():
         return []
     hidden = " and ".join(one.in_words() for one in case.hidden) or NOTHING
+    *_, lab, _ = drawn(case)
     found = pd.read_parquet(path)
     said = found[found["verdict"].isin(["named", "ambiguous"])]
     causes = said["class_id"].where(said["class_id"] != "", said["rank"].astype(str))
     return [
-        {"case": case.name, "hidden": hidden, **in_words(rows)}
+        {"case": case.name, "hidden": hidden, "the lab's own": lab.in_words(), **in_words(rows)}
         for _, rows in said.groupby(causes, sort=False)
     ]
 

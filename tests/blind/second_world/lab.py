@@ -42,6 +42,13 @@ class Plate:
     gain: float
     calibration: np.ndarray
 
+    def in_words(self) -> str:
+        """What it errs by with nothing hidden, as the causes' numbers are given."""
+        x, y = self.misplaced_m
+        return (
+            f"x {x:.4f} m; y {y:.4f} m; yaw {self.misturned_rad:.4f} rad; gain {self.gain - 1:.4f}"
+        )
+
     @classmethod
     def drawn(
         cls, centre_m: tuple[float, float], half_m: tuple[float, float], rng: np.random.Generator
@@ -102,6 +109,11 @@ class Lab:
         one = [((0.05, 0.0), (0.45, 0.45))]
         self.plates = tuple(Plate.drawn(*p, rng) for p in (places if two_plates else one))
         self.delay_s, self.noise_m = rng.uniform(0.0, 0.0008), rng.uniform(0.0002, 0.0006)
+
+    def in_words(self) -> str:
+        """What it errs by with nothing hidden."""
+        plates = (f"plate {k}: {one.in_words()}" for k, one in enumerate(self.plates, start=1))
+        return "; ".join([f"delay {self.delay_s:.4f} s", *plates])
 
     @property
     def fine_hz(self) -> float:

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from second_world.balance import balanced
-from second_world.body import draw_body
+from second_world.body import Body, draw_body
 from second_world.c3d_file import write_c3d
 from second_world.effects import Changes, changes_of
 from second_world.lab import Lab
-from second_world.landmarks import place_landmarks
+from second_world.landmarks import Landmark, place_landmarks
 from second_world.movements import moving
 from second_world.people import Case
 from second_world.skin import Skin
@@ -23,18 +23,8 @@ _SCALES_SD_KG = 0.15
 
 def write_study(folder: Path, case: Case) -> None:
     """A study of one person; nothing in it tells what is hidden."""
-    somebody, equipment = case.somebody, case.equipment
-    rng = np.random.default_rng(somebody.seed)
-    body = draw_body(somebody.sex, somebody.mass_kg, somebody.height_m, rng)
-    landmarks = place_landmarks(body, rng)
-    lab = Lab(
-        equipment.marker_set,
-        equipment.rate_hz,
-        10 * equipment.rate_hz,
-        equipment.plate_type,
-        equipment.two_plates,
-        rng,
-    )
+    equipment = case.equipment
+    body, landmarks, lab, rng = drawn(case)
     skin = Skin(landmarks, lab.labels, rng, jolting=_JOLTING if case.jolting else 0.0)
     for task in ("static", "sequence", *case.tasks):
         motion = moving(task, body, lab.fine_hz, rng, wide=equipment.two_plates)
@@ -48,8 +38,25 @@ def write_study(folder: Path, case: Case) -> None:
         run = "" if task == "static" else "_run-1"
         path = folder / PERSON / f"{PERSON}_task-{task}{run}.c3d"
         write_c3d(path, lab.record(found, skin, changes, rng), equipment.plate_type)
-    weighed_kg = somebody.mass_kg + rng.normal(0.0, _SCALES_SD_KG)
+    weighed_kg = case.somebody.mass_kg + rng.normal(0.0, _SCALES_SD_KG)
     _write_participants(folder, case, weighed_kg)  # last: with it, a study is complete
+
+
+def drawn(case: Case) -> tuple[Body, dict[str, Landmark], Lab, np.random.Generator]:
+    """A case's person and lab, and the generator that goes on from there."""
+    somebody, equipment = case.somebody, case.equipment
+    rng = np.random.default_rng(somebody.seed)
+    body = draw_body(somebody.sex, somebody.mass_kg, somebody.height_m, rng)
+    landmarks = place_landmarks(body, rng)
+    lab = Lab(
+        equipment.marker_set,
+        equipment.rate_hz,
+        10 * equipment.rate_hz,
+        equipment.plate_type,
+        equipment.two_plates,
+        rng,
+    )
+    return body, landmarks, lab, rng
 
 
 def _write_participants(folder: Path, case: Case, weighed_kg: float) -> None:

@@ -45,9 +45,8 @@ class Plate:
     def in_words(self) -> str:
         """What it errs by with nothing hidden, as the causes' numbers are given."""
         x, y = self.misplaced_m
-        return (
-            f"x {x:.4f} m; y {y:.4f} m; yaw {self.misturned_rad:.4f} rad; gain {self.gain - 1:.4f}"
-        )
+        place = f"x {x:.4f} m; y {y:.4f} m; yaw {np.degrees(self.misturned_rad):.2f} degrees"
+        return f"{place}; gain {self.gain - 1:.4f}"
 
     @classmethod
     def drawn(

@@ -42,6 +42,14 @@ class _Recorded:
     positions: np.ndarray
 
 
+@dataclass(frozen=True)
+class _Seen:
+    """Some frames of a trial: times (n,), markers (n, m, 3) in the person's order."""
+
+    times: np.ndarray
+    markers: np.ndarray
+
+
 def run(unit: Unit) -> None:
     """Read all trials' markers; write skeleton, marker-positions and person."""
     skeleton = load_skeleton(unit.config.skeleton)
@@ -197,17 +205,10 @@ def _refine(
     elsewhere &= elsewhere.mean(axis=0) < _FEW
     if not elsewhere.any():
         return fit
-    standing = _without(standing, elsewhere[recorded.index(still)])
+    (number,) = (k for k, one in enumerate(recorded) if one is still)
+    standing = _without(standing, elsewhere[number])
     kept = [_without(one.markers, off) for one, off in zip(seen, elsewhere, strict=True)]
     return _fitted(unit, calibration, standing, kept)
-
-
-@dataclass(frozen=True)
-class _Seen:
-    """Some frames of a trial: times (n,), markers (n, m, 3) in the person's order."""
-
-    times: np.ndarray
-    markers: np.ndarray
 
 
 def _thinned(one: _Recorded, labels: tuple[str, ...]) -> _Seen:

@@ -8,7 +8,7 @@ effects and none of the regularities describe: a channel that wanders, somebody 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,7 +55,8 @@ def with_loud_noise(selection: Selection, found: Sequence[Finding]) -> tuple[Fin
     """The findings, and one per component for all trials in which it is too loud.
 
     Asked are trials in which nothing explains as much as what has no name must; what explains less
-    of one that is loud is rejected, since it would be the wrong name.
+    of one that is loud is rejected, since it would be the wrong name. So is a constant error of the
+    same channel in other trials: what wanders passes for one where it is short.
     """
     told = [one for one in found if one.verdict != "rejected" and not _is_slight(one)]
     named = {trial for one in told for trial in one.trials}
@@ -70,12 +71,18 @@ def with_loud_noise(selection: Selection, found: Sequence[Finding]) -> tuple[Fin
     trials = {one.trial for one in loud}
     channels = dict.fromkeys(one.channel for one in loud)
     return (
-        *(
-            _rejected(one) if _is_slight(one) and trials.issuperset(one.trials) else one
-            for one in found
-        ),
+        *(_rejected(one) if _is_outdone(one, trials, channels) else one for one in found),
         *(_finding([one for one in loud if one.channel == c]) for c in channels),
     )
+
+
+def _is_outdone(one: Finding, trials: set[str], channels: Iterable[str]) -> bool:
+    """Whether loud channels of these trials make it the wrong name."""
+    if one.verdict == "rejected":
+        return False
+    if trials.isdisjoint(one.trials):
+        return any(one.target.endswith(f" {channel}") for channel in channels)
+    return _is_slight(one) and trials.issuperset(one.trials)
 
 
 def _is_slight(one: Finding) -> bool:

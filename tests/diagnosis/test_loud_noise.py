@@ -94,3 +94,15 @@ def test_a_slight_cause_is_no_name_for_what_is_loud(gain, verdict):
     assert verdict == "named" or first.sentence == (
         "not so: it is late (a component of the force errs by far more)"
     )
+
+
+@pytest.mark.parametrize(("target", "verdict"), [("all fz", "rejected"), ("all fx", "named")])
+def test_what_wanders_in_one_trial_is_no_constant_gain_in_another(target, verdict):
+    effects = [EFFECTS["sync_offset"]]
+    signatures = signatures_of(all_of(noisy(part_of_moving(0, 12), 3), wandering(2)), effects)
+    numbers = (Number("gain", "1", 0.03, 0.02, 0.04),)
+    gain = Finding(
+        "plate_gain", target, ("a",), "named", "", 1e-9, (30.0, 1.0, 60.0), numbers, "too large"
+    )
+    told, loud = with_loud_noise(select(signatures, np.random.default_rng(0)), (gain,))
+    assert told.verdict == verdict and (loud.target, loud.trials) == ("fz", ("b",))

@@ -2,8 +2,9 @@
 
 Run from the checkout. Every case, with nothing or something hidden in it, goes through ``bsip`` as
 a black box, from ``ingest`` to ``diagnose``; a Markdown table tells what was hidden beside what is
-said. The recordings come from code that shares none with ``bsip_cli.simulate`` and none for forces
-with any part of ``bsip_cli``. A study or an answer that is there is not made again.
+said. With ``--seed`` people are drawn whom nobody has looked at. The recordings come from code that
+shares none with ``bsip_cli.simulate`` and none for forces with any part of ``bsip_cli``. A study or
+an answer that is there is not made again.
 """
 
 from __future__ import annotations
@@ -16,25 +17,28 @@ from pathlib import Path
 import pandas as pd
 from blind_running import DOCUMENT, ROOT, STAGES, CommandError, run_pipeline
 from blind_tables import between_marks, markdown
+from second_world.drawn_people import drawn_cases
 from second_world.people import CASES, Case
 from second_world.study import PERSON, drawn, write_study
 from tqdm import tqdm
 
 MARK = "tests/blind/second_world_run.py"
+DRAWN = f"{MARK} --seed"
 NOTHING = "nothing"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     options = parsed(arguments)
-    known = {case.name: case for case in CASES}
+    people = CASES if options.seed is None else drawn_cases(options.seed)
+    known = {case.name: case for case in people}
     if unknown := set(options.only) - set(known):
         raise SystemExit(f"no case {', '.join(sorted(unknown))}; there are {', '.join(known)}")
-    cases = [known[name] for name in options.only] or list(CASES)
+    cases = [known[name] for name in options.only] or list(people)
     with ProcessPoolExecutor(options.jobs, max_tasks_per_child=1) as pool:
         asked = [(case, options.results / case.name) for case in cases]
         problems = list(tqdm(pool.map(answer, asked), total=len(asked), unit="case"))
-    table = pd.DataFrame(row for case in CASES for row in rows_of(case, options.results))
-    between_marks(options.document, MARK, markdown(table))
+    table = pd.DataFrame(row for case in people for row in rows_of(case, options.results))
+    between_marks(options.document, MARK if options.seed is None else DRAWN, markdown(table))
     if said := [problem for problem in problems if problem]:
         raise SystemExit("\n".join(said))
 
@@ -42,11 +46,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     add = parser.add_argument
-    add("--results", type=Path, default=ROOT / "out" / "second_world", help="folder of results")
+    add("--results", type=Path, help="folder of results, for each seed its own")
     add("--document", type=Path, default=DOCUMENT, help="Markdown file that gets the table")
+    add("--seed", type=int, help="people drawn from it instead")
     add("--jobs", type=int, default=1, help="cases at once")
     add("--only", action="append", default=[], metavar="NAME", help="a case; may be repeated")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    name = "second_world" if options.seed is None else f"second_world-{options.seed}"
+    options.results = options.results or ROOT / "out" / name
+    return options
 
 
 def answer(asked: tuple[Case, Path]) -> str:

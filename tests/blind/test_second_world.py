@@ -11,11 +11,12 @@ import pytest
 from second_world.balance import GRAVITY, Balanced, balanced
 from second_world.body import SEGMENTS, Body, draw_body
 from second_world.c3d_file import TYPES, write_c3d
+from second_world.drawn_people import drawn_cases
 from second_world.effects import Changes, Hidden, Wobble, changes_of
 from second_world.lab import Lab, Recorded
 from second_world.landmarks import place_landmarks
 from second_world.movements import moving
-from second_world.people import CASES
+from second_world.people import CASES, Case
 from second_world.skin import Skin
 
 LENGTH_S, SEED = 3.0, 11
@@ -169,12 +170,18 @@ def test_two_causes_are_hidden_at_once(body, found):
     assert np.abs(one - null).max() > 10.0 and np.abs(other - null).max() > 10.0
 
 
-def test_cases_have_names_and_seeds_of_their_own():
-    assert (
-        len({case.name for case in CASES})
-        == len({case.somebody.seed for case in CASES})
-        == len(CASES)
-    )
+@pytest.mark.parametrize("cases", [CASES, drawn_cases(3)], ids=["known", "drawn"])
+def test_cases_have_names_and_seeds_of_their_own(cases: tuple[Case, ...]):
+    names = {case.name for case in cases}
+    assert len(names) == len({case.somebody.seed for case in cases}) == len(cases)
+
+
+def test_a_seed_draws_people_whom_no_other_draws():
+    """And what is hidden is in a recording that they make."""
+    one, other = drawn_cases(3), drawn_cases(4)
+    assert one == drawn_cases(3) and not {c.somebody for c in one} & {c.somebody for c in other}
+    for case in one:
+        assert {hidden.task for hidden in case.hidden} <= {None, *case.tasks}
 
 
 @pytest.mark.parametrize("file", sorted(FOLDER.glob("*.py")), ids=lambda file: file.stem)

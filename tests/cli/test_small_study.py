@@ -574,8 +574,9 @@ def test_a_static_trial_off_the_plates_weighs_nobody(run):
     unit = unit_of(run, "diagnose", stem)
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    name, scene = diagnose._standing(unit, person, prior_of(unit, person))
-    assert name == stem and scene.valid.any()
+    standing = diagnose._standing(unit, person, prior_of(unit, person))
+    assert standing is not None
+    assert standing.stem == stem and standing.scene.valid.any() and abs(standing.share) < 0.01
     path = run.path("wrench", stem)
     wrench, notes = read_artifact(path, "wrench"), read_header(path)["provenance"]
     write_artifact(path, "wrench", wrench.assign(valid=False), notes)

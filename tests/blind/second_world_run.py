@@ -80,7 +80,7 @@ def rows_of(case: Case, results: Path) -> list[dict[str, str]]:
     if not path.is_file():
         return []
     hidden = " and ".join(one.in_words() for one in case.hidden) or NOTHING
-    *_, lab, _ = drawn(case)
+    _, _, lab, _ = drawn(case)
     found = pd.read_parquet(path)
     said = found[found["verdict"].isin(["named", "ambiguous"])]
     causes = said["class_id"].where(said["class_id"] != "", said["rank"].astype(str))

@@ -14,7 +14,7 @@ from bsip_cli.simulate.study import simulate_study
 pytestmark = pytest.mark.slow
 
 MARKER, OFF_M = "LMALL", 0.03
-CHANGED = ["x_m", "y_m", "z_m"]
+PLACE = ["x_m", "y_m", "z_m"]
 
 
 def options(*tasks: str) -> StudyOptions:
@@ -48,7 +48,7 @@ def fitted(tmp_path, bsip):
 
 def place_of(folder: Path) -> np.ndarray:
     table = read_artifact(folder / "sub-01_marker-positions.parquet", "marker-positions")
-    return table.loc[table["marker"] == MARKER, CHANGED].to_numpy()[0]
+    return table.loc[table["marker"] == MARKER, PLACE].to_numpy()[0]
 
 
 def events_of(folder: Path, task: str) -> list[tuple[str, str]]:

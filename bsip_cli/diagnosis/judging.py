@@ -55,6 +55,11 @@ class Tried:
         return self.explanation.place.trials
 
     @property
+    def is_without_name(self) -> bool:
+        """Whether it has no name, and nothing that has one is like it."""
+        return self.explanation.effect.name == UNEXPLAINED and not self.rivals
+
+    @property
     def is_rare(self) -> bool:
         """Whether chance hardly ever brings as much."""
         return self.p_value <= (ALPHA if self.is_first else ALPHA_BESIDE)

@@ -61,11 +61,11 @@ class Selection:
 def select(
     signatures: Signatures, rng: np.random.Generator, first: Round | None = None
 ) -> Selection:
-    """Forward selection of up to three causes in each trial; in a trial with one that has no name
-    nothing more can be told. ``first`` is known beforehand."""
+    """Forward selection of up to three causes in each trial; in a trial with one that can only
+    be without a name nothing more can be told. ``first`` is known beforehand."""
     rounds = [first] if first is not None and first.kept is not None else []
     found: tuple[Explanation, ...] = tuple(r.kept.explanation for r in rounds if r.kept)
-    while open_trials := _open_trials(signatures.evidence, found):
+    while open_trials := _open_trials(signatures.evidence, rounds):
         before = fit_together(signatures.evidence, found)
         signatures, before = with_likely_noise(signatures, before)
         one = _round(signatures, before, open_trials, rng)
@@ -128,10 +128,11 @@ def _drowned(one: Round) -> Round:
     return replace(one, tried=tuple(tried), kept=None)
 
 
-def _open_trials(evidence: Evidence, found: tuple[Explanation, ...]) -> set[int]:
+def _open_trials(evidence: Evidence, rounds: Sequence[Round]) -> set[int]:
     """Trials that may have another cause."""
-    causes = Counter(t for one in found for t in one.place.trials)
-    unknown = {t for one in found if one.effect.name == UNEXPLAINED for t in one.place.trials}
+    kept = [one.kept for one in rounds if one.kept is not None]
+    causes = Counter(t for one in kept for t in one.trials)
+    unknown = {t for one in kept if one.is_without_name for t in one.trials}
     return {t for t in range(len(evidence.trials)) if causes[t] < MOST} - unknown
 
 

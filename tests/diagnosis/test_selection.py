@@ -261,6 +261,15 @@ def test_a_clock_that_has_jumped_before_anything_is_seen():
     assert told == {("unexplained", ("a",), "named"), *unknown}
 
 
+def test_beside_what_may_have_a_name_more_is_told():
+    """The second trial's delay may be a jump without a name, and its channel has an offset."""
+    unseen = on_plates_from(jumped(part_of_moving(0, 12), 0.03, 3.0), 4.0)
+    offset = noisy(with_effect(unseen, EFFECTS["plate_zero"], "1 fx", OFFSET_N), 3)
+    found = said_of(selection_of(noisy(jumped(part_of_moving(12, 12), 0.03, 7.0), 4), offset))
+    told = {one.effect for one in found if one.trials == ("b",)}
+    assert {"unexplained", "sync_offset", "plate_zero"} <= told
+
+
 def test_a_fault_of_one_trial_is_not_put_on_the_other():
     first, second = part_of_moving(0, 8), part_of_moving(8, 8)
     zero = EFFECTS["plate_zero"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,10 +14,8 @@ from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.calibration import Calibration, calibrate
-from bsip_cli.motion.inverse_kinematics import solve_poses, solve_trial, tree_of
-from bsip_cli.motion.marker_fit import marker_fit
-from bsip_cli.motion.marker_offsets import offsets
-from bsip_cli.motion.scaling import Refinement, ScalingOptions, refine, varied_frames
+from bsip_cli.motion.scaling import Refinement, ScalingOptions
+from bsip_cli.motion.scaling_trials import TrialMarkers, refine_over_trials
 from bsip_cli.recordings.standing_mass import PlateMass, plate_mass, rough_mass
 from bsip_cli.stages.frames import WRENCH, markers_from, ordered_markers
 from bsip_cli.stages.known_loads import load_words
@@ -27,9 +24,6 @@ from bsip_cli.unit import Unit
 
 _QUIET_S = 1.0
 _NEARLY_ALL = 0.95  # of the markers that the best second shows
-_FRAMES_PER_TRIAL = 400
-_MOST = 0.8  # of the markers
-_FEW = 0.5  # of the trials
 
 
 @dataclass(frozen=True)
@@ -40,14 +34,6 @@ class _Recorded:
     times: np.ndarray
     labels: tuple[str, ...]
     positions: np.ndarray
-
-
-@dataclass(frozen=True)
-class _Seen:
-    """Some frames of a trial: times (n,), markers (n, m, 3) in the person's order."""
-
-    times: np.ndarray
-    markers: np.ndarray
 
 
 def run(unit: Unit) -> None:
@@ -194,68 +180,23 @@ def _mean_positions(one: _Recorded, frames: slice) -> dict[str, np.ndarray]:
 def _refine(
     unit: Unit, calibration: Calibration, recorded: list[_Recorded], still: _Recorded, quiet: slice
 ) -> Refinement:
-    """Fitted to all trials; a marker that sits elsewhere in a few of them has no say there, since
-    it would drag its place in the model towards the middle."""
     labels = calibration.person.markers
-    middle = (quiet.start + quiet.stop) // 2
-    standing = ordered_markers(still.labels, still.positions[middle : middle + 1], labels)
-    seen = [_thinned(one, labels) for one in recorded]
-    fit = _fitted(unit, calibration, standing, [one.markers for one in seen])
-    elsewhere = np.array([_elsewhere(unit, fit.person, one) for one in seen])
-    elsewhere &= elsewhere.mean(axis=0) < _FEW
-    if not elsewhere.any():
-        return fit
+    trials = [
+        TrialMarkers(one.times, ordered_markers(one.labels, one.positions, labels))
+        for one in recorded
+    ]
     (number,) = (k for k, one in enumerate(recorded) if one is still)
-    standing = _without(standing, elsewhere[number])
-    kept = [_without(one.markers, off) for one, off in zip(seen, elsewhere, strict=True)]
-    return _fitted(unit, calibration, standing, kept)
-
-
-def _thinned(one: _Recorded, labels: tuple[str, ...]) -> _Seen:
-    """Of a trial, frames that show nearly all markers."""
-    stride = max(1, len(one.times) // _FRAMES_PER_TRIAL)
-    markers = ordered_markers(one.labels, one.positions[::stride], labels)
-    enough = np.isfinite(markers[..., 0]).mean(axis=1) > _MOST
-    return _Seen(one.times[::stride][enough], markers[enough])
-
-
-def _elsewhere(unit: Unit, person: Person, one: _Seen) -> np.ndarray:
-    """(m,) markers that sit elsewhere than in the model throughout a trial."""
-    if not len(one.times):
-        return np.zeros(len(person.markers), dtype=bool)
-    scales = unit.config.ik.model_dump(include={"marker_sd_m", "robust_limit_m"})
-    poses = solve_trial(person, one.markers, **_ik_options(unit))
-    fit = marker_fit(person, one.markers, poses.q, one.times, **scales)
-    off = {event.marker for event in offsets(fit, fit.residual_m) if event.kind == "offset"}
-    return np.isin(person.markers, list(off))
-
-
-def _without(markers: np.ndarray, hidden: np.ndarray) -> np.ndarray:
-    """Markers (n, m, 3) without those that are hidden (m,)."""
-    return np.where(hidden[:, None], np.nan, markers)
-
-
-def _ik_options(unit: Unit) -> dict[str, Any]:
-    return unit.config.ik.model_dump(exclude={"undetermined_sd_rad", "held_sd_rad"})
-
-
-def _fitted(
-    unit: Unit, calibration: Calibration, standing: np.ndarray, seen: list[np.ndarray]
-) -> Refinement:
-    """To the frame ``standing`` (1, m, 3) and the markers seen in the trials."""
-    options, person, ik = unit.config.scale, calibration.person, _ik_options(unit)
-    markers = [standing, *(one for one in seen if len(one))]
-    poses = [solve_poses(person, standing, calibration.q, **ik).q]
-    poses += [solve_trial(person, one, **ik).q for one in markers[1:]]
-    all_markers, all_poses = np.concatenate(markers), np.concatenate(poses)
-    orientations, _ = tree_of(person).forward(all_poses)
-    chosen = varied_frames(orientations, options.frames)
-    return refine(
-        person,
-        all_markers[chosen],
-        all_poses[chosen],
+    middle = (quiet.start + quiet.stop) // 2
+    standing = trials[number].frames(slice(middle, middle + 1))
+    options = unit.config.scale
+    return refine_over_trials(
+        calibration,
+        standing,
+        number,
+        trials,
+        options.frames,
         ScalingOptions(**options.model_dump(exclude={"frames", "may_be_held"})),
-        ik,
+        unit.config.ik.model_dump(exclude={"undetermined_sd_rad", "held_sd_rad"}),
     )
 
 

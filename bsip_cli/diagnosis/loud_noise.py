@@ -8,7 +8,7 @@ effects and none of the regularities describe: a channel that wanders, somebody 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,7 +56,8 @@ def with_loud_noise(selection: Selection, found: Sequence[Finding]) -> tuple[Fin
 
     Asked are trials in which nothing explains as much as what has no name must; what explains less
     of one that is loud is rejected, since it would be the wrong name. So is a constant error of the
-    same channel in other trials: what wanders passes for one where it is short.
+    same channel in other trials, with all that looks like it: what wanders passes for one where it
+    is short.
     """
     told = [one for one in found if one.verdict != "rejected" and not _is_slight(one)]
     named = {trial for one in told for trial in one.trials}
@@ -68,29 +69,41 @@ def with_loud_noise(selection: Selection, found: Sequence[Finding]) -> tuple[Fin
         if one.name not in named
     )
     loud = [one for one in asked if one is not None]
-    trials = {one.trial for one in loud}
     channels = dict.fromkeys(one.channel for one in loud)
     return (
-        *(_rejected(one) if _is_outdone(one, trials, channels) else one for one in found),
+        *(_rejected(one, why) if why else one for one, why in _with_reasons(found, loud)),
         *(_finding([one for one in loud if one.channel == c]) for c in channels),
     )
 
 
-def _is_outdone(one: Finding, trials: set[str], channels: Iterable[str]) -> bool:
-    """Whether loud channels of these trials make it the wrong name."""
+def _with_reasons(found: Sequence[Finding], loud: Sequence[Loud]) -> list[tuple[Finding, str]]:
+    """Each finding and why it is wrong, or nothing; a class is wrong as a whole."""
+    reasons = [_why_wrong(one, loud) for one in found]
+    both = list(zip(found, reasons, strict=True))
+    classes = {one.class_id: why for one, why in both if why and one.class_id}
+    return [(one, why or classes.get(one.class_id, "")) for one, why in both]
+
+
+def _why_wrong(one: Finding, loud: Sequence[Loud]) -> str:
+    """Why a finding is the wrong name for what is loud, in its trials or in others; or nothing."""
+    trials = {here.trial for here in loud}
     if one.verdict == "rejected":
-        return False
+        return ""
     if trials.isdisjoint(one.trials):
-        return any(one.target.endswith(f" {channel}") for channel in channels)
-    return _is_slight(one) and trials.issuperset(one.trials)
+        for other in loud:
+            if one.target.split()[1:] == [other.channel]:  # a gain, an offset, a drift: "1 fz"
+                return f"in {other.trial} {OF_THE_LAB[other.channel]} errs by far more"
+    elif _is_slight(one) and trials.issuperset(one.trials):
+        return "a component of the force errs by far more"
+    return ""
 
 
 def _is_slight(one: Finding) -> bool:
     return one.verdict != "rejected" and one.gain[0] < 100 * NAMELESS_WORTH
 
 
-def _rejected(one: Finding) -> Finding:
-    sentence = f"not so: {one.sentence} (a component of the force errs by far more)"
+def _rejected(one: Finding, why: str) -> Finding:
+    sentence = f"not so: {one.sentence} ({why})"
     return replace(one, verdict="rejected", class_id="", sentence=sentence)
 
 

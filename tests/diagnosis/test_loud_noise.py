@@ -106,3 +106,19 @@ def test_what_wanders_in_one_trial_is_no_constant_gain_in_another(target, verdic
     )
     told, loud = with_loud_noise(select(signatures, np.random.default_rng(0)), (gain,))
     assert told.verdict == verdict and (loud.target, loud.trials) == ("fz", ("b",))
+    said = "not so: too large (in b the vertical force errs by far more)"
+    assert verdict == "named" or told.sentence == said
+
+
+def test_what_looks_like_it_is_no_better_name():
+    effects = [EFFECTS["sync_offset"]]
+    signatures = signatures_of(all_of(noisy(part_of_moving(0, 12), 3), wandering(2)), effects)
+    numbers = (Number("gain", "1", 0.03, 0.02, 0.04),)
+    gain = Finding(
+        "plate_gain", "1 fz", ("a",), "ambiguous", "A", 1e-9, (30.0, 1.0, 60.0), numbers, "large"
+    )
+    mass = replace(gain, effect="added_mass", target="head")
+    other = replace(mass, class_id="B")
+    selection = select(signatures, np.random.default_rng(0))
+    verdicts = [one.verdict for one in with_loud_noise(selection, (gain, mass, other))[:3]]
+    assert verdicts == ["rejected", "rejected", "ambiguous"]

@@ -12,28 +12,7 @@ from blind_cases import CATALOGUE, OUTSIDE, SESSION, Case, Hidden, Session, long
 from blind_running import record_study
 from blind_scoring import RIGHT_NAME, Score, score
 
-VOCABULARY = {
-    "sync_offset",
-    "clock_drift",
-    "plate_translation",
-    "plate_rotation",
-    "plate_gain",
-    "plate_crosstalk",
-    "plate_zero",
-    "plate_drift",
-    "gravity_tilt",
-    "added_mass",
-    "released_object",
-    "wobbling_mass",
-    "breathing",
-    "unmeasured_contact",
-    "joint_centre",
-    "missing_joint",
-    "marker_shift",
-    "marker_swap",
-    "over_smoothing",
-    "segment_inertia",
-}
+from bsip_cli.effects.catalogue import EFFECTS
 
 
 def cases_of(sessions: list[Session]) -> list[Case]:
@@ -44,7 +23,7 @@ def test_the_long_suite_holds_enough_of_everything():
     sessions = long_suite(10, 40, 20, 5)
     cases = cases_of(sessions)
     effects = Counter(case.hidden[0].effect for case in cases if case.kind == "single")
-    assert effects == dict.fromkeys(VOCABULARY, 10)
+    assert effects == dict.fromkeys(EFFECTS, 10)
     kinds = Counter(case.kind for case in cases)
     assert kinds == {"single": 200, "null": 40, "double": 20, "outside": 24}  # three of each
     assert {c.hidden[0].effect for c in cases if c.kind == "outside"} == set(OUTSIDE)
@@ -56,7 +35,7 @@ def test_the_long_suite_holds_enough_of_everything():
 def test_the_short_suite_holds_one_of_everything():
     cases = cases_of(short_suite(5))
     effects = Counter(case.hidden[0].effect for case in cases if case.kind == "single")
-    assert effects == dict.fromkeys(VOCABULARY, 1)
+    assert effects == dict.fromkeys(EFFECTS, 1)
     kinds = Counter(case.kind for case in cases)
     assert (kinds["null"], kinds["double"], kinds["outside"]) == (3, 2, 2)
 
@@ -106,7 +85,7 @@ def test_recordings_tell_nothing_of_what_they_hide(tmp_path):
     ]
     for path in files:
         content = path.read_bytes().lower()
-        assert not any(name.encode() in content for name in (*VOCABULARY, *OUTSIDE)), path
+        assert not any(name.encode() in content for name in (*EFFECTS, *OUTSIDE)), path
     assert [one.truth["effects"][0]["effect"] for one in recorded] == ["sync_offset", "added_mass"]
     assert score(tmp_path / "out", recorded[0])[0].case == "delay"
     lengths = [one.truth["trials"][one.stems[0]]["duration_s"] for one in recorded]

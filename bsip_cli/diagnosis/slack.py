@@ -16,7 +16,7 @@ from bsip_cli.effects.gravity_tilt import GravityTilt
 from bsip_cli.effects.scene import Scene, standing_place_m
 
 SHARE = 0.02  # of the size that labs meet
-HORIZONTAL = 0.7  # the same for the gain of horizontal forces
+HORIZONTAL = 1.5  # the same for the gain of horizontal forces
 # The same for a plate's place: bodies of another table's segments look some centimetres higher or
 # lower, as far as horizontal forces tell a height.
 PLACE = (SHARE, SHARE, 1.0)

@@ -15,8 +15,10 @@ from bsip_cli.effects.plate_frame import (
     plates_that,
 )
 from bsip_cli.effects.scene import Plate, Scene
+from bsip_cli.effects.simulated_loads import with_simulated_loads
 
 TYPICAL = 0.04  # a quarter of it is not told: plates of one lab differ by some tenths of a percent
+KNOWN_TO = 0.005  # a body whose mass lies elsewhere than the table's pushes as if weighed otherwise
 
 
 class PlateGain(Effect):
@@ -31,12 +33,12 @@ class PlateGain(Effect):
         return tuple(f"{p} {c}" for p in loaded_alone_or_all(scene) for c in CHANNELS[:3])
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        return (Parameter("gain", "1", -0.15, 0.15, TYPICAL),)
+        return (Parameter("gain", "1", -0.15, 0.15, TYPICAL, known_to=KNOWN_TO),)
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         name, channel = target.rsplit(" ", 1)
-        share, k = values[0] / (1 + values[0]), CHANNELS.index(channel)
-        return np.sum([_scaled(plate, k, share) for plate in plates_of(scene, name)], axis=0)
+        loads, k = with_simulated_loads(scene), CHANNELS.index(channel)
+        return values[0] * np.sum([_alone(plate, k) for plate in plates_of(loads, name)], axis=0)
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         name, channel = target.rsplit(" ", 1)
@@ -45,9 +47,9 @@ class PlateGain(Effect):
         return f"{reads} {OF_A_PLATE[channel]} {100 * abs(values[0]):.1f} % too {order}"
 
 
-def _scaled(plate: Plate, channel: int, share: float) -> np.ndarray:
-    """(N, 6) a share of what one channel shows."""
-    reading = in_plate(plate, np.nan_to_num(plate.wrench))
+def _alone(plate: Plate, channel: int) -> np.ndarray:
+    """(N, 6) what one channel carries."""
+    reading = in_plate(plate, plate.wrench)
     part = np.zeros_like(reading)
-    part[:, channel] = share * reading[:, channel]
+    part[:, channel] = reading[:, channel]
     return in_world(plate, part)

@@ -172,6 +172,19 @@ def test_a_gain_of_all_plates_is_that_of_each():
     )
 
 
+@pytest.mark.parametrize("channel", CHANNELS[:3])
+def test_noise_of_the_plates_is_no_part_of_a_gain(channel):
+    """Else a gain, beside a body as much lighter, would make any noise smaller."""
+    scene, effect, gain = moving(), PlateGain(), np.array([0.03])
+    noise = 20.0 * np.random.default_rng(0).standard_normal((len(scene.times_s), 6))
+    first, *others = scene.plates
+    noisy = replace(scene, plates=(replace(first, wrench=first.wrench + noise), *others))
+    force = effect.change(noisy, f"all {channel}", gain)[:, :3]
+    np.testing.assert_allclose(
+        force, effect.change(scene, f"all {channel}", gain)[:, :3], atol=1e-8
+    )
+
+
 @pytest.mark.parametrize("tilt", [[0.02, 0.0], [-0.05, 0.1]])
 def test_a_tilted_lab_is_a_simulation_with_another_gravity(tilt):
     scene = moving()

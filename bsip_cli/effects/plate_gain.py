@@ -22,8 +22,8 @@ KNOWN_TO = 0.005  # a body whose mass lies elsewhere than the table's pushes as 
 
 
 class PlateGain(Effect):
-    """One force channel, in the own axes of a plate or of all, shows 1 + gain times the truth, which
-    is as simulated."""
+    """One force channel, in the own axes of a plate or of all, shows 1 + gain times the truth: what
+    is simulated."""
 
     name = "plate_gain"
     of_the_lab = True

@@ -1,4 +1,4 @@
-"""Plates that carry what the simulation puts on them.
+"""What plates truly carry, as far as the simulation knows.
 
 A gain in proportion to the measured force, beside a body in proportion to which the simulated one
 grows, makes the difference of both smaller, whatever its cause: plates that read too much and a
@@ -7,6 +7,7 @@ body as much too light would pass for the best explanation of any noise.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,19 +17,14 @@ from bsip_cli.effects.scene import Plate, Scene
 _LEAST_N = 50.0  # a trial that weighs less has no shares
 
 
-def with_simulated_loads(scene: Scene) -> Scene:
-    """Plates that share the simulated wrench as they share the measured vertical force; frames that
-    are not valid stay."""
-    return scene.once("simulated loads", lambda: _computed(scene))
-
-
-def _computed(scene: Scene) -> Scene:
-    wrenches = [np.nan_to_num(plate.wrench) for plate in scene.plates]
+def with_simulated_load(scene: Scene, plates: Sequence[Plate]) -> list[Plate]:
+    """Plates whose wrenches add up to the simulated one: each is given its share, in the vertical
+    force, of what all lack; frames that are not valid stay."""
+    wrenches = [np.nan_to_num(plate.wrench) for plate in plates]
     carried = np.sum(wrenches, axis=0)
     missing = np.where(scene.valid[:, None], scene.predicted - carried, 0.0)
     weight = np.maximum(carried[:, 2:3], _LEAST_N)
-    plates: list[Plate] = [
+    return [
         replace(plate, wrench=wrench + wrench[:, 2:3] / weight * missing)
-        for plate, wrench in zip(scene.plates, wrenches, strict=True)
+        for plate, wrench in zip(plates, wrenches, strict=True)
     ]
-    return replace(scene, plates=tuple(plates), wrench=scene.measured)

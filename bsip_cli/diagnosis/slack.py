@@ -74,6 +74,6 @@ def _share(candidate: Candidate, scene: Scene) -> np.ndarray:
         return np.array([(candidate.scanned[0] / SPLINE_HZ) ** EDGE])
     if effect == "plate_translation":
         return np.array(PLACE)
-    all_horizontal = [f"{loaded_alone_or_all(scene)[-1]} {channel}" for channel in ("fx", "fy")]
-    whole = effect == "plate_gain" and target in all_horizontal
+    horizontal = effect == "plate_gain" and target.endswith((" fx", " fy"))
+    whole = horizontal and target.startswith(loaded_alone_or_all(scene)[-1])
     return np.array([HORIZONTAL if whole else SHARE])

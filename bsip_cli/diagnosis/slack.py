@@ -13,11 +13,10 @@ from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.gravity_tilt import GravityTilt
-from bsip_cli.effects.plate_frame import loaded_alone_or_all
 from bsip_cli.effects.scene import Scene, standing_place_m
 
 SHARE = 0.02  # of the size that labs meet
-HORIZONTAL = 1.5  # the same for the gain of all horizontal forces
+HORIZONTAL = 0.7  # the same for the gain of horizontal forces
 # The same for a plate's place: bodies of another table's segments look some centimetres higher or
 # lower, as far as horizontal forces tell a height.
 PLACE = (SHARE, SHARE, 1.0)
@@ -30,7 +29,7 @@ def slack(scene: Scene) -> np.ndarray:
     """(N, 6, k) change of the wrench for one standard deviation of each small imperfection."""
     instruments = [effect for effect in CATALOGUE if _is_of_instruments(effect)]
     columns = [
-        _share(c, scene) * c.signature(_source(effect, scene))
+        _share(c) * c.signature(_source(effect, scene))
         for effect in (*instruments, EFFECTS["over_smoothing"])
         for c in candidates_of(effect, scene)
     ]
@@ -63,11 +62,10 @@ def _is_of_instruments(effect: Effect) -> bool:
     return effect.of_the_plates or isinstance(effect, (Delay, GravityTilt))
 
 
-def _share(candidate: Candidate, scene: Scene) -> np.ndarray:
+def _share(candidate: Candidate) -> np.ndarray:
     """(k,) or (1,) of the free parameters' typical sizes.
 
-    Horizontal forces are all motion, so what the motion's amplitude errs by is the gain of all
-    plates; what the feet push against each other is none of it.
+    Horizontal forces are all motion, so what the motion's amplitude errs by is their gain.
     """
     effect, target = candidate.effect.name, candidate.target
     if effect == "over_smoothing":
@@ -75,5 +73,4 @@ def _share(candidate: Candidate, scene: Scene) -> np.ndarray:
     if effect == "plate_translation":
         return np.array(PLACE)
     horizontal = effect == "plate_gain" and target.endswith((" fx", " fy"))
-    whole = horizontal and target.startswith(loaded_alone_or_all(scene)[-1])
-    return np.array([HORIZONTAL if whole else SHARE])
+    return np.array([HORIZONTAL if horizontal else SHARE])

@@ -166,23 +166,9 @@ def test_two_plates_err_together_as_one_plate_under_both_feet(effect, values):
 def test_a_gain_of_all_plates_is_that_of_each():
     scene, effect, gain = moving(), PlateGain(), np.array([0.03])
     each = [effect.change(scene, f"{plate.name} fz", gain) for plate in scene.plates]
-    force, sum_of_each = effect.change(scene, "all fz", gain)[:, 2], sum(each)[:, 2]
-    np.testing.assert_allclose(force, sum_of_each, rtol=gain[0])  # up to the gain's square
+    np.testing.assert_allclose(effect.change(scene, "all fz", gain), sum(each), atol=1e-8)
     assert effect.sentence(scene, "all fz", gain) == (
         "all plates read the vertical force 3.0 % too large"
-    )
-
-
-@pytest.mark.parametrize("channel", CHANNELS[:3])
-def test_noise_of_the_plates_is_no_part_of_a_gain(channel):
-    """Else a gain, beside a body as much lighter, would make any noise smaller."""
-    scene, effect, gain = moving(), PlateGain(), np.array([0.03])
-    noise = 20.0 * np.random.default_rng(0).standard_normal((len(scene.times_s), 6))
-    first, *others = scene.plates
-    noisy = replace(scene, plates=(replace(first, wrench=first.wrench + noise), *others))
-    force = effect.change(noisy, f"all {channel}", gain)[:, :3]
-    np.testing.assert_allclose(
-        force, effect.change(scene, f"all {channel}", gain)[:, :3], atol=1e-8
     )
 
 

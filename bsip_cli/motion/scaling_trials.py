@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,7 +40,7 @@ def refine_over_trials(
     calibration: Calibration,
     standing: TrialMarkers,
     standing_trial: int,
-    trials: Sequence[TrialMarkers],
+    trials: Iterable[TrialMarkers],
     frames: int,
     options: ScalingOptions,
     ik: dict,
@@ -92,6 +92,7 @@ def _refined(
     options: ScalingOptions,
     ik: dict,
 ) -> Refinement:
+    """To the frame ``standing`` and to what is seen in the trials."""
     person = calibration.person
     markers = [standing.markers_m, *(one.markers_m for one in seen if len(one.times_s))]
     poses = [solve_poses(person, standing.markers_m, calibration.q, **ik).q]

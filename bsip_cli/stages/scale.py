@@ -180,20 +180,20 @@ def _mean_positions(one: _Recorded, frames: slice) -> dict[str, np.ndarray]:
 def _refine(
     unit: Unit, calibration: Calibration, recorded: list[_Recorded], still: _Recorded, quiet: slice
 ) -> Refinement:
-    labels = calibration.person.markers
-    trials = [
-        TrialMarkers(one.times, ordered_markers(one.labels, one.positions, labels))
-        for one in recorded
-    ]
+    """Fitted to all trials, one after the other put into the person's order of markers."""
+
+    def in_order(one: _Recorded, frames: slice = slice(None)) -> TrialMarkers:
+        positions = ordered_markers(one.labels, one.positions[frames], calibration.person.markers)
+        return TrialMarkers(one.times[frames], positions)
+
     (number,) = (k for k, one in enumerate(recorded) if one is still)
     middle = (quiet.start + quiet.stop) // 2
-    standing = trials[number].frames(slice(middle, middle + 1))
     options = unit.config.scale
     return refine_over_trials(
         calibration,
-        standing,
+        in_order(still, slice(middle, middle + 1)),
         number,
-        trials,
+        map(in_order, recorded),
         options.frames,
         ScalingOptions(**options.model_dump(exclude={"frames", "may_be_held"})),
         unit.config.ik.model_dump(exclude={"undetermined_sd_rad", "held_sd_rad"}),

@@ -111,7 +111,10 @@ def by_clarabel(fit):
             q[first + 10 + d] = -fit.gamma
     settings = clarabel.DefaultSettings()
     settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-13
+    # Without more refinement how far it gets depends on the processor.
+    settings.iterative_refinement_max_iter = 50
+    settings.iterative_refinement_reltol = settings.iterative_refinement_abstol = 1e-15
     solution = clarabel.DefaultSolver(
         sparse.csc_matrix(np.triu(P)),
         q,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import lsq_linear, minimize
 
 from bsip_cli.diagnosis.candidates import Candidate
 from bsip_cli.diagnosis.evidence import FLOOR
@@ -119,6 +119,12 @@ class Explanation:
         bounds = np.array([(p.least, p.most) for p in self.parameters(evidence)])
         return Explanation(self.place, np.clip(values, *bounds.T))
 
+    def room(self, evidence: Evidence) -> np.ndarray:
+        """(k, 2) by how much the free parameters may change, down and up [typical]."""
+        bounds = np.array([(p.least, p.most) for p in self.parameters(evidence)])
+        free = self.is_free(evidence)
+        return (bounds - self.values[:, None])[free] / self.typical(evidence)[:, None]
+
     def is_negligible(self, evidence: Evidence) -> bool:
         """Whether it is too small to matter beside what labs meet."""
         sizes = self.values[self.is_free(evidence)] / self.typical(evidence)
@@ -169,11 +175,11 @@ class Fit:
 
 
 def fit_together(evidence: Evidence, explanations: tuple[Explanation, ...]) -> Fit:
-    """Free parameters of all explanations by Gauss and Newton."""
+    """Free parameters of all explanations by Gauss and Newton, within their bounds."""
     found = explanations
     for _ in range(_STEPS):
         residual, tangent = _linear(evidence, found)
-        step = np.linalg.lstsq(tangent, residual, rcond=None)[0] if found else np.zeros(0)
+        step = _step(evidence, found, residual, tangent)
         now = Fit(found, residual, tangent)
         found = tuple(
             one.moved(evidence, step[now.columns(k, evidence)]) for k, one in enumerate(found)
@@ -181,6 +187,17 @@ def fit_together(evidence: Evidence, explanations: tuple[Explanation, ...]) -> F
         if np.abs(step).max(initial=0.0) < 1e-3:
             break
     return Fit(found, *_linear(evidence, found))
+
+
+def _step(
+    evidence: Evidence, found: tuple[Explanation, ...], residual: np.ndarray, tangent: np.ndarray
+) -> np.ndarray:
+    """(K,) change of all free parameters [typical]; one at its bound leaves the others free."""
+    if not found:
+        return np.zeros(0)
+    basis, triangle = np.linalg.qr(tangent)
+    room = np.concatenate([one.room(evidence) for one in found])
+    return lsq_linear(triangle, basis.T @ residual, room.T, method="bvls").x
 
 
 def changes_of(evidence: Evidence, explanations: tuple[Explanation, ...]) -> list[np.ndarray]:

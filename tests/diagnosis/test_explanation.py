@@ -32,6 +32,17 @@ def test_a_release_is_found_between_the_moments_that_are_tried():
     assert (fit.residual**2).sum() < (coarse.residual**2).sum() - 10
 
 
+def test_a_size_at_its_bound_leaves_the_others_where_they_fit_best():
+    """Held until 7 s: said best by more until 6 s, and by less than nothing until 5 s."""
+    effect = EFFECTS["released_object"]
+    evidence = all_of(noisy(with_effect(part_of_moving(0, 12), effect, "hand_r", 1.2, 7.0), 3))
+    near, far = (null(effect, "hand_r", (t,)) for t in (6.0, 5.0))
+    alone, both = (fit_together(evidence, ones) for ones in ((near,), (near, far)))
+    assert both.explanations[1].values[0] == 0.0
+    assert both.explanations[0].values == pytest.approx(alone.explanations[0].values, rel=1e-6)
+    assert (both.residual**2).sum() == pytest.approx((alone.residual**2).sum(), rel=1e-9)
+
+
 def test_what_one_trial_forbids_is_impossible_in_both(monkeypatch):
     scenes = [noisy(part_of_moving(start, 6), start) for start in (0, 6)]
     evidence = all_of(*scenes)

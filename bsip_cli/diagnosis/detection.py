@@ -34,13 +34,14 @@ class Limit:
 
 def limits_of(selection: Selection) -> Iterator[Limit]:
     """Per effect, target and parameter, in the trials together or alone; what is of the body cannot
-    be in one trial alone."""
+    be in one trial alone. Of moments, frequencies and windows the median counts: half of them show
+    the cause better."""
     signatures = selection.signatures
     fit = selection.fit
     chances = [one.chance for one in selection.rounds if one.chance is not None]
     last = chances[-1]
     scores = zip(signatures.places, signatures.information(fit.tangent), strict=True)
-    found: dict[tuple, Limit] = {}
+    found: dict[tuple, list[Limit]] = {}
     for place, information in scores:
         effect = place.candidate.effect
         elsewhere = signatures.trials_of(place.candidate) - set(place.trials)
@@ -56,10 +57,9 @@ def limits_of(selection: Selection) -> Iterator[Limit]:
             size = size if size < parameter.most else np.inf
             limit = Limit(place, parameter.name, parameter.unit, size)
             key = (effect.name, place.candidate.target, place.trials, parameter.name)
-            # Of the moments, frequencies and windows, the one where it shows best.
-            if key not in found or limit.size < found[key].size:
-                found[key] = limit
-    yield from found.values()
+            found.setdefault(key, []).append(limit)
+    for limits in found.values():
+        yield sorted(limits, key=lambda one: one.size)[len(limits) // 2]
 
 
 def _spreads(information: np.ndarray) -> np.ndarray:

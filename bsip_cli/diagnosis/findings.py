@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from bsip_cli.diagnosis.explanation import Explanation
-from bsip_cli.diagnosis.intervals import drawn_explanations
+from bsip_cli.diagnosis.intervals import drawn_explanations, has_size
 from bsip_cli.diagnosis.judging import NAMELESS_LEAST, NAMELESS_WORTH, TINY_WORTH, Tried
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.selection import Round, Selection
@@ -57,21 +57,28 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
     """All candidates that were looked at in full: those kept first, with their rivals."""
     evidence = selection.signatures.evidence
     kept = list(_kept(evidence, selection))
-    causes = {_key(cause.explanation) for _, cause, _ in kept}
-    said = set(causes)
-    findings, without_size = [], []
+    said = {_key(cause.explanation) for _, cause, _ in kept}
+    findings, rejected = [], []
+    lost: list[tuple[Tried, str]] = []
     told: set[int] = set()
     names = (a + b for a, b in product(("", *_LETTERS), _LETTERS))  # A, B, ... Z, AA, AB ...
     for one, cause, number in kept:
+        if not cause.explanation.is_possible(evidence):
+            lost.append((cause, "would have a size that cannot be"))
+            why = "beside the other causes its size cannot be"
+            rejected.append(_rejected(evidence, cause, _bare(evidence, cause), why))
+            continue
         draws = _draws(evidence, cause, number, rng)
         numbers = _numbers(evidence, cause, draws)
-        if not _has_size(evidence, draws):
-            without_size.append(_rejected(evidence, cause, numbers, "its size may as well be none"))
+        if not has_size(evidence, selection.fit, number, rng):
+            lost.append((cause, "may as well have no size"))
+            why = "its size may as well be none"
+            rejected.append(_rejected(evidence, cause, numbers, why))
             continue
         rivals = [
             rival
             for rival in cause.rivals
-            if _key(rival.explanation) not in causes and not _same(rival, cause)
+            if not any(_same(rival.explanation, other.explanation) for _, other, _ in kept)
         ]
         said.update(_key(rival.explanation) for rival in rivals)
         class_id = next(names) if rivals else ""
@@ -81,8 +88,8 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
         for rival in rivals:
             its = _numbers(one.evidence, rival, _draws(one.evidence, rival, -1, rng))
             findings.append(_finding(one.evidence, rival, its, class_id, remedy))
-    findings += _without_name(selection, told)
-    findings += without_size
+    findings += _without_name(selection, lost, told)
+    findings += rejected
     for one in selection.rounds:
         for tried in one.tried:
             if _key(tried.explanation) not in said:
@@ -91,26 +98,27 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
     return tuple(findings)
 
 
-def _without_name(selection: Selection, told: set[int]) -> Iterator[Finding]:
-    """Trials of which nothing else is told, though a cause was found there that did not stand out:
-    what is wrong has no name. Each trial once, with the cause that came nearest."""
+def _without_name(
+    selection: Selection, lost: Sequence[tuple[Tried, str]], told: set[int]
+) -> Iterator[Finding]:
+    """Trials of which nothing else is told, though a cause was found there that did not stand out,
+    or was lost, with why: what is wrong has no name. Each trial once, with the cause that came
+    nearest."""
     tried_in_all = (t for one in selection.rounds for t in one.tried)
-    drowned = [t for t in tried_in_all if t.is_drowned and not t.is_too_little_unnamed]
-    for tried in sorted(drowned, key=lambda t: -t.score):
+    drowned = ((t, "explains less than it leaves over") for t in tried_in_all if t.is_drowned)
+    enough = [(t, why) for t, why in (*drowned, *lost) if not t.is_too_little_unnamed]
+    for tried, why in sorted(enough, key=lambda one: -one[0].score):
         left = tuple(t for t in tried.trials if t not in told)
         if left:
             told = told | set(left)
-            yield _drowned(selection.signatures.evidence, tried, left)
+            yield _nearest(selection.signatures.evidence, tried, why, left)
 
 
-def _drowned(evidence: Evidence, tried: Tried, trials: tuple[int, ...]) -> Finding:
+def _nearest(evidence: Evidence, tried: Tried, why: str, trials: tuple[int, ...]) -> Finding:
     one = tried.explanation
     sentence = one.sentence(evidence)
     if one.effect.name != UNEXPLAINED:
-        sentence = (
-            "something without a name; the nearest cause explains less than it leaves over "
-            f"({sentence})"
-        )
+        sentence = f"something without a name; the nearest cause {why} ({sentence})"
     numbers = (Number("explained", "1", tried.gain.percent / 100, np.nan, np.nan),)
     without_name = _with(evidence, tried, "named", "", numbers, sentence)
     names = tuple(evidence.trials[t].name for t in trials)
@@ -118,15 +126,13 @@ def _drowned(evidence: Evidence, tried: Tried, trials: tuple[int, ...]) -> Findi
 
 
 def _kept(evidence: Evidence, selection: Selection) -> Iterator[tuple[Round, Tried, int]]:
-    """Rounds and what they kept, with the numbers of the last fit.
-
-    Not what became negligible beside later ones, or was pushed to a bound.
-    """
+    """Rounds and what they kept, with the numbers of the last fit; not what became negligible
+    beside later ones."""
     number = 0
     for one in selection.rounds:
         if one.kept is not None:
             last = selection.fit.explanations[number]
-            if last.is_possible(evidence) and not last.is_negligible(evidence):
+            if not last.is_negligible(evidence):
                 yield one, replace(one.kept, explanation=last, fit=selection.fit), number
             number += 1
 
@@ -135,18 +141,10 @@ def _key(one: Explanation) -> tuple:
     return one.effect, one.target, one.place.trials
 
 
-def _same(one: Tried, other: Tried) -> bool:
+def _same(one: Explanation, other: Explanation) -> bool:
     """The same cause, looked at in fewer or more trials."""
-    mine, theirs = one.explanation, other.explanation
-    shared = set(mine.place.trials) & set(theirs.place.trials)
-    return (mine.effect, mine.target) == (theirs.effect, theirs.target) and bool(shared)
-
-
-def _has_size(evidence: Evidence, draws: list[Explanation]) -> bool:
-    """Whether any of the sizes is not zero for sure; a moment or a frequency is no size."""
-    free = draws[0].is_free(evidence)
-    low, high = np.percentile([one.values[free] for one in draws], [2.5, 97.5], axis=0)
-    return bool(((low > 0) | (high < 0)).any())
+    shared = set(one.place.trials) & set(other.place.trials)
+    return (one.effect, one.target) == (other.effect, other.target) and bool(shared)
 
 
 def _finding(

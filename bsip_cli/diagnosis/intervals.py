@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.stats import chi2
 
 from bsip_cli.diagnosis.explanation import Explanation, Fit
 from bsip_cli.diagnosis.together import Evidence
@@ -31,6 +32,19 @@ def drawn_explanations(
     steps = _at_least(steps - np.median(steps, axis=0), covariance, rng)
     drawn = (one.all_moved(evidence, step).alike(evidence) for step in steps)
     return [alike[rng.integers(len(alike))] for alike in drawn]
+
+
+def has_size(evidence: Evidence, fit: Fit, number: int, rng: np.random.Generator) -> bool:
+    """Whether the sizes of an explanation are not all zero for sure (Wald, 5 %); moments,
+    frequencies and windows, which are no sizes, are held."""
+    one, mine = fit.explanations[number], fit.columns(number, evidence)
+    steps = _bootstrap(evidence, fit.residual, fit.tangent, rng)[:, mine]
+    spread = np.cov(steps, rowvar=False, ddof=0).reshape(steps.shape[1], -1)
+    sizes = one.values[one.is_free(evidence)] / one.typical(evidence)
+    least = np.diag(_covariance(fit.tangent)[mine, mine]) + one.known_to(evidence) ** 2
+    least += (SCALE_ERROR * sizes) ** 2
+    spread += np.diag(np.maximum(least - np.diag(spread), 0.0))
+    return bool(sizes @ np.linalg.solve(spread, sizes) > chi2.ppf(0.95, len(sizes)))
 
 
 def bounds(evidence: Evidence, fit: Fit, number: int) -> dict[str, float]:

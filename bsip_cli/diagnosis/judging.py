@@ -26,7 +26,7 @@ NAMELESS_LEAST, ARM_M = 0.003, 0.3
 TINY_WORTH = 0.2
 # What a large cause leaves behind, since no model of it is exact, is no other cause.
 LEFTOVER = 0.005  # of the squared residual that earlier causes took from the same trials
-BESIDE = 0.75  # of what a cause explains, that another one in another trial does not
+BESIDE = 0.75  # of what a cause explains, that another one does not
 
 
 @dataclass(frozen=True)
@@ -129,8 +129,8 @@ def _rms(course: np.ndarray) -> np.ndarray:
 
 
 def stands_beside(one: Tried, other: Tried, before: Fit) -> bool:
-    """Whether hardly any of what a cause explains is explained by another trial's as well. Trials
-    share a body: what is too heavy in one of them passes for too light in the others.
+    """Whether hardly any of what a cause explains is explained by another one as well. Trials share
+    a body: what is too heavy in one of them passes for too light in the others.
 
     before : fit without either.
     """

@@ -22,8 +22,9 @@ from bsip_cli.diagnosis.held_out import Z95
 from bsip_cli.diagnosis.judging import ARM_M, NAMELESS_WORTH
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.selection import Selection
+from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.effects.channel_words import OF_THE_LAB, unit_of
-from bsip_cli.effects.plate_frame import CHANNELS
+from bsip_cli.effects.plate_frame import CHANNELS, lab_channel
 from bsip_cli.effects.scene import Scene
 from bsip_cli.effects.wobbling_mass import has_impacts
 from bsip_cli.statistics.effective_samples import effective_samples
@@ -71,31 +72,41 @@ def with_loud_noise(selection: Selection, found: Sequence[Finding]) -> tuple[Fin
     loud = [one for one in asked if one is not None]
     channels = dict.fromkeys(one.channel for one in loud)
     return (
-        *(_rejected(one, why) if why else one for one, why in _with_reasons(found, loud)),
+        *(_rejected(one, why) if why else one for one, why in _with_reasons(found, loud, evidence)),
         *(_finding([one for one in loud if one.channel == c]) for c in channels),
     )
 
 
-def _with_reasons(found: Sequence[Finding], loud: Sequence[Loud]) -> list[tuple[Finding, str]]:
+def _with_reasons(
+    found: Sequence[Finding], loud: Sequence[Loud], evidence: Evidence
+) -> list[tuple[Finding, str]]:
     """Each finding and why it is wrong, or nothing; a class is wrong as a whole."""
-    reasons = [_why_wrong(one, loud) for one in found]
+    reasons = [_why_wrong(one, loud, evidence) for one in found]
     both = list(zip(found, reasons, strict=True))
     classes = {one.class_id: why for one, why in both if why and one.class_id}
     return [(one, why or classes.get(one.class_id, "")) for one, why in both]
 
 
-def _why_wrong(one: Finding, loud: Sequence[Loud]) -> str:
+def _why_wrong(one: Finding, loud: Sequence[Loud], evidence: Evidence) -> str:
     """Why a finding is the wrong name for what is loud, in its trials or in others; or nothing."""
     trials = {here.trial for here in loud}
     if one.verdict == "rejected":
         return ""
     if trials.isdisjoint(one.trials):
         for other in loud:
-            if one.target.split()[1:] == [other.channel]:  # a gain, an offset, a drift: "1 fz"
+            if _channel(one, evidence) == other.channel:
                 return f"in {other.trial} {OF_THE_LAB[other.channel]} errs by far more"
     elif _is_slight(one) and trials.issuperset(one.trials):
         return "a component of the force errs by far more"
     return ""
+
+
+def _channel(one: Finding, evidence: Evidence) -> str | None:
+    """The component that a gain, an offset or a drift is of; None of other causes."""
+    if one.target.rpartition(" ")[2] not in CHANNELS:
+        return None
+    scene = next(trial.scene for trial in evidence.trials if trial.name in one.trials)
+    return lab_channel(scene, one.target)
 
 
 def _is_slight(one: Finding) -> bool:

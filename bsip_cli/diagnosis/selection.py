@@ -234,14 +234,14 @@ def _in_vain(judged: list[Tried]) -> set[int]:
 
 
 def _kept(judged: list[Tried], before: Fit) -> Tried | None:
-    """The cause that explains most. Where that is a slight thing without a name, or what explains
-    far more is no cause, nothing is told: what explains even less would be the wrong name."""
+    """The cause that explains most. What explains less than a slight thing without a name, or than
+    what is no cause by far, would be the wrong name, unless most of that is its own."""
     good = [one for one in judged if one.is_good]
     while good:
         first = _foremost(good, before)
         if first.is_slight:
-            elsewhere = (one for one in good if set(one.trials).isdisjoint(first.trials))
-            good = [one for one in elsewhere if stands_beside(one, first, before)]
+            others = (one for one in good if one is not first)
+            good = [one for one in others if stands_beside(one, first, before)]
         elif _is_overshadowed(first, judged, before):
             good = [one for one in good if one is not first]
         else:
@@ -279,7 +279,6 @@ def _with_recurrence(good: list[Tried], before: Fit) -> dict[int, float]:
 
     What was found in another trial already is the likeliest cause here.
     """
-    known = {one.effect for one in before.explanations}
     weights = {}
     for one in good:
         place = one.explanation.place
@@ -292,9 +291,14 @@ def _with_recurrence(good: list[Tried], before: Fit) -> dict[int, float]:
             for trial in set(other.trials) - set(place.trials):
                 best[trial] = max(best.get(trial, 0.0), other.score)
         weights[id(one)] += sum(best.values())
-        if one.explanation.effect in known:
+        if _is_shown_elsewhere(one.explanation, before):
             weights[id(one)] *= AGAIN
     return weights
+
+
+def _is_shown_elsewhere(one: Explanation, before: Fit) -> bool:
+    known = (e for e in before.explanations if e.effect is one.effect)
+    return any(set(e.place.trials).isdisjoint(one.place.trials) for e in known)
 
 
 def _best_of_each(

@@ -31,7 +31,7 @@ class JointCentre(Effect):
         return scene.person.skeleton.joints[1:]
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        return tuple(Parameter(f"shift_{axis}", "m", -0.08, 0.08, 0.015) for axis in "xyz")
+        return tuple(Parameter(f"shift_{axis}", "m", -MOST_M, MOST_M, 0.015) for axis in "xyz")
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         i = scene.person.skeleton.joints.index(target)

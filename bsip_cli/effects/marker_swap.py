@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations
+from types import MappingProxyType
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -26,6 +27,7 @@ class MarkerSwap(Effect):
 
     name = "marker_swap"
     of_the_lab = False
+    least_named = MappingProxyType({"share": 0.5})  # labels are exchanged or not
     remedy = "look at the labels of the two markers in the recording and exchange them"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
@@ -53,8 +55,8 @@ class MarkerSwap(Effect):
         return values[0] * scene.pose_response.left(errors, pair, moved)[..., 0]
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        """Labels are exchanged or not: half of it is something else."""
-        return bool(0.5 <= values[0] < 1.5 and values[1] < values[2])
+        least = self.least_named["share"]
+        return bool(least <= values[0] < 1.5 and values[1] < values[2])
 
     def reported(
         self, scene: Scene, target: str, values: np.ndarray

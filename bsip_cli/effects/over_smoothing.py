@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
+
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
@@ -23,6 +25,7 @@ class OverSmoothing(Effect):
 
     name = "over_smoothing"
     of_the_lab = True
+    least_named = MappingProxyType({"share": 0.3})  # less belongs to another cut-off
     remedy = "export the trial again without the lab's filter"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
@@ -50,8 +53,8 @@ class OverSmoothing(Effect):
         return scene.pose_response.left(errors)[..., 0]
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        """A share far from 1 belongs to another cut-off."""
-        return super().possible(scene, target, values) and bool(values[0] >= 0.3)
+        is_named = bool(values[0] >= self.least_named["share"])
+        return super().possible(scene, target, values) and is_named
 
     def reported(
         self, scene: Scene, target: str, values: np.ndarray

@@ -14,6 +14,8 @@ KNOWN_TO_M = (0.001, 0.001, 0.015)
 # Far away is a plate that was moved; its height is off by the depth of its sensors, if by anything.
 MOST_M = (0.3, 0.3, 0.1)
 
+HEIGHT_TOLD_MM = 60.0  # three times what bodies of another table seem to be higher or lower
+
 
 class PlateTranslation(Effect):
     """The plate, or every plate, truly lies at its stated place plus the shift: the measured moment
@@ -40,7 +42,8 @@ class PlateTranslation(Effect):
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         x, y, z = 1000 * values
+        height = f", height {z:+.0f} mm" if abs(z) > HEIGHT_TOLD_MM else ""
         return (
             f"{plates_that(target, 'lies', 'lie')} {np.hypot(x, y):.0f} mm sideways from where the "
-            f"file says (lab X {x:+.0f} mm, Y {y:+.0f} mm, height {z:+.0f} mm)"
+            f"file says (lab X {x:+.0f} mm, Y {y:+.0f} mm{height})"
         )

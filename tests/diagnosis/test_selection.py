@@ -120,16 +120,24 @@ def test_a_moment_is_no_size(monkeypatch):
     (one,) = said_of(pushed())
     assert one.effect == "unmeasured_contact"
     monkeypatch.setattr(intervals, "SCALE_ERROR", 2.0)
-    assert said_of(pushed()) == []
+    (one,) = said_of(pushed())
+    assert one.effect == "unexplained" and "may as well have no size" in one.sentence
 
 
-def test_what_may_as_well_have_no_size_is_not_told(monkeypatch):
+def test_what_may_as_well_have_no_size_has_no_name(monkeypatch):
+    """It explains more than what is told without a name must."""
     chosen = late_with_offset()
     monkeypatch.setattr(intervals, "SCALE_ERROR", 2.0)
-    assert said_of(chosen) == []
-    findings = findings_of(chosen, np.random.default_rng(1))
-    assert [one.effect for one in findings[:2]] == ["sync_offset", "plate_zero"]
-    assert all("its size may as well be none" in one.sentence for one in findings[:2])
+    assert [one.effect for one in said_of(chosen)] == ["unexplained"]
+    rejected = findings_of(chosen, np.random.default_rng(1))[1:3]
+    assert [one.effect for one in rejected] == ["sync_offset", "plate_zero"]
+    assert all("its size may as well be none" in one.sentence for one in rejected)
+
+
+def test_slight_things_without_a_size_are_not_told(monkeypatch):
+    monkeypatch.setattr(intervals, "SCALE_ERROR", 2.0)
+    monkeypatch.setattr(judging, "NAMELESS_WORTH", 1.0)
+    assert said_of(late_with_offset()) == []
 
 
 def test_what_a_large_cause_leaves_behind_is_no_other_cause():
@@ -351,6 +359,16 @@ def test_something_slight_without_a_name_is_not_told_and_hides_no_other_trial(mo
     findings = findings_of(chosen, np.random.default_rng(1))
     swing = next(one for one in findings if (one.effect, one.target) == ("unexplained", "fz"))
     assert swing.verdict == "rejected" and "it has no name and explains less" in swing.sentence
+
+
+def test_beside_something_slight_without_a_name_a_cause_of_the_same_trial_is_told(monkeypatch):
+    """The swing explains more, and nothing of what the offset does."""
+    monkeypatch.setattr(judging, "NAMELESS_WORTH", 0.9)
+    scene = with_effect(swinging(3.0), EFFECTS["plate_zero"], "1 mx", 2.0)
+    assert {(one.effect, one.target) for one in said_of(selection_of(scene))} == {
+        ("plate_zero", "1 mx"),
+        ("plate_zero", "2 mx"),
+    }
 
 
 def test_a_plate_that_is_right_in_standing_only_is_found():

@@ -87,6 +87,21 @@ def test_errors_of_one_channel(channel):
         np.testing.assert_allclose(change, too_much, atol=1e-8, err_msg=effect.name)
 
 
+@pytest.mark.parametrize("k", [0, 1, 2])
+def test_readings_are_put_right_whatever_the_simulation_is(k):
+    unit = np.eye(6)[k]
+    cases = [
+        (PlateGain(), CHANNELS[k], 0.04, lambda r: r + 0.04 * r * unit),
+        (PlateZero(), CHANNELS[k], 12.0, lambda r: r + 12.0 * unit),
+        (PlateCrosstalk(), f"fz>{CHANNELS[k]}", 0.03, lambda r: r + 0.03 * r[:, 2:3] * unit),
+    ]
+    for effect, target, size, spoil in cases[: 3 if k < 2 else 2]:
+        scene, too_much = scene_with(spoil)
+        lighter = replace(scene, phi=0.9 * scene.phi)
+        error = effect.change(lighter, f"1 {target}", np.array([size]))
+        np.testing.assert_allclose(error, too_much, atol=1e-8, err_msg=effect.name)
+
+
 @pytest.mark.parametrize(("source", "sink"), [("fz", "fx"), ("fx", "fy"), ("fy", "fz")])
 def test_crosstalk(source, sink):
     names = ("fx", "fy", "fz")

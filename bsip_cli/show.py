@@ -9,7 +9,7 @@ from textwrap import fill
 
 import pandas as pd
 
-from bsip_cli.artifacts import is_made_from, read_artifact
+from bsip_cli.artifacts import is_made_from, read_artifact, read_header
 from bsip_cli.errors import UsageError
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
@@ -43,7 +43,8 @@ def shown(out: Path) -> Iterator[str]:
         diagnosis, detection = (_table(folder, kind) for kind in ("overall-diagnosis", "detection"))
         if diagnosis is not None and detection is not None:
             gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
-            found = verdict_of(diagnosis, detection, gains, changes)
+            facts = read_header(_path(folder, "overall-diagnosis"))["provenance"]["facts"]
+            found = verdict_of(diagnosis, detection, gains, changes, facts.get("too_short_s"))
             right = put_right_sentence(_marker_events(folder))
             yield verdict_text(folder.name, found, right, get_terminal_size().columns)
     for report in (out / "group" / "report.html", *sorted(out.glob("sub-*/report.html"))):

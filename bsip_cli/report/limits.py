@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 
-import numpy as np
 import pandas as pd
 
 from bsip_cli.report.candidates import candidates_of, causes_of
@@ -16,6 +16,7 @@ _EXAMPLES = (  # effects whose limits are told in the sentence
     ("plate_translation", "", "a plate shifted"),
     ("plate_gain", "fz", "a vertical gain wrong"),
     ("added_mass", "hand_l", "a mass on the left hand"),
+    ("added_mass", "upper_torso", "one on the upper torso"),
 )
 OF_THE_WEIGHT = "W"  # class of what quiet standing tells
 _BY = ("plate_translation", "plate_gain")  # shifted *by* less than, but a delay *under*
@@ -23,7 +24,8 @@ _BY = ("plate_translation", "plate_gain")  # shifted *by* less than, but a delay
 
 @dataclass(frozen=True)
 class Limit:
-    """Smallest size of a cause that these recordings would have shown."""
+    """Smallest size of a cause that these recordings would have shown; infinite where they show it
+    at no size."""
 
     effect: str
     target: str
@@ -39,18 +41,13 @@ class Limit:
 def limits_of(
     detection: pd.DataFrame, diagnosis: pd.DataFrame, alone: bool = False
 ) -> tuple[Limit, ...]:
-    """Of each cause and place the limit with most recordings together; found causes have none.
-
-    Of causes that only single recordings can show, the best recording counts; with ``alone``, of
-    all causes.
-    """
+    """Of each cause and place the limit with most recordings together, of what only single ones can
+    show that in each; with ``alone`` all of single recordings. Found causes have none."""
     causes = causes_of(candidates_of(diagnosis))
     found = {(one.effect, one.target) for cause in causes for one in cause}
-    rows = detection[np.isfinite(detection["limit"].astype(float))]
-    rows = rows.assign(together=rows["trials"].str.count(",") + 1)
-    rows = rows[rows["together"] == 1] if alone else rows
-    rows = rows.sort_values(["together", "limit"], ascending=[False, True], kind="stable")
-    rows = rows.drop_duplicates(["effect", "target", "parameter"]).sort_index()
+    rows = detection.assign(together=detection["trials"].str.count(",") + 1)
+    most = rows.groupby(["effect", "target", "parameter"])["together"].transform("max")
+    rows = rows[rows["together"] == (1 if alone else most)]
     return tuple(
         Limit(
             r["effect"],
@@ -79,12 +76,18 @@ def limits_sentence(limits: Sequence[Limit]) -> str:
         ]
         if of_it:
             worst = max(of_it, key=lambda x: x.size)
-            relation = "by less than" if effect in _BY else "under"
-            parts.append(f"{words} {relation} {worst.in_words()}")
+            parts.append(f"{words} {_under(worst)}")
     if not parts:
         return ""
     text = " or ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
     return f"{text[0].upper()}{text[1:]} might have gone unseen in these recordings."
+
+
+def _under(limit: Limit) -> str:
+    by = limit.effect in _BY
+    if not isfinite(limit.size):
+        return "by any amount" if by else "of any size"
+    return f"{'by less than' if by else 'under'} {limit.in_words()}"
 
 
 def looked_at(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[str, ...]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+STILL = "standing still"
 PHASES = (
-    "standing still",
+    STILL,
     "moving on one level",
     "body going down",
     "body going up",

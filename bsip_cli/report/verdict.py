@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,7 @@ _MOST_GAINS = 3
 _MOST_CHANGES = 2
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
 _NO_TRIAL = "No trial was long enough on the plates to look for errors: nobody can say."
+_TOO_SHORT = "Not looked at, since every contact is on a plate for too short a time"
 _NOTHING = "Nothing is wrong above the noise."
 
 
@@ -39,7 +40,7 @@ class Verdict:
     ----------
     headline : whether anything is wrong. found : whether anything was.
     causes : a text per cause or class of rivals.
-    results : what the causes do to forces and parameters.
+    results : what the causes do to forces and parameters, and where they were looked for.
     advice : what follows for the reader.
     limits : what might have gone unseen; empty where that is not known.
     """
@@ -62,16 +63,22 @@ def verdict_of(
     detection: pd.DataFrame,
     gains: pd.DataFrame | None = None,
     changes: pd.DataFrame | None = None,
+    too_short_s: Mapping[str, float] | None = None,
 ) -> Verdict:
     """From the artifacts ``diagnosis`` and ``detection``, and of ``extend`` where it has run
-    ``gain`` and ``bsip-change``, with one method each."""
+    ``gain`` and ``bsip-change``, with one method each. ``too_short_s``: stems of trials that had no
+    part in it, with the seconds in which every contact is on a plate."""
     causes = causes_of(candidates_of(diagnosis))
     everywhere = looked_at(detection, diagnosis)
     return Verdict(
         headline(diagnosis),
         bool(causes),
         tuple(cause_text(cause, everywhere) for cause in causes),
-        (*(_results(causes, gains, changes) if causes else ()), *_seen_in(everywhere)),
+        (
+            *(_results(causes, gains, changes) if causes else ()),
+            *_seen_in(everywhere),
+            *_not_seen_in(too_short_s or {}),
+        ),
         (*filter(None, [_named_twice(causes)]), *consequences(causes)),
         limits_sentence(limits_of(detection, diagnosis)),
     )
@@ -101,6 +108,11 @@ def headline(diagnosis: pd.DataFrame) -> str:
 def _seen_in(everywhere: Sequence[str]) -> tuple[str, ...]:
     names = [trial_label(stem) for stem in everywhere]
     return (f"Movements looked at: {listing(names)}.",) if names else ()
+
+
+def _not_seen_in(too_short_s: Mapping[str, float]) -> tuple[str, ...]:
+    names = [f"{trial_label(stem)} ({seconds:.1f} s)" for stem, seconds in too_short_s.items()]
+    return (f"{_TOO_SHORT}: {listing(names)}.",) if names else ()
 
 
 # --- a cause ----------------------------------------------------------------------------------

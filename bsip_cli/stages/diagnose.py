@@ -47,10 +47,11 @@ def run(unit: Unit) -> None:
         again = _asked(unit, moving_trials(unit, person, as_read), standing, standing.share)
         asked = max(again, asked, key=_causes)
     told = (*(f for one in asked.looked_at for f in one.told), *_weighed(unit, standing))
-    for sentence in filter(None, (one.left_out for one in asked.looked_at)):
+    for sentence in filter(None, (one.left_out() for one in asked.looked_at)):
         unit.warn(sentence)
     if asked.selection:
-        _write(unit, *_answer(asked, asked.selection, told))
+        diagnosis, limits, facts = _answer(asked, asked.selection, told)
+        _write(unit, diagnosis, limits, {**facts, "too_short_s": _too_short(asked)})
         return
     if not told:
         unit.warn(
@@ -58,7 +59,8 @@ def run(unit: Unit) -> None:
             "plate; no movement can be diagnosed"
         )
     names = _trials_of(told)
-    _write(unit, rows_of(told, tuple(names)), empty_table("detection"), {"trials": names})
+    facts = {"trials": names, "too_short_s": _too_short(asked)}
+    _write(unit, rows_of(told, tuple(names)), empty_table("detection"), facts)
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,12 @@ def _asked(
     first, weighed = _weighed_moving(evidence) if only_motion_weighs else (None, ())
     selection = select(signatures_of(evidence, ASKED), rng, first)
     return Asked(looked_at, selection, weighed, rng, heavier_by)
+
+
+def _too_short(asked: Asked) -> dict[str, float]:
+    """Moving trials that are left out, and for how many seconds every contact is on a plate."""
+    left_out = ((one.trial.stem, one.too_short_s) for one in asked.looked_at)
+    return {stem: seconds for stem, seconds in left_out if seconds is not None}
 
 
 def _causes(asked: Asked) -> int:

@@ -54,8 +54,10 @@ def _write_diagnosis(unit: Unit) -> None:
     if stem not in looked_at:
         unit.write("diagnosis", empty_table("diagnosis"))
         return
-    concerned = [stem in trials.split(", ") for trials in overall["trials"]]
-    rows = overall[np.array(concerned, dtype=bool) & (overall["effect"] != "none")]
+    concerned = np.array([stem in trials.split(", ") for trials in overall["trials"]], dtype=bool)
+    classes = set(overall["class_id"][concerned]) - {""}  # rivals of other trials belong to them
+    concerned |= overall["class_id"].isin(classes).to_numpy()
+    rows = overall[concerned & (overall["effect"] != "none").to_numpy()]
     if (rows["verdict"] == "rejected").all():
         p_value = float(rows["p_value"].min()) if len(rows) else np.nan
         rows = pd.concat([pd.DataFrame([nothing(p_value, (stem,))]), rows], ignore_index=True)

@@ -45,13 +45,22 @@ class Proven:
 @dataclass(frozen=True)
 class LookedAt:
     """A moving trial: its evidence, if there is enough to ask; what its markers prove; what is told
-    of it beforehand; or why it is left out."""
+    of it beforehand; or for how long every contact is on a plate, where that is too short."""
 
     trial: Trial
     evidence: TrialEvidence | None = None
     proven: tuple[Proven, ...] = ()
     told: tuple[Finding, ...] = ()
-    left_out: str = ""
+    too_short_s: float | None = None
+
+    def left_out(self) -> str:
+        """Why it is left out; empty where it is not."""
+        if self.too_short_s is None:
+            return ""
+        return (
+            f"{self.trial.stem}: has no part in the diagnosis: every contact is on a plate for "
+            f"{self.too_short_s:.2f} s only, {SHORTEST_S:g} s are needed"
+        )
 
     def causes(self) -> tuple[dict, ...]:
         """In full, what is proven and the forces show too."""
@@ -102,11 +111,7 @@ def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial) -> Looked
     scene = scene_of(unit, person, prior.phi, trial)
     measured_s = float(scene.valid.sum()) / scene.rate_hz
     if measured_s < SHORTEST_S:
-        return LookedAt(
-            trial,
-            left_out=f"{trial.stem}: has no part in the diagnosis: every contact is on a plate for "
-            f"{measured_s:.2f} s only, {SHORTEST_S:g} s are needed",
-        )
+        return LookedAt(trial, too_short_s=measured_s)
     fewer = slow(scene)
     held = support_of(fewer)
     if held is not None:

@@ -72,13 +72,13 @@ def candidate_gains(data: CandidateGains) -> Figure:
 
 
 def _edges(data: CandidateGains) -> tuple[float, float]:
-    """Of the axis: all gains above zero fit, and the intervals of what was kept; to the left at most
-    as far as to the right."""
+    """Of the axis: all gains fit, and the intervals of what was kept; of the others' intervals to
+    the left no more than to the right."""
     kept = np.array([verdict != "rejected" for verdict in data.verdicts])
     highs = np.concatenate([data.gain, np.where(kept, data.high, np.nan)])
     high = _ROOM * max(_LEAST, float(np.nanmax(highs, initial=_LEAST)))
-    low = _ROOM * min(-_LEAST, float(np.nanmin(data.low, initial=-_LEAST)))
-    return max(low, -high), high
+    low = _ROOM * float(np.nanmin(data.low, initial=-_LEAST))
+    return min(max(low, -high), _ROOM * float(np.nanmin(data.gain, initial=0.0))), high
 
 
 def _draw(axes: Axes, data: CandidateGains, row: int, left: float, right: float) -> None:

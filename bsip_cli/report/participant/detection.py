@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import inf, isfinite
 
 import numpy as np
 import pandas as pd
 
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.report.blocks import Block, Grid, Paragraph, Picture
-from bsip_cli.report.effect_words import effect_title, place_label, size_words
+from bsip_cli.report.effect_words import (
+    effect_title,
+    parameter_label,
+    place_label,
+    size_words,
+)
 from bsip_cli.report.figures.detection_limits import DetectionLimits, detection_limits
 from bsip_cli.report.figures.mass_limits import MassLimits, mass_limits
 from bsip_cli.report.limits import Limit, limits_of, limits_sentence
 from bsip_cli.report.usual_sizes import USUAL, usual_words
 from bsip_cli.report.words import MISSING, segment_label
 
+_TOLD_BY_PART = ("plate_translation", "plate_rotation", "plate_gain", "missing_joint")
 _FAR = 20.0  # times the largest usual size: not seen at all
 
 
@@ -31,8 +38,9 @@ def blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
         Paragraph(
             "Each limit is the size that would be found in 95 of 100 recordings like these, while "
             "the inertial parameters and the cause's other numbers stay free; none is below a "
-            "quarter of the cause's typical size, since nothing smaller is named. Smaller errors "
-            "may be there. Causes that were found have no limit, and none is given "
+            "quarter of the cause's typical size, since nothing smaller is named. Of moments, "
+            "windows and frequencies the median counts: a cause at half of them must be larger. "
+            "Smaller errors may be there. Causes that were found have no limit, and none is given "
             "for exchanged labels and smoothed markers.",
             "note",
         )
@@ -44,19 +52,39 @@ def blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
     ]
     rows = tuple(row for effect in USUAL for row in _rows(effect, together, alone))
     head = ("cause", "in all recordings", "in one alone", "shows best at", "usual in labs")
-    caption = "Least size that would be found, from the best place or direction to the worst"
+    caption = (
+        "Least size that would be found, from the best place, direction and recording to the worst"
+    )
     return [*said, Grid(head, rows, caption, words=5)]
 
 
 def _never_seen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
-    """Causes that these recordings do not show at all; what was found has no limit either."""
-    seen = set(detection["effect"][np.isfinite(detection["limit"].astype(float))])
-    seen |= set(diagnosis["effect"][diagnosis["verdict"] != "rejected"])
-    never = [e for e in dict.fromkeys(detection["effect"]) if e not in seen]
+    """Causes, or parts of them, that these recordings do not show at all; what was found has no
+    limit either."""
+    told = set(diagnosis["effect"][diagnosis["verdict"] != "rejected"])
+    least: dict[str, dict[tuple[str, str], float]] = {}
+    for r in detection.to_dict("records"):
+        if r["effect"] not in told:
+            parts, part = least.setdefault(r["effect"], {}), (r["target"], r["parameter"])
+            parts[part] = min(r["limit"], parts.get(part, inf))
+    never = []
+    for effect, sizes in least.items():
+        hidden = [part for part, size in sizes.items() if not isfinite(size)]
+        if len(hidden) == len(sizes):
+            never.append(effect_title(effect))
+        elif hidden and effect in _TOLD_BY_PART:
+            words = "; ".join(_part(effect, *part) for part in hidden)
+            never.append(f"{effect_title(effect)} ({words})")
     if not never:
         return []
-    titles = "; ".join(effect_title(effect) for effect in never)
-    return [Paragraph(f"Not to be found here at any size that can be true: {titles}.")]
+    return [Paragraph(f"Not to be found here at any size that can be true: {', '.join(never)}.")]
+
+
+def _part(effect: str, target: str, parameter: str) -> str:
+    """``plate 1, height``."""
+    return ", ".join(
+        filter(None, [place_label(effect, target), parameter_label(effect, parameter)])
+    )
 
 
 # --- figures ------------------------------------------------------------------------------------
@@ -81,8 +109,8 @@ def _usual_figure(limits: Sequence[Limit]) -> list[Block]:
     )
     caption = (
         "How small each cause might have been and still been found in these recordings. Dot: at the "
-        "place or in the direction that shows it best; bar: up to the worst; to the right the same "
-        "in figures. Grey: sizes that laboratories meet. Left of the black line every usual size "
+        "place, in the direction and recording that show it best; bar: up to the worst; to the "
+        "right the same in figures. Grey: sizes that laboratories meet. Left of the black line every usual size "
         "would have been found, right of the grey none."
     )
     return [Picture(figure, caption, "Bars: limits over usual sizes.", "diagnosis_limits")]
@@ -90,8 +118,7 @@ def _usual_figure(limits: Sequence[Limit]) -> list[Block]:
 
 def _mass_figure(together: Sequence[Limit], alone: Sequence[Limit]) -> list[Block]:
     always, once = (
-        {x.target: x.size for x in limits if x.effect == "added_mass" and x.parameter == "mass"}
-        for limits in ([x for x in together if x.trials > 1], alone)
+        _least_masses(limits) for limits in ([x for x in together if x.trials > 1], alone)
     )
     shown = [segment for segment in SEGMENTS if segment in {*always, *once}]
     if not shown:
@@ -104,6 +131,15 @@ def _mass_figure(together: Sequence[Limit], alone: Sequence[Limit]) -> list[Bloc
         "most of it), or in the single recording that shows it best."
     )
     return [Picture(figure, caption, "Dots: least mass.", "diagnosis_masses")]
+
+
+def _least_masses(limits: Sequence[Limit]) -> dict[str, float]:
+    """[kg] on each segment, of the recording that shows it best; none where no mass is seen."""
+    masses: dict[str, float] = {}
+    for one in limits:
+        if one.effect == "added_mass" and one.parameter == "mass" and isfinite(one.size):
+            masses[one.target] = min(one.size, masses.get(one.target, inf))
+    return masses
 
 
 # --- table --------------------------------------------------------------------------------------
@@ -123,6 +159,8 @@ def _rows(
         if not any(columns):
             continue
         best = min(columns[0] or columns[1], key=lambda x: x.size)
+        if not isfinite(best.size):
+            continue
         yield (
             effect_title(effect),
             *(_range(effect, limits) for limits in columns),
@@ -132,8 +170,10 @@ def _rows(
 
 
 def _usual(effect: str, limits: Sequence[Limit]) -> list[Limit]:
-    """An effect's limits that can be compared with its usual sizes."""
-    return [x for x in limits if x.effect == effect and _counts(x) and x.unit == USUAL[effect].unit]
+    """An effect's limits that can be compared with its usual sizes; none where all are infinite."""
+    usual = USUAL[effect]
+    counting = [x for x in limits if x.effect == effect and _counts(x) and x.unit == usual.unit]
+    return counting if any(isfinite(x.size) for x in counting) else []
 
 
 def _counts(limit: Limit) -> bool:
@@ -147,7 +187,9 @@ def _range(effect: str, limits: Sequence[Limit]) -> str:
         return MISSING
     best, worst = (end(limits, key=lambda x: x.size) for end in (min, max))
     usual = USUAL[effect]
-    if usual.unit == best.unit and worst.size > _FAR * usual.most:
+    if not isfinite(best.size):
+        return "not at all"
+    if not isfinite(worst.size) or (usual.unit == best.unit and worst.size > _FAR * usual.most):
         return f"from {best.in_words()}, or not at all"
     return _between(best.parameter, best.unit, best.size, worst.size)
 

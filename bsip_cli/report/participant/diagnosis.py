@@ -48,7 +48,8 @@ def verdict(record: ParticipantRecord) -> list[Block]:
     """What stands on the first screen."""
     if record.diagnosis is None or record.detection is None:
         return [Paragraph(NOT_RUN, "note")]
-    said = verdict_of(record.diagnosis, record.detection, record.gains, record.changes)
+    tables = (record.diagnosis, record.detection, record.gains, record.changes)
+    said = verdict_of(*tables, record.too_short_s)
     tone: Tone = "warning" if said.found or record.diagnosis.empty else "good"
     blocks: list[Block] = [Paragraph(said.headline, tone)]
     if said.causes:
@@ -77,7 +78,7 @@ def section(record: ParticipantRecord) -> Section:
         blocks.append(Paragraph(NOT_RUN, "note"))
     else:
         blocks += [
-            Heading("The causes looked at"),
+            Heading("The causes that came nearest"),
             *ranking(candidates_of(record.diagnosis)),
         ]
         if record.gains is not None and len(record.gains):
@@ -114,7 +115,8 @@ def ranking(candidates: Sequence[Candidate]) -> list[Block]:
             )
         )
         caption = (
-            "The causes that were fitted in full, in the order of the diagnosis: how much of the "
+            "The causes that were fitted in full, in the order of the diagnosis; all others, from "
+            "clocks to joints, were tried and explain less. How much of the "
             "squared difference between measured and simulated forces (in units of its noise) each "
             "removes in seconds that it was not fitted to, with 95 % interval. An interval that "
             "reaches below zero may be no gain at all; an arrow: it runs on. Each was tried beside "
@@ -125,7 +127,7 @@ def ranking(candidates: Sequence[Candidate]) -> list[Block]:
     rows = tuple(_row(k, one) for k, one in numbered)
     head = ("cause", "verdict", "in words", "recordings", "chance [%]", "removes [%]")
     caption = (
-        "Causes looked at. Chance: how often it would bring as much; removes: of the squared "
+        "Causes that came nearest. Chance: how often it would bring as much; removes: of the squared "
         "difference in unseen seconds, with 95 % interval"
     )
     return [*blocks, Grid(head, rows, caption, words=4)]

@@ -316,7 +316,9 @@ def _posturography(record: ParticipantRecord) -> list[Block]:
         Grid(
             ("trial", "from", *(title for _, title in _SWAY)),
             tuple(rows),
-            "About the mean of each trial; a good simulation repeats the measured values",
+            "About the mean of each trial; a good simulation repeats the measured values. Markers "
+            "shake the simulated pressure: its path and speed are too long and too fast, and in "
+            "trials of a second none of this describes anybody's balance",
             words=2,
         )
     ]

@@ -41,6 +41,12 @@ def section(record: ParticipantRecord) -> Section:
         ),
         *_findings(record),
         Heading("Contacts with the ground"),
+        Paragraph(
+            "Where a foot is low enough that it may touch the ground, and whether it is over a "
+            "plate: on purpose rather too long, so that no force beside the plates is overlooked. "
+            "These are no gait events.",
+            "note",
+        ),
         *_timelines(record),
     ]
     return Section("measured", "What was measured", tuple(blocks))

@@ -69,7 +69,7 @@ def _in_words(om: pd.DataFrame) -> str:
     between = int(((shares >= FROM_TABLE) & (shares <= DECIDED)).sum())
     by_data, by_table = listing(decided, "no segment"), listing(table, "no segment")
     text = (
-        f"The data decided (data share above {percent(DECIDED)} %) the mass of {by_data}. "
+        f"The data narrowed most (data share above {percent(DECIDED)} %) the mass of {by_data}. "
         f"The table still decides (data share under {percent(FROM_TABLE)} %) that of {by_table}. "
     )
     if between:
@@ -78,9 +78,10 @@ def _in_words(om: pd.DataFrame) -> str:
     if unknown:
         text += f"For {count(unknown, 'segment')} the data share is not known. "
     return text + (
-        "The data share is the part of the table's variance that the data removed: at 0 "
-        "% the number is the table's, at 100 % the table has no say. Each estimator counts it against "
-        "the spread it starts from itself, so shares of different estimators do not compare."
+        "The data share is the part of the table's variance that the data removed, given what the "
+        "table says of everything else: at 0 % the number is the table's; a large share does not "
+        "mean that it is right. Each estimator counts it against the spread it starts from itself, "
+        "so shares of different estimators do not compare."
     )
 
 
@@ -234,8 +235,8 @@ def _identification(table: pd.DataFrame) -> list[Block]:
         "estimator",
         "method",
         "time used [s]",
-        "samples",
-        "independent",
+        "frames",
+        "independent values",
         "base parameters",
         "Fx [N]",
         "Fy [N]",

@@ -12,7 +12,7 @@ from bsip_cli.report.candidates import candidates_of, causes_of
 from bsip_cli.report.figures.residual_by_phase import ResidualByPhase, residual_by_phase
 from bsip_cli.report.figures.wrench_residual import WrenchResidual, wrench_residual
 from bsip_cli.report.limits import looked_at
-from bsip_cli.report.movement_phases import PHASES, motion_of, phases_of
+from bsip_cli.report.movement_phases import PHASES, STILL, motion_of, phases_of
 from bsip_cli.report.records import (
     EXTENDED,
     ParticipantRecord,
@@ -21,7 +21,7 @@ from bsip_cli.report.records import (
     flags_of,
     signals_of,
 )
-from bsip_cli.report.words import component_label, count, listing, number
+from bsip_cli.report.words import component_label, count, listing, number, percent
 
 BEFORE = "OM"
 _COLUMNS = {
@@ -34,7 +34,7 @@ _COLUMNS = {
     "cop_ap": ("cop_ap_m", "mm", 1000.0),
     "cop_ml": ("cop_ml_m", "mm", 1000.0),
 }
-_STANDS_OUT = 1.5  # times the smallest of the phases: worth a mark
+_AS_LARGE = 0.7  # of the largest phase: in standing still, worth a mark
 _LEAST_FRAMES = 10  # of a phase, to be told
 
 
@@ -183,29 +183,31 @@ def _rms_by_phase(
 
 
 def _phase_grid(rms: dict[str, dict[str, np.ndarray]], phases: Sequence[str], over: str) -> Grid:
-    rows = tuple(_phase_row(component, methods) for component, methods in rms.items())
+    rows = tuple(_phase_row(component, methods, phases) for component, methods in rms.items())
     arrow = ", before → after" if any(len(methods) > 1 for methods in rms.values()) else ""
     return Grid(
         ("component", "unit", *phases),
         rows,
-        f"RMS of the residual with OM{arrow}, over {over}; marked: "
-        f"{number(_STANDS_OUT, 1)} times the smallest phase or more",
+        f"RMS of the residual with OM{arrow}, over {over}; marked: standing still, where it is "
+        f"{percent(_AS_LARGE)} % of the largest phase or more",
         words=2,
     )
 
 
-def _phase_row(component: str, methods: dict[str, np.ndarray]) -> tuple[str | Cell, ...]:
+def _phase_row(
+    component: str, methods: dict[str, np.ndarray], phases: Sequence[str]
+) -> tuple[str | Cell, ...]:
     columns = list(zip(*methods.values(), strict=True))
-    least = min((column[0] for column in columns), default=np.nan)
+    largest = max((column[0] for column in columns), default=np.nan)
     return (
         component_label(component),
         _COLUMNS[component][1],
         *(
             Cell(
                 " → ".join(number(x, 2) for x in column),
-                "warning" if column[0] > _STANDS_OUT * least else "",
+                "warning" if phase == STILL and column[0] >= _AS_LARGE * largest else "",
             )
-            for column in columns
+            for phase, column in zip(phases, columns, strict=True)
         ),
     )
 

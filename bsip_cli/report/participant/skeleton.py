@@ -11,6 +11,7 @@ from bsip_cli.report.words import listing, number, segment_label, signed, with_s
 
 _FAR_PERCENT = 5.0
 _MM = 1000.0
+_Z95 = 1.96
 
 
 def section(record: ParticipantRecord) -> Section:
@@ -81,11 +82,11 @@ def _row(name: str, row: pd.Series) -> tuple[str | Cell, ...]:
 
 
 def _symmetry(rows: pd.DataFrame) -> list[Block]:
-    lengths = dict(zip(rows.index, rows["length_m"].to_numpy(dtype=float), strict=True))
+    length, sd = (rows[name].astype(float) for name in ("length_m", "length_sd_m"))
     pairs = [
-        (name[:-2], length, lengths[f"{name[:-2]}_r"])
-        for name, length in lengths.items()
-        if name.endswith("_l") and f"{name[:-2]}_r" in lengths
+        (str(name)[:-2], length[name], length[right], _Z95 * float(np.hypot(sd[name], sd[right])))
+        for name, right in ((name, f"{str(name)[:-2]}_r") for name in rows.index)
+        if str(name).endswith("_l") and right in rows.index
     ]
     if not pairs:
         return [Paragraph("The skeleton has no pairs of segments.", "note")]
@@ -94,29 +95,35 @@ def _symmetry(rows: pd.DataFrame) -> list[Block]:
             segment_label(name),
             number(_MM * left),
             number(_MM * right),
-            signed(_MM * (left - right), 1),
+            Cell(_apart(left, right, error), "group" if abs(left - right) > error else ""),
             signed(200.0 * (left - right) / (left + right), 1),
         )
-        for name, left, right in pairs
+        for name, left, right, error in pairs
     )
-    name, left, right = max(pairs, key=lambda p: abs(p[1] - p[2]) / (p[1] + p[2]))
-    longer = "left" if left > right else "right"
-    share = 200.0 * abs(left - right) / (left + right)
+    clear = [segment_label(name) for name, left, right, error in pairs if abs(left - right) > error]
     sentence = (
-        (
-            f"The largest difference is in the {segment_label(name)}: the {longer} one is "
-            f"longer by {number(share, 1)} %."
-        )
-        if share >= 0.05
-        else "Left and right agree."
+        f"Clear of its error is a difference of the {listing(clear)}."
+        if clear
+        else "No difference is clear of its error."
     )
     return [
         Paragraph(
             f"{sentence} Left and right were tied softly, so a difference that the markers "
-            "do not show clearly is drawn towards zero."
+            "do not show clearly is drawn towards zero. Where no error stands (hands, feet) the "
+            "lengths come straight from the markers, and so do their differences: none of this is "
+            "a measurement of the person's symmetry."
         ),
-        Grid(("segment", "left [mm]", "right [mm]", "left − right [mm]", "left − right [%]"), grid),
+        Grid(
+            ("segment", "left [mm]", "right [mm]", "left − right [mm]", "left − right [%]"),
+            grid,
+            "Left against right, ± what 95 % of differences stay within if nothing differs",
+        ),
     ]
+
+
+def _apart(left: float, right: float, error: float) -> str:
+    spread = "" if np.isnan(error) else f" ± {number(_MM * error, 1)}"
+    return f"{signed(_MM * (left - right), 1)}{spread}"
 
 
 def _markers(record: ParticipantRecord) -> Grid:

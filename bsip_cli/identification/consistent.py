@@ -40,8 +40,8 @@ def estimate(problem: Problem) -> Estimate:
 def _note(fit: Fit, terms: Terms) -> str:
     masses, centres, *tensors = 1 / np.sqrt(fit.weights.spread)
     note = (
-        f"the data decide {fit.decided:.0f} of {terms.table.size} parameters, the table the rest; "
-        "distance from the table in standard deviations among people: masses "
+        f"the data decide as much as {fit.decided:.0f} of {terms.table.size} parameters, the table "
+        "the rest; distance from the table in standard deviations among people: masses "
         f"{masses:.2f}, centres of mass {centres:.2f}, inertias "
         f"{min(tensors):.2f} to {max(tensors):.2f}"
     )

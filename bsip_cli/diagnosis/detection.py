@@ -11,7 +11,7 @@ from bsip_cli.diagnosis.chance import group_of
 from bsip_cli.diagnosis.explanation import NEGLIGIBLE
 from bsip_cli.diagnosis.judging import ALPHA, WORTH
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
-from bsip_cli.diagnosis.selection import Selection
+from bsip_cli.diagnosis.rounds import Selection
 from bsip_cli.diagnosis.signatures import Place
 
 _SURE = 1.645  # standard deviations: found in 95 of 100 recordings like these

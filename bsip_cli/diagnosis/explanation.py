@@ -20,6 +20,7 @@ NEGLIGIBLE = 0.25  # of the typical size
 _STEPS = 20  # of Gauss and Newton: large effects come out of the clipping step by step
 _DIFFERENCE = 0.1  # of the typical size: a moment in time moves by a part of a frame at least
 _SEARCH = 80  # evaluations for a moment, a frequency or a window
+_UNTOLD = 1e-6  # of the largest derivative: a hinge does not tell a shift along its axis
 
 
 @dataclass(frozen=True)
@@ -116,14 +117,16 @@ class Explanation:
 
     def _within(self, evidence: Evidence, values: np.ndarray) -> Explanation:
         """With values (K,) cut to the bounds."""
-        bounds = np.array([(p.least, p.most) for p in self.parameters(evidence)])
-        return Explanation(self.place, np.clip(values, *bounds.T))
+        return Explanation(self.place, np.clip(values, *self._bounds(evidence).T))
 
     def room(self, evidence: Evidence) -> np.ndarray:
         """(k, 2) by how much the free parameters may change, down and up [typical]."""
-        bounds = np.array([(p.least, p.most) for p in self.parameters(evidence)])
-        free = self.is_free(evidence)
-        return (bounds - self.values[:, None])[free] / self.typical(evidence)[:, None]
+        room = self._bounds(evidence) - self.values[:, None]
+        return room[self.is_free(evidence)] / self.typical(evidence)[:, None]
+
+    def _bounds(self, evidence: Evidence) -> np.ndarray:
+        """(K, 2) of all parameters."""
+        return np.array([(p.least, p.most) for p in self.parameters(evidence)])
 
     def is_negligible(self, evidence: Evidence) -> bool:
         """Whether it is too small to matter beside what labs meet."""
@@ -192,12 +195,18 @@ def fit_together(evidence: Evidence, explanations: tuple[Explanation, ...]) -> F
 def _step(
     evidence: Evidence, found: tuple[Explanation, ...], residual: np.ndarray, tangent: np.ndarray
 ) -> np.ndarray:
-    """(K,) change of all free parameters [typical]; one at its bound leaves the others free."""
+    """(K,) change of all free parameters [typical]; one at its bound leaves the others free, and
+    what the motion does not tell stays where it is."""
     if not found:
         return np.zeros(0)
     basis, triangle = np.linalg.qr(tangent)
+    left, sizes, right = np.linalg.svd(triangle)
+    least = _UNTOLD * sizes[0]
+    told = np.where(sizes > least, sizes, 0.0)[:, None] * right
+    still = least * np.eye(len(sizes))
+    wanted = np.concatenate([left.T @ (basis.T @ residual), np.zeros(len(sizes))])
     room = np.concatenate([one.room(evidence) for one in found])
-    return lsq_linear(triangle, basis.T @ residual, room.T, method="bvls").x
+    return lsq_linear(np.vstack([told, still]), wanted, room.T, method="bvls").x
 
 
 def changes_of(evidence: Evidence, explanations: tuple[Explanation, ...]) -> list[np.ndarray]:

@@ -11,10 +11,10 @@ from typing import Literal
 import numpy as np
 
 from bsip_cli.diagnosis.explanation import Explanation
-from bsip_cli.diagnosis.intervals import drawn_explanations, has_size
+from bsip_cli.diagnosis.intervals import drawn_explanations
 from bsip_cli.diagnosis.judging import NAMELESS_LEAST, NAMELESS_WORTH, TINY_WORTH, Tried
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
-from bsip_cli.diagnosis.selection import Round, Selection
+from bsip_cli.diagnosis.rounds import Round, Selection
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 
@@ -56,25 +56,13 @@ class Finding:
 def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding, ...]:
     """All candidates that were looked at in full: those kept first, with their rivals."""
     evidence = selection.signatures.evidence
-    kept = list(_kept(evidence, selection))
+    kept = list(_kept(selection))
     said = {_key(cause.explanation) for _, cause, _ in kept}
-    findings, rejected = [], []
-    lost: list[tuple[Tried, str]] = []
+    findings = []
     told: set[int] = set()
     names = (a + b for a, b in product(("", *_LETTERS), _LETTERS))  # A, B, ... Z, AA, AB ...
     for one, cause, number in kept:
-        if not cause.explanation.is_possible(evidence):
-            lost.append((cause, "would have a size that cannot be"))
-            why = "beside the other causes its size cannot be"
-            rejected.append(_rejected(evidence, cause, _bare(evidence, cause), why))
-            continue
-        draws = _draws(evidence, cause, number, rng)
-        numbers = _numbers(evidence, cause, draws)
-        if not has_size(evidence, selection.fit, number, rng):
-            lost.append((cause, "may as well have no size"))
-            why = "its size may as well be none"
-            rejected.append(_rejected(evidence, cause, numbers, why))
-            continue
+        numbers = _numbers(evidence, cause, _draws(evidence, cause, number, rng))
         rivals = [
             rival
             for rival in cause.rivals
@@ -88,26 +76,25 @@ def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding
         for rival in rivals:
             its = _numbers(one.evidence, rival, _draws(one.evidence, rival, -1, rng))
             findings.append(_finding(one.evidence, rival, its, class_id, remedy))
-    findings += _without_name(selection, lost, told)
-    findings += rejected
-    for one in selection.rounds:
-        for tried in one.tried:
-            if _key(tried.explanation) not in said:
-                said.add(_key(tried.explanation))
-                findings.append(_rejected(evidence, tried, _bare(evidence, tried), _why_not(tried)))
+    findings += _without_name(selection, told)
+    tried_in_all = (tried for one in selection.rounds for tried in one.tried)
+    for tried in sorted(tried_in_all, key=lambda t: t.given_up is None):
+        if _key(tried.explanation) not in said:
+            said.add(_key(tried.explanation))
+            findings.append(_rejected(evidence, tried))
     return tuple(findings)
 
 
-def _without_name(
-    selection: Selection, lost: Sequence[tuple[Tried, str]], told: set[int]
-) -> Iterator[Finding]:
-    """Trials of which nothing else is told, though a cause was found there that did not stand out,
-    or was lost, with why: what is wrong has no name. Each trial once, with the cause that came
-    nearest."""
-    tried_in_all = (t for one in selection.rounds for t in one.tried)
-    drowned = ((t, "explains less than it leaves over") for t in tried_in_all if t.is_drowned)
-    enough = [(t, why) for t, why in (*drowned, *lost) if not t.is_too_little_unnamed]
-    for tried, why in sorted(enough, key=lambda one: -one[0].score):
+def _without_name(selection: Selection, told: set[int]) -> Iterator[Finding]:
+    """Trials of which nothing else is told, though a cause was found there and given up: what is
+    wrong has no name. Each trial once, with the cause that came nearest."""
+    given_up = [
+        (tried, tried.given_up.nearest)
+        for one in selection.rounds
+        for tried in one.tried
+        if tried.given_up and tried.given_up.nearest and not tried.is_too_little_unnamed
+    ]
+    for tried, why in sorted(given_up, key=lambda one: -one[0].score):
         left = tuple(t for t in tried.trials if t not in told)
         if left:
             told = told | set(left)
@@ -125,16 +112,13 @@ def _nearest(evidence: Evidence, tried: Tried, why: str, trials: tuple[int, ...]
     return replace(without_name, effect=UNEXPLAINED, target="", trials=names)
 
 
-def _kept(evidence: Evidence, selection: Selection) -> Iterator[tuple[Round, Tried, int]]:
-    """Rounds and what they kept, with the numbers of the last fit; not what became negligible
-    beside later ones."""
-    number = 0
-    for one in selection.rounds:
-        if one.kept is not None:
-            last = selection.fit.explanations[number]
-            if not last.is_negligible(evidence):
-                yield one, replace(one.kept, explanation=last, fit=selection.fit), number
-            number += 1
+def _kept(selection: Selection) -> Iterator[tuple[Round, Tried, int]]:
+    """Rounds and what they kept, with the numbers of the last fit and the place in it."""
+    rounds = (one for one in selection.rounds if one.kept is not None)
+    for number, one in enumerate(rounds):
+        last = selection.fit.explanations[number]
+        assert one.kept is not None
+        yield one, replace(one.kept, explanation=last, fit=selection.fit), number
 
 
 def _key(one: Explanation) -> tuple:
@@ -174,10 +158,13 @@ def _why_not(tried: Tried) -> str:
         return f"chance brings as much in {often} % of cases"
     if tried.is_leftover:
         return "it is no more than what a larger cause leaves behind"
-    if tried.is_drowned:
-        return "more than it explains remains without a cause"
+    if tried.given_up:
+        return tried.given_up.why
     if not tried.is_good:
-        return "on data held out it does not help, or hardly"
+        helps = (
+            "makes the error larger" if tried.gain.percent < 0 else "hardly helps, or not for sure"
+        )
+        return f"on data held out it {helps}"
     if tried.is_slight and tried.is_tiny:
         least = 100 * NAMELESS_LEAST
         why = f"it has no name, changes the forces by less than {least:g} % of body weight"
@@ -188,9 +175,9 @@ def _why_not(tried: Tried) -> str:
     return "another cause explains it better"
 
 
-def _rejected(evidence: Evidence, tried: Tried, numbers: tuple[Number, ...], why: str) -> Finding:
-    sentence = f"not so: {tried.explanation.sentence(evidence)} ({why})"
-    return _with(evidence, tried, "rejected", "", numbers, sentence)
+def _rejected(evidence: Evidence, tried: Tried) -> Finding:
+    sentence = f"not so: {tried.explanation.sentence(evidence)} ({_why_not(tried)})"
+    return _with(evidence, tried, "rejected", "", _bare(evidence, tried), sentence)
 
 
 def _with(

@@ -24,27 +24,31 @@ def drawn_explanations(
     """
     tangent, mine = _tangent(evidence, fit), _columns(fit, number)
     steps = _bootstrap(evidence, fit.residual, tangent, rng)[:, mine]
-    covariance = _covariance(tangent)[mine, mine]
     one = fit.explanations[number]
-    scale = SCALE_ERROR * one.values * one.is_free(evidence)
-    simple = np.array([p.known_to for p in one.parameters(evidence)])
-    covariance = covariance + np.diag((scale**2 + simple**2) / one.all_typical(evidence) ** 2)
-    steps = _at_least(steps - np.median(steps, axis=0), covariance, rng)
+    least = np.diag(_covariance(tangent))[mine] + _beyond_recordings(evidence, one)
+    steps = _at_least(steps - np.median(steps, axis=0), least, rng)
     drawn = (one.all_moved(evidence, step).alike(evidence) for step in steps)
     return [alike[rng.integers(len(alike))] for alike in drawn]
 
 
 def has_size(evidence: Evidence, fit: Fit, number: int, rng: np.random.Generator) -> bool:
-    """Whether the sizes of an explanation are not all zero for sure (Wald, 5 %); moments,
+    """Whether it is sure that not all sizes of an explanation are zero (Wald, 5 %); moments,
     frequencies and windows, which are no sizes, are held."""
     one, mine = fit.explanations[number], fit.columns(number, evidence)
     steps = _bootstrap(evidence, fit.residual, fit.tangent, rng)[:, mine]
     spread = np.cov(steps, rowvar=False, ddof=0).reshape(steps.shape[1], -1)
-    sizes = one.values[one.is_free(evidence)] / one.typical(evidence)
-    least = np.diag(_covariance(fit.tangent)[mine, mine]) + one.known_to(evidence) ** 2
-    least += (SCALE_ERROR * sizes) ** 2
+    free = one.is_free(evidence)
+    least = np.diag(_covariance(fit.tangent))[mine] + _beyond_recordings(evidence, one)[free]
     spread += np.diag(np.maximum(least - np.diag(spread), 0.0))
+    sizes = one.values[free] / one.typical(evidence)
     return bool(sizes @ np.linalg.solve(spread, sizes) > chi2.ppf(0.95, len(sizes)))
+
+
+def _beyond_recordings(evidence: Evidence, one: Explanation) -> np.ndarray:
+    """(K,) variance of all parameters that no recording betters [typical]."""
+    scale = SCALE_ERROR * one.values * one.is_free(evidence)
+    simple = np.array([p.known_to for p in one.parameters(evidence)])
+    return (scale**2 + simple**2) / one.all_typical(evidence) ** 2
 
 
 def bounds(evidence: Evidence, fit: Fit, number: int) -> dict[str, float]:
@@ -106,7 +110,7 @@ def _bootstrap(
     return np.array(steps)
 
 
-def _at_least(steps: np.ndarray, covariance: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Steps (DRAWS, k) whose spread is no smaller than that of a covariance (k, k)."""
-    missing = np.maximum(np.diag(covariance) - steps.var(axis=0), 0.0)
+def _at_least(steps: np.ndarray, variance: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Steps (DRAWS, k) whose spread is no smaller than that of a variance (k,)."""
+    missing = np.maximum(variance - steps.var(axis=0), 0.0)
     return steps + np.sqrt(missing) * rng.standard_normal(steps.shape)

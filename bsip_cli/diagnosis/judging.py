@@ -30,12 +30,31 @@ BESIDE = 0.75  # of what a cause explains, that another one does not
 
 
 @dataclass(frozen=True)
+class GivenUp:
+    """Why a cause that was kept is none in the end. why : of itself. nearest : where nothing else
+    is told of its trials; empty if that is no reason to say that something is wrong there."""
+
+    why: str
+    nearest: str
+
+
+DROWNED = GivenUp(
+    "more than it explains remains without a cause", "explains less than it leaves over"
+)
+IMPOSSIBLE = GivenUp(
+    "beside the other causes its size cannot be", "would have a size that cannot be"
+)
+SIZELESS = GivenUp("its size may as well be none", "may as well have no size")
+NEGLIGIBLE = GivenUp("beside the other causes it is too small to matter", "")
+
+
+@dataclass(frozen=True)
 class Tried:
     """A candidate that was refitted in full, beside the causes found before it.
 
     is_first : none of its trials holds one of them. is_tiny : it hardly changes the forces.
-    is_drowned : in the end, more remains beside all causes than it explains. rivals : of a cause
-    that is kept, what cannot be told from it.
+    given_up : why it is none in the end. rivals : of a cause that is kept, what cannot be told from
+    it.
     """
 
     explanation: Explanation
@@ -46,7 +65,7 @@ class Tried:
     is_leftover: bool
     is_first: bool
     is_tiny: bool
-    is_drowned: bool = False
+    given_up: GivenUp | None = None
     rivals: tuple[Tried, ...] = ()
 
     @property
@@ -83,7 +102,7 @@ class Tried:
         """Rare by chance, better on what it has not seen, worth a name, not what is left over of a
         larger cause, and more than what remains. What has no name, comes after another cause, or is
         not far beyond chance, must be better for sure."""
-        if not self.is_rare or self.is_leftover or self.is_drowned:
+        if not self.is_rare or self.is_leftover or self.given_up is not None:
             return False
         if self.gain.percent < 100 * WORTH:
             return False

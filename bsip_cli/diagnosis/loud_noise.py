@@ -21,7 +21,7 @@ from bsip_cli.diagnosis.findings import Finding, Number, interval_words
 from bsip_cli.diagnosis.held_out import Z95
 from bsip_cli.diagnosis.judging import ARM_M, NAMELESS_WORTH
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
-from bsip_cli.diagnosis.selection import Selection
+from bsip_cli.diagnosis.rounds import Selection
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.effects.channel_words import OF_THE_LAB, unit_of
 from bsip_cli.effects.plate_frame import CHANNELS, lab_channel
@@ -102,8 +102,9 @@ def _why_wrong(one: Finding, loud: Sequence[Loud], evidence: Evidence) -> str:
 
 
 def _channel(one: Finding, evidence: Evidence) -> str | None:
-    """The component that a gain, an offset or a drift is of; None of other causes."""
-    if one.target.rpartition(" ")[2] not in CHANNELS:
+    """The component that a gain, an offset or a drift of a plate is of; None of other causes."""
+    plate, _, channel = one.target.rpartition(" ")
+    if not plate or channel not in CHANNELS:
         return None
     scene = next(trial.scene for trial in evidence.trials if trial.name in one.trials)
     return lab_channel(scene, one.target)

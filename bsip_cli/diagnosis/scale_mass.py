@@ -18,7 +18,7 @@ from bsip_cli.diagnosis.held_out import gain_of
 from bsip_cli.diagnosis.judging import Tried
 from bsip_cli.diagnosis.refitting import score_of
 from bsip_cli.diagnosis.rivals import rivals_of
-from bsip_cli.diagnosis.selection import Round
+from bsip_cli.diagnosis.rounds import Round
 from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.effects.catalogue import EFFECTS

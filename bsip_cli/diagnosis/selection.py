@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice, product
 
 import numpy as np
 
-from bsip_cli.diagnosis.background import Background, background_of, new_places
-from bsip_cli.diagnosis.chance import Chance, chance_of, flipped, group_of
+from bsip_cli.diagnosis.background import new_places
+from bsip_cli.diagnosis.chance import Chance, chance_of, flipped
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together
-from bsip_cli.diagnosis.joining import Kept, joined
 from bsip_cli.diagnosis.judging import ALPHA, Tried, judged_by, stands_beside
-from bsip_cli.diagnosis.likely_noise import likely_columns, noise_beside_fit, with_likely_noise
+from bsip_cli.diagnosis.likely_noise import likely_columns, with_likely_noise
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.refitting import Refitted, refitted, start_at
 from bsip_cli.diagnosis.rivals import rivals_of
+from bsip_cli.diagnosis.rounds import Round, Selection
+from bsip_cli.diagnosis.settling import settled, told_once
 from bsip_cli.diagnosis.signatures import Signatures
 from bsip_cli.diagnosis.together import Evidence
 
@@ -35,29 +36,6 @@ Scored = tuple[np.ndarray, list[np.ndarray]]
 """Of all places in one round: their scores (K, 1) and likeliest sizes."""
 
 
-@dataclass(frozen=True)
-class Round:
-    """One step: candidates in the order of what they explain, and the one that was kept."""
-
-    evidence: Evidence
-    tried: tuple[Tried, ...]
-    kept: Tried | None
-    chance: Chance | None  # None where the evidence is not the wrench's
-
-
-@dataclass(frozen=True)
-class Selection:
-    """All rounds, and everything kept fitted together, in the coordinates of the last noise.
-
-    background : what remains beside it.
-    """
-
-    signatures: Signatures
-    rounds: tuple[Round, ...]
-    fit: Fit
-    background: Background
-
-
 def select(
     signatures: Signatures, rng: np.random.Generator, first: Round | None = None
 ) -> Selection:
@@ -73,59 +51,7 @@ def select(
         if one.kept is None:
             break
         found = one.kept.fit.explanations
-    return _standing_out(_fitted_in_the_end(signatures, *_told_once(signatures, rounds, found)))
-
-
-def _told_once(
-    signatures: Signatures, rounds: Sequence[Round], found: tuple[Explanation, ...]
-) -> tuple[tuple[Round, ...], tuple[Explanation, ...]]:
-    """What lasts, and was found by several rounds in trials of their own, in the first of them."""
-    judged = (one.kept for one in rounds if one.kept is not None)
-    left = joined(signatures.evidence, list(zip(judged, found, strict=True)))
-    causes = iter(left)
-    told = tuple(one if one.kept is None else _with(one, next(causes)) for one in rounds)
-    return told, tuple(one[1] for one in left if one is not None)
-
-
-def _with(one: Round, cause: Kept | None) -> Round:
-    """A round that kept something else, or nothing any more."""
-    now = None if cause is None else cause[0]
-    tried = (t if t is not one.kept else now for t in one.tried)
-    return replace(one, tried=tuple(t for t in tried if t is not None), kept=now)
-
-
-def _fitted_in_the_end(
-    signatures: Signatures, rounds: tuple[Round, ...], found: tuple[Explanation, ...]
-) -> Selection:
-    fit = fit_together(signatures.evidence, found)
-    if found:
-        signatures, fit = noise_beside_fit(signatures, fit)
-    return Selection(signatures, rounds, fit, background_of(signatures, fit))
-
-
-def _standing_out(selection: Selection) -> Selection:
-    """Without the causes, the weakest first, that explain less than remains beside all of them."""
-    left = {
-        number: selection.background.get(group_of(one.kept.trials), 0.0) / one.kept.score
-        for number, one in enumerate(selection.rounds)
-        if one.kept is not None and one.chance is not None
-    }
-    weakest = max(left, key=left.__getitem__, default=None)
-    if weakest is None or left[weakest] < 1:
-        return selection
-    kept = [number for number, one in enumerate(selection.rounds) if one.kept is not None]
-    explanations = zip(kept, selection.fit.explanations, strict=True)
-    found = tuple(one for number, one in explanations if number != weakest)
-    rounds = (
-        _drowned(one) if number == weakest else one for number, one in enumerate(selection.rounds)
-    )
-    return _standing_out(_fitted_in_the_end(selection.signatures, tuple(rounds), found))
-
-
-def _drowned(one: Round) -> Round:
-    """With what it kept as one of those that were only tried."""
-    tried = (replace(t, is_drowned=True) if t is one.kept else t for t in one.tried)
-    return replace(one, tried=tuple(tried), kept=None)
+    return settled(signatures, *told_once(signatures.evidence, rounds, found), rng)
 
 
 def _open_trials(evidence: Evidence, rounds: Sequence[Round]) -> set[int]:

@@ -15,6 +15,7 @@ KNOWN_TO_M = (0.001, 0.001, 0.015)
 MOST_M = (0.3, 0.3, 0.1)
 
 HEIGHT_TOLD_MM = 60.0  # three times what bodies of another table seem to be higher or lower
+HEIGHT_ALONE_MM = 20.0  # what they seem to be
 
 
 class PlateTranslation(Effect):
@@ -42,8 +43,10 @@ class PlateTranslation(Effect):
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         x, y, z = 1000 * values
-        height = f", height {z:+.0f} mm" if abs(z) > HEIGHT_TOLD_MM else ""
+        sideways = np.hypot(x, y)
+        least = min(HEIGHT_TOLD_MM, max(HEIGHT_ALONE_MM, sideways))
+        height = f", height {z:+.0f} mm" if abs(z) > least else ""
         return (
-            f"{plates_that(target, 'lies', 'lie')} {np.hypot(x, y):.0f} mm sideways from where the "
+            f"{plates_that(target, 'lies', 'lie')} {sideways:.0f} mm sideways from where the "
             f"file says (lab X {x:+.0f} mm, Y {y:+.0f} mm{height})"
         )

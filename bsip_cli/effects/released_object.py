@@ -9,7 +9,8 @@ from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.scene import Scene
 
 STEP_S = 0.5
-SEEN_S = 1.0  # on either side of the release
+# On either side of the release it is seen for a second, or for a part of what is measured, if less.
+SEEN_S, SEEN_PART = 1.0, 0.25
 KNOWN_TO_KG = 0.03  # the arm that is relieved springs back, faster than smoothed markers follow
 
 
@@ -25,7 +26,9 @@ class ReleasedObject(Effect):
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         start, end = scene.times_s[0], scene.times_s[-1]
-        moments = tuple(float(t) for t in np.arange(start + 2 * STEP_S, end - STEP_S, STEP_S))
+        first, last = scene.once(self.name, lambda: _seen_between(scene))
+        number = int(np.ceil((last - first) / STEP_S)) + 1
+        moments = tuple(np.linspace(first, last, number).tolist())
         return (
             Parameter("mass", "kg", 0.0, 20.0, 0.5, known_to=KNOWN_TO_KG),
             Parameter("release_time", "s", float(start), float(end), STEP_S, moments),
@@ -40,12 +43,20 @@ class ReleasedObject(Effect):
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Seen with the object and without it."""
-        before = scene.times_s < values[1]
-        seconds = [float((part & scene.valid).sum()) / scene.rate_hz for part in (before, ~before)]
-        return super().possible(scene, target, values) and min(seconds) >= SEEN_S
+        first, last = scene.once(self.name, lambda: _seen_between(scene))
+        return super().possible(scene, target, values) and first <= values[1] <= last
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return f"the {in_words(target)} holds {values[0]:.2f} kg and lets go at {values[1]:.2f} s"
+
+
+def _seen_between(scene: Scene) -> tuple[float, float]:
+    """First and last moment of a release that is seen from both sides [s]."""
+    times = scene.times_s[scene.valid]
+    if not len(times):
+        return float(scene.times_s[0]), float(scene.times_s[-1])
+    seen = max(1, round(min(SEEN_S * scene.rate_hz, SEEN_PART * len(times))))
+    return float(times[seen - 1]), float(times[-seen])
 
 
 def _carried(scene: Scene, target: str) -> np.ndarray:

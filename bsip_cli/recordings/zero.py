@@ -62,7 +62,9 @@ def plate_zero(
 def subtract_zero(plate: Plate, zero: PlateZero) -> tuple[Plate, Finding]:
     """The plate without its offset, and the line for the quality table."""
     if not zero.is_known():
-        return plate, _finding(plate, "never unloaded", "left its zero as it is", "info")
+        return plate, _finding(
+            plate, "no quiet stretch without load", "left its zero as it is", "info"
+        )
     seconds = sum(stop - start for start, stop in zero.stretches_s)
     force = ", ".join(f"{value:.1f}" for value in zero.offset[:3])
     found = f"({force}) N in {seconds:.1f} s without load"

@@ -16,7 +16,7 @@ _EXAMPLES = (  # effects whose limits are told in the sentence
     ("plate_translation", "", "a plate shifted"),
     ("plate_gain", "fz", "a vertical gain wrong"),
     ("added_mass", "hand_l", "a mass on the left hand"),
-    ("added_mass", "upper_torso", "one on the upper torso"),
+    ("added_mass", "upper_torso", "a mass on the upper torso"),
 )
 OF_THE_WEIGHT = "W"  # class of what quiet standing tells
 _BY = ("plate_translation", "plate_gain")  # shifted *by* less than, but a delay *under*
@@ -63,8 +63,8 @@ def limits_of(
 
 
 def limits_sentence(limits: Sequence[Limit]) -> str:
-    """``A delay ... under 2.5 ms or ... might have gone unseen.``: of plates and axes the worst
-    one; empty without examples."""
+    """``A delay ... under 2.5 ms or ... might have gone unseen.``: of plates, axes and recordings
+    the worst one; empty without examples."""
     parts = []
     for effect, ends, words in _EXAMPLES:
         of_it = [

@@ -28,7 +28,7 @@ _MOST_GAINS = 3
 _MOST_CHANGES = 2
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
 _NO_TRIAL = "No trial was long enough on the plates to look for errors: nobody can say."
-_TOO_SHORT = "Not looked at, since every contact is on a plate for too short a time"
+_TOO_SHORT = "Not looked at, since every contact is on a plate and the pose known for less than 2 s"
 _NOTHING = "Nothing is wrong above the noise."
 
 
@@ -111,7 +111,7 @@ def _seen_in(everywhere: Sequence[str]) -> tuple[str, ...]:
 
 
 def _not_seen_in(too_short_s: Mapping[str, float]) -> tuple[str, ...]:
-    names = [f"{trial_label(stem)} ({seconds:.1f} s)" for stem, seconds in too_short_s.items()]
+    names = [f"{trial_label(stem)} ({seconds:.2f} s)" for stem, seconds in too_short_s.items()]
     return (f"{_TOO_SHORT}: {listing(names)}.",) if names else ()
 
 

@@ -14,8 +14,9 @@ from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.loud_noise import with_loud_noise
 from bsip_cli.diagnosis.patterns import PATTERNS
+from bsip_cli.diagnosis.rounds import Round, Selection
 from bsip_cli.diagnosis.scale_mass import NOTICED, agreed_share, weight_round, weight_share
-from bsip_cli.diagnosis.selection import Round, Selection, select
+from bsip_cli.diagnosis.selection import select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.diagnosis.stated_mass import loaded_plate, stated_mass_findings
 from bsip_cli.diagnosis.together import Evidence, together

@@ -8,7 +8,7 @@ from bsip_cli.diagnosis.detection import limits_of
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.held_out import FOLDS, values_without
 from bsip_cli.diagnosis.intervals import bounds
-from bsip_cli.diagnosis.selection import Selection
+from bsip_cli.diagnosis.rounds import Selection
 from bsip_cli.diagnosis.together import BLOCK_S
 
 
@@ -31,7 +31,7 @@ def facts_of(selection: Selection, findings: tuple[Finding, ...]) -> dict:
     for number, (one, folds) in enumerate(zip(selection.fit.explanations, unseen, strict=True)):
         trials = tuple(evidence.trials[t].name for t in one.place.trials)
         if (one.effect.name, one.target, trials) not in verdicts:
-            continue  # it became negligible or impossible beside later ones
+            continue  # something else in its trials is far louder
         causes.append(
             {
                 "effect": one.effect.name,

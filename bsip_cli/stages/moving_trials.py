@@ -45,7 +45,7 @@ class Proven:
 @dataclass(frozen=True)
 class LookedAt:
     """A moving trial: its evidence, if there is enough to ask; what its markers prove; what is told
-    of it beforehand; or for how long every contact is on a plate, where that is too short."""
+    of it beforehand; or for how long it can be used, where that is too short."""
 
     trial: Trial
     evidence: TrialEvidence | None = None
@@ -58,8 +58,8 @@ class LookedAt:
         if self.too_short_s is None:
             return ""
         return (
-            f"{self.trial.stem}: has no part in the diagnosis: every contact is on a plate for "
-            f"{self.too_short_s:.2f} s only, {SHORTEST_S:g} s are needed"
+            f"{self.trial.stem}: has no part in the diagnosis: every contact is on a plate and the "
+            f"pose known for {self.too_short_s:.2f} s only, {SHORTEST_S:g} s are needed"
         )
 
     def causes(self) -> tuple[dict, ...]:

@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 from noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
 
-from bsip_cli.diagnosis import selection
+from bsip_cli.diagnosis import settling
 from bsip_cli.diagnosis.background import background_of, new_places
 from bsip_cli.diagnosis.clock_pattern import ClockJump
 from bsip_cli.diagnosis.explanation import fit_together
 from bsip_cli.diagnosis.findings import Finding, findings_of
+from bsip_cli.diagnosis.judging import DROWNED
 from bsip_cli.diagnosis.likely_noise import noise_beside_fit
 from bsip_cli.diagnosis.refitting import start_at
-from bsip_cli.diagnosis.selection import Selection, select
+from bsip_cli.diagnosis.rounds import Selection
+from bsip_cli.diagnosis.selection import select
 from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
 
@@ -80,12 +82,12 @@ def test_a_cause_that_stands_out_is_named():
 
 @pytest.mark.parametrize("rest", [{}, {(0,): 0.0, (1,): 0.0, (): 0.0}])
 def test_where_nothing_remains_a_cause_stands_out(monkeypatch, rest):
-    monkeypatch.setattr(selection, "background_of", in_groups(rest))
+    monkeypatch.setattr(settling, "background_of", in_groups(rest))
     assert [one.effect for one in named_in(select(signatures(), rng()))] == ["sync_offset"]
 
 
 def test_what_does_not_stand_out_has_no_name(monkeypatch):
-    monkeypatch.setattr(selection, "background_of", remaining(1e4))
+    monkeypatch.setattr(settling, "background_of", remaining(1e4))
     chosen = select(signatures(), rng())
     assert chosen.fit.explanations == ()
     (unnamed,) = named_in(chosen)
@@ -101,9 +103,9 @@ def test_what_does_not_stand_out_has_no_name(monkeypatch):
 def test_each_trial_is_without_a_name_once(monkeypatch):
     """Two causes that do not stand out in one trial: the one that came nearer is told."""
     strong, weak = (one.kept for one in select(two_causes(), rng()).rounds if one.kept)
-    monkeypatch.setattr(selection, "background_of", remaining(1e6))
+    monkeypatch.setattr(settling, "background_of", remaining(1e6))
     chosen = select(two_causes(), rng())
-    assert sum(one.is_drowned for each in chosen.rounds for one in each.tried) == 2
+    assert sum(one.given_up is DROWNED for each in chosen.rounds for one in each.tried) == 2
     (unnamed,) = named_in(chosen)
     assert strong.score > weak.score
     assert "(the forces were" in unnamed.sentence
@@ -118,7 +120,7 @@ def test_of_a_cause_in_two_trials_the_one_without_another_is_told(monkeypatch):
         one.kept.explanation.effect.name: one.kept for one in select(both, rng()).rounds if one.kept
     }
     assert found["sync_offset"].trials == (0, 1) and found["plate_zero"].trials == (0,)
-    monkeypatch.setattr(selection, "background_of", in_groups({(0,): 1.0, (1,): 1.0, (): 1e6}))
+    monkeypatch.setattr(settling, "background_of", in_groups({(0,): 1.0, (1,): 1.0, (): 1e6}))
     said = {(one.effect, one.trials) for one in named_in(select(both, rng()))}
     assert said == {("plate_zero", ("a",)), ("unexplained", ("b",))}
 
@@ -130,7 +132,7 @@ def in_groups(scores):
 def test_beside_a_named_cause_what_is_weaker_than_the_rest_is_left_out(monkeypatch):
     strong, weak = (one.kept for one in select(two_causes(), rng()).rounds if one.kept)
     assert strong.score > 1.15 * weak.score
-    monkeypatch.setattr(selection, "background_of", remaining(1.1 * weak.score))
+    monkeypatch.setattr(settling, "background_of", remaining(1.1 * weak.score))
     (named,) = named_in(select(two_causes(), rng()))
     assert named.effect == strong.explanation.effect.name
 

@@ -15,7 +15,7 @@ from bsip_cli.effects.catalogue import EFFECTS
 
 
 def test_a_release_is_found_between_the_moments_that_are_tried():
-    effect, moment = EFFECTS["released_object"], 6.27
+    effect, moment = EFFECTS["released_object"], 6.45
     scene = noisy(with_effect(part_of_moving(0, 12), effect, "hand_r", 1.2, moment), 3)
     evidence = all_of(scene)
     tried = [c.scanned[0] for c in candidates_of(effect, scene) if c.target == "hand_r"]
@@ -41,6 +41,20 @@ def test_a_size_at_its_bound_leaves_the_others_where_they_fit_best():
     assert both.explanations[1].values[0] == 0.0
     assert both.explanations[0].values == pytest.approx(alone.explanations[0].values, rel=1e-6)
     assert (both.residual**2).sum() == pytest.approx((alone.residual**2).sum(), rel=1e-9)
+
+
+def test_what_a_hinge_does_not_tell_stays_where_it_is():
+    """A shift along its axis changes nothing; the rest is fitted, and nothing runs to a bound."""
+    effect, scene = EFFECTS["joint_centre"], part_of_moving(0, 12)
+    shift = np.array([0.02, -0.01, 0.0])
+    evidence = all_of(noisy(with_effect(scene, effect, "knee_r", *shift), 3, 0.01))
+    start = replace(null(effect, "knee_r"), values=np.zeros(3))
+    (found,) = fit_together(evidence, (start,)).explanations
+    untold = np.linalg.svd(found.tangent(evidence))[2][2]
+    assert abs(untold @ found.values) < 1e-6
+    hidden, seen = (effect.change(scene, "knee_r", x) for x in (shift, found.values))
+    assert np.abs(seen - hidden).max() < 0.3 * np.abs(hidden).max()  # the rest passes for noise
+    assert found.is_possible(evidence)
 
 
 def test_what_one_trial_forbids_is_impossible_in_both(monkeypatch):

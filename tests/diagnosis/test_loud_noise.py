@@ -110,6 +110,15 @@ def test_what_wanders_in_one_trial_is_no_constant_gain_in_another(target, verdic
     assert verdict == "named" or told.sentence == said
 
 
+def test_a_regularity_of_the_same_component_elsewhere_stands():
+    """Its target is a component of the lab's, and no plate's channel."""
+    effects = [EFFECTS["sync_offset"]]
+    signatures = signatures_of(all_of(noisy(part_of_moving(0, 12), 3), wandering(2)), effects)
+    swing = Finding("unexplained", "fz", ("a",), "named", "", 1e-9, (30.0, 1.0, 60.0), (), "swings")
+    told, loud = with_loud_noise(select(signatures, np.random.default_rng(0)), (swing,))
+    assert told == swing and loud.trials == ("b",)
+
+
 def test_what_looks_like_it_is_no_better_name():
     effects = [EFFECTS["sync_offset"]]
     signatures = signatures_of(all_of(noisy(part_of_moving(0, 12), 3), wandering(2)), effects)

@@ -8,16 +8,20 @@ from functools import cache
 import numpy as np
 import pytest
 from noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
+from noisy_trial import null as null_of
 
 from bsip_cli.diagnosis import detection, intervals, judging, selection
 from bsip_cli.diagnosis.channel_patterns import with_play
 from bsip_cli.diagnosis.detection import Limit, limits_of
-from bsip_cli.diagnosis.explanation import NEGLIGIBLE
+from bsip_cli.diagnosis.explanation import NEGLIGIBLE, fit_together
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import gain_of
+from bsip_cli.diagnosis.intervals import has_size
 from bsip_cli.diagnosis.judging import ALPHA
 from bsip_cli.diagnosis.patterns import PATTERNS
-from bsip_cli.diagnosis.selection import Selection, select
+from bsip_cli.diagnosis.rounds import Selection
+from bsip_cli.diagnosis.selection import select
+from bsip_cli.diagnosis.settling import settled
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
@@ -120,14 +124,15 @@ def test_a_moment_is_no_size(monkeypatch):
     (one,) = said_of(pushed())
     assert one.effect == "unmeasured_contact"
     monkeypatch.setattr(intervals, "SCALE_ERROR", 2.0)
-    (one,) = said_of(pushed())
+    (one,) = said_of(pushed.__wrapped__())
     assert one.effect == "unexplained" and "may as well have no size" in one.sentence
 
 
 def test_what_may_as_well_have_no_size_has_no_name(monkeypatch):
     """It explains more than what is told without a name must."""
-    chosen = late_with_offset()
     monkeypatch.setattr(intervals, "SCALE_ERROR", 2.0)
+    chosen = late_with_offset.__wrapped__()
+    assert chosen.fit.explanations == ()
     assert [one.effect for one in said_of(chosen)] == ["unexplained"]
     rejected = findings_of(chosen, np.random.default_rng(1))[1:3]
     assert [one.effect for one in rejected] == ["sync_offset", "plate_zero"]
@@ -137,7 +142,29 @@ def test_what_may_as_well_have_no_size_has_no_name(monkeypatch):
 def test_slight_things_without_a_size_are_not_told(monkeypatch):
     monkeypatch.setattr(intervals, "SCALE_ERROR", 2.0)
     monkeypatch.setattr(judging, "NAMELESS_WORTH", 1.0)
-    assert said_of(late_with_offset()) == []
+    assert said_of(late_with_offset.__wrapped__()) == []
+
+
+def test_of_two_that_take_each_others_size_the_stronger_is_told_with_its_own():
+    """Let go at 6 s, found at 6 s and at 5.95 s: together neither has a size for sure."""
+    effect = EFFECTS["released_object"]
+    scene = with_effect(part_of_moving(0, 12), effect, "hand_r", 1.2, 6.0)
+    signatures = signatures_of(all_of(noisy(scene, 3)), [effect])
+    alone = select(signatures, rng())
+    (only,) = (one for one in alone.rounds if one.kept)
+    other = replace(
+        only.kept, explanation=null_of(effect, "hand_r", (5.95,)), score=0.5 * only.kept.score
+    )
+    rounds = (only, replace(only, kept=other, tried=(other,)))
+    found = (*alone.fit.explanations, other.explanation)
+    together = fit_together(alone.signatures.evidence, found)
+    assert not any(
+        has_size(alone.signatures.evidence, together, number, rng()) for number in range(2)
+    )
+    both = settled(alone.signatures, rounds, found, rng())
+    (told,) = both.fit.explanations
+    assert told.values == pytest.approx(alone.fit.explanations[0].values, rel=0.02)
+    assert [one.kept is not None for one in both.rounds] == [True, False]
 
 
 def test_what_a_large_cause_leaves_behind_is_no_other_cause():
@@ -563,13 +590,17 @@ def test_limits_are_told_though_nothing_was_worth_a_try():
     assert len(limits(selection)) > 50
 
 
-def test_what_later_causes_push_to_a_bound_is_not_said():
-    """Values that are no longer possible beside the others are no finding."""
-    selection = late_with_offset()
-    first, second = selection.fit.explanations
-    beyond = replace(second, values=np.array([200.0]))
-    pushed = replace(selection, fit=replace(selection.fit, explanations=(first, beyond)))
-    assert [one.effect for one in said_of(pushed)] == [first.effect.name]
+def test_what_later_causes_push_to_a_bound_is_not_said(monkeypatch):
+    """What is no longer possible beside the others is no finding, and not in the fit."""
+    chosen = late_with_offset()
+    found = chosen.fit.explanations
+    zero = found[1].effect
+    monkeypatch.setattr(type(zero), "possible", lambda *_: False)
+    pushed = settled(chosen.signatures, chosen.rounds, found, rng())
+    assert [one.effect.name for one in pushed.fit.explanations] == [found[0].effect.name]
+    assert [one.effect for one in said_of(pushed)] == [found[0].effect.name]
+    rejected = next(o for o in findings_of(pushed, rng()) if o.effect == zero.name)
+    assert "its size cannot be" in rejected.sentence
 
 
 def test_what_is_well_above_its_limit_is_found():

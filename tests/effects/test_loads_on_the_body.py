@@ -107,6 +107,18 @@ def test_an_object_is_seen_with_and_without():
     assert not effect.possible(blind, "hand_r", np.array([1.5, 3.0]))
 
 
+def test_in_a_throw_less_than_a_second_is_enough():
+    """Of 2.2 s a quarter on either side; every moment that is tried can be the one."""
+    effect, scene = ReleasedObject(), moving()
+    throw = replace(scene, valid=(TIMES >= 2.0) & (TIMES < 4.2))
+    assert effect.possible(throw, "hand_r", np.array([0.3, 2.6]))
+    assert not effect.possible(throw, "hand_r", np.array([0.3, 2.4]))
+    for one in (throw, scene):
+        moments = [moment for (moment,) in effect.scans(one, "hand_r")]
+        assert len(moments) >= 3 and np.diff(moments).max() <= 0.5
+        assert all(effect.possible(one, "hand_r", np.array([0.3, t])) for t in moments)
+
+
 def test_a_contact_lasts():
     effect, scene = UnmeasuredContact(), moving()
     long, short = np.array([0, 0, 50.0, 3.0, 1.0]), np.array([0, 0, 50.0, 3.0, 0.5])

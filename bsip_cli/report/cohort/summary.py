@@ -72,8 +72,8 @@ def _gain(record: CohortRecord) -> list[Block]:
         if worse
         else Paragraph(
             "OM follows better in every component, by the typical change and in the number of "
-            "participants. What of that could be chance stands in tables 4 and 5, after Holm's "
-            "correction for the number of tests.",
+            "participants. What of that could be chance, after Holm's correction for the number "
+            "of tests, says the note under table 4.",
             "good",
         )
     )

@@ -158,8 +158,9 @@ def _rows(
         ]
         if not any(columns):
             continue
-        best = min(columns[0] or columns[1], key=lambda x: x.size)
-        if not isfinite(best.size):
+        ends = [min(limits, key=lambda x: x.size) for limits in columns if limits]
+        best = next((x for x in ends if isfinite(x.size)), None)
+        if best is None:
             continue
         yield (
             effect_title(effect),

@@ -316,9 +316,10 @@ def _posturography(record: ParticipantRecord) -> list[Block]:
         Grid(
             ("trial", "from", *(title for _, title in _SWAY)),
             tuple(rows),
-            "About the mean of each trial; a good simulation repeats the measured values. Markers "
-            "shake the simulated pressure: its path and speed are too long and too fast, and in "
-            "trials of a second none of this describes anybody's balance",
+            "About the mean of each trial; a good simulation repeats the measured values. While "
+            "somebody moves, noise of the markers makes the simulated path too long; in quiet "
+            "standing smoothing makes it too short. Trials of a second or two do not describe "
+            "anybody's balance",
             words=2,
         )
     ]

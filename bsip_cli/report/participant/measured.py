@@ -20,7 +20,8 @@ def section(record: ParticipantRecord) -> Section:
     blocks: list[Block] = [
         Paragraph(
             "Forces are compared only while every foot that touches the ground stands on a "
-            "plate (the compared share). A frame is determined if its markers fix the pose."
+            "plate (the compared share). A frame is usable if its markers fix the pose, and no "
+            "end of the trial or gap of the pose lies within 0.1 s."
         ),
         Grid(
             (
@@ -28,7 +29,7 @@ def section(record: ParticipantRecord) -> Section:
                 "role",
                 "duration [s]",
                 "compared [%]",
-                "determined [%]",
+                "usable [%]",
                 "with gaps",
                 "samples left open [%]",
                 "excluded",

@@ -189,7 +189,7 @@ def _phase_grid(rms: dict[str, dict[str, np.ndarray]], phases: Sequence[str], ov
         ("component", "unit", *phases),
         rows,
         f"RMS of the residual with OM{arrow}, over {over}; marked: standing still, where it is "
-        f"{percent(_AS_LARGE)} % of the largest phase or more",
+        f"{percent(_AS_LARGE)} % of the largest moving phase or more",
         words=2,
     )
 
@@ -198,7 +198,8 @@ def _phase_row(
     component: str, methods: dict[str, np.ndarray], phases: Sequence[str]
 ) -> tuple[str | Cell, ...]:
     columns = list(zip(*methods.values(), strict=True))
-    largest = max((column[0] for column in columns), default=np.nan)
+    moving = [column[0] for phase, column in zip(phases, columns, strict=True) if phase != STILL]
+    largest = max(moving, default=np.nan)
     return (
         component_label(component),
         _COLUMNS[component][1],

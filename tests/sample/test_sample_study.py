@@ -106,3 +106,24 @@ def test_valid_windows_follow_the_true_contacts(out):
         for window in beside:
             inner = wrench["time_s"].between(window["start_s"] + 0.05, window["end_s"] - 0.05)
             assert not wrench.loc[inner, "valid"].any()
+
+
+def test_the_balls_that_nobody_tells_of_are_found(out):
+    """In every throw of which two seconds can be used, and nothing else is named."""
+    found = []
+    for path in sorted(out.glob("sub-*/sub-??_diagnosis.parquet")):
+        rows = pd.read_parquet(path)
+        told = rows[(rows["verdict"] != "rejected") & (rows["effect"] != "none")]
+        if not len(told):
+            continue
+        assert set(zip(told["effect"], told["target"], strict=True)) == {
+            ("released_object", "hand_r")
+        }, path.parent.name
+        record = json.loads((SAMPLE / "truth" / f"{path.parent.name}_truth.json").read_text())
+        for name, ball in (("mass", "mass_kg"), ("release_time", "release_s")):
+            for row in told[told["parameter"] == name].itertuples():
+                true = record["trials"][row.trials]["ball"][ball]
+                found.append((row.trials, name, row.ci_low <= true <= row.ci_high))
+    masses = {(trial, inside) for trial, name, inside in found if name == "mass"}
+    assert len(masses) == 7
+    assert sum(inside for *_, inside in found) >= 0.85 * len(found)

@@ -554,7 +554,7 @@ def test_trials_too_short_to_diagnose_are_named(run, monkeypatch):
     assert outcome.state == "done"
     (told,) = [one for one in outcome.sentences if "has no part in the diagnosis" in one]
     assert told.startswith(f"sub-01_{TRIALS[1]}: ")
-    assert told.endswith("on a plate for 2.80 s only, 5 s are needed")
+    assert told.endswith("on a plate and the pose known for 2.80 s only, 5 s are needed")
 
 
 def test_where_no_trial_is_long_enough_nobody_says_that_nothing_is_wrong(run, monkeypatch):

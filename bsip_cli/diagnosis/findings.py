@@ -14,6 +14,7 @@ from bsip_cli.diagnosis.explanation import Explanation
 from bsip_cli.diagnosis.intervals import drawn_explanations
 from bsip_cli.diagnosis.judging import NAMELESS_LEAST, NAMELESS_WORTH, TINY_WORTH, Tried
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
+from bsip_cli.diagnosis.refitting import alike
 from bsip_cli.diagnosis.rounds import Round, Selection
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
@@ -114,11 +115,10 @@ def _nearest(evidence: Evidence, tried: Tried, why: str, trials: tuple[int, ...]
 
 def _kept(selection: Selection) -> Iterator[tuple[Round, Tried, int]]:
     """Rounds and what they kept, with the numbers of the last fit and the place in it."""
-    rounds = (one for one in selection.rounds if one.kept is not None)
-    for number, one in enumerate(rounds):
-        last = selection.fit.explanations[number]
-        assert one.kept is not None
-        yield one, replace(one.kept, explanation=last, fit=selection.fit), number
+    kept = ((one, one.kept) for one in selection.rounds if one.kept is not None)
+    last = zip(kept, selection.fit.explanations, strict=True)
+    for number, ((one, cause), explanation) in enumerate(last):
+        yield one, replace(cause, explanation=explanation, fit=selection.fit), number
 
 
 def _key(one: Explanation) -> tuple:
@@ -127,8 +127,7 @@ def _key(one: Explanation) -> tuple:
 
 def _same(one: Explanation, other: Explanation) -> bool:
     """The same cause, looked at in fewer or more trials."""
-    shared = set(one.place.trials) & set(other.place.trials)
-    return (one.effect, one.target) == (other.effect, other.target) and bool(shared)
+    return alike(one, other) and not set(one.place.trials).isdisjoint(other.place.trials)
 
 
 def _finding(

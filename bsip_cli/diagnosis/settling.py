@@ -12,7 +12,14 @@ from bsip_cli.diagnosis.chance import group_of
 from bsip_cli.diagnosis.explanation import Explanation, fit_together
 from bsip_cli.diagnosis.intervals import has_size
 from bsip_cli.diagnosis.joining import Kept, joined
-from bsip_cli.diagnosis.judging import DROWNED, IMPOSSIBLE, NEGLIGIBLE, SIZELESS, GivenUp
+from bsip_cli.diagnosis.judging import (
+    DROWNED,
+    IMPOSSIBLE,
+    NEGLIGIBLE,
+    SIZELESS,
+    GivenUp,
+    Tried,
+)
 from bsip_cli.diagnosis.likely_noise import noise_beside_fit
 from bsip_cli.diagnosis.rounds import Round, Selection
 from bsip_cli.diagnosis.signatures import Signatures
@@ -23,7 +30,7 @@ def told_once(
     evidence: Evidence, rounds: Sequence[Round], found: tuple[Explanation, ...]
 ) -> tuple[tuple[Round, ...], tuple[Explanation, ...]]:
     """What lasts, and was found by several rounds in trials of their own, in the first of them."""
-    judged = (one.kept for one in rounds if one.kept is not None)
+    judged = (cause for _, cause in _kept(rounds))
     left = joined(evidence, list(zip(judged, found, strict=True)))
     causes = iter(left)
     told = tuple(one if one.kept is None else _with(one, next(causes)) for one in rounds)
@@ -53,12 +60,17 @@ def settled(
     return settled(signatures, *_without(selection, *lost), rng) if lost else selection
 
 
+def _kept(rounds: Sequence[Round]) -> list[tuple[Round, Tried]]:
+    """Rounds that kept a cause, each with it, in the order of the fit."""
+    return [(one, one.kept) for one in rounds if one.kept is not None]
+
+
 def _weakest_drowned(selection: Selection) -> tuple[int, GivenUp] | None:
-    """The round whose cause explains least beside what remains, if that is more."""
+    """Place in the fit of the cause that explains least beside what remains, if that is more."""
     left = {
-        number: selection.background.get(group_of(one.kept.trials), 0.0) / one.kept.score
-        for number, one in enumerate(selection.rounds)
-        if one.kept is not None and one.chance is not None
+        place: selection.background.get(group_of(cause.trials), 0.0) / cause.score
+        for place, (one, cause) in enumerate(_kept(selection.rounds))
+        if one.chance is not None
     }
     weakest = max(left, key=left.__getitem__, default=None)
     return None if weakest is None or left[weakest] < 1 else (weakest, DROWNED)
@@ -67,17 +79,11 @@ def _weakest_drowned(selection: Selection) -> tuple[int, GivenUp] | None:
 def _weakest_without_size(
     selection: Selection, rng: np.random.Generator
 ) -> tuple[int, GivenUp] | None:
-    """The round whose cause has no size, or none that can be, and the least score."""
-    lost = []
-    kept = ((n, one.kept) for n, one in enumerate(selection.rounds) if one.kept is not None)
-    for place, (number, cause) in enumerate(kept):
-        why = _why_without_size(selection, place, rng)
-        if why is not None:
-            lost.append((cause.score, number, why))
-    if not lost:
-        return None
-    _, number, why = min(lost, key=lambda one: one[0])
-    return number, why
+    """Place in the fit of the cause with the least score that has no size, or none that can be."""
+    scores = [cause.score for _, cause in _kept(selection.rounds)]
+    asked = ((place, _why_without_size(selection, place, rng)) for place in range(len(scores)))
+    lost = [(place, why) for place, why in asked if why is not None]
+    return min(lost, key=lambda one: scores[one[0]], default=None)
 
 
 def _why_without_size(selection: Selection, place: int, rng: np.random.Generator) -> GivenUp | None:
@@ -92,20 +98,18 @@ def _why_without_size(selection: Selection, place: int, rng: np.random.Generator
 
 
 def _without(
-    selection: Selection, given_up: int, why: GivenUp
+    selection: Selection, place: int, why: GivenUp
 ) -> tuple[tuple[Round, ...], tuple[Explanation, ...]]:
-    """Rounds and causes without what one of them kept: there it was only tried."""
-    rounds, left = [], []
-    causes = iter(selection.fit.explanations)
-    for number, one in enumerate(selection.rounds):
-        cause = None if one.kept is None else next(causes)
-        if number != given_up:
-            rounds.append(one)
-            left += [] if cause is None else [cause]
-            continue
-        tried = (
-            replace(t, explanation=cause or t.explanation, given_up=why) if t is one.kept else t
-            for t in one.tried
-        )
-        rounds.append(replace(one, tried=tuple(tried), kept=None))
-    return tuple(rounds), tuple(left)
+    """Rounds and causes without the one at a place of the fit: in its round it was only tried."""
+    rounds, explanations = selection.rounds, selection.fit.explanations
+    number = [n for n, one in enumerate(rounds) if one.kept is not None][place]
+    one = rounds[number]
+    tried = (
+        replace(t, explanation=explanations[place], given_up=why) if t is one.kept else t
+        for t in one.tried
+    )
+    only_tried = replace(one, tried=tuple(tried), kept=None)
+    return (
+        (*rounds[:number], only_tried, *rounds[number + 1 :]),
+        (*explanations[:place], *explanations[place + 1 :]),
+    )

@@ -62,7 +62,7 @@ class ParticipantRecord:
     """One participant; ``facts`` is the single row of the ``person`` artifact, ``loads`` the known
     loads as (trial label, words). ``diagnosis``, ``detection``, ``gains`` and ``changes`` (of a model
     extended by what was found) are None where their stages have not run; ``too_short_s``: trials that
-    had no part in the diagnosis, with the seconds in which every contact is on a plate."""
+    had no part in the diagnosis, with the seconds of them that can be used."""
 
     id: str
     facts: pd.Series

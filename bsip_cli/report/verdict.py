@@ -67,7 +67,7 @@ def verdict_of(
 ) -> Verdict:
     """From the artifacts ``diagnosis`` and ``detection``, and of ``extend`` where it has run
     ``gain`` and ``bsip-change``, with one method each. ``too_short_s``: stems of trials that had no
-    part in it, with the seconds in which every contact is on a plate."""
+    part in it, with the seconds of them that can be used."""
     causes = causes_of(candidates_of(diagnosis))
     everywhere = looked_at(detection, diagnosis)
     return Verdict(

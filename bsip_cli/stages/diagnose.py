@@ -107,7 +107,7 @@ def _asked(
 
 
 def _too_short(asked: Asked) -> dict[str, float]:
-    """Moving trials that are left out, and for how many seconds every contact is on a plate."""
+    """Moving trials that are left out, and how many seconds of them can be used."""
     left_out = ((one.trial.stem, one.too_short_s) for one in asked.looked_at)
     return {stem: seconds for stem, seconds in left_out if seconds is not None}
 

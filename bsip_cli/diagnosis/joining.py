@@ -10,13 +10,15 @@ from bsip_cli.diagnosis.explanation import Explanation, fit_together
 from bsip_cli.diagnosis.held_out import Gain
 from bsip_cli.diagnosis.judging import Tried
 from bsip_cli.diagnosis.refitting import agreeing, alike
+from bsip_cli.diagnosis.rivals import in_few_trials
+from bsip_cli.diagnosis.signatures import Signatures
 from bsip_cli.diagnosis.together import Evidence
 
 Kept = tuple[Tried, Explanation]
 """A cause as it was judged, and as it was fitted last."""
 
 
-def joined(evidence: Evidence, kept: Sequence[Kept]) -> list[Kept | None]:
+def joined(signatures: Signatures, kept: Sequence[Kept]) -> list[Kept | None]:
     """None for the later one of two that are the same and agree on their size; the former is then
     in the trials of both."""
     left: list[Kept | None] = list(kept)
@@ -26,8 +28,9 @@ def joined(evidence: Evidence, kept: Sequence[Kept]) -> list[Kept | None]:
             continue
         both = _in_all(one[1], other[1])
         rest = [k[1] for n, k in enumerate(left) if k is not None and n not in (first, later)]
-        if _agree(evidence, rest, both):
-            left[first], left[later] = (_of_both(one[0], other[0], both), both), None
+        if _agree(signatures.evidence, rest, both):
+            rivals = _rivals(one[0], other[0], in_few_trials(signatures, both))
+            left[first], left[later] = (_of_both(one[0], other[0], both, rivals), both), None
     return left
 
 
@@ -48,8 +51,15 @@ def _agree(evidence: Evidence, rest: Sequence[Explanation], both: Explanation) -
     return agreeing(evidence, fit, saved) == both.place.trials
 
 
-def _of_both(one: Tried, other: Tried, both: Explanation) -> Tried:
-    """Whose rivals are those of both: what either tells from it is told."""
+def _rivals(one: Tried, other: Tried, apart: bool) -> tuple[Tried, ...]:
+    """Those of both: what either tells from it is told. apart : or those of each, if both have
+    some."""
+    if apart and one.rivals and other.rivals:
+        return (*one.rivals, *other.rivals)
+    return tuple(r for r in one.rivals if any(_same(r, s) for s in other.rivals))
+
+
+def _of_both(one: Tried, other: Tried, both: Explanation, rivals: tuple[Tried, ...]) -> Tried:
     gain = Gain(
         one.gain.blocks + other.gain.blocks,
         one.gain.concerned | other.gain.concerned,
@@ -61,7 +71,7 @@ def _of_both(one: Tried, other: Tried, both: Explanation) -> Tried:
         score=one.score + other.score,
         p_value=min(one.p_value, other.p_value),
         gain=gain,
-        rivals=tuple(r for r in one.rivals if any(_same(r, s) for s in other.rivals)),
+        rivals=rivals,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import replace
 from itertools import islice, product
 
@@ -16,15 +16,17 @@ from bsip_cli.diagnosis.judging import ALPHA, Tried, judged_by, stands_beside
 from bsip_cli.diagnosis.likely_noise import likely_columns, with_likely_noise
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.refitting import Refitted, refitted, start_at
-from bsip_cli.diagnosis.rivals import rivals_of
+from bsip_cli.diagnosis.rivals import in_few_trials, rivals_of
 from bsip_cli.diagnosis.rounds import Round, Selection
 from bsip_cli.diagnosis.settling import settled, told_once
 from bsip_cli.diagnosis.signatures import Signatures
 from bsip_cli.diagnosis.together import Evidence
+from bsip_cli.effects.effect import Effect
 
 MOST = 3  # causes in one trial
 TRIES = 10  # candidates that are refitted in a round
 SHOWN = 3  # that are looked at even where nothing stands out
+RIVALS_TRIED = 2  # in each trial of a lasting cause that few trials show
 WORTH_A_TRY = 0.5  # of the best score
 # A cause from the catalogue is named though a regularity without a name explains a bit more.
 NAMED_AT = 0.95
@@ -51,7 +53,7 @@ def select(
         if one.kept is None:
             break
         found = one.kept.fit.explanations
-    return settled(signatures, *told_once(signatures.evidence, rounds, found), rng)
+    return settled(signatures, *told_once(signatures, rounds, found), rng)
 
 
 def _open_trials(evidence: Evidence, rounds: Sequence[Round]) -> set[int]:
@@ -71,6 +73,7 @@ def _round(
     scored = signatures.scores(before.residual[:, None], before.tangent)
     tried = _tried(signatures, before, scored, open_trials, rough)
     tried += _elsewhere(signatures, before, scored, tried)
+    tried += _apart(signatures, before, scored, tried)
     chance = _chance(signatures, max(tried, key=lambda t: t.score).fit if tried else before, rng)
     judged = [judged_by(evidence, before, *one, chance) for one in tried]
     while _kept(judged, before) is None and (in_vain := _in_vain(judged) & open_trials):
@@ -81,7 +84,8 @@ def _round(
     kept = _kept(judged, before)
     if kept is None:
         return Round(evidence, tuple(judged), None, chance)
-    named = replace(kept, rivals=rivals_of(evidence, kept, judged))
+    apart = in_few_trials(signatures, kept.explanation)
+    named = replace(kept, rivals=rivals_of(evidence, kept, judged, apart))
     return Round(evidence, tuple(named if t is kept else t for t in judged), named, chance)
 
 
@@ -129,15 +133,52 @@ def _elsewhere(
         if t in shared and _squares_in(evidence, own, t) < _squares_in(evidence, fit, t)
     )
     known = {(effect, t) for effect, t, _ in alone}
-    scores, sizes = scored
     for effect, t in product(better, shared):
         if (effect, t) not in known:
-            ranked = _best_of_each(signatures, scores[:, 0], sizes, {t}, before)
-            mine = (k for k in ranked if signatures.places[k].candidate.effect is effect)
-            for k in islice(mine, 1):
-                one = refitted(signatures, before, signatures.places[k], sizes[k], {t})
-                if one is not None:
-                    yield one
+            yield from _alone(signatures, before, scored, t, (effect,), 1)
+
+
+def _apart(
+    signatures: Signatures, before: Fit, scored: Scored, tried: Sequence[Refitted]
+) -> Iterator[Refitted]:
+    """What else a fault of the lab that few trials show may be in each of them: what is worn in two
+    of them, at two places, passes for one plate that reads too much."""
+    known = {_key(one.explanation) for one in tried}
+    catalogue = {p.candidate.effect for p in signatures.places}
+    named = {effect for effect in catalogue if effect.name != UNEXPLAINED}
+    asked = {
+        (one.effect, t)
+        for one, _, _ in tried
+        if in_few_trials(signatures, one)
+        for t in one.place.trials
+    }
+    for effect, t in sorted(asked, key=lambda pair: (pair[1], pair[0].name)):
+        for other in _alone(signatures, before, scored, t, named - {effect}, RIVALS_TRIED):
+            if _key(other.explanation) not in known:
+                known.add(_key(other.explanation))
+                yield other
+
+
+def _key(one: Explanation) -> tuple[Effect, str, tuple[int, ...]]:
+    return one.effect, one.target, one.place.trials
+
+
+def _alone(
+    signatures: Signatures,
+    before: Fit,
+    scored: Scored,
+    trial: int,
+    effects: Container[Effect],
+    most: int,
+) -> Iterator[Refitted]:
+    """The best candidates of some effects in one trial, refitted in full."""
+    scores, sizes = scored
+    ranked = _best_of_each(signatures, scores[:, 0], sizes, {trial}, before)
+    mine = (k for k in ranked if signatures.places[k].candidate.effect in effects)
+    for k in islice(mine, most):
+        one = refitted(signatures, before, signatures.places[k], sizes[k], {trial})
+        if one is not None:
+            yield one
 
 
 def _squares_in(evidence: Evidence, fit: Fit, trial: int) -> float:

@@ -23,15 +23,14 @@ from bsip_cli.diagnosis.judging import (
 from bsip_cli.diagnosis.likely_noise import noise_beside_fit
 from bsip_cli.diagnosis.rounds import Round, Selection
 from bsip_cli.diagnosis.signatures import Signatures
-from bsip_cli.diagnosis.together import Evidence
 
 
 def told_once(
-    evidence: Evidence, rounds: Sequence[Round], found: tuple[Explanation, ...]
+    signatures: Signatures, rounds: Sequence[Round], found: tuple[Explanation, ...]
 ) -> tuple[tuple[Round, ...], tuple[Explanation, ...]]:
     """What lasts, and was found by several rounds in trials of their own, in the first of them."""
     judged = (cause for _, cause in _kept(rounds))
-    left = joined(evidence, list(zip(judged, found, strict=True)))
+    left = joined(signatures, list(zip(judged, found, strict=True)))
     causes = iter(left)
     told = tuple(one if one.kept is None else _with(one, next(causes)) for one in rounds)
     return told, tuple(one[1] for one in left if one is not None)

@@ -12,6 +12,7 @@ from bsip_cli.diagnosis.explanation import Explanation, explanation_of, fit_toge
 from bsip_cli.diagnosis.held_out import gain_of
 from bsip_cli.diagnosis.joining import joined
 from bsip_cli.diagnosis.judging import Tried
+from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.effects.catalogue import EFFECTS
 
@@ -19,6 +20,10 @@ from bsip_cli.effects.catalogue import EFFECTS
 def trials_late_by(*delays_s: float) -> Evidence:
     scenes = (late(part_of_moving(8 * k, 8), delay) for k, delay in enumerate(delays_s))
     return all_of(*(noisy(scene, 5 + k) for k, scene in enumerate(scenes)))
+
+
+def signatures(evidence: Evidence) -> Signatures:
+    return signatures_of(evidence, [EFFECTS["sync_offset"], EFFECTS["plate_drift"]])
 
 
 def delay_in(evidence: Evidence, trial: int, delay_s: float) -> Explanation:
@@ -35,7 +40,7 @@ def kept(evidence: Evidence, one: Explanation) -> tuple[Tried, Explanation]:
 def test_trials_that_agree_share_one_cause():
     evidence = trials_late_by(0.008, 0.008)
     found = [kept(evidence, delay_in(evidence, t, 0.008)) for t in (0, 1)]
-    (tried, both), later = joined(evidence, found)
+    (tried, both), later = joined(signatures(evidence), found)
     assert later is None
     assert tried.explanation is both and both.place.trials == (0, 1)
     assert tried.gain.concerned.all() and tried.score == 200.0
@@ -55,14 +60,14 @@ def test_what_one_trial_tells_from_it_is_no_rival_in_both(in_second, left):
         (replace(tried, rivals=(rival,) if has else ()), one)
         for (tried, one), rival, has in zip(found, rivals, (True, in_second), strict=True)
     )
-    (tried, _), _ = joined(evidence, [first, second])
+    (tried, _), _ = joined(signatures(evidence), [first, second])
     assert len(tried.rivals) == left
 
 
 def test_trials_that_differ_keep_theirs():
     evidence = trials_late_by(0.006, 0.014)
     found = [kept(evidence, delay_in(evidence, t, s)) for t, s in ((0, 0.006), (1, 0.014))]
-    assert joined(evidence, found) == found
+    assert joined(signatures(evidence), found) == found
 
 
 def test_what_does_not_last_is_another_cause_in_every_trial():
@@ -74,4 +79,4 @@ def test_what_does_not_last_is_another_cause_in_every_trial():
         for t, one in enumerate(evidence.trials)
     )
     found = [kept(evidence, one) for one in causes]
-    assert joined(evidence, found) == found
+    assert joined(signatures(evidence), found) == found

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from moving_scene import CORNERS
 from noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
 from noisy_trial import null as null_of
 
@@ -24,7 +25,7 @@ from bsip_cli.diagnosis.selection import select
 from bsip_cli.diagnosis.settling import settled
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.scene import Plate, Scene
 from bsip_cli.stages.diagnosis_rows import rows_of
 
 NAMES = (
@@ -432,6 +433,32 @@ def test_a_swing_between_the_regular_frequencies_is_found_in_a_long_trial():
         p.candidate.scanned[0] for p in clean if p.candidate.target == "fz" and p.candidate.scanned
     ]
     assert min(abs(f - hertz) for f in regular) > 0.02 and len(regular) < len(asked)
+
+
+def gained_in(*trials: int) -> list[Finding]:
+    """Four trials on one plate, which reads 1.8 % too much in some of them."""
+    parts = [on_one_plate(part_of_moving(8 * k, 8, 0.05)) for k in range(4)]
+    for t in trials:
+        parts[t] = with_effect(parts[t], EFFECTS["plate_gain"], "1 fz", 0.018)
+    return said_of(selection_of(*(noisy(scene, 9 + k) for k, scene in enumerate(parts))))
+
+
+def on_one_plate(scene: Scene) -> Scene:
+    return replace(scene, plates=(Plate("1", CORNERS, scene.predicted),))
+
+
+def test_what_half_of_the_trials_show_may_be_another_cause_in_each():
+    found = gained_in(0, 2)
+    assert {one.class_id for one in found} == {"A"}
+    assert found[0].effect == "plate_gain" and found[0].trials == ("a", "c")
+    masses = {one.trials for one in found if one.effect == "added_mass"}
+    assert masses == {("a",), ("c",)}
+
+
+def test_what_most_trials_show_is_of_the_lab():
+    found = gained_in(0, 1, 2)
+    assert found[0].effect == "plate_gain"
+    assert {one.trials for one in found} == {("a", "b", "c")}
 
 
 # --- causes that look alike, and the rows of the artifact ---------------------------------------

@@ -189,7 +189,12 @@ def fit_together(evidence: Evidence, explanations: tuple[Explanation, ...]) -> F
         )
         if np.abs(step).max(initial=0.0) < 1e-3:
             break
-    return Fit(found, *_linear(evidence, found))
+    return fit_of(evidence, found)
+
+
+def fit_of(evidence: Evidence, explanations: tuple[Explanation, ...]) -> Fit:
+    """Explanations with the sizes that they have."""
+    return Fit(explanations, *_linear(evidence, explanations))
 
 
 def _step(

@@ -6,6 +6,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from bsip_cli.diagnosis.explanation import Explanation, Fit
+from bsip_cli.diagnosis.fair_sizes import goes_with_mass
+from bsip_cli.diagnosis.scale_mass import TRUSTED
 from bsip_cli.diagnosis.together import Evidence
 
 DRAWS = 200
@@ -48,7 +50,8 @@ def _beyond_recordings(evidence: Evidence, one: Explanation) -> np.ndarray:
     """(K,) variance of all parameters that no recording betters [typical]."""
     scale = SCALE_ERROR * one.values * one.is_free(evidence)
     simple = np.array([p.known_to for p in one.parameters(evidence)])
-    return (scale**2 + simple**2) / one.all_typical(evidence) ** 2
+    weighed = TRUSTED * goes_with_mass(evidence, one)
+    return (scale**2 + simple**2 + weighed**2) / one.all_typical(evidence) ** 2
 
 
 def bounds(evidence: Evidence, fit: Fit, number: int) -> dict[str, float]:

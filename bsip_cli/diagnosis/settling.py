@@ -10,6 +10,7 @@ import numpy as np
 from bsip_cli.diagnosis.background import background_of
 from bsip_cli.diagnosis.chance import group_of
 from bsip_cli.diagnosis.explanation import Explanation, fit_together
+from bsip_cli.diagnosis.fair_sizes import fairly_sized
 from bsip_cli.diagnosis.intervals import has_size
 from bsip_cli.diagnosis.joining import Kept, joined
 from bsip_cli.diagnosis.judging import (
@@ -54,6 +55,7 @@ def settled(
     fit = fit_together(signatures.evidence, found)
     if found:
         signatures, fit = noise_beside_fit(signatures, fit)
+        fit = fairly_sized(signatures.evidence, fit)
     selection = Selection(signatures, rounds, fit, background_of(signatures, fit))
     lost = _weakest_drowned(selection) or _weakest_without_size(selection, rng)
     return settled(signatures, *_without(selection, *lost), rng) if lost else selection

@@ -1,0 +1,78 @@
+"""Vertical gains of all trials, sized beside the stated mass.
+
+A plate that shows too much and a body that is heavier go along with each other in every trial. What
+the simulation lacks of the horizontal forces and moments is less beside a lighter body, so least
+squares trade mass for gain: beyond what a scale may err by, and always in the same direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_of, fit_together
+from bsip_cli.diagnosis.together import Evidence, together
+from bsip_cli.effects.plate_gain import PlateGain
+
+_VERTICAL = " fz"
+
+
+def fairly_sized(evidence: Evidence, fit: Fit) -> Fit:
+    """The same causes; where a vertical gain in all trials is among them, with the sizes, and at
+    the plates, that leave least beside a body of the stated mass."""
+    if not any(goes_with_mass(evidence, one) for one in fit.explanations):
+        return fit
+    weighed = _of_stated_mass(evidence)
+    choices = product(*(_at_any_plate(evidence, one) for one in fit.explanations))
+    fits = (fit_together(weighed, explanations) for explanations in choices)
+    return fit_of(evidence, min(fits, key=_squares).explanations)
+
+
+def goes_with_mass(evidence: Evidence, one: Explanation) -> bool:
+    """Whether it is a vertical gain in all trials of a person whose mass is stated."""
+    if not isinstance(one.effect, PlateGain) or not one.target.endswith(_VERTICAL):
+        return False
+    return one.place.trials == _possible(evidence, one) and bool(_heavier(evidence).any())
+
+
+def _at_any_plate(evidence: Evidence, one: Explanation) -> Iterator[Explanation]:
+    yield one
+    if not goes_with_mass(evidence, one):
+        return
+    scene = one.scene(evidence)
+    for target in one.effect.targets(scene):
+        candidate = replace(one.place.candidate, target=target)
+        other = replace(one, place=replace(one.place, candidate=candidate))
+        if target != one.target and goes_with_mass(evidence, other):
+            yield other
+
+
+def _possible(evidence: Evidence, one: Explanation) -> tuple[int, ...]:
+    return tuple(
+        t
+        for t, trial in enumerate(evidence.trials)
+        if one.target in one.effect.targets(trial.scene)
+    )
+
+
+def _of_stated_mass(evidence: Evidence) -> Evidence:
+    """The same evidence of a body that is as heavy as stated."""
+    heavier = _heavier(evidence)
+    trials = (
+        replace(one, shared=one.shared - np.outer(one.shared @ heavier, heavier))
+        for one in evidence.trials
+    )
+    return together(tuple(trials))
+
+
+def _heavier(evidence: Evidence) -> np.ndarray:
+    """(p,) shared nuisances that make the body heavier by one standard deviation; zeros where no
+    mass is stated."""
+    return evidence.trials[0].filtered.heavier
+
+
+def _squares(fit: Fit) -> float:
+    return float((fit.residual**2).sum())

@@ -79,3 +79,10 @@ def test_without_a_stated_mass_or_in_one_trial_it_stays_as_it_is(in_all):
     fit = fit_of(evidence, (one,))
     assert not goes_with_mass(evidence, one)
     assert fairly_sized(evidence, fit) is fit
+
+
+def test_two_gains_stay_those_of_two_plates():
+    evidence = weighed(two_trials(on_one_plate=False))
+    both = tuple(gain_of(evidence, 0, 1, target=target) for target in ("1 fz", "2 fz"))
+    found = fairly_sized(evidence, fit_together(evidence, both)).explanations
+    assert len({one.target for one in found}) == 2

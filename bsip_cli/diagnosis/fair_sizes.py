@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_of, fit_together
+from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.plate_gain import PlateGain
 
@@ -23,7 +24,7 @@ _VERTICAL = " fz"
 def fairly_sized(evidence: Evidence, fit: Fit) -> Fit:
     """The same causes; where a vertical gain in all trials is among them, with the sizes, and at
     the plates, that leave least beside a body of the stated mass."""
-    if not any(goes_with_mass(evidence, one) for one in fit.explanations):
+    if not any(goes_with_mass(evidence, one.place) for one in fit.explanations):
         return fit
     weighed = _of_stated_mass(evidence)
     choices = product(*(_at_any_plate(evidence, one) for one in fit.explanations))
@@ -31,31 +32,24 @@ def fairly_sized(evidence: Evidence, fit: Fit) -> Fit:
     return fit_of(evidence, min(fits, key=_squares).explanations)
 
 
-def goes_with_mass(evidence: Evidence, one: Explanation) -> bool:
+def goes_with_mass(evidence: Evidence, place: Place) -> bool:
     """Whether it is a vertical gain in all trials of a person whose mass is stated."""
-    if not isinstance(one.effect, PlateGain) or not one.target.endswith(_VERTICAL):
+    effect, target = place.candidate.effect, place.candidate.target
+    if not isinstance(effect, PlateGain) or not target.endswith(_VERTICAL):
         return False
-    return one.place.trials == _possible(evidence, one) and bool(_heavier(evidence).any())
+    scenes = enumerate(one.scene for one in evidence.trials)
+    possible = tuple(t for t, scene in scenes if target in effect.targets(scene))
+    return place.trials == possible and bool(_heavier(evidence).any())
 
 
 def _at_any_plate(evidence: Evidence, one: Explanation) -> Iterator[Explanation]:
     yield one
-    if not goes_with_mass(evidence, one):
+    if not goes_with_mass(evidence, one.place):
         return
-    scene = one.scene(evidence)
-    for target in one.effect.targets(scene):
-        candidate = replace(one.place.candidate, target=target)
-        other = replace(one, place=replace(one.place, candidate=candidate))
-        if target != one.target and goes_with_mass(evidence, other):
-            yield other
-
-
-def _possible(evidence: Evidence, one: Explanation) -> tuple[int, ...]:
-    return tuple(
-        t
-        for t, trial in enumerate(evidence.trials)
-        if one.target in one.effect.targets(trial.scene)
-    )
+    for target in one.effect.targets(one.scene(evidence)):
+        place = replace(one.place, candidate=replace(one.place.candidate, target=target))
+        if target != one.target and goes_with_mass(evidence, place):
+            yield replace(one, place=place)
 
 
 def _of_stated_mass(evidence: Evidence) -> Evidence:

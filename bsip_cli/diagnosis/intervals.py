@@ -50,7 +50,7 @@ def _beyond_recordings(evidence: Evidence, one: Explanation) -> np.ndarray:
     """(K,) variance of all parameters that no recording betters [typical]."""
     scale = SCALE_ERROR * one.values * one.is_free(evidence)
     simple = np.array([p.known_to for p in one.parameters(evidence)])
-    weighed = TRUSTED * goes_with_mass(evidence, one)
+    weighed = TRUSTED * goes_with_mass(evidence, one.place)
     return (scale**2 + simple**2 + weighed**2) / one.all_typical(evidence) ** 2
 
 

@@ -9,10 +9,13 @@ import pytest
 from moving_scene import CORNERS
 from noisy_trial import SEGMENTS, all_of, noisy, part_of_moving, shown, with_effect
 
+from bsip_cli.diagnosis.detection import limits_of
 from bsip_cli.diagnosis.explanation import Explanation, explanation_of, fit_of, fit_together
 from bsip_cli.diagnosis.fair_sizes import fairly_sized, goes_with_mass
 from bsip_cli.diagnosis.intervals import drawn_explanations
 from bsip_cli.diagnosis.scale_mass import TRUSTED
+from bsip_cli.diagnosis.selection import select
+from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Plate, Scene
@@ -77,7 +80,7 @@ def test_without_a_stated_mass_or_in_one_trial_it_stays_as_it_is(in_all):
     evidence = two_trials() if in_all else weighed(two_trials())
     one = gain_of(evidence, *((0, 1) if in_all else (0,)))
     fit = fit_of(evidence, (one,))
-    assert not goes_with_mass(evidence, one)
+    assert not goes_with_mass(evidence, one.place)
     assert fairly_sized(evidence, fit) is fit
 
 
@@ -86,3 +89,12 @@ def test_two_gains_stay_those_of_two_plates():
     both = tuple(gain_of(evidence, 0, 1, target=target) for target in ("1 fz", "2 fz"))
     found = fairly_sized(evidence, fit_together(evidence, both)).explanations
     assert len({one.target for one in found}) == 2
+
+
+def test_what_a_scale_cannot_tell_might_go_unseen():
+    limits = {}
+    for name, evidence in (("stated", weighed(two_trials())), ("unstated", two_trials())):
+        selection = select(signatures_of(evidence, [GAIN]), np.random.default_rng(0))
+        limits[name] = {one.place.trials: one.size for one in limits_of(selection)}
+    assert limits["stated"][0, 1] > 3 * TRUSTED > limits["unstated"][0, 1]
+    assert limits["stated"][(0,)] < 3 * TRUSTED

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
+
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
@@ -31,6 +33,7 @@ class WobblingMass(Effect):
     of_the_lab = False
     of_the_person = True
     remedy = "hop three times, or drop on the heels"
+    least_named = MappingProxyType({"mass": 0.5})  # what swings to the sides only is none
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
         if not has_impacts(scene):
@@ -54,6 +57,10 @@ class WobblingMass(Effect):
         key = (self.name, target, float(frequency), float(damping))
         upright, aside = scene.once(key, lambda: _swings(scene, target, frequency, damping))
         return mass * upright + sideways * aside
+
+    def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
+        within = super().possible(scene, target, values)
+        return within and bool(values[0] >= self.least_named["mass"])
 
     def reported(
         self, scene: Scene, target: str, values: np.ndarray

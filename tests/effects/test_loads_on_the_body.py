@@ -148,6 +148,12 @@ def test_a_contact_that_is_seen_to_begin_began_then():
     )
 
 
+@pytest.mark.parametrize(("mass", "possible"), [(0.1, False), (2.0, True)])
+def test_what_swings_to_the_sides_only_is_no_wobbling_mass(mass, possible):
+    values = np.array([mass, 4.0, 0.2, 1.5])
+    assert WobblingMass().possible(moving(), "thigh_l", values) is possible
+
+
 @pytest.mark.parametrize(("frequency", "damping"), [(3.0, 0.1), (6.5, 0.3)])
 def test_a_wobbling_mass_is_an_oscillator_on_a_moving_ground(frequency, damping):
     scene, pace = moving(), 2 * np.pi * frequency

@@ -9,12 +9,11 @@ import numpy as np
 
 from bsip_cli.diagnosis.chance import group_of
 from bsip_cli.diagnosis.explanation import NEGLIGIBLE
-from bsip_cli.diagnosis.fair_sizes import goes_with_mass
+from bsip_cli.diagnosis.fair_sizes import known_to
 from bsip_cli.diagnosis.held_out import Z95
 from bsip_cli.diagnosis.judging import ALPHA, WORTH
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.rounds import Selection
-from bsip_cli.diagnosis.scale_mass import TRUSTED
 from bsip_cli.diagnosis.signatures import Place
 
 _SURE = 1.645  # standard deviations: found in 95 of 100 recordings like these
@@ -53,8 +52,7 @@ def limits_of(selection: Selection) -> Iterator[Limit]:
         scene = signatures.evidence.trials[place.trials[0]].scene
         rows = sum(len(signatures.evidence.trials[t].residual) for t in place.trials)
         beyond = selection.background.get(group_of(place.trials), 0.0)
-        weighed = goes_with_mass(signatures.evidence, place)
-        beyond_scale = (Z95 + _SURE) * TRUSTED * weighed
+        beyond_scale = (Z95 + _SURE) * known_to(signatures.evidence, place)
         least = max(last.limit(place.trials, ALPHA), beyond, WORTH * rows / 2)
         for parameter, sd in zip(place.candidate.free(scene), _spreads(information), strict=True):
             needed = max(sd * (np.sqrt(2 * least) + _SURE), NEGLIGIBLE)

@@ -170,6 +170,11 @@ class Fit:
     residual: np.ndarray
     tangent: np.ndarray
 
+    @property
+    def squares(self) -> float:
+        """Squared white residual."""
+        return float((self.residual**2).sum())
+
     def columns(self, number: int, evidence: Evidence) -> slice:
         """Which columns of the tangent belong to an explanation."""
         widths = [len(e.typical(evidence)) for e in self.explanations]

@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_of, fit_together
+from bsip_cli.diagnosis.scale_mass import TRUSTED
 from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.plate_gain import PlateGain
@@ -29,7 +30,12 @@ def fairly_sized(evidence: Evidence, fit: Fit) -> Fit:
     weighed = _of_stated_mass(evidence)
     choices = product(*(_at_any_plate(evidence, one) for one in fit.explanations))
     fits = (fit_together(weighed, explanations) for explanations in choices)
-    return fit_of(evidence, min(fits, key=_squares).explanations)
+    return fit_of(evidence, min(fits, key=lambda one: one.squares).explanations)
+
+
+def known_to(evidence: Evidence, place: Place) -> float:
+    """Standard deviation that no recording betters: a scale's, of what goes with the mass."""
+    return TRUSTED if goes_with_mass(evidence, place) else 0.0
 
 
 def goes_with_mass(evidence: Evidence, place: Place) -> bool:
@@ -66,7 +72,3 @@ def _heavier(evidence: Evidence) -> np.ndarray:
     """(p,) shared nuisances that make the body heavier by one standard deviation; zeros where no
     mass is stated."""
     return evidence.trials[0].filtered.heavier
-
-
-def _squares(fit: Fit) -> float:
-    return float((fit.residual**2).sum())

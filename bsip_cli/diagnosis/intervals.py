@@ -6,8 +6,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from bsip_cli.diagnosis.explanation import Explanation, Fit
-from bsip_cli.diagnosis.fair_sizes import goes_with_mass
-from bsip_cli.diagnosis.scale_mass import TRUSTED
+from bsip_cli.diagnosis.fair_sizes import known_to
 from bsip_cli.diagnosis.together import Evidence
 
 DRAWS = 200
@@ -50,7 +49,7 @@ def _beyond_recordings(evidence: Evidence, one: Explanation) -> np.ndarray:
     """(K,) variance of all parameters that no recording betters [typical]."""
     scale = SCALE_ERROR * one.values * one.is_free(evidence)
     simple = np.array([p.known_to for p in one.parameters(evidence)])
-    weighed = TRUSTED * goes_with_mass(evidence, one.place)
+    weighed = known_to(evidence, one.place)
     return (scale**2 + simple**2 + weighed**2) / one.all_typical(evidence) ** 2
 
 

@@ -157,7 +157,7 @@ def stands_beside(one: Tried, other: Tried, before: Fit) -> bool:
     both = np.column_stack([other.fit.tangent, one.fit.tangent])
     step = np.linalg.lstsq(both, left, rcond=None)[0]
     beside = _squares(left) - _squares(left - both @ step)
-    return beside > BESIDE * (_squares(before.residual) - _squares(one.fit.residual))
+    return beside > BESIDE * (before.squares - one.fit.squares)
 
 
 def _squares(residual: np.ndarray) -> float:

@@ -49,7 +49,7 @@ def refitted(
     if place.candidate.effect.lasts and everywhere > set(place.trials):
         wider = replace(start, place=replace(place, trials=tuple(sorted(everywhere))))
         fits.append(fit_together(evidence, (*before.explanations, wider)))
-    fit = min((_supported(evidence, before, one) for one in fits), key=_squares)
+    fit = min((_supported(evidence, before, one) for one in fits), key=lambda one: one.squares)
     found = fit.explanations[-1]
     if not found.is_possible(evidence) or found.is_negligible(evidence):
         return None
@@ -67,10 +67,6 @@ def needs_another_mass(evidence: Evidence, before: Fit, fit: Fit) -> bool:
 def alike(one: Explanation, other: Explanation) -> bool:
     """Whether they are the same effect at the same place."""
     return (one.effect, one.target) == (other.effect, other.target)
-
-
-def _squares(fit: Fit) -> float:
-    return float((fit.residual**2).sum())
 
 
 def _supported(evidence: Evidence, before: Fit, fit: Fit) -> Fit:
@@ -114,5 +110,4 @@ def _saved_by_small(tangent: np.ndarray, residual: np.ndarray) -> float:
 
 def score_of(before: Fit, after: Fit, free: int) -> float:
     """-log p of what the squared residual loses, by the chi-square of the free parameters."""
-    lost = float((before.residual**2).sum() - (after.residual**2).sum())
-    return float(minus_log_p(lost, free))
+    return float(minus_log_p(before.squares - after.squares, free))

@@ -59,7 +59,7 @@ class AddedMass(Effect):
         return (("mass", "kg", float(values[0])), *positions)
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        within = super().possible(scene, target, values) and values[0] >= self.least_named["mass"]
+        within = super().possible(scene, target, values)
         return bool(within and np.linalg.norm(values[1:]) <= REACH_M * values[0])
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:

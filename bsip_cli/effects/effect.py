@@ -111,15 +111,16 @@ class Effect(ABC):
         return values[None]
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        """Whether the values can be true of a body or a lab; at a bound they would go beyond it."""
-        parameters = self.parameters(scene, target)
-        bounded = zip(parameters, values, strict=True)
-        return all(
+        """Whether the values can be true of a body or a lab; at a bound they would go beyond it.
+        What is too small to be named cannot."""
+        bounded = tuple(zip(self.parameters(scene, target), values, strict=True))
+        within = all(
             p.least <= x <= p.most
             if p.scan
             else p.least + NEAR * p.typical < x < p.most - NEAR * p.typical
             for p, x in bounded
         )
+        return within and all(x >= self.least_named.get(p.name, -np.inf) for p, x in bounded)
 
     def agrees(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Whether the residuals of the markers allow it: they do not grow by it."""

@@ -52,10 +52,6 @@ class OverSmoothing(Effect):
         errors = -values[0] * _lost_m(scene, float(values[1]))[..., None]
         return scene.pose_response.left(errors)[..., 0]
 
-    def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        is_named = bool(values[0] >= self.least_named["share"])
-        return super().possible(scene, target, values) and is_named
-
     def reported(
         self, scene: Scene, target: str, values: np.ndarray
     ) -> tuple[tuple[str, str, float], ...]:

@@ -58,10 +58,6 @@ class WobblingMass(Effect):
         upright, aside = scene.once(key, lambda: _swings(scene, target, frequency, damping))
         return mass * upright + sideways * aside
 
-    def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
-        within = super().possible(scene, target, values)
-        return within and bool(values[0] >= self.least_named["mass"])
-
     def reported(
         self, scene: Scene, target: str, values: np.ndarray
     ) -> tuple[tuple[str, str, float], ...]:

@@ -106,7 +106,8 @@ class Whitening:
 class Filtered:
     """What has passed the filter: residual (n, 6), the trial's own nuisances (n, 6, m) and those it
     shares (n, 6, p), noise level of the accelerations (n,); noise that is always there (6,); how
-    many standard deviations of a stated mass the shared ones make the body heavier (p,)."""
+    many standard deviations of a stated mass the shared ones make the body heavier (p,), and that
+    standard deviation as part of it; zeros where none is stated."""
 
     filter: Filter
     residual: np.ndarray
@@ -115,6 +116,7 @@ class Filtered:
     level: np.ndarray
     least: np.ndarray
     heavier: np.ndarray
+    mass_sd: float
 
 
 @dataclass(frozen=True)
@@ -161,12 +163,13 @@ def trial_evidence(
     noise_level: np.ndarray,
     cutoff_hz: float,
     heavier: np.ndarray | None = None,
+    mass_sd: float = 0.0,
 ) -> TrialEvidence:
     """Evidence of a trial in full, with nuisances of unit variance of the ``slow`` one.
 
     own (N', 6, m), shared (N', 6, p) : nuisances that are the trial's own, and those that it
-    shares with other trials. noise_level (N,) : of the accelerations. heavier (p,) : as of
-    :class:`Filtered`; nothing where no mass is stated.
+    shares with other trials. noise_level (N,) : of the accelerations. heavier (p,), mass_sd :
+    as of :class:`Filtered`; nothing where no mass is stated.
     """
     heavier = np.zeros(shared.shape[2]) if heavier is None else heavier
     fewer = slow(scene)
@@ -175,7 +178,9 @@ def trial_evidence(
     residual = _residual(scene, filter_, stride, cutoff_hz)
     level = noise_level[::stride][filter_.frames]
     least = LEAST * scene.mass_kg * GRAVITY_M_S2
-    filtered = Filtered(filter_, residual, filter_(own), filter_(shared), level, least, heavier)
+    filtered = Filtered(
+        filter_, residual, filter_(own), filter_(shared), level, least, heavier, mass_sd
+    )
     return _evidence(name, fewer, filtered, np.zeros_like(residual))
 
 

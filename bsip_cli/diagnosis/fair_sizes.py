@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_of, fit_together
-from bsip_cli.diagnosis.scale_mass import TRUSTED
+from bsip_cli.diagnosis.scale_mass import mass_sd_of
 from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.plate_gain import PlateGain
@@ -35,7 +35,7 @@ def fairly_sized(evidence: Evidence, fit: Fit) -> Fit:
 
 def known_to(evidence: Evidence, place: Place) -> float:
     """Standard deviation that no recording betters: a scale's, of what goes with the mass."""
-    return TRUSTED if goes_with_mass(evidence, place) else 0.0
+    return mass_sd_of(evidence) if goes_with_mass(evidence, place) else 0.0
 
 
 def goes_with_mass(evidence: Evidence, place: Place) -> bool:

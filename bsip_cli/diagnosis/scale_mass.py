@@ -27,8 +27,8 @@ from bsip_cli.effects.plate_gain import PlateGain
 from bsip_cli.effects.plate_zero import PlateZero
 from bsip_cli.effects.scene import Scene
 
-TRUSTED = 0.008  # standard deviation of a stated mass, relative: clothes, shoes, a meal
-NOTICED = 0.02  # part of the mass from which on it is told
+NOTICED = 0.02  # part of the mass from which on it is told, if a scale errs less
+SURE = 2.5  # standard deviations of a stated mass beyond which it is
 
 
 def weight_share(scene: Scene) -> float:
@@ -37,14 +37,26 @@ def weight_share(scene: Scene) -> float:
     return float(apart.mean()) / (scene.mass_kg * GRAVITY_M_S2)
 
 
+def is_noticed(share: float, mass_sd: float) -> bool:
+    """Whether the plates read so much more or less (part of the stated mass) than a scale errs by.
+
+    mass_sd : standard deviation of the stated mass, part of it.
+    """
+    return abs(share) >= max(NOTICED, SURE * mass_sd)
+
+
+def p_of(share: float, mass_sd: float) -> float:
+    """How likely a scale errs by that much."""
+    return float(2 * norm.sf(abs(share) / mass_sd))
+
+
 def agreed_share(evidence: Evidence) -> float | None:
     """What moving trials say of the stated mass, like ``weight_share``; nothing if plates and scale
     agree, or the trials do not agree with each other."""
     apart = np.array([weight_share(one.scene) for one in evidence.trials])
     share = float(np.median(apart))
-    if abs(share) < NOTICED or np.abs(apart - share).max() > 0.5 * abs(share):
-        return None
-    return share
+    agree = np.abs(apart - share).max() <= 0.5 * abs(share)
+    return share if agree and is_noticed(share, mass_sd_of(evidence)) else None
 
 
 def weight_round(evidence: Evidence, share: float, plate: str) -> Round | None:
@@ -54,7 +66,7 @@ def weight_round(evidence: Evidence, share: float, plate: str) -> Round | None:
     share : of body weight, from ``agreed_share``.
     """
     channel = f"{plate} fz"
-    p_value = float(2 * norm.sf(abs(share) / TRUSTED))
+    p_value = p_of(share, mass_sd_of(evidence))
     weight = share * evidence.trials[0].scene.mass_kg * GRAVITY_M_S2
     gain = _tried(evidence, EFFECTS[PlateGain.name], channel, share, p_value)
     offset = _tried(evidence, EFFECTS[PlateZero.name], channel, weight, p_value)
@@ -62,6 +74,11 @@ def weight_round(evidence: Evidence, share: float, plate: str) -> Round | None:
         return None
     kept = replace(gain, rivals=rivals_of(evidence, gain, (gain, offset)))
     return Round(evidence, (kept, offset), kept, None)
+
+
+def mass_sd_of(evidence: Evidence) -> float:
+    """Standard deviation of the stated mass, part of it."""
+    return evidence.trials[0].filtered.mass_sd
 
 
 def _tried(evidence: Evidence, effect: Effect, target: str, size: float, p_value: float) -> Tried:

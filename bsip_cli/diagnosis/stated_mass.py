@@ -10,12 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from scipy.stats import norm
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.findings import Finding, Number
 from bsip_cli.diagnosis.held_out import Z95
-from bsip_cli.diagnosis.scale_mass import NOTICED, TRUSTED
+from bsip_cli.diagnosis.scale_mass import is_noticed, p_of
 from bsip_cli.effects.added_mass import AddedMass
 from bsip_cli.effects.plate_gain import PlateGain
 from bsip_cli.effects.plate_zero import PlateZero
@@ -42,17 +41,23 @@ def _loaded_plates(scene: Scene) -> list[str]:
 
 
 def stated_mass_findings(
-    share: float, mass_kg: float, plate: str | None, trials: tuple[str, ...], manner: str
+    share: float,
+    mass_kg: float,
+    mass_sd: float,
+    plate: str | None,
+    trials: tuple[str, ...],
+    manner: str,
 ) -> tuple[Finding, ...]:
-    """The class of causes if the plates differ from the stated mass by more than NOTICED.
+    """The class of causes if the plates differ from the stated mass by more than a scale does.
 
-    share : of the stated mass, from ``weight_share`` or ``agreed_share``. plate : from
+    share : of the stated mass, from ``weight_share`` or ``agreed_share``. mass_sd : its standard
+    deviation, part of it. plate : from
     ``loaded_plate``. trials : the recordings that tell. manner : how they were read, in words.
     """
-    if abs(share) < NOTICED:
+    if not is_noticed(share, mass_sd):
         return ()
-    p_value = float(2 * norm.sf(abs(share) / TRUSTED))
-    error = TRUSTED * mass_kg
+    p_value = p_of(share, mass_sd)
+    error = mass_sd * mass_kg
     extra = share * mass_kg
     told = (
         f"the plates read {mass_kg + extra:.2f} kg {manner}, {abs(extra):.1f} kg "
@@ -62,7 +67,7 @@ def stated_mass_findings(
     gain = f"the plates' vertical gain is off by {100 * share:+.1f} %"
     zero = f"the plates' zero is off by {weight:+.0f} N"
     causes = [
-        (PlateGain.name, "gain", "1", share, TRUSTED, gain),
+        (PlateGain.name, "gain", "1", share, mass_sd, gain),
         (PlateZero.name, "offset", "N", weight, weight_error, zero),
     ]
     if extra > 0:

@@ -15,7 +15,13 @@ from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.loud_noise import with_loud_noise
 from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.diagnosis.rounds import Round, Selection
-from bsip_cli.diagnosis.scale_mass import NOTICED, agreed_share, weight_round, weight_share
+from bsip_cli.diagnosis.scale_mass import (
+    agreed_share,
+    is_noticed,
+    mass_sd_of,
+    weight_round,
+    weight_share,
+)
 from bsip_cli.diagnosis.selection import select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.diagnosis.stated_mass import loaded_plate, stated_mass_findings
@@ -27,7 +33,14 @@ from bsip_cli.report.verdict import verdict_of
 from bsip_cli.stages.diagnosis_facts import detection_rows, facts_of
 from bsip_cli.stages.diagnosis_rows import rows_of
 from bsip_cli.stages.frames import person_from
-from bsip_cli.stages.moving_trials import SHORTEST_S, LookedAt, is_weighed, moving_trials, prior_of
+from bsip_cli.stages.moving_trials import (
+    SHORTEST_S,
+    LookedAt,
+    is_weighed,
+    moving_trials,
+    prior_of,
+    stated_sd,
+)
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.unit import Unit
 
@@ -122,10 +135,10 @@ def _agrees(selection: Selection, prior: Prior, standing: Standing) -> bool:
 
     Then no trial is judged against the stated mass, which would make one of them seem the odd one.
     """
-    share = standing.share
-    beyond = selection.signatures.evidence.beyond_stated(selection.fit.residual)
+    share, evidence = standing.share, selection.signatures.evidence
+    beyond = evidence.beyond_stated(selection.fit.residual)
     moving = beyond * prior.total_mass_sd_kg / standing.scene.mass_kg
-    return abs(share) >= NOTICED and abs(moving - share) < _ALIKE * abs(share)
+    return is_noticed(share, mass_sd_of(evidence)) and abs(moving - share) < _ALIKE * abs(share)
 
 
 def _answer(
@@ -170,7 +183,7 @@ def _weighed(unit: Unit, standing: Standing | None) -> tuple[Finding, ...]:
         return ()
     plate, mass_kg = loaded_plate([standing.scene]), standing.scene.mass_kg
     return stated_mass_findings(
-        standing.share, mass_kg, plate, (standing.stem,), "in quiet standing"
+        standing.share, mass_kg, stated_sd(unit), plate, (standing.stem,), "in quiet standing"
     )
 
 
@@ -185,7 +198,8 @@ def _weighed_moving(evidence: Evidence) -> tuple[Round | None, tuple[Finding, ..
     if plate and (first := weight_round(evidence, share, plate)):
         return first, ()
     names = tuple(one.name for one in evidence.trials)
-    return None, stated_mass_findings(share, scenes[0].mass_kg, plate, names, "in motion")
+    mass_kg, mass_sd = scenes[0].mass_kg, mass_sd_of(evidence)
+    return None, stated_mass_findings(share, mass_kg, mass_sd, plate, names, "in motion")
 
 
 def _trials_of(findings: tuple[Finding, ...]) -> list[str]:

@@ -98,8 +98,7 @@ def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:
 
     share : by what part of the stated mass the plates read more, where they are believed instead.
     """
-    stated_sd = unit.config.diagnosis.stated_mass_sd_percent
-    sd_percent = stated_sd if share is None else _READ_TO_PERCENT
+    sd_percent = 100 * stated_sd(unit) if share is None else _READ_TO_PERCENT
     known = {"total_mass_sd_percent": sd_percent} if is_weighed(unit) else {}
     table = unit.read("regression").copy()
     table[[name for name in bsip_names() if not name.startswith("com")]] *= 1 + (share or 0.0)
@@ -120,12 +119,12 @@ def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial) -> Looked
     rng = np.random.default_rng(crc32(trial.stem.encode()))
     own = own_nuisances(fewer, options.skin_factor, options.skin_draws, rng)
     shared = shared_nuisances(fewer, prior.root, options.marker_sd_m)
-    heavier = _heavier(prior, shared.shape[2]) if is_weighed(unit) else None
+    stated = (_heavier(prior, shared.shape[2]), stated_sd(unit)) if is_weighed(unit) else ()
     level = acceleration_noise(unit.read("kinematics", trial), person.skeleton)
 
     def evidence_with(nuisances: np.ndarray) -> TrialEvidence:
         return trial_evidence(
-            trial.stem, scene, nuisances, shared, level, options.cutoff_hz, heavier
+            trial.stem, scene, nuisances, shared, level, options.cutoff_hz, *stated
         )
 
     proofs = proofs_of(fewer, _slips(unit, trial), rng)
@@ -174,6 +173,11 @@ def _in_full(one: Proof, trial: Trial) -> dict:
         "folds": [values] * FOLDS,
         "bounds": {},
     }
+
+
+def stated_sd(unit: Unit) -> float:
+    """Standard deviation of a stated mass, part of it."""
+    return 0.01 * unit.config.diagnosis.stated_mass_sd_percent
 
 
 def is_weighed(unit: Unit) -> bool:

@@ -13,7 +13,6 @@ from bsip_cli.diagnosis.detection import limits_of
 from bsip_cli.diagnosis.explanation import Explanation, explanation_of, fit_of, fit_together
 from bsip_cli.diagnosis.fair_sizes import fairly_sized, goes_with_mass
 from bsip_cli.diagnosis.intervals import drawn_explanations
-from bsip_cli.diagnosis.scale_mass import TRUSTED
 from bsip_cli.diagnosis.selection import select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.diagnosis.together import Evidence, together
@@ -22,6 +21,7 @@ from bsip_cli.effects.scene import Plate, Scene
 
 GAIN = EFFECTS["plate_gain"]
 HIDDEN, LACKING = 0.03, 0.25
+TRUSTED = 0.008  # standard deviation of the stated mass, part of it
 
 
 def two_trials(on_one_plate: bool = True) -> Evidence:
@@ -43,7 +43,8 @@ def less_sideways(scene: Scene) -> Scene:
 def weighed(evidence: Evidence) -> Evidence:
     """Of a person whose mass is stated."""
     heavier = np.ones(len(SEGMENTS)) / np.sqrt(len(SEGMENTS))
-    trials = (replace(t, filtered=replace(t.filtered, heavier=heavier)) for t in evidence.trials)
+    known = {"heavier": heavier, "mass_sd": TRUSTED}
+    trials = (replace(t, filtered=replace(t.filtered, **known)) for t in evidence.trials)
     return together(tuple(trials))
 
 

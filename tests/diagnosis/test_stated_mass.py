@@ -15,8 +15,11 @@ from bsip_cli.diagnosis.stated_mass import (
     loaded_plate,
     stated_mass_findings,
 )
+from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
+
+MASS_SD = 0.008
 
 
 @pytest.mark.parametrize("share", [0.06, -0.04])
@@ -24,7 +27,7 @@ def test_plates_that_read_otherwise_make_a_class(share):
     scene = standing_still()
     scene = replace(scene, wrench=(1 + share) * scene.predicted)
     found = stated_mass_findings(
-        weight_share(scene), scene.mass_kg, None, ("standing",), "in quiet standing"
+        weight_share(scene), scene.mass_kg, MASS_SD, None, ("standing",), "in quiet standing"
     )
     sizes = {one.effect: one.numbers[0].value for one in found}
     assert abs(sizes["plate_gain"] - share) < 1e-9
@@ -42,9 +45,8 @@ def test_plates_that_agree_say_nothing():
     scene = standing_still()
     scene = replace(scene, wrench=1.01 * scene.predicted)
     share = weight_share(scene)
-    assert (
-        stated_mass_findings(share, scene.mass_kg, None, ("standing",), "in quiet standing") == ()
-    )
+    said = (None, ("standing",), "in quiet standing")
+    assert stated_mass_findings(share, scene.mass_kg, MASS_SD, *said) == ()
 
 
 def test_only_one_plate_carries_the_person_or_none_does_alone():
@@ -55,6 +57,13 @@ def test_only_one_plate_carries_the_person_or_none_does_alone():
     on_one = replace(scene, plates=(first, alone))
     assert loaded_plate([on_one, on_one]) == "1"
     assert loaded_plate([on_one, scene]) is None
+
+
+def weighed(*scenes: Scene) -> Evidence:
+    """Of a person whose mass is stated."""
+    trials = all_of(*scenes).trials
+    known = (replace(t, filtered=replace(t.filtered, mass_sd=MASS_SD)) for t in trials)
+    return together(tuple(known))
 
 
 def on_one_plate(gain: float, first_s: float) -> Scene:
@@ -70,7 +79,7 @@ def on_one_plate(gain: float, first_s: float) -> Scene:
 
 
 def test_moving_trials_on_one_plate_give_its_gain_to_begin_with():
-    evidence = all_of(on_one_plate(0.05, 0), on_one_plate(0.05, 4))
+    evidence = weighed(on_one_plate(0.05, 0), on_one_plate(0.05, 4))
     share = agreed_share(evidence)
     assert share == pytest.approx(0.05 / 1.05, abs=0.003)
     begun = weight_round(evidence, share, "1")
@@ -84,7 +93,7 @@ def test_moving_trials_on_one_plate_give_its_gain_to_begin_with():
 
 
 def test_no_plate_s_gain_is_off_by_a_quarter():
-    evidence = all_of(on_one_plate(0.25, 0), on_one_plate(0.25, 4))
+    evidence = weighed(on_one_plate(0.25, 0), on_one_plate(0.25, 4))
     share = agreed_share(evidence)
     assert share == pytest.approx(0.2, abs=0.01)
     assert weight_round(evidence, share, "1") is None
@@ -92,5 +101,18 @@ def test_no_plate_s_gain_is_off_by_a_quarter():
 
 @pytest.mark.parametrize("gains", [(0.05, -0.05), (0.01, 0.01)])
 def test_moving_trials_that_disagree_or_are_near_say_nothing(gains):
-    evidence = all_of(on_one_plate(gains[0], 0), on_one_plate(gains[1], 4))
+    evidence = weighed(on_one_plate(gains[0], 0), on_one_plate(gains[1], 4))
     assert agreed_share(evidence) is None
+
+
+def test_a_scale_that_errs_more_says_less():
+    scene = standing_still()
+    share = weight_share(replace(scene, wrench=1.03 * scene.predicted))
+    said = (None, ("standing",), "in quiet standing")
+    good = stated_mass_findings(share, scene.mass_kg, MASS_SD, *said)
+    assert stated_mass_findings(share, scene.mass_kg, 2 * MASS_SD, *said) == ()
+    assert good[0].numbers[0].high < share * MASS_KG + 2 * MASS_SD * MASS_KG
+    evidence = weighed(on_one_plate(0.03, 0), on_one_plate(0.03, 4))
+    loose = (replace(t, filtered=replace(t.filtered, mass_sd=2 * MASS_SD)) for t in evidence.trials)
+    assert agreed_share(evidence) == pytest.approx(0.03 / 1.03, abs=0.003)
+    assert agreed_share(together(tuple(loose))) is None

@@ -15,7 +15,7 @@ from bsip_cli.diagnosis.together import Evidence
 
 ALPHA = 0.01  # in every round; with the chance's own errors one null in twenty has an alarm
 ALPHA_BESIDE = 1e-5  # beside another cause in the same trial, since no model of a cause is exact
-BEYOND_DOUBT = 1e-6  # so rare by chance that a gain above its standard error is enough
+BEYOND_DOUBT = 1e-20  # so rare by chance that a gain above its standard error is enough
 # Of the squared residual of its trials: skin, and a body unlike the table's, go along with the
 # movement and bring some percent.
 WORTH = 0.03

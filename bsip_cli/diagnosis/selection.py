@@ -248,19 +248,21 @@ def _with_recurrence(good: list[Tried], before: Fit) -> dict[int, float]:
     """
     weights = {}
     for one in good:
-        place = one.explanation.place
-        weights[id(one)] = one.score
-        if one.explanation.effect.lasts or len(place.trials) > 1:
-            continue
-        alike = [t for t in good if t.explanation.effect is one.explanation.effect]
-        best: dict[int, float] = {}
-        for other in alike:
-            for trial in set(other.trials) - set(place.trials):
-                best[trial] = max(best.get(trial, 0.0), other.score)
-        weights[id(one)] += sum(best.values())
-        if _is_shown_elsewhere(one.explanation, before):
-            weights[id(one)] *= AGAIN
+        weight = one.score
+        if not one.explanation.effect.lasts and len(one.trials) == 1:
+            weight += _recurring(one, good)
+        again = AGAIN if _is_shown_elsewhere(one.explanation, before) else 1.0
+        weights[id(one)] = again * weight
     return weights
+
+
+def _recurring(one: Tried, good: list[Tried]) -> float:
+    best: dict[int, float] = {}
+    for other in good:
+        if other.explanation.effect is one.explanation.effect:
+            for trial in set(other.trials) - set(one.trials):
+                best[trial] = max(best.get(trial, 0.0), other.score)
+    return sum(best.values())
 
 
 def _is_shown_elsewhere(one: Explanation, before: Fit) -> bool:

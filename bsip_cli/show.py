@@ -26,10 +26,17 @@ def shown(out: Path) -> Iterator[str]:
     Raises
     ------
     UsageError
-        Nothing to show has been written there.
+        Nothing to show has been written there, or it is a file.
     BadDataError
         A diagnosis cannot be read.
     """
+    if out.is_file():
+        raise UsageError(
+            "this is a file, not a folder of results",
+            file=out,
+            remedy="name the folder that `bsip run` was given with --out, or look at one artifact "
+            "with `bsip info`",
+        )
     tables = tables_of(out)
     people = sorted(out.glob("sub-*/*_diagnosis.parquet"))
     if not tables and not people:

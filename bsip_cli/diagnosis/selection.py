@@ -12,6 +12,7 @@ import numpy as np
 from bsip_cli.diagnosis.background import new_places
 from bsip_cli.diagnosis.chance import Chance, chance_of, flipped
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together
+from bsip_cli.diagnosis.foremost import foremost
 from bsip_cli.diagnosis.judging import ALPHA, Tried, judged_by, stands_beside
 from bsip_cli.diagnosis.likely_noise import likely_columns, with_likely_noise
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
@@ -28,10 +29,7 @@ TRIES = 10  # candidates that are refitted in a round
 SHOWN = 3  # that are looked at even where nothing stands out
 RIVALS_TRIED = 2  # in each trial of a lasting cause that few trials show
 WORTH_A_TRY = 0.5  # of the best score
-# A cause from the catalogue is named though a regularity without a name explains a bit more.
-NAMED_AT = 0.95
 OVERSHADOWS = 2.0  # so many times the score
-AGAIN = 1.25  # how much more an effect counts that another trial shows already
 
 
 Scored = tuple[np.ndarray, list[np.ndarray]]
@@ -205,7 +203,7 @@ def _kept(judged: list[Tried], before: Fit) -> Tried | None:
     what is no cause by far, would be the wrong name, unless most of that is its own."""
     good = [one for one in judged if one.is_good]
     while good:
-        first = _foremost(good, before)
+        first = foremost(good, before)
         if first.is_slight:
             others = (one for one in good if one is not first)
             good = [one for one in others if stands_beside(one, first, before)]
@@ -227,47 +225,6 @@ def _is_overshadowed(one: Tried, judged: list[Tried], before: Fit) -> bool:
         and not stands_beside(one, other, before)
         for other in judged
     )
-
-
-def _foremost(good: list[Tried], before: Fit) -> Tried:
-    """What explains most, if possible with a name; what recurs in several trials counts
-    together."""
-    weights = _with_recurrence(good, before)
-    named = [one for one in good if one.explanation.effect.name != UNEXPLAINED]
-    best = max(good, key=lambda one: weights[id(one)])
-    if not named:
-        return best
-    first = max(named, key=lambda one: weights[id(one)])
-    return first if weights[id(first)] >= NAMED_AT * weights[id(best)] else best
-
-
-def _with_recurrence(good: list[Tried], before: Fit) -> dict[int, float]:
-    """Score of each; with it the best of the same effect in every other trial where it differs.
-
-    What was found in another trial already is the likeliest cause here.
-    """
-    weights = {}
-    for one in good:
-        weight = one.score
-        if not one.explanation.effect.lasts and len(one.trials) == 1:
-            weight += _recurring(one, good)
-        again = AGAIN if _is_shown_elsewhere(one.explanation, before) else 1.0
-        weights[id(one)] = again * weight
-    return weights
-
-
-def _recurring(one: Tried, good: list[Tried]) -> float:
-    best: dict[int, float] = {}
-    for other in good:
-        if other.explanation.effect is one.explanation.effect:
-            for trial in set(other.trials) - set(one.trials):
-                best[trial] = max(best.get(trial, 0.0), other.score)
-    return sum(best.values())
-
-
-def _is_shown_elsewhere(one: Explanation, before: Fit) -> bool:
-    known = (e for e in before.explanations if e.effect is one.effect)
-    return any(set(e.place.trials).isdisjoint(one.place.trials) for e in known)
 
 
 def _best_of_each(

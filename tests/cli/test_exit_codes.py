@@ -81,6 +81,13 @@ def test_show_without_tables(bsip, tmp_path):
     assert "run `bsip run` first, or name the folder" in one_sentence(answer)
 
 
+def test_show_of_one_artifact(bsip, tmp_path):
+    (tmp_path / "sub-01_diagnosis.parquet").write_bytes(b"PAR1")
+    answer = bsip("show", tmp_path / "sub-01_diagnosis.parquet")
+    assert_usage_error(answer)
+    assert "`bsip info`" in one_sentence(answer)
+
+
 # --- configuration ------------------------------------------------------------------------------
 
 

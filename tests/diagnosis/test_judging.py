@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.diagnosis.explanation import Fit
+from bsip_cli.diagnosis.candidates import Candidate
+from bsip_cli.diagnosis.explanation import Explanation, Fit
 from bsip_cli.diagnosis.held_out import Gain
 from bsip_cli.diagnosis.judging import NAMELESS_WORTH, TINY_WORTH, Tried, stands_beside
+from bsip_cli.diagnosis.signatures import Place
+from bsip_cli.effects.catalogue import EFFECTS
 
 ROWS = 400
 NO_GAIN = Gain(np.zeros(1), np.ones(1, dtype=bool), 1.0)
@@ -58,3 +61,14 @@ def test_what_hardly_changes_the_forces_explains_the_more_and_stands_alone(tiny,
 def of(share: float) -> Gain:
     """A gain by this share of the squared residual, the same in two blocks."""
     return Gain(np.array([share, share]) / 2, np.ones(2, dtype=bool), 1.0)
+
+
+@pytest.mark.parametrize(("p_value", "good"), [(1e-30, True), (1e-12, False)])
+def test_a_gain_that_is_not_sure_is_enough_beyond_doubt_only(p_value, good):
+    """10 % of the squared residual, its standard error 6 %. Nulls have had a chance of 1e-12."""
+    place = Place(Candidate(EFFECTS["plate_crosstalk"], "1 fy>fz", ()), (0,))
+    gain = Gain(np.array([0.092, 0.008]), np.ones(2, dtype=bool), 1.0)
+    assert gain.is_real()
+    assert not gain.is_sure()
+    one = replace(with_course(course(1), course(1)), explanation=Explanation(place, np.zeros(1)))
+    assert replace(one, gain=gain, p_value=p_value).is_good == good

@@ -1,0 +1,52 @@
+"""Which of several good causes comes first."""
+
+from __future__ import annotations
+
+from bsip_cli.diagnosis.explanation import Explanation, Fit
+from bsip_cli.diagnosis.judging import Tried
+from bsip_cli.diagnosis.pattern import UNEXPLAINED
+
+# A cause from the catalogue is named though a regularity without a name explains a bit more.
+NAMED_AT = 0.95
+AGAIN = 1.25  # how much more an effect counts that another trial shows already
+
+
+def foremost(good: list[Tried], before: Fit) -> Tried:
+    """What explains most, if possible with a name; what recurs in several trials counts
+    together."""
+    weights = _with_recurrence(good, before)
+    named = [one for one in good if one.explanation.effect.name != UNEXPLAINED]
+    best = max(good, key=lambda one: weights[id(one)])
+    if not named:
+        return best
+    first = max(named, key=lambda one: weights[id(one)])
+    return first if weights[id(first)] >= NAMED_AT * weights[id(best)] else best
+
+
+def _with_recurrence(good: list[Tried], before: Fit) -> dict[int, float]:
+    """Score of each; with it the best of the same effect in every other trial where it differs.
+
+    What was found in another trial already is the likeliest cause here.
+    """
+    weights = {}
+    for one in good:
+        weight = one.score
+        if not one.explanation.effect.lasts and len(one.trials) == 1:
+            weight += _recurring(one, good)
+        again = AGAIN if _is_shown_elsewhere(one.explanation, before) else 1.0
+        weights[id(one)] = again * weight
+    return weights
+
+
+def _recurring(one: Tried, good: list[Tried]) -> float:
+    best: dict[int, float] = {}
+    for other in good:
+        if other.explanation.effect is one.explanation.effect:
+            for trial in set(other.trials) - set(one.trials):
+                best[trial] = max(best.get(trial, 0.0), other.score)
+    return sum(best.values())
+
+
+def _is_shown_elsewhere(one: Explanation, before: Fit) -> bool:
+    known = (e for e in before.explanations if e.effect is one.effect)
+    return any(set(e.place.trials).isdisjoint(one.place.trials) for e in known)

@@ -254,7 +254,7 @@ STAGES = (
         "cohort",
         "An HTML report per participant and one for the cohort.",
         reads=("values", "comparisons", "person", "identification", "tables-files"),
-        reads_if_there=("report-files",),
+        reads_if_there=("overall-diagnosis", "report-files"),
         writes=("group-report-files",),
         options=("stats",),
         module="bsip_cli.stages.group_report",

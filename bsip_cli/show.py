@@ -12,6 +12,7 @@ import pandas as pd
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
 from bsip_cli.errors import UsageError
 from bsip_cli.report.records import with_all_causes
+from bsip_cli.report.shared import SHARED, person_of, shared_causes
 from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.report.verdict import Verdict, put_right_sentence, verdict_of
 from bsip_cli.report.words import printable
@@ -46,29 +47,46 @@ def shown(out: Path) -> Iterator[str]:
             remedy="run `bsip run` first, or name the folder that it was given with --out",
         )
     yield from [tables] if tables else []
+    everybody = []
     for folder in sorted(path for path in out.glob("sub-*") if path.is_dir()):
         diagnosis, detection = (_table(folder, kind) for kind in ("overall-diagnosis", "detection"))
         if diagnosis is not None and detection is not None:
             gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
             facts = read_header(_path(folder, "overall-diagnosis"))["provenance"]["facts"]
+            everybody.append(person_of(folder.name, diagnosis))
             found = verdict_of(diagnosis, detection, gains, changes, facts.get("too_short_s"))
             right = put_right_sentence(_marker_events(folder))
             yield verdict_text(folder.name, found, right, get_terminal_size().columns)
+    yield from _shared_text(shared_causes(everybody), get_terminal_size().columns)
     for report in (out / "group" / "report.html", *sorted(out.glob("sub-*/report.html"))):
         if report.exists():
             yield f"report: {report}"
 
 
+def _shared_text(sentences: tuple[str, ...], columns: int) -> Iterator[str]:
+    """What several participants have in common, if anything."""
+    if sentences:
+        width = _width(columns)
+        bullets = (_wrapped(text, width, "  - ") for text in sentences)
+        yield "\n".join(
+            ["\n## Is anything wrong: all participants", _wrapped(SHARED, width), *bullets]
+        )
+
+
 def verdict_text(name: str, found: Verdict, right: tuple[str, ...], columns: int) -> str:
     """A diagnosis for a terminal of so many columns: causes numbered, lines broken; ``right`` says
     what was put right before."""
-    width = max(40, min(columns, _WIDEST))
+    width = _width(columns)
     lines = [f"\n## Is anything wrong: {printable(name)}", _wrapped(found.headline, width)]
     for number, cause in enumerate(found.causes, start=1):
         lines.append(_wrapped(cause, width, f"{number:2d}. "))
     rest = (*right, *found.results, *found.advice, found.limits)
     lines += [_wrapped(text, width, "  - ") for text in rest if text]
     return "\n".join(lines)
+
+
+def _width(columns: int) -> int:
+    return max(40, min(columns, _WIDEST))
 
 
 def _wrapped(text: str, width: int, first: str = "") -> str:

@@ -152,13 +152,19 @@ def how_sure(one: Candidate) -> str:
         chance = "chance under 0.1 %"
     if not np.isfinite(gain):
         return f"How sure: {chance}."
-    level = "Weak" if low <= 0 else "Sure" if one.p_value < LEAST_TOLD else "Likely"
     digits = 0 if gain >= 10 else 1
     share, least, most = (number(x, digits) for x in (gain, low, high))
     return (
-        f"{level} ({chance}): explains {share} % ({least} to {most} %) of the difference in seconds "
-        "it was not fitted to."
+        f"{_level(one.p_value, low)} ({chance}): explains {share} % ({least} to {most} %) of the "
+        "difference in seconds it was not fitted to."
     )
+
+
+def _level(p_value: float, least_gain: float) -> str:
+    """In few seconds no gain is sure, though chance be out of the question."""
+    if p_value >= LEAST_TOLD:
+        return "Likely" if least_gain > 0 else "Weak"
+    return "Sure" if least_gain > 0 else "Hardly chance, in few seconds"
 
 
 # --- what it does -----------------------------------------------------------------------------

@@ -1,7 +1,8 @@
 """Report (cohort): one HTML page with the papers' tables and the gain per participant.
 
-Reads values, comparisons, person, identification, tables-files; links to the participants'
-reports where report-files are there. Writes group-report-files.
+Reads values, comparisons, person, identification, tables-files, and where it is there
+overall-diagnosis; links to the participants' reports where report-files are there. Writes
+group-report-files.
 """
 
 from __future__ import annotations
@@ -91,7 +92,13 @@ def _member(unit: Unit, participant: Participant) -> Member:
         _first_row(unit, "identification", participant),
         unit.path("report-files", participant=participant).exists(),
         refusals_of(unit, participant),
+        _diagnosis(unit, participant),
     )
+
+
+def _diagnosis(unit: Unit, participant: Participant) -> pd.DataFrame | None:
+    there = unit.path("overall-diagnosis", participant=participant).exists()
+    return unit.read("overall-diagnosis", participant=participant) if there else None
 
 
 def _first_row(unit: Unit, kind: str, participant: Participant) -> dict[str, Any] | None:

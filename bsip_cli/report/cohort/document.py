@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from bsip_cli.report.blocks import Document
-from bsip_cli.report.cohort import gain, limits, people, published_tables, summary
+from bsip_cli.report.cohort import diagnoses, gain, limits, people, published_tables, summary
 from bsip_cli.report.cohort.record import CohortRecord
 
 SECTIONS = (
     summary.section,
     people.section,
+    diagnoses.section,
     gain.section,
     published_tables.section,
     limits.section,

@@ -1,4 +1,4 @@
-"""Section 3: the gain of identification, participant by participant."""
+"""Section 4: the gain of identification, participant by participant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Section 5: what to mind, warnings, options and versions."""
+"""Section 6: what to mind, warnings, options and versions."""
 
 from __future__ import annotations
 

@@ -17,13 +17,15 @@ from bsip_cli.report.tables.model import Table
 
 @dataclass(frozen=True)
 class Member:
-    """One participant of the study; what is shown of person and identification, if there."""
+    """One participant of the study; what is shown of person and identification, and the whole
+    ``diagnosis``, if there."""
 
     id: str
     facts: Mapping[str, Any] | None
     identification: Mapping[str, Any] | None
     has_report: bool
     refusals: tuple[Refusal, ...]
+    diagnosis: pd.DataFrame | None = None
 
 
 @dataclass(frozen=True)

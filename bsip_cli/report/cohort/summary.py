@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.report.blocks import Block, Bullets, Grid, Heading, Paragraph, Section
+from bsip_cli.report.cohort import diagnoses
 from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.gains import SAME_WITHIN
 from bsip_cli.report.words import (
@@ -25,6 +26,8 @@ def section(record: CohortRecord) -> Section:
             "identified parameters."
         ),
         *_missing(record),
+        Heading("Is anything wrong in the recordings?"),
+        diagnoses.verdict(record),
         Heading("Do the identified parameters follow the forces better?"),
         *_gain(record),
     ]
@@ -89,7 +92,7 @@ def _gain(record: CohortRecord) -> list[Block]:
     blocks.append(
         Paragraph(
             "Typical: the geometric mean of the participants' error ratios. The same: within "
-            f"{percent(SAME_WITHIN)} %. Tests stand in the tables of section 4.",
+            f"{percent(SAME_WITHIN)} %. Tests stand in the tables of section 5.",
             "note",
         )
     )

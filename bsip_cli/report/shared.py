@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ SHARED = (
     "than to a person:"
 )
 _MOST_NAMED = 12  # participants in one sentence
+_MOST_TOLD = 8  # causes
 
 
 @dataclass(frozen=True)
@@ -34,19 +35,37 @@ def person_of(participant: str, diagnosis: pd.DataFrame) -> Person:
 
 
 def shared_causes(people: Sequence[Person]) -> tuple[str, ...]:
-    """A sentence for each named cause that more than one person has."""
-    found: dict[str, dict[str, Candidate]] = {}
+    """A sentence for each cause that more than one person has, be it as one of several
+    that look alike; what most people have comes first."""
+    asked = sum(one.was_looked_at for one in people)
+    found = _people_of_causes(people)
+    shared = sorted(
+        (label for label in found if len(found[label]) > 1), key=lambda x: -len(found[x])
+    )
+    return tuple(
+        f"{capital(label)}: {_told(found[label], asked)}." for label in shared[:_MOST_TOLD]
+    )
+
+
+def _people_of_causes(people: Sequence[Person]) -> dict[str, dict[str, tuple[Candidate, ...]]]:
+    """Of each cause, by its label, the people who have it, and itself before its rivals there."""
+    found: dict[str, dict[str, tuple[Candidate, ...]]] = {}
     for one in people:
         for cause in one.causes:
-            if len(cause) == 1:
-                found.setdefault(cause[0].label, {}).setdefault(one.id, cause[0])
-    asked = sum(one.was_looked_at for one in people)
-    return tuple(
-        f"{capital(label)}: in {len(of)} of {asked} participants ({named_people(list(of))})"
-        f"{_sizes([one.main_number() for one in of.values()])}."
-        for label, of in found.items()
-        if len(of) > 1
-    )
+            for rival in cause:
+                others = (c for c in cause if c is not rival)
+                found.setdefault(rival.label, {}).setdefault(one.id, (rival, *others))
+    return found
+
+
+def _told(of: Mapping[str, Sequence[Candidate]], asked: int) -> str:
+    unsure = [name for name, cause in of.items() if len(cause) > 1]
+    where = f"in {len(of)} of {asked} participants ({named_people(list(of))})"
+    sizes = _sizes([cause[0].main_number() for cause in of.values()])
+    if not unsure:
+        return f"{where}{sizes}"
+    which = "all of them" if len(unsure) == len(of) else named_people(unsure)
+    return f"{where}{sizes}; one of several that look alike in {which}"
 
 
 def _sizes(numbers: Sequence[Number | None]) -> str:
@@ -57,7 +76,8 @@ def _sizes(numbers: Sequence[Number | None]) -> str:
     factor, unit = readable_unit(known[0].name, known[0].unit)
     values = sorted(factor * n.value for n in known)
     digits = digits_of(values[-1] - values[0] or values[0])
-    span = f"{signed(values[0], digits)} to {signed(values[-1], digits)}"
+    ends = dict.fromkeys(signed(value, digits) for value in (values[0], values[-1]))
+    span = " to ".join(ends)
     low, high = (np.array([getattr(n, end) for n in known]) for end in ("low", "high"))
     if not np.isfinite(high - low).all():
         return f", {with_unit(span, unit)}"

@@ -16,8 +16,9 @@ from bsip_cli.report.cohort.record import CohortRecord, Member
 from bsip_cli.report.origins import HowMade
 from bsip_cli.report.shared import named_people, person_of, shared_causes
 
-TURNED = diagnosis(["sub-01_task-sequence_run-1"])
-NOTHING = TURNED[TURNED["verdict"] == "rejected"]
+FOUND = diagnosis(["sub-01_task-sequence_run-1"])  # a turned plate, a class of two, one rejected
+TURNED = FOUND[FOUND["verdict"] != "ambiguous"]
+NOTHING = FOUND[FOUND["verdict"] == "rejected"]
 
 
 def turned_by(radians: float, half: float = 0.01) -> pd.DataFrame:
@@ -61,6 +62,15 @@ def test_twice_in_one_person_is_not_shared():
     assert shared(ann=pd.concat([TURNED, again]), bob=NOTHING) == ()
 
 
+def test_a_rival_counts_and_is_told_as_one():
+    offset = FOUND["effect"] == "plate_zero"
+    named = FOUND[offset].assign(verdict="named", class_id="")
+    first, *others = shared(ann=FOUND, bob=FOUND, eve=named, tom=FOUND.assign(class_id="X"))
+    assert "in 4 of 4 participants (ann, bob, eve and tom)" in first
+    assert first.endswith("; one of several that look alike in ann, bob and tom.")
+    assert others[-1].endswith("; one of several that look alike in all of them.")
+
+
 def test_many_people_are_counted():
     names = [f"sub-{k:02d}" for k in range(15)]
     assert named_people(names).endswith("sub-11 and 3 more")
@@ -80,7 +90,7 @@ def text_of(record: CohortRecord) -> str:
 
 
 def test_the_section_lists_causes_and_names_those_without():
-    record = cohort(ann=TURNED, bob=NOTHING, eve=None, tom=TURNED.iloc[:0])
+    record = cohort(ann=FOUND, bob=NOTHING, eve=None, tom=TURNED.iloc[:0])
     text = text_of(record)
     assert "Nothing is wrong above the noise in bob." in text
     assert "Not searched for errors: eve." in text

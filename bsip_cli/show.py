@@ -12,7 +12,7 @@ import pandas as pd
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
 from bsip_cli.errors import UsageError
 from bsip_cli.report.records import with_all_causes
-from bsip_cli.report.shared import SHARED, person_of, shared_causes
+from bsip_cli.report.shared import SHARED, searched, shared_causes
 from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.report.verdict import Verdict, put_right_sentence, verdict_of
 from bsip_cli.report.words import printable
@@ -53,7 +53,7 @@ def shown(out: Path) -> Iterator[str]:
         if diagnosis is not None and detection is not None:
             gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
             facts = read_header(_path(folder, "overall-diagnosis"))["provenance"]["facts"]
-            everybody.append(person_of(folder.name, diagnosis))
+            everybody.append(searched(folder.name, diagnosis, facts))
             found = verdict_of(diagnosis, detection, gains, changes, facts.get("too_short_s"))
             right = put_right_sentence(_marker_events(folder))
             yield verdict_text(folder.name, found, right, get_terminal_size().columns)
@@ -68,9 +68,7 @@ def _shared_text(sentences: tuple[str, ...], columns: int) -> Iterator[str]:
     if sentences:
         width = _width(columns)
         bullets = (_wrapped(text, width, "  - ") for text in sentences)
-        yield "\n".join(
-            ["\n## Is anything wrong: all participants", _wrapped(SHARED, width), *bullets]
-        )
+        yield "\n".join(["\n## What several participants share", _wrapped(SHARED, width), *bullets])
 
 
 def verdict_text(name: str, found: Verdict, right: tuple[str, ...], columns: int) -> str:

@@ -14,28 +14,27 @@ AGAIN = 1.25  # how much more an effect counts that another trial shows already
 def foremost(good: list[Tried], before: Fit) -> Tried:
     """What explains most, if possible with a name; what recurs in several trials counts
     together."""
-    weights = _with_recurrence(good, before)
+
+    def weight(one: Tried) -> float:
+        return _with_recurrence(one, good, before)
+
     named = [one for one in good if one.explanation.effect.name != UNEXPLAINED]
-    best = max(good, key=lambda one: weights[id(one)])
+    best = max(good, key=weight)
     if not named:
         return best
-    first = max(named, key=lambda one: weights[id(one)])
-    return first if weights[id(first)] >= NAMED_AT * weights[id(best)] else best
+    first = max(named, key=weight)
+    return first if weight(first) >= NAMED_AT * weight(best) else best
 
 
-def _with_recurrence(good: list[Tried], before: Fit) -> dict[int, float]:
-    """Score of each; with it the best of the same effect in every other trial where it differs.
+def _with_recurrence(one: Tried, good: list[Tried], before: Fit) -> float:
+    """Its score; with it the best of the same effect in every other trial where it differs.
 
     What was found in another trial already is the likeliest cause here.
     """
-    weights = {}
-    for one in good:
-        weight = one.score
-        if not one.explanation.effect.lasts and len(one.trials) == 1:
-            weight += _recurring(one, good)
-        again = AGAIN if _is_shown_elsewhere(one.explanation, before) else 1.0
-        weights[id(one)] = again * weight
-    return weights
+    weight = one.score
+    if not one.explanation.effect.lasts and len(one.trials) == 1:
+        weight += _recurring(one, good)
+    return AGAIN * weight if _is_shown_elsewhere(one.explanation, before) else weight
 
 
 def _recurring(one: Tried, good: list[Tried]) -> float:
@@ -48,5 +47,10 @@ def _recurring(one: Tried, good: list[Tried]) -> float:
 
 
 def _is_shown_elsewhere(one: Explanation, before: Fit) -> bool:
-    known = (e for e in before.explanations if e.effect is one.effect)
+    """What lasts is the same cause at the same place only."""
+    known = (
+        e
+        for e in before.explanations
+        if e.effect is one.effect and (e.target == one.target or not one.effect.lasts)
+    )
     return any(set(e.place.trials).isdisjoint(one.place.trials) for e in known)

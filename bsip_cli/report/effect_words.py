@@ -27,8 +27,9 @@ _PERSON = (
     "squeezes it into the inertial parameters of some segment."
 )
 _LOAD = (
-    "What is not stated as a load ends up in the masses of the body: state it in study.toml "
-    "([[loads]]) or leave it out of the recording, and run again."
+    "A load that is not stated ends up in the masses of the body where its recording identifies "
+    "them, and in the errors of the forces where it judges them: state it in study.toml ([[loads]]) "
+    "or leave it out of the recording, and run again."
 )
 WEIGHT = (
     "Either the stated mass is wrong or what the plates measure: weigh the person first. Only if a "

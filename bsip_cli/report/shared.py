@@ -4,85 +4,135 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from statsmodels.stats.meta_analysis import combine_effects
 
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.report.candidates import Candidate, Number, candidates_of, causes_of
-from bsip_cli.report.words import capital, listing, signed
+from bsip_cli.report.words import capital, listing, number, task_of
 
 SHARED = (
-    "What several participants share points to the laboratory, the protocol or the model rather "
-    "than to a person:"
+    "Shared causes may point to the laboratory, the protocol or the model rather than to a person "
+    "(a few of very many may be coincidence):"
 )
 _MOST_NAMED = 12  # participants in one sentence
 _MOST_TOLD = 8  # causes
+_DIFFER = 0.05  # p-value from which on sizes may be the same
+_Z95 = 1.959963984540054
+
+Cause = tuple[Candidate, ...]
+"""A single candidate, or all of a class of rivals."""
 
 
 @dataclass(frozen=True)
-class Person:
-    """What was found of one participant: a single candidate each, or all of a class of rivals."""
+class Searched:
+    """What was found of one participant.
+
+    trials, too_short : stems of moving trials that were searched, or too short for that.
+    was_searched : whether anything can be said at all.
+    """
 
     id: str
-    causes: tuple[tuple[Candidate, ...], ...]
-    was_looked_at: bool
+    causes: tuple[Cause, ...]
+    trials: tuple[str, ...]
+    too_short: tuple[str, ...]
+    was_searched: bool
 
 
-def person_of(participant: str, diagnosis: pd.DataFrame) -> Person:
-    """From the artifact ``diagnosis`` of a person; it is empty where no trial was long enough."""
-    return Person(participant, causes_of(candidates_of(diagnosis)), not diagnosis.empty)
-
-
-def shared_causes(people: Sequence[Person]) -> tuple[str, ...]:
-    """A sentence for each cause that more than one person has, be it as one of several
-    that look alike; what most people have comes first."""
-    asked = sum(one.was_looked_at for one in people)
-    found = _people_of_causes(people)
-    shared = sorted(
-        (label for label in found if len(found[label]) > 1), key=lambda x: -len(found[x])
-    )
-    return tuple(
-        f"{capital(label)}: {_told(found[label], asked)}." for label in shared[:_MOST_TOLD]
+def searched(participant: str, diagnosis: pd.DataFrame, facts: Mapping[str, Any]) -> Searched:
+    """From a person's artifact ``diagnosis``, which is empty where no trial was long enough, and
+    its facts."""
+    return Searched(
+        participant,
+        causes_of(candidates_of(diagnosis)),
+        tuple(facts.get("trials", ())),
+        tuple(facts.get("too_short_s", {})),
+        not diagnosis.empty,
     )
 
 
-def _people_of_causes(people: Sequence[Person]) -> dict[str, dict[str, tuple[Candidate, ...]]]:
-    """Of each cause, by its label, the people who have it, and itself before its rivals there."""
-    found: dict[str, dict[str, tuple[Candidate, ...]]] = {}
-    for one in people:
-        for cause in one.causes:
-            for rival in cause:
-                others = (c for c in cause if c is not rival)
-                found.setdefault(rival.label, {}).setdefault(one.id, (rival, *others))
-    return found
+def shared_causes(people: Sequence[Searched]) -> tuple[str, ...]:
+    """A sentence for each cause that more than one person has, be it as one of several that look
+    alike; what most people have comes first."""
+    shared = [found for found in _found(people) if len(found.people) > 1]
+    shared.sort(key=lambda found: -len(found.people))
+    said = [_told(found, people) for found in shared[:_MOST_TOLD]]
+    left = len(shared) - len(said)
+    return (*said, f"And {left} more, see the participants' reports.") if left else tuple(said)
 
 
-def _told(of: Mapping[str, Sequence[Candidate]], asked: int) -> str:
-    unsure = [name for name, cause in of.items() if len(cause) > 1]
-    where = f"in {len(of)} of {asked} participants ({named_people(list(of))})"
-    sizes = _sizes([cause[0].main_number() for cause in of.values()])
+@dataclass
+class _Found:
+    """A cause by its label: who has it, what of each, and for whom it may be another one."""
+
+    label: str
+    people: dict[str, list[Candidate]]
+    named_of: set[str]
+
+
+def _found(people: Sequence[Searched]) -> list[_Found]:
+    found: dict[str, _Found] = {}
+    for person in people:
+        for cause in person.causes:
+            for one in cause:
+                known = found.setdefault(one.label, _Found(one.label, {}, set()))
+                known.people.setdefault(person.id, []).append(one)
+                if len(cause) == 1:
+                    known.named_of.add(person.id)
+    return list(found.values())
+
+
+def _told(found: _Found, people: Sequence[Searched]) -> str:
+    unsure = [person for person in found.people if person not in found.named_of]
+    possibly = "possibly " if not found.named_of else ""
+    where = (
+        f"{possibly}in {len(found.people)} of {_asked(found, people)} participants "
+        f"({named_people(list(found.people))})"
+    )
+    every = [one.main_number() for of in found.people.values() for one in of]
+    text = f"{capital(found.label)}: {where}{_sizes(every)}"
     if not unsure:
-        return f"{where}{sizes}"
-    which = "all of them" if len(unsure) == len(of) else named_people(unsure)
-    return f"{where}{sizes}; one of several that look alike in {which}"
+        return f"{text}."
+    which = "all of them" if len(unsure) == len(found.people) else named_people(unsure)
+    return f"{text}; one of several that look alike in {which}."
+
+
+def _asked(found: _Found, people: Sequence[Searched]) -> int:
+    """How many could have shown it: a recording of the same task was searched. Of standing, which is
+    no search, everybody counts."""
+    tasks = {task_of(t) for of in found.people.values() for one in of for t in one.trials}
+    of_each = {p.id: {task_of(t) for t in p.trials} for p in people if p.was_searched}
+    if tasks.isdisjoint(set().union(*of_each.values())):
+        return len(of_each)
+    return sum(not tasks.isdisjoint(own) or p in found.people for p, own in of_each.items())
 
 
 def _sizes(numbers: Sequence[Number | None]) -> str:
-    """From the least to the largest, and whether their intervals have a value in common."""
+    """From the least to the largest, and whether they may all be the same."""
     known = [n for n in numbers if n is not None]
     if len(known) < len(numbers) or len({n.name for n in known}) > 1:
         return ""
     factor, unit = readable_unit(known[0].name, known[0].unit)
-    values = sorted(factor * n.value for n in known)
-    digits = digits_of(values[-1] - values[0] or values[0])
-    ends = dict.fromkeys(signed(value, digits) for value in (values[0], values[-1]))
-    span = " to ".join(ends)
-    low, high = (np.array([getattr(n, end) for n in known]) for end in ("low", "high"))
-    if not np.isfinite(high - low).all():
-        return f", {with_unit(span, unit)}"
-    verb = "agree" if low.max() <= high.min() else "differ by more than their intervals"
-    return f", {with_unit(span, unit)}; the sizes {verb}"
+    values = factor * np.array([n.value for n in known])
+    widths = factor * np.array([n.high - n.low for n in known])
+    are_known = bool(np.all(np.isfinite(widths) & (widths > 0)))
+    digits = digits_of(float(np.median(widths)) if are_known else float(values.max()))
+    ends = dict.fromkeys(number(value, digits) for value in (values.min(), values.max()))
+    span = f", {with_unit(' to '.join(ends), unit)}"
+    if not are_known:
+        return span
+    if _p_of_the_same(values, widths / (2 * _Z95)) < _DIFFER:
+        return f"{span}; the sizes differ by more than their intervals"
+    return f"{span}; the sizes may all be the same"
+
+
+def _p_of_the_same(values: np.ndarray, errors: np.ndarray) -> float:
+    """Chance that one size spreads like these (Cochran's Q)."""
+    with np.errstate(divide="ignore"):  # of I squared, where all are the same
+        return float(combine_effects(values, errors**2).test_homogeneity().pvalue)
 
 
 def named_people(names: Sequence[str]) -> str:

@@ -28,7 +28,9 @@ _MOST_GAINS = 3
 _MOST_CHANGES = 2
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
 _NO_TRIAL = "No trial was long enough on the plates to look for errors: nobody can say."
-_TOO_SHORT = "Not looked at, since every contact is on a plate and the pose known for less than 2 s"
+_TOO_SHORT = (
+    "Not looked at, because less than 2 s of them have every contact on a plate and the pose known"
+)
 _NOTHING = "Nothing is wrong above the noise."
 
 
@@ -147,16 +149,14 @@ def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
 def how_sure(one: Candidate) -> str:
     """Against chance, and on data that were not used to size it."""
     gain, low, high = one.gain
-    chance = f"chance {number(100 * one.p_value, 1)} %"
-    if one.p_value < LEAST_TOLD:
-        chance = "chance under 0.1 %"
+    chance = f"chance {chance_words(one.p_value)}"
     if not np.isfinite(gain):
         return f"How sure: {chance}."
     digits = 0 if gain >= 10 else 1
     share, least, most = (number(x, digits) for x in (gain, low, high))
     return (
         f"{_level(one.p_value, low)} ({chance}): explains {share} % ({least} to {most} %) of the "
-        "difference in seconds it was not fitted to."
+        "squared difference in seconds it was not fitted to."
     )
 
 
@@ -164,7 +164,12 @@ def _level(p_value: float, least_gain: float) -> str:
     """In few seconds no gain is sure, though chance be out of the question."""
     if p_value >= LEAST_TOLD:
         return "Likely" if least_gain > 0 else "Weak"
-    return "Sure" if least_gain > 0 else "Hardly chance, in few seconds"
+    return "Sure" if least_gain > 0 else "Real, but with an uncertain gain"
+
+
+def chance_words(p_value: float) -> str:
+    """How often chance would bring as much."""
+    return f"{number(100 * p_value, 1)} %" if p_value >= LEAST_TOLD else "under 0.1 %"
 
 
 # --- what it does -----------------------------------------------------------------------------
@@ -203,7 +208,7 @@ def gain_sentence(gains: pd.DataFrame) -> str:
     ]
     return (
         "What it does to the forces: with what was found in the model, the error on data that did "
-        f"not size it falls — {'; '.join(parts)}.{rises}"
+        f"not size it falls most in {'; '.join(parts)}.{rises}"
     )
 
 

@@ -92,6 +92,12 @@ def trial_label(stem: str) -> str:
     return f"{match['task']} (run {match['run']})" if match["run"] else match["task"]
 
 
+def task_of(stem: str) -> str:
+    """``sequence`` for sub-01_task-sequence_run-1."""
+    match = _STEM.fullmatch(stem)
+    return match["task"] if match else stem
+
+
 def labelled(text: str) -> str:
     """A text with the stems of recordings in it as their labels."""
     return re.sub(_STEM, lambda found: trial_label(found[0]), text)

@@ -8,10 +8,12 @@ group-report-files.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import pandas as pd
 
+from bsip_cli.artifacts import read_header
 from bsip_cli.pipeline import STAGES, producer, stages_named
 from bsip_cli.report.cohort.document import cohort_document
 from bsip_cli.report.cohort.people import SHOWN
@@ -21,6 +23,7 @@ from bsip_cli.report.figures.workflow import Step
 from bsip_cli.report.origins import HowMade
 from bsip_cli.report.page import render
 from bsip_cli.report.records import Origin
+from bsip_cli.report.shared import Searched, searched
 from bsip_cli.report.tables.build import build_tables
 from bsip_cli.report.words import listing
 from bsip_cli.schemas import SCHEMAS
@@ -92,13 +95,16 @@ def _member(unit: Unit, participant: Participant) -> Member:
         _first_row(unit, "identification", participant),
         unit.path("report-files", participant=participant).exists(),
         refusals_of(unit, participant),
-        _diagnosis(unit, participant),
+        _searched(unit, participant),
     )
 
 
-def _diagnosis(unit: Unit, participant: Participant) -> pd.DataFrame | None:
-    there = unit.path("overall-diagnosis", participant=participant).exists()
-    return unit.read("overall-diagnosis", participant=participant) if there else None
+def _searched(unit: Unit, participant: Participant) -> Searched | None:
+    path = unit.path("overall-diagnosis", participant=participant)
+    if not path.exists():
+        return None
+    diagnosis = unit.read("overall-diagnosis", participant=participant)
+    return searched(participant.id, diagnosis, read_header(path)["provenance"]["facts"])
 
 
 def _first_row(unit: Unit, kind: str, participant: Participant) -> dict[str, Any] | None:
@@ -109,8 +115,9 @@ def _first_row(unit: Unit, kind: str, participant: Participant) -> dict[str, Any
 
 
 def _origins(unit: Unit) -> Iterator[Origin]:
-    """Of all that is read; a participant's own facts are no options of the group."""
-    for kind in unit.stage.reads:
+    """Of all that is read; a participant's own facts are no options of the group, and what a
+    diagnosis found has its section."""
+    for kind in unit.stage.inputs:
         if SCHEMAS[kind].level == "cohort":
             yield origin_of(unit.path(kind), "")
         else:
@@ -119,4 +126,5 @@ def _origins(unit: Unit) -> Iterator[Origin]:
                 if path.exists():
                     origin = origin_of(path, name)
                     origin.options.pop("participant", None)
-                    yield origin
+                    found = kind == "overall-diagnosis"
+                    yield replace(origin, messages=()) if found else origin

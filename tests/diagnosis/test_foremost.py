@@ -18,8 +18,8 @@ NOTHING = np.zeros((1, 0))
 TETHER, TILT, PUSH = Tether(), EFFECTS["gravity_tilt"], EFFECTS["unmeasured_contact"]
 
 
-def explained(effect: Effect, *trials: int) -> Explanation:
-    return Explanation(Place(Candidate(effect, "", ()), trials), np.zeros(1))
+def explained(effect: Effect, *trials: int, target: str = "") -> Explanation:
+    return Explanation(Place(Candidate(effect, target, ()), trials), np.zeros(1))
 
 
 def tried(explanation: Explanation, score: float) -> Tried:
@@ -48,3 +48,17 @@ def test_what_lasts_counts_where_it_is_alone():
     gain = EFFECTS["plate_gain"]
     gains, tilt = [tried(explained(gain, t), 300) for t in (0, 1)], tried(explained(TILT, 0), 500)
     assert foremost([*gains, tilt], after()) is tilt
+
+
+def test_what_lasts_was_found_only_at_its_own_place():
+    gain = EFFECTS["plate_gain"]
+    second, tilt = tried(explained(gain, 3, target="2 mx"), 467), tried(explained(TILT, 3), 547)
+    assert foremost([second, tilt], after(explained(gain, 0, target="1 fz"))) is tilt
+    assert foremost([second, tilt], after(explained(gain, 0, target="2 mx"))) is second
+
+
+def test_a_name_is_preferred_where_none_explains_hardly_more():
+    pull = tried(explained(TETHER, 0), 100)
+    named, too_little = tried(explained(TILT, 0), 96), tried(explained(TILT, 0), 94)
+    assert foremost([pull, named], after()) is named
+    assert foremost([pull, too_little], after()) is pull

@@ -83,7 +83,7 @@ def test_a_gain_that_may_be_none_is_weak(found):
     sure = text_of(found.assign(p_value=1e-9, gain_ci_high=140.0), detection(TRIALS))
     assert "Sure (chance under 0.1 %): explains 8.0 % (4.0 to 100.0 %)" in sure
     short = text_of(found.assign(p_value=1e-40, gain_ci_low=-1.0), detection(TRIALS))
-    assert "Hardly chance, in few seconds (chance under 0.1 %): explains" in short
+    assert "Real, but with an uncertain gain (chance under 0.1 %): explains" in short
 
 
 def test_rivals_come_with_what_tells_them_apart(found):

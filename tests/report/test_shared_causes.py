@@ -8,17 +8,20 @@ import numpy as np
 import pandas as pd
 import pytest
 from fake_study import diagnosis
+from scipy.stats import norm
 
 from bsip_cli.report.blocks import Bullets, Grid
 from bsip_cli.report.cohort import diagnoses
 from bsip_cli.report.cohort.ratios import Ratios
 from bsip_cli.report.cohort.record import CohortRecord, Member
 from bsip_cli.report.origins import HowMade
-from bsip_cli.report.shared import named_people, person_of, shared_causes
+from bsip_cli.report.shared import named_people, searched, shared_causes
 
-FOUND = diagnosis(["sub-01_task-sequence_run-1"])  # a turned plate, a class of two, one rejected
+TRIAL = "sub-01_task-sequence_run-1"
+FOUND = diagnosis([TRIAL])  # a turned plate, a class of two, one rejected
 TURNED = FOUND[FOUND["verdict"] != "ambiguous"]
 NOTHING = FOUND[FOUND["verdict"] == "rejected"]
+FACTS = {"trials": [TRIAL], "too_short_s": {"sub-01_task-throwing": 1.8}}
 
 
 def turned_by(radians: float, half: float = 0.01) -> pd.DataFrame:
@@ -32,43 +35,80 @@ def turned_by(radians: float, half: float = 0.01) -> pd.DataFrame:
 
 
 def shared(**tables: pd.DataFrame) -> tuple[str, ...]:
-    return shared_causes([person_of(name, table) for name, table in tables.items()])
+    return shared_causes([searched(name, table, FACTS) for name, table in tables.items()])
 
 
 def test_a_cause_of_two_people_is_told_with_their_sizes():
     (said,) = shared(ann=turned_by(0.035), bob=NOTHING, eve=turned_by(0.04))
     assert said == (
-        "Force plate turned or tilted: plate 1: in 2 of 3 participants (ann and eve), +2.01 to "
-        "+2.29°; the sizes agree."
+        "Force plate turned or tilted: plate 1: in 2 of 3 participants (ann and eve), 2.0 to "
+        "2.3°; the sizes may all be the same."
     )
 
 
 def test_sizes_whose_intervals_lie_apart_differ():
     (said,) = shared(ann=turned_by(0.035), eve=turned_by(0.07))
-    assert said.endswith("the sizes differ by more than their intervals.")
+    assert said.endswith("2.0 to 4.0°; the sizes differ by more than their intervals.")
+
+
+def test_many_sizes_that_chance_spreads_may_be_the_same():
+    """Thirty intervals at 95 % seldom have a value in common."""
+    angles = norm.ppf((np.arange(30) + 0.5) / 30, 0.035, 0.01 / 1.96)
+    people = {f"p{k}": turned_by(angle) for k, angle in enumerate(angles)}
+    (said,) = shared(**people)
+    assert angles.max() - angles.min() > 0.02  # so no value lies in all intervals
+    assert said.endswith("the sizes may all be the same.")
 
 
 def test_sizes_without_intervals_are_not_compared():
     (said,) = shared(ann=turned_by(0.035), eve=turned_by(0.07, np.nan))
-    assert said.endswith("+4.0°.")
+    assert said.endswith("2.0 to 4.0°.")
 
 
 def test_what_one_person_has_is_not_shared():
     assert shared(ann=TURNED, bob=NOTHING) == ()
 
 
-def test_twice_in_one_person_is_not_shared():
-    again = TURNED.assign(rank=TURNED["rank"] + 10)
+def test_twice_in_one_person_is_not_shared_but_counts_among_the_sizes():
+    again = turned_by(0.07).assign(rank=TURNED["rank"] + 10)
     assert shared(ann=pd.concat([TURNED, again]), bob=NOTHING) == ()
+    (said,) = shared(ann=pd.concat([TURNED, again]), bob=turned_by(0.035))
+    assert "2.0 to 4.0°" in said
+
+
+def test_only_those_count_of_whom_such_a_recording_was_searched():
+    elsewhere = {"trials": ["sub-02_task-squat"], "too_short_s": {"sub-02_task-sequence": 1.8}}
+    people = [searched(name, TURNED, FACTS) for name in ("ann", "eve")]
+    (said,) = shared_causes([*people, searched("bob", NOTHING, elsewhere)])
+    assert "in 2 of 2 participants" in said
+    standing = TURNED.assign(trials="sub-01_task-static")  # which is weighed, not searched
+    people = [searched(name, standing, FACTS) for name in ("ann", "eve")]
+    (said,) = shared_causes([*people, searched("bob", NOTHING, elsewhere)])
+    assert "in 2 of 3 participants" in said
 
 
 def test_a_rival_counts_and_is_told_as_one():
     offset = FOUND["effect"] == "plate_zero"
     named = FOUND[offset].assign(verdict="named", class_id="")
-    first, *others = shared(ann=FOUND, bob=FOUND, eve=named, tom=FOUND.assign(class_id="X"))
+    first, *others = shared(ann=FOUND, bob=FOUND, eve=named, tom=FOUND)
     assert "in 4 of 4 participants (ann, bob, eve and tom)" in first
     assert first.endswith("; one of several that look alike in ann, bob and tom.")
+    assert "possibly in 3 of 4 participants" in others[-1]
     assert others[-1].endswith("; one of several that look alike in all of them.")
+
+
+def test_what_is_named_once_is_no_rival_of_the_same_person():
+    named = FOUND[FOUND["effect"] == "plate_zero"].assign(verdict="named", class_id="", rank=9)
+    first, *_ = shared(ann=pd.concat([FOUND, named]), eve=named)
+    assert "look alike" not in first
+
+
+def test_more_than_a_list_holds_is_counted():
+    plates = range(1, 11)
+    many = pd.concat([TURNED.assign(target=str(k), rank=TURNED["rank"] + 9 * k) for k in plates])
+    *said, last = shared(ann=many, eve=many)
+    assert len(said) == 8
+    assert last.startswith("And 2 more")
 
 
 def test_many_people_are_counted():
@@ -81,7 +121,8 @@ def test_many_people_are_counted():
 
 
 def cohort(**tables: pd.DataFrame | None) -> CohortRecord:
-    members = tuple(Member(name, {}, {}, True, (), table) for name, table in tables.items())
+    found = {n: None if t is None else searched(n, t, FACTS) for n, t in tables.items()}
+    members = tuple(Member(name, {}, {}, True, (), one) for name, one in found.items())
     return CohortRecord(members, Ratios({}, held_out=False), {}, (), (), (), HowMade(), ())
 
 
@@ -92,13 +133,17 @@ def text_of(record: CohortRecord) -> str:
 def test_the_section_lists_causes_and_names_those_without():
     record = cohort(ann=FOUND, bob=NOTHING, eve=None, tom=TURNED.iloc[:0])
     text = text_of(record)
-    assert "Nothing is wrong above the noise in bob." in text
+    assert (
+        "Nothing wrong above the noise was found in bob (searched: sequence (run 1); too short to "
+        "be searched: throwing)." in text
+    )
     assert "Not searched for errors: eve." in text
     assert "No recording was long enough on the plates to look for errors: tom." in text
     (grid,) = (b for b in diagnoses.section(record).blocks if isinstance(b, Grid))
     first, rivals = grid.cells()
     assert (first[0].text, first[0].link) == ("ann", "../ann/report.html")
     assert first[1].text.startswith("Plate 1 is turned by +2.0 degrees")
+    assert first[3].text == "0.5 %"
     assert rivals[1].text.startswith("One of these: ")
 
 
@@ -112,13 +157,18 @@ def test_what_is_shared_stands_in_the_section():
     ("tables", "said"),
     [
         ({"ann": TURNED, "bob": NOTHING}, "Something is wrong in 1 of 2 participants: ann."),
-        ({"bob": NOTHING}, "Nothing is wrong above the noise, in 1 participant."),
+        ({"bob": NOTHING}, "Nothing wrong above the noise was found in 1 participant."),
         ({"bob": None}, "Nobody's recordings were searched for errors"),
         ({"bob": TURNED.iloc[:0]}, "No recording was long enough"),
     ],
 )
 def test_the_verdict_of_all(tables, said):
     assert diagnoses.verdict(cohort(**tables)).text.startswith(said)
+
+
+def test_chance_is_mentioned_where_something_was_found():
+    assert "may be chance" in text_of(cohort(ann=TURNED))
+    assert "may be chance" not in text_of(cohort(bob=NOTHING, eve=NOTHING))
 
 
 def test_a_person_without_report_has_no_link():

@@ -7,79 +7,97 @@ from collections.abc import Sequence
 import numpy as np
 
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Paragraph, Section
-from bsip_cli.report.candidates import Candidate
-from bsip_cli.report.cohort.record import CohortRecord, Member
-from bsip_cli.report.shared import SHARED, Person, named_people, person_of, shared_causes
-from bsip_cli.report.words import capital, count, number
+from bsip_cli.report.cohort.record import CohortRecord
+from bsip_cli.report.shared import SHARED, Cause, Searched, named_people, shared_causes
+from bsip_cli.report.verdict import chance_words
+from bsip_cli.report.words import capital, count, labelled, listing, number
 
 _NOT_RUN = "Nobody's recordings were searched for errors: run `bsip diagnose`."
 _TOO_SHORT = "No recording was long enough on the plates to look for errors"
 _BY_CHANCE = (
-    "Where nothing is wrong, chance raises an alarm in about one participant of twenty: what one of "
-    "many shows, slightly, may be none."
+    "The search is set so that at most about one in twenty people with nothing wrong has an alarm: a "
+    "single weak finding among many people may be chance."
 )
-
-
-def people_of(members: Sequence[Member]) -> tuple[Person, ...]:
-    """Those whom the diagnosis has searched."""
-    return tuple(person_of(m.id, m.diagnosis) for m in members if m.diagnosis is not None)
 
 
 def verdict(record: CohortRecord) -> Paragraph:
     """One paragraph on whether anything is wrong."""
-    people = people_of(record.members)
-    looked_at = [p for p in people if p.was_looked_at]
-    if not looked_at:
+    people = _people(record)
+    asked = [p for p in people if p.was_searched]
+    if not asked:
         return Paragraph(f"{_TOO_SHORT}." if people else _NOT_RUN, "note")
-    wrong = [p.id for p in looked_at if p.causes]
-    asked = count(len(looked_at), "participant")
+    wrong = [p.id for p in asked if p.causes]
+    how_many = count(len(asked), "participant")
     if not wrong:
-        return Paragraph(f"Nothing is wrong above the noise, in {asked}.", "good")
+        return Paragraph(f"Nothing wrong above the noise was found in {how_many}.", "good")
     return Paragraph(
-        f"Something is wrong in {len(wrong)} of {asked}: {named_people(wrong)}. Section 3 says what.",
+        f"Something is wrong in {len(wrong)} of {how_many}: {named_people(wrong)}. The section on "
+        "what is wrong in the recordings says what.",
         "warning",
     )
 
 
 def section(record: CohortRecord) -> Section:
-    people = people_of(record.members)
-    blocks: list[Block] = [verdict(record)] if not people else []
-    blocks += _unsearched(record.members, people)
-    right = [p.id for p in people if p.was_looked_at and not p.causes]
-    if right:
-        blocks.append(
-            Paragraph(f"Nothing is wrong above the noise in {named_people(right)}.", "good")
-        )
+    people = _people(record)
+    blocks: list[Block] = [] if people else [verdict(record)]
+    blocks += _unsearched(record)
+    blocks += [Paragraph(text, "good") for text in _nothing_found(people)]
     reports = {m.id for m in record.members if m.has_report}
     rows = tuple(_row(one.id, cause, reports) for one in people for cause in one.causes)
     if rows:
-        head = ("participant", "found", "recordings", "removes [%]")
+        head = ("participant", "found", "recordings", "chance", "removes [%]")
         caption = (
-            "What was found; rivals look alike in these recordings. Removes: of the squared "
-            "difference in unseen seconds, with 95 % interval. The participants' reports say more"
+            "What was found; rivals look alike in these recordings. Chance: how often it would bring "
+            "as much. Removes: of the squared difference between measured and simulated forces, in "
+            "units of its noise, in seconds left out when its size was fitted, with 95 % interval"
         )
         blocks.append(Grid(head, rows, caption, words=3))
     if shared := shared_causes(people):
         blocks += [Paragraph(SHARED), Bullets(shared, "warning")]
-    if len(people) > 1:
+    if rows:
         blocks.append(Paragraph(_BY_CHANCE, "note"))
     return Section("diagnoses", "What is wrong in the recordings", tuple(blocks))
 
 
-def _unsearched(members: Sequence[Member], people: Sequence[Person]) -> list[Block]:
+def _people(record: CohortRecord) -> tuple[Searched, ...]:
+    return tuple(m.searched for m in record.members if m.searched is not None)
+
+
+def _unsearched(record: CohortRecord) -> list[Block]:
     """Those of whom nothing can be said."""
-    known = {p.id for p in people}
-    missing = [m.id for m in members if m.facts is not None and m.id not in known]
+    people = _people(record)
+    missing = [m.id for m in record.members if m.facts is not None and m.searched is None]
     said: list[Block] = []
     if missing and people:
         said.append(Paragraph(f"Not searched for errors: {named_people(missing)}.", "note"))
-    short = [p.id for p in people if not p.was_looked_at]
+    short = [p.id for p in people if not p.was_searched]
     if short:
         said.append(Paragraph(f"{_TOO_SHORT}: {named_people(short)}.", "note"))
     return said
 
 
-def _row(person: str, cause: Sequence[Candidate], reports: set[str]) -> tuple[str | Cell, ...]:
+def _nothing_found(people: Sequence[Searched]) -> list[str]:
+    """Those of the same movements together."""
+    of_movements: dict[str, list[str]] = {}
+    for one in people:
+        if one.was_searched and not one.causes:
+            of_movements.setdefault(_movements(one), []).append(one.id)
+    return [
+        f"Nothing wrong above the noise was found in {named_people(names)}{movements}."
+        for movements, names in of_movements.items()
+    ]
+
+
+def _movements(one: Searched) -> str:
+    short = f"; too short to be searched: {_trials(one.too_short)}" if one.too_short else ""
+    return f" (searched: {_trials(one.trials)}{short})" if one.trials else ""
+
+
+def _trials(stems: Sequence[str]) -> str:
+    return labelled(listing(list(stems)))
+
+
+def _row(person: str, cause: Cause, reports: set[str]) -> tuple[str | Cell, ...]:
     first = cause[0]
     told = [capital(rival.told()) for rival in cause]
     gain, low, high = first.gain
@@ -87,5 +105,6 @@ def _row(person: str, cause: Sequence[Candidate], reports: set[str]) -> tuple[st
         Cell(person, link=f"../{person}/report.html" if person in reports else ""),
         told[0] if len(told) == 1 else f"One of these: {'; '.join(told)}",
         first.where(),
+        chance_words(first.p_value),
         f"{number(gain)} ({number(low)} to {number(high)})" if np.isfinite(gain) else "not tested",
     )

@@ -12,20 +12,21 @@ from bsip_cli.report.cohort.ratios import Ratios
 from bsip_cli.report.figures.workflow import Step
 from bsip_cli.report.origins import HowMade
 from bsip_cli.report.records import Refusal
+from bsip_cli.report.shared import Searched
 from bsip_cli.report.tables.model import Table
 
 
 @dataclass(frozen=True)
 class Member:
-    """One participant of the study; what is shown of person and identification, and the whole
-    ``diagnosis``, if there."""
+    """One participant of the study; what is shown of person and identification, and what a
+    diagnosis found, if there."""
 
     id: str
     facts: Mapping[str, Any] | None
     identification: Mapping[str, Any] | None
     has_report: bool
     refusals: tuple[Refusal, ...]
-    diagnosis: pd.DataFrame | None = None
+    searched: Searched | None = None
 
 
 @dataclass(frozen=True)

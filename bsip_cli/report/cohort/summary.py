@@ -75,8 +75,8 @@ def _gain(record: CohortRecord) -> list[Block]:
         if worse
         else Paragraph(
             "OM follows better in every component, by the typical change and in the number of "
-            "participants. What of that could be chance, after Holm's correction for the number "
-            "of tests, says the note under table 4.",
+            "participants. Of the centre of pressure and the vertical force, tests with Holm's "
+            "correction say what could be chance: under table 4.",
             "good",
         )
     )
@@ -92,7 +92,7 @@ def _gain(record: CohortRecord) -> list[Block]:
     blocks.append(
         Paragraph(
             "Typical: the geometric mean of the participants' error ratios. The same: within "
-            f"{percent(SAME_WITHIN)} %. Tests stand in the tables of section 5.",
+            f"{percent(SAME_WITHIN)} %. Tests stand in the papers' tables.",
             "note",
         )
     )

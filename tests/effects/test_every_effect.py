@@ -53,7 +53,7 @@ def landing() -> Scene:
     """The moving person, on the first of whose plates twice the body weight lands for a moment."""
     scene = moving()
     first, *others = scene.plates
-    push = 2 * scene.predicted[:, 2].mean() * np.exp(-0.5 * ((scene.times_s - 2.5) / 0.1) ** 2)
+    push = 2 * scene.predicted[:, 2].mean() * np.exp(-0.5 * ((scene.times_s - 2.5) / 0.05) ** 2)
     shown = first.wrench + push[:, None] * [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
     return replace(scene, plates=(replace(first, wrench=shown), *others))
 

@@ -9,6 +9,7 @@ import pytest
 from moving_scene import RATE_HZ, moving, rms, standing_still
 from scipy.integrate import solve_ivp
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import Inertia
 from bsip_cli.effects.added_mass import AddedMass
 from bsip_cli.effects.breathing import OUTWARD, Breathing
@@ -146,6 +147,20 @@ def test_a_contact_that_is_seen_to_begin_began_then():
     np.testing.assert_allclose(
         UnmeasuredContact().alike(scene, "hand_l", seen)[[0, -1]], [seen] * 2
     )
+
+
+@pytest.mark.parametrize(
+    ("rise_s", "peak", "is_impact"), [(0.03, 1.6, True), (0.4, 2.4, False), (0.03, 0.3, False)]
+)
+def test_an_impact_is_a_change_of_force_within_moments(rise_s, peak, is_impact):
+    """Heels that drop push with less than a fast squat and within a tenth of the time. peak : of
+    the vertical force above its least, body weights."""
+    still = standing_still(2.0)
+    weight = still.mass_kg * GRAVITY_M_S2
+    wrench = np.zeros((len(still.times_s), 6))
+    wrench[:, 2] = weight * peak * np.clip((still.times_s - 1.0) / rise_s, 0.0, 1.0)
+    landed = replace(still, wrench=wrench)
+    assert bool(WobblingMass().targets(landed)) is is_impact
 
 
 @pytest.mark.parametrize(("mass", "possible"), [(0.1, False), (2.0, True)])

@@ -42,6 +42,7 @@ from bsip_cli.report.words import (
 
 NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 _MOST_IN_FIGURE = 12
+_LEAST_GAIN = 0.05  # percent: less prints as none
 
 
 def verdict(record: ParticipantRecord) -> list[Block]:
@@ -165,8 +166,8 @@ def gain_blocks(gains: pd.DataFrame) -> list[Block]:
             component_label(r["component"]),
             r["unit"],
             number(r["rmse_before"], 2),
-            Cell(number(r["rmse_after"], 2), "better" if r["ci_low"] > 0 else ""),
-            f"{number(r['gain_percent'], 0)} ({number(r['ci_low'], 0)} to {number(r['ci_high'], 0)})",
+            Cell(number(r["rmse_after"], 2), "better" if r["ci_low"] >= _LEAST_GAIN else ""),
+            f"{_whole(r['gain_percent'])} ({_whole(r['ci_low'])} to {_whole(r['ci_high'])})",
         )
         for r in gains.to_dict("records")
     )
@@ -180,6 +181,11 @@ def gain_blocks(gains: pd.DataFrame) -> list[Block]:
             groups=(("", 2), ("RMSE", 2), ("95 % interval", 1)),
         ),
     ]
+
+
+def _whole(percent: float) -> str:
+    """Without decimals, but where only these tell it from zero."""
+    return number(percent, 0 if abs(percent) >= 1 else 1)
 
 
 def _data_words(gains: pd.DataFrame) -> str:

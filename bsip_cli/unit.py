@@ -247,9 +247,11 @@ class Unit:
         """An artifact, or those of its rows with the wanted values in text columns."""
         return read_artifact(self.path(kind, trial, participant), kind, **wanted)
 
-    def facts(self, kind: str, trial: Trial | None = None) -> dict:
+    def facts(
+        self, kind: str, trial: Trial | None = None, participant: Participant | None = None
+    ) -> dict:
         """What the producing stage said of its result as a whole."""
-        return read_header(self.path(kind, trial), kind)["provenance"]["facts"]
+        return read_header(self.path(kind, trial, participant), kind)["provenance"]["facts"]
 
     def write(self, kind: str, frame: pd.DataFrame, facts: dict | None = None) -> None:
         write_artifact(self.path(kind), kind, frame, self._notes(facts or {}))

@@ -8,8 +8,8 @@ import numpy as np
 
 from bsip_cli.body.inertia import Inertia
 from bsip_cli.body.names import in_words
+from bsip_cli.statistics.normal import Z95
 
-Z95 = 1.959964  # of the normal distribution
 _BESIDE = 0.5  # of the largest coordinate of a shift: smaller ones are not put into words
 
 

@@ -10,11 +10,11 @@ import numpy as np
 from bsip_cli.diagnosis.chance import group_of
 from bsip_cli.diagnosis.explanation import NEGLIGIBLE
 from bsip_cli.diagnosis.fair_sizes import known_to
-from bsip_cli.diagnosis.held_out import Z95
 from bsip_cli.diagnosis.judging import ALPHA, WORTH
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.rounds import Selection
 from bsip_cli.diagnosis.signatures import Place
+from bsip_cli.statistics.normal import Z95
 
 _SURE = 1.645  # standard deviations: found in 95 of 100 recordings like these
 _TOLD = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bsip_cli.diagnosis.explanation import Explanation, Fit
 from bsip_cli.diagnosis.judging import Tried
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
+from bsip_cli.diagnosis.refitting import alike
 
 # A cause from the catalogue is named though a regularity without a name explains a bit more.
 NAMED_AT = 0.95
@@ -51,6 +52,6 @@ def _is_shown_elsewhere(one: Explanation, before: Fit) -> bool:
     known = (
         e
         for e in before.explanations
-        if e.effect is one.effect and (e.target == one.target or not one.effect.lasts)
+        if (alike(e, one) if one.effect.lasts else e.effect is one.effect)
     )
     return any(set(e.place.trials).isdisjoint(one.place.trials) for e in known)

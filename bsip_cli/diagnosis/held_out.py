@@ -8,9 +8,9 @@ import numpy as np
 
 from bsip_cli.diagnosis.explanation import Fit
 from bsip_cli.diagnosis.together import Evidence
+from bsip_cli.statistics.normal import Z95
 
 FOLDS = 5
-Z95 = 1.959964  # of the normal distribution
 
 
 @dataclass(frozen=True)

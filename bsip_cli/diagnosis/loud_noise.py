@@ -18,7 +18,6 @@ from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.evidence import TrialEvidence
 from bsip_cli.diagnosis.explanation import changes_of
 from bsip_cli.diagnosis.findings import Finding, Number, interval_words
-from bsip_cli.diagnosis.held_out import Z95
 from bsip_cli.diagnosis.judging import ARM_M, NAMELESS_WORTH
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.rounds import Selection
@@ -28,6 +27,7 @@ from bsip_cli.effects.plate_frame import CHANNELS, lab_channel
 from bsip_cli.effects.scene import Scene
 from bsip_cli.effects.wobbling_mass import has_impacts
 from bsip_cli.statistics.effective_samples import effective_samples
+from bsip_cli.statistics.normal import Z95
 
 LOUDER = 12.0  # times the median of the components
 # Of body weight, moments at an arm of ARM_M: sensors and labs differ below it.

@@ -13,12 +13,12 @@ import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.findings import Finding, Number
-from bsip_cli.diagnosis.held_out import Z95
 from bsip_cli.diagnosis.scale_mass import is_noticed, p_of
 from bsip_cli.effects.added_mass import AddedMass
 from bsip_cli.effects.plate_gain import PlateGain
 from bsip_cli.effects.plate_zero import PlateZero
 from bsip_cli.effects.scene import Scene
+from bsip_cli.statistics.normal import Z95
 
 CLASS = "W"  # of the weight; those found in the motion are A, B, C
 REMEDY = (

@@ -18,11 +18,12 @@ from scipy.stats import chi2
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.names import in_words
 from bsip_cli.diagnosis.findings import Finding, Number
-from bsip_cli.diagnosis.held_out import FOLDS, Z95, Gain
+from bsip_cli.diagnosis.held_out import FOLDS, Gain
 from bsip_cli.diagnosis.together import BLOCK_S
 from bsip_cli.effects.scene import Scene
 from bsip_cli.effects.unmeasured_contact import UnmeasuredContact
 from bsip_cli.statistics.effective_samples import effective_samples
+from bsip_cli.statistics.normal import Z95
 
 HANDS, TRUNK = ("hand_l", "hand_r"), "upper_torso"
 STILL_M = 0.004  # root mean square distance of a hand that holds on from its mean place

@@ -110,6 +110,13 @@ class Candidate:
         sizes = main or [n for n in self.numbers if n.name not in _NO_SIZES]
         return max(sizes or self.numbers, key=Number.certainty, default=None)
 
+    def removes(self) -> str:
+        """``61.1 (-19.6 to 100.0)``, percent of the squared difference in unseen seconds."""
+        gain, low, high = self.gain
+        if not np.isfinite(gain):
+            return "not tested"
+        return f"{number(gain)} ({number(low)} to {number(high)})"
+
     def where(self) -> str:
         """``hops (run 1) and squat (run 1)``."""
         return listing([trial_label(stem) for stem in self.trials])

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from statsmodels.stats.meta_analysis import combine_effects
 
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.report.candidates import Candidate, Number, candidates_of, causes_of
 from bsip_cli.report.words import capital, listing, number, task_of
+from bsip_cli.statistics.homogeneity import p_of_one_size
 
 SHARED = (
     "Shared causes may point to the laboratory, the protocol or the model rather than to a person "
@@ -21,7 +21,6 @@ SHARED = (
 _MOST_NAMED = 12  # participants in one sentence
 _MOST_TOLD = 8  # causes
 _DIFFER = 0.05  # p-value from which on sizes may be the same
-_Z95 = 1.959963984540054
 
 Cause = tuple[Candidate, ...]
 """A single candidate, or all of a class of rivals."""
@@ -124,15 +123,9 @@ def _sizes(numbers: Sequence[Number | None]) -> str:
     span = f", {with_unit(' to '.join(ends), unit)}"
     if not are_known:
         return span
-    if _p_of_the_same(values, widths / (2 * _Z95)) < _DIFFER:
+    if p_of_one_size(values, widths) < _DIFFER:
         return f"{span}; the sizes differ by more than their intervals"
     return f"{span}; the sizes may all be the same"
-
-
-def _p_of_the_same(values: np.ndarray, errors: np.ndarray) -> float:
-    """Chance that one size spreads like these (Cochran's Q)."""
-    with np.errstate(divide="ignore"):  # of I squared, where all are the same
-        return float(combine_effects(values, errors**2).test_homogeneity().pvalue)
 
 
 def named_people(names: Sequence[str]) -> str:

@@ -13,7 +13,6 @@ from typing import Any
 
 import pandas as pd
 
-from bsip_cli.artifacts import read_header
 from bsip_cli.pipeline import STAGES, producer, stages_named
 from bsip_cli.report.cohort.document import cohort_document
 from bsip_cli.report.cohort.people import SHOWN
@@ -100,11 +99,11 @@ def _member(unit: Unit, participant: Participant) -> Member:
 
 
 def _searched(unit: Unit, participant: Participant) -> Searched | None:
-    path = unit.path("overall-diagnosis", participant=participant)
-    if not path.exists():
+    if not unit.path("overall-diagnosis", participant=participant).exists():
         return None
     diagnosis = unit.read("overall-diagnosis", participant=participant)
-    return searched(participant.id, diagnosis, read_header(path)["provenance"]["facts"])
+    facts = unit.facts("overall-diagnosis", participant=participant)
+    return searched(participant.id, diagnosis, facts)
 
 
 def _first_row(unit: Unit, kind: str, participant: Participant) -> dict[str, Any] | None:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Paragraph, Section
 from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.shared import SHARED, Cause, Searched, named_people, shared_causes
 from bsip_cli.report.verdict import chance_words
-from bsip_cli.report.words import capital, count, labelled, listing, number
+from bsip_cli.report.words import capital, count, labelled, listing
 
 _NOT_RUN = "Nobody's recordings were searched for errors: run `bsip diagnose`."
 _TOO_SHORT = "No recording was long enough on the plates to look for errors"
@@ -100,11 +98,10 @@ def _trials(stems: Sequence[str]) -> str:
 def _row(person: str, cause: Cause, reports: set[str]) -> tuple[str | Cell, ...]:
     first = cause[0]
     told = [capital(rival.told()) for rival in cause]
-    gain, low, high = first.gain
     return (
         Cell(person, link=f"../{person}/report.html" if person in reports else ""),
         told[0] if len(told) == 1 else f"One of these: {'; '.join(told)}",
         first.where(),
         chance_words(first.p_value),
-        f"{number(gain)} ({number(low)} to {number(high)})" if np.isfinite(gain) else "not tested",
+        first.removes(),
     )

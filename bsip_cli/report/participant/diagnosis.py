@@ -142,7 +142,6 @@ def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
     marks: dict[str, Mark] = {"named": "group", "ambiguous": "warning"}
     answers = {"ambiguous": f"rival in class {one.class_id}", "unnamed": "found, without a name"}
     verdict = answers.get(one.answer, one.answer)
-    gain, low, high = one.gain
     reason = one.why_not()
     return (
         _numbered(k, one),
@@ -150,9 +149,7 @@ def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
         capital(f"{one.what()}; rejected: {reason}" if reason else one.told()),
         one.where(),
         percent(one.p_value, 1) if one.p_value >= LEAST_TOLD else "< 0.1",
-        f"{number(gain, 1)} ({number(low, 1)} to {number(high, 1)})"
-        if np.isfinite(gain)
-        else "not tested",
+        one.removes(),
     )
 
 

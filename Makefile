@@ -26,7 +26,7 @@ test: check
 	$(BIN)/pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
 blind: .venv/ready
-	$(BIN)/python tests/blind/blind_long.py --jobs $(JOBS) --draws $(DRAWS)
+	$(BIN)/python -m tests.blind.blind_long --jobs $(JOBS) --draws $(DRAWS)
 
 check: .venv/ready
 	$(BIN)/ruff check .

@@ -1,6 +1,6 @@
 """Errors of segments and forces, and coverage of the intervals, on simulated people.
 
-    python benchmarks/accuracy.py --people 20
+    python -m benchmarks.accuracy --people 20
 
 The people differ from the table, their skin moves, and half of them are women. Each is identified
 three times: from the sequence, from ten seconds of squats, and from ten seconds of standing in
@@ -14,13 +14,12 @@ import sys
 import tempfile
 from pathlib import Path
 
-from measure import ROOT, markdown, run_child
-
-# isort: split
 import numpy as np
 import pandas as pd
-from accuracy_measures import TRUTH, force_errors, segment_errors
-from accuracy_study import ONE_ARM, SQUATS, write_study
+
+from benchmarks.accuracy_measures import TRUTH, force_errors, segment_errors
+from benchmarks.accuracy_study import ONE_ARM, SQUATS, write_study
+from benchmarks.measure import ROOT, markdown, run_child
 
 ESTIMATORS = ("consistent", "hansen2017", "robert2017", "base")
 RECORDINGS = {

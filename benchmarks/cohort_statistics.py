@@ -1,6 +1,6 @@
 """Time and memory of the group's stages over thousands of participants' artifacts.
 
-    python benchmarks/cohort_statistics.py [--participants 100 1000 10000]
+    python -m benchmarks.cohort_statistics [--participants 100 1000 10000]
 
 One simulated person is run through the pipeline; every participant gets that person's artifacts
 with other numbers and names. ``bsip run --group`` then has the work of a cohort of that size.
@@ -14,15 +14,13 @@ import tempfile
 import time
 from pathlib import Path
 
-from measure import ROOT, machine, markdown, run_child
-from participant import run_stage, study_options
-
-# isort: split
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from benchmarks.measure import ROOT, machine, markdown, run_child
+from benchmarks.participant import run_stage, study_options
 from bsip_cli.pipeline import STAGES
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.simulate.study import simulate_study

@@ -12,13 +12,11 @@ import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from measure import machine, markdown
-
-# isort: split
 import numpy as np
 from scipy.interpolate import make_smoothing_spline
 from scipy.signal import butter, filtfilt
 
+from benchmarks.measure import machine, markdown
 from bsip_cli.config import load_config
 from bsip_cli.motion.splines import smooth
 

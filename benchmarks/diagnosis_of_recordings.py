@@ -1,6 +1,6 @@
 """What bsip says of real recordings as they are, and with one injected cause each.
 
-    python benchmarks/diagnosis_of_recordings.py DATA --write docs/diagnosis_of_recordings.md
+    python -m benchmarks.diagnosis_of_recordings DATA --write docs/diagnosis_of_recordings.md
 
 DATA is a folder with the recordings listed in SUBJECTS; those that are missing are left out. Every
 case leaves a file in --results and is not run again while that is there: remove the folder to
@@ -17,13 +17,11 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from measure import ROOT, run_child
-
-# isort: split
-from diagnosis_answers import Answer, answer_of
-from diagnosis_page import page
-from injected_causes import CAUSES, Cause
-from recordings import STUDIES, Source, make_study
+from benchmarks.diagnosis_answers import Answer, answer_of
+from benchmarks.diagnosis_page import page
+from benchmarks.injected_causes import CAUSES, Cause
+from benchmarks.measure import ROOT, run_child
+from benchmarks.recordings import STUDIES, Source, make_study
 
 STAGES = ("ingest", "scale", "ik", "regress", "identify", "reconstruct", "diagnose", "extend")
 BAD_DATA = 3  # some trial was refused, the rest is done

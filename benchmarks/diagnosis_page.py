@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from diagnosis_answers import COMPONENTS, Answer, Balance, Found
-from injected_causes import Cause
-from measure import markdown
+
+from benchmarks.diagnosis_answers import COMPONENTS, Answer, Balance, Found
+from benchmarks.injected_causes import Cause
+from benchmarks.measure import markdown
 
 BELOW = "missed, below what is seen"
 RIGHT, IN_CLASS, ALIKE = "right name", "right class", "named as what looks alike"
@@ -201,7 +202,7 @@ def _found_size(cause: Cause, before: Answer, one: Found) -> str:
 
 _HEAD = """# Diagnosis of real recordings
 
-Made by `python benchmarks/diagnosis_of_recordings.py ../shared/data --write
+Made by `python -m benchmarks.diagnosis_of_recordings ../shared/data --write
 docs/diagnosis_of_recordings.md`. The recordings belong to others and are not part of the project.
 """
 

@@ -7,11 +7,9 @@ import statistics
 import tempfile
 from pathlib import Path
 
-from measure import ROOT, machine, markdown
-from participant import run_stage
-from sections import replace_section
-
-# isort: split
+from benchmarks.measure import ROOT, machine, markdown
+from benchmarks.participant import run_stage
+from benchmarks.sections import replace_section
 from bsip_cli.simulate.options import Asked, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 

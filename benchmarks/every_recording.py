@@ -1,6 +1,6 @@
 """A table of every recording in a folder: what was read, corrected and refused, and the mass.
 
-    python benchmarks/every_recording.py ../shared/data --write docs/recordings.md
+    python -m benchmarks.every_recording ../shared/data --write docs/recordings.md
 
 The standing mass is compared with the sum of the plates as the file's own numbers give it without
 any correction: by ezc3d for C3D files, by the vertical columns for TRC with MOT and for CSV.
@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import shutil
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,11 +17,7 @@ from pathlib import Path
 import ezc3d
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "real"))
-
-from figaroh_csv import convert
-from sections import replace_section
-
+from benchmarks.sections import replace_section
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.model import Recording
@@ -30,6 +25,7 @@ from bsip_cli.recordings.mot import read_mot
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.recordings.resample import sample_at_frames, wrench_at_marker_rate
 from bsip_cli.recordings.standing_mass import still_frames
+from tests.real.figaroh_csv import convert
 
 SECTION = "every recording"
 _PAIRS = {"squat2_pig61/markers.trc": "squat2_pig61/grf.mot"}  # names that do not belong together

@@ -4,7 +4,7 @@ figaroh is asked of another interpreter, which needs ``pip install figaroh==1.0.
 bsip):
 
     python3 -m venv bench && bench/bin/pip install figaroh==1.0.2
-    python benchmarks/figaroh_comparison.py --figaroh-python bench/bin/python
+    python -m benchmarks.figaroh_comparison --figaroh-python bench/bin/python
 
 Both get the same tree (Pinocchio's model, written by one and read by the other), motion and wrench,
 once without noise and once with white noise. figaroh solves all frames at once in the pelvis'
@@ -24,11 +24,9 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from measure import ROOT, machine, markdown, run_child
-
-# isort: split
 import numpy as np
 
+from benchmarks.measure import ROOT, machine, markdown, run_child
 from bsip_cli.config import load_config
 from bsip_cli.dynamics.base_parameters import find_basis
 from bsip_cli.dynamics.regressor import move_moments, predicted_wrench, rotations_of
@@ -36,12 +34,7 @@ from bsip_cli.identification.base import estimate
 from bsip_cli.identification.equations import accumulate
 from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.noise import even_noise
-
-# The tests' person whose parameters are known.
-sys.path.insert(0, str(ROOT / "tests" / "identification"))
-sys.path.insert(0, str(ROOT / "tests" / "body"))
-
-from synthetic_identification import motion, recording, world
+from tests.identification.synthetic_identification import motion, recording, world
 
 CUTOFF_HZ = load_config([]).identify.cutoff_hz
 NOISE = np.array([5.0, 5.0, 5.0, 2.5, 2.5, 2.5])  # white, of each component [N, N m]
@@ -131,15 +124,15 @@ def peak_mb() -> float:
 
 def contest(folder: Path, python: str, rounds: int) -> tuple[dict, dict]:
     """What both printed, medians of rounds in turns; the wrenches lie in the folder."""
-    here = Path(__file__).resolve()
     commands = {
-        "bsip": [sys.executable, str(here), "--worker", str(folder)],
-        "figaroh": [python, str(here.with_name("figaroh_worker.py")), str(folder)],
+        "bsip": [sys.executable, "-m", "benchmarks.figaroh_comparison", "--worker", str(folder)],
+        "figaroh": [python, str(ROOT / "benchmarks" / "figaroh_worker.py"), str(folder)],
     }
     printed: dict[str, list[dict]] = {name: [] for name in commands}
     for _ in range(rounds):
         for name, command in commands.items():
-            printed[name].append(json.loads(run_child(command).stdout.splitlines()[-1]))
+            stdout = run_child(command, folder=ROOT).stdout
+            printed[name].append(json.loads(stdout.splitlines()[-1]))
     bsip, figaroh = (
         {
             key: statistics.median(one[key] for one in found) if key != "version" else value

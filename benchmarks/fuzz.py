@@ -1,6 +1,6 @@
 """Thousands of damaged files: what bsip answers, how long it takes, how much memory.
 
-    python benchmarks/fuzz.py --cases 400 --data ../shared/data --write docs/recordings.md
+    python -m benchmarks.fuzz --cases 400 --data ../shared/data --write docs/recordings.md
 
 Per kind of file CASES copies are damaged (tests/fuzz/damage.py) and ingested in processes with
 limits of time and memory; with DATA the real C3D files of tests/fuzz/fuzz_study.py too. The
@@ -15,11 +15,9 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "fuzz"))
-
-from fuzz_run import Result, run_cases
-from fuzz_study import REAL, TARGETS
-from sections import replace_section
+from benchmarks.sections import replace_section
+from tests.fuzz.fuzz_run import Result, run_cases
+from tests.fuzz.fuzz_study import REAL, TARGETS
 
 SECTION = "fuzz"
 _STATES = ("refused", "said", "unchanged", "silent", "bug", "died")

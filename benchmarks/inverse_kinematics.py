@@ -3,7 +3,7 @@
 OpenSim is asked of another interpreter, which needs ``pip install opensim`` (not part of bsip):
 
     python3 -m venv bench && bench/bin/pip install opensim
-    python benchmarks/inverse_kinematics.py --opensim-python bench/bin/python
+    python -m benchmarks.inverse_kinematics --opensim-python bench/bin/python
 """
 
 from __future__ import annotations
@@ -16,15 +16,12 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from measure import cpu_seconds, interleaved, machine, markdown, run_child
-
-# isort: split
 import numpy as np
-import opensim_model
 import pinocchio as pin
-import pinocchio_loop
-from moving_person import movement, noisy_markers, sample_person, standing
 
+from benchmarks import opensim_model, pinocchio_loop
+from benchmarks.measure import ROOT, cpu_seconds, interleaved, machine, markdown, run_child
+from benchmarks.moving_person import movement, noisy_markers, sample_person, standing
 from bsip_cli.body.person import Person
 from bsip_cli.config import load_config
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
@@ -151,9 +148,10 @@ def first_call() -> None:
 def compile_rows() -> list[list[str]]:
     """First call in a fresh process, with an empty cache and with a full one."""
     rows = []
+    command = [sys.executable, "-m", "benchmarks.inverse_kinematics", "--first-call"]
     with tempfile.TemporaryDirectory() as cache:
         for label in ("first solve, empty cache", "first solve, cached"):
-            used = run_child([sys.executable, __file__, "--first-call"], {"NUMBA_CACHE_DIR": cache})
+            used = run_child(command, {"NUMBA_CACHE_DIR": cache}, ROOT)
             first, second = json.loads(used.stdout.splitlines()[-1])
             rows.append([label, f"{first - second:.2f}"])
     return rows

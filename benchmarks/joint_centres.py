@@ -17,11 +17,10 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from measure import ROOT, machine, markdown
-from participant import run_stage
-from sections import replace_section
 
-# isort: split
+from benchmarks.measure import ROOT, machine, markdown
+from benchmarks.participant import run_stage
+from benchmarks.sections import replace_section
 from bsip_cli.artifacts import read_artifact
 from bsip_cli.body.names import without_side
 from bsip_cli.body.person import Person

@@ -18,9 +18,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from measure import ROOT, markdown, run_child
 
-# isort: split
+from benchmarks.measure import ROOT, markdown, run_child
 from bsip_cli.body.loads import PointMass, load_parameters
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton

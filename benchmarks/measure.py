@@ -1,4 +1,4 @@
-"""CPU-seconds, memory and Markdown tables; imports nothing heavy, and numpy gets one thread."""
+"""CPU-seconds, memory and Markdown tables; imports nothing heavy."""
 
 from __future__ import annotations
 
@@ -12,10 +12,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-# One thread, as the command line has it; import this module before numpy.
-for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -1,16 +1,14 @@
-"""What the benchmarks share: a person who moves. Import ``measure`` before this."""
+"""What the benchmarks share: a person who moves."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
 
-from measure import ROOT
-
-# isort: split
 import numpy as np
 import pinocchio as pin
 
+from benchmarks.measure import ROOT
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton

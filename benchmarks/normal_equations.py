@@ -8,15 +8,12 @@ import resource
 import sys
 import tracemalloc
 from dataclasses import replace
-from pathlib import Path
 
-from measure import ROOT, cpu_seconds, interleaved, machine, markdown, run_child
-
-# isort: split
 import numpy as np
 import pinocchio as pin
-from moving_person import movement, sample_person
 
+from benchmarks.measure import ROOT, cpu_seconds, interleaved, machine, markdown, run_child
+from benchmarks.moving_person import movement, sample_person
 from bsip_cli.config import load_config
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.identification import consistent
@@ -25,13 +22,8 @@ from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.logdet_fit import minimise
 from bsip_cli.identification.noise import even_noise
 from bsip_cli.identification.weights import fit_with_weights, objective_of, terms_of
-
-# The tests' person with known parameters, and their conic form of the same problem.
-sys.path.insert(0, str(ROOT / "tests" / "identification"))
-sys.path.insert(0, str(ROOT / "tests" / "body"))
-
-import synthetic_identification
-from test_logdet_fit import by_clarabel
+from tests.identification import synthetic_identification
+from tests.identification.test_logdet_fit import by_clarabel
 
 RATE_HZ = 100.0
 CUTOFF_HZ = load_config([]).identify.cutoff_hz
@@ -92,9 +84,10 @@ def print_memory(duration_s: float, traced: bool) -> None:
 def memory_table(durations_s: list[float]) -> str:
     rows = []
     for duration in durations_s:
-        child = [sys.executable, str(Path(__file__).resolve()), "--memory", f"{duration}"]
+        child = [sys.executable, "-m", "benchmarks.normal_equations", "--memory", f"{duration}"]
         plain, traced = (
-            json.loads(run_child([*child, *extra]).stdout) for extra in ([], ["traced"])
+            json.loads(run_child([*child, *extra], folder=ROOT).stdout)
+            for extra in ([], ["traced"])
         )
         rows.append([f"{duration:g}", f"{plain[0]:.0f}", f"{plain[1]:.0f}", f"{traced[2]:.1f}"])
     header = ["trial [s]", "recording itself [MB]", "growth of peak RSS [MB]", "traced peak [MB]"]

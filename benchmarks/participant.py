@@ -8,9 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from measure import ROOT, Usage, machine, markdown, run_child
-
-# isort: split
+from benchmarks.measure import ROOT, Usage, machine, markdown, run_child
 from bsip_cli.pipeline import STAGES
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study

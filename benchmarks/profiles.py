@@ -1,6 +1,6 @@
 """Where the time of each stage goes, for one simulated participant: own time by function.
 
-    python benchmarks/profiles.py [--sequence-s 120] [--write]
+    python -m benchmarks.profiles [--sequence-s 120] [--write]
 
 Compiled functions (numba, Pinocchio, LAPACK) count where Python calls them.
 """
@@ -17,12 +17,10 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from measure import ROOT, machine, markdown
-from participant import run_stage, study_options
-from sections import replace_section
-
-# isort: split
 import bsip_cli
+from benchmarks.measure import ROOT, machine, markdown
+from benchmarks.participant import run_stage, study_options
+from benchmarks.sections import replace_section
 from bsip_cli.pipeline import STAGES, Stage
 from bsip_cli.runner import perform
 from bsip_cli.session import OpenedStudy, open_study

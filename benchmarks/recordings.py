@@ -1,6 +1,6 @@
 """What bsip makes of real recordings: marker residuals, and errors of RM and OM.
 
-    python benchmarks/recordings.py DATA --write docs/recordings.md
+    python -m benchmarks.recordings DATA --write docs/recordings.md
 
 DATA is a folder with the recordings listed in STUDIES; those that are missing are left out.
 """
@@ -17,12 +17,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "real"))
-
-from every_recording import SECTION as EVERY
-from figaroh_csv import convert
-from fuzz import SECTION as FUZZ
-from sections import marks, read_section, replace_section
+from benchmarks.every_recording import SECTION as EVERY
+from benchmarks.fuzz import SECTION as FUZZ
+from benchmarks.sections import marks, read_section, replace_section
+from tests.real.figaroh_csv import convert
 
 
 @dataclass(frozen=True)
@@ -218,7 +216,7 @@ def _table(rows: list[dict[str, str]]) -> str:
 
 _PAGE = """# Real recordings
 
-Made by `python benchmarks/recordings.py ../shared/data --write docs/recordings.md`; the last two
+Made by `python -m benchmarks.recordings ../shared/data --write docs/recordings.md`; the last two
 tables by scripts of their own. The recordings belong to others and are not part of the project.
 
 ## Markers after scaling
@@ -249,7 +247,7 @@ stated mass in all trials but walking.
 
 ## Every recording
 
-Made by `python benchmarks/every_recording.py ../shared/data --write docs/recordings.md`: each file
+Made by `python -m benchmarks.every_recording ../shared/data --write docs/recordings.md`: each file
 alone, before a marker set is chosen and before unloaded plates are zeroed. `bsip` is the mean
 vertical force of all plates over g, `alone` the same frames as ezc3d's extraction has them (TRC and
 CSV: the vertical columns) without any correction. `standing` are the frames of the longest calm
@@ -268,7 +266,7 @@ hold other counts than ezc3d takes from their parameters; the forces of the firs
 
 ## Damaged files
 
-Made by `python benchmarks/fuzz.py --data ../shared/data --write docs/recordings.md`: bytes flipped,
+Made by `python -m benchmarks.fuzz --data ../shared/data --write docs/recordings.md`: bytes flipped,
 emptied, moved and cut, words set to extremes, text cells and lines mangled. `refused`: in words;
 `said`: read, with a warning that the sound file does not have; `unchanged`: the same numbers.
 `silent` would be another number without a word, `bug` a traceback, `died` a killed process (20 s,

@@ -1,6 +1,6 @@
 """Participants per hour: `bsip run` for 1 to 12 people in one and in two processes.
 
-    python benchmarks/scaling.py [--participants 1 4 12] [--sequence-s 30]
+    python -m benchmarks.scaling [--participants 1 4 12] [--sequence-s 30]
 
 A static trial and a sequence each. Both take turns on the same recordings; the clock counts, so
 nothing else should run.
@@ -16,10 +16,8 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from measure import machine, markdown
-from participant import run_stage, study_options
-
-# isort: split
+from benchmarks.measure import machine, markdown
+from benchmarks.participant import run_stage, study_options
 from bsip_cli.simulate.study import simulate_study
 
 SEED = 2017

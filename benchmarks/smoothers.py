@@ -1,6 +1,6 @@
 """Error of the reconstructed wrench on unseen data with each way to smooth the motion.
 
-    python benchmarks/smoothers.py STUDY [STUDY ...]
+    python -m benchmarks.smoothers STUDY [STUDY ...]
 
 Each study is run with the penalised spline and with Butterworth filters of 6 and 10 Hz; printed
 are mean RMSE of OM over the trials (static ones aside) that did not identify it.

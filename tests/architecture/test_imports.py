@@ -5,7 +5,8 @@ from __future__ import annotations
 from graphlib import TopologicalSorter
 
 import pytest
-from imports_of import modules, names_from, package
+
+from tests.architecture.imports_of import modules, names_from, package
 
 SCIENCE = ("body", "dynamics", "motion", "recordings", "statistics", "identification")
 

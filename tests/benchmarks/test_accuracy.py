@@ -1,12 +1,10 @@
 """The accuracy benchmark: its recordings are what they claim, its measures count right."""
 
-import accuracy
-import accuracy_measures
-import accuracy_study
 import numpy as np
 import pandas as pd
 import pytest
 
+from benchmarks import accuracy, accuracy_measures, accuracy_study
 from bsip_cli.body.inertia import Inertia
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import draw_person

@@ -3,16 +3,19 @@
 import sys
 import xml.etree.ElementTree as ET
 
-import derivatives
-import inverse_kinematics
-import measure
-import moving_person
-import normal_equations
 import numpy as np
-import opensim_model
-import participant
-import pinocchio_loop
 import pytest
+
+from benchmarks import (
+    derivatives,
+    inverse_kinematics,
+    measure,
+    moving_person,
+    normal_equations,
+    opensim_model,
+    participant,
+    pinocchio_loop,
+)
 
 
 @pytest.fixture(scope="module")

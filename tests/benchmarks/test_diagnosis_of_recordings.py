@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 
-from diagnosis_answers import Answer, Found
-from diagnosis_page import (
+from benchmarks.diagnosis_answers import Answer, Found
+from benchmarks.diagnosis_page import (
     ALIKE,
     BELOW,
     ELSEWHERE,
@@ -18,7 +18,7 @@ from diagnosis_page import (
     injected_table,
     verdict_of,
 )
-from injected_causes import CAUSES, Parameter
+from benchmarks.injected_causes import CAUSES, Parameter
 
 BY_EFFECT = {cause.effect: cause for cause in CAUSES}
 SHIFT = BY_EFFECT["plate_translation"]

@@ -2,10 +2,11 @@
 
 import json
 
-import figaroh_comparison
 import numpy as np
 import pinocchio as pin
-from synthetic_identification import motion, recording, world
+
+from benchmarks import figaroh_comparison
+from tests.identification.synthetic_identification import motion, recording, world
 
 
 def test_the_wrench_in_the_base_is_what_the_base_joint_carries():

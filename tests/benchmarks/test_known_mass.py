@@ -1,9 +1,9 @@
 """The experiment with known masses, small: the simulator carries them, and they come back."""
 
-import known_mass
 import numpy as np
 import pytest
 
+from benchmarks import known_mass
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import draw_person
 

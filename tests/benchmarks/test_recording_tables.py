@@ -6,9 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from every_recording import all_rows, table
-from recording_writers import PlateSpec, standing_markers, standing_wrench, write_c3d
-from sections import marks, read_section, replace_section
+
+from benchmarks.every_recording import all_rows, table
+from benchmarks.sections import marks, read_section, replace_section
+from tests.recordings.recording_writers import (
+    PlateSpec,
+    standing_markers,
+    standing_wrench,
+    write_c3d,
+)
 
 ROOT = Path(__file__).parents[2]
 

@@ -8,9 +8,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from blind_cases import Session
-from blind_running import Recorded, cpu_seconds, record_study, run_pipeline, write_atomically
-from blind_scoring import Score, score, score_of_clean_trial
+from tests.blind.blind_cases import Session
+from tests.blind.blind_running import (
+    Recorded,
+    cpu_seconds,
+    record_study,
+    run_pipeline,
+    write_atomically,
+)
+from tests.blind.blind_scoring import Score, score, score_of_clean_trial
 
 Pipeline = Callable[[Path, Sequence[str], int], list[str]]
 

@@ -8,7 +8,6 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from blind_running import DOCUMENT, ROOT
 from tqdm import tqdm
 
 from bsip_cli.body.skeleton import load_skeleton
@@ -18,6 +17,7 @@ from bsip_cli.session import open_study
 from bsip_cli.stages.frames import person_from
 from bsip_cli.stages.moving_trials import moving_trials, prior_of
 from bsip_cli.unit import Unit
+from tests.blind.blind_running import DOCUMENT, ROOT
 
 
 def parser_of_kept(description: str | None, results: str) -> argparse.ArgumentParser:

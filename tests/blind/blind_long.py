@@ -13,12 +13,13 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from blind_batch import Batch, run_batch
-from blind_cases import Case, Session, long_suite
-from blind_running import DOCUMENT, ROOT, STAGES, write_atomically
-from blind_scoring import Score
-from blind_tables import between_marks, document, scores_frame
 from tqdm import tqdm
+
+from tests.blind.blind_batch import Batch, run_batch
+from tests.blind.blind_cases import Case, Session, long_suite
+from tests.blind.blind_running import DOCUMENT, ROOT, STAGES, write_atomically
+from tests.blind.blind_scoring import Score
+from tests.blind.blind_tables import between_marks, document, scores_frame
 
 MARK = "tests/blind/blind_long.py"
 BATCH = 8  # people of one study; an interruption loses at most their work

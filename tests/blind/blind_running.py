@@ -16,7 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from blind_cases import HOST_TASKS, SESSION_TASKS, Case, Hidden, Session
+from tests.blind.blind_cases import HOST_TASKS, SESSION_TASKS, Case, Hidden, Session
 
 ROOT = Path(__file__).parents[2]
 DOCUMENT = ROOT / "docs" / "blind_suite.md"

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pandas as pd
 import pyarrow.parquet as pq
-from blind_cases import NOTHING, SESSION
-from blind_running import Recorded
-from blind_truth import Expected, Record, equivalents, expected
+
+from tests.blind.blind_cases import NOTHING, SESSION
+from tests.blind.blind_running import Recorded
+from tests.blind.blind_truth import Expected, Record, equivalents, expected
 
 UNEXPLAINED = "unexplained"
 PERSON = "participant"  # the source that is no trial

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from blind_cases import NOTHING
-from blind_running import write_atomically
-from blind_scoring import (
+from scipy.stats import norm
+
+from tests.blind.blind_cases import NOTHING
+from tests.blind.blind_running import write_atomically
+from tests.blind.blind_scoring import (
     FOUND,
     MISSED,
     RIGHT_CLASS,
@@ -21,7 +23,6 @@ from blind_scoring import (
     WRONG_NAME,
     Estimate,
 )
-from scipy.stats import norm
 
 Z95 = 1.96
 HIDDEN_KINDS = ("single", "double", "outside")

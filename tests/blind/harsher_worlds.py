@@ -13,13 +13,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
-from blind_running import DOCUMENT, ROOT, STAGES, run_pipeline
-from blind_scoring import read_answer
-from blind_tables import between_marks, markdown, wilson
 
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.presets import diagnosis
 from bsip_cli.simulate.study import simulate_study
+from tests.blind.blind_running import DOCUMENT, ROOT, STAGES, run_pipeline
+from tests.blind.blind_scoring import read_answer
+from tests.blind.blind_tables import between_marks, markdown, wilson
 
 MARK = "tests/blind/harsher_worlds.py"
 WORLDS = {

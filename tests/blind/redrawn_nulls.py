@@ -17,9 +17,6 @@ from pathlib import Path
 from zlib import crc32
 
 import numpy as np
-from blind_evidence import batches, evidence_of_person, for_each, parser_of_kept, unit_of_person
-from blind_running import Recorded, write_atomically
-from blind_tables import between_marks, wilson
 
 from bsip_cli.diagnosis.evidence import TrialEvidence
 from bsip_cli.diagnosis.findings import findings_of
@@ -28,6 +25,15 @@ from bsip_cli.diagnosis.selection import select
 from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.diagnosis.together import together
 from bsip_cli.stages.diagnose import ASKED
+from tests.blind.blind_evidence import (
+    batches,
+    evidence_of_person,
+    for_each,
+    parser_of_kept,
+    unit_of_person,
+)
+from tests.blind.blind_running import Recorded, write_atomically
+from tests.blind.blind_tables import between_marks, wilson
 
 MARK = "tests/blind/redrawn_nulls.py"
 

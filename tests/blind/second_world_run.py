@@ -15,12 +15,13 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import pandas as pd
-from blind_running import DOCUMENT, ROOT, STAGES, CommandError, run_pipeline
-from blind_tables import between_marks, markdown
-from second_world.drawn_people import drawn_cases
-from second_world.people import CASES, Case
-from second_world.study import PERSON, drawn, write_study
 from tqdm import tqdm
+
+from tests.blind.blind_running import DOCUMENT, ROOT, STAGES, CommandError, run_pipeline
+from tests.blind.blind_tables import between_marks, markdown
+from tests.blind.second_world.drawn_people import drawn_cases
+from tests.blind.second_world.people import CASES, Case
+from tests.blind.second_world.study import PERSON, drawn, write_study
 
 MARK = "tests/blind/second_world_run.py"
 DRAWN = f"{MARK} --seed"

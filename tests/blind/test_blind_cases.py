@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from collections import Counter
 
-import blind_long
 import numpy as np
 import pytest
-from blind_batch import Batch
-from blind_cases import CATALOGUE, OUTSIDE, SESSION, Case, Hidden, Session, long_suite, short_suite
-from blind_running import record_study
-from blind_scoring import RIGHT_NAME, Score, score
 
 from bsip_cli.effects.catalogue import EFFECTS
+from tests.blind import blind_long
+from tests.blind.blind_batch import Batch
+from tests.blind.blind_cases import (
+    CATALOGUE,
+    OUTSIDE,
+    SESSION,
+    Case,
+    Hidden,
+    Session,
+    long_suite,
+    short_suite,
+)
+from tests.blind.blind_running import record_study
+from tests.blind.blind_scoring import RIGHT_NAME, Score, score
 
 
 def cases_of(sessions: list[Session]) -> list[Case]:

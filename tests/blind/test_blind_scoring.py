@@ -12,9 +12,10 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from blind_cases import SESSION, Case, Hidden
-from blind_running import Recorded
-from blind_scoring import (
+
+from tests.blind.blind_cases import SESSION, Case, Hidden
+from tests.blind.blind_running import Recorded
+from tests.blind.blind_scoring import (
     MISSED,
     PUT_RIGHT,
     RIGHT_CLASS,
@@ -27,7 +28,7 @@ from blind_scoring import (
     score,
     score_of_clean_trial,
 )
-from blind_tables import (
+from tests.blind.blind_tables import (
     accuracy,
     document,
     elsewhere,

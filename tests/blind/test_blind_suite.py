@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import pytest
-from blind_batch import Batch, run_batch
-from blind_cases import CATALOGUE, short_suite
-from blind_running import STAGES
-from blind_scoring import FOUND, PUT_RIGHT, RIGHT_NAME, SILENT, UNEXPLAINED, WRONG_NAME, Score
-from blind_tables import document, scores_frame
+
+from tests.blind.blind_batch import Batch, run_batch
+from tests.blind.blind_cases import CATALOGUE, short_suite
+from tests.blind.blind_running import STAGES
+from tests.blind.blind_scoring import (
+    FOUND,
+    PUT_RIGHT,
+    RIGHT_NAME,
+    SILENT,
+    UNEXPLAINED,
+    WRONG_NAME,
+    Score,
+)
+from tests.blind.blind_tables import document, scores_frame
 
 SEED = 7
 pytestmark = pytest.mark.slow

@@ -10,10 +10,6 @@ from pathlib import Path
 import ezc3d
 import numpy as np
 import pytest
-from blind_cases import CATALOGUE as RANGES
-from blind_cases import OUTSIDE, PAIRS
-from blind_truth import MAPPINGS, PLATE, Expected, equivalents, expected
-from moving_scene import RATE_HZ, moving, standing_still
 
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect
@@ -24,6 +20,10 @@ from bsip_cli.simulate.instruments import Instruments
 from bsip_cli.simulate.options import Asked, Laboratory, StudyOptions
 from bsip_cli.simulate.recording import plates_of
 from bsip_cli.simulate.study import simulate_study
+from tests.blind.blind_cases import CATALOGUE as RANGES
+from tests.blind.blind_cases import OUTSIDE, PAIRS
+from tests.blind.blind_truth import MAPPINGS, PLATE, Expected, equivalents, expected
+from tests.effects.moving_scene import RATE_HZ, moving, standing_still
 
 # A trial from the start of the clock: what effects of the instruments need to know of it.
 TRIAL = {"recorded_from_s": 0.0, "duration_s": 6.0}

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from blind_tables import between_marks
-from noisy_trial import evidence_of, late, noisy, part_of_moving
-from redrawn_nulls import redrawn, summary, with_random_phases
 
 from bsip_cli.diagnosis.loud_noise import noise_of
+from tests.blind.blind_tables import between_marks
+from tests.blind.redrawn_nulls import redrawn, summary, with_random_phases
+from tests.diagnosis.noisy_trial import evidence_of, late, noisy, part_of_moving
 
 
 @pytest.mark.parametrize("count", [300, 301])

@@ -8,16 +8,17 @@ from pathlib import Path
 import ezc3d
 import numpy as np
 import pytest
-from second_world.balance import GRAVITY, Balanced, balanced
-from second_world.body import SEGMENTS, Body, draw_body
-from second_world.c3d_file import TYPES, write_c3d
-from second_world.drawn_people import drawn_cases
-from second_world.effects import Changes, Hidden, Wobble, changes_of
-from second_world.lab import Lab, Recorded
-from second_world.landmarks import place_landmarks
-from second_world.movements import moving
-from second_world.people import CASES, Case
-from second_world.skin import Skin
+
+from tests.blind.second_world.balance import GRAVITY, Balanced, balanced
+from tests.blind.second_world.body import SEGMENTS, Body, draw_body
+from tests.blind.second_world.c3d_file import TYPES, write_c3d
+from tests.blind.second_world.drawn_people import drawn_cases
+from tests.blind.second_world.effects import Changes, Hidden, Wobble, changes_of
+from tests.blind.second_world.lab import Lab, Recorded
+from tests.blind.second_world.landmarks import place_landmarks
+from tests.blind.second_world.movements import moving
+from tests.blind.second_world.people import CASES, Case
+from tests.blind.second_world.skin import Skin
 
 LENGTH_S, SEED = 3.0, 11
 _TWO_CAUSES = (("drift", 15.0), ("gain", 0.1))
@@ -190,4 +191,5 @@ def test_imports_nothing_of_bsip(file):
     nodes = list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
     names = [alias.name for n in nodes if isinstance(n, ast.Import) for alias in n.names]
     names += [str(node.module) for node in nodes if isinstance(node, ast.ImportFrom)]
-    assert not [name for name in names if name.startswith(("bsip_cli", "blind_"))]
+    ours = [name for name in names if name.startswith(("bsip_cli", "benchmarks", "tests"))]
+    assert all(name.startswith("tests.blind.second_world") for name in ours)

@@ -6,12 +6,12 @@ import json
 
 import numpy as np
 import pytest
-from blind_truth import Expected
-from noisy_trial import all_of, late, noisy, part_of_moving
-from true_gains import _gains, summary
 
 from bsip_cli.diagnosis.cause import Cause
 from bsip_cli.effects.catalogue import EFFECTS
+from tests.blind.blind_truth import Expected
+from tests.blind.true_gains import _gains, summary
+from tests.diagnosis.noisy_trial import all_of, late, noisy, part_of_moving
 
 DELAY_S = 0.010
 

@@ -14,10 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from blind_evidence import batches, evidence_of_person, for_each, parser_of_kept, unit_of_person
-from blind_running import Recorded, write_atomically
-from blind_tables import between_marks, markdown
-from blind_truth import Expected, expected
 
 from bsip_cli.diagnosis.cause import Cause
 from bsip_cli.diagnosis.explanation import (
@@ -30,6 +26,16 @@ from bsip_cli.diagnosis.explanation import (
 from bsip_cli.diagnosis.held_out import gain_of
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.stages.found_causes import causes_of
+from tests.blind.blind_evidence import (
+    batches,
+    evidence_of_person,
+    for_each,
+    parser_of_kept,
+    unit_of_person,
+)
+from tests.blind.blind_running import Recorded, write_atomically
+from tests.blind.blind_tables import between_marks, markdown
+from tests.blind.blind_truth import Expected, expected
 
 MARK = "tests/blind/true_gains.py"
 

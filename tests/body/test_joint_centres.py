@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from standing_person import standing_markers
 
 from bsip_cli.body.joint_centres import joint_centres
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.errors import BadDataError
+from tests.body.standing_person import standing_markers
 
 STATURE_M = 1.75
 WIDTH = 0.25  # between the ASIS

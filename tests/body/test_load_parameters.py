@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from standing_person import standing
 
 from bsip_cli.body.loads import PointMass, load_parameters
+from tests.body.standing_person import standing
 
 
 @pytest.mark.parametrize("segment", ["shank_r", "upper_torso"])

@@ -1,5 +1,4 @@
 import pytest
-from standing_person import standing_markers
 
 from bsip_cli.body.markersets import (
     LANDMARKS,
@@ -8,6 +7,7 @@ from bsip_cli.body.markersets import (
 )
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.errors import UsageError
+from tests.body.standing_person import standing_markers
 
 SHIPPED = (
     "biobuddy_ech",

@@ -2,10 +2,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from standing_person import standing
 
 from bsip_cli.body.anthropometry import load_table, mean_length_m, regress, stature_m
 from bsip_cli.body.names import SEGMENTS
+from tests.body.standing_person import standing
 
 
 @pytest.mark.parametrize("sex", ["M", "F"])

@@ -38,7 +38,7 @@ def test_forty_velocities():
 
 
 def test_entries_stand_where_pinocchio_has_them():
-    from standing_person import standing
+    from tests.body.standing_person import standing
 
     skeleton = load_skeleton("hansen2017")
     model = pinocchio_model(standing().person)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from standing_person import HEIGHT_M, standing_markers
 
 from bsip_cli.body.anthropometry import mean_length_m
 from bsip_cli.body.joint_centres import JointCentres, joint_centres
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.motion.calibration import Calibration, calibrate
+from tests.body.standing_person import HEIGHT_M, standing_markers
 
 ARM_L = ("LUA", "LELB", "LFA", "LWRR", "LWRU", "LHAND")
 

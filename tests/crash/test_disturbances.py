@@ -5,7 +5,8 @@ from __future__ import annotations
 import random
 
 import pytest
-from disturbances import Bench, disturb, killed, one_process_killed
+
+from tests.crash.disturbances import Bench, disturb, killed, one_process_killed
 
 pytestmark = pytest.mark.slow
 

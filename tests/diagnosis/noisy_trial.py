@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from moving_scene import moving, scene_of
 from scipy.interpolate import CubicSpline
 
 from bsip_cli.diagnosis.candidates import Candidate
@@ -18,6 +17,7 @@ from bsip_cli.diagnosis.signatures import Place
 from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Scene
+from tests.effects.moving_scene import moving, scene_of
 
 CUTOFF_HZ = 8.0
 NOISE = np.array([2.0, 2.0, 4.0, 1.0, 1.0, 0.5])  # [N, N m] of the whole wrench, per frame

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from moving_scene import moving
 
 from bsip_cli.body.inertia import Inertia, from_phi
 from bsip_cli.diagnosis.attribution import (
@@ -14,6 +13,7 @@ from bsip_cli.diagnosis.attribution import (
 )
 from bsip_cli.dynamics.cop import centre_of_pressure
 from bsip_cli.dynamics.regressor import predicted_wrench
+from tests.effects.moving_scene import moving
 
 GROUND = Ground(0.0, np.array([0.6, 0.8]), 50.0)
 

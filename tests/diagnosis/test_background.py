@@ -6,7 +6,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
 
 from bsip_cli.diagnosis import settling
 from bsip_cli.diagnosis.background import background_of, new_places
@@ -20,6 +19,7 @@ from bsip_cli.diagnosis.rounds import Selection
 from bsip_cli.diagnosis.selection import select
 from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
+from tests.diagnosis.noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
 
 NAMES = ("sync_offset", "plate_gain", "plate_zero", "added_mass")
 EFFECTS_ASKED = [EFFECTS[name] for name in NAMES]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from moving_scene import moving
 
 from bsip_cli.diagnosis.cause import Blocks, Cause, change_by, method_of, unseen_change_by
 from bsip_cli.effects.plate_zero import PlateZero
 from bsip_cli.effects.sync_offset import SyncOffset
+from tests.effects.moving_scene import moving
 
 BLOCKS = Blocks(first=3, start_s=0.1, block_s=2.0, folds=5)
 FOLDS = np.array([[10.0], [20.0], [30.0], [40.0], [50.0]])

@@ -6,11 +6,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from noisy_trial import all_of, noisy, part_of_moving
 
 from bsip_cli.diagnosis.chance import Chance, chance_of, flipped
 from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
+from tests.diagnosis.noisy_trial import all_of, noisy, part_of_moving
 
 SEEDS = 80
 NAMES = ("sync_offset", "gravity_tilt", "plate_zero", "added_mass")

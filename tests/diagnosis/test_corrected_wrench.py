@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moving_scene import moving
 from scipy.interpolate import CubicSpline
 
 from bsip_cli.diagnosis.cause import Cause, change_by
@@ -18,6 +17,7 @@ from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.plate_zero import PlateZero
 from bsip_cli.effects.scene import Scene
 from bsip_cli.effects.sync_offset import SyncOffset
+from tests.effects.moving_scene import moving
 
 
 def cause_of(effect: Effect, target: str, *values: float) -> Cause:

@@ -6,12 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from noisy_trial import all_of, fitted, late, noisy, null, part_of_moving, with_effect
 
 from bsip_cli.diagnosis.candidates import candidates_of
 from bsip_cli.diagnosis.explanation import fit_together, refined
 from bsip_cli.diagnosis.intervals import SCALE_ERROR, drawn_explanations
 from bsip_cli.effects.catalogue import EFFECTS
+from tests.diagnosis.noisy_trial import (
+    all_of,
+    fitted,
+    late,
+    noisy,
+    null,
+    part_of_moving,
+    with_effect,
+)
 
 
 def test_a_release_is_found_between_the_moments_that_are_tried():

@@ -6,8 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moving_scene import CORNERS
-from noisy_trial import SEGMENTS, all_of, noisy, part_of_moving, shown, with_effect
 
 from bsip_cli.diagnosis.detection import limits_of
 from bsip_cli.diagnosis.explanation import Explanation, explanation_of, fit_of, fit_together
@@ -18,6 +16,8 @@ from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Plate, Scene
+from tests.diagnosis.noisy_trial import SEGMENTS, all_of, noisy, part_of_moving, shown, with_effect
+from tests.effects.moving_scene import CORNERS
 
 GAIN = EFFECTS["plate_gain"]
 HIDDEN, LACKING = 0.03, 0.25

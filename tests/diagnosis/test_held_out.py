@@ -6,12 +6,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from noisy_trial import all_of, fitted, late, noisy, null, part_of_moving
 
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together
 from bsip_cli.diagnosis.held_out import FOLDS, gain_of, values_without
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.effects.catalogue import EFFECTS
+from tests.diagnosis.noisy_trial import all_of, fitted, late, noisy, null, part_of_moving
 
 DELAY_S = 0.006
 

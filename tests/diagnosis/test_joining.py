@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from noisy_trial import all_of, late, noisy, part_of_moving, with_effect
 
 from bsip_cli.diagnosis.explanation import Explanation, explanation_of, fit_together
 from bsip_cli.diagnosis.held_out import gain_of
@@ -15,6 +14,7 @@ from bsip_cli.diagnosis.judging import Tried
 from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.diagnosis.together import Evidence
 from bsip_cli.effects.catalogue import EFFECTS
+from tests.diagnosis.noisy_trial import all_of, late, noisy, part_of_moving, with_effect
 
 
 def trials_late_by(*delays_s: float) -> Evidence:

@@ -6,7 +6,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from noisy_trial import all_of, late, noisy, part_of_moving, with_effect
 
 from bsip_cli.diagnosis.candidates import Candidate
 from bsip_cli.diagnosis.explanation import Explanation, Fit, fit_together
@@ -14,6 +13,7 @@ from bsip_cli.diagnosis.likely_noise import likely_columns, noise_beside_fit, wi
 from bsip_cli.diagnosis.signatures import Signatures, signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
+from tests.diagnosis.noisy_trial import all_of, late, noisy, part_of_moving, with_effect
 
 EFFECTS_ASKED = [EFFECTS[name] for name in ("sync_offset", "plate_drift", "unmeasured_contact")]
 LEANING = ("hand_l", 0.0, 10.0, 60.0, 4.0, 4.0)

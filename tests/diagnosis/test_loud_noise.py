@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from noisy_trial import all_of, noisy, part_of_moving, shown
 from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.diagnosis.findings import Finding, Number
@@ -15,6 +14,7 @@ from bsip_cli.diagnosis.selection import select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
+from tests.diagnosis.noisy_trial import all_of, noisy, part_of_moving, shown
 
 WANDER_N = 30.0
 NOTHING = np.zeros((600, 6))  # at the rate of the evidence

@@ -6,8 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moving_scene import moving
-from noisy_trial import all_of, noisy
 from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.diagnosis import marker_proof
@@ -15,6 +13,8 @@ from bsip_cli.diagnosis.findings import Finding, interval_words
 from bsip_cli.diagnosis.marker_proof import CLEAR, PROVEN, Proof, Slip, proofs_of
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
+from tests.diagnosis.noisy_trial import all_of, noisy
+from tests.effects.moving_scene import moving
 
 SKIN_M, SLOW_S, DURATION_S = 0.003, 0.4, 12.0
 SLIP = Slip("LKNEL", 5.0, 12.0)

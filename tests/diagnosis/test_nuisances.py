@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from moving_scene import moving
 from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.diagnosis.skin import skin_draws
 from bsip_cli.diagnosis.smoothing_bias import smoothing_bias
 from bsip_cli.diagnosis.wander import WANDER_M, wander
+from tests.effects.moving_scene import moving
 
 
 def draws(rms_m, shared=0.0, count=20):

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from noisy_trial import MASS_SD_KG, SEGMENTS, all_of, noisy, part_of_moving
 
 from bsip_cli.diagnosis.explanation import fit_together
 from bsip_cli.diagnosis.refitting import FURTHER, needs_another_mass
 from bsip_cli.diagnosis.together import together
+from tests.diagnosis.noisy_trial import MASS_SD_KG, SEGMENTS, all_of, noisy, part_of_moving
 
 STATED_SD_KG = 0.25
 

@@ -7,9 +7,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from moving_scene import CORNERS
-from noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
-from noisy_trial import null as null_of
 
 from bsip_cli.diagnosis import detection, intervals, judging, selection
 from bsip_cli.diagnosis.channel_patterns import with_play
@@ -27,6 +24,9 @@ from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Plate, Scene
 from bsip_cli.stages.diagnosis_rows import rows_of
+from tests.diagnosis.noisy_trial import all_of, late, noisy, part_of_moving, shown, with_effect
+from tests.diagnosis.noisy_trial import null as null_of
+from tests.effects.moving_scene import CORNERS
 
 NAMES = (
     "sync_offset",

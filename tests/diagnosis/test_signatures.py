@@ -7,13 +7,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from noisy_trial import all_of, late, noisy, part_of_moving
 from scipy.stats import chi2
 
 from bsip_cli.diagnosis.explanation import Explanation
 from bsip_cli.diagnosis.signatures import Place, Signatures, signatures_of
 from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.catalogue import EFFECTS
+from tests.diagnosis.noisy_trial import all_of, late, noisy, part_of_moving
 
 NAMES = ("sync_offset", "gravity_tilt", "released_object")
 

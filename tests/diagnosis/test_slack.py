@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from noisy_trial import CUTOFF_HZ, fitted, late, noisy, null, part_of_moving
 
 from bsip_cli.diagnosis.evidence import TrialEvidence, slow, trial_evidence
 from bsip_cli.diagnosis.slack import slack
 from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.scene import Scene
 from bsip_cli.effects.sync_offset import SyncOffset
+from tests.diagnosis.noisy_trial import CUTOFF_HZ, fitted, late, noisy, null, part_of_moving
 
 
 def beside_slack(scene: Scene) -> TrialEvidence:

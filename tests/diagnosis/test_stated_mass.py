@@ -6,8 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moving_scene import MASS_KG, standing_still
-from noisy_trial import all_of, noisy, part_of_moving, with_effect
 
 from bsip_cli.diagnosis.scale_mass import agreed_share, weight_round, weight_share
 from bsip_cli.diagnosis.stated_mass import (
@@ -18,6 +16,8 @@ from bsip_cli.diagnosis.stated_mass import (
 from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
+from tests.diagnosis.noisy_trial import all_of, noisy, part_of_moving, with_effect
+from tests.effects.moving_scene import MASS_KG, standing_still
 
 MASS_SD = 0.008
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from moving_scene import moving
 
 from bsip_cli.diagnosis.support import Support, held_by, support_of
+from tests.effects.moving_scene import moving
 
 WEIGHT_N = 650.0
 TIMES_S = np.arange(1000) / 100.0

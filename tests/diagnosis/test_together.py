@@ -6,10 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from noisy_trial import MASS_SD_KG, SEGMENTS, all_of, noisy, part_of_moving, with_effect
 
 from bsip_cli.diagnosis.together import Evidence, clipped, together
 from bsip_cli.effects.segment_inertia import SegmentInertia
+from tests.diagnosis.noisy_trial import (
+    MASS_SD_KG,
+    SEGMENTS,
+    all_of,
+    noisy,
+    part_of_moving,
+    with_effect,
+)
 
 
 def trials(extra_kg: float = 0.0):

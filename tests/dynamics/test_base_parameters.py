@@ -3,12 +3,12 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing_person import standing, tilted_person
 
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.dynamics.base_parameters import expressions, find_basis, random_regressor
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import wrench_regressor
+from tests.body.standing_person import standing, tilted_person
 
 
 @pytest.fixture(scope="module", params=["standing", "tilted"])

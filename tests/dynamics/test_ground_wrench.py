@@ -3,7 +3,6 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing_person import Swing, standing, tilted_person
 
 from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.gravity import GRAVITY_M_S2
@@ -16,6 +15,7 @@ from bsip_cli.dynamics.regressor import (
     skew,
     wrench_regressor,
 )
+from tests.body.standing_person import Swing, standing, tilted_person
 
 
 def random_inertias(count, seed):

@@ -3,12 +3,12 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing_person import Swing, standing
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.loads import PointMass, load_parameters
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
+from tests.body.standing_person import Swing, standing
 
 
 @pytest.mark.parametrize("segment", ["lower_torso", "upper_torso", "forearm_r", "foot_l"])

@@ -7,13 +7,13 @@ from functools import cache
 
 import numpy as np
 import pinocchio as pin
-from standing_person import Swing, standing
 
 from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.inertia import Inertia
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.effects.scene import Plate, Scene
+from tests.body.standing_person import Swing, standing
 
 MASS_KG, RATE_HZ = 72.0, 100.0
 # Corners as in a C3D file: x from the second to the first, y from the fourth to the first.

@@ -11,11 +11,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from moving_scene import RATE_HZ, derivatives, moving, phi, rms, scene_of
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
-from standing_person import markers_of, standing
 
 from bsip_cli.body.inertia import Inertia, from_phi
 from bsip_cli.body.person import Person
@@ -30,6 +28,8 @@ from bsip_cli.effects.over_smoothing import CORNER, OverSmoothing
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.inverse_kinematics import solve_trial
 from bsip_cli.motion.jacobian import marker_residuals
+from tests.body.standing_person import markers_of, standing
+from tests.effects.moving_scene import RATE_HZ, derivatives, moving, phi, rms, scene_of
 
 PERSON = standing().person
 LIMIT_M = 0.025

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from every_effect import assert_tangent_is_the_derivative, some, values_of
-from moving_scene import moving
-from standing_person import standing
 
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.scene import Scene
 from bsip_cli.effects.wobbling_mass import WobblingMass
 from bsip_cli.motion.jacobian import marker_residuals
+from tests.body.standing_person import standing
+from tests.effects.every_effect import assert_tangent_is_the_derivative, some, values_of
+from tests.effects.moving_scene import moving
 
 VOCABULARY = [
     "sync_offset",

@@ -1,9 +1,9 @@
 """A trial at a lower rate shows what is slow as it is, and nothing of what is fast."""
 
 import numpy as np
-from moving_scene import moving, scene_of
 
 from bsip_cli.effects.scene import without_fast
+from tests.effects.moving_scene import moving, scene_of
 
 
 def swinging(frequency_hz: float) -> np.ndarray:

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moving_scene import RATE_HZ, moving, rms, standing_still
 from scipy.integrate import solve_ivp
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
@@ -17,6 +16,7 @@ from bsip_cli.effects.released_object import ReleasedObject
 from bsip_cli.effects.segment_inertia import SegmentInertia
 from bsip_cli.effects.unmeasured_contact import RAMP_S, UnmeasuredContact
 from bsip_cli.effects.wobbling_mass import WobblingMass
+from tests.effects.moving_scene import RATE_HZ, moving, rms, standing_still
 
 G = 9.80665
 UP = np.array([0.0, 0.0, G])

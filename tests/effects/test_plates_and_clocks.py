@@ -7,10 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from moving_scene import MASS_KG, RATE_HZ, moving, phi, rms, scene_of, standing_still
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
-from standing_person import Swing, standing
 
 from bsip_cli.dynamics.cop import centre_of_pressure
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
@@ -26,6 +24,8 @@ from bsip_cli.effects.plate_translation import PlateTranslation
 from bsip_cli.effects.plate_zero import PlateZero
 from bsip_cli.effects.scene import Plate, Scene
 from bsip_cli.effects.sync_offset import SyncOffset
+from tests.body.standing_person import Swing, standing
+from tests.effects.moving_scene import MASS_KG, RATE_HZ, moving, phi, rms, scene_of, standing_still
 
 # A plate as files have it: turned by 30 degrees, x from the second corner to the first, y from the
 # fourth to the first, z into the floor, moments about a sensor below the surface.

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
-from moving_scene import derivatives, moving, rms, scene_of
-from standing_person import away, markers_of, standing
 
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.effects.marker_course import during, step
 from bsip_cli.motion.inverse_kinematics import solve_trial
 from bsip_cli.motion.jacobian import marker_residuals
 from bsip_cli.motion.pose_response import marker_trust, pose_response, pose_responses
+from tests.body.standing_person import away, markers_of, standing
+from tests.effects.moving_scene import derivatives, moving, rms, scene_of
 
 PERSON = standing().person
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from exported_person import configuration, our_model, velocity, whole_body
 
 from bsip_cli.body.exports.biomod import biomod_text
+from tests.exports.exported_person import configuration, our_model, velocity, whole_body
 
 biorbd = pytest.importorskip("biorbd", reason="the biorbd package is not installed")
 

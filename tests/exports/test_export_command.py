@@ -12,8 +12,6 @@ import numpy as np
 import pandas as pd
 import pinocchio as pin
 import pytest
-from exported_person import identified_person
-from test_osim_given import draw, inertias_in
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import write_artifact
@@ -23,6 +21,8 @@ from bsip_cli.cli import cli
 from bsip_cli.errors import BadDataError
 from bsip_cli.provenance import file_hash
 from bsip_cli.stages.frames import bsip_table
+from tests.exports.exported_person import identified_person
+from tests.exports.test_osim_given import draw, inertias_in
 
 ENDINGS = {".urdf", ".xml", ".osim", ".bioMod", ".csv"}
 NOTES = {"made_by": {}, "messages": [], "facts": {}}

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from exported_person import joint_frames, our_model, poses
 
 from bsip_cli.body.exports.mjcf import mjcf_text
+from tests.exports.exported_person import joint_frames, our_model, poses
 
 mujoco = pytest.importorskip("mujoco", reason="the mujoco package is not installed")
 

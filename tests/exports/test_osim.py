@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from exported_person import configuration, our_model, whole_body
 
 from bsip_cli.body.exports.osim import osim_text
+from tests.exports.exported_person import configuration, our_model, whole_body
 
 opensim = pytest.importorskip("opensim", reason="the opensim package is not installed")
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 import pytest
-from exported_person import our_model, whole_body
 
 from bsip_cli.body.exports.body_map import (
     check_segments,
@@ -19,6 +18,7 @@ from bsip_cli.body.exports.body_map import (
 from bsip_cli.body.exports.identified import neutral_pose
 from bsip_cli.body.exports.osim_given import check_fits, read_given_model, with_inertias
 from bsip_cli.errors import UsageError
+from tests.exports.exported_person import our_model, whole_body
 
 # Frames of bodies that are not where our segments' joints are: from our joint, our axes.
 _AWAY = {

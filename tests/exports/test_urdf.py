@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
-from exported_person import configuration, our_model, velocity, whole_body
 
 from bsip_cli.body.exports.urdf import urdf_text
+from tests.exports.exported_person import configuration, our_model, velocity, whole_body
 
 H_S = 1e-5
 

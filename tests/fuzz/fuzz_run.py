@@ -9,7 +9,6 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-_WORKER = Path(__file__).with_name("fuzz_worker.py")
 _ROOT = Path(__file__).parents[2]
 
 
@@ -45,8 +44,9 @@ def run_cases(
 def _one_process(
     target: str, first: int, stop: int, scratch: Path, data: Path | None
 ) -> list[Result]:
-    paths = [str(_ROOT), str(_WORKER.parent), os.environ.get("PYTHONPATH", "")]
-    command = [sys.executable, str(_WORKER), target, str(first), str(stop), str(scratch)]
+    paths = [str(_ROOT), os.environ.get("PYTHONPATH", "")]
+    command = [sys.executable, "-m", "tests.fuzz.fuzz_worker", target]
+    command += [str(first), str(stop), str(scratch)]
     ran = subprocess.run(
         [*command, *([str(data)] if data else [])],
         capture_output=True,

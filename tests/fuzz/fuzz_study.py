@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from damage import BINARY, TEXT, Damage
 
 from bsip_cli.errors import BsipError
 from bsip_cli.pipeline import stages_named
@@ -18,6 +17,7 @@ from bsip_cli.recordings.resample import wrench_at_marker_rate
 from bsip_cli.runner import perform
 from bsip_cli.session import open_study
 from bsip_cli.unit import Unit
+from tests.fuzz.damage import BINARY, TEXT, Damage
 
 SAMPLE = Path(__file__).parents[2] / "sample_data" / "sub-01"
 _TOML = """\

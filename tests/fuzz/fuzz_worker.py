@@ -1,6 +1,6 @@
 """Runs fuzz cases in this process under limits of time and memory; one line of JSON per case.
 
-python tests/fuzz/fuzz_worker.py TARGET FIRST STOP SCRATCH
+python -m tests.fuzz.fuzz_worker TARGET FIRST STOP SCRATCH
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-from fuzz_study import (
+from tests.fuzz.fuzz_study import (
     REAL,
     TARGETS,
     Answer,

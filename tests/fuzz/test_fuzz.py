@@ -6,8 +6,9 @@
 from __future__ import annotations
 
 import pytest
-from fuzz_run import run_cases
-from fuzz_study import TARGETS
+
+from tests.fuzz.fuzz_run import run_cases
+from tests.fuzz.fuzz_study import TARGETS
 
 N_CASES = {"c3d": 70, "trc": 35, "mot": 25, "participants": 25, "options": 25, "markerset": 20}
 _MOST_S = 15.0

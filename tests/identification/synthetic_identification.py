@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 import pinocchio as pin
-from standing_person import Swing, standing
 
 from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.inertia import Inertia
@@ -19,6 +18,7 @@ from bsip_cli.identification.equations import NormalEquations, Recording
 from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.noise import even_noise
 from bsip_cli.identification.prior import Prior, Spread, prior_of
+from tests.body.standing_person import Swing, standing
 
 MASS_KG = 72.0
 RATE_HZ = 100.0

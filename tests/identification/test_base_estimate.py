@@ -3,15 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import stats
-from synthetic_identification import (
-    equations_of,
-    motion,
-    problem_of,
-    recording,
-    regressor,
-    remeasured,
-    world,
-)
 
 from bsip_cli.dynamics.lowpass import lowpass_operator
 from bsip_cli.dynamics.regressor import predicted_wrench, wrench_regressor
@@ -20,6 +11,15 @@ from bsip_cli.identification.equations import ResidualSeries, accumulate
 from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.noise import even_noise, noise_of
 from bsip_cli.identification.uncertainty import readable
+from tests.identification.synthetic_identification import (
+    equations_of,
+    motion,
+    problem_of,
+    recording,
+    regressor,
+    remeasured,
+    world,
+)
 
 NOISE = np.array([3.0, 3.0, 5.0, 1.5, 1.5, 1.0])  # N, N m
 

@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy import stats
-from synthetic_identification import motion, problem_of, regressor, world
 
 from bsip_cli.body.inertia import from_phi, from_readable
 from bsip_cli.dynamics.regressor import predicted_wrench, wrench_regressor
@@ -12,6 +11,7 @@ from bsip_cli.identification.prior import likeliest
 from bsip_cli.identification.pseudo_inertia import are_physical
 from bsip_cli.identification.uncertainty import readable
 from bsip_cli.identification.weights import Weights, fit_at, fit_with_weights, terms_of
+from tests.identification.synthetic_identification import motion, problem_of, regressor, world
 
 
 def distance(phi):

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_identification import problem_of, regressor, world
 
 from bsip_cli.identification.data_share import beforehand, in_words
 from bsip_cli.identification.excitation import excitation
 from bsip_cli.identification.hansen2017 import estimate
 from bsip_cli.identification.uncertainty import readable
+from tests.identification.synthetic_identification import problem_of, regressor, world
 
 
 def problem(stride: int = 25, noise: float = 5.0):

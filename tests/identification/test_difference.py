@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_identification import problem_of, regressor, world
 
 from bsip_cli.body.loads import PointMass, load_parameters
 from bsip_cli.identification.difference import change_of_segment, difference
 from bsip_cli.identification.estimator import Estimate, Problem
+from tests.identification.synthetic_identification import problem_of, regressor, world
 
 NOISE = np.array([10.0, 10.0, 10.0, 5.0, 5.0, 5.0])
 DRAWS = 200

@@ -1,12 +1,18 @@
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from synthetic_identification import MASS_KG, motion, problem_of, regressor, world
 
 from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.identification.excitation import excitation
 from bsip_cli.identification.hansen2017 import estimate
 from bsip_cli.identification.uncertainty import readable
+from tests.identification.synthetic_identification import (
+    MASS_KG,
+    motion,
+    problem_of,
+    regressor,
+    world,
+)
 
 
 def distance(phi):

@@ -4,12 +4,12 @@ import clarabel
 import numpy as np
 import pytest
 from scipy import sparse
-from synthetic_identification import problem_of, regressor, world
 
 from bsip_cli.errors import NumericalError
 from bsip_cli.identification.logdet_fit import Objective, minimise
 from bsip_cli.identification.pseudo_inertia import BASIS, are_physical, pseudo_inertias
 from bsip_cli.identification.weights import Weights, objective_of, terms_of
+from tests.identification.synthetic_identification import problem_of, regressor, world
 
 
 def objective(problem, gamma=0.5):

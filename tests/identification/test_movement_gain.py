@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from synthetic_identification import equations_of, regressor, world
 
 from bsip_cli.dynamics.regressor import wrench_regressor
 from bsip_cli.identification.data_share import beforehand
@@ -14,6 +13,7 @@ from bsip_cli.identification.excitation import excitation
 from bsip_cli.identification.movement_gain import advice
 from bsip_cli.identification.movements import DURATION_S, load_movements, motion_of
 from bsip_cli.identification.noise import even_noise
+from tests.identification.synthetic_identification import equations_of, regressor, world
 
 BY_NAME = {movement.name: movement for movement in load_movements()}
 ARMS = ("arms_forward", "arms_sideways", "arm_circles_l", "arm_circles_r", "elbows", "throw_l")

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from synthetic_identification import world
 
 from bsip_cli.identification.movements import (
     DURATION_S,
@@ -14,6 +13,7 @@ from bsip_cli.identification.movements import (
     motion_of,
     possible,
 )
+from tests.identification.synthetic_identification import world
 
 BY_NAME = {movement.name: movement for movement in load_movements()}
 FORWARD, RIGHT, UP = (1, 0, 0), (0, -1, 0), (0, 0, 1)  # the person faces the world's X

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from synthetic_identification import world
 
 from bsip_cli.body.inertia import PARAMETERS, from_phi
 from bsip_cli.identification.equations import ResidualSeries
 from bsip_cli.identification.estimator import Estimate
 from bsip_cli.identification.noise import noise_of
 from bsip_cli.identification.uncertainty import readable
+from tests.identification.synthetic_identification import world
 
 
 def ar1(a, count, seed):

@@ -3,11 +3,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_identification import RATE_HZ, motion, recording, world
 
 from bsip_cli.dynamics.lowpass import lowpass_operator
 from bsip_cli.dynamics.regressor import wrench_regressor
 from bsip_cli.identification.equations import Recording, accumulate, residual_series
+from tests.identification.synthetic_identification import RATE_HZ, motion, recording, world
 
 CUTOFF_HZ = 8.0
 REFERENCE = np.array([0.2, -0.1, 0.0])

@@ -1,8 +1,8 @@
 import numpy as np
-from synthetic_identification import world
 
 from bsip_cli.body.inertia import Inertia, from_phi
 from bsip_cli.identification import pseudo_inertia
+from tests.identification.synthetic_identification import world
 
 STEP = 1e-6
 

@@ -3,11 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from synthetic_identification import problem_of, regressor, world
 
 from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.robert2017 import estimate, programme_of, solve
 from bsip_cli.identification.uncertainty import readable
+from tests.identification.synthetic_identification import problem_of, regressor, world
 
 
 def noisy(noise=3.0, seed=1, phi=None):

@@ -8,8 +8,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from standing_person import standing
-from synthetic_identification import SPREAD, problem_of, regressor, world
 
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.base_parameters import find_basis
@@ -18,6 +16,8 @@ from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.excitation import excitation
 from bsip_cli.identification.prior import prior_of
 from bsip_cli.identification.uncertainty import readable
+from tests.body.standing_person import standing
+from tests.identification.synthetic_identification import SPREAD, problem_of, regressor, world
 
 ESTIMATORS = ("consistent", "hansen2017", "robert2017", "base")
 

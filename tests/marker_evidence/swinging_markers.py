@@ -5,12 +5,12 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from standing_person import Swing, joint_frames, markers_of, standing
 
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.motion.inverse_kinematics import solve_trial
 from bsip_cli.motion.marker_evidence import marker_evidence
 from bsip_cli.motion.marker_fit import MarkerFit, marker_fit
+from tests.body.standing_person import Swing, joint_frames, markers_of, standing
 
 PERSON = standing().person
 RATE_HZ, DURATION_S = 50.0, 8.0

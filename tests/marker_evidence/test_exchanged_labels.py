@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from swinging_markers import MARKERS, PERSON, fitted, recording
 
 from bsip_cli.motion.marker_evidence import Evidence, marker_evidence
 from bsip_cli.motion.marker_exchange import Exchange, as_recorded, misfit_m, put_right, refitted
+from tests.marker_evidence.swinging_markers import MARKERS, PERSON, fitted, recording
 
 ARM = ("upper_arm_r", "forearm_r", "hand_r")
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from swinging_markers import MARKERS, PERSON, events_of, fitted, recording
 
 from bsip_cli.motion.marker_events import MarkerEvent, summaries
 from bsip_cli.motion.marker_offsets import offsets
+from tests.marker_evidence.swinging_markers import MARKERS, PERSON, events_of, fitted, recording
 
 START, STOP = 160, 175  # frames: 3.2 to 3.5 s
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from standing_person import markers_of, random_poses
-from swinging_markers import MARKERS, PERSON, SCALES, fitted
 
 from bsip_cli.motion.inverse_kinematics import solve_poses, tree_of
 from bsip_cli.motion.marker_fit import best_source, marker_fit
+from tests.body.standing_person import markers_of, random_poses
+from tests.marker_evidence.swinging_markers import MARKERS, PERSON, SCALES, fitted
 
 
 @pytest.mark.parametrize("label", ["RKNEL", "LASIS", "RELB", "LHAND", "T10"])

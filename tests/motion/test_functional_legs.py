@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from standing_person import HEIGHT_M, standing_markers
 
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
@@ -16,6 +15,7 @@ from bsip_cli.motion.calibration import calibrate
 from bsip_cli.motion.functional_legs import FunctionalLandmarks, functional_landmarks
 from bsip_cli.recordings.labels import match_labels
 from bsip_cli.recordings.read import read_recording
+from tests.body.standing_person import HEIGHT_M, standing_markers
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 JOINTS = ("knee_lateral", "knee_medial", "malleolus_lateral", "malleolus_medial")

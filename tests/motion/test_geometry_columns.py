@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from standing_person import markers_of, random_poses, tilted_person
 
 from bsip_cli.motion.inverse_kinematics import tree_of
 from bsip_cli.motion.jacobian import model_markers, subtrees
 from bsip_cli.motion.scaling import ScalingOptions, _column, _parameters, _with
+from tests.body.standing_person import markers_of, random_poses, tilted_person
 
 KINDS = ("length", "joint", "origin", "parent_tilt", "child_tilt", "shift", "marker")
 OPTIONS = ScalingOptions(

@@ -3,15 +3,6 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing_person import (
-    away,
-    joint_frames,
-    markers_of,
-    random_poses,
-    standing,
-    standing_markers,
-    tilted_person,
-)
 
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.motion.inverse_kinematics import neutral, tree_of
@@ -20,6 +11,15 @@ from bsip_cli.motion.jacobian import (
     model_markers,
     pose_columns,
     subtrees,
+)
+from tests.body.standing_person import (
+    away,
+    joint_frames,
+    markers_of,
+    random_poses,
+    standing,
+    standing_markers,
+    tilted_person,
 )
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from standing_person import joint_frames, markers_of, random_poses, standing
 
 from bsip_cli.motion.inverse_kinematics import solve_poses
 from bsip_cli.motion.scaling import (
@@ -12,6 +11,7 @@ from bsip_cli.motion.scaling import (
     refine,
     varied_frames,
 )
+from tests.body.standing_person import joint_frames, markers_of, random_poses, standing
 
 LOOSE = ScalingOptions(
     joint_centre_sd_m=0.1,

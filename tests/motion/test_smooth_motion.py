@@ -5,12 +5,12 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing_person import Swing, markers_of, standing
 
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.smoothing import _angular, smooth_motion
 from bsip_cli.motion.splines import SmoothSignal
+from tests.body.standing_person import Swing, markers_of, standing
 
 RATE_HZ = 100.0
 OPTIONS = {

@@ -4,7 +4,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.optimize import least_squares
-from standing_person import away, joint_frames, markers_of, random_poses, standing, tilted_person
 
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.errors import BadDataError
@@ -14,6 +13,14 @@ from bsip_cli.motion.inverse_kinematics import (
     place_base,
     solve_poses,
     solve_trial,
+)
+from tests.body.standing_person import (
+    away,
+    joint_frames,
+    markers_of,
+    random_poses,
+    standing,
+    tilted_person,
 )
 
 SD, LIMIT, POSTURE = 0.005, 0.025, 3.0

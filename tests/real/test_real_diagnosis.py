@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from test_real_studies import DATA, make_study
+
+from tests.real.test_real_studies import DATA, make_study
 
 pytestmark = [
     pytest.mark.real,

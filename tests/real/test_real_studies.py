@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from figaroh_csv import convert
+
+from tests.real.figaroh_csv import convert
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 

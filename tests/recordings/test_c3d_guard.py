@@ -6,13 +6,18 @@ import sys
 
 import numpy as np
 import pytest
-from recording_writers import PlateSpec, standing_markers, standing_wrench, write_c3d
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings import c3d_content, c3d_guard
 from bsip_cli.recordings.c3d_guard import read_by_ezc3d
 from bsip_cli.recordings.c3d_parameters import numbers, texts
 from bsip_cli.recordings.read import read_recording
+from tests.recordings.recording_writers import (
+    PlateSpec,
+    standing_markers,
+    standing_wrench,
+    write_c3d,
+)
 
 N = 20
 

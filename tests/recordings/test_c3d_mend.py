@@ -6,10 +6,15 @@ import struct
 
 import numpy as np
 import pytest
-from recording_writers import PlateSpec, standing_markers, standing_wrench, write_c3d
 
 from bsip_cli.recordings import c3d_content
 from bsip_cli.recordings.read import read_recording
+from tests.recordings.recording_writers import (
+    PlateSpec,
+    standing_markers,
+    standing_wrench,
+    write_c3d,
+)
 
 N = 30
 

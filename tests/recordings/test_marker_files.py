@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from recording_writers import write_c3d
 
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.recordings.labels import LabelMatch, match_labels
 from bsip_cli.recordings.marker_guess import guess_marker_set
 from bsip_cli.recordings.read import read_recording
+from tests.recordings.recording_writers import write_c3d
 
 HANSEN = load_marker_set("hansen2017")
 LABELS = [marker.label for marker in HANSEN.markers]

@@ -4,13 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from recording_writers import (
-    CORNERS_M,
-    PlateSpec,
-    standing_markers,
-    standing_wrench,
-    write_c3d,
-)
 
 from bsip_cli.recordings.analog import lost_samples, spike_samples
 from bsip_cli.recordings.cop_polynomial import correct_cop
@@ -21,6 +14,13 @@ from bsip_cli.recordings.read import read_recording
 from bsip_cli.recordings.standing_mass import about_mass, plate_mass, rough_mass, still_frames
 from bsip_cli.recordings.weight_shift import sign_doubts
 from bsip_cli.recordings.zero import plate_zero
+from tests.recordings.recording_writers import (
+    CORNERS_M,
+    PlateSpec,
+    standing_markers,
+    standing_wrench,
+    write_c3d,
+)
 
 N, RATIO = 60, 10
 RATE_HZ = 1000.0

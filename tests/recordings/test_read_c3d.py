@@ -6,7 +6,12 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from recording_writers import (
+
+from bsip_cli.errors import BadDataError
+from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.plates import PlateDescription
+from bsip_cli.recordings.read import read_recording
+from tests.recordings.recording_writers import (
     CORNERS_M,
     ORIGIN_M,
     Y_UP_FROM_Z_UP,
@@ -15,11 +20,6 @@ from recording_writers import (
     standing_wrench,
     write_c3d,
 )
-
-from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.plates import PlateDescription
-from bsip_cli.recordings.read import read_recording
 
 N = 60
 RATIO = 10

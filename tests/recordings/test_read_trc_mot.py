@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from recording_writers import (
+
+from bsip_cli.errors import BadDataError
+from bsip_cli.recordings.read import read_recording
+from tests.recordings.recording_writers import (
     Y_UP_FROM_Z_UP,
     standing_markers,
     standing_wrench,
     write_mot,
     write_trc,
 )
-
-from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.read import read_recording
 
 N = 80
 TURN = Y_UP_FROM_Z_UP.T

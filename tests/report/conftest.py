@@ -3,13 +3,13 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from fake_study import Artifacts, study
 
 from bsip_cli.config import Config, load_config
 from bsip_cli.pipeline import STAGES
 from bsip_cli.runner import Outcome, perform
 from bsip_cli.study import Participant, Study
 from bsip_cli.unit import Unit
+from tests.report.fake_study import Artifacts, study
 
 
 @dataclass

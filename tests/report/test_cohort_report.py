@@ -6,7 +6,6 @@ from html import unescape
 
 import numpy as np
 import pytest
-from fake_study import Artifacts
 
 from bsip_cli.artifacts import empty_table
 from bsip_cli.report.cohort.document import cohort_document
@@ -15,6 +14,7 @@ from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.origins import HowMade
 from bsip_cli.report.words import MISSING
 from bsip_cli.stages.group_report import record_of
+from tests.report.fake_study import Artifacts
 
 
 @pytest.fixture(scope="module")

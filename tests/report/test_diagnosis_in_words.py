@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from fake_study import attribution, changes, detection, diagnosis, gains
 
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.effects.catalogue import EFFECTS
@@ -22,6 +21,7 @@ from bsip_cli.report.records import EXTENDED, with_all_causes
 from bsip_cli.report.separating import separating_recording
 from bsip_cli.report.usual_sizes import USUAL
 from bsip_cli.report.verdict import change_sentence, gain_sentence, headline, verdict_of
+from tests.report.fake_study import attribution, changes, detection, diagnosis, gains
 
 TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]
 

@@ -6,7 +6,8 @@ import json
 import math
 
 import pytest
-from browser import Page, chromium, opened
+
+from tests.report.browser import Page, chromium, opened
 
 pytestmark = pytest.mark.skipif(
     chromium() is None, reason="no chromium here: reports are not opened in a browser"

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fake_study import EVIL, Artifacts, empty, gains
 
 from bsip_cli.report.blocks import Bullets, Document, Grid, Paragraph, Picture
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import ParticipantRecord, Refusal
 from bsip_cli.stages.report import record_of
+from tests.report.fake_study import EVIL, Artifacts, empty, gains
 
 
 @pytest.fixture(scope="module")

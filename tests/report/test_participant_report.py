@@ -5,9 +5,9 @@ from html import unescape
 from xml.etree import ElementTree
 
 import pytest
-from fake_study import EVIL, svgs
 
 from bsip_cli.report.words import number, with_spread
+from tests.report.fake_study import EVIL, svgs
 
 TITLES = (
     "Summary",

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from fake_study import EVIL, marker_events
 
 from bsip_cli.report.blocks import Grid, Picture
 from bsip_cli.report.page import render
@@ -14,6 +13,7 @@ from bsip_cli.report.participant.diagnosis import verdict
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import EXTENDED, ParticipantRecord, TrialRecord
 from bsip_cli.stages.report import record_of
+from tests.report.fake_study import EVIL, marker_events
 
 SIGNALS = ["fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm", "cop_ap_m", "cop_ml_m"]
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from fake_study import diagnosis
 from scipy.stats import norm
 
 from bsip_cli.report.blocks import Bullets, Grid
@@ -16,6 +15,7 @@ from bsip_cli.report.cohort.ratios import Ratios
 from bsip_cli.report.cohort.record import CohortRecord, Member
 from bsip_cli.report.origins import HowMade
 from bsip_cli.report.shared import named_people, searched, shared_causes
+from tests.report.fake_study import diagnosis
 
 TRIAL = "sub-01_task-sequence_run-1"
 FOUND = diagnosis([TRIAL])  # a turned plate, a class of two, one rejected

@@ -1,10 +1,10 @@
 """What ``bsip show`` prints of a diagnosis: lines that fit, and nothing that a file could hide."""
 
 import pandas as pd
-from fake_study import detection, diagnosis, marker_events
 
 from bsip_cli.report.verdict import put_right_sentence, verdict_of
 from bsip_cli.show import verdict_text
+from tests.report.fake_study import detection, diagnosis, marker_events
 
 TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]
 

@@ -8,7 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from conftest import person_of
 
 from bsip_cli.errors import UsageError
 from bsip_cli.simulate.asked import drawn, effects_of, pair_up, touches
@@ -26,6 +25,7 @@ from bsip_cli.simulate.recording import MM, Measurement, measure_trial
 from bsip_cli.simulate.rotations import about_z
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.simulate.trial import Trial, simulate_trial
+from tests.simulate.conftest import person_of
 
 G = 9.81
 PERSON_SEED = 3

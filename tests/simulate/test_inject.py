@@ -8,7 +8,6 @@ from pathlib import Path
 import ezc3d
 import numpy as np
 import pytest
-from conftest import person_of, trial_of_task
 
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.recordings.model import Recording
@@ -19,6 +18,7 @@ from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.injection.folder import inject_recording
 from bsip_cli.simulate.options import Asked, Laboratory, Rates, Richness
 from bsip_cli.simulate.recording import write_trial
+from tests.simulate.conftest import person_of, trial_of_task
 
 G = 9.81
 

@@ -7,16 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from printed_study import (
-    N,
-    drawn_table,
-    group_row,
-    group_table,
-    paired_row,
-    paired_table,
-    paper,
-    sway_tables,
-)
 from scipy import stats
 
 from bsip_cli.errors import UsageError
@@ -26,6 +16,16 @@ from bsip_cli.statistics.published.paper import Claim, PrintedTable, Row, load_p
 from bsip_cli.statistics.published.printed import Cell, Interval, image, rounded_from
 from bsip_cli.statistics.published.readings import as_meant
 from bsip_cli.statistics.published.sway_audit import unit_of_length
+from tests.statistics.printed_study import (
+    N,
+    drawn_table,
+    group_row,
+    group_table,
+    paired_row,
+    paired_table,
+    paper,
+    sway_tables,
+)
 
 
 def found(table: PrintedTable, **more) -> list[tuple[str, str]]:

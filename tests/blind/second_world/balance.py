@@ -14,10 +14,10 @@ import numpy as np
 from scipy.linalg import solve_banded
 from scipy.ndimage import gaussian_filter1d
 
-from second_world.body import Body
-from second_world.kinematics import Poses, poses_of
-from second_world.motion import Foot, Motion
-from second_world.smooth import about_z, turned
+from tests.blind.second_world.body import Body
+from tests.blind.second_world.kinematics import Poses, poses_of
+from tests.blind.second_world.motion import Foot, Motion
+from tests.blind.second_world.smooth import about_z, turned
 
 GRAVITY = np.array([0.0, 0.0, 9.81])
 _ROUNDS = 7

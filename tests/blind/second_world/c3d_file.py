@@ -9,7 +9,7 @@ from pathlib import Path
 import ezc3d
 import numpy as np
 
-from second_world.lab import Plate, Recorded
+from tests.blind.second_world.lab import Plate, Recorded
 
 MM = 1000.0
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from second_world.effects import Hidden
-from second_world.people import Case, Equipment, Somebody
+from tests.blind.second_world.effects import Hidden
+from tests.blind.second_world.people import Case, Equipment, Somebody
 
 NULLS = 10
 _MARKER_SETS = ("hansen2017", "plugin_gait", "plugin_gait_medial")

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from scipy.signal import butter, lsim, lti, sosfilt
 
-from second_world.balance import GRAVITY, Load, rate_of
-from second_world.body import SIDES
-from second_world.motion import Motion
-from second_world.smooth import window
+from tests.blind.second_world.balance import GRAVITY, Load, rate_of
+from tests.blind.second_world.body import SIDES
+from tests.blind.second_world.motion import Motion
+from tests.blind.second_world.smooth import window
 
 HAND_M = np.array([0.02, 0.0, -0.07])  # where a hand holds something, in its frame
 WAIST_M = np.array([-0.1, 0.0, 0.05])  # where a tether pulls, in the pelvis' frame

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-from second_world.body import SIDES, Body
-from second_world.motion import Foot, Motion
-from second_world.smooth import about_x, about_y, about_z, turned
+from tests.blind.second_world.body import SIDES, Body
+from tests.blind.second_world.motion import Foot, Motion
+from tests.blind.second_world.smooth import about_x, about_y, about_z, turned
 
 _STANDING = 0.990  # height of the hips above the ankles over the leg's length
 _STRETCHED = 0.9955  # no leg is longer than that

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
-from second_world.balance import GRAVITY, Balanced, by_foot
-from second_world.effects import Changes
-from second_world.landmarks import MARKER_SETS
-from second_world.skin import Skin
-from second_world.smooth import about_z
+from tests.blind.second_world.balance import GRAVITY, Balanced, by_foot
+from tests.blind.second_world.effects import Changes
+from tests.blind.second_world.landmarks import MARKER_SETS
+from tests.blind.second_world.skin import Skin
+from tests.blind.second_world.smooth import about_z
 
 # Plate axes in the lab as columns, in AMTI's manner: x to the left, y ahead, z down.
 PLATE_AXES = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from second_world.body import HALF_SHOULDERS, SIDES, Body, suprasternale_m, usual_neck_m
+from tests.blind.second_world.body import HALF_SHOULDERS, SIDES, Body, suprasternale_m, usual_neck_m
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from second_world.body import SIDES, Body
-from second_world.smooth import slow_course, step
+from tests.blind.second_world.body import SIDES, Body
+from tests.blind.second_world.smooth import slow_course, step
 
 _ROOT = ("ahead", "left", "up", "pelvis_yaw", "pelvis_pitch", "pelvis_roll")
 _TRUNK = ("trunk_pitch", "trunk_roll", "trunk_yaw", "neck_pitch", "neck_roll", "neck_yaw")

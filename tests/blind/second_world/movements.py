@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from second_world.body import SIDES, Body
-from second_world.motion import Motion
-from second_world.smooth import step, window
+from tests.blind.second_world.body import SIDES, Body
+from tests.blind.second_world.motion import Motion
+from tests.blind.second_world.smooth import step, window
 
 
 class Block:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from second_world.effects import Hidden
+from tests.blind.second_world.effects import Hidden
 
 
 @dataclass(frozen=True)

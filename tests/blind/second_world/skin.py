@@ -9,11 +9,11 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-from second_world.balance import rate_of
-from second_world.body import LIMBS, SEGMENTS, SIDES, kind_of
-from second_world.kinematics import Poses
-from second_world.landmarks import Landmark
-from second_world.smooth import slow_course
+from tests.blind.second_world.balance import rate_of
+from tests.blind.second_world.body import LIMBS, SEGMENTS, SIDES, kind_of
+from tests.blind.second_world.kinematics import Poses
+from tests.blind.second_world.landmarks import Landmark
+from tests.blind.second_world.smooth import slow_course
 
 # Shift of all markers of a segment per turn of a joint beside it [m/rad].
 _PER_RAD = {

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from second_world.balance import balanced
-from second_world.body import Body, draw_body
-from second_world.c3d_file import write_c3d
-from second_world.effects import Changes, changes_of
-from second_world.lab import Lab
-from second_world.landmarks import Landmark, place_landmarks
-from second_world.movements import moving
-from second_world.people import Case
-from second_world.skin import Skin
+from tests.blind.second_world.balance import balanced
+from tests.blind.second_world.body import Body, draw_body
+from tests.blind.second_world.c3d_file import write_c3d
+from tests.blind.second_world.effects import Changes, changes_of
+from tests.blind.second_world.lab import Lab
+from tests.blind.second_world.landmarks import Landmark, place_landmarks
+from tests.blind.second_world.movements import moving
+from tests.blind.second_world.people import Case
+from tests.blind.second_world.skin import Skin
 
 PERSON = "sub-01"
 _JOLTING = 0.9

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from bsip_cli.errors import BadDataError
+from bsip_cli.files import check_regular
 from bsip_cli.recordings.cop_near_feet import cop_findings
 from bsip_cli.recordings.model import Recording
 
@@ -17,6 +18,7 @@ def read_recording(path: Path) -> Recording:
 
 
 def _read(path: Path) -> Recording:
+    check_regular(path)
     suffix = path.suffix.lower()
     if suffix == ".c3d":
         from bsip_cli.recordings.c3d import read_c3d

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -58,7 +59,7 @@ def companion_mot(path: Path) -> Path | None:
     """The MOT that belongs to a TRC, or None."""
     stem = path.with_suffix("")
     candidates = [stem.with_suffix(".mot"), stem.with_name(stem.name + "_grf.mot")]
-    return next((candidate for candidate in candidates if candidate.is_file()), None)
+    return next((candidate for candidate in candidates if os.path.lexists(candidate)), None)
 
 
 def _even_markers(

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.files import check_regular
 from bsip_cli.simulate.asked import effects_of, pair_up
 from bsip_cli.simulate.injection.folder import (
     inject_recording,
@@ -70,11 +71,11 @@ def inject_command(
     """Copy a study or one recording with effects hidden in it; returns the exit code."""
     if not effects:
         raise UsageError("nothing to hide", expected="at least one --effect with its --size")
-    if not source.exists():
-        raise UsageError("it does not exist", file=source, expected="a study or a recording")
+    if not source.is_dir():
+        check_regular(source, UsageError)
     asked = pair_up(effects, sizes, targets, simulated=False)
     options = StudyOptions(seed=seed, effects=asked, effect_tasks=tuple(effect_tasks))
-    if source.is_file():
+    if not source.is_dir():
         if participants or effect_tasks:
             raise UsageError("one recording has no participants or tasks to choose from")
         return _inject_one(source, out, options)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError
+from bsip_cli.files import check_regular
 from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.injection.changes import changed_by
 from bsip_cli.simulate.instruments import Instruments, SensingPlate
@@ -83,6 +84,7 @@ def _read_mot(file: Path) -> Table:
 
 
 def _lines(file: Path) -> list[str]:
+    check_regular(file)
     try:
         return file.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:

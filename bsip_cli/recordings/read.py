@@ -12,7 +12,7 @@ from bsip_cli.recordings.model import Recording
 
 
 def read_recording(path: Path) -> Recording:
-    """Read a ``.c3d``, or a ``.trc`` with the ``.mot`` (or ``_grf.mot``) of the same stem."""
+    """Read a ``.c3d``, or a ``.trc`` with the file of ground forces beside it."""
     recording = _read(Path(path))
     return replace(recording, findings=(*recording.findings, *cop_findings(recording)))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Literal, get_args
@@ -11,6 +11,7 @@ from typing import Annotated, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bsip_cli.errors import UsageError
+from bsip_cli.files import read_toml
 
 
 def shipped(*parts: str) -> Path:
@@ -162,18 +163,18 @@ class Config(Section):
 
 
 def load_config(files: Iterable[Path]) -> Config:
-    """Defaults, then each existing file in turn.
+    """Defaults, then each file that is there in turn.
 
     Raises
     ------
     UsageError
         A file is not TOML, or holds unknown options or values out of range: all named at once.
     """
-    merged = _read_toml(shipped("default.toml"))
+    merged = read_toml(shipped("default.toml"))
     sources = []
     for file in files:
-        if file.exists():
-            merged = _merge(merged, _read_toml(file))
+        if os.path.lexists(file):
+            merged = _merge(merged, read_toml(file))
             sources.append(str(file))
     try:
         return Config.model_validate(merged)
@@ -204,17 +205,6 @@ def with_estimators(config: Config, names: tuple[str, ...]) -> Config:
             "; ".join(_fault(e, values) for e in error.errors() if len(e["loc"]) > 2),
             remedy="check --estimator",
         ) from None
-
-
-def _read_toml(file: Path) -> dict:
-    try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(
-            f"not valid TOML ({error})", file=file, remedy="correct that line"
-        ) from None
-    except OSError as error:
-        raise UsageError(f"cannot be read ({error.strerror})", file=file) from None
 
 
 def _merge(base: Mapping, over: Mapping) -> dict:

@@ -1,19 +1,62 @@
-"""``OUT/dataset_description.json``: what the folder of results is, as BIDS derivatives have it."""
+"""The folder of results: where it may lie, and what it says of itself to users of BIDS."""
 
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import write_atomically
+from bsip_cli.errors import UsageError
+from bsip_cli.files import fault_of
+from bsip_cli.folders import is_folder, lies_in
 
 NAME = "dataset_description.json"
 BIDS_VERSION = "1.10.0"
 
 
-def describe_dataset(out: Path, study: Path) -> None:
-    """Write the description unless the same one is there.
+def make_out(out: Path, study: Path) -> None:
+    """Make sure that there is a folder for results, apart from the recordings.
+
+    Raises
+    ------
+    UsageError
+        It is the study, lies above it or in a participant's folder, or cannot be made.
+    """
+    if found := _in_the_way(out, study):
+        raise UsageError(
+            found,
+            file=out,
+            expected="a folder for results, apart from the recordings",
+            remedy=f"name another one with --out, like {study / 'derivatives' / 'bsip'}",
+        )
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"is no folder to write to ({error.strerror})", file=out, remedy="check --out"
+        ) from None
+
+
+def _in_the_way(out: Path, study: Path) -> str:
+    """Why results cannot lie there; empty if they can."""
+    if os.path.lexists(out) and not is_folder(out):
+        return f"is no folder to write to: it {fault_of(out) or 'is a file'}"
+    if lies_in(study, out):
+        return "is the study" if lies_in(out, study) else "holds the study"
+    homes = [home for form in ("sub-*", "sub-*/ses-*") for home in study.glob(form)]
+    inside = [home.name for home in homes if lies_in(out, home)]
+    real = Path(os.path.realpath(out))
+    for path in (real, *real.parents):  # a folder that would be taken for a participant's
+        above = path.parent
+        if path.name.startswith("sub-") and lies_in(above, study) and lies_in(study, above):
+            inside.append(path.name)
+    return f"is the folder of {inside[0]} or lies in it" if inside else ""
+
+
+def describe_dataset(out: Path, study: Path) -> str:
+    """Write the description unless the same one is there; what to say of one of other origin.
 
     Raises
     ------
@@ -34,5 +77,23 @@ def describe_dataset(out: Path, study: Path) -> None:
     }
     text = json.dumps(description, indent=2) + "\n"
     path = out / NAME
-    if not path.exists() or path.read_text(encoding="utf-8") != text:
-        write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    if os.path.lexists(path):
+        found = _own_text(path)
+        if found is None:
+            return f"{path}: is not of bsip, and stays as it is"
+        if found == text:
+            return ""
+    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    return ""
+
+
+def _own_text(path: Path) -> str | None:
+    """What a description says that bsip wrote; None of any other."""
+    try:
+        if path.is_symlink() or fault_of(path):
+            return None
+        text = path.read_text(encoding="utf-8")
+        is_own = any(one["Name"] == "bsip" for one in json.loads(text)["GeneratedBy"])
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return None
+    return text if is_own else None

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 
+def printable(text: str) -> str:
+    """A text with a question mark for what is no letter, digit or sign: it may steer a terminal."""
+    return "".join(c if c.isprintable() else "?" for c in text)
+
+
 class BsipError(Exception):
     """Base of all errors that are not bugs.
 
@@ -29,7 +34,7 @@ class BsipError(Exception):
         where = f"{self.file}: " if self.file else ""
         expected = f"; expected {self.expected}" if self.expected else ""
         remedy = f". To mend it: {self.remedy}" if self.remedy else ""
-        return f"{where}{self.found}{expected}{remedy}."
+        return printable(f"{where}{self.found}{expected}{remedy}.")
 
     def __reduce__(self):  # crosses process borders with its data
         return _rebuild, (type(self), self.found, self.expected, self.remedy, self.file)

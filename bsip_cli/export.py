@@ -31,6 +31,7 @@ from bsip_cli.body.exports.osim_given import (
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError, BsipError, UsageError
+from bsip_cli.files import check_regular
 from bsip_cli.lock import held_alone
 from bsip_cli.pipeline import Stage
 from bsip_cli.provenance import file_hash
@@ -120,6 +121,7 @@ def _without_note(
 
 
 def _given_model(file: Path, name: str | None, skeleton: Skeleton) -> tuple[GivenModel, BodyMap]:
+    check_regular(file, UsageError)
     try:
         content = file.read_bytes()
     except OSError as error:

@@ -239,7 +239,8 @@ def artifacts_page() -> str:
         "and beside them, as JSON under the key `bsip`: the kind and version of the table, the "
         "stage and versions that made it, the SHA-256 of every input (of the group's artifacts one "
         'for each participant, over the lines "name hash" of all that was read), the options the '
-        "stage read, its warnings. `*` in a column's name stands for a family of columns."
+        "stage read, its warnings. `*` in a column's name stands for a family of columns. Of a "
+        "session's trial, names begin with sub-XX_ses-SES_task-TASK."
     ]
     for stage in STAGES:
         parts += _stage_parts(stage)

@@ -27,7 +27,7 @@ from bsip_cli.pipeline import Stage, by_level, producer
 from bsip_cli.study import Participant, Study
 from bsip_cli.unit import Unit
 
-State = Literal["done", "fresh", "waiting", "refused", "unwritten", "bug"]
+State = Literal["done", "fresh", "waiting", "refused", "unwritten", "bug", "noted"]
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,8 +15,8 @@ from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.check_study import check_prefixes, check_segments, check_trials
 from bsip_cli.config import Config, load_config, with_estimators
-from bsip_cli.dataset import describe_dataset
-from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.dataset import describe_dataset, make_out
+from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.pipeline import Stage, by_level, stages_named
 from bsip_cli.runner import Outcome, refusal_sentence, run_stages
 from bsip_cli.study import Study, load_study
@@ -45,7 +45,7 @@ def run_session(
     if any(stage.level == "cohort" for stage in stages):
         chosen = ()  # what is about all needs all
     opened = open_study(root, out, chosen, config_file, estimators)
-    describe_dataset(out, opened.study.root)
+    refusals = (*opened.refusals, *_notes(describe_dataset(out, opened.study.root)))
     participants = opened.study.participants
     running = run_stages(stages, opened.study, out, opened.config, force=force, jobs=jobs)
     total = sum(
@@ -54,7 +54,7 @@ def run_session(
         else sum(len(p.trials) if s.level == "trial" else 1 for p in participants)
         for s in stages
     )
-    return follow(command, opened.refusals, running, total, out)
+    return follow(command, refusals, running, total, out)
 
 
 def _stages(command: str, chosen: tuple[str, ...], group: bool) -> tuple[Stage, ...]:
@@ -70,7 +70,7 @@ def _stages(command: str, chosen: tuple[str, ...], group: bool) -> tuple[Stage, 
 
 @dataclass(frozen=True)
 class OpenedStudy:
-    """A study as a command meets it: its chosen participants, and who could not be listed."""
+    """A study as a command meets it: its chosen participants, and who or what is not used."""
 
     study: Study
     config: Config
@@ -99,8 +99,8 @@ def open_study(
     if config.loads or config.ingest.prefixes:
         whole = load_study(root, roles) if chosen else (study, refusals)
         _check_names(config, *whole)
-    _check_out(out)
-    return OpenedStudy(study, config, tuple(refusal_sentence(refusals)))
+    make_out(out, root)
+    return OpenedStudy(study, config, (*_notes(*study.notes), *refusal_sentence(refusals)))
 
 
 def _check_names(config: Config, study: Study, refusals: list[BadDataError]) -> None:
@@ -108,6 +108,12 @@ def _check_names(config: Config, study: Study, refusals: list[BadDataError]) -> 
     if not refusals:  # else a load may belong to who or what was refused
         check_trials(config.loads, study)
         check_prefixes(config.ingest.prefixes, study)
+
+
+def _notes(*sentences: str) -> Iterator[Outcome]:
+    """Of what is no fault: it is said, and the exit code stays."""
+    for sentence in filter(None, sentences):
+        yield Outcome("study", "study", "noted", (printable(sentence),))
 
 
 def follow(
@@ -143,15 +149,6 @@ def _own_file(root: Path, name: str) -> str:
     """A user's own TOML file lies in the study, or where the command was given."""
     in_study = root / name
     return str(in_study) if name.endswith(".toml") and in_study.is_file() else name
-
-
-def _check_out(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(
-            f"is no folder to write to ({error.strerror})", file=out, remedy="check --out"
-        ) from None
 
 
 def _tell(outcome: Outcome) -> None:

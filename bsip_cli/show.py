@@ -10,12 +10,11 @@ from textwrap import fill
 import pandas as pd
 
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
-from bsip_cli.errors import UsageError
+from bsip_cli.errors import UsageError, printable
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.shared import SHARED, searched, shared_causes
 from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.report.verdict import Verdict, put_right_sentence, verdict_of
-from bsip_cli.report.words import printable
 from bsip_cli.schemas import SCHEMAS
 
 _WIDEST = 100  # letters in a line
@@ -110,7 +109,7 @@ def _path(folder: Path, kind: str) -> Path:
 def _marker_events(folder: Path) -> list[tuple[str, pd.DataFrame]]:
     """Stems of the trials and what was found of their markers."""
     ending = f"_{SCHEMAS['marker-events'].file_name}.parquet"
-    paths = sorted(folder.glob(f"{folder.name}_task-*{ending}"))
+    paths = sorted(folder.glob(f"{folder.name}_*{ending}"))
     return [(p.name.removesuffix(ending), read_artifact(p, "marker-events")) for p in paths]
 
 

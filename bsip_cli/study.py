@@ -1,57 +1,40 @@
-"""A study on disk: participants, trials, their roles, and where artifacts lie."""
+"""A study on disk: participants, trials, their roles, and what lies there and is not used."""
 
 from __future__ import annotations
 
-import csv
-import difflib
-import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+import os
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
-from bsip_cli.errors import BadDataError, UsageError
-
-Role = Literal["static", "sequence", "validation"]
-
-_PARTICIPANT = re.compile(r"sub-[A-Za-z0-9]+")
-_TRIAL = re.compile(
-    r"(?P<participant>sub-[A-Za-z0-9]+)_task-(?P<task>[A-Za-z0-9]+)(_run-(?P<run>[0-9]+))?"
+from bsip_cli.errors import BadDataError, UsageError, printable
+from bsip_cli.files import fault_of
+from bsip_cli.folders import entries, is_folder
+from bsip_cli.participants import NAME, Participant, participant_of, read_rows, rows_of
+from bsip_cli.trials import (
+    RECORDINGS,
+    Fault,
+    Role,
+    Trial,
+    find_trials,
+    listed,
+    refusals_of,
 )
-_RECORDINGS = (".c3d", ".trc")
-MANY = 20
-"""So many participants are no more named one by one in a message."""
 
-_NAME_RULE = "names like sub-01_task-sequence_run-1.c3d (letters and digits only)"
+__all__ = ["Participant", "Role", "Study", "Trial", "load_study"]
 
-
-@dataclass(frozen=True)
-class Trial:
-    """One recording: ``stem`` names all its artifacts; ``run`` is None without run-... in it."""
-
-    participant_id: str
-    task: str
-    stem: str
-    path: Path
-    role: Role
-    run: int | None = None
-
-
-@dataclass(frozen=True)
-class Participant:
-    """One row of participants.tsv; mass and height are None where the table says n/a."""
-
-    id: str
-    sex: Literal["M", "F"]
-    mass_kg: float | None
-    height_m: float | None
-    trials: tuple[Trial, ...]
+_FEW = 3
+"""So many files are named; of more, how many there are of each kind."""
 
 
 @dataclass(frozen=True)
 class Study:
+    """``notes`` say what lies there that is no recording."""
+
     root: Path
     participants: tuple[Participant, ...]
+    notes: tuple[str, ...] = ()
 
 
 def load_study(
@@ -68,7 +51,7 @@ def load_study(
     Returns
     -------
     The study, and what had to be refused: a participant whose row or folder cannot be used does
-    not stop the others.
+    not stop the others, nor does a recording.
 
     Raises
     ------
@@ -77,248 +60,113 @@ def load_study(
     BadDataError
         participants.tsv cannot be read or lacks a column.
     """
-    if not root.is_dir():
+    if not is_folder(root):
         raise UsageError(
             "there is no such folder", file=root, remedy="name the folder with participants.tsv"
         )
-    rows = _participant_rows(root / "participants.tsv")
-    if chosen:
-        rows = _rows_of(chosen, rows, root / "participants.tsv")
-    participants: dict[str, Participant] = {}
-    refusals: list[BadDataError] = []
-    for row in rows:
+    table = root / "participants.tsv"
+    rows = read_rows(table)
+    loading = _Loading(root, roles)
+    for row in rows_of(chosen, rows, table) if chosen else rows:
+        loading.add(row)
+    if not chosen:
+        loading.look_around({(row["participant_id"] or "").strip() for row in rows})
+    study = Study(root, tuple(loading.participants.values()), tuple(loading.all_notes()))
+    return study, loading.refusals
+
+
+class _Loading:
+    """Who is found in a study row by row, and what cannot be used."""
+
+    def __init__(self, root: Path, roles: dict[str, tuple[str, ...]]) -> None:
+        self.root, self.roles = root, roles
+        self.participants: dict[str, Participant] = {}  # by id in small letters
+        self.refusals: list[BadDataError] = []
+        self.notes: list[str] = []
+        self.others: list[Path] = []
+        self.spare_forces: list[Path] = []
+
+    def add(self, row: dict[str, str]) -> None:
+        """A row of participants.tsv, with the folder of that name."""
         try:
-            participant, misnamed = _participant(root, row, roles)
+            person = participant_of(row, self.root / "participants.tsv")
+            if (known := self.participants.get(person.id.casefold())) is not None:
+                raise self._twice(person.id, known.id)
+            _check_folder(self.root, person.id)
+            found = find_trials(self.root / person.id, person.id, self.roles)
         except BadDataError as refusal:
-            refusals.append(refusal)
-            continue
-        if participant.id in participants:
-            refusals.append(_twice(root, participant.id))
-            continue
-        participants[participant.id] = participant
-        refusals += misnamed
-    return Study(root, tuple(participants.values())), refusals
+            self.refusals.append(refusal)
+            return
+        self.others += found.others
+        self.spare_forces += found.spare_forces
+        self.refusals += found.refusals
+        if found.trials:
+            person = replace(person, trials=tuple(found.trials))
+            self.participants[person.id.casefold()] = person
 
-
-def _rows_of(chosen: Sequence[str], rows: list[dict[str, str]], file: Path) -> list[dict[str, str]]:
-    """The rows of some participants, in their order."""
-    known: dict[str, list[dict[str, str]]] = {}
-    for row in rows:
-        known.setdefault((row["participant_id"] or "").strip(), []).append(row)
-    unknown = [name for name in chosen if name not in known]
-    if unknown:
-        near = [n for name in unknown for n in difflib.get_close_matches(name, known)]
-        raise UsageError(
-            f"no participant {', '.join(unknown)}",
-            file=file,
-            expected=f"one of {', '.join(known if len(known) < MANY else near or [*known][:MANY])}",
-        )
-    return [row for name in dict.fromkeys(chosen) for row in known[name]]
-
-
-def _participant_rows(file: Path) -> list[dict[str, str]]:
-    required = ("participant_id", "sex", "mass_kg")
-    try:
-        with file.open(encoding="utf-8-sig", newline="") as handle:
-            rows = list(csv.DictReader(handle, delimiter="\t"))
-            header = rows[0].keys() if rows else ()
-    except OSError as error:
-        raise BadDataError(
-            f"cannot be read ({error.strerror})",
-            file=file,
-            expected="a tab-separated table with participant_id, sex, mass_kg, height_m",
-            remedy="write one, a line per participant",
-        ) from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise BadDataError(
-            f"is not a text table ({error})",
-            file=file,
-            expected="tab-separated UTF-8 text",
-            remedy="save it again as tab-separated text",
-        ) from None
-    known = (*required, "height_m")
-    missing = [name for name in required if name not in header]
-    if misspelt := _misspelt(header, known):
-        raise BadDataError(
-            "has " + ", ".join(f"a column {name!r} and no {near}" for name, near in misspelt),
-            file=file,
-            expected=", ".join(known),
-            remedy="correct the name",
-        )
-    if missing and _is_one_column(header):
-        raise BadDataError(
-            f"has one column, {next(iter(header))!r}",
-            file=file,
-            expected=f"{', '.join(known)}, separated by tabs",
-            remedy="put a tab between the cells of every line, no spaces or commas",
-        )
-    if missing:
-        raise BadDataError(
-            f"has no column {', '.join(missing)}" if rows else "names no participant",
-            file=file,
-            expected="participant_id, sex, mass_kg, height_m, separated by tabs",
-            remedy="add it",
-        )
-    return rows
-
-
-def _is_one_column(header: Iterable[str | None]) -> bool:
-    """Whether all columns' names have come as one: the table is separated by something else."""
-    (*names,) = header
-    return len(names) == 1 and "participant_id" in str(names[0]) and str(names[0]).count("_") > 1
-
-
-def _misspelt(header: Iterable[str], known: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Columns whose names are cut or slightly other than one that is lacking, and that one."""
-    found = []
-    lacking = [name for name in known if name not in header]
-    for name in (str(name).strip().lower() for name in header if name not in known):
-        cut = [near for near in lacking if len(name) >= 3 and near.startswith(name)]
-        near = cut or difflib.get_close_matches(name, lacking, n=1, cutoff=0.75)
-        found += [(name, near[0])] if near else []
-    return found
-
-
-def _check_cells(file: Path, row: dict) -> None:
-    """Every line must have a cell for each column: else cells are lost or shifted."""
-    if None in row or None in row.values():
-        n_columns = sum(name is not None for name in row)
-        n_cells = sum(cell is not None for cell in row.values()) - (None in row)
-        n_cells += len(row.get(None, ()))
-        raise BadDataError(
-            f"the line of {row.get('participant_id')!r} has {n_cells} cells",
-            file=file,
-            expected=f"{n_columns}, as many as there are columns, separated by tabs",
-            remedy="write n/a where something is unknown",
+    def _twice(self, name: str, known: str) -> BadDataError:
+        return BadDataError(
+            f"{name} stands twice" + ("" if name == known else f", in other capitals as {known}"),
+            file=self.root / "participants.tsv",
+            expected="a line per participant; the first one counts",
+            remedy="remove one",
         )
 
+    def look_around(self, named: set[str]) -> None:
+        """What lies beside the folders of those whom participants.tsv names."""
+        try:
+            paths = entries(self.root)
+        except BadDataError as closed:
+            self.refusals.append(closed)
+            return
+        expected, remedy = "recordings in the folders of participants", "move it there"
+        outside = [path for path in paths if path.suffix.lower() in RECORDINGS]
+        found = "lies in no participant's folder"
+        self.refusals += refusals_of(Fault(path, found, expected, remedy) for path in outside)
+        unnamed = [path for path in paths if NAME.fullmatch(path.name) and path.name not in named]
+        if unnamed:
+            table = self.root / "participants.tsv"
+            self.notes.append(f"{table} does not name {_where(unnamed, self.root)}: not used")
 
-def _twice(root: Path, name: str) -> BadDataError:
-    return BadDataError(
-        f"{name} stands twice",
-        file=root / "participants.tsv",
-        expected="a line per participant; the first one counts",
-        remedy="remove one",
-    )
-
-
-def _participant(
-    root: Path, row: dict[str, str], roles: dict[str, tuple[str, ...]]
-) -> tuple[Participant, list[BadDataError]]:
-    file = root / "participants.tsv"
-    name = (row["participant_id"] or "").strip()
-    if not _PARTICIPANT.fullmatch(name):
-        raise BadDataError(
-            f"participant_id {name!r}",
-            file=file,
-            expected="sub- and letters or digits",
-            remedy="rename the participant and the folder",
-        )
-    _check_cells(file, row)
-    sex = (row["sex"] or "").strip().upper()
-    if sex not in ("M", "F"):
-        raise BadDataError(
-            f"sex {row['sex']!r} of {name}",
-            file=file,
-            expected="M or F",
-            remedy="the tables know these two; choose the nearer one",
-        )
-    folder = root / name
-    if not folder.is_dir():
-        raise BadDataError(
-            f"there is no folder {name}",
-            file=root,
-            expected="one folder per participant",
-            remedy="add it, or take the line out of participants.tsv",
-        )
-    trials, misnamed = _trials(folder, name, roles)
-    participant = Participant(
-        id=name,
-        sex=sex,  # type: ignore[arg-type]
-        mass_kg=_number(row, "mass_kg", name, file, 10.0, 400.0),
-        height_m=_number(row, "height_m", name, file, 0.5, 2.6),
-        trials=trials,
-    )
-    return participant, misnamed
-
-
-def _number(
-    row: dict[str, str], column: str, name: str, file: Path, low: float, high: float
-) -> float | None:
-    text = (row.get(column) or "n/a").strip()
-    if text.lower() in ("n/a", ""):
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not low <= value <= high:
-        raise BadDataError(
-            f"{column} {text!r} of {name}",
-            file=file,
-            expected=f"a number between {low:g} and {high:g}, or n/a",
-            remedy=_how_to_write(text, low, high),
-        )
-    return value
-
-
-def _how_to_write(text: str, low: float, high: float) -> str:
-    """The likely reason why a number is none, or out of range."""
-    try:
-        value = float(text.replace(",", "."))
-    except ValueError:
-        return "correct it"
-    if low <= value <= high:
-        return "write a point for the comma"
-    return "give it in metres" if low <= value / 100 <= high else "correct it"
-
-
-def _trials(
-    folder: Path, participant: str, roles: dict[str, tuple[str, ...]]
-) -> tuple[tuple[Trial, ...], list[BadDataError]]:
-    """The recordings of a folder, and refusals of those whose names say nothing."""
-    trials, misnamed = [], []
-    for path in sorted(folder.iterdir()):
-        if path.suffix.lower() not in _RECORDINGS or not path.is_file():
-            continue
-        match = _TRIAL.fullmatch(path.stem)
-        if match is None or match["participant"] != participant:
-            misnamed.append(
-                BadDataError(
-                    "its name does not say what it is",
-                    file=path,
-                    expected=_NAME_RULE,
-                    remedy="rename it",
-                )
+    def all_notes(self) -> Iterator[str]:
+        """What is no recording, in one sentence for each kind."""
+        yield from self.notes
+        folders = [path for path in self.others if is_folder(path)]
+        files = [path for path in self.others if path not in set(folders)]
+        if folders:
+            yield (
+                "folders that are not looked into, since recordings lie in sub-XX and in "
+                f"sub-XX/ses-YY: {_where(folders, self.root)}"
             )
-            continue
-        role = _role(match["task"], roles)
-        run = int(match["run"]) if match["run"] else None
-        trials.append(Trial(participant, match["task"], path.stem, path, role, run))
-    stems = [trial.stem for trial in trials]
-    double = {stem for stem in stems if stems.count(stem) > 1}
-    if double:
-        raise BadDataError(
-            f"two recordings called {', '.join(sorted(double))}",
-            file=folder,
-            expected="one .c3d or one .trc of each name",
-            remedy="remove one or give it a run number",
-        )
-    if not trials:
-        named = ", ".join(Path(one.file).name for one in misnamed)
-        raise BadDataError(
-            f"no recordings but {named}, whose name does not say what it is"
-            if misnamed
-            else "no recordings",
-            file=folder,
-            expected=f"recordings with {_NAME_RULE}",
-            remedy="rename them" if misnamed else "add them",
-        )
-    return tuple(trials), misnamed
+        if files:
+            yield f"files that are no recordings and not used: {_kinds(files, self.root)}"
+        if self.spare_forces:
+            yield (
+                "forces that are not used, since those of the C3D of their name are: "
+                f"{_kinds(self.spare_forces, self.root)}"
+            )
 
 
-def _role(task: str, roles: dict[str, tuple[str, ...]]) -> Role:
-    for role in ("static", "sequence"):
-        if task in roles[role]:
-            return role  # type: ignore[return-value]
-    return "validation"
+def _check_folder(root: Path, name: str) -> None:
+    folder = root / name
+    if is_folder(folder):
+        return
+    is_there = os.path.lexists(folder)
+    raise BadDataError(
+        fault_of(folder) or "is a file" if is_there else f"there is no folder {name}",
+        file=folder if is_there else root,
+        expected="one folder per participant",
+        remedy="add it, or take the line out of participants.tsv",
+    )
+
+
+def _kinds(files: Sequence[Path], root: Path) -> str:
+    """Where a few files lie; of more, how many there are of each kind."""
+    if len(files) <= _FEW:
+        return _where(files, root)
+    counts = Counter(path.suffix.lower() or "without an ending" for path in files)
+    return ", ".join(f"{n} {printable(kind)}" for kind, n in counts.most_common())
+
+
+def _where(paths: Sequence[Path], root: Path) -> str:
+    return listed(str(path.relative_to(root)) for path in paths)

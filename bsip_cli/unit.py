@@ -121,7 +121,7 @@ class Unit:
         """Name and path of every file that a unit of a participant reads, but for refused ones."""
         files = self._files_of(self.participant)
         if self.trial is not None and not self.stage.inputs:
-            files |= {path.name: path for path in _recording_files(self.trial.path)}
+            files |= {path.name: path for path in self.trial.files}
         return files | self._files_of_options()
 
     def _files_of(self, participant: Participant | None) -> dict[str, Path]:
@@ -282,8 +282,3 @@ def _owners_of_refusals(participant: Participant | None, *trials: Trial | None) 
     """Whose refusals concern a participant's artifacts in these trials."""
     owner = participant.id if participant else "group"
     return [owner, *(trial.stem for trial in trials if trial is not None)]
-
-
-def _recording_files(path: Path) -> list[Path]:
-    companions = (path.with_suffix(".mot"), path.with_name(f"{path.stem}_grf.mot"))
-    return [path, *(file for file in companions if path.suffix.lower() == ".trc" and file.exists())]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
+import os
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +11,7 @@ from pathlib import Path
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
+from bsip_cli.files import read_toml
 
 _SIDED = {
     "forehead",
@@ -79,15 +80,12 @@ def load_marker_set(name: str) -> MarkerSet:
         There is no such file, or it names unknown segments or landmarks: all faults at once.
     """
     file = Path(name) if name.endswith(".toml") else _shipped_file(name)
-    try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError:
+    if not os.path.lexists(file):
         known = ", ".join(["auto", *shipped_names()])
         raise UsageError(
             "there is no such marker set", file=name, expected=f"{known}, or a path to a .toml"
-        ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"not valid TOML ({error})", file=file) from None
+        )
+    data = read_toml(file)
     faults = _faults(data)
     if faults:
         raise UsageError("; ".join(faults), file=file, remedy="configs/markersets has examples")
@@ -114,7 +112,7 @@ def _shipped_file(name: str) -> Path:
     file = shipped("markersets", f"{name}.toml")
     others = () if file.exists() else shipped("markersets").glob("*.toml")
     for other in others:
-        if name in tomllib.loads(other.read_text(encoding="utf-8")).get("also_called", ()):
+        if name in read_toml(other).get("also_called", ()):
             return other
     return file
 

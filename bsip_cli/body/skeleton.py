@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tomllib
+import os
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +11,7 @@ from typing import Literal
 
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
+from bsip_cli.files import read_toml
 
 JointType = Literal["free", "spherical", "revolute"]
 
@@ -103,8 +104,12 @@ def load_skeleton(name: str) -> Skeleton:
         There is no such file, or its tree is not one: the first fault is named.
     """
     file = Path(name) if name.endswith(".toml") else shipped("skeletons", f"{name}.toml")
+    if not os.path.lexists(file):
+        known = ", ".join(sorted(path.stem for path in shipped("skeletons").glob("*.toml")))
+        raise UsageError("there is no such skeleton", file=name, expected=known)
+    data = read_toml(file)
     try:
-        rows = tomllib.loads(file.read_text(encoding="utf-8"))["segments"]
+        rows = data["segments"]
         names = tuple(row["name"] for row in rows)
         parents = tuple(names.index(row["parent"]) if row["parent"] else -1 for row in rows)
         skeleton = Skeleton(
@@ -115,10 +120,7 @@ def load_skeleton(name: str) -> Skeleton:
             tuple(row["type"] for row in rows),
             tuple(row["table"] for row in rows),
         )
-    except OSError:
-        known = ", ".join(sorted(path.stem for path in shipped("skeletons").glob("*.toml")))
-        raise UsageError("there is no such skeleton", file=name, expected=known) from None
-    except (KeyError, TypeError, ValueError, tomllib.TOMLDecodeError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise UsageError(
             f"not a skeleton ({error})",
             file=file,

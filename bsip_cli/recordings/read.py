@@ -6,17 +6,19 @@ from dataclasses import replace
 from pathlib import Path
 
 from bsip_cli.errors import BadDataError
+from bsip_cli.files import check_regular
 from bsip_cli.recordings.cop_near_feet import cop_findings
 from bsip_cli.recordings.model import Recording
 
 
 def read_recording(path: Path) -> Recording:
-    """Read a ``.c3d``, or a ``.trc`` with the ``.mot`` (or ``_grf.mot``) of the same stem."""
+    """Read a ``.c3d``, or a ``.trc`` with the file of ground forces beside it."""
     recording = _read(Path(path))
     return replace(recording, findings=(*recording.findings, *cop_findings(recording)))
 
 
 def _read(path: Path) -> Recording:
+    check_regular(path)
     suffix = path.suffix.lower()
     if suffix == ".c3d":
         from bsip_cli.recordings.c3d import read_c3d

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError
+from bsip_cli.files import check_regular
 from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.printable import printable
 from bsip_cli.recordings.scene_size import settle_unit, without_absurd
@@ -67,6 +68,7 @@ def read_trc(path: Path) -> Trc:
 
 def read_lines(path: Path) -> list[str]:
     """A text file's lines; what cannot be opened or is no text is refused."""
+    check_regular(path)
     try:
         if path.stat().st_size > _LARGEST_TEXT:
             raise BadDataError(

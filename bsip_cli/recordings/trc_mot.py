@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError
+from bsip_cli.force_files import forces_beside
 from bsip_cli.recordings import world
 from bsip_cli.recordings.analog import spike_samples
 from bsip_cli.recordings.assemble import why_no_forces
@@ -31,10 +32,10 @@ class _Action:
 
 
 def read_trc_mot(path: Path) -> Recording:
-    """Markers from the TRC; plates from STEM.mot or STEM_grf.mot if one lies beside it."""
+    """Markers from the TRC; plates from the file of forces beside it, if there is one."""
     trc = read_trc(path)
     time_s, rate_hz, positions, findings = _even_markers(trc, path)
-    mot_path = companion_mot(path)
+    mot_path = forces_beside(path)
     mot = read_mot(mot_path) if mot_path else None
     up = _up(trc, mot)
     rotation = world.rotation_to_z_up(up)
@@ -52,13 +53,6 @@ def read_trc_mot(path: Path) -> Recording:
         forces_note=note,
         time0_s=float(time_s[0]),
     )
-
-
-def companion_mot(path: Path) -> Path | None:
-    """The MOT that belongs to a TRC, or None."""
-    stem = path.with_suffix("")
-    candidates = [stem.with_suffix(".mot"), stem.with_name(stem.name + "_grf.mot")]
-    return next((candidate for candidate in candidates if candidate.is_file()), None)
 
 
 def _even_markers(

@@ -32,7 +32,10 @@ ROLES = {
     "validation": "validates",
 }
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_STEM = re.compile(r"sub-[A-Za-z0-9]+_task-(?P<task>[A-Za-z0-9]+)(_run-(?P<run>[0-9]+))?")
+_STEM = re.compile(
+    r"sub-[A-Za-z0-9]+(_ses-(?P<session>[A-Za-z0-9]+))?"
+    r"_task-(?P<task>[A-Za-z0-9]+)(_run-(?P<run>[0-9]+))?"
+)
 
 
 def number(value: float | None, digits: int = 1) -> str:
@@ -85,11 +88,12 @@ def count(n: int, singular: str, plural: str = "") -> str:
 
 
 def trial_label(stem: str) -> str:
-    """``sequence (run 1)`` for sub-01_task-sequence_run-1."""
+    """``sequence (session 2, run 1)`` for sub-01_ses-2_task-sequence_run-1."""
     match = _STEM.fullmatch(stem)
     if match is None:
         return stem
-    return f"{match['task']} (run {match['run']})" if match["run"] else match["task"]
+    which = ", ".join(f"{word} {match[word]}" for word in ("session", "run") if match[word])
+    return f"{match['task']} ({which})" if which else match["task"]
 
 
 def task_of(stem: str) -> str:
@@ -106,11 +110,6 @@ def labelled(text: str) -> str:
 def capital(text: str) -> str:
     """A text as the beginning of a sentence."""
     return f"{text[:1].upper()}{text[1:]}"
-
-
-def printable(text: str) -> str:
-    """A text from files as a terminal may have it: what is no letter, digit or sign becomes ``?``."""
-    return "".join(c if c.isprintable() else "?" for c in text)
 
 
 def segment_label(segment: str) -> str:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.files import check_regular, fault_of
+from bsip_cli.folders import is_folder, lies_in
 from bsip_cli.simulate.asked import effects_of, pair_up
 from bsip_cli.simulate.injection.folder import (
     inject_recording,
@@ -35,10 +39,7 @@ def simulate_command(
     plate_per_foot: bool = False,
 ) -> None:
     """Write a simulated study into a new or empty folder."""
-    if study.exists() and any(study.iterdir()):
-        raise UsageError(
-            "the folder is not empty", file=study, remedy="name a new folder for the study"
-        )
+    _check_new(study)
     options = preset(preset_name)
     if participants is not None:
         options = replace(options, participants=participants, sexes="")
@@ -53,7 +54,8 @@ def simulate_command(
         options = replace(options, laboratory=laboratory)
     asked = pair_up(effects, sizes, targets)
     options = replace(options, run=run, effects=asked, effect_tasks=tuple(effect_tasks))
-    simulate_study(study, options)
+    with _writing(study):
+        simulate_study(study, options)
     click.echo(f"bsip simulate: {options.participants} people in {study}", err=True)
 
 
@@ -70,19 +72,21 @@ def inject_command(
     """Copy a study or one recording with effects hidden in it; returns the exit code."""
     if not effects:
         raise UsageError("nothing to hide", expected="at least one --effect with its --size")
-    if not source.exists():
-        raise UsageError("it does not exist", file=source, expected="a study or a recording")
+    if not source.is_dir():
+        check_regular(source, UsageError)
     asked = pair_up(effects, sizes, targets, simulated=False)
     options = StudyOptions(seed=seed, effects=asked, effect_tasks=tuple(effect_tasks))
-    if source.is_file():
+    if not source.is_dir():
         if participants or effect_tasks:
             raise UsageError("one recording has no participants or tasks to choose from")
         return _inject_one(source, out, options)
-    if out.exists() and any(out.iterdir()):
+    if lies_in(out, source):
         raise UsageError(
-            "the folder is not empty", file=out, remedy="name a new folder for the copy"
+            "lies in what is to be copied", file=out, remedy="name a folder outside the study"
         )
-    done = inject_study(source, out, options, participants)
+    _check_new(out)
+    with _writing(out):
+        done = inject_study(source, out, options, participants)
     for error in done.refused:
         click.echo(f"bsip inject: {error}", err=True)
     click.echo(f"bsip inject: {len(done.changed)} recordings changed in {out}", err=True)
@@ -92,10 +96,35 @@ def inject_command(
 def _inject_one(source: Path, out: Path, options: StudyOptions) -> int:
     """One recording; OUT is the new file, or a folder for it."""
     copy = out if out.suffix.lower() == source.suffix.lower() else out / source.name
-    if copy.exists():
+    if os.path.lexists(copy):
         raise UsageError("the file is there already", file=copy, remedy="name a new one")
     hidden = effects_of(options, 1)
-    facts = inject_recording(source, copy, hidden)
-    write_truth_of_recording(copy, hidden, facts)
+    with _writing(copy):
+        facts = inject_recording(source, copy, hidden)
+        write_truth_of_recording(copy, hidden, facts)
     click.echo(f"bsip inject: {copy}", err=True)
     return 0
+
+
+def _check_new(folder: Path) -> None:
+    """Nothing may be there but an empty folder."""
+    remedy = "name a new folder"
+    if os.path.lexists(folder) and not is_folder(folder):
+        raise UsageError(fault_of(folder) or "is a file", file=folder, remedy=remedy)
+    with _writing(folder):
+        is_empty = not is_folder(folder) or not any(folder.iterdir())
+    if not is_empty:
+        raise UsageError("the folder is not empty", file=folder, remedy=remedy)
+
+
+@contextmanager
+def _writing(place: Path) -> Iterator[None]:
+    """What the system refuses while files are made, in one sentence."""
+    try:
+        yield
+    except OSError as error:
+        raise UsageError(
+            f"cannot be made ({error.strerror or error})",
+            file=place,
+            remedy="make room there, or name another place",
+        ) from None

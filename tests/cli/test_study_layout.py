@@ -79,6 +79,11 @@ def test_many_participants_are_not_listed_in_a_message(empty_study):
         ("sub-02", "the line of 'sub-02' has 1 cells; expected 4"),
         ("sub-02\tF\t60\t1.7\t5", "the line of 'sub-02' has 5 cells; expected 4"),
         ("sub-01\tM\t71\t1.81", "sub-01 stands twice"),
+        ("SUB-01\tM\t71\t1.81", "participant_id 'SUB-01'"),
+        ("sub-02\0\tM\t71\t1.81", "participant_id 'sub-02\\x00'"),
+        ('"sub\n-02"\tM\t71\t1.81', "participant_id 'sub\\n-02'"),
+        ("sub-" + "0" * 300 + "\tM\t71\t1.81", "there is no folder sub-000"),
+        ("sub-02\tF\t60\t1.7" + "\t" * 100_000, "has 100004 cells"),
     ],
 )
 def test_bad_line_is_refused_and_the_others_stay(empty_study, line, said):
@@ -98,6 +103,9 @@ def test_bad_line_is_refused_and_the_others_stay(empty_study, line, said):
         (b"participant_id sex mass_kg\nsub-01 M 70\n", "put a tab between the cells"),
         (b"name\tage\nsub-01\t70\n", "has no column participant_id, sex, mass_kg"),
         (HEADER.encode("utf-16"), "is not a text table"),
+        (HEADER.encode() + b"sub-01\t" + b"M" * 200_000, "is not a text table .field larger"),
+        (b"\0" * 5000, "names no participant"),
+        (HEADER.encode()[:-1] + b"\tx" * 1_000_000 + b"\nsub-01\n", "has 1000004 columns"),
     ],
 )
 def test_table_that_cannot_be_read(empty_study, content, said):
@@ -119,9 +127,10 @@ def test_recording_whose_name_says_nothing(empty_study):
 def test_a_folder_whose_only_recording_is_misnamed_names_it(empty_study):
     folder = empty_study / "sub-01"
     (folder / "sub-01_task-static.c3d").rename(folder / "sub-01_task-my-static.c3d")
-    _, refusals = load(empty_study)
-    assert "no recordings but sub-01_task-my-static.c3d, whose name" in refusals[0]
-    assert "rename them" in refusals[0]
+    study, (misnamed, nobody) = load(empty_study)
+    assert [person.id for person in study.participants] == ["sub-02"]
+    assert "sub-01_task-my-static.c3d: its name does not say what it is" in misnamed
+    assert nobody.startswith(f"{folder}: none of its recordings can be used")
 
 
 @pytest.mark.parametrize(
@@ -144,7 +153,7 @@ def test_two_recordings_of_one_name(empty_study):
     (empty_study / "sub-01" / "sub-01_task-static.trc").write_bytes(b"")
     study, refusals = load(empty_study)
     assert [person.id for person in study.participants] == ["sub-02"]
-    assert "two recordings called sub-01_task-static" in refusals[0]
+    assert "of one name, but for capitals and the ending: sub-01_task-static.c3d, " in refusals[0]
 
 
 @pytest.mark.parametrize("ending", ["trc", "TRC"])

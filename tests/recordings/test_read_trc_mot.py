@@ -56,7 +56,7 @@ def _trial(tmp_path, *, unit="mm", mot="a.mot", ratio=1, start_s=0.0, n=N, **mot
 
 
 @pytest.mark.parametrize("naming", NAMINGS)
-@pytest.mark.parametrize("mot", ["a.mot", "a_grf.mot"])
+@pytest.mark.parametrize("mot", ["a.mot", "a_grf.mot", "a_Forces.STO"])
 def test_known_wrench_comes_back(tmp_path, naming, mot):
     recording, markers, force, moment = _trial(tmp_path, mot=mot, naming=naming)
     np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)

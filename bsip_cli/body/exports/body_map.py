@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tomllib
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +10,7 @@ from pathlib import Path
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
+from bsip_cli.files import read_toml
 
 
 @dataclass(frozen=True)
@@ -48,13 +49,13 @@ def load_body_map(name: str) -> BodyMap:
         There is no such file, or it is no map.
     """
     file = Path(name) if name.endswith(".toml") else shipped("opensim", f"{name}.toml")
-    try:
-        rows = tomllib.loads(file.read_text(encoding="utf-8"))["groups"]
-        groups = tuple(_group(row) for row in rows)
-    except OSError:
+    if not os.path.lexists(file):
         raise UsageError(
             "there is no such map of bodies", file=name, expected=", ".join(shipped_names())
-        ) from None
+        )
+    data = read_toml(file)
+    try:
+        groups = tuple(_group(row) for row in data["groups"])
     except (KeyError, TypeError, ValueError) as error:
         raise UsageError(
             f"not a map of bodies ({error})",

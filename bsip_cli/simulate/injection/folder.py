@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.files import fault_of
+from bsip_cli.folders import entries, is_folder
+from bsip_cli.force_files import ENDINGS
 from bsip_cli.simulate.asked import effects_of, touches
 from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.injection.c3d_file import inject_c3d
@@ -19,12 +22,15 @@ from bsip_cli.simulate.injection.changes import check_injectable
 from bsip_cli.simulate.injection.trc_mot_files import inject_trc_mot
 from bsip_cli.simulate.options import StudyOptions
 
-RECORDING = re.compile(r"(?P<participant>sub-[^_]+)_task-(?P<task>[^_]+).*\.(c3d|trc)$", re.I)
+RECORDING = re.compile(
+    r"(?P<participant>sub-[^_]+)(_ses-[^_]+)?_task-(?P<task>[^_]+).*\.(c3d|trc)$", re.I
+)
 
 
 @dataclass(frozen=True)
 class Injection:
-    """What became of the recordings. refused : with the reason, copied as they were."""
+    """What became of the recordings. refused : with the reason, copied as they were, or not at all
+    where they cannot be read."""
 
     changed: tuple[Path, ...]
     refused: tuple[BadDataError, ...]
@@ -53,9 +59,11 @@ def inject_study(
 ) -> Injection:
     """Copy a study folder into a new one, with the options' effects in its recordings.
 
+    Hidden files and folders (.git, of a study under version control) are left behind.
+
     participants : in whose recordings; empty: in everybody's.
     """
-    people = sorted(path.name for path in study.glob("sub-*") if path.is_dir())
+    people = sorted(path.name for path in study.glob("sub-*") if is_folder(path))
     unknown = sorted(set(participants) - set(people))
     if not people:
         raise UsageError("no folders sub-... in it", expected="a study", file=study)
@@ -67,13 +75,14 @@ def inject_study(
     changed: list[Path] = []
     refused: list[BadDataError] = []
     trials: dict[str, dict[str, object]] = {name: {} for name in people}
-    files = sorted(path for path in study.rglob("*") if path.is_file())
-    # MOT files come last: those of a changed TRC file are there by then
-    for source in sorted(files, key=lambda path: path.suffix.lower() == ".mot"):
-        place = out / source.relative_to(study)
+    files = _files_in(study, refused, (study,))
+    # forces come last: those of a changed TRC file are there by then
+    for source in sorted(files, key=lambda path: path.suffix.lower() in ENDINGS):
+        relative = source.relative_to(study)
+        place = out / relative
         match = RECORDING.match(source.name)
         active = []
-        if match and match["participant"] in chosen:
+        if match and match["participant"] in chosen and relative.parts[0] == match["participant"]:
             every = effects[match["participant"]]
             active = [e for e in every if touches(e, match["task"], options.effect_tasks)]
         if not active or not match:
@@ -88,6 +97,23 @@ def inject_study(
     for name in chosen:
         _write_truth(out, name, effects[name], trials[name])
     return Injection(tuple(changed), tuple(refused))
+
+
+def _files_in(folder: Path, refused: list[BadDataError], above: tuple[Path, ...]) -> Iterator[Path]:
+    """Every file that can be read, also where links lead, but not in circles."""
+    try:
+        paths = entries(folder)
+    except BadDataError as closed:
+        refused.append(closed)
+        return
+    for path in paths:
+        if is_folder(path) and not any(path.samefile(one) for one in above):
+            yield from _files_in(path, refused, (*above, path))
+        elif found := fault_of(path):
+            found = "leads in a circle" if is_folder(path) else found
+            refused.append(BadDataError(found, file=path, expected="a file that may be read"))
+        else:
+            yield path
 
 
 def _copy(source: Path, place: Path) -> None:

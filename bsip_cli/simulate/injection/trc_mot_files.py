@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError
+from bsip_cli.files import check_regular
+from bsip_cli.force_files import forces_beside
 from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.injection.changes import changed_by
 from bsip_cli.simulate.instruments import Instruments, SensingPlate
@@ -45,7 +47,9 @@ def inject_trc_mot(trc: Path, copy: Path, effects: Sequence[Effect]) -> Instrume
     ------
     BadDataError : a file that is not what its ending says; times that do not match.
     """
-    mot = mot_beside(trc)
+    mot = forces_beside(trc)
+    if mot is None:
+        raise BadDataError("there are no forces beside it", expected="a .mot", file=trc)
     markers, forces = _read_trc(trc), _read_mot(mot)
     sets = _force_sets(forces, mot)
     scale = _scale_m(markers, trc)
@@ -53,16 +57,10 @@ def inject_trc_mot(trc: Path, copy: Path, effects: Sequence[Effect]) -> Instrume
     after = changed_by(effects, before, trc)
     _write(copy, _new_trc(markers, before, after, scale))
     _write(
-        copy.with_name(copy.stem + mot.name.removeprefix(trc.stem)),
+        copy.with_name(copy.stem + mot.name[len(trc.stem) :]),
         _new_mot(forces, sets, before, after),
     )
     return after
-
-
-def mot_beside(trc: Path) -> Path:
-    """The MOT file of a TRC file: the same stem, or with _grf after it."""
-    with_grf = trc.with_name(f"{trc.stem}_grf.mot")
-    return with_grf if with_grf.exists() else trc.with_suffix(".mot")
 
 
 def _read_trc(file: Path) -> Table:
@@ -83,6 +81,7 @@ def _read_mot(file: Path) -> Table:
 
 
 def _lines(file: Path) -> list[str]:
+    check_regular(file)
     try:
         return file.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:

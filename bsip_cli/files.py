@@ -1,0 +1,82 @@
+"""Files that others wrote: what may be opened at all, and TOML."""
+
+from __future__ import annotations
+
+import os
+import stat
+import tomllib
+from pathlib import Path
+
+from bsip_cli.errors import BadDataError, BsipError, UsageError
+
+_LARGEST_TOML = 1_000_000  # bytes; eighty times the longest that ships
+_NO_FILES = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a FIFO"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+def fault_of(path: Path) -> str:
+    """Why a path is no regular file that can be read, as a clause; empty if it is one.
+
+    Nothing is opened: who opens a FIFO waits for ever.
+    """
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        is_link = path.is_symlink()
+        return f"is a broken symbolic link to {path.readlink()}" if is_link else "does not exist"
+    except (OSError, ValueError) as error:  # ValueError: a name that no file can have
+        return f"cannot be looked at ({getattr(error, 'strerror', None) or error})"
+    if stat.S_ISREG(mode):
+        return "" if os.access(path, os.R_OK) else "may not be read (no permission)"
+    return f"is {next((name for is_one, name in _NO_FILES if is_one(mode)), 'no regular file')}"
+
+
+def check_regular(path: Path, error: type[BsipError] = BadDataError) -> None:
+    """Refuse what is no regular file that can be read, without opening it.
+
+    Raises
+    ------
+    BadDataError
+        Or ``error``, where another one is asked for.
+    """
+    if fault := fault_of(path):
+        raise error(
+            fault,
+            expected="a regular file",
+            remedy="put the file there, or name another one",
+            file=path,
+        )
+
+
+def read_toml(file: Path) -> dict:
+    """The content of a TOML file.
+
+    Raises
+    ------
+    UsageError
+        It cannot be read, or is not TOML.
+    """
+    check_regular(file, UsageError)
+    try:
+        if file.stat().st_size > _LARGEST_TOML:
+            raise UsageError(
+                f"a file of {file.stat().st_size / 1e6:.1f} MB",
+                expected=f"TOML of at most {_LARGEST_TOML / 1e6:g} MB",
+                file=file,
+            )
+        return tomllib.loads(file.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise UsageError(f"cannot be read ({error.strerror or error})", file=file) from None
+    except RecursionError:
+        raise _not_toml(file, "brackets nested too deeply") from None
+    except ValueError as error:  # tomllib's, no UTF-8, a number of more digits than Python reads
+        raise _not_toml(file, str(error)) from None
+
+
+def _not_toml(file: Path, why: str) -> UsageError:
+    return UsageError(f"not valid TOML ({why})", file=file, remedy="correct that place")

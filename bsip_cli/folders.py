@@ -1,0 +1,52 @@
+"""Folders: what lies in one, and whether a path leads into one."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from bsip_cli.errors import BadDataError
+
+
+def is_folder(path: Path) -> bool:
+    """Whether a folder is there; ``Path.is_dir`` raises where nobody may look."""
+    status = _status(path)
+    return status is not None and stat.S_ISDIR(status.st_mode)
+
+
+def entries(folder: Path) -> list[Path]:
+    """Everything in a folder that is not hidden, sorted.
+
+    Raises
+    ------
+    BadDataError
+        The folder cannot be listed.
+    """
+    try:
+        return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    except OSError as error:
+        raise BadDataError(
+            f"cannot be listed ({error.strerror or error})",
+            file=folder,
+            expected="a folder that may be read",
+            remedy="give yourself the right to read it, or copy it anew",
+        ) from None
+
+
+def lies_in(path: Path, folder: Path) -> bool:
+    """Whether a path is a folder or leads into it, whatever links and capitals it is written with.
+
+    What is not there yet lies where it would be made.
+    """
+    real, known = Path(os.path.realpath(path)), _status(folder)
+    found = (_status(above) for above in (real, *real.parents))
+    return known is not None and any(one and os.path.samestat(one, known) for one in found)
+
+
+def _status(path: Path) -> os.stat_result | None:
+    """Of what a path leads to; None where nothing is, or nobody may look."""
+    try:
+        return path.stat()
+    except (OSError, ValueError):  # ValueError: a name that no file can have
+        return None

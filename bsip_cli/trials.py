@@ -1,0 +1,280 @@
+"""What lies in a participant's folder: recordings, known by their names, and all that is none."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+from bsip_cli.errors import BadDataError, printable
+from bsip_cli.files import fault_of
+from bsip_cli.folders import entries, is_folder
+from bsip_cli.force_files import ENDINGS, forces_beside
+from bsip_cli.schemas import SCHEMAS
+
+Role = Literal["static", "sequence", "validation"]
+
+RECORDINGS = (".c3d", ".trc")
+MANY = 20
+"""So many names are no more told one by one in a message."""
+
+_TRIAL = re.compile(
+    r"(?P<participant>sub-[A-Za-z0-9]+)(_ses-(?P<session>[A-Za-z0-9]+))?"
+    r"_task-(?P<task>[A-Za-z0-9]+)(_run-(?P<run>[0-9]+))?"
+)
+_SESSION = re.compile(r"ses-(?P<session>[A-Za-z0-9]+)")
+_PACKED = (".gz", ".bz2", ".xz", ".zst", ".zip", ".7z", ".rar", ".tar", ".tgz")
+_NAME_BYTES = 255  # of a file's name, on the file systems of Linux and macOS
+_LONGEST_KIND = max(len(one.file_name) for one in SCHEMAS.values() if one.level == "trial")
+# What an artifact's name has more than the trial's, while it is written; 4194304: the last process.
+_STEM_BYTES = _NAME_BYTES - _LONGEST_KIND - len("._.parquet.4194304.part.part")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One recording: ``stem`` names all its artifacts; ``run`` is None without run-... in it."""
+
+    participant_id: str
+    task: str
+    stem: str
+    path: Path
+    role: Role
+    run: int | None = None
+    session: str | None = None
+    forces: Path | None = None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All that is read of it: the recording, and the ground forces beside a TRC."""
+        return (self.path, self.forces) if self.forces else (self.path,)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Why an entry that looks like a recording cannot be used.
+
+    ``alike`` is equal where it can be said of several at once, though ``found`` is not.
+    """
+
+    path: Path
+    found: str
+    expected: str
+    remedy: str
+    alike: str = ""
+
+
+def refusals_of(faults: Iterable[Fault]) -> list[BadDataError]:
+    """One refusal for all entries of a folder that have the same fault."""
+    alike: dict[tuple, list[Fault]] = {}
+    for one in faults:
+        alike.setdefault((one.path.parent, one.alike or one.found, one.remedy), []).append(one)
+    return [_refusal(*group) for group in alike.values()]
+
+
+def _refusal(first: Fault, *rest: Fault) -> BadDataError:
+    likewise = f" (likewise {listed(one.path.name for one in rest)})" if rest else ""
+    return BadDataError(
+        f"{first.found}{likewise}",
+        file=first.path,
+        expected=first.expected,
+        remedy=first.remedy,
+    )
+
+
+def listed(names: Iterable[str]) -> str:
+    """``a.c3d, b.c3d and 7 more``, as names may be printed."""
+    shown = [printable(name) for name in names]
+    more = f" and {len(shown) - MANY} more" if len(shown) > MANY else ""
+    return ", ".join(shown[:MANY]) + more
+
+
+@dataclass
+class Folder:
+    """What lies in a participant's folder and in those of the sessions, but hidden entries."""
+
+    path: Path
+    participant: str
+    roles: Mapping[str, tuple[str, ...]]
+    trials: list[Trial] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
+    refusals: list[BadDataError] = field(default_factory=list)
+    others: list[Path] = field(default_factory=list)
+    spare_forces: list[Path] = field(default_factory=list)
+    """Tables beside a C3D, which has forces of its own."""
+
+    def look_through(self, folder: Path, session: str | None = None) -> None:
+        """Say of every entry what it is.
+
+        Raises
+        ------
+        BadDataError
+            The folder cannot be listed.
+        """
+        paths = entries(folder)
+        names = {path.name.casefold() for path in paths}
+        for path in paths:
+            kind = path.suffix.lower()
+            if kind in RECORDINGS:
+                self._recording(path, session)
+            elif kind in ENDINGS:
+                self._forces(path, names)
+            elif session is None and path.name.startswith("ses-") and (no := _fault_of_file(path)):
+                self._session(path, no)
+            elif kind in _PACKED and _is_packed_recording(path, names):
+                self.faults.append(Fault(path, "is packed", "the file itself", "unpack it"))
+            else:
+                self.others.append(path)
+
+    def _recording(self, path: Path, session: str | None) -> None:
+        fault = _fault_of_file(path) or self._fault_of_name(path, session)
+        if fault is None:
+            try:
+                forces = forces_beside(path) if path.suffix.lower() == ".trc" else None
+            except BadDataError as several:
+                self.refusals.append(several)
+                return
+            if forces and (fault := _fault_of_file(forces)):
+                fault = replace(fault, path=path, found=f"its forces, {forces.name}: {fault.found}")
+        if fault:
+            self.faults.append(fault)
+            return
+        match = _TRIAL.fullmatch(path.stem)
+        assert match is not None
+        run = int(match["run"]) if match["run"] else None
+        role = _role(match["task"], self.roles)
+        self.trials.append(
+            Trial(self.participant, match["task"], path.stem, path, role, run, session, forces)
+        )
+
+    def _fault_of_name(self, path: Path, session: str | None) -> Fault | None:
+        """What is wrong with a recording's name in the folder of a session, or in none's."""
+        here = _place(self.participant, session)
+        expected = _names_like(here)
+        match = _TRIAL.fullmatch(path.stem)
+        if match is None:
+            return Fault(path, "its name does not say what it is", expected, "rename it")
+        named = _place(match["participant"], match["session"])
+        if named != here:
+            found = f"its name says {named} and its folder {here}"
+            return Fault(path, found, expected, "rename it, or move it")
+        if len(path.stem) > _STEM_BYTES:
+            found = f"a name of {len(path.stem)} letters before its ending"
+            expected = f"at most {_STEM_BYTES}, since the names of its results are longer"
+            return Fault(path, found, expected, "shorten it")
+        return None
+
+    def _forces(self, path: Path, names: set[str]) -> None:
+        """A table of forces is read with its TRC, spare beside a C3D, and lost without both."""
+        stem = re.sub(r"_(grf|forces)$", "", path.stem, flags=re.IGNORECASE)
+        beside = {f"{s}{kind}".casefold() for s in (stem, path.stem) for kind in RECORDINGS}
+        found = {Path(name).suffix for name in beside & names}
+        if ".trc" in found:
+            return
+        if found:
+            self.spare_forces.append(path)
+        elif _TRIAL.fullmatch(stem):
+            expected = f"{stem}.trc, with its markers, beside it"
+            self.faults.append(
+                Fault(path, "forces without markers", expected, "add that file, or remove this one")
+            )
+        else:
+            self.others.append(path)
+
+    def _session(self, path: Path, no_file: Fault) -> None:
+        if not is_folder(path):
+            self.faults.append(replace(no_file, expected="a session's folder"))
+            return
+        match = _SESSION.fullmatch(path.name)
+        if match is None:
+            found, expected = "a session's folder of this name", "ses- and letters or digits"
+            self.faults.append(
+                Fault(path, found, expected, "rename the folder and the recordings in it")
+            )
+            return
+        try:
+            self.look_through(path, match["session"])
+        except BadDataError as closed:
+            self.refusals.append(closed)
+
+
+def find_trials(folder: Path, participant: str, roles: Mapping[str, tuple[str, ...]]) -> Folder:
+    """The recordings of a participant, sorted by name, and all else in the folder.
+
+    Raises
+    ------
+    BadDataError
+        The folder cannot be listed.
+    """
+    found = Folder(folder, participant, roles)
+    found.look_through(folder)
+    found.refusals[:0] = refusals_of(found.faults)
+    found.trials.sort(key=lambda trial: trial.stem)
+    if double := _of_one_name(found.trials):
+        found.refusals.append(
+            BadDataError(
+                f"recordings of one name, but for capitals and the ending: {listed(double)}",
+                file=folder,
+                expected="one .c3d or one .trc of each name",
+                remedy="remove one or give it a run number",
+            )
+        )
+        found.trials.clear()
+    if not found.trials:
+        found.refusals.append(_nothing_in(found))
+    return found
+
+
+def _of_one_name(trials: Iterable[Trial]) -> list[str]:
+    """Recordings whose results would lie in the same files, also where capitals do not count."""
+    names: dict[str, list[str]] = {}
+    for trial in trials:
+        names.setdefault(trial.stem.casefold(), []).append(trial.path.name)
+    return [name for alike in names.values() if len(alike) > 1 for name in alike]
+
+
+def _nothing_in(folder: Folder) -> BadDataError:
+    are_unusable = bool(folder.refusals)
+    return BadDataError(
+        "none of its recordings can be used" if are_unusable else "no recordings",
+        file=folder.path,
+        expected=f"recordings with {_names_like(folder.participant)}",
+        remedy="correct what is said of each" if are_unusable else "add them",
+    )
+
+
+def _names_like(place: str) -> str:
+    return f"names like {place}_task-sequence_run-1.c3d (letters and digits only)"
+
+
+def _place(participant: str, session: str | None) -> str:
+    return f"{participant}_ses-{session}" if session else participant
+
+
+def _role(task: str, roles: Mapping[str, tuple[str, ...]]) -> Role:
+    for role in ("static", "sequence"):
+        if task in roles[role]:
+            return role  # type: ignore[return-value]
+    return "validation"
+
+
+def _fault_of_file(path: Path) -> Fault | None:
+    """Why a path is no file that can be read; nothing is opened."""
+    found, expected = fault_of(path), "a file that may be read"
+    if not found:
+        return None
+    if ".git/annex/" in found:  # where a DataLad clone's links lead
+        remedy = "fetch its content with `datalad get` or `git annex get`"
+        return Fault(path, found, expected, remedy, alike="not fetched")
+    return Fault(path, found, expected, "put the file there, or remove what is in its place")
+
+
+def _is_packed_recording(path: Path, names: set[str]) -> bool:
+    """Whether a packed file is called as a recording that does not lie unpacked beside it."""
+    inner = path.stem.removesuffix(".tar")
+    kind = Path(inner).suffix.lower()
+    if kind in (*RECORDINGS, *ENDINGS):
+        return inner.casefold() not in names
+    beside = {f"{inner}{ending}".casefold() for ending in RECORDINGS}
+    return bool(_TRIAL.fullmatch(inner)) and not beside & names

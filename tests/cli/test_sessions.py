@@ -1,0 +1,147 @@
+"""Sessions as in BIDS: ``sub-01/ses-2/sub-01_ses-2_task-walking_run-1.c3d``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from bsip_cli.artifacts import read_artifact
+from bsip_cli.config import load_config
+from bsip_cli.pipeline import STAGES
+from bsip_cli.report.words import labelled, task_of, trial_label
+from bsip_cli.runner import perform
+from bsip_cli.schemas import SCHEMAS
+from bsip_cli.simulate.options import Rates, StudyOptions
+from bsip_cli.simulate.study import simulate_study
+from bsip_cli.study import Study, Trial, load_study
+from bsip_cli.unit import Unit
+
+ROLES = {"static": ("static",), "sequence": ("sequence",)}
+
+
+def put(root: Path, *names: str) -> None:
+    for name in names:
+        path = root / "sub-01" / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(b"")
+
+
+def trials_of(root: Path) -> tuple[list[Trial], list[str]]:
+    study, refusals = load_study(root, ROLES, ["sub-01"])
+    return list(study.participants[0].trials), [str(refusal) for refusal in refusals]
+
+
+def test_trials_know_their_session(empty_study):
+    put(
+        empty_study,
+        "ses-2/sub-01_ses-2_task-sequence_run-1.c3d",
+        "ses-pre/sub-01_ses-pre_task-w.trc",
+    )
+    put(empty_study, "ses-pre/sub-01_ses-pre_task-w_grf.mot")
+    trials, refusals = trials_of(empty_study)
+    assert refusals == []
+    assert [(t.session, t.task, t.run, t.role) for t in trials] == [
+        ("2", "sequence", 1, "sequence"),
+        ("pre", "w", None, "validation"),
+        (None, "static", None, "static"),
+    ]
+    assert trials[1].files[1].name == "sub-01_ses-pre_task-w_grf.mot"
+
+
+def test_artifacts_of_all_sessions_lie_with_their_participant(empty_study):
+    put(empty_study, "ses-2/sub-01_ses-2_task-walking_run-1.c3d")
+    study, _ = load_study(empty_study, ROLES)
+    person = study.participants[0]
+    unit = Unit(STAGES[0], study, Path("out"), load_config([]), person, person.trials[0])
+    name = "sub-01_ses-2_task-walking_run-1"
+    assert unit.path("markers") == Path("out/sub-01") / f"{name}_markers.parquet"
+    assert list(unit.inputs()) == [f"{name}.c3d"]
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        (
+            "ses-2/sub-01_task-walk.c3d",
+            "its name says sub-01 and its folder sub-01_ses-2; expected "
+            "names like sub-01_ses-2_task-",
+        ),
+        ("ses-2/sub-01_ses-3_task-walk.c3d", "says sub-01_ses-3 and its folder sub-01_ses-2"),
+        ("ses-2/sub-02_ses-2_task-walk.c3d", "says sub-02_ses-2 and its folder sub-01_ses-2"),
+        ("ses-2/sub-01_ses-_task-walk.c3d", "its name does not say what it is"),
+        ("ses-2/sub-01_ses-2_task-walk.mot", "forces without markers"),
+        ("ses-2/sub-01_ses-2_task-walk.c3d.gz", "is packed"),
+    ],
+)
+def test_what_cannot_be_used_in_a_session(empty_study, name, said):
+    put(empty_study, name)
+    trials, (refusal,) = trials_of(empty_study)
+    assert [trial.task for trial in trials] == ["static"]
+    assert refusal.startswith(str(empty_study / "sub-01" / name))
+    assert said in refusal
+
+
+def test_a_participant_who_has_sessions_only(empty_study):
+    (empty_study / "sub-01" / "sub-01_task-static.c3d").unlink()
+    put(empty_study, "ses-1/sub-01_ses-1_task-walk.c3d", "ses-2/sub-01_ses-2_task-walk.c3d")
+    trials, refusals = trials_of(empty_study)
+    assert ([trial.session for trial in trials], refusals) == (["1", "2"], [])
+
+
+def test_labels_tell_sessions_apart():
+    stem = "sub-01_ses-pre_task-walk_run-2"
+    assert trial_label(stem) == "walk (session pre, run 2)"
+    assert trial_label("sub-01_ses-2_task-walk") == "walk (session 2)"
+    assert task_of(stem) == "walk"
+    assert labelled(f"in {stem} and sub-1_task-hop") == "in walk (session pre, run 2) and hop"
+
+
+# --- the same numbers -----------------------------------------------------------------------------
+
+
+RENAMED = {
+    "sub-01_task-sequence_run-1": "sub-01_ses-1_task-sequence_run-1",
+    "sub-01_task-static": "sub-01_ses-2_task-static",
+}
+
+
+def performed(root: Path, out: Path) -> Study:
+    """Ingest and scale, in this process."""
+    config = load_config([root / "study.toml"])
+    study, refusals = load_study(root, config.roles.model_dump())
+    assert refusals == []
+    (person,) = study.participants
+    for stage in STAGES[:2]:
+        for trial in person.trials if stage.level == "trial" else (None,):
+            outcome = perform(Unit(stage, study, out, config, person, trial))
+            assert outcome.state == "done", outcome
+    return study
+
+
+@pytest.mark.slow
+def test_sessions_change_no_number(tmp_path):
+    """One body and one skeleton, whichever sessions the recordings are of."""
+    root = tmp_path / "study"
+    tasks = {"static": 1.0, "sequence": 4.0}
+    rates = {"default": Rates(marker_hz=50, analog_hz=250)}
+    one = StudyOptions(1, seed=3, sexes="M", tasks=tuple(tasks), durations_s=tasks, rates=rates)
+    simulate_study(root, one)
+    performed(root, tmp_path / "flat")
+    for stem, new in RENAMED.items():
+        folder = root / "sub-01" / new.split("_")[1]
+        folder.mkdir()
+        (root / "sub-01" / f"{stem}.c3d").rename(folder / f"{new}.c3d")
+    study = performed(root, tmp_path / "sessions")
+    assert {trial.stem for trial in study.participants[0].trials} == set(RENAMED.values())
+    paths = sorted((tmp_path / "flat" / "sub-01").glob("*.parquet"))
+    assert len(paths) == sum(len(s.writes) * (2 if s.level == "trial" else 1) for s in STAGES[:2])
+    kinds = {schema.file_name: kind for kind, schema in SCHEMAS.items()}
+    for path in paths:
+        kind = kinds[path.stem.rpartition("_")[2]]
+        flat = read_artifact(path, kind).replace(RENAMED)
+        stem = path.stem.removesuffix(f"_{SCHEMAS[kind].file_name}")
+        other = path.name.replace(stem, RENAMED.get(stem, stem))
+        other = read_artifact(tmp_path / "sessions" / "sub-01" / other, kind)
+        pd.testing.assert_frame_equal(flat, other, check_exact=True)

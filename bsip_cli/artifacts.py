@@ -13,13 +13,13 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from bsip_cli.errors import BadDataError, not_writable
-from bsip_cli.provenance import file_hash
+from bsip_cli.errors import BadDataError, ChangedError, not_writable
+from bsip_cli.fingerprints import BLANK, SEAL, file_hash, fingerprint, forget, seal
 from bsip_cli.schemas import SCHEMAS, Schema
 
 _TYPES = {"float": pa.float64(), "int": pa.int64(), "bool": pa.bool_(), "text": pa.string()}
 
-_UNFINISHED = ".part"
+_UNFINISHED = ".bsip-part"
 
 
 def empty_table(kind: str) -> pd.DataFrame:
@@ -37,12 +37,12 @@ def write_artifact(path: Path, kind: str, frame: pd.DataFrame, provenance: Mappi
     """
     header = _header(SCHEMAS[kind], provenance)
     table = _to_arrow(SCHEMAS[kind], frame).replace_schema_metadata(header)
-    write_atomically(
-        path,
-        lambda temporary: pq.write_table(
-            table, temporary, compression="zstd", write_page_checksum=True
-        ),
-    )
+
+    def write(temporary: Path) -> None:
+        _write_tables(temporary, table.schema, [table])
+        seal(temporary)
+
+    write_atomically(path, write)
 
 
 def write_artifact_in_parts(
@@ -65,6 +65,7 @@ def write_artifact_in_parts(
             whole = schema.with_metadata(_header(layout, provenance()))
             with pq.ParquetFile(rows) as file:
                 _write_tables(temporary, whole, _row_groups(file))
+            seal(temporary)
         finally:
             rows.unlink(missing_ok=True)
 
@@ -75,6 +76,7 @@ def _write_tables(path: Path, schema: pa.Schema, tables: Iterable[pa.Table]) -> 
     with pq.ParquetWriter(path, schema, compression="zstd", write_page_checksum=True) as writer:
         for table in tables:
             writer.write_table(table.replace_schema_metadata(schema.metadata))
+        writer.add_key_value_metadata({SEAL: BLANK})
 
 
 def _row_groups(file: pq.ParquetFile) -> Iterator[pa.Table]:
@@ -98,6 +100,7 @@ def write_atomically(path: Path, write) -> None:
             with temporary.open("rb") as handle:
                 os.fsync(handle.fileno())
             temporary.replace(path)
+            forget(path)
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:
@@ -120,6 +123,7 @@ def remove(path: Path) -> None:
     """
     try:
         path.unlink(missing_ok=True)
+        forget(path)
     except OSError as error:
         raise not_writable(path, error) from None
 
@@ -135,12 +139,13 @@ def read_artifact(path: Path, kind: str, **wanted: Collection[str]) -> pd.DataFr
     Raises
     ------
     BadDataError
-        The file is not an artifact of this kind, is damaged, or of a version this bsip does not
-        know.
+        The file is not an artifact of this kind, has changed since it was written, or is of a
+        version this bsip does not know.
     """
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             _check_kind(_header_in(file.schema_arrow), SCHEMAS[kind], path)
+            _check_intact(path)
             if not wanted:
                 return file.read().to_pandas()
             are_wanted = pq.filters_to_expression([(c, "in", v) for c, v in wanted.items()])
@@ -156,7 +161,8 @@ def read_header(path: Path, kind: str | None = None) -> dict[str, Any]:
     Raises
     ------
     BadDataError
-        The file is missing or is not an artifact; with ``kind``, it is of another kind or version.
+        The file is missing, is not an artifact or has changed since it was written; with ``kind``,
+        it is of another kind or version.
     """
     try:
         found = _header_in(pq.read_schema(path))
@@ -164,6 +170,7 @@ def read_header(path: Path, kind: str | None = None) -> dict[str, Any]:
         raise _not_an_artifact(path, error) from None
     if kind is not None:
         _check_kind(found, SCHEMAS[kind], path)
+    _check_intact(path)
     return found
 
 
@@ -177,6 +184,16 @@ def is_made_from(path: Path, source: Path) -> bool:
     """
     known = read_header(path)["provenance"]["made_by"]["inputs"]
     return source.exists() and known.get(source.name) == file_hash(source)
+
+
+def _check_intact(path: Path) -> None:
+    if not fingerprint(path).intact:  # some other program's copy has no seal
+        raise ChangedError(
+            "has changed since bsip wrote it",
+            file=path,
+            expected="the content that its seal tells of",
+            remedy="run `bsip run` again: it is made anew",
+        )
 
 
 def _header_in(schema: pa.Schema) -> dict[str, Any]:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import click
 
 from bsip_cli import __version__
-from bsip_cli.errors import BsipError
+from bsip_cli.endings import EndedError, raise_when_ended
+from bsip_cli.errors import BsipError, not_readable, printable
 from bsip_cli.pipeline import STAGES
 
 # One thread per process: results do not depend on the number of cores, and --jobs decides the load.
@@ -24,7 +26,8 @@ def cli() -> None:
     """Find a person's body segment inertial parameters from motion capture and force plates.
 
     Exit codes: 0 done; 2 usage or configuration, or results cannot be written; 3 bad data (the rest
-    is done); 4 numerical failure; 1 a bug.
+    is done); 4 numerical failure; 1 a bug (the rest is done); 129, 130 and 143 ended by HUP, INT
+    and TERM.
     """
 
 
@@ -56,10 +59,15 @@ def _stage_command(name: str, summary: str) -> click.Command:
         "--jobs", default=1, show_default=True, type=click.IntRange(1), help="Participants at once."
     )
     @click.option("--force", is_flag=True, help="Redo what is up to date.")
+    @click.option(
+        "--verify",
+        is_flag=True,
+        help="Hash every file again, also those whose size and times have not changed.",
+    )
     def command(study, out, chosen, config_file, **options):
         from bsip_cli.session import run_session
 
-        sys.exit(run_session(name, study, out, chosen, config_file, **options))
+        return run_session(name, study, out, chosen, config_file, **options)
 
     return command
 
@@ -186,7 +194,7 @@ def inject(source, out, participants, seed, **effects):
     """
     from bsip_cli.simulate.command import inject_command
 
-    sys.exit(inject_command(source, out, participants, seed, **effects))
+    return inject_command(source, out, participants, seed, **effects)
 
 
 @cli.command()
@@ -231,7 +239,7 @@ def export(study, out, chosen, method, formats, model_file, model_bodies, repair
     from bsip_cli.export import Request, export_session
 
     request = Request(method, formats, model_file, model_bodies, repair)
-    sys.exit(export_session(study, out, chosen, config_file, request))
+    return export_session(study, out, chosen, config_file, request)
 
 
 @cli.command()
@@ -266,7 +274,7 @@ def markers(file, marker_set, prefix, write):
     """
     from bsip_cli.markers import Request, markers_command
 
-    sys.exit(markers_command(Request(file, marker_set, prefix, write)))
+    return markers_command(Request(file, marker_set, prefix, write))
 
 
 @cli.command()
@@ -309,13 +317,32 @@ def info(artifact) -> None:
 
 def main() -> None:
     """Entry point: turns errors into one sentence and a documented exit code."""
+    raise_when_ended()
     try:
-        cli(standalone_mode=False)
+        exit_code = cli(standalone_mode=False)
+        sys.stdout.flush()
     except click.ClickException as error:
-        error.show()
-        sys.exit(2)
+        _end(printable(error.format_message()), 2, error)
     except click.Abort:
-        sys.exit(130)
+        _end("", 130)
     except BsipError as error:
-        click.echo(f"bsip: {error}", err=True)
-        sys.exit(error.exit_code)
+        _end(str(error), error.exit_code)
+    except EndedError as ended:
+        _end(f"{ended}", ended.exit_code)
+    except BrokenPipeError:  # whoever reads the answer, like `head`, has seen enough
+        _end("", 0)
+    except OSError as error:
+        _end(str(not_readable(error)), 2)
+    sys.exit(exit_code)
+
+
+def _end(sentence: str, exit_code: int, usage: click.ClickException | None = None) -> None:
+    """Say the last sentence, if somebody listens still, and leave."""
+    with suppress(OSError):
+        if isinstance(usage, click.UsageError) and usage.ctx is not None:
+            click.echo(usage.ctx.get_usage(), err=True)
+        if sentence:
+            click.echo(f"bsip: {sentence}", err=True)
+    with suppress(OSError):  # what stands in its buffer cannot be written either
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(exit_code)

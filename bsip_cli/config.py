@@ -156,6 +156,10 @@ class Config(Section):
     diagnosis: Diagnosis
     stats: Stats
 
+    def only(self, names: Iterable[str]) -> Config:
+        """These options alone: whoever asks for another one gets an AttributeError."""
+        return self.model_construct(**{name: getattr(self, name) for name in names})
+
     def options(self, names: Iterable[str]) -> dict:
         """The named options as plain values, as they enter an artifact's provenance."""
         everything = self.model_dump(mode="json")

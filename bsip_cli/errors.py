@@ -69,6 +69,19 @@ class BadDataError(BsipError):
     exit_code = 3
 
 
+class ChangedError(BadDataError):
+    """An artifact is no more what its producer wrote (exit code 3)."""
+
+
+def not_readable(error: OSError) -> BadDataError:
+    """What to raise where the system lets no file be read."""
+    return BadDataError(
+        f"the system refuses ({error.strerror or error})",
+        file=error.filename or "",
+        remedy="check the disk and the limits of the system (ulimit), and run again",
+    )
+
+
 class NumericalError(BsipError):
     """A computation did not converge or has no unique answer (exit code 4)."""
 

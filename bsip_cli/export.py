@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -32,9 +32,9 @@ from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError, BsipError, UsageError
 from bsip_cli.files import check_regular
+from bsip_cli.fingerprints import file_hash
 from bsip_cli.lock import held_alone
 from bsip_cli.pipeline import Stage
-from bsip_cli.provenance import file_hash
 from bsip_cli.runner import Outcome, lacking
 from bsip_cli.schemas import bsip_names
 from bsip_cli.session import follow, open_study
@@ -84,7 +84,7 @@ def export_session(
     skeleton = load_skeleton(opened.config.skeleton)
     writers = _writers(request, skeleton)
 
-    def running() -> Iterator[Outcome]:
+    def running() -> Generator[Outcome, None, None]:
         for participant in opened.study.participants:
             unit = Unit(_READER, opened.study, out, opened.config, participant)
             yield _export(unit, skeleton, request, writers)

@@ -1,4 +1,4 @@
-"""What made an artifact: inputs by hash, options, versions. No clock: same work, same bytes."""
+"""What made an artifact: inputs, options, code, versions. No clock: same work, same bytes."""
 
 from __future__ import annotations
 
@@ -10,37 +10,30 @@ from importlib.metadata import version
 from pathlib import Path
 
 from bsip_cli import __version__
+from bsip_cli.code_hash import code_hash
+from bsip_cli.fingerprints import file_hash
+from bsip_cli.pipeline import Stage
 
 _LIBRARIES = (
     "clarabel",
     "ezc3d",
+    "jinja2",
     "matplotlib",
     "numba",
     "numpy",
     "pandas",
     "pin",
     "pyarrow",
+    "pydantic",
     "scipy",
     "statsmodels",
 )
 
 
-def file_hash(path: Path) -> str:
-    """SHA-256 of a file's bytes."""
-    status = path.stat()
-    return _file_hash(str(path), status.st_mtime_ns, status.st_size)
-
-
-@lru_cache(maxsize=4096)
-def _file_hash(path: str, _modified: int, _size: int) -> str:
-    with Path(path).open("rb") as handle:
-        return hashlib.file_digest(handle, "sha256").hexdigest()
-
-
 def hash_of_files(files: Mapping[str, Path]) -> str:
     """SHA-256 of the lines "name hash" of some files, in the order of their names."""
     lines = (f"{name} {file_hash(path)}\n" for name, path in sorted(files.items()))
-    return hashlib.sha256("".join(lines).encode()).hexdigest()
+    return hashlib.sha256("".join(lines).encode("utf-8", "surrogateescape")).hexdigest()
 
 
 @lru_cache(maxsize=1)
@@ -49,11 +42,12 @@ def library_versions() -> dict[str, str]:
     return {name: version(name) for name in _LIBRARIES}
 
 
-def describe(stage: str, inputs: Mapping[str, str], options: Mapping) -> dict:
+def describe(stage: Stage, inputs: Mapping[str, str], options: Mapping) -> dict:
     """The provenance of what ``stage`` makes from ``inputs`` (name: hash) with ``options``."""
     return {
-        "stage": stage,
+        "stage": stage.name,
         "bsip_version": __version__,
+        "code": code_hash(stage.module),
         "libraries": library_versions(),
         "inputs": dict(sorted(inputs.items())),
         "options": json.loads(json.dumps(options, sort_keys=True)),

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import importlib
-import multiprocessing
-from collections.abc import Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+import signal
+import traceback
+from collections.abc import Generator, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import pandas as pd
 
-from bsip_cli.artifacts import remove, write_artifact
+from bsip_cli import fingerprints
+from bsip_cli.artifacts import remove, write_artifact, write_atomically
 from bsip_cli.config import Config
 from bsip_cli.errors import (
     BadDataError,
@@ -21,11 +22,18 @@ from bsip_cli.errors import (
     NotWritableError,
     NumericalError,
     UsageError,
+    not_readable,
+    printable,
 )
+from bsip_cli.freshness import stale_upstream, was_changed, why_stale
 from bsip_cli.lock import held_alone
-from bsip_cli.pipeline import Stage, by_level, producer
+from bsip_cli.pipeline import STAGES, Stage, by_level, producer
 from bsip_cli.study import Participant, Study
+from bsip_cli.trials import listed
 from bsip_cli.unit import Unit
+from bsip_cli.workers import Died, work_on
+
+_SHORT_OF_MEMORY = "the process was killed (out of memory?); run again, with fewer --jobs"
 
 State = Literal["done", "fresh", "waiting", "refused", "unwritten", "bug", "noted"]
 
@@ -41,85 +49,165 @@ class Outcome:
     exit_code: int = 0
 
 
+@dataclass(frozen=True)
+class Manner:
+    """How stages are run: ``force`` redoes what is fresh, ``verify`` hashes every file again,
+    ``jobs`` participants run at once, each in a process of its own."""
+
+    force: bool = False
+    verify: bool = False
+    jobs: int = 1
+
+
+@dataclass(frozen=True)
+class _Task:
+    """Stages of one participant, or of the cohort; ``doubtful``: whose results may be stale."""
+
+    stages: tuple[Stage, ...]
+    study: Study
+    out: Path
+    config: Config
+    manner: Manner
+    participant: Participant | None = None
+    doubtful: frozenset[str] = frozenset()
+
+    @property
+    def name(self) -> str:
+        return self.participant.id if self.participant else "group"
+
+    @property
+    def folder(self) -> Path:
+        return self.out / self.name
+
+
 def run_stages(
-    stages: tuple[Stage, ...],
-    study: Study,
-    out: Path,
-    config: Config,
-    *,
-    force: bool,
-    jobs: int,
-) -> Iterator[Outcome]:
+    stages: tuple[Stage, ...], study: Study, out: Path, config: Config, manner: Manner
+) -> Generator[Outcome, None, None]:
     """Run ``stages`` participant by participant, then those of the cohort; yield what became.
 
-    ``force`` redoes what is fresh; ``jobs`` participants run at once, each in its own process.
+    Raises
+    ------
+    EndedError
+        A signal asked this process or one of its workers to end.
     """
     personal, shared = by_level(stages)
+    doubtful = {participant.id for participant in study.participants}
     if personal:
-        with _processes(jobs) as pool:
-            running = {}
-            for participant in study.participants:
-                alone = Study(study.root, (participant,))  # all that its process needs to know
-                work = pool.submit(_run, personal, alone, out, config, force, participant)
-                running[participant.id] = work
-            for name, future in running.items():
-                yield from _outcomes(future, name, personal)
+        alone = (
+            # all that a process needs to know
+            _Task(personal, Study(study.root, (participant,)), out, config, manner, participant)
+            for participant in study.participants
+        )
+        troubled = set()
+        for owner, outcome in _outcomes(alone, manner.jobs):
+            troubled |= {owner} if outcome.exit_code else set()
+            yield outcome
+        doubtful = troubled if _is_whole(personal) else doubtful
     if shared:
-        with _processes(1) as pool:
-            for stage in shared:
-                future = pool.submit(_run, (stage,), study, out, config, force)
-                yield from _outcomes(future, "group", (stage,))
+        group = _Task(shared, study, out, config, manner, doubtful=frozenset(doubtful))
+        yield from (outcome for _, outcome in _outcomes([group], 1))
 
 
-def _processes(jobs: int) -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"))
+def _is_whole(stages: tuple[Stage, ...]) -> bool:
+    return all(stage in stages for stage in by_level(STAGES)[0])
 
 
-def _outcomes(
-    future: Future[list[Outcome]], name: str, stages: tuple[Stage, ...]
-) -> Iterable[Outcome]:
-    """What a process made of ``stages``; its bug stops nobody else's work."""
-    error = future.exception()
-    return future.result() if error is None else [_bug(name, stages, error)]
+def _outcomes(tasks: Iterable[_Task], jobs: int) -> Iterator[tuple[str, Outcome]]:
+    """Whose, and what; the end of a process stops nobody else's work."""
+    for result in work_on(tasks, _run, jobs, _tidy):
+        if isinstance(result, Died):
+            yield result.task.name, _killed(result.task, result.exit_code)
+        else:
+            yield result
 
 
-def _run(
-    stages: tuple[Stage, ...],
-    study: Study,
-    out: Path,
-    config: Config,
-    force: bool,
-    participant: Participant | None = None,
-) -> list[Outcome]:
-    """Stages of one participant, or of the cohort, unless another bsip is at them."""
-    name = participant.id if participant else "group"
+def _tidy(task: _Task) -> None:
+    """Take away what a killed process left half written, unless another bsip is at it by now."""
+    with suppress(UsageError), held_alone(task.folder):
+        pass
+
+
+def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
+    """The stages of a task, unless another bsip is at them."""
     try:
-        with held_alone(out / name):
-            return _run_alone(stages, study, out, config, force, participant)
+        with held_alone(task.folder):
+            fingerprints.forget_all()
+            if not task.manner.verify:
+                _recall(task)
+            for outcome in _run_alone(task):
+                yield task.name, outcome
+            _remember(task)
     except UsageError as error:
-        return [Outcome(stages[0].name, name, "refused", (str(error),), error.exit_code)]
+        said = (str(error),)
+        yield task.name, Outcome(task.stages[0].name, task.name, "refused", said, error.exit_code)
+    except Exception as error:  # noqa: BLE001  a bug outside of the units stops one task only
+        yield task.name, _bug(task.stages[0].name, task.name, error)
 
 
-def _run_alone(
-    stages: Iterable[Stage],
-    study: Study,
-    out: Path,
-    config: Config,
-    force: bool,
-    participant: Participant | None,
-) -> list[Outcome]:
+def _recall(task: _Task) -> None:
+    fingerprints.recall(task.folder)
+    if task.participant is None:
+        for participant in task.study.participants:
+            fingerprints.recall(task.out / participant.id)
+
+
+def _remember(task: _Task) -> None:
+    """Keep what is known of the participant's files, or of the group's own."""
+    recordings = [task.study.root / task.participant.id] if task.participant else []
+    text = fingerprints.to_keep([task.folder, *recordings])
+    path = task.folder / fingerprints.NAME
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def _run_alone(task: _Task) -> Iterator[Outcome]:
     """Unit by unit; what cannot be written ends it, else the rest would be made without it."""
-    if participant is not None:
-        _forget_gone_recordings(out / participant.id, participant)
-    outcomes = []
-    for stage in stages:
-        trials = participant.trials if participant and stage.level == "trial" else (None,)
+    study, left_out = task.study, {}
+    if task.participant is not None:
+        _forget_gone_recordings(task.folder, task.participant)
+        yield from _behind(task)
+    else:
+        left_out = _stale_people(task)
+        study = Study(
+            study.root, tuple(one for one in study.participants if one.id not in left_out)
+        )
+        yield from _left_out(task, left_out)
+    for stage in task.stages:
+        trials = task.participant.trials if task.participant and stage.level == "trial" else (None,)
         for trial in trials:
-            unit = Unit(stage, study, out, config, participant, trial)
-            outcomes.append(perform(unit, force))
-            if outcomes[-1].state == "unwritten":
-                return outcomes
-    return outcomes
+            unit = Unit(
+                stage, study, task.out, task.config, task.participant, trial, left_out=left_out
+            )
+            outcome = perform(unit, task.manner.force)
+            yield outcome
+            if outcome.state == "unwritten":
+                return
+
+
+def _behind(task: _Task) -> Iterator[Outcome]:
+    """A word where stages that are run alone build on what is not up to date."""
+    assert task.participant is not None
+    unit = Unit(task.stages[-1], task.study, task.out, task.config, task.participant)
+    if why := stale_upstream(unit, task.participant, task.stages):
+        said = (f"{task.name}: {why}; `bsip run` brings it up to date",)
+        yield Outcome(task.stages[0].name, task.name, "noted", said)
+
+
+def _stale_people(task: _Task) -> dict[str, str]:
+    """Participants whose results are not up to date, and why."""
+    unit = Unit(task.stages[0], task.study, task.out, task.config)
+    doubtful = (one for one in task.study.participants if one.id in task.doubtful)
+    found = {one.id: stale_upstream(unit, one, task.stages) for one in doubtful}
+    return {name: why for name, why in found.items() if why}
+
+
+def _left_out(task: _Task, left_out: Mapping[str, str]) -> Iterator[Outcome]:
+    reasons: dict[str, list[str]] = {}
+    for name, why in left_out.items():
+        reasons.setdefault(why, []).append(name)
+    for why, names in reasons.items():
+        said = f"{listed(names)}: left out of the group, since {why}; run `bsip run` first"
+        yield Outcome(task.stages[0].name, "group", "refused", (said,), BadDataError.exit_code)
 
 
 def _forget_gone_recordings(folder: Path, participant: Participant) -> None:
@@ -131,27 +219,37 @@ def _forget_gone_recordings(folder: Path, participant: Participant) -> None:
 
 
 def perform(unit: Unit, force: bool = False) -> Outcome:
-    """Do one unit unless it is fresh or lacks its inputs."""
+    """Do one unit unless it is fresh or lacks its inputs; its bug is written down, too."""
     stage = unit.stage
-    waiting = lacking(unit)
-    if waiting is not None:
-        return waiting
-    fresh = unit.is_fresh()  # asked first: a file that changes from here on makes it stale
-    if fresh and not force:
-        return Outcome(stage.name, unit.name, "fresh")
     try:
+        waiting = lacking(unit)
+        if waiting is not None:
+            return waiting
+        why = why_stale(unit)  # asked first: a file that changes from here on makes it stale
+        if not why and not force:
+            return Outcome(stage.name, unit.name, "fresh")
+        said = [
+            f"{name} has changed since it was written: made again" for name in was_changed(unit)
+        ]
         importlib.import_module(stage.module).run(unit)
         remove(unit.refusal_path())
     except BsipError as error:
         return _refused(unit, error)
-    return Outcome(stage.name, unit.name, "done", tuple(unit.messages))
+    except OSError as error:
+        return _refused(unit, not_readable(error))
+    except Exception as error:  # noqa: BLE001  a bug in one unit leaves the others standing
+        bug = _bug(stage.name, unit.name, error)
+        _write_refusal(unit, "bug", bug.sentences[0].splitlines()[0])
+        return bug
+    return Outcome(stage.name, unit.name, "done", (*said, *unit.messages))
 
 
 def _refused(unit: Unit, error: BsipError) -> Outcome:
     """Write down what is wrong with the data; say what is wrong, after the unit's warnings."""
     if not isinstance(error, UsageError):
         try:
-            _write_refusal(unit, error)
+            kind = "numerical failure" if isinstance(error, NumericalError) else "bad data"
+            _write_refusal(unit, kind, str(error))
         except NotWritableError as closed:
             return _refused(unit, closed)
     sentence = str(error) if unit.name in str(error) else f"{unit.name}: {error}"
@@ -178,21 +276,30 @@ def _refused_upstream(unit: Unit) -> bool:
     return any(any(folder.glob("*_refusal-*.parquet")) for folder in folders)
 
 
-def _write_refusal(unit: Unit, error: BsipError) -> None:
-    kind = "numerical failure" if isinstance(error, NumericalError) else "bad data"
-    row = pd.DataFrame([{"stage": unit.stage.name, "kind": kind, "sentence": str(error)}])
+def _write_refusal(unit: Unit, kind: str, sentence: str) -> None:
+    row = pd.DataFrame([{"stage": unit.stage.name, "kind": kind, "sentence": sentence}])
     notes = {"made_by": unit.made_by, "messages": list(unit.messages), "facts": {}}
     write_artifact(unit.refusal_path(), "refusal", row, notes)
 
 
-def _bug(name: str, stages: tuple[Stage, ...], error: BaseException) -> Outcome:
-    stage = stages[0].name if len({stage.name for stage in stages}) == 1 else "run"
-    if isinstance(error, BrokenProcessPool):
-        found = "the process was killed (out of memory?); run again, with fewer --jobs"
-    else:
-        trace = str(error.__cause__ or "").strip('"\n')
-        found = f"a bug in bsip: {type(error).__name__}: {error}\n{trace}".rstrip()
-    return Outcome(stage, name, "bug", (f"{name}: {found}",), 1)
+def _bug(stage: str, name: str, error: Exception) -> Outcome:
+    """What to say of an exception that nobody foresaw, with its trace for the report of a bug."""
+    if isinstance(error, MemoryError):
+        return Outcome(stage, name, "bug", (f"{name}: {_SHORT_OF_MEMORY}",), 1)
+    trace = "".join(traceback.format_exception(error)).strip()
+    found = f"a bug in bsip: {type(error).__name__}: {printable(str(error))}"
+    return Outcome(stage, name, "bug", (f"{name}: {found}\n{trace}",), 1)
+
+
+def _killed(task: _Task, exit_code: int | None) -> Outcome:
+    stage = task.stages[0].name if len({stage.name for stage in task.stages}) == 1 else "run"
+    how = _SHORT_OF_MEMORY if exit_code == -signal.SIGKILL else f"it crashed ({_ending(exit_code)})"
+    return Outcome(stage, task.name, "bug", (f"{task.name}: {how}",), 1)
+
+
+def _ending(exit_code: int | None) -> str:
+    code = exit_code or 0
+    return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
 
 def refusal_sentence(refusals: list[BadDataError]) -> Iterator[Outcome]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from bsip_cli.config import Config, load_config, with_estimators
 from bsip_cli.dataset import describe_dataset, make_out
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.pipeline import Stage, by_level, stages_named
-from bsip_cli.runner import Outcome, refusal_sentence, run_stages
+from bsip_cli.runner import Manner, Outcome, refusal_sentence, run_stages
 from bsip_cli.study import Study, load_study
 
 _SEVERITY = (0, 3, 4, 2, 1)  # of several exit codes the gravest counts
@@ -33,13 +34,14 @@ def run_session(
     *,
     jobs: int,
     force: bool,
+    verify: bool = False,
     estimators: tuple[str, ...] = (),
     group: bool = False,
 ) -> int:
     """Run a command's stages on a study and return the exit code.
 
     ``estimators`` stand for the configured ones, unless empty; ``group`` leaves out what is
-    about one participant.
+    about one participant; ``verify`` hashes every file, also where its times have not changed.
     """
     stages = _stages(command, chosen, group)
     if any(stage.level == "cohort" for stage in stages):
@@ -47,7 +49,8 @@ def run_session(
     opened = open_study(root, out, chosen, config_file, estimators)
     refusals = (*opened.refusals, *_notes(describe_dataset(out, opened.study.root)))
     participants = opened.study.participants
-    running = run_stages(stages, opened.study, out, opened.config, force=force, jobs=jobs)
+    manner = Manner(force=force, verify=verify, jobs=jobs)
+    running = run_stages(stages, opened.study, out, opened.config, manner)
     total = sum(
         1
         if s.level == "cohort"
@@ -117,16 +120,21 @@ def _notes(*sentences: str) -> Iterator[Outcome]:
 
 
 def follow(
-    command: str, refusals: Iterable[Outcome], running: Iterable[Outcome], total: int, out: Path
+    command: str,
+    refusals: Iterable[Outcome],
+    running: Generator[Outcome, None, None],
+    total: int,
+    out: Path,
 ) -> int:
     """Tell the user what becomes of the units, with a bar of ``total`` steps; the exit code."""
     outcomes = list(refusals)
     for outcome in outcomes:
         _tell(outcome)
-    with tqdm(total=total, desc=command, unit="unit", disable=None) as progress:
+    bar = tqdm(total=total, desc=command, unit="unit", disable=None)
+    with bar as progress, closing(running):  # whatever happens here, no process goes on
         for outcome in running:
             outcomes.append(outcome)
-            progress.update()
+            progress.update(outcome.state != "noted")
             _tell(outcome)
     _summary(command, outcomes, out)
     return _exit_code(outcomes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import takewhile
@@ -17,9 +17,9 @@ from bsip_cli.artifacts import (
     write_artifact_in_parts,
 )
 from bsip_cli.config import Config, Load
-from bsip_cli.errors import BadDataError
+from bsip_cli.fingerprints import file_hash
 from bsip_cli.pipeline import STAGES, Stage, producer
-from bsip_cli.provenance import describe, file_hash, hash_of_files
+from bsip_cli.provenance import describe, hash_of_files
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.standing import Folder
 from bsip_cli.study import Participant, Study, Trial
@@ -27,7 +27,11 @@ from bsip_cli.study import Participant, Study, Trial
 
 @dataclass
 class Unit:
-    """What a stage is handed: it reads, writes and warns through this and nothing else."""
+    """What a stage is handed: it reads, writes and warns through this and nothing else.
+
+    ``config`` are the options that the stage names. ``left_out`` are participants whose results are
+    not up to date, with the reason: a cohort stage tells of them and does not use them.
+    """
 
     stage: Stage
     study: Study
@@ -36,6 +40,12 @@ class Unit:
     participant: Participant | None = None
     trial: Trial | None = None
     messages: list[str] = field(default_factory=list)
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    config_of_all: Config = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.config_of_all = self.config
+        self.config = self.config.only(self.stage.options)
 
     @property
     def name(self) -> str:
@@ -115,7 +125,7 @@ class Unit:
             owners, before
         )
 
-    # --- inputs, freshness ------------------------------------------------------------------
+    # --- inputs ------------------------------------------------------------------------------
 
     def inputs(self) -> dict[str, Path]:
         """Name and path of every file that a unit of a participant reads, but for refused ones."""
@@ -190,7 +200,7 @@ class Unit:
                 "mass_kg": self.participant.mass_kg,
                 "height_m": self.participant.height_m,
             }
-        return describe(self.stage.name, self._hashes(), options)
+        return describe(self.stage, self._hashes(), options)
 
     def _hashes(self) -> dict[str, str]:
         """Of every input; in the group, of everything of a participant together."""
@@ -200,40 +210,8 @@ class Unit:
         everybody = ((person.id, self._files_of(person)) for person in self.study.participants)
         people = {name: hash_of_files(files) for name, files in everybody if files}
         files = self._files_of(None) | self._files_of_options()
-        return {name: file_hash(path) for name, path in files.items()} | people
-
-    def is_fresh(self) -> bool:
-        """Everything the unit writes is there and made from what it would read now."""
-        wanted = self.made_by
-        if self.refusal_path().exists():
-            return False
-        return all(self._is_current(kind, wanted) for kind in self.stage.writes) and all(
-            self._is_amended(kind, wanted) for kind in self.stage.amends
-        )
-
-    def _is_amended(self, kind: str, amended_by: dict) -> bool:
-        try:
-            header = read_header(self.path(kind), kind)
-        except BadDataError:
-            return False
-        return header["provenance"].get("amended_by") == amended_by
-
-    def _is_current(self, kind: str, made_by: dict) -> bool:
-        path = self.path(kind)
-        try:
-            header = read_header(path, kind)
-            if header["provenance"]["made_by"] != made_by:
-                return False
-            listed = read_artifact(path, kind) if SCHEMAS[kind].column("sha256") else None
-        except BadDataError:
-            return False
-        if listed is None:
-            return True
-        files = zip(listed["file"], listed["sha256"], strict=True)
-        return all(
-            (self.out / name).is_file() and file_hash(self.out / name) == known
-            for name, known in files
-        )
+        hashes = {name: file_hash(path) for name, path in files.items()}
+        return hashes | people | {name: f"left out: {why}" for name, why in self.left_out.items()}
 
     # --- reading and writing ----------------------------------------------------------------
 

@@ -14,7 +14,7 @@ import pandas as pd
 
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header, write_atomically
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.provenance import file_hash
+from bsip_cli.fingerprints import file_hash
 from bsip_cli.report.blocks import Document
 from bsip_cli.report.figures.canvas import to_png
 from bsip_cli.report.page import render

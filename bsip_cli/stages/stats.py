@@ -57,6 +57,8 @@ class _Cohort:
         BadDataError
             Nobody has any.
         """
+        for name, why in self._unit.left_out.items():
+            self._missing.note(f"{name} is left out, since {why}", 1, 2, 3, 4, 5, 6)
         waiting: list[Value] = []
         for participant in self._unit.study.participants:
             waiting += self._values_of(participant)
@@ -170,6 +172,10 @@ class _Missing:
     def add(self, what: str, *numbers: int) -> None:
         """`what` ("sub-02 has no ...") is not in the tables with these numbers."""
         self._unit.warn(f"{what}: not in {_in_words(numbers)}")
+        self.note(what, *numbers)
+
+    def note(self, what: str, *numbers: int) -> None:
+        """The same of what the user has been told already."""
         self.found.append({"sentence": what, "tables": [f"table{k}" for k in numbers]})
 
 

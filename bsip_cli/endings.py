@@ -1,0 +1,55 @@
+"""How a run is ended from outside: HUP, INT and TERM become one exception, which tidies up."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+ENDING = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
+_SHELL = 128  # shells add it to a signal's number for the exit code
+
+
+class EndedError(BaseException):
+    """A signal asks the process to end; not an ``Exception``, so that nothing takes it for one."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+    @property
+    def exit_code(self) -> int:
+        return _SHELL + self.number
+
+    def __str__(self) -> str:
+        name = signal.Signals(self.number).name
+        return f"ended by {name}; what is finished stays, and the next run goes on from there"
+
+
+def raise_when_ended() -> None:
+    """From now on these signals raise `EndedError`; those that are ignored (nohup) stay so."""
+    for number in ENDING:
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, _raise)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
+
+
+def _raise(number: int, _frame: object) -> None:
+    raise EndedError(number)
+
+
+def signal_in(exit_code: int | None) -> int | None:
+    """The signal that ended a process, if one of these did: by itself or as an exit code."""
+    code = exit_code or 0
+    number = -code if code < 0 else code - _SHELL
+    return number if number in ENDING else None
+
+
+@contextmanager
+def endings_wait() -> Iterator[None]:
+    """Inside, the signals wait until the end; processes started there begin with them waiting."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,0 +1,186 @@
+"""Whether results are still true: made by this code and these options, from what is there now."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+
+from bsip_cli.artifacts import read_artifact, read_header
+from bsip_cli.code_hash import code_hash
+from bsip_cli.errors import BadDataError, ChangedError
+from bsip_cli.fingerprints import file_hash, fingerprint
+from bsip_cli.pipeline import STAGES, Stage, producer
+from bsip_cli.schemas import SCHEMAS
+from bsip_cli.study import Participant
+from bsip_cli.unit import Unit
+
+
+def why_stale(unit: Unit) -> str:
+    """Why a unit has work to do, as a clause; empty if all that it writes is there and true.
+
+    Raises
+    ------
+    BadDataError
+        A file that it reads cannot be read.
+    """
+    if unit.refusal_path().exists():
+        return "it was refused before"
+    for kind in unit.stage.writes:
+        if why := _why_not(unit, kind, "made_by") or _listed_changed(unit, kind):
+            return why
+    amended = (_why_not(unit, kind, "amended_by") for kind in unit.stage.amends)
+    return next(filter(None, amended), "")
+
+
+def was_changed(unit: Unit) -> list[str]:
+    """Names of files that the unit has written and that are no more what it wrote."""
+    return [name for kind in unit.stage.writes for name in _changed(unit, kind)]
+
+
+def stale_upstream(unit: Unit, participant: Participant, stages: Collection[Stage]) -> str:
+    """The first result of a participant on which ``stages`` build and that is no more true, and
+    why; empty if all are."""
+    before = {one.label for stage in stages for one in _before(stage)}
+    before -= {stage.label for stage in stages}
+    for stage in STAGES:
+        for other in units_of(stage, unit, participant) if stage.label in before else ():
+            if why := _untrue(other):
+                return f"what `bsip {stage.name}` made of {other.name} is not up to date ({why})"
+    return ""
+
+
+def units_of(stage: Stage, like: Unit, participant: Participant) -> Iterator[Unit]:
+    """A stage's units about one participant, in the study and with all options of ``like``."""
+    trials = participant.trials if stage.level == "trial" else (None,)
+    for trial in trials:
+        yield Unit(stage, like.study, like.out, like.config_of_all, participant, trial)
+
+
+def _untrue(unit: Unit) -> str:
+    """Why what is there is not true; what is not there, or was refused as it stands, is no lie."""
+    refusal = unit.refusal_path()
+    if refusal.exists():
+        return _differs(read_header(refusal, "refusal")["provenance"]["made_by"], unit.made_by)
+    if unit.missing() or not any(unit.path(kind).exists() for kind in unit.stage.writes):
+        return ""
+    return why_stale(unit)
+
+
+@lru_cache(maxsize=64)
+def _before(stage: Stage) -> tuple[Stage, ...]:
+    """The stages about participants whose results a stage reads, directly or not, in order."""
+    found: set[str] = set()
+    waiting = list(stage.inputs)
+    while waiting:
+        maker = producer(waiting.pop())
+        if maker.label not in found:
+            found.add(maker.label)
+            waiting += maker.inputs
+    return tuple(s for s in STAGES if s.label in found and s.level != "cohort")
+
+
+# --- one artifact -----------------------------------------------------------------------------
+
+
+def _why_not(unit: Unit, kind: str, maker: str) -> str:
+    path = unit.path(kind)
+    if not path.exists():
+        return f"{path.name} is not there"
+    try:
+        provenance = read_header(path, kind)["provenance"]
+    except ChangedError:
+        return f"{path.name} has changed since it was written"
+    except BadDataError as error:
+        return f"{path.name} {error.found}"
+    return _differs(provenance.get(maker), unit.made_by)
+
+
+def _differs(known: Mapping | None, wanted: Mapping) -> str:
+    """What two provenances do not have in common, as a clause."""
+    if known == wanted:
+        return ""
+    if known is None:
+        return "nothing was added to it yet"
+    words = {
+        "code": "the code or a shipped table has changed",
+        "bsip_version": "the version of bsip has changed",
+        "libraries": "the version of a library has changed",
+    }
+    for part, sentence in words.items():
+        if known.get(part) != wanted[part]:
+            return sentence
+    options = _names(known["options"], wanted["options"])
+    if options:
+        return f"other options ({', '.join(options)})"
+    return f"other input ({', '.join(_names(known['inputs'], wanted['inputs'])[:3])})"
+
+
+def _names(one: Mapping, other: Mapping) -> list[str]:
+    """Keys under which two mappings differ."""
+    return sorted(key for key in one.keys() | other.keys() if one.get(key) != other.get(key))
+
+
+def _listed_changed(unit: Unit, kind: str) -> str:
+    """Files beside the artifact (pages, figures, tables) are no more those it lists."""
+    names = _changed_files(unit, kind)
+    return f"{names[0]} has changed since it was written" if names else ""
+
+
+def _changed_files(unit: Unit, kind: str) -> list[str]:
+    if SCHEMAS[kind].column("sha256") is None:
+        return []
+    listed = read_artifact(unit.path(kind), kind)
+    files = zip(listed["file"], listed["sha256"], strict=True)
+    return [name for name, known in files if not _is(unit.out / name, known)]
+
+
+def _is(path: Path, sha256: str) -> bool:
+    return path.is_file() and file_hash(path) == sha256
+
+
+def _changed(unit: Unit, kind: str) -> list[str]:
+    path = unit.path(kind)
+    if not path.exists():
+        return []
+    try:
+        read_header(path, kind)
+    except ChangedError:
+        return [path.name]
+    except BadDataError:  # not sealed: of an earlier bsip, or damaged
+        return [] if fingerprint(path).intact else [path.name]
+    return [name for name in _changed_files(unit, kind) if (unit.out / name).exists()]
+
+
+def outdated(path: Path) -> str:
+    """Why an artifact is no more true as far as the folder of results tells, without the study.
+
+    Its code has changed, or an artifact that it was made from, or one that that was made from.
+
+    Raises
+    ------
+    BadDataError
+        It is missing, is no artifact or has changed since it was written.
+    """
+    waiting, seen = [path], set()
+    while waiting:
+        one = waiting.pop()
+        provenance = read_header(one)["provenance"]
+        made_by = provenance["made_by"]
+        if made_by.get("code") != _code_of(one):
+            return f"{one.name} was made by other code"
+        for name, known in made_by["inputs"].items():
+            source = one.with_name(name)
+            if source.suffix != ".parquet" or source.name in seen:
+                continue
+            if not source.exists() or file_hash(source) != known:
+                return f"{one.name} was made from another {name}"
+            seen.add(source.name)
+            waiting.append(source)
+    return ""
+
+
+def _code_of(path: Path) -> str:
+    kind = read_header(path)["kind"]
+    makers = [stage for stage in STAGES if kind in stage.writes]
+    return code_hash(makers[0].module) if makers else ""

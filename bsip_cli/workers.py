@@ -1,0 +1,155 @@
+"""Processes that work on tasks one after the other, and end with the process that started them."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import Generic, TypeVar
+
+from bsip_cli.endings import EndedError, endings_wait, raise_when_ended, signal_in
+
+_SPAWN = multiprocessing.get_context("spawn")
+_TO_END_S = 2.0  # for a worker that was asked to end; then it is killed
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+@dataclass
+class _Worker(Generic[Task]):
+    process: BaseProcess
+    pipe: Connection
+    task: Task | None = None
+
+
+@dataclass(frozen=True)
+class Died(Generic[Task]):
+    """A worker came to its end in the middle of a task."""
+
+    task: Task
+    exit_code: int | None
+
+
+def work_on(
+    tasks: Iterable[Task],
+    work: Callable[[Task], Iterable[Result]],
+    jobs: int,
+    tidy: Callable[[Task], None],
+) -> Iterator[Result | Died[Task]]:
+    """The results of ``work`` on each task as they come, from so many processes at once.
+
+    Parameters
+    ----------
+    work : a function of a module, since it is found by its name in another process.
+    tidy : what is to be done for a task whose worker was killed in its middle.
+
+    Raises
+    ------
+    EndedError
+        This process, or one of the workers, was asked to end. All workers have ended by then.
+    """
+    pending, workers = deque(tasks), list[_Worker[Task]]()
+    jobs = min(jobs, len(pending))
+    try:
+        while pending or any(worker.task is not None for worker in workers):
+            while pending and len(workers) < jobs:
+                workers.append(_start(work))
+            for worker in workers:
+                if worker.task is None and pending:
+                    _hand(worker, pending.popleft())
+            by_pipe = {worker.pipe: worker for worker in workers}
+            for pipe in wait(list(by_pipe)):
+                worker = by_pipe[pipe]  # type: ignore[index]
+                try:
+                    result = worker.pipe.recv()
+                except (EOFError, OSError):
+                    workers.remove(worker)
+                    yield from _died(worker, tidy)
+                    continue
+                if result is None:
+                    worker.task = None
+                else:
+                    yield result
+    finally:
+        _end(workers, tidy)
+
+
+def _start(work: Callable) -> _Worker:
+    ours, theirs = _SPAWN.Pipe()
+    process = _SPAWN.Process(target=_serve, args=(theirs, work), daemon=True)
+    with endings_wait():
+        process.start()
+    theirs.close()
+    return _Worker(process, ours)
+
+
+def _hand(worker: _Worker[Task], task: Task) -> None:
+    worker.task = task
+    with suppress(OSError):  # it has died: then its end of the pipe says so
+        worker.pipe.send(task)
+
+
+def _died(worker: _Worker[Task], tidy: Callable[[Task], None]) -> Iterator[Died[Task]]:
+    worker.process.join()
+    if worker.task is not None:
+        tidy(worker.task)
+    number = signal_in(worker.process.exitcode)
+    if number is not None:
+        raise EndedError(number)
+    if worker.task is not None:
+        yield Died(worker.task, worker.process.exitcode)
+
+
+def _end(workers: list[_Worker[Task]], tidy: Callable[[Task], None]) -> None:
+    """Idle workers leave when their pipe is closed; the others are asked to, and then killed."""
+    with endings_wait():
+        for worker in workers:
+            worker.pipe.close()
+            if worker.task is not None:
+                worker.process.terminate()
+        until = time.monotonic() + _TO_END_S
+        for worker in workers:
+            worker.process.join(max(0.0, until - time.monotonic()))
+            if worker.process.is_alive():
+                worker.process.kill()
+                worker.process.join()
+            if worker.task is not None:
+                tidy(worker.task)
+
+
+# --- in the worker ----------------------------------------------------------------------------
+
+
+def _serve(pipe: Connection, work: Callable) -> None:
+    """Take tasks until the pipe is closed."""
+    try:
+        raise_when_ended()
+        threading.Thread(target=_leave_with_parent, daemon=True).start()
+        while True:
+            for result in work(pipe.recv()):
+                pipe.send(result)
+            pipe.send(None)
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        return  # the parent wants no more
+    except EndedError as ended:
+        sys.exit(ended.exit_code)
+
+
+def _leave_with_parent() -> None:
+    """Wait for the parent's end, also when it was killed; then end this process."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(_TO_END_S)
+    os.kill(os.getpid(), signal.SIGKILL)

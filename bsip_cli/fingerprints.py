@@ -21,13 +21,14 @@ from bsip_cli.errors import BadDataError
 SEAL = "bsip_seal"
 BLANK = "0" * 64
 NAME = ".fingerprints.json"
+_OWN = (NAME, ".lock")
 
 _PLACE = re.compile(SEAL.encode() + rb"[^0-9a-f]{1,4}([0-9a-f]{64})")  # Thrift: key, length, text
 _MAGIC = b"PAR1"
 _CHUNK = 1 << 20
-# Times of FAT and of some network file systems have steps of 2 s: a file hashed sooner after its
-# last change may change again with the same times.
-_SETTLED_NS = 2_000_000_000
+# A file may change again within one step of its times: 2 s on FAT and some network file systems,
+# which keep no more than hundredths of a second; at most 10 ms, a tick of the kernel, on others.
+_COARSE_NS, _COARSE_STEP_S, STEP_S = 10_000_000, 2.0, 0.02
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,7 @@ def fingerprint(path: Path) -> Fingerprint:
         before, now = _status(name), time.time_ns()
         known = _known.get(name)
         if known is None or known.status != before:
-            is_settled = now - max(before[-2:]) > _SETTLED_NS
-            known = _known[name] = _Known(before, _taken(name), is_settled)
+            known = _known[name] = _Known(before, _taken(name), _is_settled(before, now))
     except OSError as error:
         _known.pop(name, None)
         raise BadDataError(
@@ -99,25 +99,47 @@ def seal(path: Path) -> None:
 # --- kept between runs ------------------------------------------------------------------------
 
 
-def recall(folder: Path) -> None:
-    """Take in what an earlier run kept in a folder; what is damaged there is not believed."""
+def recall(folder: Path) -> str:
+    """Take in what an earlier run kept in a folder; its note. What is damaged is not believed."""
     try:
         kept = json.loads((folder / NAME).read_text(encoding="utf-8"))
-        for name, (status, sha256, intact) in kept.items():
+        for name, (status, sha256, intact) in kept["files"].items():
             _known.setdefault(name, _Known(tuple(status), Fingerprint(sha256, intact), True))
-    except (OSError, ValueError, TypeError, AttributeError):
-        return  # nothing is known: files are hashed again
+        return str(kept["note"])
+    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+        return ""  # nothing is known: files are hashed again
 
 
-def to_keep(folders: Iterable[Path]) -> str:
-    """What is known of the files below some folders, as a text for `recall`."""
+def to_keep(folders: Iterable[Path], note: str) -> str:
+    """What is known of the files below some folders, and a note, as a text for `recall`."""
     below = tuple(str(folder.absolute()) + os.sep for folder in folders)
     kept = {
         name: [known.status, known.found.sha256, known.found.intact]
         for name, known in sorted(_known.items())
         if known.is_settled and name.startswith(below) and os.path.lexists(name)
     }
-    return json.dumps(kept, indent=0) + "\n"
+    return json.dumps({"note": note, "files": kept}, indent=0) + "\n"
+
+
+def snapshot(folder: Path, files: Iterable[Path]) -> str:
+    """SHA-256 over names, sizes, times and inodes of some files and of all in a folder.
+
+    Of a file that was hashed it is those at that moment. Empty where one has changed so shortly
+    ago that it may change again with the same times.
+    """
+    inside = (Path(place, name) for place, _, names in os.walk(folder) for name in names)
+    paths = sorted({*files, *(path for path in inside if path.name not in _OWN)})
+    digest, now = hashlib.sha256(), time.time_ns()
+    for path in paths:
+        known = _known.get(str(path.absolute()))
+        try:
+            status = known.status if known else _status(str(path))
+        except OSError:
+            return ""
+        if not _is_settled(status, now):
+            return ""
+        digest.update(os.fsencode(path) + repr(status).encode())
+    return digest.hexdigest()
 
 
 def forget_all() -> None:
@@ -133,6 +155,11 @@ def _status(name: str) -> tuple[int, ...]:
     if not stat.S_ISREG(found.st_mode):
         raise OSError(0, "not a regular file")
     return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
+
+
+def _is_settled(status: tuple[int, ...], now: int) -> bool:
+    step_s = _COARSE_STEP_S if status[-1] % _COARSE_NS == 0 else STEP_S
+    return now - max(status[-2:]) > step_s * 1e9
 
 
 def _taken(name: str) -> Fingerprint:

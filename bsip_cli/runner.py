@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import signal
+import time
 import traceback
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -15,6 +17,7 @@ import pandas as pd
 
 from bsip_cli import fingerprints
 from bsip_cli.artifacts import remove, write_artifact, write_atomically
+from bsip_cli.code_hash import code_hash
 from bsip_cli.config import Config
 from bsip_cli.errors import (
     BadDataError,
@@ -28,7 +31,8 @@ from bsip_cli.errors import (
 from bsip_cli.freshness import stale_upstream, was_changed, why_stale
 from bsip_cli.lock import held_alone
 from bsip_cli.pipeline import STAGES, Stage, by_level, producer
-from bsip_cli.study import Participant, Study
+from bsip_cli.provenance import library_versions
+from bsip_cli.study import Participant, Study, Trial
 from bsip_cli.trials import listed
 from bsip_cli.unit import Unit
 from bsip_cli.workers import Died, work_on
@@ -131,12 +135,15 @@ def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
     """The stages of a task, unless another bsip is at them."""
     try:
         with held_alone(task.folder):
-            fingerprints.forget_all()
-            if not task.manner.verify:
-                _recall(task)
+            if _is_unchanged(task):
+                yield from ((task.name, outcome) for outcome in _all_fresh(task))
+                return
+            is_true = True
             for outcome in _run_alone(task):
+                is_true &= outcome.state in ("done", "fresh")
                 yield task.name, outcome
-            _remember(task)
+            time.sleep(fingerprints.STEP_S)  # for what was written last to have its own time
+            _remember(task, _state(task) if is_true else "")
     except UsageError as error:
         said = (str(error),)
         yield task.name, Outcome(task.stages[0].name, task.name, "refused", said, error.exit_code)
@@ -144,20 +151,48 @@ def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
         yield task.name, _bug(task.stages[0].name, task.name, error)
 
 
-def _recall(task: _Task) -> None:
-    fingerprints.recall(task.folder)
-    if task.participant is None:
-        for participant in task.study.participants:
-            fingerprints.recall(task.out / participant.id)
+def _is_unchanged(task: _Task) -> bool:
+    """Nothing has changed since all of a participant's results were found to be up to date."""
+    fingerprints.forget_all()
+    now = _state(task)
+    if task.manner.verify:
+        return False
+    folders = [task.out / participant.id for participant in task.study.participants]
+    notes = [fingerprints.recall(folder) for folder in [task.folder, *folders]]
+    return notes[0] == now != "" and not task.manner.force
 
 
-def _remember(task: _Task) -> None:
+def _state(task: _Task) -> str:
+    """All that decides whether a participant's results are up to date, as a hash; of all stages."""
+    if task.participant is None or not _is_whole(task.stages):
+        return ""
+    named = (Path(task.config.marker_set), Path(task.config.skeleton))
+    options = [path for path in named if path.suffix == ".toml"]
+    recordings = [file for trial in task.participant.trials for file in trial.files]
+    files = fingerprints.snapshot(task.folder, [*recordings, *options])
+    code = [code_hash(stage.module) for stage in task.stages]
+    facts = (files, code, library_versions(), task.config.model_dump_json(), task.participant)
+    return hashlib.sha256(repr(facts).encode()).hexdigest() if files else ""
+
+
+def _all_fresh(task: _Task) -> Iterator[Outcome]:
+    for stage, trial in _units(task):
+        yield Outcome(stage.name, trial.stem if trial else task.name, "fresh")
+
+
+def _remember(task: _Task, state: str) -> None:
     """Keep what is known of the participant's files, or of the group's own."""
     recordings = [task.study.root / task.participant.id] if task.participant else []
-    text = fingerprints.to_keep([task.folder, *recordings])
+    text = fingerprints.to_keep([task.folder, *recordings], state)
     path = task.folder / fingerprints.NAME
     if not path.exists() or path.read_text(encoding="utf-8") != text:
         write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def _units(task: _Task) -> Iterator[tuple[Stage, Trial | None]]:
+    for stage in task.stages:
+        trials = task.participant.trials if task.participant and stage.level == "trial" else (None,)
+        yield from ((stage, trial) for trial in trials)
 
 
 def _run_alone(task: _Task) -> Iterator[Outcome]:
@@ -172,16 +207,12 @@ def _run_alone(task: _Task) -> Iterator[Outcome]:
             study.root, tuple(one for one in study.participants if one.id not in left_out)
         )
         yield from _left_out(task, left_out)
-    for stage in task.stages:
-        trials = task.participant.trials if task.participant and stage.level == "trial" else (None,)
-        for trial in trials:
-            unit = Unit(
-                stage, study, task.out, task.config, task.participant, trial, left_out=left_out
-            )
-            outcome = perform(unit, task.manner.force)
-            yield outcome
-            if outcome.state == "unwritten":
-                return
+    for stage, trial in _units(task):
+        unit = Unit(stage, study, task.out, task.config, task.participant, trial, left_out=left_out)
+        outcome = perform(unit, task.manner.force)
+        yield outcome
+        if outcome.state == "unwritten":
+            return
 
 
 def _behind(task: _Task) -> Iterator[Outcome]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,8 @@ class Folder:
     def now(cls, path: Path) -> Folder:
         """As it is; a folder that is not there is empty."""
         try:
-            return cls(path, frozenset(entry.name for entry in path.iterdir()))
+            with os.scandir(path) as entries:
+                return cls(path, frozenset(entry.name for entry in entries))
         except FileNotFoundError:
             return cls(path, frozenset())
 

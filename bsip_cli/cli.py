@@ -12,7 +12,7 @@ import click
 
 from bsip_cli import __version__
 from bsip_cli.endings import EndedError, raise_when_ended
-from bsip_cli.errors import BsipError, not_readable, printable
+from bsip_cli.errors import BsipError, not_readable
 from bsip_cli.pipeline import STAGES
 
 # One thread per process: results do not depend on the number of cores, and --jobs decides the load.
@@ -322,7 +322,8 @@ def main() -> None:
         exit_code = cli(standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as error:
-        _end(printable(error.format_message()), 2, error)
+        error.show()
+        sys.exit(2)
     except click.Abort:
         _end("", 130)
     except BsipError as error:
@@ -336,11 +337,9 @@ def main() -> None:
     sys.exit(exit_code)
 
 
-def _end(sentence: str, exit_code: int, usage: click.ClickException | None = None) -> None:
+def _end(sentence: str, exit_code: int) -> None:
     """Say the last sentence, if somebody listens still, and leave."""
     with suppress(OSError):
-        if isinstance(usage, click.UsageError) and usage.ctx is not None:
-            click.echo(usage.ctx.get_usage(), err=True)
         if sentence:
             click.echo(f"bsip: {sentence}", err=True)
     with suppress(OSError):  # what stands in its buffer cannot be written either

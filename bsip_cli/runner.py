@@ -324,7 +324,11 @@ def _bug(stage: str, name: str, error: Exception) -> Outcome:
 
 def _killed(task: _Task, exit_code: int | None) -> Outcome:
     stage = task.stages[0].name if len({stage.name for stage in task.stages}) == 1 else "run"
-    how = _SHORT_OF_MEMORY if exit_code == -signal.SIGKILL else f"it crashed ({_ending(exit_code)})"
+    how = (
+        _SHORT_OF_MEMORY
+        if exit_code == -signal.SIGKILL
+        else f"the process crashed ({_ending(exit_code)})"
+    )
     return Outcome(stage, task.name, "bug", (f"{task.name}: {how}",), 1)
 
 

@@ -8,14 +8,15 @@ from bsip_cli import session
 from bsip_cli.artifacts import read_header
 from bsip_cli.config import load_config
 from bsip_cli.pipeline import Stage
-from bsip_cli.runner import run_stages
+from bsip_cli.runner import Manner, run_stages
 from bsip_cli.study import load_study
 
 STAGES = {
     "faulty": 'def run(unit):\n    if unit.name in ("sub-01", "group"):\n'
     '        raise ValueError("boom")\n    unit.warn(f"{unit.name}: went well")\n',
     "harmless": 'def run(unit):\n    unit.warn(f"{unit.name}: went well")\n',
-    "deadly": 'import os\ndef run(unit):\n    if unit.name == "sub-01":\n        os._exit(9)\n',
+    "deadly": 'import os\ndef run(unit):\n    if unit.name == "sub-01":\n'
+    "        os.kill(os.getpid(), 9)\n",
     "numeric": "from bsip_cli.errors import NumericalError\ndef run(unit):\n"
     '    raise NumericalError("no optimum", file=unit.name)\n',
     "doubtful": "from bsip_cli.errors import BadDataError\ndef run(unit):\n"
@@ -41,7 +42,7 @@ def outcomes(empty_study, tmp_path):
     def of(*stages: Stage):
         study, _ = load_study(empty_study, {"static": ("static",), "sequence": ()})
         out = tmp_path / "out"
-        running = run_stages(stages, study, out, load_config([]), force=True, jobs=1)
+        running = run_stages(stages, study, out, load_config([]), Manner(force=True))
         return [(o.stage, o.unit, o.state, o.exit_code, o.sentences) for o in running]
 
     return of
@@ -88,7 +89,7 @@ def test_exit_code_and_words_of_a_session(stage, empty_study, tmp_path, monkeypa
     assert told.out == ""
     assert told.err.count("Traceback") == 1
     assert told.err.count("a bug in bsip: ValueError: boom") == 1
-    assert told.err.splitlines()[-1].startswith("bsip run: 1 done, 1 refused, 1 failed by a bug; ")
+    assert told.err.splitlines()[-1].startswith("bsip run: 1 done, 2 refused, 1 failed by a bug; ")
 
 
 def test_numerical_failure_is_code_4(stage, empty_study, tmp_path, monkeypatch, capsys):

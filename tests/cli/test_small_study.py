@@ -25,6 +25,7 @@ from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, load_config
 from bsip_cli.lock import held_alone
+from bsip_cli.freshness import why_stale
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.runner import Outcome, perform
 from bsip_cli.schemas import SCHEMAS, bsip_names
@@ -465,9 +466,9 @@ def test_refusal_makes_the_cohort_look_again(run):
     study, _ = load_study(run.study, load_config([]).roles.model_dump())
     config = load_config([run.study / "study.toml"])
     stats = next(stage for stage in STAGES if stage.name == "stats")
-    assert Unit(stats, study, run.out, config).is_fresh()
+    assert not why_stale(Unit(stats, study, run.out, config))
     shutil.copy(run.path("person"), run.path("refusal-scale", "sub-02"))
-    assert not Unit(stats, study, run.out, config).is_fresh()
+    assert why_stale(Unit(stats, study, run.out, config))
 
 
 @pytest.mark.parametrize(("stage", "counts"), [("scale", False), ("extend", True)])

@@ -1,5 +1,6 @@
 # make sample   set up, run the whole pipeline on sample_data, print the tables
-# make test     set up, check the code's form, run all tests
+# make test     set up, check the code's form, run the tests of every part and a small run (minutes)
+# make test-long   the other tests: whole runs, the short blind suite, real recordings, damaged files
 # make blind    hide effects in recordings and see whether `bsip diagnose` finds them (hours)
 # make cohort   simulate twelve people with 120 s sequences and run them
 # make COHORT=path [OUT=path] [-j 4] [-n]   your study: every participant on their own, then the
@@ -15,15 +16,20 @@ PROFILE ?= plain
 CLUSTER ?= .venv-cluster
 OUT ?= $(patsubst %/,%,$(COHORT))_results
 
-.PHONY: sample test blind cohort check clean study cluster
+.PHONY: sample test test-long blind cohort check clean study cluster
 
 sample: $(READY)
 	$(BIN)/bsip run sample_data --out out/sample --jobs $(JOBS)
 	$(BIN)/bsip show out/sample
 
+PYTEST = $(BIN)/pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder
+
 test: check
+	$(PYTEST) -m "not long"
+
+test-long: $(READY)
 	@$(MAKE) --no-print-directory $(CLUSTER)/ready || echo "Snakemake cannot be installed: its tests will skip"
-	$(BIN)/pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder
+	$(PYTEST) -m long
 
 blind: .venv/ready
 	$(BIN)/python -m tests.blind.blind_long --jobs $(JOBS) --draws $(DRAWS)

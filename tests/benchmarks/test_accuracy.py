@@ -66,7 +66,7 @@ def test_ratios_are_taken_per_task():
     assert rows[2].rstrip(" |").endswith("1.00 | 4.00")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_one_person(tmp_path):
     study, out = tmp_path / "study", tmp_path / "out"
     accuracy_study.write_study(study, 1, seed=5)

@@ -29,7 +29,7 @@ def test_tables_count_what_lies_inside_the_intervals():
     assert known_mass.mean_of(rows).startswith("1.067 (sd 0.126) ± 0.100")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_one_person(tmp_path):
     rows = list(known_mass.person(tmp_path, seed=7, duration_s=14.0))
     for worn in known_mass.LOADS:

@@ -78,6 +78,7 @@ def test_half_of_the_labs_have_a_plate_per_foot():
     assert not any("plate=" in one.target for case in cases_of(whole) for one in case.hidden)
 
 
+@pytest.mark.long
 def test_recordings_tell_nothing_of_what_they_hide(tmp_path):
     delayed = Case("delay", "single", "squat", (Hidden("sync_offset", 0.1),))
     carried = Case("ball", "single", "squat", (Hidden("added_mass", 2.0, "hand_l"),))

@@ -19,7 +19,7 @@ from tests.blind.blind_scoring import (
 from tests.blind.blind_tables import document, scores_frame
 
 SEED = 7
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 # What the suite forgives, of 20 effects hidden alone, 4 in pairs, 2 outside the catalogue.
 MISSES_ALLOWED = 4

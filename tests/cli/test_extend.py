@@ -26,7 +26,7 @@ from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study import load_study
 from bsip_cli.unit import Unit
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 NULL = StudyOptions(
     participants=1,

@@ -185,7 +185,7 @@ WORN = (
 )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_load_in_the_static_trial_is_no_mass_of_the_person(carried, run):
     stated = run.unit("scale").participant.mass_kg
     before = carried.read("person").iloc[0]
@@ -197,7 +197,7 @@ def test_load_in_the_static_trial_is_no_mass_of_the_person(carried, run):
     assert run.read("person").iloc[0]["plate_mass_kg"] == pytest.approx(stated, abs=0.3)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_mass_taken_from_the_plates_is_without_the_load(run):
     table = run.study / "participants.tsv"
     header, line = table.read_text().splitlines()
@@ -213,7 +213,7 @@ def test_mass_taken_from_the_plates_is_without_the_load(run):
     assert person["mass_kg"] == pytest.approx(float(mass), abs=0.3)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_declared_load_is_not_taken_for_the_body(carried, run):
     """Both runs together identify: without a word no body explains both, declared one does."""
     run.declare(*WORN)
@@ -226,7 +226,7 @@ def test_declared_load_is_not_taken_for_the_body(carried, run):
     assert fit < 0.3 * misfit
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_prediction_and_report_include_the_load(run):
     run.declare(*WORN)
     run.everything("reconstruct")
@@ -246,7 +246,7 @@ def test_prediction_and_report_include_the_load(run):
     assert "8 kg on the upper torso in static and sequence (run 2)" in plain
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_changed_load_redoes_what_it_touches_and_nothing_else(run):
     run.everything("reconstruct")
     assert set(run.everything("reconstruct").values()) == {"fresh"}
@@ -270,7 +270,7 @@ def without_forces(run: Run, stem: str) -> None:
     write_artifact(path, "wrench", run.read("wrench", stem).assign(valid=False), header)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_runs_identify_together(run):
     run.declare(*WORN)
     run.everything("identify")
@@ -282,7 +282,7 @@ def test_two_runs_identify_together(run):
     assert table["duration_s"] == pytest.approx(used + 0.02 * len(blocks))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_run_with_unusable_forces_does_not_identify(run):
     run.declare(*WORN)
     run.everything("regress")
@@ -292,7 +292,7 @@ def test_run_with_unusable_forces_does_not_identify(run):
     assert run.read("identification").iloc[0]["trials"] == LOADED
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_blocks_are_left_out_in_each_run(run):
     run.declare(*WORN)
     run.options("identify", hold_out_fraction=0.25, block_s=2.0)
@@ -310,7 +310,7 @@ def test_blocks_are_left_out_in_each_run(run):
         assert (usable & left_out).any()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_order_of_the_runs_does_not_matter(run):
     run.declare(*WORN)
     run.everything("identify")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from bsip_cli.artifacts import read_artifact
 from bsip_cli.simulate.options import Asked, Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 MARKER, OFF_M = "LMALL", 0.03
 PLACE = ["x_m", "y_m", "z_m"]
@@ -32,11 +33,12 @@ def options(*tasks: str) -> StudyOptions:
     )
 
 
-@pytest.fixture
-def fitted(tmp_path, bsip):
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory, bsip):
+    @cache
     def fit(*tasks: str) -> Path:
         """Folder of the person, poses fitted."""
-        root = tmp_path / "-".join(("off", *tasks))
+        root = tmp_path_factory.mktemp("-".join(("off", *tasks)))
         simulate_study(root / "study", options(*tasks))
         for stage in ("ingest", "scale", "ik"):
             answer = bsip(stage, root / "study", "--out", root / "out", "--jobs", 1)

@@ -120,7 +120,7 @@ def performed(root: Path, out: Path) -> Study:
     return study
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_sessions_change_no_number(tmp_path):
     """One body and one skeleton, whichever sessions the recordings are of."""
     root = tmp_path / "study"

@@ -38,8 +38,6 @@ from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study import load_study
 from bsip_cli.unit import Unit
 
-pytestmark = pytest.mark.slow
-
 OPTIONS = StudyOptions(
     participants=2,
     seed=3,
@@ -151,6 +149,7 @@ def test_files_of_a_run(first_run):
     assert set(first_run.files()) == names
 
 
+@pytest.mark.long
 def test_two_runs_give_the_same_bytes(first_run, bsip, tmp_path):
     """Another folder, one process instead of two."""
     again = Run(first_run.study, tmp_path / "elsewhere")
@@ -265,6 +264,7 @@ def test_touched_recording_is_the_same_recording(run, bsip):
     assert run.times() == times
 
 
+@pytest.mark.long
 def test_changed_recording_runs_again_with_what_reads_it(run, bsip):
     with run.recording("sub-01_task-squat_run-1").open("ab") as handle:
         handle.write(bytes(512))
@@ -406,6 +406,7 @@ def test_lost_report_is_made_again(run):
 # --- bad data beside good -----------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_corrupt_recording_and_its_return(run, bsip, first_run):
     """The rest goes on without it; mended, everything is as if nothing had been."""
     recording = run.recording("sub-01_task-squat_run-1")

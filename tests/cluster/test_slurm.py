@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 CANNOT = 77
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_node_that_dies_and_job_over_its_memory(tmp_path):
     bsip = tmp_path / "bsip"
     bsip.write_text(f'#!/bin/sh\nexec {sys.executable} -m bsip_cli "$@"\n')

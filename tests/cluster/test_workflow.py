@@ -26,9 +26,12 @@ echo "$*" >> "$CALLS"
 case "$*" in *"$FAILS"*) exit $CODE;; esac
 """
 
-pytestmark = pytest.mark.skipif(
-    SNAKEMAKE is None, reason="Snakemake is not there; `make .venv-cluster/ready` installs it"
-)
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(
+        SNAKEMAKE is None, reason="Snakemake is not there; `make .venv-cluster/ready` installs it"
+    ),
+]
 
 
 @dataclass
@@ -123,7 +126,6 @@ def test_a_refusal_is_no_failure(stand_in, code):
     assert stand_in("everybody") == (0, [])
 
 
-@pytest.mark.slow
 def test_the_same_artifacts_as_make(tmp_path):
     options = StudyOptions(
         participants=1,

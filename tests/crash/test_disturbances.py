@@ -8,7 +8,7 @@ import pytest
 
 from tests.crash.disturbances import Bench, disturb, killed, one_process_killed
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ def test_two_hundred_cases():
     assert sum(N_CASES.values()) == 200 and N_CASES.keys() == TARGETS.keys()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("target", N_CASES)
 def test_damaged_files(tmp_path, target):
     results = run_cases(target, 0, N_CASES[target], tmp_path / "fuzz")

@@ -13,7 +13,7 @@ from tests.real.test_real_studies import DATA, make_study
 
 pytestmark = [
     pytest.mark.real,
-    pytest.mark.slow,
+    pytest.mark.long,
     pytest.mark.skipif(
         not DATA.is_dir(), reason="the real recordings (../shared/data) are missing"
     ),

@@ -17,6 +17,7 @@ DATA = Path(__file__).parents[2].parent / "shared" / "data"
 
 pytestmark = [
     pytest.mark.real,
+    pytest.mark.long,
     pytest.mark.skipif(
         not DATA.is_dir(), reason="the real recordings (../shared/data) are missing"
     ),

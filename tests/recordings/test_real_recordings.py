@@ -62,6 +62,7 @@ def _c3d_files(folder: Path) -> list[Path]:
     return sorted(p for p in folder.iterdir() if p.suffix.lower() == ".c3d")
 
 
+@pytest.mark.long
 def test_every_file_reads_or_is_refused_in_words(real_data):
     refused = {}
     for path in _all(real_data):
@@ -76,6 +77,7 @@ def test_every_file_reads_or_is_refused_in_words(real_data):
     assert all(words in refused[name] for name, words in REFUSED.items())
 
 
+@pytest.mark.long
 def test_the_same_samples_as_ezc3d(real_data):
     """Wherever ezc3d can read a file and its counts are not in doubt, to the last bit."""
     n_compared = 0

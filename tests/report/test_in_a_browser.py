@@ -9,9 +9,12 @@ import pytest
 
 from tests.report.browser import Page, chromium, opened
 
-pytestmark = pytest.mark.skipif(
-    chromium() is None, reason="no chromium here: reports are not opened in a browser"
-)
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(
+        chromium() is None, reason="no chromium here: reports are not opened in a browser"
+    ),
+]
 
 
 @pytest.fixture(scope="module", params=["sub-01", "group"])

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from bsip_cli.artifacts import empty_table, write_artifact_in_parts
-from bsip_cli.errors import BadDataError
+from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.pipeline import STAGES
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.session import open_study
@@ -243,6 +243,12 @@ def test_an_entry_that_cannot_be_looked_at(empty_study, folder, monkeypatch):
     study, (refusal,) = load(empty_study)
     assert added(study) == {}
     assert "walk.c3d: cannot be looked at (Input/output error)" in refusal
+
+
+def test_a_study_whose_path_is_no_utf8(empty_study, tmp_path):
+    root = empty_study.rename(tmp_path / "st\udcffudy")
+    with pytest.raises(UsageError, match=r"st\?udy: its path holds bytes that are no UTF-8"):
+        load(root)
 
 
 # --- plainly no recording: said -------------------------------------------------------------------

@@ -134,7 +134,7 @@ class _Loading:
         """What is no recording, in one sentence for each kind."""
         yield from self.notes
         folders = [path for path in self.others if is_folder(path)]
-        files = [path for path in self.others if path not in set(folders)]
+        files = sorted({*self.others} - {*folders})
         if folders:
             yield (
                 "folders that are not looked into, since recordings lie in sub-XX and in "

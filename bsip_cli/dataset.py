@@ -10,7 +10,8 @@ from bsip_cli import __version__
 from bsip_cli.artifacts import write_atomically
 from bsip_cli.errors import UsageError
 from bsip_cli.files import fault_of
-from bsip_cli.folders import is_folder, lies_in
+from bsip_cli.folders import check_path, is_folder, lies_in
+from bsip_cli.participants import NAME as NAME_OF_PERSON
 
 NAME = "dataset_description.json"
 BIDS_VERSION = "1.10.0"
@@ -24,6 +25,7 @@ def make_out(out: Path, study: Path) -> None:
     UsageError
         It is the study, lies above it or in a participant's folder, or cannot be made.
     """
+    check_path(out)
     if found := _in_the_way(out, study):
         raise UsageError(
             found,
@@ -44,15 +46,19 @@ def _in_the_way(out: Path, study: Path) -> str:
     if os.path.lexists(out) and not is_folder(out):
         return f"is no folder to write to: it {fault_of(out) or 'is a file'}"
     if lies_in(study, out):
-        return "is the study" if lies_in(out, study) else "holds the study"
-    homes = [home for form in ("sub-*", "sub-*/ses-*") for home in study.glob(form)]
+        return "is the study" if _is_same(out, study) else "holds the study"
+    people = [path for path in study.glob("sub-*") if NAME_OF_PERSON.fullmatch(path.name)]
+    homes = [home for person in people for home in (person, *person.glob("ses-*"))]
     inside = [home.name for home in homes if lies_in(out, home)]
     real = Path(os.path.realpath(out))
     for path in (real, *real.parents):  # a folder that would be taken for a participant's
-        above = path.parent
-        if path.name.startswith("sub-") and lies_in(above, study) and lies_in(study, above):
+        if NAME_OF_PERSON.fullmatch(path.name) and _is_same(path.parent, study):
             inside.append(path.name)
     return f"is the folder of {inside[0]} or lies in it" if inside else ""
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    return lies_in(one, other) and lies_in(other, one)
 
 
 def describe_dataset(out: Path, study: Path) -> str:

@@ -6,13 +6,29 @@ import os
 import stat
 from pathlib import Path
 
-from bsip_cli.errors import BadDataError
+from bsip_cli.errors import BadDataError, UsageError
 
 
 def is_folder(path: Path) -> bool:
     """Whether a folder is there; ``Path.is_dir`` raises where nobody may look."""
     status = _status(path)
     return status is not None and stat.S_ISDIR(status.st_mode)
+
+
+def check_path(path: Path) -> None:
+    """Refuse a path that the libraries for C3D and Parquet cannot open.
+
+    Raises
+    ------
+    UsageError
+        It holds bytes that are no UTF-8.
+    """
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise UsageError(
+            "its path holds bytes that are no UTF-8", file=path, remedy="rename the folder"
+        ) from None
 
 
 def entries(folder: Path) -> list[Path]:
@@ -24,7 +40,8 @@ def entries(folder: Path) -> list[Path]:
         The folder cannot be listed.
     """
     try:
-        return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+        paths = (path for path in folder.iterdir() if not path.name.startswith("."))
+        return sorted(paths, key=lambda path: path.name)
     except OSError as error:
         raise BadDataError(
             f"cannot be listed ({error.strerror or error})",

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.files import fault_of
-from bsip_cli.folders import entries, is_folder
+from bsip_cli.folders import check_path, entries, is_folder
 from bsip_cli.participants import NAME, Participant, participant_of, read_rows, rows_of
 from bsip_cli.trials import (
     RECORDINGS,
@@ -56,7 +56,8 @@ def load_study(
     Raises
     ------
     UsageError
-        There is no study at ``root``, or participants.tsv does not name who is chosen.
+        There is no study at ``root``, its path cannot be opened by all who read it, or
+        participants.tsv does not name who is chosen.
     BadDataError
         participants.tsv cannot be read or lacks a column.
     """
@@ -64,6 +65,7 @@ def load_study(
         raise UsageError(
             "there is no such folder", file=root, remedy="name the folder with participants.tsv"
         )
+    check_path(root)
     table = root / "participants.tsv"
     rows = read_rows(table)
     loading = _Loading(root, roles)
@@ -132,7 +134,7 @@ class _Loading:
         """What is no recording, in one sentence for each kind."""
         yield from self.notes
         folders = [path for path in self.others if is_folder(path)]
-        files = [path for path in self.others if path not in set(folders)]
+        files = sorted({*self.others} - {*folders})
         if folders:
             yield (
                 "folders that are not looked into, since recordings lie in sub-XX and in "

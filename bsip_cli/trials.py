@@ -29,7 +29,7 @@ _PACKED = (".gz", ".bz2", ".xz", ".zst", ".zip", ".7z", ".rar", ".tar", ".tgz")
 _NAME_BYTES = 255  # of a file's name, on the file systems of Linux and macOS
 _LONGEST_KIND = max(len(one.file_name) for one in SCHEMAS.values() if one.level == "trial")
 # What an artifact's name has more than the trial's, while it is written; 4194304: the last process.
-_STEM_BYTES = _NAME_BYTES - _LONGEST_KIND - len("._.parquet.4194304.bsip-part.bsip-part")
+STEM_BYTES = _NAME_BYTES - _LONGEST_KIND - len("._.parquet.4194304.bsip-part.bsip-part")
 
 
 @dataclass(frozen=True)
@@ -159,9 +159,9 @@ class Folder:
         if named != here:
             found = f"its name says {named} and its folder {here}"
             return Fault(path, found, expected, "rename it, or move it")
-        if len(path.stem) > _STEM_BYTES:
+        if len(path.stem) > STEM_BYTES:
             found = f"a name of {len(path.stem)} letters before its ending"
-            expected = f"at most {_STEM_BYTES}, since the names of its results are longer"
+            expected = f"at most {STEM_BYTES}, since the names of its results are longer"
             return Fault(path, found, expected, "shorten it")
         return None
 

@@ -28,7 +28,7 @@ ALLOWED = {
     "standing": "pipeline",
     "unit": "artifacts config errors pipeline provenance schemas standing study",
     "lock": "artifacts errors",
-    "dataset": "__init__ artifacts errors files folders",
+    "dataset": "__init__ artifacts errors files folders participants",
     "info": "__init__ artifacts provenance schemas",
     "runner": "artifacts config errors lock pipeline study unit",
     "check_study": "body config errors study",

@@ -9,11 +9,12 @@ import pandas as pd
 import pytest
 
 from bsip_cli.artifacts import empty_table, write_artifact_in_parts
-from bsip_cli.errors import BadDataError
+from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.pipeline import STAGES
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.session import open_study
 from bsip_cli.study import Study, load_study
+from bsip_cli.trials import STEM_BYTES
 
 ROLES = {"static": ("static",), "sequence": ("sequence",)}
 ANNEX = "../.git/annex/objects/Qk/1z/MD5E-s10--a.c3d/MD5E-s10--a.c3d"
@@ -119,7 +120,7 @@ MISNAMED = "its name does not say what it is"
         (["gän\udcffge.c3d"], MISNAMED),
         (["Tom 1.c3d", "Tom 2.c3d"], rf"Tom 1.c3d: {MISNAMED} \(likewise Tom 2.c3d\)"),
         (["sub-01_ses-2_task-walk.c3d"], "its name says sub-01_ses-2 and its folder sub-01;"),
-        (["sub-01_task-" + "w" * 194 + ".c3d"], "a name of 206 letters .* at most 205"),
+        ([f"{'sub-01_task-':w<{STEM_BYTES + 1}}.c3d"], f"letters before .* at most {STEM_BYTES}"),
         (
             ["sub-01_task-walk.trc", "sub-01_task-walk.mot", "sub-01_task-walk_grf.mot"],
             "walk.trc: there are sub-01_task-walk.mot and sub-01_task-walk_grf.mot beside it",
@@ -154,14 +155,15 @@ def test_many_alike_are_told_together(empty_study, folder):
     assert "sub-01_task-t20.c3d and 9 more)" in refusal
 
 
-def test_a_name_may_be_as_long_as_its_artifacts(empty_study, folder, tmp_path):
+def test_a_name_may_be_as_long_as_its_artifacts(empty_study, folder, tmp_path, monkeypatch):
     """The longest that is allowed, and the longest name that is written of it."""
-    stem = "sub-01_task-" + "w" * 193
+    stem = f"{'sub-01_task-':w<{STEM_BYTES}}"
     make(folder, f"{stem}.c3d")
     assert list(added(load(empty_study)[0])) == [stem]
     kinds = [s for s in SCHEMAS.values() if s.level == "trial"]
     kind = max(kinds, key=lambda schema: len(schema.file_name))
     assert max(len(f"refusal-{stage.name}") for stage in STAGES) <= len(kind.file_name)
+    monkeypatch.setattr(os, "getpid", lambda: 4194304)  # the longest
     path = tmp_path / "out" / f"{stem}_{kind.file_name}.parquet"
     rows = empty_table(kind.kind)
     write_artifact_in_parts(path, kind.kind, [pd.DataFrame(rows)], dict)
@@ -243,6 +245,12 @@ def test_an_entry_that_cannot_be_looked_at(empty_study, folder, monkeypatch):
     study, (refusal,) = load(empty_study)
     assert added(study) == {}
     assert "walk.c3d: cannot be looked at (Input/output error)" in refusal
+
+
+def test_a_study_whose_path_is_no_utf8(empty_study, tmp_path):
+    root = empty_study.rename(tmp_path / "st\udcffudy")
+    with pytest.raises(UsageError, match=r"st\?udy: its path holds bytes that are no UTF-8"):
+        load(root)
 
 
 # --- plainly no recording: said -------------------------------------------------------------------

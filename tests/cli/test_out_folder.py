@@ -27,7 +27,15 @@ def study(empty_study) -> Path:
 
 @pytest.mark.parametrize(
     "place",
-    ["derivatives/bsip", "derivatives", "results", "a/b/c", "../out", "subjects", "../study-2"],
+    [
+        "derivatives/bsip",
+        "derivatives",
+        "results",
+        "a/b/c",
+        "../out",
+        "sub-01_results",
+        "../study-2",
+    ],
 )
 def test_results_lie_apart(study, place):
     make_out(study / place, study)
@@ -56,6 +64,7 @@ def test_results_lie_apart(study, place):
         ("broken", "is no folder to write to: it is a broken symbolic link to nowhere"),
         ("circle", "is no folder to write to: it cannot be looked at"),
         ("participants.tsv/out", r"is no folder to write to \(Not a directory\)"),
+        ("o\udcffut", "bytes that are no UTF-8"),
         ("n" * 300, r"is no folder to write to \(File name too long\)"),
     ],
 )

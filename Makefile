@@ -16,7 +16,7 @@ PROFILE ?= plain
 CLUSTER ?= .venv-cluster
 OUT ?= $(patsubst %/,%,$(COHORT))_results
 
-.PHONY: sample test test-long blind cohort check clean study cluster
+.PHONY: sample test test-long blind cohort check clean study cluster locks
 
 sample: $(READY)
 	$(BIN)/bsip run sample_data --out out/sample --jobs $(JOBS)
@@ -84,14 +84,30 @@ endif
 .venv/ready: requirements.lock pyproject.toml
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'bsip needs Python 3.11 or later; name one with make PYTHON=...')"
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --editable .
 	touch .venv/ready
 
 $(CLUSTER)/ready: requirements-cluster.lock
 	$(PYTHON) -m venv $(CLUSTER)
-	$(CLUSTER)/bin/python -m pip install --quiet --disable-pip-version-check --requirement requirements-cluster.lock
+	$(CLUSTER)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements-cluster.lock
 	touch $@
+
+# Both locks anew from pyproject.toml, with the versions that they have;
+# make locks UPGRADE=--upgrade takes the newest that fit.
+UV = uv==0.13.9
+UPGRADE ?=
+LOCK = --no-config --quiet pip compile --universal --python-version 3.11 --generate-hashes \
+	--no-annotate --custom-compile-command "make locks" $(UPGRADE)
+CLUSTER_NEEDS = import tomllib; \
+	print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["cluster"], sep="\n")
+
+locks:
+	@tool=$$(mktemp -d) && trap "rm -rf $$tool" EXIT && $(PYTHON) -m venv $$tool && \
+	$$tool/bin/python -m pip install --quiet --disable-pip-version-check $(UV) && \
+	$$tool/bin/uv $(LOCK) pyproject.toml --extra dev --output-file requirements.lock && \
+	$(PYTHON) -c '$(CLUSTER_NEEDS)' > $$tool/cluster.in && \
+	$$tool/bin/uv $(LOCK) $$tool/cluster.in --output-file requirements-cluster.lock
 
 clean:
 	rm -rf .venv $(CLUSTER) out

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections import namedtuple
 
 import numpy as np
-from numba import njit
+
+from bsip_cli.motion.compiled import compiled
 
 FREE, SPHERICAL, REVOLUTE = 0, 1, 2
 
@@ -28,14 +29,14 @@ Task = namedtuple("Task", "segments positions weights limit prior")
 Sums = namedtuple("Sums", "weight first second force moment product")
 
 
-@njit(cache=True)
+@compiled
 def _cross(a, b, out):
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True)
+@compiled
 def _rotation_of_quaternion(q, out):
     x, y, z, w = q[0], q[1], q[2], q[3]
     out[0, 0] = 1 - 2 * (y * y + z * z)
@@ -49,7 +50,7 @@ def _rotation_of_quaternion(q, out):
     out[2, 2] = 1 - 2 * (x * x + y * y)
 
 
-@njit(cache=True)
+@compiled
 def _turn_quaternion(q, omega):
     """q <- q * exp(omega), omega in the body's own axes."""
     angle = np.sqrt(omega[0] ** 2 + omega[1] ** 2 + omega[2] ** 2)
@@ -66,7 +67,7 @@ def _turn_quaternion(q, omega):
         q[k2] /= norm
 
 
-@njit(cache=True)
+@compiled
 def _rotation_vector(q, out):
     """Rotation vector of a unit quaternion, by the shorter way."""
     sign = 1.0 if q[3] >= 0 else -1.0
@@ -76,7 +77,7 @@ def _rotation_vector(q, out):
         out[i] = sign * k * q[i]
 
 
-@njit(cache=True)
+@compiled
 def _hinge_rotation(u, angle, out):
     """Rotation by an angle about a unit axis (Rodrigues)."""
     c, s = np.cos(angle), np.sin(angle)
@@ -92,7 +93,7 @@ def _hinge_rotation(u, angle, out):
     out[2, 1] += s * u[0]
 
 
-@njit(cache=True)
+@compiled
 def forward(q, tree, R, p):
     """Fill R (n, 3, 3) and p (n, 3): orientation of each segment and its joint centre, world."""
     local = np.empty((3, 3))
@@ -119,7 +120,7 @@ def forward(q, tree, R, p):
                 R[i, j, k] = total
 
 
-@njit(cache=True)
+@compiled
 def _residuals(R, p, task, measured, out):
     """out (m, 3) = measured - model; rows of missing markers are NaN."""
     for m in range(task.segments.size):
@@ -130,7 +131,7 @@ def _residuals(R, p, task, measured, out):
                 out[m, j] -= R[s, j, k] * task.positions[m, k]
 
 
-@njit(cache=True)
+@compiled
 def _cost(residuals, q, tree, task):
     """Half the weighted squares, growing like the logarithm beyond the limit, plus the prior."""
     total, limit = 0.0, task.limit
@@ -153,7 +154,7 @@ def _cost(residuals, q, tree, task):
     return total
 
 
-@njit(cache=True)
+@compiled
 def _evaluate(q, tree, task, measured, R, p, residuals):
     """Pose the model, fill R, p and the residuals, and return the cost."""
     forward(q, tree, R, p)
@@ -161,7 +162,7 @@ def _evaluate(q, tree, task, measured, R, p, residuals):
     return _cost(residuals, q, tree, task)
 
 
-@njit(cache=True)
+@compiled
 def _columns(R, p, tree, d, w):
     """Velocity d + w x r that each unit velocity gives a point r (from the base's origin)."""
     r = np.empty(3)
@@ -190,7 +191,7 @@ def _columns(R, p, tree, d, w):
             _cross(r, w[at], d[at])
 
 
-@njit(cache=True)
+@compiled
 def _gather(residuals, measured, base, tree, task, sums):
     """Sums over each segment's own markers, then over all that hang on it."""
     sums.weight[:] = 0.0
@@ -230,7 +231,7 @@ def _gather(residuals, measured, base, tree, task, sums):
                 sums.product[a, j, k] += sums.product[i, j, k]
 
 
-@njit(cache=True)
+@compiled
 def _assemble(d, w, sums, tree, H, g):
     """H (nv, nv; only between a velocity and its ancestors) and descent direction g of markers."""
     F, T = np.empty(3), np.empty(3)
@@ -256,7 +257,7 @@ def _assemble(d, w, sums, tree, H, g):
             a = tree.v_parents[a]
 
 
-@njit(cache=True)
+@compiled
 def _bend(d, w, sums, tree, N, H):
     """Add to H what the curvature of the markers' paths makes of the residuals (Newton's term).
 
@@ -286,7 +287,7 @@ def _bend(d, w, sums, tree, N, H):
             a = tree.v_parents[a]
 
 
-@njit(cache=True)
+@compiled
 def _add_prior(q, tree, task, H, g):
     """Pull the joint angles to zero."""
     turn = np.empty(3)
@@ -302,7 +303,7 @@ def _add_prior(q, tree, task, H, g):
             g[av] -= task.prior[av] * q[at]
 
 
-@njit(cache=True)
+@compiled
 def _factor(H, damping, v_parents, L):
     """L with H + damping diag(H) = L^T L; no fill-in (Featherstone 2008, table 6.3).
 
@@ -333,7 +334,7 @@ def _factor(H, damping, v_parents, L):
     return definite
 
 
-@njit(cache=True)
+@compiled
 def _solve(L, v_parents, x):
     """x <- (L^T L)^-1 x."""
     nv = v_parents.size
@@ -351,7 +352,7 @@ def _solve(L, v_parents, x):
         x[i] /= L[i, i]
 
 
-@njit(cache=True)
+@compiled
 def _step(q, dv, tree, R0, out):
     """out = q moved by dv (base: translation and rotation in its own axes)."""
     out[:] = q
@@ -368,7 +369,7 @@ def _step(q, dv, tree, R0, out):
             out[at] += dv[av]
 
 
-@njit(cache=True)
+@compiled
 def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
     """Move q to the least-squares pose of one frame; return the steps, or -1 if they ran out.
 
@@ -435,7 +436,7 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
     return taken
 
 
-@njit(cache=True)
+@compiled
 def solve_frames(markers, q_first, tree, task, max_steps, q_out, residual_out, sd_out, steps_out):
     """Least-squares pose of every frame, each started from the last that shows a marker: without
     one the prior leads to the neutral pose, from which others may end in a wrong optimum.
@@ -461,14 +462,14 @@ def solve_frames(markers, q_first, tree, task, max_steps, q_out, residual_out, s
             )
 
 
-@njit(cache=True)
+@compiled
 def forward_frames(q, tree, R, p):
     """Fill R (N, n, 3, 3) and p (N, n, 3) for q (N, nq)."""
     for frame in range(q.shape[0]):
         forward(q[frame], tree, R[frame], p[frame])
 
 
-@njit(cache=True)
+@compiled
 def marker_columns(R, p, markers, tree, below, columns):
     """Fill columns (N, m, 3, nv) with the velocity of each marker (N, m, 3) for each unit velocity
     where it hangs on that joint: below (n, m)."""

@@ -19,13 +19,14 @@ from functools import cached_property
 from itertools import combinations_with_replacement
 
 import numpy as np
-from numba import njit
 from scipy import sparse
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import spectrogram
 from scipy.stats import chi2
+
+from bsip_cli.motion.compiled import compiled
 
 _DEGREE = 5
 _KNOT_RATE_HZ = 100.0  # about: a whole number of samples per knot; human motion ends far below
@@ -325,7 +326,7 @@ def _fit(normal: np.ndarray, penalty: _Penalty, right: np.ndarray):
     return cho_solve_banded((factor, True), right), _inverse_band(factor)
 
 
-@njit(cache=True)
+@compiled
 def _inverse_band(factor):
     """The band of (L L^T)^-1 for a lower banded factor L (Takahashi's recursion)."""
     width, n = factor.shape

@@ -3,8 +3,8 @@
 # make test-long   the other tests: whole runs, the short blind suite, real recordings, damaged files
 # make blind    hide effects in recordings and see whether `bsip diagnose` finds them (hours)
 # make cohort   simulate twelve people with 120 s sequences and run them
-# make COHORT=path [OUT=path] [-j 4] [-n]   your study: every participant on their own, then the
-#               tables of all; only what changed is done again, who fails is named and stops nobody
+# make COHORT=path [OUT=path] [-j 4]   your study: so many participants at once, then the tables of
+#               all; only what changed is done again, who fails is named and stops nobody
 # make cluster COHORT=path [OUT=path] [PROFILE=slurm]   the same by Snakemake (workflow/README.md)
 PYTHON ?= python3
 JOBS ?= 2
@@ -14,7 +14,6 @@ READY ?= .venv/ready
 COHORT ?=
 PROFILE ?= plain
 CLUSTER ?= .venv-cluster
-OUT ?= $(patsubst %/,%,$(COHORT))_results
 
 .PHONY: sample test test-long blind cohort check clean study cluster locks
 
@@ -44,39 +43,26 @@ cohort: .venv/ready
 	$(BIN)/bsip show out/cohort
 
 # --- a study of your own --------------------------------------------------------------------------
+# bsip itself knows what is up to date. Paths go through the environment: whatever stands in them, the
+# shell takes each as one word. Bad data of some participants (exit code 3) are told and no failure.
 
-ifneq ($(COHORT),)
+ifneq ($(value COHORT),)
 .DEFAULT_GOAL := study
-PEOPLE := $(shell cut -f 1 '$(COHORT)/participants.tsv' | tr -d ' \r' | grep -Ex 'sub-[A-Za-z0-9]+')
-MADE := $(OUT)/.made
+export BSIP_STUDY := $(value COHORT)
+export BSIP_OUT := $(value OUT)
+PLACES = study=$${BSIP_STUDY%/}; out=$${BSIP_OUT:-$${study}_results}
+AT_ONCE = $(or $(patsubst -j%,%,$(filter -j%,$(MAKEFLAGS))),$(JOBS))
+TOLD = case $$code in 0|3) $(BIN)/bsip show "$$out";; *) exit $$code;; esac
 
-study: $(MADE)/group
-	@test -n "$(strip $(PEOPLE))" || { echo "make: $(COHORT)/participants.tsv names nobody" >&2; exit 2; }
-	@$(BIN)/bsip show $(OUT)
-	@failed=; for who in $(PEOPLE); do test -f $(MADE)/$$who || failed="$$failed $$who"; done; \
-	test -z "$$failed" || { echo "make: not done:$$failed; read what bsip said of them" >&2; exit 3; }
-
-# A name with a blank comes out of the inner wildcard in pieces, and of the outer not at all.
-# A participant that bsip refuses (exit code 3) is done until a file of theirs changes.
-define participant
-$(MADE)/$(1): $$(wildcard $$(wildcard $(COHORT)/$(1)/* $(COHORT)/*.t*)) | $(READY)
-	@mkdir -p $(MADE)
-	$(BIN)/bsip run $(COHORT) --out $(OUT) --participant $(1); code=$$$$?; \
-	case $$$$code in 0|3) touch $$@;; *) rm -f $$@; echo "make: $(1) failed ($$$$code)" >&2;; esac
-endef
-$(foreach who,$(PEOPLE),$(eval $(call participant,$(who))))
-
-$(MADE)/group: $(addprefix $(MADE)/,$(PEOPLE))
-	@mkdir -p $(MADE)
-	$(BIN)/bsip run $(COHORT) --out $(OUT) --group || [ $$? -eq 3 ]
-	@touch $@
+study: $(READY)
+	@$(PLACES); $(BIN)/bsip run "$$study" --out "$$out" --jobs $(AT_ONCE); code=$$?; $(TOLD)
 
 SNAKEMAKE = $(CLUSTER)/bin/snakemake --snakefile workflow/Snakefile \
-	--profile workflow/profiles/$(PROFILE) --config study=$(COHORT) out=$(OUT) bsip=$(abspath $(BIN))/bsip
+	--profile workflow/profiles/$(PROFILE) --config study="$$study" out="$$out" bsip=$(abspath $(BIN))/bsip
 
 cluster: $(READY) $(CLUSTER)/ready
-	$(SNAKEMAKE) -- everybody; code=$$?; \
-	$(SNAKEMAKE) -- group && $(BIN)/bsip show $(OUT) && exit $$code
+	@$(PLACES); $(SNAKEMAKE) -- everybody; failed=$$?; \
+	$(BIN)/bsip run "$$study" --out "$$out" --group; code=$$?; $(TOLD) && exit $$failed
 endif
 
 # --- setting up -----------------------------------------------------------------------------------

@@ -90,6 +90,19 @@ for _name in ("report", "run"):
     )
 
 
+@cli.command()
+@click.argument("study", type=click.Path(path_type=Path))
+def people(study):
+    """Print the participants of a study, one in a line, for scripts and job schedulers.
+
+    Exit code 3 with nothing printed: participants.tsv cannot be read.
+    """
+    from bsip_cli.participants import named_in
+
+    for name in named_in(study / "participants.tsv"):
+        click.echo(name)
+
+
 def _effect_options(command: Any) -> Any:
     """What to hide in recordings; matched in the order given."""
     options = (

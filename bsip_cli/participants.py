@@ -31,6 +31,12 @@ class Participant:
     trials: tuple[Trial, ...] = ()
 
 
+def named_in(file: Path) -> list[str]:
+    """Whom participants.tsv names, each once, without names that cannot be."""
+    names = (str(row["participant_id"] or "").strip() for row in read_rows(file))
+    return [name for name in dict.fromkeys(names) if NAME.fullmatch(name)]
+
+
 def rows_of(chosen: Sequence[str], rows: list[dict[str, str]], file: Path) -> list[dict[str, str]]:
     """The rows of some participants, in their order."""
     known: dict[str, list[dict[str, str]]] = {}

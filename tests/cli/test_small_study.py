@@ -24,8 +24,8 @@ from bsip_cli import __version__
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, load_config
-from bsip_cli.lock import held_alone
 from bsip_cli.freshness import why_stale
+from bsip_cli.lock import held_alone
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.runner import Outcome, perform
 from bsip_cli.schemas import SCHEMAS, bsip_names

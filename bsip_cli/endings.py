@@ -26,15 +26,24 @@ class EndedError(BaseException):
         return f"ended by {name}; what is finished stays, and the next run goes on from there"
 
 
-def raise_when_ended() -> None:
-    """From now on these signals raise `EndedError`; those that are ignored (nohup) stay so."""
+def raise_when_ended(once: bool = False) -> None:
+    """From now on these signals raise `EndedError`; those that are ignored (nohup) stay so.
+
+    once : those that come later are ignored, for a process that another one will kill.
+    """
     for number in ENDING:
         if signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, _raise)
+            signal.signal(number, _raise_once if once else _raise)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
 
 
 def _raise(number: int, _frame: object) -> None:
+    raise EndedError(number)
+
+
+def _raise_once(number: int, _frame: object) -> None:
+    for later in ENDING:
+        signal.signal(later, signal.SIG_IGN)
     raise EndedError(number)
 
 

@@ -133,7 +133,7 @@ def _end(workers: list[_Worker[Task]], tidy: Callable[[Task], None]) -> None:
 def _serve(pipe: Connection, work: Callable) -> None:
     """Take tasks until the pipe is closed."""
     try:
-        raise_when_ended()
+        raise_when_ended(once=True)
         threading.Thread(target=_leave_with_parent, daemon=True).start()
         while True:
             for result in work(pipe.recv()):

@@ -187,11 +187,13 @@ def is_made_from(path: Path, source: Path) -> bool:
 
 
 def _check_intact(path: Path) -> None:
-    if not fingerprint(path).intact:  # some other program's copy has no seal
+    intact = fingerprint(path).intact
+    if not intact:
+        changed, unsealed = "has changed since bsip wrote it", "has no seal of bsip"
         raise ChangedError(
-            "has changed since bsip wrote it",
+            unsealed if intact is None else changed,
             file=path,
-            expected="the content that its seal tells of",
+            expected="the content that was sealed when it was written",
             remedy="run `bsip run` again: it is made anew",
         )
 

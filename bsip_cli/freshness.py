@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bsip_cli.artifacts import read_artifact, read_header
 from bsip_cli.code_hash import code_hash
-from bsip_cli.errors import BadDataError, ChangedError
+from bsip_cli.errors import BadDataError
 from bsip_cli.fingerprints import file_hash, fingerprint
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.schemas import SCHEMAS
@@ -34,7 +34,7 @@ def why_stale(unit: Unit) -> str:
 
 
 def was_changed(unit: Unit) -> list[str]:
-    """Names of files that the unit has written and that are no more what it wrote."""
+    """Files that the unit has written and that are no more what it wrote, as clauses."""
     return [name for kind in unit.stage.writes for name in _changed(unit, kind)]
 
 
@@ -89,8 +89,6 @@ def _why_not(unit: Unit, kind: str, maker: str) -> str:
         return f"{path.name} is not there"
     try:
         provenance = read_header(path, kind)["provenance"]
-    except ChangedError:
-        return f"{path.name} has changed since it was written"
     except BadDataError as error:
         return f"{path.name} {error.found}"
     return _differs(provenance.get(maker), unit.made_by)
@@ -124,7 +122,7 @@ def _names(one: Mapping, other: Mapping) -> list[str]:
 def _listed_changed(unit: Unit, kind: str) -> str:
     """Files beside the artifact (pages, figures, tables) are no more those it lists."""
     names = _changed_files(unit, kind)
-    return f"{names[0]} has changed since it was written" if names else ""
+    return f"{names[0]} has changed since bsip wrote it" if names else ""
 
 
 def _changed_files(unit: Unit, kind: str) -> list[str]:
@@ -145,11 +143,11 @@ def _changed(unit: Unit, kind: str) -> list[str]:
         return []
     try:
         read_header(path, kind)
-    except ChangedError:
-        return [path.name]
-    except BadDataError:  # not sealed: of an earlier bsip, or damaged
-        return [] if fingerprint(path).intact else [path.name]
-    return [name for name in _changed_files(unit, kind) if (unit.out / name).exists()]
+    except BadDataError as error:
+        is_sealed = fingerprint(path).intact  # then it is of another version of bsip
+        return [] if is_sealed else [f"{path.name} {error.found}"]
+    files = [name for name in _changed_files(unit, kind) if (unit.out / name).exists()]
+    return [f"{name} has changed since bsip wrote it" for name in files]
 
 
 def outdated(path: Path) -> str:

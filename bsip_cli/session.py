@@ -21,6 +21,7 @@ from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.pipeline import Stage, by_level, stages_named
 from bsip_cli.runner import Manner, Outcome, refusal_sentence, run_stages
 from bsip_cli.study import Study, load_study
+from bsip_cli.trials import listed
 
 _SEVERITY = (0, 3, 4, 2, 1)  # of several exit codes the gravest counts
 
@@ -47,7 +48,10 @@ def run_session(
     if any(stage.level == "cohort" for stage in stages):
         chosen = ()  # what is about all needs all
     opened = open_study(root, out, chosen, config_file, estimators)
-    refusals = (*opened.refusals, *_notes(describe_dataset(out, opened.study.root)))
+    notes = [describe_dataset(out, opened.study.root)]
+    if not chosen:
+        notes.append(_left_behind(out, opened.study))
+    refusals = (*opened.refusals, *_notes(*notes))
     participants = opened.study.participants
     manner = Manner(force=force, verify=verify, jobs=jobs)
     running = run_stages(stages, opened.study, out, opened.config, manner)
@@ -111,6 +115,15 @@ def _check_names(config: Config, study: Study, refusals: list[BadDataError]) -> 
     if not refusals:  # else a load may belong to who or what was refused
         check_trials(config.loads, study)
         check_prefixes(config.ingest.prefixes, study)
+
+
+def _left_behind(out: Path, study: Study) -> str:
+    """Whose results lie there who are no more in the study."""
+    known = {participant.id for participant in study.participants}
+    gone = [path.name for path in sorted(out.glob("sub-*/*_skeleton.parquet"))]
+    names = sorted({name.split("_")[0] for name in gone} - known)
+    whose = f"results of {listed(names)}, not of this study as it is now: they do not count"
+    return f"{out}: holds {whose}" if names else ""
 
 
 def _notes(*sentences: str) -> Iterator[Outcome]:

@@ -10,12 +10,14 @@ from textwrap import fill
 import pandas as pd
 
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
-from bsip_cli.errors import UsageError, printable
+from bsip_cli.errors import BadDataError, UsageError, printable
+from bsip_cli.freshness import outdated
 from bsip_cli.report.records import with_all_causes
-from bsip_cli.report.shared import SHARED, searched, shared_causes
+from bsip_cli.report.shared import SHARED, Searched, searched, shared_causes
 from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.report.verdict import Verdict, put_right_sentence, verdict_of
 from bsip_cli.schemas import SCHEMAS
+from bsip_cli.trials import listed
 
 _WIDEST = 100  # letters in a line
 
@@ -46,20 +48,57 @@ def shown(out: Path) -> Iterator[str]:
             remedy="run `bsip run` first, or name the folder that it was given with --out",
         )
     yield from [tables] if tables else []
-    everybody = []
+    everybody, unread = [], []
     for folder in sorted(path for path in out.glob("sub-*") if path.is_dir()):
-        diagnosis, detection = (_table(folder, kind) for kind in ("overall-diagnosis", "detection"))
-        if diagnosis is not None and detection is not None:
-            gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
-            facts = read_header(_path(folder, "overall-diagnosis"))["provenance"]["facts"]
-            everybody.append(searched(folder.name, diagnosis, facts))
-            found = verdict_of(diagnosis, detection, gains, changes, facts.get("too_short_s"))
-            right = put_right_sentence(_marker_events(folder))
-            yield verdict_text(folder.name, found, right, get_terminal_size().columns)
+        try:
+            if found := _person(folder):
+                everybody.append(found[0])
+                yield found[1]
+        except BadDataError as error:
+            unread.append(folder.name)
+            yield f"\n{error}"
+    yield from _no_more_true(out, get_terminal_size().columns)
     yield from _shared_text(shared_causes(everybody), get_terminal_size().columns)
     for report in (out / "group" / "report.html", *sorted(out.glob("sub-*/report.html"))):
         if report.exists():
             yield f"report: {report}"
+    if unread:
+        raise BadDataError(
+            f"the diagnosis of {listed(unread)} cannot be shown",
+            file=out,
+            remedy="run `bsip run` again",
+        )
+
+
+def _person(folder: Path) -> tuple[Searched, str] | None:
+    """What was searched in a participant's recordings and what came out, in words."""
+    diagnosis, detection = (_table(folder, kind) for kind in ("overall-diagnosis", "detection"))
+    if diagnosis is None or detection is None:
+        return None
+    gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
+    facts = read_header(_path(folder, "overall-diagnosis"))["provenance"]["facts"]
+    found = verdict_of(diagnosis, detection, gains, changes, facts.get("too_short_s"))
+    right = put_right_sentence(_marker_events(folder))
+    text = verdict_text(folder.name, found, right, get_terminal_size().columns)
+    return searched(folder.name, diagnosis, facts), text
+
+
+def _no_more_true(out: Path, columns: int) -> Iterator[str]:
+    """Whose report is of other code, or of artifacts that were made anew since."""
+    files = (_path(folder, "report-files") for folder in sorted(out.glob("sub-*")))
+    found = {path.parent.name: _why_outdated(path) for path in files if path.exists()}
+    reasons = [f"{name}: {why}" for name, why in found.items() if why]
+    if reasons:
+        width = _width(columns)
+        bullets = (_wrapped(text, width, "  - ") for text in reasons)
+        yield "\n".join(["\n## Not up to date: run `bsip run` again", *bullets])
+
+
+def _why_outdated(path: Path) -> str:
+    try:
+        return outdated(path)
+    except BadDataError as error:
+        return str(error)
 
 
 def _shared_text(sentences: tuple[str, ...], columns: int) -> Iterator[str]:

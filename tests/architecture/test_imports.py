@@ -22,24 +22,31 @@ ALLOWED = {
     "participants": "errors files trials",
     "study": "errors files folders participants trials",
     "schemas": "",
-    "artifacts": "errors provenance schemas",
-    "provenance": "__init__",
+    "artifacts": "errors fingerprints schemas",
+    "fingerprints": "errors",
+    "code_hash": "config",
+    "endings": "",
+    "workers": "endings",
+    "provenance": "__init__ code_hash fingerprints pipeline",
     "pipeline": "schemas",
     "standing": "pipeline",
-    "unit": "artifacts config errors pipeline provenance schemas standing study",
+    "unit": "artifacts config errors fingerprints pipeline provenance schemas standing study",
+    "freshness": "artifacts code_hash errors fingerprints pipeline schemas study unit",
     "lock": "artifacts errors",
     "dataset": "__init__ artifacts errors files folders participants",
     "info": "__init__ artifacts provenance schemas",
-    "runner": "artifacts config errors lock pipeline study unit",
+    "runner": "__init__ artifacts code_hash config errors fingerprints freshness lock pipeline "
+    "provenance study trials unit workers",
     "check_study": "body config errors study",
-    "session": "body check_study config dataset errors pipeline runner study",
+    "session": "body check_study config dataset errors pipeline runner study trials",
     "__main__": "cli",
-    "export": "__init__ artifacts body errors files lock pipeline provenance runner schemas "
+    "export": "__init__ artifacts body errors files fingerprints lock pipeline runner schemas "
     "session stages unit",
-    "show": "artifacts errors report schemas",
+    "show": "artifacts errors freshness report schemas trials",
     "published": "report statistics",
     "markers": "body config errors recordings",
-    "cli": "__init__ errors export info markers pipeline published session show simulate",
+    "cli": "__init__ endings errors export info markers participants pipeline published session "
+    "show simulate",
     "reference": "cli config pipeline published schemas",
     "body": "config errors files",
     "dynamics": "body errors",
@@ -52,8 +59,8 @@ ALLOWED = {
     "diagnosis": "body dynamics effects errors identification motion statistics",
     "report": "body caches dynamics effects errors motion schemas statistics",
     "simulate": "body config errors files folders force_files",
-    "stages": "artifacts body diagnosis dynamics effects errors identification motion pipeline "
-    "provenance recordings report schemas statistics study unit",
+    "stages": "artifacts body diagnosis dynamics effects errors fingerprints identification "
+    "motion pipeline recordings report schemas statistics study unit",
 }
 
 FOREIGN_TO_SCIENCE = {"pandas", "pyarrow", "click", "tqdm", "logging", "subprocess", "matplotlib"}

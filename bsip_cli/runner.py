@@ -259,9 +259,7 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
         why = why_stale(unit)  # asked first: a file that changes from here on makes it stale
         if not why and not force:
             return Outcome(stage.name, unit.name, "fresh")
-        said = [
-            f"{name} has changed since it was written: made again" for name in was_changed(unit)
-        ]
+        said = [f"{changed}: made again" for changed in was_changed(unit)]
         importlib.import_module(stage.module).run(unit)
         remove(unit.refusal_path())
     except BsipError as error:

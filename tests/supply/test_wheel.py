@@ -96,7 +96,7 @@ def test_holds_the_package_and_its_configuration(wheel):
     assert names == shipped | {f"bsip_cli/{name}" for name in files_below(ROOT / "bsip_cli")}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_runs_without_the_checkout(installed):
     assert installed.place().is_relative_to(installed.folder)
     said = installed.bsip("run", "study", "--out", "out").stderr.lower()
@@ -105,12 +105,12 @@ def test_runs_without_the_checkout(installed):
     assert not [library for library in ("matplotlib", "fontconfig", "numba") if library in said]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_published_tables_come_along(installed):
     assert "Hansen 2017" in installed.bsip("published", "audit", "hansen2017").stdout
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_broken_cache_changes_nothing(installed):
     installed.bsip("run", "study", "--out", "out")  # nothing to do, if the test before has run
     before, kept = installed.results(), sorted(installed.temporary.rglob("*.nbc"))

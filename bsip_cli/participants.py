@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 from bsip_cli.errors import BadDataError, UsageError
-from bsip_cli.files import check_regular
+from bsip_cli.files import fault_of
 from bsip_cli.trials import MANY, Trial
 
 NAME = re.compile(r"sub-[A-Za-z0-9]+")
@@ -61,7 +61,8 @@ def read_rows(file: Path) -> list[dict[str, str]]:
     BadDataError
         It cannot be read, is no such table or lacks a column.
     """
-    check_regular(file)
+    if fault := fault_of(file):
+        raise _unreadable(file, f"cannot be read: it {fault}")
     try:
         with file.open(encoding="utf-8-sig", newline="") as handle:
             reader = csv.DictReader(handle, delimiter="\t")
@@ -69,9 +70,7 @@ def read_rows(file: Path) -> list[dict[str, str]]:
             _check_count(file, header)
             rows = list(reader)
     except OSError as error:
-        raise BadDataError(
-            f"cannot be read ({error.strerror or error})", file=file, remedy="copy it anew"
-        ) from None
+        raise _unreadable(file, f"cannot be read ({error.strerror or error})") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise BadDataError(
             f"is not a text table ({error})",
@@ -83,6 +82,15 @@ def read_rows(file: Path) -> list[dict[str, str]]:
         raise _lacking(file, "names no participant")
     _check_names(file, header)
     return rows
+
+
+def _unreadable(file: Path, found: str) -> BadDataError:
+    return BadDataError(
+        found,
+        file=file,
+        expected="a tab-separated table with participant_id, sex, mass_kg, height_m",
+        remedy="write one, a line per participant",
+    )
 
 
 def _check_count(file: Path, header: Sequence[str]) -> None:

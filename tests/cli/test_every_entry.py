@@ -319,7 +319,7 @@ def test_a_fifo_for_a_table_ends(bsip, empty_study, tmp_path):
     os.mkfifo(empty_study / "participants.tsv")
     answer = bsip("run", empty_study, "--out", tmp_path / "out")
     assert answer.code == 3
-    assert answer.err.startswith(f"bsip: {empty_study}/participants.tsv: is a FIFO")
+    assert f"{empty_study}/participants.tsv: cannot be read: it is a FIFO" in answer.err
 
 
 def test_a_note_is_no_fault(empty_study, folder, tmp_path):

@@ -176,7 +176,11 @@ def test_corrupt_recording_is_refused_in_one_sentence(bsip, empty_study, tmp_pat
     assert ". To mend it: " in sentence
     assert summary == f"bsip ingest: 1 refused; results in {out}"
     written = out / "sub-02" / "sub-02_task-static_refusal-ingest.parquet"
-    assert {path.name for path in (out / "sub-02").iterdir()} == {".lock", written.name}
+    assert {path.name for path in (out / "sub-02").iterdir()} == {
+        ".fingerprints.json",
+        ".lock",
+        written.name,
+    }
     row = read_artifact(written, "refusal").iloc[0]
     assert (row["stage"], row["kind"]) == ("ingest", "bad data")
     assert row["sentence"] in sentence

@@ -25,7 +25,7 @@ HEAVY = [
     "statsmodels",
 ]
 STAGE_COMMANDS = [*dict.fromkeys(stage.name for stage in STAGES), "run"]
-OTHER_COMMANDS = ["simulate", "inject", "export", "markers", "show", "published", "info"]
+OTHER_COMMANDS = ["simulate", "inject", "export", "markers", "show", "published", "info", "people"]
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_every_stage_takes_the_same_arguments(name):
     options = [each.opts for each in params if isinstance(each, click.Option)]
     assert arguments == ["study"]
     own = {"identify": [["--estimator"]], "report": [["--group"]], "run": [["--group"]]}
-    common = [["--out"], ["--participant"], ["--config"], ["--jobs"], ["--force"]]
+    common = [["--out"], ["--participant"], ["--config"], ["--jobs"], ["--force"], ["--verify"]]
     assert options == [*common, *own.get(name, [])]
 
 

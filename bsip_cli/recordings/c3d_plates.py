@@ -13,7 +13,7 @@ from bsip_cli.recordings.plates import N_CHANNELS, PlateDescription, corners_are
 from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlateChannels:
     """One plate's description and its channels."""
 

@@ -13,7 +13,7 @@ from bsip_cli.recordings.c3d_records import TEXT, Record, group_names
 _WORD = 0x10000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scaling:
     """Of the analog channels: (count - offset) x scale, each (n_channels,)."""
 

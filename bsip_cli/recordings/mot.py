@@ -31,7 +31,7 @@ _BARE = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GroundForce:
     """One force: as written, lab frame."""
 
@@ -41,7 +41,7 @@ class GroundForce:
     torque_Nm: np.ndarray  # (n, 3), free torque at the point
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mot:
     time_s: np.ndarray  # (n,)
     forces: tuple[GroundForce, ...]

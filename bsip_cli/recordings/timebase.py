@@ -14,7 +14,7 @@ _SAME = 0.02  # of the sample interval: stamps that all lie on the grid
 _EXACT = 1e-3  # of the sample interval: a stamp that lies on the grid among others that do not
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Grid:
     time_s: np.ndarray  # (n,), even
     rate_hz: float

@@ -20,7 +20,7 @@ _HEADER = re.compile(r"^\s*frame\s*#", re.IGNORECASE)
 _LARGEST_TEXT = 2**30  # bytes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trc:
     """A TRC file's content, lab frame."""
 
@@ -31,7 +31,7 @@ class Trc:
     findings: tuple[Finding, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Table:
     values: np.ndarray  # (n_rows, n_columns)
     findings: tuple[Finding, ...]

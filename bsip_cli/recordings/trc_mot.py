@@ -21,7 +21,7 @@ from bsip_cli.recordings.trc import Trc, read_trc
 _LARGEST_ROOM = 20.0  # a point of force further away is in mm
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Action:
     """All forces of a MOT, lab frame, sign and unit settled, at the MOT's times."""
 

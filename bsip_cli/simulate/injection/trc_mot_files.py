@@ -21,7 +21,7 @@ LOADED_N = 20.0
 UNEVEN_SHARE = 0.02  # of a frame's length, by which a stamp may be off
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """A text table. head : its lines before the data. values : (rows, columns)."""
 

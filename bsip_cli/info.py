@@ -12,6 +12,8 @@ import pyarrow.parquet as pq
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import read_header
+from bsip_cli.errors import printable
+from bsip_cli.files import check_regular
 from bsip_cli.provenance import library_versions
 from bsip_cli.schemas import SCHEMAS
 
@@ -32,6 +34,11 @@ def artifact_info(path: Path) -> Iterator[str]:
     BadDataError
         It is not there, or no artifact.
     """
+    check_regular(path)
+    yield from map(printable, _lines(path))
+
+
+def _lines(path: Path) -> Iterator[str]:
     header = read_header(path)
     kind, provenance = header["kind"], header["provenance"]
     meaning = f": {SCHEMAS[kind].meaning}" if kind in SCHEMAS else ""
@@ -47,7 +54,8 @@ def artifact_info(path: Path) -> Iterator[str]:
         yield f"fact      {name} = {json.dumps(fact, ensure_ascii=False)}"
     yield "columns"
     for field in pq.read_schema(path):
-        notes = {key.decode(): text.decode() for key, text in (field.metadata or {}).items()}
+        known = (field.metadata or {}).items()
+        notes = {key.decode(errors="replace"): text.decode(errors="replace") for key, text in known}
         yield f"  {field.name}{_unit(notes)}  {notes.get('meaning', '')}".rstrip()
 
 

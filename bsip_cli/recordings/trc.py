@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bsip_cli.errors import BadDataError
+from bsip_cli.errors import BadDataError, printable
 from bsip_cli.recordings.model import Finding
-from bsip_cli.recordings.printable import printable
 from bsip_cli.recordings.scene_size import settle_unit, without_absurd
 from bsip_cli.recordings.text_lines import check_names, head_of, row_counts, text_lines
 from bsip_cli.recordings.units import length_in_m

@@ -11,7 +11,8 @@ from typing import Any, get_args, get_origin, get_type_hints
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-from imports_of import modules
+
+from tests.architecture.imports_of import modules
 
 # What annotations name and Python cannot evaluate: two imports for the type checker, array[float].
 FOR_TYPES_ONLY = {"Level": str, "Figure": object, "array": list}

@@ -8,10 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recording_writers import standing_markers, standing_wrench, write_mot, write_trc
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.read import read_recording
+from tests.recordings.recording_writers import (
+    standing_markers,
+    standing_wrench,
+    write_mot,
+    write_trc,
+)
 
 N = 50
 HEAD = "PathFileType\t4\t(X/Y/Z)\ta.trc\nDataRate\tUnits\n100\tmm\n"

@@ -15,6 +15,7 @@ from bsip_cli.files import read_toml
 
 JointType = Literal["free", "spherical", "revolute"]
 
+_KEYS = ("name", "parent", "joint", "type", "table")
 _Q_PARTS = {
     "free": ("tx", "ty", "tz", "qx", "qy", "qz", "qw"),
     "spherical": ("qx", "qy", "qz", "qw"),
@@ -95,6 +96,12 @@ def _starts(sizes) -> tuple[int, ...]:
     return tuple(starts)
 
 
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{value!r} is no text")
+    return value
+
+
 def load_skeleton(name: str) -> Skeleton:
     """Read a skeleton file: the name of a shipped one, or a path.
 
@@ -109,7 +116,7 @@ def load_skeleton(name: str) -> Skeleton:
         raise UsageError("there is no such skeleton", file=name, expected=known)
     data = read_toml(file)
     try:
-        rows = data["segments"]
+        rows = [{key: _text(row[key]) for key in _KEYS} for row in data["segments"]]
         names = tuple(row["name"] for row in rows)
         parents = tuple(names.index(row["parent"]) if row["parent"] else -1 for row in rows)
         skeleton = Skeleton(

@@ -22,7 +22,7 @@ _SHORT = re.compile(  # F1_x, P1_x, M1_x and FP1_Fx, FP1_Px, FP1_Mx
     r"^(?:(?P<kind1>[fpmt])(?P<id1>\d+)|fp(?P<id2>\d+)_(?P<kind2>[fpmt]))_?(?P<axis>[xyz])$"
 )
 _ROWS = re.compile(r"^(?:nrows\s*=|datarows)\s*(\d{1,12})$", re.IGNORECASE)
-_MOST_FORCES = 255  # as a C3D file can have plates
+_MOST_FORCES = 64  # as many plates are read of a C3D file
 _KINDS = {"v": "force", "f": "force", "p": "point", "m": "torque", "t": "torque"}
 _BARE = {
     "force": "force",

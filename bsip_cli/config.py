@@ -14,7 +14,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from bsip_cli.errors import UsageError
 from bsip_cli.files import read_toml
 
-
 _MOST_FAULTS, _LONGEST_VALUE = 20, 80  # faults and characters that are told
 
 

@@ -91,8 +91,8 @@ def _check_values(value: object, depth: int = 0) -> None:
         raise ValueError(f"values nested more than {_DEEPEST} deep")
     if isinstance(value, int) and not -(2**63) <= value < 2**63:
         raise ValueError("an integer of more than 64 bits")
-    parts = value.values() if isinstance(value, dict) else value
-    for part in parts if isinstance(value, dict | list) else ():
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    for part in parts:
         _check_values(part, depth + 1)
 
 

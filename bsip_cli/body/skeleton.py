@@ -96,12 +96,6 @@ def _starts(sizes) -> tuple[int, ...]:
     return tuple(starts)
 
 
-def _text(value: object) -> str:
-    if not isinstance(value, str):
-        raise TypeError(f"{value!r} is no text")
-    return value
-
-
 def load_skeleton(name: str) -> Skeleton:
     """Read a skeleton file: the name of a shipped one, or a path.
 
@@ -116,7 +110,10 @@ def load_skeleton(name: str) -> Skeleton:
         raise UsageError("there is no such skeleton", file=name, expected=known)
     data = read_toml(file)
     try:
-        rows = [{key: _text(row[key]) for key in _KEYS} for row in data["segments"]]
+        rows = data["segments"]
+        odd = next((row for row in rows if not all(isinstance(row[k], str) for k in _KEYS)), None)
+        if odd:
+            raise TypeError(f"{odd!r} has values that are no text")
         names = tuple(row["name"] for row in rows)
         parents = tuple(names.index(row["parent"]) if row["parent"] else -1 for row in rows)
         skeleton = Skeleton(

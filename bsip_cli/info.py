@@ -60,11 +60,13 @@ def _lines(path: Path) -> Iterator[str]:
 
 
 def _made(made_by: dict[str, Any], title: str) -> Iterator[str]:
-    libraries = ", ".join(f"{name} {version}" for name, version in made_by["libraries"].items())
-    yield f"{title:<9} bsip {made_by['stage']} {made_by['bsip_version']} with {libraries}"
-    for name, digest in made_by["inputs"].items():
+    known = made_by.get("libraries") or {}
+    libraries = ", ".join(f"{name} {version}" for name, version in known.items())
+    stage, version = made_by.get("stage", "?"), made_by.get("bsip_version", "?")
+    yield f"{title:<9} bsip {stage} {version} with {libraries}"
+    for name, digest in (made_by.get("inputs") or {}).items():
         yield f"  input   {name} sha256 {digest}"
-    for name, value in made_by["options"].items():
+    for name, value in (made_by.get("options") or {}).items():
         yield f"  option  {name} = {json.dumps(value, ensure_ascii=False)}"
 
 

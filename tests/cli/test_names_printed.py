@@ -77,6 +77,17 @@ def test_a_recording_and_its_labels(bsip, tmp_path, monkeypatch, name):
     assert lost.code == 3
 
 
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_a_terminal_of_few_letters(bsip, tmp_path, monkeypatch, encoding):
+    markers, labels = standing_markers(10)
+    path = write_trc(tmp_path / "a.trc", np.arange(10) / 100.0, markers, [*labels[1:], "体"])
+    monkeypatch.setenv("PYTHONIOENCODING", encoding)
+    monkeypatch.chdir(tmp_path)
+    said = bsip("markers", path)
+    assert said.code == 3 and said.err == ""
+    assert "体" in said.out or "\\u4f53" in said.out
+
+
 @pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
 def test_a_study(bsip, empty_study, name):
     (empty_study / "sub-01" / f"{name}.c3d").write_bytes(b"")

@@ -97,4 +97,9 @@ def _check_values(value: object, depth: int = 0) -> None:
 
 
 def _not_toml(file: Path, why: str) -> UsageError:
-    return UsageError(f"not valid TOML ({why})", file=file, remedy="correct that place")
+    return UsageError(
+        f"not valid TOML ({why})",
+        file=file,
+        expected="TOML in UTF-8",
+        remedy="correct that place",
+    )

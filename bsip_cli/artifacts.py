@@ -19,6 +19,15 @@ from bsip_cli.schemas import SCHEMAS, Schema
 
 _TYPES = {"float": pa.float64(), "int": pa.int64(), "bool": pa.bool_(), "text": pa.string()}
 
+_MADE_BY = dict.fromkeys(("stage", "bsip_version"), str | None) | dict.fromkeys(
+    ("libraries", "inputs", "options"), dict | None
+)
+_SHAPE = {
+    "kind": str,
+    "schema_version": int,
+    "provenance": {"made_by": _MADE_BY, "messages": [str], "facts": dict},
+}
+
 _UNFINISHED = ".bsip-part"
 
 
@@ -199,7 +208,28 @@ def _check_intact(path: Path) -> None:
 
 
 def _header_in(schema: pa.Schema) -> dict[str, Any]:
-    return json.loads((schema.metadata or {})[b"bsip"])
+    """What made a table; KeyError or ValueError where that is not said as bsip says it."""
+    try:
+        found = json.loads((schema.metadata or {})[b"bsip"])
+    except RecursionError:
+        raise ValueError("brackets without end") from None
+    if not (
+        _has_shape(found, _SHAPE)
+        and _has_shape(found["provenance"].get("amended_by", {}), _MADE_BY)
+    ):
+        raise ValueError("another shape")
+    return found
+
+
+def _has_shape(value: Any, shape: Any) -> bool:
+    """Whether a value of JSON is of a type, or has a shape for each of these keys."""
+    if isinstance(shape, dict):
+        return isinstance(value, dict) and all(
+            _has_shape(value.get(key), part) for key, part in shape.items()
+        )
+    if isinstance(shape, list):
+        return isinstance(value, list) and all(_has_shape(part, shape[0]) for part in value)
+    return isinstance(value, shape)
 
 
 def _check_kind(found: Mapping, schema: Schema, path: Path) -> None:

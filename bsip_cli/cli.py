@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from contextlib import suppress
@@ -331,6 +332,8 @@ def info(artifact) -> None:
 def main() -> None:
     """Entry point: turns errors into one sentence and a documented exit code."""
     raise_when_ended()
+    if isinstance(sys.stdout, io.TextIOWrapper):  # letters that a terminal of few cannot show
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         exit_code = cli(standalone_mode=False)
         sys.stdout.flush()

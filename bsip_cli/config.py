@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import json
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -13,6 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from bsip_cli.errors import UsageError
 from bsip_cli.files import read_toml
 
+_MOST_FAULTS, _LONGEST_VALUE = 20, 80  # faults and characters that are told
+
 
 def shipped(*parts: str) -> Path:
     """Path of a file that ships in ``configs/``, in a checkout as in an installed wheel."""
@@ -22,7 +25,7 @@ def shipped(*parts: str) -> Path:
 
 
 class Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Roles(Section):
@@ -30,6 +33,8 @@ class Roles(Section):
     sequence: tuple[str, ...]
 
 
+_MANY = 10_000  # frames, rounds or draws: more take days and change no digit
+Count = Annotated[int, Field(ge=1, le=_MANY)]
 Metre = Annotated[float, Field(ge=-2, le=2)]
 
 
@@ -74,16 +79,16 @@ class Scale(Section):
     marker_sd_m: float = Field(gt=0)
     hinge_sd_rad: float = Field(gt=0)
     symmetry_sd: float = Field(gt=0)
-    frames: int = Field(ge=1)
+    frames: Count
     independent_frames: float = Field(gt=0)
-    iterations: int = Field(ge=0)
+    iterations: int = Field(ge=0, le=_MANY)
 
 
 class Ik(Section):
     marker_sd_m: float = Field(gt=0)
     robust_limit_m: float = Field(gt=0)
     posture_sd_rad: float = Field(gt=0)
-    iterations: int = Field(ge=1)
+    iterations: Count
     undetermined_sd_rad: float = Field(gt=0)
     held_sd_rad: float = Field(gt=0)
 
@@ -128,7 +133,7 @@ class Reconstruct(Section):
 class Diagnosis(Section):
     cutoff_hz: float = Field(gt=0)
     skin_factor: float = Field(ge=0)
-    skin_draws: int = Field(ge=1)
+    skin_draws: Count
     marker_sd_m: float = Field(gt=0)
     stated_mass_sd_percent: float = Field(gt=0)
 
@@ -181,10 +186,12 @@ def load_config(files: Iterable[Path]) -> Config:
             merged = _merge(merged, read_toml(file))
             sources.append(str(file))
     try:
-        return Config.model_validate(merged)
+        return Config.model_validate_json(json.dumps(merged, default=_date), strict=True)
     except ValidationError as error:
+        faults = error.errors()
+        more = f"; and {len(faults) - _MOST_FAULTS} more" if len(faults) > _MOST_FAULTS else ""
         raise UsageError(
-            "; ".join(_fault(e, merged) for e in error.errors()),
+            "; ".join(_fault(e, merged) for e in faults[:_MOST_FAULTS]) + more,
             file=", ".join(sources),
             remedy="configs/default.toml lists every option with its unit",
         ) from None
@@ -211,6 +218,11 @@ def with_estimators(config: Config, names: tuple[str, ...]) -> Config:
         ) from None
 
 
+def _date(value: object) -> dict:
+    """What JSON lacks, as what no option takes."""
+    return {"date": str(value)}
+
+
 def _merge(base: Mapping, over: Mapping) -> dict:
     merged = dict(base)
     for key, value in over.items():
@@ -225,7 +237,7 @@ def _fault(error: Mapping, values: Mapping) -> str:
     if error["type"] == "missing":
         return f"{name} is missing"
     if error["type"] != "extra_forbidden":
-        return f"{name} = {error['input']!r}: {error['msg']}"
+        return f"{name} = {repr(error['input'])[:_LONGEST_VALUE]}: {error['msg']}"
     model: type[BaseModel] = Config
     for part in path[:-1]:
         if not part.isdigit():

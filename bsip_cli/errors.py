@@ -4,8 +4,14 @@ from __future__ import annotations
 
 
 def printable(text: str) -> str:
-    """A text with a question mark for what is no letter, digit or sign: it may steer a terminal."""
-    return "".join(c if c.isprintable() else "?" for c in text)
+    """A text with a question mark for what is no letter, digit, sign or blank.
+
+    A line break forges a line, an escape sequence steers a terminal, a change of direction reads
+    as another name, and bytes of a path that are no UTF-8 cannot be written.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c == "\N{NO-BREAK SPACE}" else "?" for c in text)
 
 
 class BsipError(Exception):

@@ -10,6 +10,8 @@ from pathlib import Path
 from bsip_cli.errors import BadDataError, BsipError, UsageError
 
 _LARGEST_TOML = 1_000_000  # bytes; eighty times the longest that ships
+_LONGEST_LINE = 10_000  # characters; a key of n parts takes tomllib a time that grows as n squared
+_DEEPEST = 10  # tables and lists in another; no option has more than four
 _NO_FILES = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a FIFO"),
@@ -69,14 +71,35 @@ def read_toml(file: Path) -> dict:
                 expected=f"TOML of at most {_LARGEST_TOML / 1e6:g} MB",
                 file=file,
             )
-        return tomllib.loads(file.read_text(encoding="utf-8-sig"))
+        text = file.read_text(encoding="utf-8-sig")
+        if max(map(len, text.splitlines()), default=0) > _LONGEST_LINE:
+            raise ValueError(f"a line of more than {_LONGEST_LINE} characters")
+        content = tomllib.loads(text)
+        _check_values(content)
     except OSError as error:
         raise UsageError(f"cannot be read ({error.strerror or error})", file=file) from None
     except RecursionError:
-        raise _not_toml(file, "brackets nested too deeply") from None
+        raise _not_toml(file, "brackets in brackets without end") from None
     except ValueError as error:  # tomllib's, no UTF-8, a number of more digits than Python reads
         raise _not_toml(file, str(error)) from None
+    return content
+
+
+def _check_values(value: object, depth: int = 0) -> None:
+    """ValueError where values are nested deeper than any option, or an integer is none of TOML."""
+    if depth > _DEEPEST:
+        raise ValueError(f"values nested more than {_DEEPEST} deep")
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        raise ValueError("an integer of more than 64 bits")
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    for part in parts:
+        _check_values(part, depth + 1)
 
 
 def _not_toml(file: Path, why: str) -> UsageError:
-    return UsageError(f"not valid TOML ({why})", file=file, remedy="correct that place")
+    return UsageError(
+        f"not valid TOML ({why})",
+        file=file,
+        expected="TOML in UTF-8",
+        remedy="correct that place",
+    )

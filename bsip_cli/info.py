@@ -12,6 +12,8 @@ import pyarrow.parquet as pq
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import read_header
+from bsip_cli.errors import printable
+from bsip_cli.files import check_regular
 from bsip_cli.provenance import library_versions
 from bsip_cli.schemas import SCHEMAS
 
@@ -32,6 +34,11 @@ def artifact_info(path: Path) -> Iterator[str]:
     BadDataError
         It is not there, or no artifact.
     """
+    check_regular(path)
+    yield from map(printable, _lines(path))
+
+
+def _lines(path: Path) -> Iterator[str]:
     header = read_header(path)
     kind, provenance = header["kind"], header["provenance"]
     meaning = f": {SCHEMAS[kind].meaning}" if kind in SCHEMAS else ""
@@ -47,16 +54,19 @@ def artifact_info(path: Path) -> Iterator[str]:
         yield f"fact      {name} = {json.dumps(fact, ensure_ascii=False)}"
     yield "columns"
     for field in pq.read_schema(path):
-        notes = {key.decode(): text.decode() for key, text in (field.metadata or {}).items()}
+        known = (field.metadata or {}).items()
+        notes = {key.decode(errors="replace"): text.decode(errors="replace") for key, text in known}
         yield f"  {field.name}{_unit(notes)}  {notes.get('meaning', '')}".rstrip()
 
 
 def _made(made_by: dict[str, Any], title: str) -> Iterator[str]:
-    libraries = ", ".join(f"{name} {version}" for name, version in made_by["libraries"].items())
-    yield f"{title:<9} bsip {made_by['stage']} {made_by['bsip_version']} with {libraries}"
-    for name, digest in made_by["inputs"].items():
+    known = made_by.get("libraries") or {}
+    libraries = ", ".join(f"{name} {version}" for name, version in known.items())
+    stage, version = made_by.get("stage", "?"), made_by.get("bsip_version", "?")
+    yield f"{title:<9} bsip {stage} {version} with {libraries}"
+    for name, digest in (made_by.get("inputs") or {}).items():
         yield f"  input   {name} sha256 {digest}"
-    for name, value in made_by["options"].items():
+    for name, value in (made_by.get("options") or {}).items():
         yield f"  option  {name} = {json.dumps(value, ensure_ascii=False)}"
 
 

@@ -15,7 +15,7 @@ from bsip_cli.body.markersets import Marker, MarkerSet, load_marker_set
 from bsip_cli.body.names import in_words, without_side
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.config import load_config
-from bsip_cli.errors import UsageError
+from bsip_cli.errors import UsageError, printable
 from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.labels import LabelMatch, match_labels
 from bsip_cli.recordings.marker_guess import SetFit, fits
@@ -84,7 +84,7 @@ def _compared(request: Request, recording: Recording, chosen: MarkerSet) -> bool
 
 
 def _say(lines: Sequence[str]) -> None:
-    click.echo("\n".join(lines))
+    click.echo("\n".join(map(printable, lines)))
 
 
 def _size(recording: Recording) -> str:
@@ -196,7 +196,7 @@ def _write_starter(request: Request, recording: Recording) -> None:
     """
     target = request.write or Path(f"{request.file.stem.replace(' ', '_')}_markers.toml")
     labels = [_bare(label) for label in recording.labels if _is_of(label, request.prefix)]
-    text = starter_toml(labels, request.file.name, target.name)
+    text = starter_toml(labels, printable(request.file.name), printable(target.name))
     try:
         with target.open("x", encoding="utf-8") as file:
             file.write(text)

@@ -174,7 +174,8 @@ def _own_file(root: Path, name: str) -> str:
 
 def _tell(outcome: Outcome) -> None:
     for sentence in outcome.sentences:
-        tqdm.write(f"{outcome.stage}: {sentence}", file=sys.stderr)
+        lines = sentence.split("\n") if outcome.state == "bug" else [sentence]  # with its trace
+        tqdm.write(f"{outcome.stage}: " + "\n".join(map(printable, lines)), file=sys.stderr)
 
 
 def _summary(command: str, outcomes: Iterable[Outcome], out: Path) -> None:
@@ -188,7 +189,9 @@ def _summary(command: str, outcomes: Iterable[Outcome], out: Path) -> None:
         "bug": "failed by a bug",
     }
     said = ", ".join(f"{states[state]} {word}" for state, word in words.items() if states[state])
-    click.echo(f"bsip {command}: {said or 'nothing to do'}; results in {out}", err=True)
+    click.echo(
+        f"bsip {command}: {said or 'nothing to do'}; results in {printable(str(out))}", err=True
+    )
 
 
 def _exit_code(outcomes: Iterable[Outcome]) -> int:

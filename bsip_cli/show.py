@@ -47,7 +47,7 @@ def shown(out: Path) -> Iterator[str]:
             file=out,
             remedy="run `bsip run` first, or name the folder that it was given with --out",
         )
-    yield from [tables] if tables else []
+    yield from ["\n".join(map(printable, tables.split("\n")))] if tables else []
     everybody, unread = [], []
     for folder in sorted(path for path in out.glob("sub-*") if path.is_dir()):
         try:
@@ -61,7 +61,7 @@ def shown(out: Path) -> Iterator[str]:
     yield from _shared_text(shared_causes(everybody), get_terminal_size().columns)
     for report in (out / "group" / "report.html", *sorted(out.glob("sub-*/report.html"))):
         if report.exists():
-            yield f"report: {report}"
+            yield f"report: {printable(str(report))}"
     if unread:
         raise BadDataError(
             f"the diagnosis of {listed(unread)} cannot be shown",

@@ -17,6 +17,7 @@ from bsip_cli.artifacts import (
     write_artifact_in_parts,
 )
 from bsip_cli.config import Config, Load
+from bsip_cli.errors import printable
 from bsip_cli.fingerprints import file_hash
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.provenance import describe, hash_of_files
@@ -55,7 +56,7 @@ class Unit:
 
     def warn(self, message: str) -> None:
         """Tell the user when the unit is done or refused, and the reader of its artifacts later."""
-        self.messages.append(message)
+        self.messages.append(printable(message))
 
     # --- where things lie -------------------------------------------------------------------
 

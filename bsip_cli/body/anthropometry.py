@@ -15,7 +15,7 @@ from bsip_cli.body.person import Person
 _MEAN_STATURE_M = {"M": 1.77, "F": 1.61}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TableRow:
     """One segment of a table: fractions of the body's mass and of the segment's length.
 

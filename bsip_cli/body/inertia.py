@@ -17,7 +17,7 @@ SYMMETRIC = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # Pinocchio's orde
 _READABLE = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # the tables' order of I
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Inertia:
     """Mass [kg], centre of mass (3,) [m] and tensor (3, 3) [kg m2] about it, in one frame."""
 

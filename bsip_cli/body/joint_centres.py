@@ -30,7 +30,7 @@ _HALF_BREADTH = {"elbow": 0.022, "knee": 0.031, "malleolus": 0.022}
 _THORAX_WIDTH, _THORAX_SLOPE = 0.077, -25.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class JointCentres:
     """World positions [m] by name (``hip_l`` ...) and the directions the frames are built on.
 

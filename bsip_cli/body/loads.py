@@ -11,7 +11,7 @@ from bsip_cli.body.inertia import Inertia
 from bsip_cli.body.person import Person
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PointMass:
     """A mass [kg] at ``position_m`` (3,) in the frame of a segment, from the segment's origin."""
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import difflib
 import os
+from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 
 from bsip_cli.body.names import SEGMENTS
@@ -140,7 +142,7 @@ def _faults(data: dict) -> list[str]:
                 faults.append(f'{label}: expected the name of a landmark or ""')
             elif landmark and landmark not in LANDMARKS:
                 faults.append(f"{label}: unknown landmark {landmark}{_near(landmark, LANDMARKS)}")
-    faults += [f"{label} stands twice" for label in sorted(set(labels)) if labels.count(label) > 1]
+    faults += [f"{label} stands twice" for label, n in sorted(Counter(labels).items()) if n > 1]
     return faults + _option_faults(data, labels)
 
 
@@ -156,7 +158,7 @@ def _option_faults(data: dict, labels: list[str]) -> list[str]:
     faults += [
         f"{label}: expected a weight of 0 or more"
         for label, weight in weights.items()
-        if not (isinstance(weight, int | float) and weight >= 0)
+        if not (isinstance(weight, int | float) and 0 <= weight < inf)
     ]
     faults += [
         f'{label}: expected aliases like ["NAME"]'

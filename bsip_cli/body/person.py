@@ -12,7 +12,7 @@ from bsip_cli.body.skeleton import Skeleton
 _LEVER_M = 0.02
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Person:
     """Geometry of one person; arrays run over the skeleton's segments or over the markers.
 

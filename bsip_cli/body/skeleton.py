@@ -15,6 +15,7 @@ from bsip_cli.files import read_toml
 
 JointType = Literal["free", "spherical", "revolute"]
 
+_KEYS = ("name", "parent", "joint", "type", "table")
 _Q_PARTS = {
     "free": ("tx", "ty", "tz", "qx", "qy", "qz", "qw"),
     "spherical": ("qx", "qy", "qz", "qw"),
@@ -110,6 +111,9 @@ def load_skeleton(name: str) -> Skeleton:
     data = read_toml(file)
     try:
         rows = data["segments"]
+        odd = next((row for row in rows if not all(isinstance(row[k], str) for k in _KEYS)), None)
+        if odd:
+            raise TypeError(f"{odd!r} has values that are no text")
         names = tuple(row["name"] for row in rows)
         parents = tuple(names.index(row["parent"]) if row["parent"] else -1 for row in rows)
         skeleton = Skeleton(

@@ -23,7 +23,7 @@ _C7, _SUPRASTERNALE = np.array([-0.126, 0.069]), np.array([0.167, -0.110])
 _BREADTH, _LENGTH_TO_TORSO = 0.742, 0.94
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Completed:
     """Landmarks (3,) [m] with the stand-ins among them, and what was put in, in words."""
 
@@ -93,7 +93,7 @@ def _placed(middle: np.ndarray, waist: np.ndarray, right: np.ndarray) -> dict[st
     }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Arm:
     """Elbow's lateral landmark and wrist centre (3,) [m], where they are known, and the notes."""
 

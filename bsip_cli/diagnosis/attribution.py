@@ -21,7 +21,7 @@ GROUPS = ("mass", "centre_of_mass", "inertia")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ground:
     """Where and towards what the centre of pressure is taken.
 
@@ -37,7 +37,7 @@ class Ground:
     min_force_N: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Attribution:
     """One component's error.
 

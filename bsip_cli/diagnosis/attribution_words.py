@@ -13,7 +13,7 @@ from bsip_cli.statistics.normal import Z95
 _BESIDE = 0.5  # of the largest coordinate of a shift: smaller ones are not put into words
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bodies:
     """A segment by the table and as identified, about its joint centre.
 

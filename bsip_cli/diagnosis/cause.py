@@ -12,7 +12,7 @@ from bsip_cli.effects.joint_change import Sized, joint_change, joint_delay_s
 from bsip_cli.effects.scene import Scene
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cause:
     """An effect at a place, in some trials.
 

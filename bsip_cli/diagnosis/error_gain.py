@@ -9,7 +9,7 @@ import numpy as np
 _DRAWS = 500
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BlockErrors:
     """Squared errors before and after, summed per block (b,), and the number of samples (b,)."""
 

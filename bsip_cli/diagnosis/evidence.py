@@ -35,7 +35,7 @@ _MATTERS = 1e-3  # by which a direction is shrunk, at least
 LEAST = np.array([0.0003, 0.0003, 0.0005, 0.0005, 0.0005, 0.0001])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Filter:
     """One low-pass for everything: operator (n, N), frames (n,), spans of neighbouring samples."""
 
@@ -67,7 +67,7 @@ def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
     return Filter(operator, frames, tuple(pairwise(edges)), place, rate_hz)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Whitening:
     """spread (n, 6) of the noise, recursion (6, p) of its autoregression, and of the whitened
     nuisances N the left singular vectors (6 n, m) that matter and by how much each is shrunk (m,).
@@ -102,7 +102,7 @@ class Whitening:
         return _innovations(wrenches / spread, recursion, self.filter)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Filtered:
     """What has passed the filter: residual (n, 6), the trial's own nuisances (n, 6, m) and those it
     shares (n, 6, p), noise level of the accelerations (n,); noise that is always there (6,); how
@@ -119,7 +119,7 @@ class Filtered:
     mass_sd: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TrialEvidence:
     """One trial in coordinates in which its own nuisances and its noise are white.
 

@@ -23,7 +23,7 @@ _SEARCH = 80  # evaluations for a moment, a frequency or a window
 _UNTOLD = 1e-6  # of the largest derivative: a hinge does not tell a shift along its axis
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Explanation:
     """An effect in some trials, all of its parameters in the effect's order."""
 
@@ -161,7 +161,7 @@ def explanation_of(
     return Explanation(Place(candidate, trials), values)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """Explanations fitted together: white residual that they leave (R,), and the derivative (R, K)
     of the change by all their free parameters, one after the other [typical]."""

@@ -13,7 +13,7 @@ from bsip_cli.statistics.normal import Z95
 FOLDS = 5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Gain:
     """Squared white residual that goes, per block (b,), 0 in trials that are not concerned.
 

@@ -49,7 +49,7 @@ class Slip:
     least_m: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Proof:
     """A cause in one trial, sized by the markers.
 

@@ -31,7 +31,7 @@ class Place:
     trials: tuple[int, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Filtered:
     """Signatures in one trial (n, 6, K), and which part of them is a candidate's.
 
@@ -42,7 +42,7 @@ class _Filtered:
     parts: dict[Candidate, slice]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Products:
     """Of the white signatures: those with the shared space (p, K), and each candidate's Gram matrix
     (k, k)."""
@@ -51,7 +51,7 @@ class _Products:
     grams: dict[Candidate, np.ndarray]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Batch:
     """Places (n,) with as many free parameters k: their numbers, information (n, k, k) beside what
     the trials share, and per trial which signatures are theirs (n, k), -1 for none."""

@@ -33,7 +33,7 @@ LIGHTER = 0.02  # of body weight: missing mean vertical force
 SURE = 4.0  # standard errors
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Support:
     """What hands hold on to in one trial.
 

@@ -18,7 +18,7 @@ BLOCK_S = 1.0  # stretches of time that stand for independent ones
 _CLIP = 4.0  # standard deviations: a contact's edge must not stand for a minute of movement
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Evidence:
     """White residual of all trials, and what turns signatures into the same coordinates.
 

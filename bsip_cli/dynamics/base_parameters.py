@@ -19,7 +19,7 @@ _TOLERANCE = 1e-9
 _SEED = 20170629
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Basis:
     """phi_base = combine @ phi, and the wrench is regressor[:, independent] @ phi_base.
 

@@ -13,7 +13,7 @@ from bsip_cli.body.inertia import SYMMETRIC
 UP = np.array([0.0, 0.0, 1.0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Point:
     """position (N, 3) [m] and acceleration (N, 3) [m/s2] of a body-fixed point, world axes."""
 
@@ -26,7 +26,7 @@ class Point:
         return np.hstack([force, np.cross(self.position_m, force)])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SegmentMotion:
     """Of n segments in N frames, world axes: rotation (N, n, 3, 3) and position (N, n, 3) [m] of
     the joint centres, the centres' acceleration [m/s2], angular velocity [rad/s] and acceleration

@@ -12,7 +12,7 @@ from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import rotations_of, skew
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WrenchResponse:
     """Linear response of the world wrench about the origin to errors d of the motion.
 

@@ -21,7 +21,7 @@ _WORTH_A_WORD = 0.05
 _MOVEMENTS = {"flexion": "bending forwards", "lateral": "bending sideways", "axial": "turning"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SplitTorso:
     """The two parts of a torso that bends a second time.
 

@@ -27,7 +27,7 @@ SLOW_ENOUGH = 0.8  # of half the lower rate, when frames are left out
 TRUST_S = 0.05  # standard deviation of what smooths the markers' trust
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plate:
     """A force plate and what it measured.
 
@@ -58,7 +58,7 @@ class Plate:
         return np.stack([first, np.cross(normal, first), normal])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene:
     """One trial: what was measured of the motion and the ground, and a body to simulate.
 

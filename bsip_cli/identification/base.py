@@ -17,7 +17,7 @@ from bsip_cli.identification.estimator import Estimate, Problem
 _TRACE_OF_PRIOR = 1e-8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BaseParameters:
     """values (rank,), covariance (rank, rank) and the regression's values (rank,)."""
 

@@ -14,7 +14,7 @@ _GROUPS = (("mass", slice(0, 1)), ("centre of mass", slice(1, 4)), ("inertia", s
 _FROM_TABLE = 0.2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Beforehand:
     """What is known before any wrench, about the table, in coordinates that scatter as N(0, 1).
 

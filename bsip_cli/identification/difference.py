@@ -25,7 +25,7 @@ import numpy as np
 from bsip_cli.identification.estimator import Estimate, Problem
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Difference:
     """phi (P,) of b minus a, its covariance (P, P) about ``resolution @ change`` for a true change
     (P,), and the resolution (P, P)."""
@@ -35,7 +35,7 @@ class Difference:
     resolution: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SegmentChange:
     """Change (10,) of one segment's parameters about its joint, and its covariance (10, 10)."""
 

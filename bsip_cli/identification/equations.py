@@ -20,7 +20,7 @@ def _alike(noise_level: np.ndarray) -> np.ndarray:
     return np.ones((len(noise_level), 6))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording:
     """Motion and measured wrench of one trial.
 
@@ -38,7 +38,7 @@ class Recording:
     noise_level: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NormalEquations:
     """Sums over samples of the wrench equation, one set per component c of the wrench.
 
@@ -82,7 +82,7 @@ class NormalEquations:
         return np.sqrt(np.maximum(squares, 0.0) / self.samples)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Samples:
     """Filtered and decimated equations of some frames: regressor (n, 6, P) and measured wrench
     (n, 6) about the reference, and the accelerations' noise level (n,)."""
@@ -92,7 +92,7 @@ class Samples:
     noise_level: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ResidualSeries:
     """What a parameter vector leaves of one recording: residual (n, 6), noise level (n,)."""
 

@@ -35,7 +35,7 @@ class Problem:
         return self.equations.weighted(self.noise.weights() / self.trust_ratio**2)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Estimate:
     """Parameters (P,) about the joint centres, their covariance (P, P), and a note for people.
 

@@ -12,7 +12,7 @@ from bsip_cli.identification.estimator import Problem
 _BETTER_THAN_TABLE = 0.5  # part of the prior variance: below it the data know more than the table
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Excitation:
     """What the motion shows, each parameter in its prior spread, each component in its noise.
 

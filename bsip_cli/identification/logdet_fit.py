@@ -23,7 +23,7 @@ _ARMIJO = 1e-4
 _SHORTEST = 1e-10
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Objective:
     """quadratic (k, k), linear (k,), shown (P, k), table (P,) of J > 0, gamma > 0."""
 
@@ -50,7 +50,7 @@ class Objective:
         return self.quadratic + self.gamma * self.shown.T @ curvature @ self.shown
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Optimum:
     """x of the smallest value, that value, the inverse Hessian there, and Newton's steps."""
 

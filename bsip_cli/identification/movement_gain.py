@@ -23,7 +23,7 @@ _ADVISED = 3
 _STRIDE = 2  # frames; squares of 2.2 Hz need 9 Hz
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Gain:
     """What a movement adds.
 

@@ -19,7 +19,7 @@ _ROUNDS = 8
 _QUIETEST = 0.1  # of the root-mean-square: no frame is trusted more than ten times the average
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Noise:
     """Of each component of the wrench [N, N m].
 

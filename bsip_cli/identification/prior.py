@@ -20,7 +20,7 @@ class Spread:
     total_mass_sd_percent: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Prior:
     """Mean and covariance of the inertial parameters before the data.
 

@@ -24,7 +24,7 @@ from bsip_cli.identification.positive_masses import smallest
 _SMALLEST_MASS = 0.05  # of the table's
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Programme:
     """min 1/2 |z|^2 + 1/2 |relations z - targets|^2, every mass of table + spread z above floor.
 

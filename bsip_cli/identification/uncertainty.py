@@ -11,7 +11,7 @@ from bsip_cli.identification.estimator import Estimate
 from bsip_cli.identification.prior import Prior
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ReadableParameters:
     """Per segment (n, 10): mass, centre of mass and tensor about it in the segment frame.
 

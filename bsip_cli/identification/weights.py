@@ -31,7 +31,7 @@ _SETTLED = 0.02  # relative change of the weights
 _LARGEST_CHANGE = 4.0  # per round
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Terms:
     """The sums behind the objective, in coordinates x in which people scatter as N(0, 1) as [prior]
     says, along the directions that the data show from best to not at all: in the parameters' own
@@ -51,7 +51,7 @@ class Terms:
     spread_weight: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Weights:
     """Of the deviations (2 + n,), 1 as [prior] says, and of the log-det term."""
 
@@ -59,7 +59,7 @@ class Weights:
     gamma: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """Optimum with its weights, its evidence, the covariance before the data, and how many
     parameters the data decided."""

@@ -19,7 +19,7 @@ from bsip_cli.motion.functional_legs import functional_landmarks
 Frame = tuple[np.ndarray, np.ndarray]  # origin (3,) and axes (3, 3) with X, Y, Z as columns
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Calibration:
     """A first guess of the person, the pose it was taken in (nq,), and what was assumed."""
 

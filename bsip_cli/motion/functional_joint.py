@@ -11,7 +11,7 @@ from bsip_cli.body.rigid_motion import rigid_motion
 _LEAST_FRAMES = 20
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FunctionalJoint:
     """The point and the line that stay where they are in both segments, in the reference pose.
 

@@ -17,7 +17,7 @@ _LARGEST_RESIDUAL_M = 0.02  # the clusters do not turn about one line
 _HALF_M = 0.04  # of the distance of the epicondyles put in; only their middle and direction count
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FunctionalLandmarks:
     """Landmarks (3,) [m] in the reference pose, and how they were found, in words."""
 

@@ -16,7 +16,7 @@ _STARTS, _START_SD_RAD, _LARGEST_MISFIT_M = 16, 0.8, 0.1
 _KINDS = {"free": kernel.FREE, "spherical": kernel.SPHERICAL, "revolute": kernel.REVOLUTE}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Poses:
     """Least-squares poses of N frames.
 

@@ -13,7 +13,7 @@ _LEAST_FREEDOM = 8
 _LEAST_ERROR = 1e-6  # keeps columns that stand still from making the equations singular
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LevelChange:
     """The most likely change of level of a signal.
 
@@ -34,7 +34,7 @@ class LevelChange:
     z: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Problem:
     """Sums over the samples z = [X, y] (n, 1 + k + d): the constant, the columns, the signal.
 

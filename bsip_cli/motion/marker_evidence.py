@@ -39,7 +39,7 @@ from bsip_cli.motion.marker_slips import slips
 from bsip_cli.motion.marker_swaps import swaps
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Evidence:
     """What is wrong with the markers of one trial.
 

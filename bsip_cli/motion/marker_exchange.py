@@ -28,7 +28,7 @@ class Exchange:
     statistic: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Labelling:
     """A fit and the labels it rests on.
 

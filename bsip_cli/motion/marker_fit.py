@@ -19,7 +19,7 @@ MEDIAN_LENGTH = 1.538
 _USUAL_M = 0.03  # how far a displaced marker moves, before the data speak
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MarkerFit:
     """Markers of N frames and the poses fitted to them.
 

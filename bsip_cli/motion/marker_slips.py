@@ -34,7 +34,7 @@ class _Found:
     block: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Slip:
     m: int
     frame: int

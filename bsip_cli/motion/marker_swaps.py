@@ -26,7 +26,7 @@ _UNSEEN_S = 0.25  # a reversal is looked for over gaps up to this long
 _MOST = 12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Pair:
     """Two markers, the frames (N,) in which they may be exchanged, and how sharp the signs are."""
 

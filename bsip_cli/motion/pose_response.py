@@ -15,7 +15,7 @@ _BLOCK = 400
 _PRIOR_M = 1e-3  # against the markers' metres: what no marker shows stays where it is
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PoseResponse:
     """The least-squares step of the inverse kinematics at poses q (N, nq).
 

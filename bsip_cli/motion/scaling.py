@@ -29,7 +29,7 @@ class ScalingOptions:
     iterations: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Refinement:
     """The refined person, its poses, the residual before, and standard deviations.
 

@@ -19,7 +19,7 @@ _MOST = 0.8  # of the markers
 _FEW = 0.5  # of the trials
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TrialMarkers:
     """Frames of one trial: times_s (N,), markers_m (N, m, 3) world in the person's order, NaN where
     missing."""

@@ -23,7 +23,7 @@ _NOISE_FRAMES = 12
 _LOOSE, _WEAK_PRIOR = 60.0, 200.0  # rad/m
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """q (N, nq), v (N, nv), a (N, nv) in Pinocchio's conventions, and the noise of a (N, nv).
 

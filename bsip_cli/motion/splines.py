@@ -41,7 +41,7 @@ _BRIDGE_WEIGHT = 1e-4  # of a missing sample, against 1: keeps long gaps solvabl
 _FREQUENCIES = 1000  # at which a gain is computed to find the cut-off
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SmoothSignal:
     """A smoothed signal and its derivatives at the samples, each (N, channels).
 
@@ -68,7 +68,7 @@ class SkinNoise:
     from_hz: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Penalty:
     """Weights of the squared fourth (n - 4,) and second differences of n coefficients."""
 

@@ -19,7 +19,7 @@ _ABSURD_N = 15_000.0
 _MANY = 0.02  # of the samples
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SampleCheck:
     """One mask per fault, (n,) bool, True = faulty."""
 

@@ -11,6 +11,7 @@ from bsip_cli.recordings.c3d_header import Header
 from bsip_cli.recordings.c3d_layout import Layout
 from bsip_cli.recordings.c3d_parameters import Parameters, number
 from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.timebase import MOST_HZ
 
 _SAME = 1e-3
 
@@ -20,7 +21,7 @@ def settle_rate(
 ) -> tuple[float, list[Finding]]:
     """Frames per second, and findings where the file's statements of rates differ."""
     stated = number(parameters.get("POINT", {}), "RATE")
-    usable = [rate for rate in (stated, header.rate_hz) if np.isfinite(rate) and 0 < rate < 1e5]
+    usable = [rate for rate in (stated, header.rate_hz) if np.isfinite(rate) and 0 < rate < MOST_HZ]
     if not usable:
         raise BadDataError(
             f"POINT:RATE is {stated:g} Hz",

@@ -27,7 +27,7 @@ from bsip_cli.recordings.model import Finding
 _LARGEST_FILE = 2**31  # bytes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Content:
     """What a C3D file holds, in its own units and lab frame."""
 

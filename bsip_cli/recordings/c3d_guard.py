@@ -24,7 +24,7 @@ _CPU_S, _CPU_S_PER_MB = 10, 5
 _WALL_PER_CPU = 6  # other processes may want the same cores
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Samples:
     """What ezc3d read, in the file's units and lab frame."""
 

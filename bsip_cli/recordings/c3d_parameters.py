@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bsip_cli.recordings.printable import printable
+from bsip_cli.errors import printable
 
 Value = tuple[str, ...] | np.ndarray
 Group = Mapping[str, Value]

@@ -13,7 +13,7 @@ from bsip_cli.recordings.plates import N_CHANNELS, PlateDescription, corners_are
 from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlateChannels:
     """One plate's description and its channels."""
 
@@ -93,6 +93,7 @@ def _read_plate(
     rows = _channel_rows(group, kind, index, len(content.analog))
     raw = content.analog[rows].T
     scales = content.analog_scales[rows]
+    _check_scales(scales)
     plate = PlateChannels(
         plate=PlateDescription(
             str(index + 1), kind, corners, origin, _cop_polynomial(group, kind, index)
@@ -102,6 +103,15 @@ def _read_plate(
         baseline=_baseline(group, content.samples_per_frame, len(raw)),
     )
     return plate, _about_units(content, kind, index, rows)
+
+
+def _check_scales(scales: np.ndarray) -> None:
+    """One channel of size zero is one that does not answer, which is judged elsewhere."""
+    if not np.isfinite(scales).all() or not scales.any():
+        size = next((s for s in scales if not np.isfinite(s)), 0.0)
+        raise _UnusablePlateError(
+            f"ANALOG:GEN_SCALE times SCALE is {size:g}", "numbers other than 0"
+        )
 
 
 def _kind(group: Group, index: int) -> int:

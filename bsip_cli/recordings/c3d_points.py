@@ -22,7 +22,7 @@ _OUTPUT_NAMES = re.compile(
 _AXIS_ENDINGS = "OALP"  # Plug-in Gait draws a segment by four points, PELO PELA PELL PELP
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Points:
     """The real markers of a file."""
 

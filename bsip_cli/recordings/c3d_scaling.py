@@ -13,7 +13,7 @@ from bsip_cli.recordings.c3d_records import TEXT, Record, group_names
 _WORD = 0x10000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scaling:
     """Of the analog channels: (count - offset) x scale, each (n_channels,)."""
 
@@ -30,13 +30,17 @@ class Scaling:
 
 
 def scaling_of(group: Group, n_channels: int, is_unsigned: bool) -> Scaling:
-    """GEN_SCALE times SCALE, one where the file says nothing; OFFSET, zero likewise."""
-    general = number(group, "GEN_SCALE")
+    """GEN_SCALE times SCALE, one where the file says nothing; OFFSET, zero likewise.
+
+    What the file says may be no number, or zero: a plate of such channels is left out.
+    """
+    general = number(group, "GEN_SCALE") if np.size(group.get("GEN_SCALE", ())) else 1.0
     scales, offsets = np.ones(n_channels), np.zeros(n_channels)
     for values, name in ((scales, "SCALE"), (offsets, "OFFSET")):
         given = np.ravel(numbers(group, name))[:n_channels]
         values[: len(given)] = given
-    scales *= general if np.isfinite(general) else 1.0
+    with np.errstate(invalid="ignore", over="ignore"):
+        scales *= general
     if is_unsigned:
         offsets = np.where(offsets < 0, offsets + _WORD, offsets)
     return Scaling(scales, offsets, is_unsigned)

@@ -16,7 +16,7 @@ from bsip_cli.recordings.resample import FrameWrench
 _SIDES = {"l": "left", "r": "right"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlateLoad:
     """One plate at the marker rate."""
 
@@ -27,7 +27,7 @@ class PlateLoad:
     usable: np.ndarray  # (n_frames,) bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ContactWindows:
     valid: np.ndarray  # (n_frames,) bool: every contact is measured
     on_ground: dict[str, np.ndarray]  # side -> (n_frames,) bool
@@ -92,7 +92,7 @@ def contact_windows(
     return ContactWindows(valid, on_ground, on_plate, tuple(reasons))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Foot:
     position_m: np.ndarray  # (n_frames, k, 2), horizontal
     height_m: np.ndarray  # (n_frames, k), over each marker's standing height; inf = unseen

@@ -15,7 +15,7 @@ _NEAR_FLOOR_M = 0.17  # ankles and below
 _FEW = 200
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene:
     """The markers in the world frame, and how their frames and the plates' samples meet."""
 

@@ -18,7 +18,7 @@ _ROUNDING_S = 1e-9
 _SUPPORT = 8  # frames used on each side by the spline
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FilledMarkers:
     markers_m: np.ndarray  # (n_frames, n_markers, 3), what stays missing is NaN
     filled: np.ndarray  # (n_frames, n_markers) bool, True = not measured

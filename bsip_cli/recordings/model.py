@@ -25,7 +25,7 @@ class Finding:
     level: str  # one of LEVELS
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plate:
     """One force plate's wrench on the body, world frame, at the analog rate."""
 
@@ -40,7 +40,7 @@ class Plate:
         return np.hstack([self.force_N, self.moment_Nm])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording:
     """Markers and plates of one trial; analog sample 0 and frame 0 are simultaneous."""
 

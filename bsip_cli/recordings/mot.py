@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +12,7 @@ import numpy as np
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.model import Finding
-from bsip_cli.recordings.trc import read_lines, row_counts
+from bsip_cli.recordings.text_lines import check_names, head_of, row_counts, text_lines
 
 _COLUMN = re.compile(
     r"^(?P<before>.*?)(?P<what>force|torque|moment|grf|grm|cop)(?P<between>.*?)"
@@ -20,6 +22,7 @@ _SHORT = re.compile(  # F1_x, P1_x, M1_x and FP1_Fx, FP1_Px, FP1_Mx
     r"^(?:(?P<kind1>[fpmt])(?P<id1>\d+)|fp(?P<id2>\d+)_(?P<kind2>[fpmt]))_?(?P<axis>[xyz])$"
 )
 _ROWS = re.compile(r"^(?:nrows\s*=|datarows)\s*(\d{1,12})$", re.IGNORECASE)
+_MOST_FORCES = 64  # as many plates are read of a C3D file
 _KINDS = {"v": "force", "f": "force", "p": "point", "m": "torque", "t": "torque"}
 _BARE = {
     "force": "force",
@@ -31,7 +34,7 @@ _BARE = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GroundForce:
     """One force: as written, lab frame."""
 
@@ -41,7 +44,7 @@ class GroundForce:
     torque_Nm: np.ndarray  # (n, 3), free torque at the point
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mot:
     time_s: np.ndarray  # (n,)
     forces: tuple[GroundForce, ...]
@@ -50,19 +53,13 @@ class Mot:
 
 def read_mot(path: Path) -> Mot:
     """Read the ground forces of a MOT (or STO) file."""
-    lines = read_lines(path)
-    end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
-    body = [line for line in lines[end + 1 :] if line.strip()] if end is not None else []
-    if end is None or len(body) < 2:
-        raise BadDataError(
-            "no table after 'endheader'",
-            expected="a MOT file",
-            remedy="export the forces again",
-            file=path,
-        )
-    if "," in body[0]:
-        body = [line.replace(",", " ") for line in body]
-    names = body[0].split()
+    lines = text_lines(path)
+    header, end = head_of(lines, lambda line: line.strip().lower() == "endheader")
+    first = next((line for line in lines if line.strip()), "") if end else ""
+    names = first.replace(",", " ").split()
+    if not names:
+        raise _no_table(path)
+    check_names(names, "columns", path)
     if names[0].lower() != "time":
         raise BadDataError(
             f"first column '{names[0]}'",
@@ -70,9 +67,20 @@ def read_mot(path: Path) -> Mot:
             remedy="export the forces again",
             file=path,
         )
-    table = _table(body[1:], len(names), path)
-    findings = row_counts("rows of forces", _stated_rows(lines[:end]), len(table))
+    table = _table(lines, len(names), "," in first, path)
+    if not len(table):
+        raise _no_table(path)
+    findings = row_counts("rows of forces", _stated_rows(header), len(table))
     return Mot(table[:, 0], _forces(names, table, path), tuple(findings))
+
+
+def _no_table(path: Path) -> BadDataError:
+    return BadDataError(
+        "no table after 'endheader'",
+        expected="a MOT file",
+        remedy="export the forces again",
+        file=path,
+    )
 
 
 def _stated_rows(header: list[str]) -> float:
@@ -83,25 +91,28 @@ def _stated_rows(header: list[str]) -> float:
     return float("nan")
 
 
-def _table(lines: list[str], n_columns: int, path: Path) -> np.ndarray:
-    rows = [line.split() for line in lines]
-    odd = next((row for row in rows if len(row) != n_columns), None)
-    if odd is not None:
-        raise BadDataError(
-            f"a row of {len(odd)} cells",
-            expected=f"{n_columns}, as many as there are columns",
-            remedy="export the forces again",
-            file=path,
-        )
-    try:
-        return np.array(rows, dtype=float)
-    except ValueError as error:
-        raise BadDataError(
-            f"its table cannot be read: {error}",
-            expected="numbers with a decimal point",
-            remedy="export the forces again",
-            file=path,
-        ) from error
+def _table(lines: Iterator[str], n_columns: int, by_commas: bool, path: Path) -> np.ndarray:
+    """(n_rows, n_columns); eight bytes for each cell and no more."""
+    values = array("d")
+    for line in lines:
+        cells = (line.replace(",", " ") if by_commas else line).split()
+        if cells and len(cells) != n_columns:
+            raise BadDataError(
+                f"a row of {len(cells)} cells",
+                expected=f"{n_columns}, as many as there are columns",
+                remedy="export the forces again",
+                file=path,
+            )
+        try:
+            values.extend(map(float, cells))
+        except ValueError as error:
+            raise BadDataError(
+                f"its table cannot be read: {str(error)[:80]}",
+                expected="numbers with a decimal point",
+                remedy="export the forces again",
+                file=path,
+            ) from error
+    return np.frombuffer(values).reshape(-1, n_columns)
 
 
 def _forces(names: list[str], table: np.ndarray, path: Path) -> tuple[GroundForce, ...]:
@@ -117,6 +128,13 @@ def _forces(names: list[str], table: np.ndarray, path: Path) -> tuple[GroundForc
             forces.append(
                 GroundForce(str(len(forces) + 1), parts["force"], parts["point"], parts["torque"])
             )
+    if len(forces) > _MOST_FORCES:
+        raise BadDataError(
+            f"{len(forces)} ground forces",
+            expected=f"at most {_MOST_FORCES}",
+            remedy="export the forces again",
+            file=path,
+        )
     if not forces:
         raise BadDataError(
             "no ground force among the columns " + ", ".join(names[:8]),
@@ -132,7 +150,7 @@ def _meaning(name: str) -> tuple[str, str, str] | None:
     if short := _SHORT.match(name.lower()):
         kind = _KINDS[short["kind1"] or short["kind2"]]
         return short["id1"] or short["id2"], kind, short["axis"]
-    match = _COLUMN.match(name.lower())
+    match = _COLUMN.match(name.lower()) if name.lower().endswith(("x", "y", "z")) else None
     if match is None:
         return None
     kind = _KINDS.get(match["kind"]) or _BARE[match["what"]]

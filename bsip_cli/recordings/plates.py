@@ -19,7 +19,7 @@ LOADED_N = 100.0  # a foot stands on the plate
 _LEAST_FORCE_N = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlateDescription:
     """What the file says of one plate, SI, lab frame."""
 
@@ -46,7 +46,7 @@ class PlateDescription:
         return axes / np.linalg.norm(axes, axis=0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LocalWrench:
     """Force [N] and moment [N m] in the plate frame, (n, 3) each, at the sensor's origin."""
 

@@ -17,7 +17,7 @@ _LEAST_WEIGHT = 0.4  # at the very ends half of the filter hangs over
 _BLOCK_FRAMES = 1000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FrameWrench:
     """Wrench on the body at the marker times, world frame, about the world origin."""
 

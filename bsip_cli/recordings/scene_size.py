@@ -35,7 +35,7 @@ def settle_unit(
 
 def without_absurd(positions_m: np.ndarray) -> list[Finding]:
     """Turn positions beyond any laboratory into missing ones (in place), and say so."""
-    absurd = np.abs(np.nan_to_num(positions_m)).max(axis=-1, initial=0.0) > _LARGEST_LAB_M
+    absurd = ((positions_m > _LARGEST_LAB_M) | (positions_m < -_LARGEST_LAB_M)).any(axis=-1)
     if not absurd.any():
         return []
     positions_m[absurd] = np.nan

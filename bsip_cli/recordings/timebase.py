@@ -10,11 +10,12 @@ from bsip_cli.recordings.model import Finding
 
 _JITTER = 0.05  # of the sample interval: below it the stamps count as even
 _JUMP = 2.5  # sample intervals: above it the recording is torn
+MOST_HZ = 1e5  # no camera and no plate is faster
 _SAME = 0.02  # of the sample interval: stamps that all lie on the grid
 _EXACT = 1e-3  # of the sample interval: a stamp that lies on the grid among others that do not
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Grid:
     time_s: np.ndarray  # (n,), even
     rate_hz: float
@@ -24,12 +25,16 @@ class Grid:
 def even_grid(stamps_s: np.ndarray, stated_rate_hz: float) -> Grid | None:
     """The even grid nearest to the stamps (n,); torn stamps give their longest stretch.
 
-    None if the stamps do not increase.
+    None if the stamps do not increase, faster than ``MOST_HZ``, or so unevenly that the grid would
+    have more times than their largest steps allow.
     """
-    steps = np.diff(stamps_s)
-    if not len(steps) or not np.isfinite(stamps_s).all() or np.median(steps) <= 0:
+    with np.errstate(over="ignore", invalid="ignore"):
+        steps = np.diff(stamps_s)
+    if not len(steps) or not np.isfinite(steps).all() or np.median(steps) <= 0:
         return None
     rate_hz = _rate(steps, stated_rate_hz)
+    if rate_hz > MOST_HZ:
+        return None
     findings: list[Finding] = []
     start, stop = _longest_stretch(steps, rate_hz)
     if stop - start < len(stamps_s):
@@ -44,6 +49,8 @@ def even_grid(stamps_s: np.ndarray, stated_rate_hz: float) -> Grid | None:
         rate_hz = float(1 / np.median(np.diff(kept)))
         findings.append(_uneven(np.diff(kept), rate_hz))
     n = int(np.floor((kept[-1] - kept[0]) * rate_hz + _SAME)) + 1
+    if n > _JUMP * len(kept) + 1 or rate_hz > MOST_HZ:
+        return None
     return Grid(kept[0] + np.arange(n) / rate_hz, rate_hz, tuple(findings))
 
 
@@ -57,7 +64,8 @@ def onto_grid(grid: Grid, stamps_s: np.ndarray, values: np.ndarray) -> np.ndarra
     nearest = nearest - left_is_nearer
     off = np.abs(stamps_s[nearest] - grid.time_s) * grid.rate_hz
     if off.max() <= _SAME:
-        return values[nearest]
+        is_all = np.array_equal(nearest, np.arange(len(values)))
+        return values if is_all else values[nearest]
     flat = values.reshape(len(values), -1)
     columns = [_interpolated(grid.time_s, stamps_s, column) for column in flat.T]
     result = np.column_stack(columns)

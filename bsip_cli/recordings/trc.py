@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import re
+from array import array
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from math import isfinite, nan
 from pathlib import Path
 
 import numpy as np
 
-from bsip_cli.errors import BadDataError
-from bsip_cli.files import check_regular
+from bsip_cli.errors import BadDataError, printable
 from bsip_cli.recordings.model import Finding
-from bsip_cli.recordings.printable import printable
 from bsip_cli.recordings.scene_size import settle_unit, without_absurd
+from bsip_cli.recordings.text_lines import check_names, head_of, row_counts, text_lines
 from bsip_cli.recordings.units import length_in_m
 
 _MISSING = {"", "nan", "na", "n/a", "none"}
+_SOON = 100_000  # rows, a quarter of an hour at 100 Hz: the last marker is seen in one of them
 _HEADER = re.compile(r"^\s*frame\s*#", re.IGNORECASE)
-_LARGEST_TEXT = 2**30  # bytes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trc:
     """A TRC file's content, lab frame."""
 
@@ -31,84 +33,35 @@ class Trc:
     findings: tuple[Finding, ...]
 
 
-@dataclass(frozen=True)
-class _Table:
-    values: np.ndarray  # (n_rows, n_columns)
-    findings: tuple[Finding, ...]
-
-
 def read_trc(path: Path) -> Trc:
     """Read a TRC file; the labels' line may have empty columns."""
-    lines = read_lines(path)
-    header_at = next((i for i, line in enumerate(lines) if _HEADER.match(line)), None)
-    if header_at is None or header_at < 1:
+    lines = text_lines(path)
+    above, heading = head_of(lines, _HEADER.match)
+    if heading is None or not above:
         raise BadDataError(
             "no line that begins with 'Frame#'",
             expected="a TRC file",
             remedy="export the trial again",
             file=path,
         )
-    fields = _header_fields(lines[:header_at])
-    labels = _labels(lines[header_at])
-    table = _table(lines[header_at + 2 :], labels, path)
-    raw = table.values[:, 2:].reshape(len(table.values), len(labels), 3)
-    raw[(raw == 0).all(axis=-1)] = np.nan
+    fields = _header_fields(above)
+    labels = _labels(heading)
+    check_names(labels, "labels", path)
+    next(lines, None)  # X1, Y1, Z1, X2, ...
+    rows = _rows(lines, labels, path)
+    positions = np.frombuffer(rows.positions).reshape(len(rows.times), len(labels), 3)
+    positions[(positions == 0).all(axis=-1)] = np.nan
     unit = fields.get("units", "")
-    size, about_unit = settle_unit(raw, unit, length_in_m(unit), "Units")
-    positions = raw * size
+    size, about_unit = settle_unit(positions, unit, length_in_m(unit), "Units")
+    positions *= size
     findings = (
-        *_about_counts(fields, len(labels), len(table.values)),
-        *table.findings,
+        *_about_counts(fields, len(labels), len(rows.times)),
+        *rows.findings(),
         *about_unit,
         *without_absurd(positions),
     )
     rate_hz = _number(fields.get("datarate", ""))
-    return Trc(labels, table.values[:, 1], positions, rate_hz, findings)
-
-
-def read_lines(path: Path) -> list[str]:
-    """A text file's lines; what cannot be opened or is no text is refused."""
-    check_regular(path)
-    try:
-        if path.stat().st_size > _LARGEST_TEXT:
-            raise BadDataError(
-                f"a text of {path.stat().st_size / 1e9:.1f} GB",
-                expected=f"at most {_LARGEST_TEXT / 1e9:.1f} GB",
-                remedy="cut the trial into shorter ones",
-                file=path,
-            )
-        lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
-    except OSError as error:
-        raise BadDataError(
-            f"cannot be opened ({error.strerror})",
-            expected="a readable text file",
-            remedy="check the file",
-            file=path,
-        ) from error
-    if not lines:
-        raise BadDataError(
-            "the file is empty",
-            expected="a text file",
-            remedy="copy or export the trial again",
-            file=path,
-        )
-    return lines
-
-
-def row_counts(what: str, stated: float, found: int) -> list[Finding]:
-    """A warning where a header counts other rows or columns than the file has."""
-    if not np.isfinite(stated) or stated == found:
-        return []
-    return [
-        Finding(
-            check="layout",
-            subject="",
-            found=f"the header counts {stated:g} {what}, the file has {found}",
-            expected="one count",
-            action=f"read {found}",
-            level="warning",
-        )
-    ]
+    return Trc(labels, np.frombuffer(rows.times), positions, rate_hz, findings)
 
 
 def _labels(line: str) -> tuple[str, ...]:
@@ -133,101 +86,125 @@ def _about_counts(fields: dict[str, str], n_markers: int, n_frames: int) -> list
     ]
 
 
-def _table(lines: list[str], labels: tuple[str, ...], path: Path) -> _Table:
-    n_columns = 2 + 3 * len(labels)
-    rows = [_cells(line, n_columns) for line in lines if line.strip()]
-    if not rows or not labels:
+class _Rows:
+    """What has been read of the table; eight bytes for each cell and no more."""
+
+    def __init__(self, labels: tuple[str, ...], path: Path) -> None:
+        self.labels, self.path = labels, path
+        self.n_columns = 2 + 3 * len(labels)
+        self.times, self.positions = array("d"), array("d")
+        self.widest = 0
+        self.n_words, self.a_word = 0, ""
+        self.is_cut = False
+        self._most_cells = path.stat().st_size
+
+    def add(self, cells: list[str]) -> None:
+        """Editors cut empty cells at the end, whole markers of them; else cells are shifted."""
+        missing = self.n_columns - len(cells)
+        if missing < 0 or missing % 3:
+            raise self.refusal(len(cells))
+        self.widest = max(self.widest, len(cells))
+        row, words = _numbers(cells)
+        self.times.append(row[1])
+        self.positions.extend(row[2:])
+        if missing:
+            self.positions.extend([nan] * missing)
+        if words:
+            self.n_words += len(words)
+            self.a_word = self.a_word or words[0]
+        if self.widest < self.n_columns and len(self.times) > _SOON:
+            raise self.refusal(self.widest)
+        if len(self.positions) > self._most_cells:
+            raise BadDataError(
+                f"{len(self.labels)} labels over rows that are all but empty",
+                expected="positions under the labels",
+                remedy="export the trial with the markers that were seen",
+                file=self.path,
+            )
+
+    def refusal(self, width: int) -> BadDataError:
+        return BadDataError(
+            f"a row of {width} cells under {len(self.labels)} labels",
+            expected=f"{self.n_columns} cells: frame, time and three for each label",
+            remedy="export the trial again",
+            file=self.path,
+        )
+
+    def findings(self) -> list[Finding]:
+        found = [_finding("the last row is cut", "a complete file", "left that row out")]
+        found = found if self.is_cut else []
+        if self.n_words:
+            found.append(
+                _finding(
+                    f"{self.n_words} cells that are no numbers, as '{printable(self.a_word[:20])}'",
+                    "numbers, or empty cells where a marker is missing",
+                    "took them as missing",
+                )
+            )
+        return found
+
+
+def _rows(lines: Iterable[str], labels: tuple[str, ...], path: Path) -> _Rows:
+    rows = _Rows(labels, path)
+    last: list[str] = []
+    for cells in _table(lines, rows.n_columns):
+        if last:
+            rows.add(last)
+        last = cells
+    if not last or not labels:
         raise BadDataError(
             "no marker data",
             expected="a TRC file with markers",
             remedy="export the trial again",
             file=path,
         )
-    findings = []
-    if len(rows) > 1 and len(rows[-1]) < n_columns:
-        rows.pop()
-        findings.append(_cut_row())
-    _check_widths(rows, n_columns, labels, path)
-    table = np.array([[_number(cell) for cell in _padded(row, n_columns)] for row in rows])
-    if not np.isfinite(table[:, 1]).all():
+    rows.is_cut = len(rows.times) > 0 and len(last) < rows.n_columns
+    if not rows.is_cut:
+        rows.add(last)
+    if rows.widest < rows.n_columns:
+        raise rows.refusal(rows.widest)
+    if not np.isfinite(rows.times).all():
         raise BadDataError(
             "a row without a time",
             expected="times in column 2, numbers with a decimal point",
             remedy="export the trial again",
             file=path,
         )
-    findings += _about_words(rows)
-    return _Table(table, tuple(findings))
+    return rows
 
 
-def _cells(line: str, n_columns: int) -> list[str]:
-    """A row's cells: by blanks if that gives the right number, else by tabs; empty ones at
-    its end are dropped."""
-    cells = line.split()
-    if len(cells) == n_columns:
-        return cells
-    cells = [cell.strip() for cell in line.rstrip("\r\n").split("\t")]
-    while len(cells) > n_columns and not cells[-1]:
-        cells.pop()
-    return cells
+def _table(lines: Iterable[str], n_columns: int) -> Iterator[list[str]]:
+    """The cells of each row that is not blank: by blanks if that gives the right number, else by
+    tabs; empty ones at its end are dropped."""
+    for line in lines:
+        cells = line.split()
+        if len(cells) == n_columns:
+            yield cells
+        elif cells:
+            cells = [cell.strip() for cell in line.rstrip("\r\n").split("\t")]
+            while len(cells) > n_columns and not cells[-1]:
+                cells.pop()
+            yield cells
 
 
-def _check_widths(
-    rows: list[list[str]], n_columns: int, labels: tuple[str, ...], path: Path
-) -> None:
-    """Editors cut empty cells at the end, whole markers of them; else cells are shifted."""
-    widths = {len(row) for row in rows}
-    shifted = [w for w in widths if w > n_columns or (n_columns - w) % 3]
-    if max(widths) == n_columns and not shifted:
-        return
-    raise BadDataError(
-        f"a row of {max(shifted or widths)} cells under {len(labels)} labels",
-        expected=f"{n_columns} cells: frame, time and three for each label",
-        remedy="export the trial again",
-        file=path,
-    )
-
-
-def _padded(row: list[str], n_columns: int) -> list[str]:
-    return row + [""] * (n_columns - len(row))
-
-
-def _cut_row() -> Finding:
-    return Finding(
-        check="layout",
-        subject="",
-        found="the last row is cut",
-        expected="a complete file",
-        action="left that row out",
-        level="warning",
-    )
-
-
-def _about_words(rows: list[list[str]]) -> list[Finding]:
-    words = [
-        cell
-        for row in rows
-        for cell in row[2:]
-        if cell.lower() not in _MISSING and not np.isfinite(_number(cell))
-    ]
-    if not words:
-        return []
-    return [
-        Finding(
-            check="layout",
-            subject="",
-            found=f"{len(words)} cells that are no numbers, as '{words[0][:20]}'",
-            expected="numbers, or empty cells where a marker is missing",
-            action="took them as missing",
-            level="warning",
-        )
-    ]
+def _numbers(cells: list[str]) -> tuple[list[float], list[str]]:
+    """A row's values, and those of its cells behind the time that are words."""
+    try:
+        row = list(map(float, cells))
+    except ValueError:
+        row = list(map(_number, cells))
+    if isfinite(sum(row)):
+        return row, []
+    positions = zip(cells[2:], row[2:], strict=True)
+    return row, [c for c, x in positions if not isfinite(x) and c.lower() not in _MISSING]
 
 
 def _number(cell: str) -> float:
-    if cell.lower() in _MISSING:
-        return float("nan")
     try:
-        return float(cell)
+        return float(cell) if cell else nan
     except ValueError:
-        return float("nan")
+        return nan
+
+
+def _finding(found: str, expected: str, action: str) -> Finding:
+    return Finding("layout", "", found, expected, action, "warning")

@@ -15,13 +15,14 @@ from bsip_cli.recordings.assemble import why_no_forces
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
 from bsip_cli.recordings.plates import LOADED_N
-from bsip_cli.recordings.timebase import even_grid, onto_grid
+from bsip_cli.recordings.timebase import MOST_HZ, even_grid, onto_grid
 from bsip_cli.recordings.trc import Trc, read_trc
 
+_VALUES_PER_BYTE = 5  # of both files: a grid of forces may need as much memory as c3d_guard allows
 _LARGEST_ROOM = 20.0  # a point of force further away is in mm
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Action:
     """All forces of a MOT, lab frame, sign and unit settled, at the MOT's times."""
 
@@ -37,9 +38,10 @@ def read_trc_mot(path: Path) -> Recording:
     time_s, rate_hz, positions, findings = _even_markers(trc, path)
     mot_path = forces_beside(path)
     mot = read_mot(mot_path) if mot_path else None
+    most = _VALUES_PER_BYTE * sum(file.stat().st_size for file in (path, mot_path) if file)
     up = _up(trc, mot)
     rotation = world.rotation_to_z_up(up)
-    analog_rate_hz, plates, note, found = _plates(mot, up, rotation, time_s, rate_hz)
+    analog_rate_hz, plates, note, found = _plates(mot, up, rotation, time_s, rate_hz, most)
     turned = world.finding_about(up)
     return Recording(
         path=path,
@@ -69,8 +71,8 @@ def _even_markers(
     grid = even_grid(trc.time_s, trc.rate_hz)
     if grid is None:
         raise BadDataError(
-            "times that do not increase",
-            expected="increasing times",
+            "times that do not increase evenly",
+            expected=f"increasing times of one rate, below {MOST_HZ:,.0f} Hz",
             remedy="export the trial again",
             file=path,
         )
@@ -113,16 +115,20 @@ def _plates(
     rotation: np.ndarray,
     time_s: np.ndarray,
     marker_rate_hz: float,
+    most_values: int,
 ) -> tuple[float, tuple[Plate, ...], str, tuple[Finding, ...]]:
     """Analog rate, plates, the reason for none, findings."""
     if mot is None:
         return marker_rate_hz, (), "no .mot file of the same name beside the .trc", ()
     grid = even_grid(mot.time_s, float("nan"))
     if grid is None:
-        return marker_rate_hz, (), "the times of the .mot do not increase", ()
+        return marker_rate_hz, (), "the times of the .mot do not increase evenly", ()
+    last = float(time_s[-1] - time_s[0]) * grid.rate_hz
+    if 6 * last * len(mot.forces) > most_values:
+        note = f"the .mot has {len(mot.time_s)} rows and {last:.3g} would be needed beside the .trc"
+        return marker_rate_hz, (), note, ()
     action = _action(mot, up)
-    n = round((time_s[-1] - time_s[0]) * grid.rate_hz) + 1
-    analog = replace(grid, time_s=time_s[0] + np.arange(n) / grid.rate_hz)
+    analog = replace(grid, time_s=time_s[0] + np.arange(round(last) + 1) / grid.rate_hz)
     plates = tuple(
         _plate(name, onto_grid(analog, mot.time_s, np.hstack([force, moment])), rotation)
         for name, force, moment in zip(action.names, action.force_N, action.moment_Nm, strict=True)

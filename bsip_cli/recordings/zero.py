@@ -13,7 +13,7 @@ from bsip_cli.recordings.model import Finding, Plate
 _WINDOW_S = 0.2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlateZero:
     """A plate's reading in its unloaded stretches."""
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from bsip_cli.errors import printable
 from bsip_cli.report.blocks import Document
 from bsip_cli.report.film import film_data
 
@@ -24,6 +25,7 @@ def render(document: Document) -> str:
         loader=FileSystemLoader(_TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
+        finalize=_cleaned,
         trim_blocks=True,
         lstrip_blocks=True,
     )
@@ -34,6 +36,12 @@ def render(document: Document) -> str:
     return environment.get_template("report.html.j2").render(
         document=document, style=style, script=script, script_hash=_hash(script)
     )
+
+
+def _cleaned(value: object) -> object:
+    """Names of files and markers may hold control characters; what templates make is clean."""
+    is_foreign = isinstance(value, str) and not isinstance(value, Markup)
+    return printable(str(value)) if is_foreign else value
 
 
 def _own(name: str) -> str:

@@ -35,7 +35,7 @@ class Refusal:
     sentence: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TrialRecord:
     """One trial; a table is None where a stage did not make it."""
 
@@ -57,7 +57,7 @@ class TrialRecord:
         return trial_label(self.stem)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ParticipantRecord:
     """One participant; ``facts`` is the single row of the ``person`` artifact, ``loads`` the known
     loads as (trial label, words). ``diagnosis``, ``detection``, ``gains`` and ``changes`` (of a model

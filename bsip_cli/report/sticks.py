@@ -18,7 +18,7 @@ _ON_GROUND_PERCENTILE = 2.0
 _GAP_S = 0.1  # a film does not freeze longer
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Skeleton:
     """Bones as pairs of points, each a segment with a position (in joint axes of that segment)."""
 
@@ -29,7 +29,7 @@ class _Skeleton:
     sides: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """A trial's motion as the model makes it; anterior (2,) is the person's forward direction in
     the world."""

@@ -53,7 +53,7 @@ MOST_ROUNDS = 60
 MOST_LOWERINGS = 12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class State:
     """The pelvis' path (T, 3), and its turn (T, 3) against the plan as a rotation vector.
 
@@ -239,7 +239,7 @@ def _com_target(
     return np.stack([ahead, height, aside], axis=1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _CartTable:
     """lift c - mass height c'' = moment, for the centre of mass c (T,) in one direction.
 

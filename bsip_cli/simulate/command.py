@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.files import check_regular, fault_of
 from bsip_cli.folders import is_folder, lies_in
 from bsip_cli.simulate.asked import effects_of, pair_up
@@ -56,7 +56,7 @@ def simulate_command(
     options = replace(options, run=run, effects=asked, effect_tasks=tuple(effect_tasks))
     with _writing(study):
         simulate_study(study, options)
-    click.echo(f"bsip simulate: {options.participants} people in {study}", err=True)
+    click.echo(f"bsip simulate: {options.participants} people in {printable(str(study))}", err=True)
 
 
 def inject_command(
@@ -89,7 +89,9 @@ def inject_command(
         done = inject_study(source, out, options, participants)
     for error in done.refused:
         click.echo(f"bsip inject: {error}", err=True)
-    click.echo(f"bsip inject: {len(done.changed)} recordings changed in {out}", err=True)
+    click.echo(
+        f"bsip inject: {len(done.changed)} recordings changed in {printable(str(out))}", err=True
+    )
     return BadDataError.exit_code if done.refused or not done.changed else 0
 
 
@@ -102,7 +104,7 @@ def _inject_one(source: Path, out: Path, options: StudyOptions) -> int:
     with _writing(copy):
         facts = inject_recording(source, copy, hidden)
         write_truth_of_recording(copy, hidden, facts)
-    click.echo(f"bsip inject: {copy}", err=True)
+    click.echo(f"bsip inject: {printable(str(copy))}", err=True)
     return 0
 
 

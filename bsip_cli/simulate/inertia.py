@@ -9,7 +9,7 @@ import numpy as np
 from bsip_cli.simulate.rotations import from_rotation_vector
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Inertia:
     """A rigid body's mass distribution.
 

@@ -15,7 +15,7 @@ from bsip_cli.errors import UsageError
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SensingPlate:
     """A force plate where the file says it is.
 
@@ -40,7 +40,7 @@ class SensingPlate:
         return np.hstack([force @ self.axes, at_sensor @ self.axes])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Instruments:
     """Markers and force plates of one trial.
 

@@ -27,7 +27,7 @@ SKIN_SIZE_M = {  # travel of a marker against the bone for a large joint movemen
 OTHER_SKIN_SIZE_M = 0.0015
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Marker:
     """One skin marker.
 

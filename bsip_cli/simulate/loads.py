@@ -29,7 +29,7 @@ class Load(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ball:
     """A ball, or any small object, in a hand; a point mass.
 

@@ -44,7 +44,7 @@ MASS_SPREAD = {"upper_arm": 0.15, "forearm": 0.15, "hand": 0.15}
 COM_SPREAD_M = {"lower_torso": 0.011, "thorax": 0.012, "abdomen": 0.012, "thigh": 0.007}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Person:
     """A simulated person; the truth.
 
@@ -82,7 +82,7 @@ class Person:
         return {name: parts[name] for name in SEGMENTS}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeanSegment:
     """A row of the mean person: percent of body mass, centre of mass and tensor in lengths."""
 

@@ -14,7 +14,7 @@ from bsip_cli.simulate.loads import Ball, Load
 STEP_S = 0.001
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Foot:
     """One foot over time.
 
@@ -32,7 +32,7 @@ class Foot:
     on_plate: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """A movement before balance. All arrays share one time axis.
 

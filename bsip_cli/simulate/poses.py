@@ -9,7 +9,7 @@ import numpy as np
 from bsip_cli.simulate.rotations import rotate
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Poses:
     """Poses of all bodies in one world frame.
 

@@ -26,7 +26,7 @@ FULL_SCALE = np.array([2500.0, 2500.0, 5000.0, 1.5e6, 1.5e6, 0.8e6])  # N and N 
 ADC_STEPS = 2**15
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pose:
     """From the walkway frame to the lab (Z up): lab = rotation @ walkway + offset_m."""
 
@@ -47,7 +47,7 @@ class Pose:
         return turned, self.vectors(moment) + np.cross(self.offset_m, turned)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plate:
     """A force plate in the lab. axes : (3, 3) columns x ahead, y to the right, z down."""
 
@@ -142,7 +142,7 @@ def _plate_of(contact: Contact, plates: list[Plate], pose: Pose) -> int | None:
     return met[0] if met else None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measurement:
     """What the lab's instruments deliver for one trial, before it is written.
 

@@ -19,7 +19,7 @@ STANDING_REACH = 0.9925  # leg length in quiet stance, of the straight leg
 TOE_OUT_RAD = np.deg2rad(8.0)
 
 
-@dataclass
+@dataclass(eq=False)
 class FootSketch:
     """How one foot moves. Times (T,); the foot is flat on the ground when all is zero.
 
@@ -40,7 +40,7 @@ class FootSketch:
     on_plate: np.ndarray
 
 
-@dataclass
+@dataclass(eq=False)
 class Sketch:
     """The joint angles and feet of a person, first in natural stance for all times t_s."""
 

@@ -29,7 +29,7 @@ class Contact:
     cop_m: tuple[float, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trial:
     """A simulated trial at 1000 Hz, walkway frame (X ahead, Y up, Z right, origin on the ground).
 

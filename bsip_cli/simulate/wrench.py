@@ -18,7 +18,7 @@ from bsip_cli.simulate.poses import Poses
 from bsip_cli.simulate.rotations import rotate, transpose, unskew
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Momentum:
     """Whole-body momentum in an inertial frame.
 

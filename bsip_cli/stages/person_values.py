@@ -29,7 +29,7 @@ SWAY = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording:
     """A trial with what ``reconstruct`` said of it, and its part in this study."""
 

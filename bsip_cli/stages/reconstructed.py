@@ -26,7 +26,7 @@ Wrenches = dict[str, np.ndarray]  # method: (N, 6) about the world's origin [N, 
 Signals = dict[str, dict[str, np.ndarray]]  # method: component: (N,) [N, N m, m]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Judgement:
     """By what a trial's wrenches are compared.
 

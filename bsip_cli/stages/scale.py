@@ -26,7 +26,7 @@ _QUIET_S = 1.0
 _NEARLY_ALL = 0.95  # of the markers that the best second shows
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Recorded:
     """Markers of one trial: times (N,), labels, positions (N, m, 3)."""
 

@@ -34,7 +34,7 @@ ALLOWED = {
     "freshness": "artifacts code_hash errors fingerprints pipeline schemas study unit",
     "lock": "artifacts errors",
     "dataset": "__init__ artifacts errors files folders participants",
-    "info": "__init__ artifacts provenance schemas",
+    "info": "__init__ artifacts errors files provenance schemas",
     "runner": "__init__ artifacts code_hash config errors fingerprints freshness lock pipeline "
     "provenance study trials unit workers",
     "check_study": "body config errors study",

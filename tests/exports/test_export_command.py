@@ -179,7 +179,7 @@ def test_given_model_gets_the_inertias(results, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--model-file", "nowhere.osim"], "nowhere.osim: cannot be read (No such file"),
+        (["--model-file", "nowhere.osim"], "nowhere.osim: does not exist"),
         (["--model-file", "{table}"], "expected an .osim file of OpenSim 4"),
         (["--model-file", "{odd}"], "its bodies fit no shipped map (gait2392, rajagopal)"),
         (["--model-file", "{odd}", "--model-bodies", "x"], "there is no such map of bodies"),

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from bsip_cli.motion import marker_slips
 from bsip_cli.motion.marker_events import MarkerEvent, summaries
 from bsip_cli.motion.marker_offsets import offsets
 from tests.marker_evidence.swinging_markers import MARKERS, PERSON, events_of, fitted, recording
@@ -58,6 +61,24 @@ def test_a_ghost_of_a_second_is_a_jump_and_not_two_slips():
     event = only(events_of(*moved(2, "LASIS", 0.04, slice(START, START + 50))))
     assert (event.kind, event.marker) == ("jump", "LASIS")
     assert (event.start_s, event.end_s) == pytest.approx((3.2, 4.2), abs=0.06)
+
+
+def test_one_of_two_slips_at_the_same_time_that_comes_back(monkeypatch):
+    """Other slips of that marker in that frame stay what they are."""
+    there, back = np.array([0.03, 0.0, 0.0]), np.array([-0.03, 0.0, 0.0])
+    times = ((START, there), (STOP, np.array([0.0, 0.03, 0.0])), (STOP, back))
+    slips = [marker_slips._Slip(0, frame, vector, 9.0) for frame, vector in times]
+    strongest = SimpleNamespace(change=SimpleNamespace(z=9.0))
+    search = SimpleNamespace(
+        left=None,
+        changes=lambda: [strongest] * len(slips),
+        source=lambda *_: (slips.pop(0), None),
+        take=lambda *_: None,
+    )
+    monkeypatch.setattr(marker_slips, "_Search", lambda *_: search)
+    times_s, markers, _ = recording(2)
+    events, _ = marker_slips.slips(fitted(markers, times_s), np.zeros(0))
+    assert [(one.kind, round(one.start_s, 1)) for one in events] == [("jump", 3.2), ("slip", 3.5)]
 
 
 def test_a_jump_in_a_filled_gap_says_so_and_a_filled_slip_is_none():

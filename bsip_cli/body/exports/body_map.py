@@ -102,10 +102,16 @@ def check_segments(body_map: BodyMap, skeleton: Skeleton) -> None:
 
 def _group(row: dict) -> BodyGroup:
     group = BodyGroup(
-        tuple(row["bodies"]),
-        tuple(row["segments"]),
+        _texts(row["bodies"]),
+        _texts(row["segments"]),
         tuple((str(segment), str(body)) for segment, body in row["joints"]),
     )
     if not (group.bodies and group.segments and group.joints):
         raise ValueError("a group without bodies, segments or joints")
     return group
+
+
+def _texts(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
+        raise TypeError(f"{value!r} is no list of names")
+    return tuple(value)

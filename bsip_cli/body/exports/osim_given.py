@@ -23,7 +23,7 @@ from bsip_cli.errors import UsageError
 _BODIES = "Model/BodySet/objects/Body"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Placement:
     """Orientation (3, 3) and origin (3,) [m] of a frame in another."""
 

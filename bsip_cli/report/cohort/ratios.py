@@ -18,7 +18,7 @@ ReadValues = Callable[[str, str], pd.DataFrame]
 """Table and variable to their rows of ``values``."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ratios:
     """Mean error of OM over mean error of RM, NaN where one is not known or zero.
 

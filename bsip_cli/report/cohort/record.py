@@ -29,7 +29,7 @@ class Member:
     searched: Searched | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CohortRecord:
     """Attributes: ``ratios`` of the errors of OM and RM; ``task_errors`` of an error's name in
     table 4; ``missing`` sentences on who is in no table; ``table_files`` relative to OUT;

@@ -17,7 +17,7 @@ _GROUPS = (  # colour and hatch: told apart in grey too
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AttributionBars:
     """Segments in words; per component (its name in words) shares (s, 3) [%] by group."""
 

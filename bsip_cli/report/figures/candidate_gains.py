@@ -31,7 +31,7 @@ _STYLES = {  # verdict: colour, marker, filled, what the legend says
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CandidateGains:
     """All of the same length, best first; gains and intervals [% of the squared residual]."""
 

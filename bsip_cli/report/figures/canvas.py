@@ -15,6 +15,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from bsip_cli.errors import printable
+
 WIDTH_MM = 170.0  # the text width of a page
 INK, SOFT, FAINT = "#1c1c1c", "#6e6e6e", "#d4d4d4"
 ORANGE, BLUE, GREEN, PURPLE = "#D55E00", "#0072B2", "#009E73", "#CC79A7"  # Okabe and Ito
@@ -105,7 +107,7 @@ def plain(text: str) -> str:
 
 def literal(text: str) -> str:
     """A foreign text as it is: no mathematics, nothing unprintable."""
-    return "".join(c if c.isprintable() else "?" for c in text).replace("$", r"\$")
+    return printable(text).replace("$", r"\$")
 
 
 def thinned(length: int, most: int = MOST_POINTS) -> slice:

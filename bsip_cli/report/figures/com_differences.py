@@ -16,7 +16,7 @@ _NORMAL_95 = 1.96
 _AXES = ("forward (X)", "along the segment, up (Y)", "to the right (Z)")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ComDifferences:
     """(s, 3) over segments and axes: OM - RM and its standard deviation [mm], data share 0..1."""
 

@@ -20,7 +20,7 @@ from bsip_cli.report.figures.canvas import (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ContactTimeline:
     """All (n,): times [s] and flags."""
 

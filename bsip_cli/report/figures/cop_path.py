@@ -18,7 +18,7 @@ from bsip_cli.report.figures.canvas import (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CopPath:
     """Per method (n, 2): to the right and forward [mm]."""
 

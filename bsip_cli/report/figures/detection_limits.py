@@ -14,7 +14,7 @@ _LEFT, _RIGHT = 0.08, 40.0  # of the axis: what lies beyond ends in an arrow
 _TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DetectionLimits:
     """All (c,), a cause each; sizes over the least that labs meet.
 

@@ -21,7 +21,7 @@ from bsip_cli.report.figures.canvas import (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ErrorsPerTask:
     """(t, p) over tasks and participants, NaN where not known; ``quantity`` with its unit.
 

@@ -24,7 +24,7 @@ _TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
 _SPREAD = 0.28
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GainDots:
     """(c, p) over components and participants: RMSE of OM / RMSE of RM, NaN where not known."""
 

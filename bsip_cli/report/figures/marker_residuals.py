@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from bsip_cli.report.figures.canvas import BLUE, INK, house_style, new_figure, plain, tidy
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MarkerResiduals:
     """RMS residual per marker (m,) [mm], and over all of them [mm]."""
 

@@ -23,7 +23,7 @@ from bsip_cli.report.figures.canvas import (
 _TICKS_KG = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MassLimits:
     """Segments in words, and the least mass (s,) that is seen on each [kg], worn in all recordings
     or in a single one; NaN where that is not known."""

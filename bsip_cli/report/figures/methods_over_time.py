@@ -18,7 +18,7 @@ from bsip_cli.report.figures.canvas import (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MethodsOverTime:
     """A signal per method on a common clock.
 

@@ -15,7 +15,7 @@ _COLUMNS = 2
 _STYLES = (("o", "white", BLUE), ("D", ORANGE, ORANGE))  # marker, face, edge
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ResidualByPhase:
     """RMS of the residual.
 

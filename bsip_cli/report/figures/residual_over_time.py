@@ -18,7 +18,7 @@ from bsip_cli.report.figures.canvas import (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ResidualOverTime:
     """All (n,): time [s], RMS over the markers [mm], the frame's worst marker [mm]."""
 

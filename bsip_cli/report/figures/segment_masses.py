@@ -25,7 +25,7 @@ _NORMAL_95 = 1.96
 _TICKS_KG = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SegmentMasses:
     """All (s,) over the segments; masses and standard deviations [kg], shares in 0..1."""
 

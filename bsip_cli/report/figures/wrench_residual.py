@@ -29,7 +29,7 @@ _ALONE = ((BLUE, "-", 0.7),)
 _BEFORE_AFTER = (("#8fc1e3", "-", 1.7), (ORANGE, "-", 0.7))  # light and wide, dark and thin
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WrenchResidual:
     """Residuals of one trial.
 

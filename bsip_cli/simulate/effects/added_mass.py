@@ -20,7 +20,7 @@ OFF_AXIS_M = 0.05
 ALONG_M = 0.05
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AddedMass(Effect):
     """A small ball of `size` kg on a segment; the scale did not see it.
 

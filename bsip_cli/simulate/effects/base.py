@@ -34,7 +34,7 @@ class Target:
         return self.settings.get(key, otherwise)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Effect:
     """Base of all effects. A concrete one is a frozen dataclass of its drawn parameters.
 

@@ -50,7 +50,7 @@ class Breathing(Effect):
         return "upper_torso"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ChestMotion:
     """Mass that leaves its place in a body: mass times displacement (T, 3), body axes."""
 

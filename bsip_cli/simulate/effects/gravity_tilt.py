@@ -12,7 +12,7 @@ from bsip_cli.simulate.instruments import Instruments
 from bsip_cli.simulate.rotations import from_rotation_vector
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GravityTilt(Effect):
     """The lab's axes are turned against the world by turn_rad (rotation vector, lab axes).
 

@@ -21,7 +21,7 @@ LANDMARKS = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class JointCentre(Effect):
     """The true centre lies at shift_m from where its landmarks put it (parent segment's axes).
 

@@ -19,7 +19,7 @@ CLOSE_PAIRS = 5
 LEAST_FRAMES = 15  # a shorter stretch between gaps is not smoothed
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MarkerShift(Effect):
     """A marker slips along the skin, within SLIP_S, and stays there.
 

@@ -219,7 +219,7 @@ class ElasticTether(Effect):
         return replace(plan, loads=(*plan.loads, band))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Band:
     """An elastic band from a fixed point (3,) to the pelvis, taut from the start."""
 

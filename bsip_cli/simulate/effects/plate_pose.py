@@ -15,7 +15,7 @@ from bsip_cli.simulate.rotations import from_rotation_vector
 AXES = ("x", "y", "z")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlateTranslation(Effect):
     """The plate truly lies at its stated place plus shift_m (lab axes).
 
@@ -55,7 +55,7 @@ class PlateTranslation(Effect):
         return f"plate {self.plate}" if self.plate else "all plates"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlateRotation(Effect):
     """The plate is truly turned by turn_rad (rotation vector, lab axes) about its centre."""
 

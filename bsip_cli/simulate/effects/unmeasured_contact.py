@@ -27,7 +27,7 @@ PACE_HZ = 0.6
 CLEAR_OF_FLIGHT_S = 0.3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Support:
     """An outside force on a point of the body.
 

@@ -82,7 +82,7 @@ class WobblingMass(Effect):
         return {"position_m": position.tolist()}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Swinging:
     """A point mass on a spring and a damper at a point of a body.
 

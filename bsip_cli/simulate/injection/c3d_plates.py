@@ -16,7 +16,7 @@ METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2}
 MOMENTS = {"Nm": 1.0, "Nmm": 1e-3, "Ncm": 1e-2}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WiredPlate:
     """A plate and its wiring.
 

@@ -21,7 +21,7 @@ LOADED_N = 20.0
 UNEVEN_SHARE = 0.02  # of a frame's length, by which a stamp may be off
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """A text table. head : its lines before the data. values : (rows, columns)."""
 
@@ -68,7 +68,8 @@ def _read_trc(file: Path) -> Table:
     start = next((k for k in range(5, min(8, len(lines))) if _is_row(lines[k])), 0)
     if not start or not lines[0].startswith("PathFileType"):
         raise BadDataError("this is no TRC file", file=file)
-    return Table(lines[:start], _values(lines[start:], "\t"))
+    width = 2 + 3 * len(_trc_labels(lines[:start]))
+    return Table(lines[:start], _values(lines[start:], "\t", width, file))
 
 
 def _read_mot(file: Path) -> Table:
@@ -77,7 +78,8 @@ def _read_mot(file: Path) -> Table:
     if not ends:
         raise BadDataError("the line endheader is missing", file=file)
     start = ends[0] + 2
-    return Table(lines[:start], _values(lines[start:], None))
+    width = len("".join(lines[start - 1 : start]).split())
+    return Table(lines[:start], _values(lines[start:], None, width, file))
 
 
 def _lines(file: Path) -> list[str]:
@@ -92,19 +94,27 @@ def _is_row(line: str) -> bool:
     return bool(re.match(r"\s*\d+\s+[-\d.]", line))
 
 
-def _values(lines: list[str], separator: str | None) -> np.ndarray:
-    """(rows, columns); an empty or unreadable field is NaN."""
+def _values(lines: list[str], separator: str | None, least: int, file: Path) -> np.ndarray:
+    """(rows, columns), at least two and ``least``; an empty or unreadable field is NaN."""
     rows = [line.rstrip("\r\n").split(separator) for line in lines if line.strip()]
-    width = max(map(len, rows))
+    width = max(map(len, rows), default=0)
+    if len(rows) < 2 or width < least or len(rows) * width > file.stat().st_size:
+        raise BadDataError("this is no table", expected="rows as long as the heading", file=file)
     table = np.full((len(rows), width), np.nan)
     for k, row in enumerate(rows):
-        for j, field in enumerate(row):
-            table[k, j] = float(field) if field.strip() else np.nan
+        table[k, : len(row)] = [_number(field) for field in row]
     return table
 
 
-def _trc_labels(table: Table) -> list[str]:
-    return [name.strip() for name in table.head[3].split("\t")[2:] if name.strip()]
+def _number(field: str) -> float:
+    try:
+        return float(field)
+    except ValueError:
+        return float("nan")
+
+
+def _trc_labels(head: list[str]) -> list[str]:
+    return [name.strip() for name in head[3].split("\t")[2:] if name.strip()]
 
 
 def _scale_m(table: Table, file: Path) -> float:
@@ -138,7 +148,7 @@ def _force_sets(table: Table, file: Path) -> list[ForceSet]:
 def _instruments(
     markers: Table, forces: Table, sets: list[ForceSet], scale: float, file: Path
 ) -> Instruments:
-    labels = _trc_labels(markers)
+    labels = _trc_labels(markers.head)
     times, samples = markers.values[:, 1], forces.values[:, 0]
     points = scale * markers.values[:, 2 : 2 + 3 * len(labels)].reshape(len(times), -1, 3)
     ratio = round(len(samples) / len(times))

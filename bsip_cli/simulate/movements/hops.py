@@ -23,7 +23,7 @@ IMPACT_S = (0.008, 0.070)  # start and end of the strike after touch-down
 MOST_HOPS = 12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hops:
     """Times [s] and speed of a series of equal hops.
 

@@ -20,7 +20,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from bsip_cli import __version__
+from bsip_cli import __version__, fingerprints
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, load_config
@@ -60,7 +60,10 @@ class Run:
     out: Path
 
     def files(self) -> dict[str, Path]:
-        found = sorted(path for path in self.out.rglob("*") if path.is_file())
+        """Without what is known of their times, which is another in each folder."""
+        found = sorted(
+            p for p in self.out.rglob("*") if p.is_file() and p.name != fingerprints.NAME
+        )
         return {path.relative_to(self.out).as_posix(): path for path in found}
 
     def fitted_causes(self, sub: str) -> int:

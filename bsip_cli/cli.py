@@ -346,8 +346,8 @@ def main() -> None:
         _end(str(error), error.exit_code)
     except EndedError as ended:
         _end(f"{ended}", ended.exit_code)
-    except BrokenPipeError:  # whoever reads the answer, like `head`, has seen enough
-        _end("", 0)
+    except (BrokenPipeError, SystemExit):  # who reads the answer, like `head`, has seen enough:
+        _end("", 0)  # click leaves then, and only then, by itself
     except OSError as error:
         _end(str(not_readable(error)), 2)
     sys.exit(exit_code)

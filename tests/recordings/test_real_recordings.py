@@ -93,7 +93,7 @@ def test_the_same_samples_as_ezc3d(real_data):
         np.testing.assert_array_equal(own.positions, positions)
         np.testing.assert_array_equal(own.analog.ravel(), theirs["analogs"].ravel())
         n_compared += 1
-    assert n_compared == 44
+    assert n_compared >= 69  # data sets are added, none is taken away
 
 
 @pytest.mark.parametrize("folder", ["edge_c3dorg", "c3dorg_plate_types", "btk_functional_ll"])

@@ -57,8 +57,8 @@ TOLD = case $$code in 0|3) $(BIN)/bsip show "$$out";; *) exit $$code;; esac
 study: $(READY)
 	@$(PLACES); $(BIN)/bsip run "$$study" --out "$$out" --jobs $(AT_ONCE); code=$$?; $(TOLD)
 
-SNAKEMAKE = $(CLUSTER)/bin/snakemake --snakefile workflow/Snakefile \
-	--profile workflow/profiles/$(PROFILE) --config study="$$study" out="$$out" bsip=$(abspath $(BIN))/bsip
+SNAKEMAKE = BSIP="$(abspath $(BIN))/bsip" BSIP_STUDY="$$study" BSIP_OUT="$$out" \
+	$(CLUSTER)/bin/snakemake --snakefile workflow/Snakefile --profile workflow/profiles/$(PROFILE)
 
 cluster: $(READY) $(CLUSTER)/ready
 	@$(PLACES); $(SNAKEMAKE) -- everybody; failed=$$?; \

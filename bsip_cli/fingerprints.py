@@ -99,14 +99,20 @@ def seal(path: Path) -> None:
 # --- kept between runs ------------------------------------------------------------------------
 
 
+def kept_in(folder: Path) -> bytes:
+    """What an earlier run kept in a folder, as it stands there; nothing if that is no file."""
+    path = folder / NAME
+    return path.read_bytes() if path.is_file() else b""
+
+
 def recall(folder: Path) -> str:
     """Take in what an earlier run kept in a folder; its note. What is damaged is not believed."""
     try:
-        kept = json.loads((folder / NAME).read_text(encoding="utf-8"))
+        kept = json.loads(kept_in(folder))
         for name, (status, sha256, intact) in kept["files"].items():
             _known.setdefault(name, _Known(tuple(status), Fingerprint(sha256, intact), True))
         return str(kept["note"])
-    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return ""  # nothing is known: files are hashed again
 
 

@@ -183,10 +183,10 @@ def _all_fresh(task: _Task) -> Iterator[Outcome]:
 def _remember(task: _Task, state: str) -> None:
     """Keep what is known of the participant's files, or of the group's own."""
     recordings = [task.study.root / task.participant.id] if task.participant else []
-    text = fingerprints.to_keep([task.folder, *recordings], state)
-    path = task.folder / fingerprints.NAME
-    if not path.exists() or path.read_text(encoding="utf-8") != text:
-        write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    kept = fingerprints.to_keep([task.folder, *recordings], state).encode()
+    if fingerprints.kept_in(task.folder) != kept:
+        path = task.folder / fingerprints.NAME
+        write_atomically(path, lambda temporary: temporary.write_bytes(kept))
 
 
 def _units(task: _Task) -> Iterator[tuple[Stage, Trial | None]]:

@@ -406,6 +406,54 @@ def test_lost_report_is_made_again(run):
     assert report.read_bytes() == content
 
 
+def test_edited_report_is_made_again_and_that_is_said(run):
+    report = run.out / "sub-01" / "report.html"
+    content = report.read_bytes()
+    report.write_bytes(content.replace(b"<h1>", b"<h1>My "))
+    assert report.read_bytes() != content
+    outcome = run.perform("report")
+    said = "sub-01/report.html has changed since it was written: made again"
+    assert (outcome.state, outcome.sentences[0]) == ("done", said)
+    assert report.read_bytes() == content
+
+
+# --- whose results are stale stays out of the group ---------------------------------------------
+
+
+@pytest.mark.parametrize("command", [("stats",), ("run", "--group")], ids=" ".join)
+def test_who_is_stale_is_left_out_of_the_group_and_named(run, bsip, command):
+    """Heavier by a kilogram in participants.tsv; then as before, and all is as before."""
+    table, content, times = run.study / "participants.tsv", run.content(), run.times()
+    before = pd.read_csv(table, sep="\t")
+    heavier = before["mass_kg"] + [0.0, 1.0]
+    before.assign(mass_kg=heavier).to_csv(table, sep="\t", index=False, na_rep="n/a")
+    answer = bsip(command[0], run.study, "--out", run.out, *command[1:])
+    assert answer.code == 3
+    assert answer.err.splitlines()[0] == (
+        "stats: sub-02: left out of the group, since what `bsip ingest` made of "
+        f"sub-02_{TRIALS[0]} is not up to date (other options (participant)); run `bsip run` first"
+    )
+    values = read_artifact(run.path("values", "group"), "values")
+    assert set(values["participant"]) == {"sub-01"}
+    assert all(name.startswith("group/") for name in run.rewritten(times))
+    before.to_csv(table, sep="\t", index=False, na_rep="n/a")
+    assert bsip("run", run.study, "--out", run.out, "--group").code == 0
+    assert run.content() == content
+
+
+def test_all_are_left_out_of_the_group(run, bsip, tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text("[reconstruct]\ncop_min_force_percent_bw = 31.0\n")
+    times = run.times()
+    answer = bsip("stats", run.study, "--out", run.out, "--config", own)
+    assert answer.code == 3
+    lines = answer.err.splitlines()
+    because = " is not up to date (other options (reconstruct)); run `bsip run` first"
+    assert [line for line in lines if line.endswith(because)] == lines[:2]
+    assert [line.split(":")[1] for line in lines[:2]] == [" sub-01", " sub-02"]
+    assert stages_of(run.rewritten(times)) == set()
+
+
 # --- bad data beside good -----------------------------------------------------------------------
 
 

@@ -1,29 +1,33 @@
-"""The Snakemake workflow beside ``make``: the same artifacts, and who fails stops nobody else."""
+"""The Snakemake workflow: each call asks bsip for everybody, and leaves what ``make`` leaves."""
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
 import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from bsip_cli.pipeline import STAGES
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 
 ROOT = Path(__file__).parents[2]
 INSTALLED = ROOT / ".venv-cluster" / "bin" / "snakemake"
 SNAKEMAKE = str(INSTALLED) if INSTALLED.exists() else shutil.which("snakemake")
-OWN_FILES = {".made", ".snakemake", ".lock"}
-PERSONAL = list(dict.fromkeys(stage.name for stage in STAGES if stage.level != "cohort"))
-STAND_IN = """#!/bin/sh
-echo "$*" >> "$CALLS"
-case "$*" in *"$FAILS"*) exit $CODE;; esac
+OWN_FILES = {".made", ".snakemake", ".lock", ".fingerprints.json"}
+PEOPLE = "participant_id\tsex\tmass_kg\nsub-01\tM\t70\nsub-02\tF\t60\n"
+# Lists people as bsip does; else notes its arguments, and fails where it is asked for FAILS.
+STAND_IN = """#!{python}
+import json, os, sys
+if sys.argv[1] == "people":
+    os.execv(sys.executable, [sys.executable, "-m", "bsip_cli", *sys.argv[1:]])
+with open(os.environ["CALLS"], "a") as calls:
+    calls.write(json.dumps(sys.argv[1:]) + "\\n")
+sys.exit(int(os.environ["CODE"]) if os.environ["FAILS"] in sys.argv else 0)
 """
 
 pytestmark = [
@@ -35,32 +39,64 @@ pytestmark = [
 
 
 @dataclass
-class Study:
-    """A study of two people, its results, and the program that makes them."""
+class Place:
+    """A folder with a study in it, and the program that is to stand for bsip."""
 
     folder: Path
-    bsip: Path
 
-    def snakemake(self, target: str, *options: str, **environment: str):
+    @property
+    def bsip(self) -> Path:
+        return self.folder / "bin" / "bsip"
+
+    def install(self, program: str) -> None:
+        self.bsip.parent.mkdir()
+        self.bsip.write_text(program)
+        self.bsip.chmod(0o755)
+        (self.folder / "bin" / "snakemake").symlink_to(str(SNAKEMAKE))
+        (self.folder / "workflow").symlink_to(ROOT / "workflow")
+
+    def snakemake(self, study: str = "study", out: str = "out", **environment: str):
         command = [
-            *(str(SNAKEMAKE), "--snakefile", str(ROOT / "workflow" / "Snakefile")),
-            *("--profile", str(ROOT / "workflow" / "profiles" / "plain"), *options),
-            *("--config", f"study={self.folder / 'study'}", f"out={self.folder / 'out'}"),
-            *(f"bsip={self.bsip}", "--", target),
+            *(str(SNAKEMAKE), "--snakefile", "workflow/Snakefile"),
+            *("--profile", "workflow/profiles/plain", "--", "everybody"),
         ]
-        return self.call(command, **environment)
+        return self.call(
+            command, BSIP=str(self.bsip), BSIP_STUDY=study, BSIP_OUT=out, **environment
+        )
 
-    def call(self, command: list[str], **environment: str) -> subprocess.CompletedProcess:
+    def make(self, *given: str, **environment: str):
+        there = ("BIN=bin", "READY=", "CLUSTER=.", "-o", "./ready")
+        return self.call(["make", "-f", str(ROOT / "Makefile"), *there, *given], **environment)
+
+    def call(self, command: list[str], **environment: str) -> subprocess.CompletedProcess[str]:
+        own = {
+            "MAKEFLAGS": "",
+            "XDG_CACHE_HOME": str(self.folder / "cache"),
+            "PYTHONPATH": str(ROOT),
+            "CALLS": str(self.folder / "calls"),
+            "FAILS": "nobody",
+            "CODE": "1",
+        }
         return subprocess.run(
             command,
             cwd=self.folder,
-            env=os.environ | {"MAKEFLAGS": "", "XDG_CACHE_HOME": str(self.folder)} | environment,
+            env=os.environ | own | environment,
             capture_output=True,
             text=True,
         )
 
+    def calls(self) -> list[list[str]]:
+        """What the stand-in was asked since this was last asked; the participants' calls sorted."""
+        notes = self.folder / "calls"
+        lines = notes.read_text().splitlines() if notes.exists() else []
+        notes.unlink(missing_ok=True)
+        found = [json.loads(line) for line in lines]
+        return sorted(c for c in found if "--participant" in c) + [
+            c for c in found if "--participant" not in c
+        ]
+
     def content(self) -> dict[str, bytes]:
-        """Every file of the results by its name, without what make and Snakemake keep."""
+        """Every file of the results by its name, without what is kept for the next call."""
         out = self.folder / "out"
         names = (path.relative_to(out) for path in sorted(out.rglob("*")) if path.is_file())
         return {
@@ -70,60 +106,100 @@ class Study:
         }
 
 
+def asked(*people: str, study: str = "study", out: str = "out") -> list[list[str]]:
+    return [["run", study, "--out", out, "--participant", who] for who in people]
+
+
 @pytest.fixture
-def stand_in(tmp_path):
-    """Two people without recordings, and a program that only notes how it is called."""
-    for who in ("sub-01", "sub-02"):
-        (tmp_path / "study" / who).mkdir(parents=True)
-        (tmp_path / "study" / who / f"{who}_task-static.c3d").write_bytes(b"")
-    (tmp_path / "study" / "participants.tsv").write_text(
-        "participant_id\tsex\nsub-01\tM\nsub-02\tF\nsub-03; touch hacked\tF\n"
-    )
-    program = tmp_path / "bsip"
-    program.write_text(STAND_IN)
-    program.chmod(0o755)
-    study = Study(tmp_path, program)
-    calls = tmp_path / "calls"
-
-    def run(target: str, fails: str = "nothing", code: int = 1) -> tuple[int, list[str]]:
-        """Exit code, and the calls as command and participant in the order of the names."""
-        calls.write_text("")
-        done = study.snakemake(target, CALLS=str(calls), FAILS=fails, CODE=str(code))
-        lines = [line.split() for line in calls.read_text().splitlines()]
-        return done.returncode, sorted(f"{line[0]} {line[-1]}" for line in lines)
-
-    return run
+def place(tmp_path) -> Place:
+    place = Place(tmp_path)
+    place.install(STAND_IN.format(python=sys.executable))
+    (tmp_path / "study" / "sub-02").mkdir(parents=True)
+    (tmp_path / "study" / "participants.tsv").write_text(PEOPLE)
+    return place
 
 
-def everything_of(*people: str, until: str | None = None) -> list[str]:
-    stages = PERSONAL[: PERSONAL.index(until) + 1] if until else PERSONAL
-    return sorted(f"{stage} {who}" for stage in stages for who in people)
+def test_everybody_is_asked_at_each_call(place):
+    """Also when a recording comes that is older than everything there."""
+    for _ in range(2):
+        assert place.snakemake().returncode == 0
+        assert place.calls() == asked("sub-01", "sub-02")
+    older = place.folder / "study" / "sub-02" / "sub-02_task-static.c3d"
+    older.write_bytes(b"")
+    os.utime(older, (0, 0))
+    assert place.snakemake().returncode == 0
+    assert place.calls() == asked("sub-01", "sub-02")
 
 
-def test_every_stage_of_everybody_once_and_then_the_group(stand_in, tmp_path):
-    assert stand_in("everybody") == (0, everything_of("sub-01", "sub-02"))
-    assert stand_in("group") == (0, ["run --group"])
-    assert stand_in("everybody") == (0, [])
-    earlier = time.time() - 100
-    for path in tmp_path.rglob("*"):
-        os.utime(path, (earlier, earlier))
-    (tmp_path / "study" / "sub-02" / "sub-02_task-static.c3d").touch()
-    assert stand_in("everybody") == (0, everything_of("sub-02"))
-    assert not (tmp_path / "hacked").exists()
-
-
-def test_one_failure_stops_neither_the_others_nor_the_tables(stand_in):
-    code, calls = stand_in("everybody", fails="sub-01")
-    assert (code != 0, calls) == (True, sorted(["ingest sub-01", *everything_of("sub-02")]))
-    assert stand_in("group") == (0, ["run --group"])
-    assert stand_in("everybody") == (0, everything_of("sub-01"))
-    assert stand_in("group") == (0, ["run --group"])
+def test_one_failure_stops_nobody_and_fails_the_whole(place):
+    assert place.snakemake(FAILS="sub-01").returncode != 0
+    assert place.calls() == asked("sub-01", "sub-02")
+    assert place.snakemake().returncode == 0
 
 
 @pytest.mark.parametrize("code", [3, 4])
-def test_a_refusal_is_no_failure(stand_in, code):
-    assert stand_in("everybody", fails="sub-01", code=code)[0] == 0
-    assert stand_in("everybody") == (0, [])
+def test_a_refusal_is_no_failure(place, code):
+    assert place.snakemake(FAILS="sub-01", CODE=str(code)).returncode == 0
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        'participant_id\tsex\tmass_kg\n"sub-01"\tM\t70\n"sub-02"\tF\t60\n',
+        "age\tmass_kg\tsex\tparticipant_id\n30\t70\tM\tsub-01\n\t60\tF\tsub-02\n",
+        "participant_id\tsex\tmass_kg\nsub-01\t\t\n\t\t\n sub-02 \tF\t60\n",
+        PEOPLE.replace("\n", "\r\n"),
+        "\ufeff" + PEOPLE + "sub-03; touch hacked\tF\t60\nsub-01\tM\t70\n",
+    ],
+    ids=["quoted", "other order", "blank cells", "CRLF", "impossible and twice"],
+)
+def test_people_are_those_whom_bsip_reads(place, table):
+    (place.folder / "study" / "participants.tsv").write_bytes(table.encode())
+    assert place.snakemake().returncode == 0
+    assert place.calls() == asked("sub-01", "sub-02")
+    assert list(place.folder.rglob("hacked")) == []
+
+
+def test_what_cannot_be_read_is_refused_in_words(place):
+    done = place.snakemake(study="elsewhere")
+    assert done.returncode != 0
+    assert "bsip: elsewhere/participants.tsv: " in done.stderr
+    assert "bsip cannot list the participants of 'elsewhere'" in done.stderr
+    done = place.snakemake(out="a{b}")
+    assert done.returncode != 0
+    assert "'a{b}': Snakemake takes braces for wildcards" in done.stderr
+    place.bsip.unlink()
+    done = place.snakemake()
+    assert done.returncode != 0
+    assert "cannot be started (No such file or directory)" in done.stderr
+    assert place.calls() == []
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["two words", "it's; touch hacked", "$(touch hacked) `touch hacked` $HOME", "007", "a: #b\"'"],
+)
+def test_make_cluster_with_odd_names(place, name):
+    shutil.move(place.folder / "study", place.folder / name)
+    done = place.make("cluster", f"COHORT={name}/")
+    assert done.returncode == 0, done.stderr
+    out = f"{name}_results"
+    assert place.calls() == [
+        *asked("sub-01", "sub-02", study=name, out=out),
+        ["run", name, "--out", out, "--group"],
+        ["show", out],
+    ]
+    assert list(place.folder.rglob("hacked")) == []
+
+
+def test_make_cluster_fails_with_one_after_the_tables_of_the_others(place):
+    done = place.make("cluster", "COHORT=study", "OUT=out", FAILS="sub-01")
+    assert done.returncode != 0
+    group = ["run", "study", "--out", "out", "--group"]
+    assert place.calls() == [*asked("sub-01", "sub-02"), group, ["show", "out"]]
+    done = place.make("cluster", "COHORT=study", "OUT=out", FAILS="--group", CODE="2")
+    assert done.returncode != 0
+    assert place.calls() == [*asked("sub-01", "sub-02"), group]
 
 
 def test_the_same_artifacts_as_make(tmp_path):
@@ -136,20 +212,19 @@ def test_the_same_artifacts_as_make(tmp_path):
         rates={"default": Rates(marker_hz=50, analog_hz=250)},
     )
     simulate_study(tmp_path / "study", options)
-    study = Study(tmp_path, tmp_path / "bin" / "bsip")
-    study.bsip.parent.mkdir()
-    study.bsip.write_text(f'#!/bin/sh\nexec {sys.executable} -m bsip_cli "$@"\n')
-    study.bsip.chmod(0o755)
-    out = tmp_path / "out"
-    for target in ("everybody", "group"):
-        done = study.snakemake(target)
-        assert done.returncode == 0, done.stderr
-    of_workflow = study.content()
-    shutil.rmtree(out)
-    made = ["make", "-f", str(ROOT / "Makefile"), "-j", "2", f"COHORT={tmp_path / 'study'}"]
-    done = study.call([*made, f"OUT={out}", f"BIN={study.bsip.parent}", "READY="])
+    place = Place(tmp_path)
+    place.install(f'#!/bin/sh\nexec {sys.executable} -m bsip_cli "$@"\n')
+    given = ("COHORT=study", "OUT=out")
+    done = place.make("cluster", *given)
     assert done.returncode == 0, done.stderr
-    of_make = study.content()
+    of_workflow = place.content()
+    done = place.make("cluster", *given)
+    assert done.returncode == 0, done.stderr
+    assert place.content() == of_workflow
+    shutil.rmtree(tmp_path / "out")
+    done = place.make("study", *given)
+    assert done.returncode == 0, done.stderr
+    of_make = place.content()
     assert "group/report.html" in of_make
     assert of_workflow.keys() == of_make.keys()
     assert [name for name in of_make if of_workflow[name] != of_make[name]] == []

@@ -121,6 +121,14 @@ def to_keep(folders: Iterable[Path], note: str) -> str:
     return json.dumps({"note": note, "files": kept}, indent=0) + "\n"
 
 
+def is_kept(folder: Path, text: str) -> bool:
+    """Whether a folder has this text already; one that cannot be read is another."""
+    try:
+        return (folder / NAME).read_bytes() == text.encode()
+    except OSError:
+        return False
+
+
 def snapshot(folder: Path, files: Iterable[Path]) -> str:
     """SHA-256 over names, sizes, times and inodes of some files and of all in a folder.
 

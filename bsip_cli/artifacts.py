@@ -109,9 +109,10 @@ def write_atomically(path: Path, write) -> None:
             with temporary.open("rb") as handle:
                 os.fsync(handle.fileno())
             temporary.replace(path)
-            forget(path)
-        finally:
+        except BaseException:  # once it has its final name, nothing is left that could fail
             temporary.unlink(missing_ok=True)
+            raise
+        forget(path)
     except OSError as error:
         raise not_writable(path, error) from None
 

@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from bsip_cli import __version__
-from bsip_cli.endings import EndedError, raise_when_ended
+from bsip_cli.endings import EndedError, ignore_endings, raise_when_ended
 from bsip_cli.errors import BsipError, not_readable
 from bsip_cli.pipeline import STAGES
 
@@ -331,7 +331,18 @@ def info(artifact) -> None:
 
 def main() -> None:
     """Entry point: turns errors into one sentence and a documented exit code."""
-    raise_when_ended()
+    try:
+        raise_when_ended()
+        sentence, exit_code = _answer()
+        ignore_endings()
+    except EndedError as ended:
+        ignore_endings()
+        sentence, exit_code = str(ended), ended.exit_code
+    _end(sentence, exit_code)
+
+
+def _answer() -> tuple[str, int]:
+    """Do what was asked; the last sentence, if there is one, and the exit code."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # letters that a terminal of few cannot show
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -339,18 +350,16 @@ def main() -> None:
         sys.stdout.flush()
     except click.ClickException as error:
         error.show()
-        sys.exit(2)
+        return "", 2
     except click.Abort:
-        _end("", 130)
+        return "", 130
     except BsipError as error:
-        _end(str(error), error.exit_code)
-    except EndedError as ended:
-        _end(f"{ended}", ended.exit_code)
+        return str(error), error.exit_code
     except (BrokenPipeError, SystemExit):  # who reads the answer, like `head`, has seen enough:
-        _end("", 0)  # click leaves then, and only then, by itself
+        return "", 0  # click leaves then, and only then, by itself
     except OSError as error:
-        _end(str(not_readable(error)), 2)
-    sys.exit(exit_code)
+        return str(not_readable(error)), 2
+    return "", exit_code or 0
 
 
 def _end(sentence: str, exit_code: int) -> None:

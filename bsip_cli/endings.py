@@ -42,9 +42,18 @@ def _raise(number: int, _frame: object) -> None:
 
 
 def _raise_once(number: int, _frame: object) -> None:
-    for later in ENDING:
-        signal.signal(later, signal.SIG_IGN)
+    ignore_endings()
     raise EndedError(number)
+
+
+def ignore_endings() -> None:
+    """From now on nothing is raised, for a process that is about to end."""
+    for number in ENDING:  # with SIG_IGN, Python would complain of one that has just come
+        signal.signal(number, _pass_over)
+
+
+def _pass_over(_number: int, _frame: object) -> None:
+    return
 
 
 def signal_in(exit_code: int | None) -> int | None:

@@ -100,9 +100,12 @@ def seal(path: Path) -> None:
 
 
 def kept_in(folder: Path) -> bytes:
-    """What an earlier run kept in a folder, as it stands there; nothing if that is no file."""
+    """What an earlier run kept in a folder; nothing where that is no file or cannot be read."""
     path = folder / NAME
-    return path.read_bytes() if path.is_file() else b""
+    try:
+        return path.read_bytes() if path.is_file() else b""
+    except OSError:
+        return b""
 
 
 def recall(folder: Path) -> str:

@@ -127,8 +127,8 @@ def _outcomes(tasks: Iterable[_Task], jobs: int) -> Iterator[tuple[str, Outcome]
 
 def _tidy(task: _Task) -> None:
     """Take away what a killed process left half written, unless another bsip is at it by now."""
-    with suppress(UsageError), held_alone(task.folder):
-        pass
+    with suppress(UsageError, OSError), held_alone(task.folder):
+        pass  # what cannot be taken away now, the next run takes
 
 
 def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
@@ -144,11 +144,17 @@ def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
                 yield task.name, outcome
             time.sleep(fingerprints.STEP_S)  # for what was written last to have its own time
             _remember(task, _state(task) if is_true else "")
-    except UsageError as error:
-        said = (str(error),)
-        yield task.name, Outcome(task.stages[0].name, task.name, "refused", said, error.exit_code)
+    except BsipError as error:
+        yield task.name, _stopped(task, error)
+    except OSError as error:
+        yield task.name, _stopped(task, not_readable(error))
     except Exception as error:  # noqa: BLE001  a bug outside of the units stops one task only
         yield task.name, _bug(task.stages[0].name, task.name, error)
+
+
+def _stopped(task: _Task, error: BsipError) -> Outcome:
+    sentence = str(error) if task.name in str(error) else f"{task.name}: {error}"
+    return Outcome(task.stages[0].name, task.name, "refused", (sentence,), error.exit_code)
 
 
 def _is_unchanged(task: _Task) -> bool:

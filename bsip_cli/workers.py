@@ -16,7 +16,13 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Generic, TypeVar
 
-from bsip_cli.endings import EndedError, endings_wait, raise_when_ended, signal_in
+from bsip_cli.endings import (
+    EndedError,
+    endings_wait,
+    ignore_endings,
+    raise_when_ended,
+    signal_in,
+)
 
 _SPAWN = multiprocessing.get_context("spawn")
 _TO_END_S = 2.0  # for a worker that was asked to end; then it is killed
@@ -131,16 +137,16 @@ def _end(workers: list[_Worker[Task]], tidy: Callable[[Task], None]) -> None:
 
 
 def _serve(pipe: Connection, work: Callable) -> None:
-    """Take tasks until the pipe is closed."""
+    """Take tasks until the pipe is closed, or a signal comes."""
     try:
         raise_when_ended(once=True)
         threading.Thread(target=_leave_with_parent, daemon=True).start()
-        while True:
-            for result in work(pipe.recv()):
-                pipe.send(result)
-            pipe.send(None)
-    except (EOFError, BrokenPipeError, ConnectionResetError):
-        return  # the parent wants no more
+        with suppress(EOFError, BrokenPipeError, ConnectionResetError):  # the parent wants no more
+            while True:
+                for result in work(pipe.recv()):
+                    pipe.send(result)
+                pipe.send(None)
+        ignore_endings()
     except EndedError as ended:
         sys.exit(ended.exit_code)
 

@@ -1,6 +1,6 @@
-"""Reads one C3D file with ezc3d; run by c3d_guard as a process of its own, under limits.
+"""Reads a C3D file from its standard input with ezc3d; c3d_guard runs it under limits.
 
-    python c3d_child.py FILE MEMORY_BYTES CPU_SECONDS > arrays.npz
+    python c3d_child.py MEMORY_BYTES CPU_SECONDS < file.c3d > arrays.npz
 
 Imports nothing of bsip, so that it starts fast.
 """
@@ -12,17 +12,18 @@ import os
 import sys
 
 REFUSED = 3
+_INPUT = "/dev/fd/0"
 
 
 def main() -> None:
-    file, memory_bytes, cpu_s = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    memory_bytes, cpu_s = int(sys.argv[1]), int(sys.argv[2])
     result = os.dup(1)
     os.dup2(2, 1)  # whatever a library prints is no result
     _limit(memory_bytes, cpu_s)
     import ezc3d
 
     try:
-        arrays = _arrays(ezc3d.c3d(file))
+        arrays = _arrays(ezc3d.c3d(_INPUT))
     except (RuntimeError, OSError, ValueError, TypeError, LookupError, MemoryError) as error:
         sys.stderr.write(str(error) or type(error).__name__)
         sys.exit(REFUSED)

@@ -6,7 +6,6 @@ ezc3d would misread or refuse a sound file (c3d_mend says which), it reads a cop
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -62,7 +61,7 @@ def read_content(path: Path) -> Content:
         )
         samples = replace(samples, analog=scaling.applied(samples.analog, layout.is_float))
     else:
-        samples = _read_piece(path, path, layout)
+        samples = _read_piece(path, raw, layout)
     if header.is_full:
         samples = _without_padding(samples, layout)
     return Content(
@@ -95,12 +94,8 @@ def _bytes(path: Path) -> bytes:
 
 def _read_pieces(path: Path, layout: Layout, written: Callable[[Layout], bytes]) -> Samples:
     """What ezc3d reads of a file that is written anew in one or several pieces."""
-    parts, read = pieces(layout), []
-    with tempfile.TemporaryDirectory(prefix="bsip-") as folder:
-        copy = Path(folder) / "mended.c3d"
-        for part in parts:
-            copy.write_bytes(written(part))
-            read.append(_read_piece(path, copy, part))
+    parts = pieces(layout)
+    read = [_read_piece(path, written(part), part) for part in parts]
     whole = [*map(_padded, read[:-1], parts), read[-1]]
     return replace(
         read[0],
@@ -110,8 +105,8 @@ def _read_pieces(path: Path, layout: Layout, written: Callable[[Layout], bytes])
     )
 
 
-def _read_piece(path: Path, file: Path, layout: Layout) -> Samples:
-    samples = read_by_ezc3d(file, path)
+def _read_piece(path: Path, content: bytes, layout: Layout) -> Samples:
+    samples = read_by_ezc3d(content, path)
     _check_counts(path, samples, layout)
     return samples
 

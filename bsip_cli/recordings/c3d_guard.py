@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,21 +35,28 @@ class Samples:
     analog: np.ndarray  # (n_channels, n)
 
 
-def read_by_ezc3d(file: Path, named: Path) -> Samples:
-    """Parameters, points and analogs of a C3D file by ezc3d; faults name the file ``named``."""
-    size = file.stat().st_size
+def read_by_ezc3d(content: bytes, named: Path) -> Samples:
+    """Parameters, points and analogs of a C3D file by ezc3d; faults name the file ``named``.
+
+    ezc3d does not notice when reading fails half way: it gets a copy of what was read already.
+    """
+    size = len(content)
     memory_bytes = _MEMORY_BYTES + _MEMORY_PER_BYTE * size
     cpu_s = _CPU_S + int(_CPU_S_PER_MB * size / 1e6)
-    command = [sys.executable, "-P", str(_CHILD), str(file), str(memory_bytes), str(cpu_s)]
+    command = [sys.executable, "-P", str(_CHILD), str(memory_bytes), str(cpu_s)]
     one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     try:
-        ran = subprocess.run(
-            command,
-            capture_output=True,
-            check=False,
-            env={**os.environ, **one_thread},
-            timeout=_WALL_PER_CPU * cpu_s,
-        )
+        with tempfile.TemporaryFile() as copy:
+            copy.write(content)
+            copy.seek(0)
+            ran = subprocess.run(
+                command,
+                stdin=copy,
+                capture_output=True,
+                check=False,
+                env={**os.environ, **one_thread},
+                timeout=_WALL_PER_CPU * cpu_s,
+            )
     except subprocess.TimeoutExpired as error:
         raise _refusal(named, f"did not finish within {_WALL_PER_CPU * cpu_s} s") from error
     if ran.returncode == 0:

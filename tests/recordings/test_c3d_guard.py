@@ -30,7 +30,7 @@ def path(tmp_path):
 
 
 def test_samples_and_parameters_come_back(path):
-    samples = read_by_ezc3d(path, path)
+    samples = read_by_ezc3d(path.read_bytes(), path)
     markers, labels = standing_markers(N)
     np.testing.assert_allclose(samples.positions, 1e3 * markers, atol=1e-3)
     assert samples.residuals.shape == (N, len(labels)) and samples.analog.shape == (6, 10 * N)
@@ -42,7 +42,7 @@ def test_labels_that_are_no_utf8(path):
     content = path.read_bytes()
     label = standing_markers(1)[1][0].encode()
     path.write_bytes(content.replace(label, b"\xe9" + label[1:], 1))
-    labels = texts(read_by_ezc3d(path, path).parameters["POINT"], "LABELS")
+    labels = texts(read_by_ezc3d(path.read_bytes(), path).parameters["POINT"], "LABELS")
     assert labels[0] == "\u00e9" + label[1:].decode()
 
 
@@ -71,12 +71,12 @@ def test_a_child_that_dies_or_hangs_is_one_sentence(path, tmp_path, monkeypatch,
 def test_the_child_has_a_limit_of_memory(path, monkeypatch):
     monkeypatch.setattr(c3d_guard, "_MEMORY_BYTES", 60_000_000)
     with pytest.raises(BadDataError, match="ezc3d"):
-        read_by_ezc3d(path, path)
+        read_by_ezc3d(path.read_bytes(), path)
 
 
 def test_other_counts_than_the_files_are_refused(path, monkeypatch):
     """Whatever ezc3d makes of a file, its counts must be those that fill the file."""
-    shorter = read_by_ezc3d(path, path)
+    shorter = read_by_ezc3d(path.read_bytes(), path)
     monkeypatch.setattr(
         c3d_content,
         "read_by_ezc3d",

@@ -65,6 +65,7 @@ def fault_rounds(folder: Path, chance: random.Random, names: Sequence[str]) -> l
 
 
 def signal_rounds(folder: Path, chance: random.Random, count: int) -> list[Round]:
+    signals.answer_all()
     study = make_study(folder / "study_of_three", participants=3)
     bench = Bench.of(study, folder / "before_signals", *SIGNALLED)
     takes_s = signals.seconds_of(bench, folder / "out")

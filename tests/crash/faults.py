@@ -48,21 +48,28 @@ class Call:
         return f"{self.name} {self.file} (call {self.number}): {how}"
 
 
+NONE = Call(0, "", "")
+
+
+def environment(library: Path, below: Path, trace: Path, call: Call) -> dict[str, str]:
+    """What tells the library which call is to fail, of those on files below a folder."""
+    return {
+        "LD_PRELOAD": str(library),
+        "FAULT_BELOW": f"{below}/",
+        "FAULT_TRACE": str(trace),
+        "FAULT_AT": str(call.number),
+        "FAULT_ERRNO": str(call.error),
+        **({"FAULT_STAYS": "1"} if call.stays else {}),
+    }
+
+
 def run_with(
     bench: Bench, library: Path, out: Path, call: Call
 ) -> tuple[Ended, list[str], list[str]]:
     """One run, the processes that it left, and the calls that it made."""
     trace = out.with_name(f"{out.name}.trace")
     trace.write_bytes(b"")
-    environment = {
-        "LD_PRELOAD": str(library),
-        "FAULT_BELOW": f"{out.parent}/",
-        "FAULT_TRACE": str(trace),
-        "FAULT_AT": str(call.number),
-        "FAULT_ERRNO": str(call.error),
-        **({"FAULT_STAYS": "1"} if call.stays else {}),
-    }
-    process = bench.start(out, **environment)
+    process = bench.start(out, **environment(library, out.parent, trace, call))
     done = ended(process)
     orphans = left_after(process.pid)
     return done, orphans, trace.read_bytes().decode().splitlines()
@@ -71,7 +78,7 @@ def run_with(
 def calls_of(bench: Bench, library: Path, out: Path, chance: random.Random) -> list[Call]:
     """The calls of an undisturbed run in their order, each with a failure that it may meet; of
     several that follow each other on one file the first and the last."""
-    done, _, lines = run_with(bench, library, bench.fresh_out(out), Call(0, "", ""))
+    done, _, lines = run_with(bench, library, bench.fresh_out(out), NONE)
     assert done.code == 0 and all(len(line) == _RECORD - 1 for line in lines), done.said
     calls = [Call(n, *line.split(maxsplit=1)) for n, line in enumerate(lines, 1)]
     streaks = [list(same) for _, same in groupby(calls, lambda call: (call.name, call.file))]

@@ -29,6 +29,13 @@ class Signal:
         return f"{self.kind.name} to {self.target} after {self.after_s:.2f} s"
 
 
+def answer_all() -> None:
+    """A shell has those ignored that it starts in the background, and bsip ignores them then."""
+    for kind in ASKING:
+        if signal.getsignal(kind) == signal.SIG_IGN:
+            signal.signal(kind, signal.SIG_DFL)
+
+
 def drawn(chance: random.Random, takes_s: float) -> Signal:
     """At any moment; every fourth in the first second, every fourth about the end."""
     moment = chance.choice(

@@ -412,7 +412,7 @@ def test_edited_report_is_made_again_and_that_is_said(run):
     report.write_bytes(content.replace(b"<h1>", b"<h1>My "))
     assert report.read_bytes() != content
     outcome = run.perform("report")
-    said = "sub-01/report.html has changed since it was written: made again"
+    said = "sub-01/report.html has changed since bsip wrote it: made again"
     assert (outcome.state, outcome.sentences[0]) == ("done", said)
     assert report.read_bytes() == content
 

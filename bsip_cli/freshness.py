@@ -38,10 +38,12 @@ def was_changed(unit: Unit) -> list[str]:
     return [name for kind in unit.stage.writes for name in _changed(unit, kind)]
 
 
-def stale_upstream(unit: Unit, participant: Participant, stages: Collection[Stage]) -> str:
-    """The first result of a participant on which ``stages`` build and that is no more true, and
-    why; empty if all are."""
-    before = {one.label for stage in stages for one in _before(stage)}
+def stale_upstream(unit: Unit, participant: Participant | None, stages: Collection[Stage]) -> str:
+    """The first result of a participant, or of the group, on which ``stages`` build and that is no
+    more true, and why; empty if all are."""
+    of_group = participant is None
+    earlier = (one for stage in stages for one in _before(stage))
+    before = {one.label for one in earlier if (one.level == "cohort") == of_group}
     before -= {stage.label for stage in stages}
     for stage in STAGES:
         for other in units_of(stage, unit, participant) if stage.label in before else ():
@@ -50,11 +52,13 @@ def stale_upstream(unit: Unit, participant: Participant, stages: Collection[Stag
     return ""
 
 
-def units_of(stage: Stage, like: Unit, participant: Participant) -> Iterator[Unit]:
-    """A stage's units about one participant, in the study and with all options of ``like``."""
-    trials = participant.trials if stage.level == "trial" else (None,)
+def units_of(stage: Stage, like: Unit, participant: Participant | None) -> Iterator[Unit]:
+    """A stage's units about a participant, or the group, in the study and with all options of
+    ``like``."""
+    trials = participant.trials if participant and stage.level == "trial" else (None,)
+    whole = like.study, like.out, like.config_of_all, participant
     for trial in trials:
-        yield Unit(stage, like.study, like.out, like.config_of_all, participant, trial)
+        yield Unit(stage, *whole, trial, left_out=like.left_out)
 
 
 def _untrue(unit: Unit) -> str:
@@ -69,7 +73,7 @@ def _untrue(unit: Unit) -> str:
 
 @lru_cache(maxsize=64)
 def _before(stage: Stage) -> tuple[Stage, ...]:
-    """The stages about participants whose results a stage reads, directly or not, in order."""
+    """The stages whose results a stage reads, directly or not, in order."""
     found: set[str] = set()
     waiting = list(stage.inputs)
     while waiting:
@@ -77,7 +81,7 @@ def _before(stage: Stage) -> tuple[Stage, ...]:
         if maker.label not in found:
             found.add(maker.label)
             waiting += maker.inputs
-    return tuple(s for s in STAGES if s.label in found and s.level != "cohort")
+    return tuple(s for s in STAGES if s.label in found)
 
 
 # --- one artifact -----------------------------------------------------------------------------

@@ -206,13 +206,13 @@ def _run_alone(task: _Task) -> Iterator[Outcome]:
     study, left_out = task.study, {}
     if task.participant is not None:
         _forget_gone_recordings(task.folder, task.participant)
-        yield from _behind(task)
     else:
         left_out = _stale_people(task)
         study = Study(
             study.root, tuple(one for one in study.participants if one.id not in left_out)
         )
         yield from _left_out(task, left_out)
+    yield from _behind(task, study, left_out)
     for stage, trial in _units(task):
         unit = Unit(stage, study, task.out, task.config, task.participant, trial, left_out=left_out)
         outcome = perform(unit, task.manner.force)
@@ -221,10 +221,10 @@ def _run_alone(task: _Task) -> Iterator[Outcome]:
             return
 
 
-def _behind(task: _Task) -> Iterator[Outcome]:
+def _behind(task: _Task, study: Study, left_out: Mapping[str, str]) -> Iterator[Outcome]:
     """A word where stages that are run alone build on what is not up to date."""
-    assert task.participant is not None
-    unit = Unit(task.stages[-1], task.study, task.out, task.config, task.participant)
+    last = task.stages[-1]
+    unit = Unit(last, study, task.out, task.config, task.participant, left_out=left_out)
     if why := stale_upstream(unit, task.participant, task.stages):
         said = (f"{task.name}: {why}; `bsip run` brings it up to date",)
         yield Outcome(task.stages[0].name, task.name, "noted", said)
@@ -296,6 +296,8 @@ def _refused(unit: Unit, error: BsipError) -> Outcome:
 def lacking(unit: Unit) -> Outcome | None:
     """Why a unit cannot begin: what it reads is not there, or was refused."""
     stage, gone = unit.stage.name, unit.missing()
+    if not unit.participants():
+        return Outcome(stage, unit.name, "waiting", (f"{unit.name}: nobody is left for {stage}",))
     if not gone:
         return None
     if _refused_upstream(unit):

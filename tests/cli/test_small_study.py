@@ -412,7 +412,7 @@ def test_edited_report_is_made_again_and_that_is_said(run):
     report.write_bytes(content.replace(b"<h1>", b"<h1>My "))
     assert report.read_bytes() != content
     outcome = run.perform("report")
-    said = "sub-01/report.html has changed since it was written: made again"
+    said = "sub-01/report.html has changed since bsip wrote it: made again"
     assert (outcome.state, outcome.sentences[0]) == ("done", said)
     assert report.read_bytes() == content
 
@@ -445,13 +445,29 @@ def test_all_are_left_out_of_the_group(run, bsip, tmp_path):
     own = tmp_path / "own.toml"
     own.write_text("[reconstruct]\ncop_min_force_percent_bw = 31.0\n")
     times = run.times()
-    answer = bsip("stats", run.study, "--out", run.out, "--config", own)
+    answer = bsip("run", run.study, "--out", run.out, "--config", own, "--group")
     assert answer.code == 3
     lines = answer.err.splitlines()
     because = " is not up to date (other options (reconstruct)); run `bsip run` first"
     assert [line for line in lines if line.endswith(because)] == lines[:2]
     assert [line.split(":")[1] for line in lines[:2]] == [" sub-01", " sub-02"]
+    assert [line for line in lines if "nobody is left for" in line] == [
+        f"{stage}: group: nobody is left for {stage}" for stage in ("stats", "tables", "report")
+    ]
     assert stages_of(run.rewritten(times)) == set()
+
+
+def test_a_stage_of_the_group_alone_says_what_is_stale_before_it(run, bsip, tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text("[stats]\nalpha = 0.04\n")
+    answer = bsip("tables", run.study, "--out", run.out, "--config", own)
+    assert answer.code == 0
+    assert answer.err.splitlines()[0] == (
+        "tables: group: what `bsip stats` made of group is not up to date "
+        "(other options (stats)); `bsip run` brings it up to date"
+    )
+    answer = bsip("tables", run.study, "--out", run.out)
+    assert answer.err.startswith("bsip tables: 1 ")
 
 
 # --- bad data beside good -----------------------------------------------------------------------

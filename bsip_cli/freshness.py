@@ -143,7 +143,7 @@ def _is(path: Path, sha256: str) -> bool:
 
 def _changed(unit: Unit, kind: str) -> list[str]:
     path = unit.path(kind)
-    if not path.exists():
+    if not path.is_file():  # a folder in its place is told when it is to be written
         return []
     try:
         read_header(path, kind)

@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from bsip_cli import __version__
-from bsip_cli.endings import EndedError, ignore_endings, raise_when_ended
+from bsip_cli.endings import EndedError, endings_kept, ignore_endings, raise_when_ended
 from bsip_cli.errors import BsipError, not_readable
 from bsip_cli.pipeline import STAGES
 
@@ -333,7 +333,8 @@ def main() -> None:
     """Entry point: turns errors into one sentence and a documented exit code."""
     try:
         raise_when_ended()
-        sentence, exit_code = _answer()
+        with endings_kept():
+            sentence, exit_code = _answer()
         ignore_endings()
     except EndedError as ended:
         ignore_endings()

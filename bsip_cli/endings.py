@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 ENDING = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
+_raised: list[int] = []
 _SHELL = 128  # shells add it to a signal's number for the exit code
 
 
@@ -38,12 +39,30 @@ def raise_when_ended(once: bool = False) -> None:
 
 
 def _raise(number: int, _frame: object) -> None:
+    _raised.append(number)
     raise EndedError(number)
 
 
-def _raise_once(number: int, _frame: object) -> None:
+def _raise_once(number: int, frame: object) -> None:
     ignore_endings()
-    raise EndedError(number)
+    _raise(number, frame)
+
+
+def end_if_asked() -> None:
+    """Raise again what code of others has caught, or made an error of its own (pydantic does)."""
+    if _raised:
+        raise EndedError(_raised[0])
+
+
+@contextmanager
+def endings_kept() -> Iterator[None]:
+    """Whatever becomes of the exception inside, an ending is one afterwards."""
+    try:
+        yield
+    except Exception:
+        end_if_asked()
+        raise
+    end_if_asked()
 
 
 def ignore_endings() -> None:

@@ -19,6 +19,7 @@ from bsip_cli import fingerprints
 from bsip_cli.artifacts import remove, write_artifact, write_atomically
 from bsip_cli.code_hash import code_hash
 from bsip_cli.config import Config
+from bsip_cli.endings import end_if_asked
 from bsip_cli.errors import (
     BadDataError,
     BsipError,
@@ -257,6 +258,7 @@ def _forget_gone_recordings(folder: Path, participant: Participant) -> None:
 
 def perform(unit: Unit, force: bool = False) -> Outcome:
     """Do one unit unless it is fresh or lacks its inputs; its bug is written down, too."""
+    end_if_asked()
     stage = unit.stage
     try:
         waiting = lacking(unit)
@@ -281,6 +283,7 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
 
 def _refused(unit: Unit, error: BsipError) -> Outcome:
     """Write down what is wrong with the data; say what is wrong, after the unit's warnings."""
+    end_if_asked()
     if not isinstance(error, UsageError):
         try:
             kind = "numerical failure" if isinstance(error, NumericalError) else "bad data"
@@ -321,6 +324,7 @@ def _write_refusal(unit: Unit, kind: str, sentence: str) -> None:
 
 def _bug(stage: str, name: str, error: Exception) -> Outcome:
     """What to say of an exception that nobody foresaw, with its trace for the report of a bug."""
+    end_if_asked()
     if isinstance(error, MemoryError):
         return Outcome(stage, name, "bug", (f"{name}: {_SHORT_OF_MEMORY}",), 1)
     trace = "".join(traceback.format_exception(error)).strip()

@@ -18,6 +18,8 @@ from typing import Generic, TypeVar
 
 from bsip_cli.endings import (
     EndedError,
+    end_if_asked,
+    endings_kept,
     endings_wait,
     ignore_endings,
     raise_when_ended,
@@ -69,12 +71,13 @@ def work_on(
     try:
         while pending or any(worker.task is not None for worker in workers):
             while pending and len(workers) < jobs:
-                workers.append(_start(work))
+                workers.append(_start())
             for worker in workers:
                 if worker.task is None and pending:
-                    _hand(worker, pending.popleft())
+                    _hand(worker, work, pending.popleft())
             by_pipe = {worker.pipe: worker for worker in workers}
             for pipe in wait(list(by_pipe)):
+                end_if_asked()
                 worker = by_pipe[pipe]  # type: ignore[index]
                 try:
                     result = worker.pipe.recv()
@@ -90,19 +93,19 @@ def work_on(
         _end(workers, tidy)
 
 
-def _start(work: Callable) -> _Worker:
+def _start() -> _Worker:
     ours, theirs = _SPAWN.Pipe()
-    process = _SPAWN.Process(target=_serve, args=(theirs, work), daemon=True)
+    process = _SPAWN.Process(target=_serve, args=(theirs,), daemon=True)
     with endings_wait():
         process.start()
     theirs.close()
     return _Worker(process, ours)
 
 
-def _hand(worker: _Worker[Task], task: Task) -> None:
+def _hand(worker: _Worker[Task], work: Callable, task: Task) -> None:
     worker.task = task
     with suppress(OSError):  # it has died: then its end of the pipe says so
-        worker.pipe.send(task)
+        worker.pipe.send((work, task))
 
 
 def _died(worker: _Worker[Task], tidy: Callable[[Task], None]) -> Iterator[Died[Task]]:
@@ -136,14 +139,19 @@ def _end(workers: list[_Worker[Task]], tidy: Callable[[Task], None]) -> None:
 # --- in the worker ----------------------------------------------------------------------------
 
 
-def _serve(pipe: Connection, work: Callable) -> None:
-    """Take tasks until the pipe is closed, or a signal comes."""
+def _serve(pipe: Connection) -> None:
+    """Take tasks until the pipe is closed, or a signal comes.
+
+    Their imports, which take seconds, come with the first task: by then signals are answered.
+    """
     try:
         raise_when_ended(once=True)
         threading.Thread(target=_leave_with_parent, daemon=True).start()
-        with suppress(EOFError, BrokenPipeError, ConnectionResetError):  # the parent wants no more
+        gone = (EOFError, BrokenPipeError, ConnectionResetError)  # the parent wants no more
+        with endings_kept(), suppress(*gone):
             while True:
-                for result in work(pipe.recv()):
+                work, task = pipe.recv()
+                for result in work(task):
                     pipe.send(result)
                 pipe.send(None)
         ignore_endings()

@@ -7,6 +7,7 @@ import pytest
 from bsip_cli import session
 from bsip_cli.artifacts import read_header
 from bsip_cli.config import load_config
+from bsip_cli.endings import EndedError
 from bsip_cli.pipeline import Stage
 from bsip_cli.runner import Manner, run_stages
 from bsip_cli.study import load_study
@@ -19,6 +20,11 @@ STAGES = {
     "        os.kill(os.getpid(), 9)\n",
     "numeric": "from bsip_cli.errors import NumericalError\ndef run(unit):\n"
     '    raise NumericalError("no optimum", file=unit.name)\n',
+    "converting": "import os, signal\ndef run(unit):\n    try:\n"
+    "        os.kill(os.getpid(), signal.SIGTERM)\n    except BaseException:\n"
+    '        raise ValueError("what the signal raised was caught") from None\n',
+    "swallowing": "import os, signal\ndef run(unit):\n    try:\n"
+    "        os.kill(os.getpid(), signal.SIGTERM)\n    except BaseException:\n        pass\n",
     "doubtful": "from bsip_cli.errors import BadDataError\ndef run(unit):\n"
     '    unit.warn(f"{unit.name}: the labels look exchanged")\n'
     '    raise BadDataError("no pose", file=unit.name)\n',
@@ -77,6 +83,15 @@ def test_killed_process_is_not_called_a_bug(stage, outcomes):
     assert "killed" in found[0][4][0]
     assert "a bug in bsip" not in found[0][4][0]
     assert found[-1][:3] == ("harmless", "group", "done")
+
+
+@pytest.mark.parametrize("name", ["converting", "swallowing"])
+def test_a_signal_that_other_code_catches_ends_the_run_all_the_same(
+    stage, outcomes, tmp_path, name
+):
+    with pytest.raises(EndedError, match="ended by SIGTERM"):
+        outcomes(stage(name, "participant"))
+    assert not list(tmp_path.rglob("*_refusal-*"))
 
 
 def test_exit_code_and_words_of_a_session(stage, empty_study, tmp_path, monkeypatch, capsys):

@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,10 +38,15 @@ def make_study(folder: Path, participants: int) -> Path:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run ended, and its words."""
+    """How a run ended, its words, and the processes that it left."""
 
     code: int
     said: str
+    left: tuple[str, ...] = ()
+
+
+Run = Callable[[Path, Path, Sequence[str], Mapping[str, str]], Ended]
+"""A command on a study, with results in a folder, under variables of the environment."""
 
 
 @dataclass(frozen=True)
@@ -52,24 +57,28 @@ class Bench:
     command: tuple[str, ...]
     before: Path
     whole: Mapping[str, bytes]
+    run_command: Run
 
     @classmethod
-    def of(cls, study: Path, before: Path, *command: str) -> Bench:
+    def of(cls, run: Run, study: Path, before: Path, *command: str) -> Bench:
         """Where ``before`` is not there, the command begins without any results."""
         before.mkdir(exist_ok=True)
         out = before.with_name(f"{before.name}_whole_{'_'.join(command)}")
         shutil.copytree(before, out)
-        done = ended(start(study, out, command))
+        done = run(study, out, command, {})
         if done.code:
             raise RuntimeError(f"the undisturbed run ended with {done.code}: {done.said}")
-        return cls(study, command, before, files_of(out))
+        return cls(study, command, before, files_of(out), run)
 
     def fresh_out(self, out: Path) -> Path:
         shutil.rmtree(out, ignore_errors=True)
         return shutil.copytree(self.before, out)
 
-    def start(self, out: Path, **environment: str) -> subprocess.Popen:
-        return start(self.study, out, self.command, environment)
+    def run(self, out: Path, environment: Mapping[str, str]) -> Ended:
+        return self.run_command(self.study, out, self.command, environment)
+
+    def start(self, out: Path) -> subprocess.Popen:
+        return start(self.study, out, self.command, {})
 
     # --- what must hold, as a list of what does not -------------------------------------------
 
@@ -88,7 +97,8 @@ class Bench:
 
     def wrong_next(self, out: Path) -> list[str]:
         """The next run ends well, with the undisturbed bytes and nothing half written."""
-        done = ended(start(self.study, out, [word for word in self.command if word != "--force"]))
+        command = [word for word in self.command if word != "--force"]
+        done = self.run_command(self.study, out, command, {})
         left = [str(path) for path in out.rglob(_UNFINISHED)]
         return [
             *([f"the next run ended with {done.code}: {done.said}"] if done.code else []),
@@ -103,12 +113,23 @@ class Bench:
         return [name for name in names if found.get(name) != self.whole.get(name)]
 
 
-def start(study: Path, out: Path, command, environment=None) -> subprocess.Popen:
+def by_processes(
+    study: Path, out: Path, command: Sequence[str], environment: Mapping[str, str]
+) -> Ended:
+    """As users run it."""
+    process = start(study, out, command, environment)
+    done = ended(process)
+    return Ended(done.code, done.said, tuple(left_after(process.pid)))
+
+
+def start(
+    study: Path, out: Path, command: Sequence[str], environment: Mapping[str, str]
+) -> subprocess.Popen:
     """In a session of its own, by which its processes are known."""
     name, *options = command
     return subprocess.Popen(
         [sys.executable, "-m", "bsip_cli", name, str(study), "--out", str(out), *options],
-        env={**os.environ, **(environment or {})},
+        env={**os.environ, **environment},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

@@ -1,14 +1,15 @@
 """Disturb bsip again and again: nothing is lost, nothing is left.
 
-    python -m tests.crash.disturbances [--rounds 330] [--seed 1] [--jobs 1]
+    python -m tests.crash.disturbances [--rounds 120] [--seed 1] [--jobs 1]
 
-Two thirds of the rounds let one call of the system fail: every open, read, write, fsync, rename and
-unlink on the study or the results in turn (EIO, EMFILE; a disk that is full or read-only from there
-on). One third sends TERM, INT, HUP or KILL at a random moment to bsip, to all its processes or to a
-worker. Afterwards what has a final name must be whole, no process and no lock may be left, bsip has
-ended with a documented exit code and a sentence; and the next run must end with the bytes of a run
-that nothing disturbed. Signals before bsip's own first line, while Python starts, are left out:
-nothing can answer them.
+Every open, read, write, fsync, rename and unlink on the study and the results fails in turn (EIO,
+EMFILE; a disk that is full or read-only from there on) while an artifact is written or read and
+while a stage is run in one process. Then come rounds with all of bsip's processes: in a third of
+them a call fails, in the others TERM, INT, HUP or KILL comes at a random moment to bsip, to all its
+processes or to a worker. Afterwards what has a final name must be whole, no process and no lock may
+be left, bsip has ended with a documented exit code and a sentence; and the next run must end with
+the bytes of a run that nothing disturbed. Signals before bsip's own first line, while Python
+starts, are left out: nothing can answer them.
 """
 
 from __future__ import annotations
@@ -24,9 +25,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.crash import faults, signals
-from tests.crash.bench import Bench, ended, make_study, start
+from tests.crash.bench import Bench, by_processes, make_study
+from tests.crash.benches import UPSTREAM, benches
+from tests.crash.every_call import every_call
 
-UPSTREAM = {"ingest": (), "regress": ("ingest", "scale")}
 SIGNALLED = ("ingest", "--jobs", "2")
 
 
@@ -39,21 +41,10 @@ class Round:
     disturb: Callable[[Path], tuple[list[str], bool]]
 
 
-def benches(folder: Path, names: Sequence[str]) -> Iterator[Bench]:
-    """Each stage where its results are not there yet, and where they are and are made again."""
-    study = make_study(folder / "study", participants=1)
-    for name in names:
-        before = folder / f"before_{name}"
-        for stage in UPSTREAM[name]:
-            ended(start(study, before, (stage,)))
-        yield Bench.of(study, before, name)
-        yield Bench.of(study, before.with_name(f"{before.name}_whole_{name}"), name, "--force")
-
-
 def fault_rounds(folder: Path, chance: random.Random, names: Sequence[str]) -> list[Round]:
     """A round for every call."""
     library, rounds = faults.compiled(folder), []
-    for bench in benches(folder, names):
+    for bench in benches(by_processes, folder, names):
         for call in faults.calls_of(bench, library, folder / "out", chance):
 
             def disturb(out: Path, bench: Bench = bench, call: faults.Call = call):
@@ -67,7 +58,7 @@ def fault_rounds(folder: Path, chance: random.Random, names: Sequence[str]) -> l
 def signal_rounds(folder: Path, chance: random.Random, count: int) -> list[Round]:
     signals.answer_all()
     study = make_study(folder / "study_of_three", participants=3)
-    bench = Bench.of(study, folder / "before_signals", *SIGNALLED)
+    bench = Bench.of(by_processes, study, folder / "before_signals", *SIGNALLED)
     takes_s = signals.seconds_of(bench, folder / "out")
     rounds = []
     for sent in (signals.drawn(chance, takes_s) for _ in range(count)):
@@ -96,25 +87,34 @@ def disturbed(rounds: Sequence[Round], folder: Path, jobs: int) -> tuple[Counter
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rounds", type=int, default=330)
+    parser.add_argument("--rounds", type=int, default=120, help="that start bsip's processes")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1, help="rounds at once")
     given = parser.parse_args()
-    chance = random.Random(given.seed)
+    hits: Counter[str] = Counter()
+    wrong: list[str] = []
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        calls = fault_rounds(folder, chance, tuple(UPSTREAM))
-        wanted = min(len(calls), given.rounds * 2 // 3)
-        chosen = [calls[k * len(calls) // wanted] for k in range(wanted)]
-        sent = signal_rounds(folder, chance, given.rounds - wanted)
-        print(f"{wanted} of {len(calls)} calls fail, {len(sent)} signals", flush=True)
-        rounds = [*chosen, *sent]
-        chance.shuffle(rounds)  # a run that is ended early has met all kinds
-        hits, wrong = disturbed(rounds, folder, given.jobs)
+        for counts, found in _all(Path(name), given):
+            hits += counts
+            wrong += found
     for kind, count in sorted(hits.items()):
         print(f"{count:4d}  {kind}")
     print(f"{hits.total()} disturbances hit a run at work, {len(wrong)} faults")
     return 1 if wrong else 0
+
+
+def _all(folder: Path, given: argparse.Namespace) -> Iterator[tuple[Counter[str], list[str]]]:
+    for what in ("write", "read", *UPSTREAM):
+        counts, wrong = every_call(what, folder / what, given.seed)
+        print("".join(f"FAULT: {fault}\n" for fault in wrong), end="", flush=True)
+        yield Counter({f"{call} fails ({what})": n for call, n in counts.items()}), wrong
+    chance = random.Random(given.seed)
+    calls = fault_rounds(folder, chance, tuple(UPSTREAM))
+    wanted = min(len(calls), given.rounds // 3)
+    chosen = [calls[k * len(calls) // wanted] for k in range(wanted)]
+    rounds = [*chosen, *signal_rounds(folder, chance, given.rounds - wanted)]
+    chance.shuffle(rounds)  # a run that is ended early has met all kinds
+    yield disturbed(rounds, folder, given.jobs)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ static int fate(const char *call, const char *path, int writes) {
     const char *below = getenv("FAULT_BELOW"), *trace = getenv("FAULT_TRACE");
     char record[257];
     int was = errno, stays = getenv("FAULT_STAYS") != NULL;
-    if (!below || !trace || strncmp(path, below, strlen(below))) return GOES_ON;
+    if (!below || !trace || strncmp(path, below, strlen(below)) || !strcmp(path, trace)) return GOES_ON;
     snprintf(record, sizeof record, "%-9s %-245.245s\n", call, path + strlen(below));
     int file = REAL(open)(trace, O_WRONLY | O_APPEND | O_CLOEXEC);
     if (file < 0 || REAL(write)(file, record, 256) != 256) abort();

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
-from tests.crash.bench import Bench, Ended, ended, left_after
+from tests.crash.bench import Bench, Ended
 
 _SOURCE = Path(__file__).with_name("failing_calls.c")
+LIBRARY = "failing_calls.so"
 _RECORD = 256  # bytes, as there
 _READING = ("read", "pread", "pread64", "opendir", "unlink")
 CODES = (0, 2, 3)  # it did without, cannot write, cannot read
@@ -24,7 +25,7 @@ def compiler() -> str | None:
 
 def compiled(folder: Path) -> Path:
     """The library that lets calls fail."""
-    library = folder / "failing_calls.so"
+    library = folder / LIBRARY
     command = [str(compiler()), "-shared", "-fPIC", "-o", str(library), str(_SOURCE), "-ldl"]
     subprocess.run(command, check=True)
     return library
@@ -63,22 +64,18 @@ def environment(library: Path, below: Path, trace: Path, call: Call) -> dict[str
     }
 
 
-def run_with(
-    bench: Bench, library: Path, out: Path, call: Call
-) -> tuple[Ended, list[str], list[str]]:
-    """One run, the processes that it left, and the calls that it made."""
+def run_with(bench: Bench, library: Path, out: Path, call: Call) -> tuple[Ended, list[str]]:
+    """One run, and the calls that it made."""
     trace = out.with_name(f"{out.name}.trace")
     trace.write_bytes(b"")
-    process = bench.start(out, **environment(library, out.parent, trace, call))
-    done = ended(process)
-    orphans = left_after(process.pid)
-    return done, orphans, trace.read_bytes().decode().splitlines()
+    done = bench.run(out, environment(library, out.parent, trace, call))
+    return done, trace.read_bytes().decode().splitlines()
 
 
 def calls_of(bench: Bench, library: Path, out: Path, chance: random.Random) -> list[Call]:
     """The calls of an undisturbed run in their order, each with a failure that it may meet; of
     several that follow each other on one file the first and the last."""
-    done, _, lines = run_with(bench, library, bench.fresh_out(out), NONE)
+    done, lines = run_with(bench, library, bench.fresh_out(out), NONE)
     assert done.code == 0 and all(len(line) == _RECORD - 1 for line in lines), done.said
     calls = [Call(n, *line.split(maxsplit=1)) for n, line in enumerate(lines, 1)]
     streaks = [list(same) for _, same in groupby(calls, lambda call: (call.name, call.file))]
@@ -97,7 +94,7 @@ def _failing(call: Call, chance: random.Random) -> Call:
 
 def what_fails(bench: Bench, library: Path, out: Path, call: Call) -> list[str]:
     """What did not hold when this call failed."""
-    done, orphans, lines = run_with(bench, library, bench.fresh_out(out), call)
+    done, lines = run_with(bench, library, bench.fresh_out(out), call)
     if len(lines) < call.number:
         return [f"only {len(lines)} calls were made"]
     is_named = any(word in done.said for word in (str(out), str(bench.study), "sub-01"))
@@ -106,7 +103,7 @@ def what_fails(bench: Bench, library: Path, out: Path, call: Call) -> list[str]:
         *([f"a trace: {done.said}"] if "Traceback" in done.said else []),
         *([f"no file is named: {done.said}"] if done.code and not is_named else []),
         *(f"exit code 0 with another {name}" for name in bench.others(out) if not done.code),
-        *(f"an orphan: {line}" for line in orphans),
+        *(f"an orphan: {line}" for line in done.left),
         *bench.broken_left(out),
         *bench.wrong_next(out),
     ]

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import random
-import subprocess
 import sys
 
 import pytest
 
 from tests.crash import faults
-from tests.crash.bench import Bench
+from tests.crash.bench import Bench, by_processes
 from tests.crash.disturbances import disturbed, fault_rounds, signal_rounds
+from tests.crash.every_call import every_call
 
 needs_shim = pytest.mark.skipif(
     sys.platform != "linux" or faults.compiler() is None,
@@ -29,30 +28,26 @@ def chance():
 @pytest.mark.parametrize("what", ["write", "read"])
 def test_every_call_of_an_artifact_fails_in_turn(tmp_path, what):
     """What is under the final name is the old or the new artifact, and nothing lies beside it."""
-    (tmp_path / "artifacts").mkdir()
-    (tmp_path / "trace").touch()
-    environment = faults.environment(
-        faults.compiled(tmp_path), tmp_path / "artifacts", tmp_path / "trace", faults.NONE
-    )
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.crash.every_call", what, str(tmp_path / "artifacts")],
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    assert int(done.stdout) > 4 * 5  # open, read and their like, in each of four ways
+    counts, wrong = every_call(what, tmp_path / what, seed=7)
+    assert wrong == []
+    assert counts.total() > 4 * 5  # open, read and their like, in each of four ways
 
 
 @needs_shim
 @pytest.mark.long
 def test_calls_that_fail_lose_nothing(tmp_path, chance):
     rounds = fault_rounds(tmp_path, chance, ("ingest",))
-    reading = [one for one in rounds if ".c3d" in one.name and one.kind == "read fails"]
-    chosen = [*rounds[:: len(rounds) // 8], *reading[-1:]]
-    hits, wrong = disturbed(chosen, tmp_path, jobs=1)
+    hits, wrong = disturbed(rounds[:: len(rounds) // 5], tmp_path, jobs=1)
     assert wrong == []
-    assert hits.total() == len(chosen)
+    assert hits.total() >= 5
+
+
+@needs_shim
+@pytest.mark.long
+def test_every_call_of_a_stage_fails_in_turn(tmp_path):
+    counts, wrong = every_call("regress", tmp_path / "regress", seed=7)
+    assert wrong == []
+    assert {"open", "read", "pread", "write", "fsync", "rename"} <= counts.keys()
 
 
 @needs_proc
@@ -68,7 +63,8 @@ def test_what_is_not_whole_is_noticed(tmp_path):
     (out / "sub-01").mkdir(parents=True)
     (out / "sub-01" / "sub-01_person.parquet").write_bytes(b"PAR1, and cut")
     (out / "sub-01" / "report.html").write_bytes(b"<html>")
-    bench = Bench(tmp_path, ("ingest",), tmp_path, {"sub-01/report.html": b"<html></html>"})
+    whole = {"sub-01/report.html": b"<html></html>"}
+    bench = Bench(tmp_path, ("ingest",), tmp_path, whole, by_processes)
     broken = "\n".join(bench.broken_left(out))
     assert "sub-01_person.parquet is there, which no run makes" in broken
     assert "sub-01_person.parquet: is not an artifact" in broken

@@ -35,8 +35,8 @@ ALLOWED = {
     "lock": "artifacts errors",
     "dataset": "__init__ artifacts errors files folders participants",
     "info": "__init__ artifacts errors files provenance schemas",
-    "runner": "__init__ artifacts code_hash config endings errors fingerprints freshness lock pipeline "
-    "provenance study trials unit workers",
+    "runner": "__init__ artifacts code_hash config endings errors fingerprints freshness lock "
+    "pipeline provenance study trials unit workers",
     "check_study": "body config errors study",
     "session": "body check_study config dataset errors pipeline runner study trials",
     "__main__": "cli",

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bsip_cli.freshness import why_stale
 from bsip_cli.report.blocks import Bullets, Document, Grid, Paragraph, Picture
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import ParticipantRecord, Refusal
@@ -180,8 +181,8 @@ def test_a_report_comes_without_a_diagnosis_and_anew_with_one(reports, tmp_path)
     own = replace(reports, out=tmp_path)
     own.run("report", person)
     assert "bsip diagnose" in own.html("sub-01")
-    assert own.unit("report", person).is_fresh()
+    assert not why_stale(own.unit("report", person))
     later.rename(diagnosis)
-    assert not own.unit("report", person).is_fresh()
+    assert why_stale(own.unit("report", person))
     own.run("report", person)
     assert "Plate 1 is turned" in own.html("sub-01")

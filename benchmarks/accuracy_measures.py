@@ -15,10 +15,10 @@ import pandas as pd
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.config import load_config
 from bsip_cli.pipeline import STAGES
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages import reconstruct
-from bsip_cli.study import load_study
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import load_study
 
 TRUTH = "true parameters"
 _QUANTILE = 1.96

@@ -27,13 +27,13 @@ from bsip_cli.config import Config, Load, load_config
 from bsip_cli.identification.difference import Difference, change_of_segment, difference
 from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.pipeline import STAGES
+from bsip_cli.running.unit import Unit
 from bsip_cli.simulate import people, recording, study, trial
 from bsip_cli.simulate.inertia import Inertia, combined
 from bsip_cli.simulate.options import StudyOptions
 from bsip_cli.stages import identification_problem
 from bsip_cli.stages.frames import person_from
-from bsip_cli.study import load_study
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import load_study
 
 ESTIMATORS = ("consistent", "hansen2017")
 NOTHING = "nothing"

@@ -19,11 +19,11 @@ from pathlib import Path
 
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.pipeline import STAGES
-from bsip_cli.session import open_study
+from bsip_cli.running.session import open_study
+from bsip_cli.running.unit import Unit
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
-from bsip_cli.study import Participant, Study
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import Participant, Study
 
 OPTIONS = StudyOptions(
     participants=1,

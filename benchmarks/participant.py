@@ -58,10 +58,11 @@ def import_cpu_s(name: str) -> float:
     levels = {stage.level == "cohort" for stage in STAGES if stage.name == name}
     alone = len(levels) == 1  # else its modules are imported in two processes
     groups = [modules] if alone else [[module] for module in modules]
-    base = run_child([sys.executable, "-c", "import bsip_cli.runner"], folder=ROOT).cpu_s
+    base = run_child([sys.executable, "-c", "import bsip_cli.running.runner"], folder=ROOT).cpu_s
     return sum(
         run_child(
-            [sys.executable, "-c", f"import bsip_cli.runner, {', '.join(group)}"], folder=ROOT
+            [sys.executable, "-c", f"import bsip_cli.running.runner, {', '.join(group)}"],
+            folder=ROOT,
         ).cpu_s
         - base
         for group in groups

@@ -22,10 +22,10 @@ from benchmarks.measure import ROOT, machine, markdown
 from benchmarks.participant import run_stage, study_options
 from benchmarks.sections import replace_section
 from bsip_cli.pipeline import STAGES, Stage
-from bsip_cli.runner import perform
-from bsip_cli.session import OpenedStudy, open_study
+from bsip_cli.running.runner import perform
+from bsip_cli.running.session import OpenedStudy, open_study
+from bsip_cli.running.unit import Unit
 from bsip_cli.simulate.study import simulate_study
-from bsip_cli.unit import Unit
 
 PAGE, SECTION = ROOT / "docs" / "benchmarks.md", "profiles"
 PACKAGE = Path(bsip_cli.__file__).parent

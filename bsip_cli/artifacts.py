@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from bsip_cli.errors import BadDataError, ChangedError, not_writable
-from bsip_cli.fingerprints import BLANK, SEAL, file_hash, fingerprint, forget, seal
+from bsip_cli.files.fingerprints import BLANK, SEAL, file_hash, fingerprint, forget, seal
 from bsip_cli.schemas import SCHEMAS, Schema
 
 _TYPES = {"float": pa.float64(), "int": pa.int64(), "bool": pa.bool_(), "text": pa.string()}

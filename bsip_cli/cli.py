@@ -12,9 +12,9 @@ from typing import Any
 import click
 
 from bsip_cli import __version__
-from bsip_cli.endings import EndedError, endings_kept, ignore_endings, raise_when_ended
 from bsip_cli.errors import BsipError, not_readable
 from bsip_cli.pipeline import STAGES
+from bsip_cli.running.endings import EndedError, endings_kept, ignore_endings, raise_when_ended
 
 # One thread per process: results do not depend on the number of cores, and --jobs decides the load.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -66,7 +66,7 @@ def _stage_command(name: str, summary: str) -> click.Command:
         help="Hash every file again, also those whose size and times have not changed.",
     )
     def command(study, out, chosen, config_file, **options):
-        from bsip_cli.session import run_session
+        from bsip_cli.running.session import run_session
 
         return run_session(name, study, out, chosen, config_file, **options)
 
@@ -98,7 +98,7 @@ def people(study):
 
     Exit code 3 with nothing printed: participants.tsv cannot be read.
     """
-    from bsip_cli.participants import named_in
+    from bsip_cli.study.participants import named_in
 
     for name in named_in(study / "participants.tsv"):
         click.echo(name)
@@ -250,7 +250,7 @@ def inject(source, out, participants, seed, **effects):
 def export(study, out, chosen, method, formats, model_file, model_bodies, repair, config_file):
     """Write identified people as models for Pinocchio, MuJoCo, OpenSim, biorbd and Visual3D:
     OUT/sub-XX/export/sub-XX_METHOD with .urdf, .xml (MuJoCo), .osim, .bioMod and .csv."""
-    from bsip_cli.export import Request, export_session
+    from bsip_cli.commands.export import Request, export_session
 
     request = Request(method, formats, model_file, model_bodies, repair)
     return export_session(study, out, chosen, config_file, request)
@@ -286,7 +286,7 @@ def markers(file, marker_set, prefix, write):
     written is there; 3 the recording cannot be read, no set fits, or markers are missing that a
     skeleton cannot do without.
     """
-    from bsip_cli.markers import Request, markers_command
+    from bsip_cli.commands.markers import Request, markers_command
 
     return markers_command(Request(file, marker_set, prefix, write))
 
@@ -296,7 +296,7 @@ def markers(file, marker_set, prefix, write):
 def show(out):
     """Print the tables of a finished run, what is wrong in its recordings, and where its reports
     lie."""
-    from bsip_cli.show import shown
+    from bsip_cli.commands.show import shown
 
     for part in shown(out):
         click.echo(part)
@@ -312,7 +312,7 @@ def published(what, paper):
     the printed means and standard deviations, and lists what cannot be true, with the likely
     reading. PAPER is hansen2014, hansen2017 or robert2017; without it, all.
     """
-    from bsip_cli.published import shown
+    from bsip_cli.commands.published import shown
 
     for part in shown(what, paper):
         click.echo(part)
@@ -323,7 +323,7 @@ def published(what, paper):
 def info(artifact) -> None:
     """What an artifact holds and what made it; without one, the versions of bsip and of the
     libraries its numbers depend on (for bug reports)."""
-    from bsip_cli.info import artifact_info, versions
+    from bsip_cli.commands.info import artifact_info, versions
 
     for line in versions() if artifact is None else artifact_info(artifact):
         click.echo(line)

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bsip_cli.errors import UsageError
-from bsip_cli.files import read_toml
+from bsip_cli.files.regular import read_toml
 
 _MOST_FAULTS, _LONGEST_VALUE = 20, 80  # faults and characters that are told
 

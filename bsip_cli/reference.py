@@ -17,9 +17,9 @@ from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
 
 from bsip_cli.cli import cli
+from bsip_cli.commands.published import shown
 from bsip_cli.config import Config, Section, shipped
 from bsip_cli.pipeline import STAGES, Stage, producer
-from bsip_cli.published import shown
 from bsip_cli.schemas import SCHEMAS, Level, Schema
 
 REGENERATE = "python -m bsip_cli.reference docs"

@@ -11,7 +11,7 @@ from typing import Literal
 
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
-from bsip_cli.files import read_toml
+from bsip_cli.files.regular import read_toml
 
 JointType = Literal["free", "spherical", "revolute"]
 

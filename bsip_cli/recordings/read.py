@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.files import check_regular
+from bsip_cli.files.regular import check_regular
 from bsip_cli.recordings.cop_near_feet import cop_findings
 from bsip_cli.recordings.model import Recording
 

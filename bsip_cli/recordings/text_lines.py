@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.files import check_regular
+from bsip_cli.files.regular import check_regular
 from bsip_cli.recordings.model import Finding
 
 # A C3D file counts its points in 16 bits and names them with at most 255 letters.

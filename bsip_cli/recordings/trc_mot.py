@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.force_files import forces_beside
+from bsip_cli.files.force_files import forces_beside
 from bsip_cli.recordings import world
 from bsip_cli.recordings.analog import spike_samples
 from bsip_cli.recordings.assemble import why_no_forces

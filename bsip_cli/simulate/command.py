@@ -11,8 +11,8 @@ from pathlib import Path
 import click
 
 from bsip_cli.errors import BadDataError, UsageError, printable
-from bsip_cli.files import check_regular, fault_of
-from bsip_cli.folders import is_folder, lies_in
+from bsip_cli.files.folders import is_folder, lies_in
+from bsip_cli.files.regular import check_regular, fault_of
 from bsip_cli.simulate.asked import effects_of, pair_up
 from bsip_cli.simulate.injection.folder import (
     inject_recording,

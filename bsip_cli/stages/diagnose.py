@@ -30,6 +30,7 @@ from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.prior import Prior
 from bsip_cli.report.verdict import verdict_of
+from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnosis_facts import detection_rows, facts_of
 from bsip_cli.stages.diagnosis_rows import rows_of
 from bsip_cli.stages.frames import person_from
@@ -42,7 +43,6 @@ from bsip_cli.stages.moving_trials import (
     stated_sd,
 )
 from bsip_cli.stages.trial_scene import scene_of
-from bsip_cli.unit import Unit
 
 _ALIKE = 0.5  # part of the difference to the stated mass
 _ATTRIBUTED = "segment_inertia"  # not a cause beside the parameters: they are projected out

@@ -20,11 +20,11 @@ from bsip_cli.diagnosis.attribution_words import Bodies, difference, sentence, w
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.report.words import component_label
+from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnosis_rows import nothing
 from bsip_cli.stages.frames import WRENCH, coordinates_from, person_from
 from bsip_cli.stages.known_loads import load_phi
 from bsip_cli.stages.reconstructed import Judgement, judgement_of, parameters_of, scale_of
-from bsip_cli.unit import Unit
 
 _NEEDED = (
     "bsip",

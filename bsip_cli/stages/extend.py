@@ -14,6 +14,7 @@ from bsip_cli.identification.uncertainty import readable
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.verdict import change_sentence
 from bsip_cli.report.words import segment_label
+from bsip_cli.running.unit import Unit
 from bsip_cli.stages.found_causes import body_beside, causes_of
 from bsip_cli.stages.frames import bsip_table, person_from
 from bsip_cli.stages.identification_problem import (
@@ -24,8 +25,7 @@ from bsip_cli.stages.identification_problem import (
 )
 from bsip_cli.stages.reconstructed import parameters_of
 from bsip_cli.stages.trial_scene import scene_of
-from bsip_cli.study import Trial
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import Trial
 
 _COM = ["com_x_m", "com_y_m", "com_z_m"]
 _COM_CHANGE = ["com_x_change_m", "com_y_change_m", "com_z_change_m"]

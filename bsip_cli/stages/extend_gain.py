@@ -9,8 +9,8 @@ import numpy as np
 from bsip_cli.artifacts import empty_table
 from bsip_cli.diagnosis.error_gain import BlockErrors, pooled
 from bsip_cli.report.verdict import gain_sentence
+from bsip_cli.running.unit import Unit
 from bsip_cli.stages.gain_rows import gain_rows
-from bsip_cli.unit import Unit
 
 
 def run(unit: Unit) -> None:

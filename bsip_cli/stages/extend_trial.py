@@ -15,6 +15,7 @@ from bsip_cli.diagnosis.cause import Blocks, Cause, method_of, unseen_change_by
 from bsip_cli.diagnosis.corrected_wrench import corrected_wrench, is_of_the_forces
 from bsip_cli.diagnosis.error_gain import BlockErrors, block_errors
 from bsip_cli.effects.scene import Scene
+from bsip_cli.running.unit import Unit
 from bsip_cli.stages.found_causes import blocks_of, body_beside, causes_of
 from bsip_cli.stages.frames import WRENCH, person_from
 from bsip_cli.stages.gain_rows import gain_rows
@@ -31,7 +32,6 @@ from bsip_cli.stages.reconstructed import (
     scale_of,
 )
 from bsip_cli.stages.trial_scene import scene_of
-from bsip_cli.unit import Unit
 
 
 def run(unit: Unit) -> None:

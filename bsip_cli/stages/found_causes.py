@@ -6,7 +6,7 @@ import numpy as np
 
 from bsip_cli.diagnosis.cause import Blocks, Cause
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.unit import Unit
+from bsip_cli.running.unit import Unit
 
 _NAMED = ("named", "ambiguous")
 

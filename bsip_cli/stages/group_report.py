@@ -25,11 +25,11 @@ from bsip_cli.report.records import Origin
 from bsip_cli.report.shared import Searched, searched
 from bsip_cli.report.tables.build import build_tables
 from bsip_cli.report.words import listing
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.report import files_frame, origin_of, refusals_of, write_figures, write_text
 from bsip_cli.statistics.cohort import Criteria
-from bsip_cli.study import Participant
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import Participant
 
 
 def run(unit: Unit) -> None:

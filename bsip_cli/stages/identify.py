@@ -18,6 +18,7 @@ from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.identification.excitation import Excitation, excitation
 from bsip_cli.identification.movement_gain import advice
 from bsip_cli.identification.uncertainty import readable
+from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH, bsip_table, person_from
 from bsip_cli.stages.identification_problem import (
     duration_s,
@@ -28,8 +29,7 @@ from bsip_cli.stages.identification_problem import (
     usable_frames,
 )
 from bsip_cli.stages.known_loads import load_words, loads_record
-from bsip_cli.study import Trial
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import Trial
 
 _SHORTEST_S = 0.5
 

@@ -16,8 +16,8 @@ from bsip_cli.motion.marker_events import MarkerEvent, summaries
 from bsip_cli.motion.marker_evidence import Evidence, marker_evidence
 from bsip_cli.motion.marker_fit import MarkerFit, marker_fit
 from bsip_cli.motion.smoothing import Motion, smooth_motion
+from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import markers_from, ordered_markers, person_from
-from bsip_cli.unit import Unit
 
 _MOST_SAID = 5  # of a trial's sentences about single markers
 

@@ -22,8 +22,8 @@ from bsip_cli.recordings.repeated_frames import without_repeats
 from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
 from bsip_cli.recordings.standing_mass import about_mass, plate_mass
 from bsip_cli.recordings.zero import plate_zero, subtract_zero
+from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH
-from bsip_cli.unit import Unit
 
 
 def run(unit: Unit) -> None:

@@ -7,8 +7,8 @@ import numpy as np
 from bsip_cli.body.loads import PointMass, load_parameters
 from bsip_cli.body.person import Person
 from bsip_cli.report.words import listing, segment_label
-from bsip_cli.study import Trial
-from bsip_cli.unit import Unit
+from bsip_cli.running.unit import Unit
+from bsip_cli.study.study import Trial
 
 
 def load_phi(unit: Unit, person: Person, trial: Trial | None = None) -> np.ndarray:

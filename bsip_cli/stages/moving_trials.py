@@ -20,12 +20,12 @@ from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.marker_shift import BEFORE_S
 from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.prior import Prior
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import acceleration_noise
 from bsip_cli.stages.identification_problem import prior_from
 from bsip_cli.stages.trial_scene import scene_of
-from bsip_cli.study import Trial
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import Trial
 
 SHORTEST_S = 2.0
 # Of the spreads an offset is judged against: 17 mm for a marker that is trusted to 5.

@@ -12,7 +12,7 @@ import pandas as pd
 from bsip_cli.statistics.cohort import DATA_SHARE
 from bsip_cli.statistics.cohort_correlations import CorrelationRun
 from bsip_cli.statistics.cohort_values import DIFFERENCE, MEASURED, OM, RM, Value
-from bsip_cli.study import Participant, Trial
+from bsip_cli.study.study import Participant, Trial
 
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 MEASURES = ("rmse", "pearson_r", "schwer_m", "schwer_p", "schwer_c")

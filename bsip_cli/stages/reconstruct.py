@@ -12,6 +12,7 @@ from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.dynamics.lowpass import stretches
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
+from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH, coordinates_from, person_from
 from bsip_cli.stages.known_loads import load_phi, loads_record
 from bsip_cli.stages.reconstructed import (
@@ -26,7 +27,6 @@ from bsip_cli.statistics.correlation_tests import fisher_z_difference, williams_
 from bsip_cli.statistics.effective_samples import effective_samples_of_pair
 from bsip_cli.statistics.fit_measures import fit_measures
 from bsip_cli.statistics.posturography import posturography
-from bsip_cli.unit import Unit
 
 
 def run(unit: Unit) -> None:

@@ -13,10 +13,10 @@ from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.cop import anterior_and_right, centre_of_pressure
 from bsip_cli.dynamics.lowpass import lowpass_operator, stretches
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH
 from bsip_cli.statistics.fit_measures import fit_measures
-from bsip_cli.unit import Unit
 
 MEASURED = "measured"
 _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")

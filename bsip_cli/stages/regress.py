@@ -7,8 +7,8 @@ import numpy as np
 from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.identification.prior import Spread, prior_of
+from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import bsip_table, person_from
-from bsip_cli.unit import Unit
 
 
 def run(unit: Unit) -> None:

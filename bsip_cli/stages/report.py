@@ -14,7 +14,7 @@ import pandas as pd
 
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header, write_atomically
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.fingerprints import file_hash
+from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.report.blocks import Document
 from bsip_cli.report.figures.canvas import to_png
 from bsip_cli.report.page import render
@@ -27,11 +27,11 @@ from bsip_cli.report.records import (
     with_all_causes,
 )
 from bsip_cli.report.words import ROLES, trial_label
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.frames import person_from
 from bsip_cli.stages.known_loads import load_words
-from bsip_cli.study import Participant, Trial
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import Participant, Trial
 
 _TABLES = {  # field of a trial's record: kind of artifact
     "quality": "quality",

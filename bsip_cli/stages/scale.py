@@ -17,10 +17,10 @@ from bsip_cli.motion.calibration import Calibration, calibrate
 from bsip_cli.motion.scaling import Refinement, ScalingOptions
 from bsip_cli.motion.scaling_trials import TrialMarkers, refine_over_trials
 from bsip_cli.recordings.standing_mass import PlateMass, plate_mass, rough_mass
+from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH, markers_from, ordered_markers
 from bsip_cli.stages.known_loads import load_words
-from bsip_cli.study import Trial
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import Trial
 
 _QUIET_S = 1.0
 _NEARLY_ALL = 0.95  # of the markers that the best second shows

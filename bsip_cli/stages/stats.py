@@ -13,14 +13,14 @@ import pandas as pd
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.pipeline import STAGES, producer
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.person_values import Recording, centres, correlations, masses, values_of
 from bsip_cli.statistics.cohort import Criteria, tests_of
 from bsip_cli.statistics.cohort_comparison import Comparison, with_holm
 from bsip_cli.statistics.cohort_correlations import PAIR, PersonTestCounts, person_tests
 from bsip_cli.statistics.cohort_values import OM, RM, Topic, Value, line_of
-from bsip_cli.study import Participant, Trial
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import Participant, Trial
 
 TRIAL_KINDS = ("fit", "posturography", "correlation-difference")
 ROWS_AT_ONCE = 50_000

@@ -12,8 +12,8 @@ import pandas as pd
 
 from bsip_cli.artifacts import write_atomically
 from bsip_cli.report.tables.build import RENDERERS, build_tables, folder
+from bsip_cli.running.unit import Unit
 from bsip_cli.statistics.cohort import Criteria
-from bsip_cli.unit import Unit
 
 
 def run(unit: Unit) -> None:

@@ -10,10 +10,10 @@ import pandas as pd
 from bsip_cli.body.person import Person
 from bsip_cli.effects.scene import Plate, Scene
 from bsip_cli.motion.jacobian import marker_residuals
+from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH, coordinates_from, markers_from, ordered_markers
 from bsip_cli.stages.known_loads import load_phi
-from bsip_cli.study import Trial
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import Trial
 
 _LOADED_N = 20.0
 _HALF_M = 0.3  # of a plate whose outline no file tells

@@ -15,52 +15,30 @@ ALLOWED = {
     "__init__": "",
     "errors": "",
     "files": "errors",
-    "folders": "errors",
-    "force_files": "errors folders",
     "config": "errors files",
-    "trials": "errors files folders force_files schemas",
-    "participants": "errors files trials",
-    "study": "errors files folders participants trials",
     "schemas": "",
-    "artifacts": "errors fingerprints schemas",
-    "fingerprints": "errors",
-    "code_hash": "config",
-    "endings": "",
-    "workers": "endings",
-    "provenance": "__init__ code_hash fingerprints pipeline",
+    "artifacts": "errors files schemas",
     "pipeline": "schemas",
-    "standing": "pipeline",
-    "unit": "artifacts config errors fingerprints pipeline provenance schemas standing study",
-    "freshness": "artifacts code_hash errors fingerprints pipeline schemas study unit",
-    "lock": "artifacts errors",
-    "dataset": "__init__ artifacts errors files folders participants",
-    "info": "__init__ artifacts errors files provenance schemas",
-    "runner": "__init__ artifacts code_hash config endings errors fingerprints freshness lock "
-    "pipeline provenance study trials unit workers",
-    "check_study": "body config errors study",
-    "session": "body check_study config dataset errors pipeline runner study trials",
+    "study": "__init__ artifacts body config errors files schemas",
+    "running": "__init__ artifacts body config errors files pipeline schemas study",
     "__main__": "cli",
-    "export": "__init__ artifacts body errors files fingerprints lock pipeline runner schemas "
-    "session stages unit",
-    "show": "artifacts errors freshness report schemas trials",
-    "published": "report statistics",
-    "markers": "body config errors recordings",
-    "cli": "__init__ endings errors export info markers participants pipeline published session "
-    "show simulate",
-    "reference": "cli config pipeline published schemas",
+    "commands": "__init__ artifacts body config errors files pipeline recordings report running "
+    "schemas stages statistics study",
+    "reference": "cli commands config pipeline schemas",
+    "cli": "__init__ commands errors pipeline running simulate study",
     "body": "config errors files",
     "dynamics": "body errors",
     "caches": "",
     "motion": "body caches dynamics errors",
-    "recordings": "body config errors files force_files",
+    "recordings": "body config errors files",
     "statistics": "errors",
     "identification": "body config dynamics errors statistics",
     "effects": "body dynamics errors motion",
     "diagnosis": "body dynamics effects errors identification motion statistics",
     "report": "body caches dynamics effects errors motion schemas statistics",
-    "simulate": "body config errors files folders force_files",
-    "stages": "artifacts body diagnosis dynamics effects errors fingerprints identification "
-    "motion pipeline recordings report schemas statistics study unit",
+    "simulate": "body config errors files",
+    "stages": "artifacts body diagnosis dynamics effects errors files identification motion "
+    "pipeline recordings report running schemas statistics study",
 }
 
 FOREIGN_TO_SCIENCE = {"pandas", "pyarrow", "click", "tqdm", "logging", "subprocess", "matplotlib"}
@@ -72,9 +50,10 @@ MAY_ALSO = {"recordings.c3d_guard": {"subprocess"}}
 ONLY = {
     "simulate": {"body": {"body.names", "body.markersets"}},
     "cli": {"simulate": {"simulate.command"}},
-    "export": {"stages": {"stages.frames"}},
-    "session": {"body": {"body.markersets", "body.skeleton"}},
-    "check_study": {"body": {"body.skeleton"}},
+    "commands": {"stages": {"stages.frames"}},
+    "running": {"body": {"body.markersets", "body.skeleton"}},
+    "stages": {"running": {"running.unit"}},
+    "study": {"body": {"body.skeleton"}},
 }
 
 
@@ -108,7 +87,7 @@ def test_parts_form_no_circle():
     """The rule itself has one direction."""
     order = list(TopologicalSorter({k: v.split() for k, v in ALLOWED.items()}).static_order())
     assert order.index("body") < order.index("dynamics") < order.index("stages")
-    assert order.index("unit") < order.index("runner") < order.index("session") < order.index("cli")
+    assert order.index("study") < order.index("running") < order.index("cli")
 
 
 def test_modules_form_no_circle():

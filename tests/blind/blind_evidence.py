@@ -13,10 +13,10 @@ from tqdm import tqdm
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.pipeline import stages_named
-from bsip_cli.session import open_study
+from bsip_cli.running.session import open_study
+from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import person_from
 from bsip_cli.stages.moving_trials import moving_trials, prior_of
-from bsip_cli.unit import Unit
 from tests.blind.blind_running import DOCUMENT, ROOT
 
 

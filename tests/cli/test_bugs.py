@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from bsip_cli import session
 from bsip_cli.artifacts import read_header
 from bsip_cli.config import load_config
-from bsip_cli.endings import EndedError
 from bsip_cli.pipeline import Stage
-from bsip_cli.runner import Manner, run_stages
-from bsip_cli.study import load_study
+from bsip_cli.running import session
+from bsip_cli.running.endings import EndedError
+from bsip_cli.running.runner import Manner, run_stages
+from bsip_cli.study.study import load_study
 
 STAGES = {
     "faulty": 'def run(unit):\n    if unit.name in ("sub-01", "group"):\n'

@@ -11,10 +11,10 @@ import pytest
 from bsip_cli.artifacts import empty_table, write_artifact_in_parts
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.pipeline import STAGES
+from bsip_cli.running.session import open_study
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.session import open_study
-from bsip_cli.study import Study, load_study
-from bsip_cli.trials import STEM_BYTES
+from bsip_cli.study.study import Study, load_study
+from bsip_cli.study.trials import STEM_BYTES
 
 ROLES = {"static": ("static",), "sequence": ("sequence",)}
 ANNEX = "../.git/annex/objects/Qk/1z/MD5E-s10--a.c3d/MD5E-s10--a.c3d"

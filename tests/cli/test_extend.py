@@ -12,19 +12,19 @@ import pytest
 
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.commands.show import shown
 from bsip_cli.config import load_config
 from bsip_cli.effects.added_mass import AddedMass
 from bsip_cli.pipeline import STAGES
-from bsip_cli.runner import Outcome, perform
+from bsip_cli.running.runner import Outcome, perform
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.show import shown
 from bsip_cli.simulate.options import Asked, Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages.frames import person_from
 from bsip_cli.stages.reconstructed import parameters_of
 from bsip_cli.stages.trial_scene import scene_of
-from bsip_cli.study import load_study
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import load_study
 
 pytestmark = pytest.mark.long
 

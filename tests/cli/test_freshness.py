@@ -18,9 +18,9 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from bsip_cli import fingerprints
-from bsip_cli.code_hash import imported_by
+from bsip_cli.files import fingerprints
 from bsip_cli.pipeline import STAGES
+from bsip_cli.running.code_hash import imported_by
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 
@@ -36,7 +36,7 @@ OPTIONS = StudyOptions(
 )
 HASHES = """
 import json
-from bsip_cli.code_hash import code_hash
+from bsip_cli.running.code_hash import code_hash
 from bsip_cli.pipeline import STAGES
 print(json.dumps({stage.label: code_hash(stage.module) for stage in STAGES}))
 """
@@ -128,10 +128,10 @@ def hashes(code: Path) -> dict[str, str]:
     ("file", "must", "must_not"),
     [
         ("bsip_cli/stages/regress.py", {"regress"}, {"ingest", "identify", "stats"}),
-        ("bsip_cli/unit.py", {stage.name for stage in STAGES}, set()),
+        ("bsip_cli/running/unit.py", {stage.name for stage in STAGES}, set()),
         ("bsip_cli/body/tables/dumas2007.csv", {"regress", "scale"}, {"stats", "tables"}),
         ("configs/markersets/plugin_gait.toml", {"ingest"}, {"stats", "regress"}),
-        ("bsip_cli/export.py", set(), {stage.name for stage in STAGES}),
+        ("bsip_cli/commands/export.py", set(), {stage.name for stage in STAGES}),
         ("configs/default.toml", set(), {stage.name for stage in STAGES}),
     ],
 )

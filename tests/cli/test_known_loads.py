@@ -12,15 +12,15 @@ import pytest
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.config import Config, Load, load_config
 from bsip_cli.pipeline import STAGES
-from bsip_cli.runner import Outcome, perform
+from bsip_cli.running.runner import Outcome, perform
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.simulate.inertia import Inertia, combined
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.recording import write_trial
 from bsip_cli.simulate.study import participant_person, simulate_study
 from bsip_cli.simulate.trial import simulate_trial
-from bsip_cli.study import load_study
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import load_study
 
 GOOD = '[[loads]]\nsegment = "shank_r"\nmass_kg = 1.0\nposition_m = [0.0, -0.15, 0.03]\n'
 

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from bsip_cli.body.markersets import load_marker_set
+from bsip_cli.commands.markers import Request, markers_command
 from bsip_cli.errors import BadDataError, UsageError
-from bsip_cli.markers import Request, markers_command
 
 HANSEN = [marker.label for marker in load_marker_set("hansen2017").markers]
 OWN = [

@@ -12,8 +12,8 @@ from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import load_config
 from bsip_cli.errors import BadDataError, UsageError
-from bsip_cli.participants import read_rows
 from bsip_cli.recordings.read import read_recording
+from bsip_cli.study.participants import read_rows
 
 READERS = {
     "options": lambda path: load_config([path]),

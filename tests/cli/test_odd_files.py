@@ -13,7 +13,7 @@ from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import load_config
 from bsip_cli.errors import BadDataError, UsageError
-from bsip_cli.files import check_regular, fault_of
+from bsip_cli.files.regular import check_regular, fault_of
 from bsip_cli.recordings.read import read_recording
 
 TOML_READERS = {

@@ -10,8 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from bsip_cli.artifacts import read_artifact, read_header
+from bsip_cli.commands.info import artifact_info
 from bsip_cli.errors import BadDataError
-from bsip_cli.info import artifact_info
 
 MADE_BY = {
     "stage": "scale",

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from bsip_cli.dataset import NAME, describe_dataset, make_out
 from bsip_cli.errors import UsageError
+from bsip_cli.study.dataset import NAME, describe_dataset, make_out
 
 OWN = {"Name": "old", "GeneratedBy": [{"Name": "bsip", "Version": "0.0.1"}]}
 

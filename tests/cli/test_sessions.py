@@ -11,12 +11,12 @@ from bsip_cli.artifacts import read_artifact
 from bsip_cli.config import load_config
 from bsip_cli.pipeline import STAGES
 from bsip_cli.report.words import labelled, task_of, trial_label
-from bsip_cli.runner import perform
+from bsip_cli.running.runner import perform
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
-from bsip_cli.study import Study, Trial, load_study
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import Study, Trial, load_study
 
 ROLES = {"static": ("static",), "sequence": ("sequence",)}
 

@@ -20,14 +20,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from bsip_cli import __version__, fingerprints
+from bsip_cli import __version__
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, load_config
-from bsip_cli.freshness import why_stale
-from bsip_cli.lock import held_alone
+from bsip_cli.files import fingerprints
 from bsip_cli.pipeline import STAGES, Stage, producer
-from bsip_cli.runner import Outcome, perform
+from bsip_cli.running.freshness import why_stale
+from bsip_cli.running.lock import held_alone
+from bsip_cli.running.runner import Outcome, perform
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS, bsip_names
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
@@ -35,8 +37,7 @@ from bsip_cli.stages import diagnose
 from bsip_cli.stages.frames import person_from
 from bsip_cli.stages.moving_trials import prior_of
 from bsip_cli.stages.trial_scene import scene_of
-from bsip_cli.study import load_study
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import load_study
 
 OPTIONS = StudyOptions(
     participants=2,

@@ -10,8 +10,8 @@ import pytest
 from bsip_cli.config import load_config
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.pipeline import STAGES
-from bsip_cli.study import load_study
-from bsip_cli.unit import Unit
+from bsip_cli.running.unit import Unit
+from bsip_cli.study.study import load_study
 
 ROLES = {"static": ("static",), "sequence": ("sequence", "dance")}
 HEADER = "participant_id\tsex\tmass_kg\theight_m\n"

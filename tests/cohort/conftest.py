@@ -10,11 +10,11 @@ from bsip_cli.artifacts import read_artifact, write_artifact
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.config import Config, load_config
 from bsip_cli.pipeline import STAGES
-from bsip_cli.runner import Outcome, perform
+from bsip_cli.running.runner import Outcome, perform
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names, share_name
 from bsip_cli.statistics.correlation_tests import fisher_z_difference, williams_t
-from bsip_cli.study import Study, Trial, load_study
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import Study, Trial, load_study
 
 NOTES = {"made_by": {}, "messages": [], "facts": {}}
 FILES = ("static", "sequence", "walking", "throwing_run-1", "throwing_run-2")

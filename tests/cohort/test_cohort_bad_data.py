@@ -6,7 +6,7 @@ import pytest
 
 from bsip_cli.artifacts import read_header, write_artifact
 from bsip_cli.report.tables.build import BESIDE, NAMES, RENDERERS, show
-from bsip_cli.runner import perform
+from bsip_cli.running.runner import perform
 from bsip_cli.stages import stats as stats_stage
 
 NOTES = {"made_by": {}, "messages": [], "facts": {}}

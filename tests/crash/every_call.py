@@ -23,10 +23,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from bsip_cli import cli, runner
+from bsip_cli import cli
 from bsip_cli.artifacts import read_artifact, write_artifact
 from bsip_cli.errors import BadDataError, NotWritableError
-from bsip_cli.fingerprints import forget_all
+from bsip_cli.files.fingerprints import forget_all
+from bsip_cli.running import runner
 from tests.crash import faults
 from tests.crash.bench import Ended
 from tests.crash.benches import benches

@@ -14,9 +14,9 @@ from bsip_cli.errors import BsipError
 from bsip_cli.pipeline import stages_named
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.recordings.resample import wrench_at_marker_rate
-from bsip_cli.runner import perform
-from bsip_cli.session import open_study
-from bsip_cli.unit import Unit
+from bsip_cli.running.runner import perform
+from bsip_cli.running.session import open_study
+from bsip_cli.running.unit import Unit
 from tests.fuzz.damage import BINARY, TEXT, Damage
 
 SAMPLE = Path(__file__).parents[2] / "sample_data" / "sub-01"

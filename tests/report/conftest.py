@@ -6,9 +6,9 @@ import pytest
 
 from bsip_cli.config import Config, load_config
 from bsip_cli.pipeline import STAGES
-from bsip_cli.runner import Outcome, perform
-from bsip_cli.study import Participant, Study
-from bsip_cli.unit import Unit
+from bsip_cli.running.runner import Outcome, perform
+from bsip_cli.running.unit import Unit
+from bsip_cli.study.study import Participant, Study
 from tests.report.fake_study import Artifacts, study
 
 

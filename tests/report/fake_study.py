@@ -12,7 +12,7 @@ import pandas as pd
 from bsip_cli.artifacts import write_artifact
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.schemas import SCHEMAS, bsip_names, share_name
-from bsip_cli.study import Participant, Study, Trial
+from bsip_cli.study.study import Participant, Study, Trial
 
 MASS_KG, GRAVITY = 62.8, 9.80665
 EVIL = "<script>alert('$x_1$')</script>"

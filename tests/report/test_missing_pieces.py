@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.freshness import why_stale
 from bsip_cli.report.blocks import Bullets, Document, Grid, Paragraph, Picture
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import ParticipantRecord, Refusal
+from bsip_cli.running.freshness import why_stale
 from bsip_cli.stages.report import record_of
 from tests.report.fake_study import EVIL, Artifacts, empty, gains
 

@@ -2,8 +2,8 @@
 
 import pandas as pd
 
+from bsip_cli.commands.show import verdict_text
 from bsip_cli.report.verdict import put_right_sentence, verdict_of
-from bsip_cli.show import verdict_text
 from tests.report.fake_study import detection, diagnosis, marker_events
 
 TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]

@@ -10,7 +10,7 @@ from pathlib import Path
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
-from bsip_cli.files import read_toml
+from bsip_cli.files.regular import read_toml
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError, UsageError
-from bsip_cli.files import fault_of
-from bsip_cli.folders import entries, is_folder
-from bsip_cli.force_files import ENDINGS
+from bsip_cli.files.folders import entries, is_folder
+from bsip_cli.files.force_files import ENDINGS
+from bsip_cli.files.regular import fault_of
 from bsip_cli.simulate.asked import effects_of, touches
 from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.injection.c3d_file import inject_c3d

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.files import check_regular
-from bsip_cli.force_files import forces_beside
+from bsip_cli.files.force_files import forces_beside
+from bsip_cli.files.regular import check_regular
 from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.injection.changes import changed_by
 from bsip_cli.simulate.instruments import Instruments, SensingPlate

@@ -15,11 +15,8 @@ from typing import Literal
 
 import pandas as pd
 
-from bsip_cli import fingerprints
 from bsip_cli.artifacts import remove, write_artifact, write_atomically
-from bsip_cli.code_hash import code_hash
 from bsip_cli.config import Config
-from bsip_cli.endings import end_if_asked
 from bsip_cli.errors import (
     BadDataError,
     BsipError,
@@ -29,14 +26,17 @@ from bsip_cli.errors import (
     not_readable,
     printable,
 )
-from bsip_cli.freshness import stale_upstream, was_changed, why_stale
-from bsip_cli.lock import held_alone
+from bsip_cli.files import fingerprints
 from bsip_cli.pipeline import STAGES, Stage, by_level, producer
-from bsip_cli.provenance import library_versions
-from bsip_cli.study import Participant, Study, Trial
-from bsip_cli.trials import listed
-from bsip_cli.unit import Unit
-from bsip_cli.workers import Died, work_on
+from bsip_cli.running.code_hash import code_hash
+from bsip_cli.running.endings import end_if_asked
+from bsip_cli.running.freshness import stale_upstream, was_changed, why_stale
+from bsip_cli.running.lock import held_alone
+from bsip_cli.running.provenance import library_versions
+from bsip_cli.running.unit import Unit
+from bsip_cli.running.workers import Died, work_on
+from bsip_cli.study.study import Participant, Study, Trial
+from bsip_cli.study.trials import listed
 
 _SHORT_OF_MEMORY = "the process was killed (out of memory?); run again, with fewer --jobs"
 

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.config import Load
 from bsip_cli.errors import UsageError
-from bsip_cli.study import Study
+from bsip_cli.study.study import Study
 
 _REMEDY = "correct [[loads]] in study.toml"
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Literal
 
 from bsip_cli.errors import BadDataError, printable
-from bsip_cli.files import fault_of
-from bsip_cli.folders import entries, is_folder
-from bsip_cli.force_files import ENDINGS, forces_beside
+from bsip_cli.files.folders import entries, is_folder
+from bsip_cli.files.force_files import ENDINGS, forces_beside
+from bsip_cli.files.regular import fault_of
 from bsip_cli.schemas import SCHEMAS
 
 Role = Literal["static", "sequence", "validation"]

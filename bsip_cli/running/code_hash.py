@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bsip_cli.config import shipped
 
-_PACKAGE = Path(__file__).parent
+_PACKAGE = Path(__file__).parents[1]
 _NAME = _PACKAGE.name
 _FROM = re.compile(rf"^\s*from\s+({_NAME}[\w.]*)\s+import\s+(\([^)]*\)|[^\n(]*)", re.MULTILINE)
 _IMPORT = re.compile(rf"^\s*import\s+({_NAME}[\w.]*)", re.MULTILINE)

@@ -13,8 +13,8 @@ import pyarrow.parquet as pq
 from bsip_cli import __version__
 from bsip_cli.artifacts import read_header
 from bsip_cli.errors import printable
-from bsip_cli.files import check_regular
-from bsip_cli.provenance import library_versions
+from bsip_cli.files.regular import check_regular
+from bsip_cli.running.provenance import library_versions
 from bsip_cli.schemas import SCHEMAS
 
 

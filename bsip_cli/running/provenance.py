@@ -10,9 +10,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 from bsip_cli import __version__
-from bsip_cli.code_hash import code_hash
-from bsip_cli.fingerprints import file_hash
+from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.pipeline import Stage
+from bsip_cli.running.code_hash import code_hash
 
 _LIBRARIES = (
     "clarabel",

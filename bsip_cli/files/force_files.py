@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from bsip_cli.errors import BadDataError, printable
-from bsip_cli.folders import entries
+from bsip_cli.files.folders import entries
 
 ENDINGS = (".mot", ".sto")
 _NAMES = tuple(f"{word}{ending}" for word in ("", "_grf", "_forces") for ending in ENDINGS)

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bsip_cli.errors import BadDataError, UsageError, printable
-from bsip_cli.files import fault_of
-from bsip_cli.folders import check_path, entries, is_folder
-from bsip_cli.participants import NAME, Participant, participant_of, read_rows, rows_of
-from bsip_cli.trials import (
+from bsip_cli.files.folders import check_path, entries, is_folder
+from bsip_cli.files.regular import fault_of
+from bsip_cli.study.participants import NAME, Participant, participant_of, read_rows, rows_of
+from bsip_cli.study.trials import (
     RECORDINGS,
     Fault,
     Role,

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Literal
 
 from bsip_cli.errors import BadDataError, UsageError
-from bsip_cli.files import fault_of
-from bsip_cli.trials import MANY, Trial
+from bsip_cli.files.regular import fault_of
+from bsip_cli.study.trials import MANY, Trial
 
 NAME = re.compile(r"sub-[A-Za-z0-9]+")
 _REQUIRED = ("participant_id", "sex", "mass_kg")

@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Generic, TypeVar
 
-from bsip_cli.endings import (
+from bsip_cli.running.endings import (
     EndedError,
     end_if_asked,
     endings_kept,

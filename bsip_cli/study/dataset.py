@@ -9,9 +9,9 @@ from pathlib import Path
 from bsip_cli import __version__
 from bsip_cli.artifacts import write_atomically
 from bsip_cli.errors import UsageError
-from bsip_cli.files import fault_of
-from bsip_cli.folders import check_path, is_folder, lies_in
-from bsip_cli.participants import NAME as NAME_OF_PERSON
+from bsip_cli.files.folders import check_path, is_folder, lies_in
+from bsip_cli.files.regular import fault_of
+from bsip_cli.study.participants import NAME as NAME_OF_PERSON
 
 NAME = "dataset_description.json"
 BIDS_VERSION = "1.10.0"

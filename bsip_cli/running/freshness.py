@@ -7,13 +7,13 @@ from functools import lru_cache
 from pathlib import Path
 
 from bsip_cli.artifacts import read_artifact, read_header
-from bsip_cli.code_hash import code_hash
 from bsip_cli.errors import BadDataError
-from bsip_cli.fingerprints import file_hash, fingerprint
+from bsip_cli.files.fingerprints import file_hash, fingerprint
 from bsip_cli.pipeline import STAGES, Stage, producer
+from bsip_cli.running.code_hash import code_hash
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.study import Participant
-from bsip_cli.unit import Unit
+from bsip_cli.study.study import Participant
 
 
 def why_stale(unit: Unit) -> str:

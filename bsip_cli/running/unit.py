@@ -18,12 +18,12 @@ from bsip_cli.artifacts import (
 )
 from bsip_cli.config import Config, Load
 from bsip_cli.errors import printable
-from bsip_cli.fingerprints import file_hash
+from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.pipeline import STAGES, Stage, producer
-from bsip_cli.provenance import describe, hash_of_files
+from bsip_cli.running.provenance import describe, hash_of_files
+from bsip_cli.running.status import Folder
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.standing import Folder
-from bsip_cli.study import Participant, Study, Trial
+from bsip_cli.study.study import Participant, Study, Trial
 
 
 @dataclass

@@ -31,15 +31,15 @@ from bsip_cli.body.exports.osim_given import (
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError, BsipError, UsageError
-from bsip_cli.files import check_regular
-from bsip_cli.fingerprints import file_hash
-from bsip_cli.lock import held_alone
+from bsip_cli.files.fingerprints import file_hash
+from bsip_cli.files.regular import check_regular
 from bsip_cli.pipeline import Stage
-from bsip_cli.runner import Outcome, lacking
+from bsip_cli.running.lock import held_alone
+from bsip_cli.running.runner import Outcome, lacking
+from bsip_cli.running.session import follow, open_study
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
-from bsip_cli.session import follow, open_study
 from bsip_cli.stages.frames import person_from
-from bsip_cli.unit import Unit
 
 # Not a stage of the pipeline, but it reads as one.
 _READER = Stage(

@@ -14,14 +14,14 @@ from tqdm import tqdm
 
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.check_study import check_prefixes, check_segments, check_trials
 from bsip_cli.config import Config, load_config, with_estimators
-from bsip_cli.dataset import describe_dataset, make_out
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.pipeline import Stage, by_level, stages_named
-from bsip_cli.runner import Manner, Outcome, refusal_sentence, run_stages
-from bsip_cli.study import Study, load_study
-from bsip_cli.trials import listed
+from bsip_cli.running.runner import Manner, Outcome, refusal_sentence, run_stages
+from bsip_cli.study.dataset import describe_dataset, make_out
+from bsip_cli.study.named_in_options import check_prefixes, check_segments, check_trials
+from bsip_cli.study.study import Study, load_study
+from bsip_cli.study.trials import listed
 
 _SEVERITY = (0, 3, 4, 2, 1)  # of several exit codes the gravest counts
 

@@ -11,13 +11,13 @@ import pandas as pd
 
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
 from bsip_cli.errors import BadDataError, UsageError, printable
-from bsip_cli.freshness import outdated
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.shared import SHARED, Searched, searched, shared_causes
 from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.report.verdict import Verdict, put_right_sentence, verdict_of
+from bsip_cli.running.freshness import outdated
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.trials import listed
+from bsip_cli.study.trials import listed
 
 _WIDEST = 100  # letters in a line
 

@@ -20,7 +20,7 @@ class Stage:
     where it exists, and is not missed where it does not. ``options`` are names of configuration
     entries: only they enter the provenance. ``module`` holds a function ``run(unit)``. ``amends``
     are kinds of its own level that earlier stages write and to which it adds rows. ``part`` tells
-    apart two steps of one name and level.
+    apart two steps of one name and level. ``reads_recordings``: these themselves are input.
     """
 
     name: str
@@ -33,6 +33,7 @@ class Stage:
     reads_if_there: tuple[str, ...] = ()
     amends: tuple[str, ...] = ()
     part: str = ""
+    reads_recordings: bool = False
 
     @property
     def label(self) -> str:
@@ -47,12 +48,24 @@ class Stage:
 STAGES = (
     Stage(
         "ingest",
-        "trial",
+        "participant",
         "Read recordings: markers and ground wrench in SI units, gaps filled, contacts found.",
         reads=(),
+        writes=("readings",),
+        options=("ingest",),
+        module="bsip_cli.stages.survey",
+        part="session",
+        reads_recordings=True,
+    ),
+    Stage(
+        "ingest",
+        "trial",
+        "Read recordings: markers and ground wrench in SI units, gaps filled, contacts found.",
+        reads=("readings",),
         writes=("markers", "wrench", "plates", "contacts", "quality"),
         options=("marker_set", "loads", "ingest"),
         module="bsip_cli.stages.ingest",
+        reads_recordings=True,
     ),
     Stage(
         "scale",

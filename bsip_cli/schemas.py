@@ -86,6 +86,11 @@ def _without_unit(name: str) -> str:
     return name.rsplit("_", 1)[0]
 
 
+def column_names(kind: str) -> list[str]:
+    """The columns of a kind of artifact, without families."""
+    return [column.name for column in SCHEMAS[kind].columns if column.name[-1] != "*"]
+
+
 def bsip_names() -> tuple[str, ...]:
     """The ten inertial columns of a segment, in the order of the table."""
     return tuple(_BSIP_UNITS)
@@ -153,6 +158,51 @@ _DIAGNOSIS = (
 SCHEMAS = {
     schema.kind: schema
     for schema in (
+        Schema(
+            "readings",
+            "participant",
+            1,
+            "how the numbers of a session's recordings are understood, one row per plate",
+            (
+                _text("session", "of the recordings; empty without sessions"),
+                _text("mirrored", "what was mirrored: all, markers, forces or nothing (empty)"),
+                Column("axis", "int", "", "of the world that was mirrored: 0 for X, 1 for Y"),
+                _text("plate", "its name; empty if no plate was loaded"),
+                Column("moment_scale", "float", "1", "what the moments are multiplied with"),
+                Column("point_scale", "float", "1", "what the points of force are multiplied with"),
+                _text("about", "what moments are about: stated, reversed, centred, origin, fixed"),
+                *_floats("centre_x_m centre_y_m centre_z_m", "m", "the fixed point", "lab"),
+                Column("turn", "int", "90 degrees", "by which the plate's axes were turned"),
+                Column("reversed_round", "bool", "", "corners taken in the other direction round"),
+                Column("sign", "int", "", "-1 where the file holds the action on the plate"),
+                _text("place_of", "the plate with which it was exchanged"),
+                *_floats("half_size_x_m half_size_y_m", "m", "half the widened outline", "plate"),
+                _text("refusal", "why the plate was left out"),
+                _text("repeats", "the plates whose copy or sum it is"),
+                *(
+                    column
+                    for when, words in (("before", "as the file says"), ("after", "as understood"))
+                    for column in (
+                        *_floats(
+                            f"{when}_distance_m {when}_outside_m {when}_sway_m",
+                            "m",
+                            f"centre of pressure {words}: beside feet, outside plate, spread",
+                        ),
+                        *_floats(
+                            f"{when}_torque_m {when}_level_m",
+                            "m",
+                            f"vertical, horizontal moment at it over the force {words}",
+                        ),
+                        *_floats(f"{when}_lever_m", "m", f"of the force about the sensor {words}"),
+                        *_floats(
+                            f"{when}_level_share",
+                            "1",
+                            f"of the written horizontal moment, what is left {words}",
+                        ),
+                    )
+                ),
+            ),
+        ),
         Schema(
             "markers",
             "trial",

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.recordings.model import Finding
+
 _RAILS = (2047, 2048, 32767, 32768)  # counts of 12- and 16-bit converters
 _FLAT_S = 0.02  # a true peak is not flat for longer
 _STUCK_S = 0.5
@@ -151,3 +153,39 @@ def _stuck(signal: np.ndarray, load: np.ndarray, rate_hz: float) -> np.ndarray:
         if np.nanmax(part) - np.nanmin(part) > max(_LOAD_CHANGE * scale, 50.0):
             stuck[start - 1 : stop] = True
     return stuck
+
+
+def sample_findings(plate: str, samples: SampleCheck) -> list[Finding]:
+    """Lines for the quality table about one plate's faulty samples."""
+    n = len(samples.stuck)
+    findings = [
+        Finding(
+            check=f"analog_{name}",
+            subject=plate,
+            found=f"{mask.sum()} of {n} samples {words}",
+            expected="none",
+            action="marked them unusable",
+            level="warning",
+        )
+        for name, words, mask in (
+            ("nan", "are not a number", samples.not_a_number),
+            ("clipped", "lie at the converter's limit", samples.clipped),
+            ("stuck", "do not answer to the load", samples.stuck),
+            ("lost", "are zero in all channels amid load", samples.lost),
+            ("spike", "leave their neighbours and come back at once", samples.spikes),
+        )
+        if mask.any()
+    ]
+    if samples.silent_channels:
+        names = ", ".join(str(i + 1) for i in samples.silent_channels)
+        findings.append(
+            Finding(
+                check="analog_silent",
+                subject=plate,
+                found=f"channel {names} of the plate is zero throughout",
+                expected="a signal that answers to the load",
+                action="kept the plate",
+                level="warning",
+            )
+        )
+    return findings

@@ -1,60 +1,117 @@
-"""From checked plate channels to plates in the world frame, or the reason for none."""
+"""From plates whose numbers are understood to a recording's forces, or the reason for none."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
-from bsip_cli.recordings.analog import SampleCheck
-from bsip_cli.recordings.cop_near_feet import Scene
-from bsip_cli.recordings.model import Finding, Plate
-from bsip_cli.recordings.plate_checks import check_wrench
-from bsip_cli.recordings.plate_frame import settle_frame
-from bsip_cli.recordings.plates import LOADED_N, LocalWrench, PlateDescription, to_world
+from bsip_cli.recordings.handedness import handedness
+from bsip_cli.recordings.model import Finding, Plate, Recording
+from bsip_cli.recordings.plates import LOADED_N
+from bsip_cli.recordings.settle import Opened, Scene, SessionReading, Verdict
+from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
 from bsip_cli.recordings.weight_shift import sign_doubts
 
-
-@dataclass(frozen=True)
-class PlateSource:
-    """One plate as the file gives it: wrench at the sensor's origin, plate frame."""
-
-    plate: PlateDescription
-    wrench: LocalWrench
-    samples: SampleCheck
-    baseline: slice | None
+_ABSURD_N = 15_000.0
+_LIGHTLY_LOADED_N = 20.0
+_PULL_SHARE = 0.2  # of the push's impulse
+_UNLOADED = Verdict()
 
 
-@dataclass(frozen=True)
-class Forces:
-    plates: tuple[Plate, ...]
-    findings: tuple[Finding, ...]
-    note: str  # "" or why there are no forces
-
-
-def settle_forces(
-    sources: Sequence[PlateSource], rotation_world_lab: np.ndarray, scene: Scene
-) -> Forces:
-    """Check every plate against physics and turn the good ones into the world frame."""
-    if not sources:
-        return Forces((), (), "the file has no usable force plates")
+def assemble(opened: Opened, session: SessionReading) -> Recording:
+    """The recording with its plates, understood as all trials of the session say."""
+    opened = session.scene.of(opened)
+    recording = opened.recording
+    findings = [*findings_about(session), *_about_sides(recording)]
+    if recording.forces_note:
+        return replace(recording, findings=(*recording.findings, *findings))
     plates: list[Plate] = []
-    findings: list[Finding] = []
     reversed_names = []
-    for source in sources:
-        findings += _sample_findings(source)
-        plate, found, is_reversed = _settle(source, rotation_world_lab, scene)
-        findings += found
-        plates += [plate] if plate else []
-        reversed_names += [source.plate.name] if is_reversed else []
-    findings += sign_doubts(plates, reversed_names, scene.analog_rate_hz)
-    note = why_no_forces(plates)
-    return Forces(() if note else tuple(plates), tuple(findings), note)
+    by_name = {source.name: source for source in opened.sources}
+    for source in opened.sources:
+        verdict = session.plates.get(source.name, _UNLOADED)
+        if verdict.refusal or verdict.repeats:
+            continue
+        if other := verdict.reading.place_of:
+            source = source.in_place_of(by_name[other])
+        plate = source.plate(verdict.reading)
+        if fault := _no_person(plate):
+            findings.append(fault)
+            continue
+        findings += source.findings(verdict.reading)
+        plates.append(plate)
+        if verdict.reading.sign < 0:
+            findings.append(_reversed(plate))
+            reversed_names.append(plate.name)
+    findings += sign_doubts(plates, reversed_names, recording.analog_rate_hz)
+    note = why_no_forces(plates, bool(opened.sources))
+    return replace(
+        recording,
+        plates=() if note else tuple(plates),
+        findings=(*recording.findings, *findings),
+        forces_note=note,
+    )
 
 
-def why_no_forces(plates: Sequence[Plate]) -> str:
+def findings_about(session: SessionReading) -> list[Finding]:
+    """What was decided for all trials of a session alike."""
+    plates = (_about_plate(name, verdict) for name, verdict in session.plates.items())
+    return [*_about_scene(session.scene), *(finding for found in plates for finding in found)]
+
+
+def _about_scene(scene: Scene) -> list[Finding]:
+    if not scene.mirrored:
+        return []
+    what = {"all": "markers and forces", "markers": "the markers", "forces": "the forces"}
+    found = "left and right are exchanged all over the body: a left-handed laboratory frame"
+    if scene.mirrored == "forces":
+        found = "the forces lie under the feet in a mirror only"
+    action = (
+        f"reversed the {'XY'[scene.axis]} axis of {what[scene.mirrored]}, in all trials; if "
+        "instead left and right labels are exchanged, rename them"
+    )
+    return [Finding("mirrored", "", found, "a right-handed frame", action, "corrected")]
+
+
+def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
+    if verdict.repeats:
+        whose = " and ".join(verdict.repeats)
+        found = f"its force is that of plate {whose}"
+        found += " together" if len(verdict.repeats) > 1 else ""
+        action = "left it out, so that no force counts twice"
+        expected = "plates that measure different feet"
+        return [Finding("plate_repeated", name, found, expected, action, "corrected")]
+    if verdict.refusal:
+        action = "left the plate out: no other unit, point or order of corners explains it"
+        return [_about(name, verdict.refusal, action, "excluded")]
+    reading, findings = verdict.reading, []
+    if words := reading.words():
+        assert verdict.before is not None and verdict.after is not None
+        action = f"{words}: {_words(verdict.after)}"
+        findings.append(_about(name, _words(verdict.before), action, "corrected"))
+    if reading.half_size_m is not None:
+        sides = " x ".join(f"{2 * half:.2f}" for half in reading.half_size_m)
+        found = "its load lies beside its outline and under a foot"
+        findings.append(_about(name, found, f"widened the outline to {sides} m", "corrected"))
+    return findings
+
+
+def _about_sides(recording: Recording) -> list[Finding]:
+    """Parts of the body that have left and right exchanged."""
+    found = "left and right markers are on the wrong sides, and not all over the body"
+    action = "left them as they are; correct the labels"
+    return [
+        Finding("labels", part, found, "left on the left", action, "warning")
+        for part in handedness(recording.labels, recording.markers_m).exchanged()
+    ]
+
+
+def why_no_forces(plates: Sequence[Plate], had_some: bool = True) -> str:
     """Empty, or why these plates give no forces."""
+    if not had_some:
+        return "the file has no usable force plates"
     if not plates:
         return "every force plate was left out"
     if not any(plate.usable.any() for plate in plates):
@@ -66,57 +123,46 @@ def why_no_forces(plates: Sequence[Plate]) -> str:
     return ""
 
 
-def _settle(
-    source: PlateSource, rotation_world_lab: np.ndarray, scene: Scene
-) -> tuple[Plate | None, tuple[Finding, ...], bool]:
-    """The plate or None, what was found, and whether its sign was reversed."""
-    down = (rotation_world_lab @ source.plate.rotation_lab_plate()[:, 2])[2]
-    checked = check_wrench(
-        source.wrench, source.plate, float(np.sign(down)), source.samples, source.baseline
-    )
-    if checked.wrench is None:
-        return None, checked.findings, False
-
-    def to_plate(wrench: LocalWrench, description: PlateDescription) -> Plate:
-        force, moment = to_world(wrench, description, rotation_world_lab)
-        corners = description.corners_m @ rotation_world_lab.T
-        return Plate(description.name, force, moment, corners, source.samples.usable())
-
-    plate, found = settle_frame(checked.wrench, source.plate, scene, to_plate)
-    return plate, (*checked.findings, *found), checked.is_reversed()
+def _no_person(plate: Plate) -> Finding | None:
+    """Why a plate's forces in this trial are no person's."""
+    lift = plate.force_N[plate.usable, 2]
+    if not len(lift):
+        return None
+    largest = np.percentile(np.abs(lift), 99.5)
+    if largest >= _ABSURD_N:
+        found = f"vertical forces up to {largest / 1000:.1f} kN"
+        return _left_out("plate_force", plate, found, f"less than {_ABSURD_N / 1000:.0f} kN")
+    pull = -lift[lift < -_LIGHTLY_LOADED_N].sum()
+    push = lift[lift > _LIGHTLY_LOADED_N].sum()
+    if pull > _PULL_SHARE * push and lift.min() < -LOADED_N:
+        found = f"pushes up to {lift.max():.0f} N and pulls up to {-lift.min():.0f} N"
+        return _left_out("plate_sign", plate, found, "pushes only")
+    return None
 
 
-def _sample_findings(source: PlateSource) -> list[Finding]:
-    samples = source.samples
-    n = len(samples.stuck)
-    findings = [
-        Finding(
-            check=f"analog_{name}",
-            subject=source.plate.name,
-            found=f"{mask.sum()} of {n} samples {words}",
-            expected="none",
-            action="marked them unusable",
-            level="warning",
-        )
-        for name, words, mask in (
-            ("nan", "are not a number", samples.not_a_number),
-            ("clipped", "lie at the converter's limit", samples.clipped),
-            ("stuck", "do not answer to the load", samples.stuck),
-            ("lost", "are zero in all channels amid load", samples.lost),
-            ("spike", "leave their neighbours and come back at once", samples.spikes),
-        )
-        if mask.any()
-    ]
-    if samples.silent_channels:
-        names = ", ".join(str(i + 1) for i in samples.silent_channels)
-        findings.append(
-            Finding(
-                check="analog_silent",
-                subject=source.plate.name,
-                found=f"channel {names} of the plate is zero throughout",
-                expected="a signal that answers to the load",
-                action="kept the plate",
-                level="warning",
-            )
-        )
-    return findings
+def _left_out(check: str, plate: Plate, found: str, expected: str) -> Finding:
+    return Finding(check, plate.name, found, expected, "left the plate out", "excluded")
+
+
+def _reversed(plate: Plate) -> Finding:
+    lift = plate.force_N[plate.usable, 2]
+    loaded = lift[np.abs(lift) > _LIGHTLY_LOADED_N]
+    found = "a pull: the action on the plate"
+    if len(loaded):
+        found = f"median vertical force on the body {-np.median(loaded):.0f} N"
+    action = "reversed all six components"
+    return Finding("plate_sign", plate.name, found, "a push (positive)", action, "corrected")
+
+
+def _about(name: str, found: str, action: str, level: str) -> Finding:
+    expected = f"under the foot that stands on it, to {BESIDE_M:g} m"
+    return Finding("plate_cop", name, found, expected, action, level)
+
+
+def _words(evidence: Evidence) -> str:
+    """Where a reading puts the force."""
+    if np.isfinite(evidence.distance_m):
+        place = f"{evidence.distance_m:.2f} m beside the feet on the ground"
+    else:
+        place = f"{evidence.outside_m:.2f} m outside the plate"
+    return f"centre of pressure {place}, moving by {1e3 * evidence.sway_m:.3g} mm"

@@ -8,32 +8,51 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.recordings import world
-from bsip_cli.recordings.analog import check_samples
-from bsip_cli.recordings.assemble import Forces, PlateSource, settle_forces
+from bsip_cli.recordings.analog import check_samples, sample_findings
 from bsip_cli.recordings.c3d_content import Content, read_content
 from bsip_cli.recordings.c3d_parameters import texts
 from bsip_cli.recordings.c3d_plates import PlateChannels, plate_surfaces, read_plates
 from bsip_cli.recordings.c3d_points import Points, read_points
-from bsip_cli.recordings.cop_near_feet import Scene
 from bsip_cli.recordings.model import Finding, Recording
+from bsip_cli.recordings.plate_source import C3dPlate
 from bsip_cli.recordings.plates import local_wrench
 from bsip_cli.recordings.scene_size import settle_unit
+from bsip_cli.recordings.settle import Opened
 from bsip_cli.recordings.units import length_in_m
+from bsip_cli.recordings.zero import without_baseline
 
 
-def read_c3d(path: Path) -> Recording:
-    """Markers and plates of a C3D file, SI, Z-up world frame."""
+def open_c3d(path: Path) -> Opened:
+    """Markers of a C3D file, SI, Z-up world frame, and its plates as it describes them."""
     content = read_content(path)
     unit_m, unit_findings = _length_unit(content)
     points = read_points(content, unit_m)
     plates, plate_findings = read_plates(content, unit_m)
     up = _up(content, points, plate_surfaces(content.group("FORCE_PLATFORM"), unit_m))
-    analog_rate_hz = content.rate_hz * content.samples_per_frame
+    rate_hz = content.rate_hz * content.samples_per_frame
     rotation = world.rotation_to_z_up(up)
-    scene = Scene(points.positions_m @ rotation.T, content.rate_hz, analog_rate_hz)
-    forces = settle_forces([_source(p, analog_rate_hz) for p in plates], rotation, scene)
-    findings = [*content.findings, *points.findings, *unit_findings, *plate_findings]
-    return _recording(path, content, points, up, forces, findings)
+    opened = [_source(plate, rotation, rate_hz) for plate in plates]
+    turned = world.finding_about(up)
+    recording = Recording(
+        path=path,
+        marker_rate_hz=content.rate_hz,
+        labels=points.labels,
+        markers_m=points.positions_m @ rotation.T,
+        analog_rate_hz=rate_hz,
+        plates=(),
+        findings=(
+            *content.findings,
+            *points.findings,
+            *unit_findings,
+            *plate_findings,
+            *([turned] if turned else []),
+            *(finding for _, found in opened for finding in found),
+        ),
+        rotation_world_lab=rotation,
+        forces_note="",
+        time0_s=content.first_frame / content.rate_hz,
+    )
+    return Opened(recording, tuple(source for source, _ in opened))
 
 
 def _length_unit(content: Content) -> tuple[float, list[Finding]]:
@@ -60,31 +79,17 @@ def _up(content: Content, points: Points, surfaces: Sequence[np.ndarray]) -> wor
     )
 
 
-def _source(plate: PlateChannels, analog_rate_hz: float) -> PlateSource:
-    wrench = local_wrench(plate.plate.kind, plate.channels, plate.plate)
+def _source(
+    plate: PlateChannels, rotation_world_lab: np.ndarray, analog_rate_hz: float
+) -> tuple[C3dPlate, list[Finding]]:
+    """The plate with its baseline subtracted and its faulty samples marked."""
+    description = plate.plate
+    wrench = local_wrench(description.kind, plate.channels, description)
     samples = check_samples(plate.channels, plate.counts, wrench.force_N[:, 2], analog_rate_hz)
-    return PlateSource(plate.plate, wrench, samples, plate.baseline)
-
-
-def _recording(
-    path: Path,
-    content: Content,
-    points: Points,
-    up: world.Up,
-    forces: Forces,
-    findings: list[Finding],
-) -> Recording:
-    rotation = world.rotation_to_z_up(up)
-    turned = world.finding_about(up)
-    return Recording(
-        path=path,
-        marker_rate_hz=content.rate_hz,
-        labels=points.labels,
-        markers_m=points.positions_m @ rotation.T,
-        analog_rate_hz=content.rate_hz * content.samples_per_frame,
-        plates=forces.plates,
-        findings=(*findings, *([turned] if turned else []), *forces.findings),
-        rotation_world_lab=rotation,
-        forces_note=forces.note,
-        time0_s=content.first_frame / content.rate_hz,
+    down = (rotation_world_lab @ description.rotation_lab_plate()[:, 2])[2]
+    usable = samples.usable()
+    wrench, found = without_baseline(
+        wrench, description.name, float(np.sign(down)), usable, plate.baseline
     )
+    source = C3dPlate(description, wrench, usable, rotation_world_lab)
+    return source, [*sample_findings(description.name, samples), *found]

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from bsip_cli.recordings.plates import cop_at_height
+
 LEVELS = ("info", "corrected", "warning", "excluded")
 
 
@@ -24,6 +26,12 @@ class Finding:
     action: str
     level: str  # one of LEVELS
 
+    def sentence(self) -> str:
+        """As people read it."""
+        subject = f" {self.subject}" if self.subject else ""
+        expected = f" (expected {self.expected})" if self.expected else ""
+        return f"{self.check.replace('_', ' ')}{subject}: {self.found}{expected}; {self.action}"
+
 
 @dataclass(frozen=True, eq=False)
 class Plate:
@@ -38,6 +46,10 @@ class Plate:
     def wrench(self) -> np.ndarray:
         """Force and moment side by side, (n_analog, 6)."""
         return np.hstack([self.force_N, self.moment_Nm])
+
+    def cop_m(self, height_m: float) -> np.ndarray:
+        """Centre of pressure on a horizontal surface, (n, 2); NaN without load."""
+        return cop_at_height(self.force_N, self.moment_Nm, height_m)
 
 
 @dataclass(frozen=True, eq=False)

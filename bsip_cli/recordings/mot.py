@@ -40,8 +40,8 @@ class GroundForce:
 
     name: str
     force_N: np.ndarray  # (n, 3)
-    point: np.ndarray  # (n, 3), in the file's length unit
-    torque_Nm: np.ndarray  # (n, 3), free torque at the point
+    point: np.ndarray | None  # (n, 3), in the file's length unit
+    moment: np.ndarray | None  # (n, 3), as written
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,9 +125,9 @@ def _forces(names: list[str], table: np.ndarray, path: Path) -> tuple[GroundForc
     for found in columns.values():
         if all(("force", axis) in found for axis in "xyz"):
             parts = {k: _vector(found, k, table) for k in ("force", "point", "torque")}
-            forces.append(
-                GroundForce(str(len(forces) + 1), parts["force"], parts["point"], parts["torque"])
-            )
+            assert parts["force"] is not None
+            name = str(len(forces) + 1)
+            forces.append(GroundForce(name, parts["force"], parts["point"], parts["torque"]))
     if len(forces) > _MOST_FORCES:
         raise BadDataError(
             f"{len(forces)} ground forces",
@@ -158,8 +158,10 @@ def _meaning(name: str) -> tuple[str, str, str] | None:
     return identity, kind, match["axis"]
 
 
-def _vector(found: dict[tuple[str, str], int], kind: str, table: np.ndarray) -> np.ndarray:
-    """Three columns of the table, zero where the file has none, (n, 3)."""
+def _vector(found: dict[tuple[str, str], int], kind: str, table: np.ndarray) -> np.ndarray | None:
+    """Three columns of the table, (n, 3); None where the file has none."""
+    if not any((kind, axis) in found for axis in "xyz"):
+        return None
     zero = np.zeros(len(table))
     return np.column_stack(
         [table[:, found[kind, axis]] if (kind, axis) in found else zero for axis in "xyz"]

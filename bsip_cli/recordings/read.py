@@ -2,32 +2,37 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.regular import check_regular
-from bsip_cli.recordings.cop_near_feet import cop_findings
+from bsip_cli.recordings.assemble import assemble
 from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.settle import Opened, SessionReading, Survey, settle_session
 
 
-def read_recording(path: Path) -> Recording:
-    """Read a ``.c3d``, or a ``.trc`` with the file of ground forces beside it."""
-    recording = _read(Path(path))
-    return replace(recording, findings=(*recording.findings, *cop_findings(recording)))
+def read_recording(path: Path, session: SessionReading | None = None) -> Recording:
+    """Read a ``.c3d``, or a ``.trc`` with the file of ground forces beside it.
+
+    ``session`` says how its numbers are to be understood; without it this trial alone decides.
+    """
+    opened = open_recording(path)
+    return assemble(opened, session or settle_session([Survey.of(opened)]))
 
 
-def _read(path: Path) -> Recording:
+def open_recording(path: Path) -> Opened:
+    """A recording whose plates are still as the file has them."""
+    path = Path(path)
     check_regular(path)
     suffix = path.suffix.lower()
     if suffix == ".c3d":
-        from bsip_cli.recordings.c3d import read_c3d
+        from bsip_cli.recordings.c3d import open_c3d
 
-        return read_c3d(path)
+        return open_c3d(path)
     if suffix == ".trc":
-        from bsip_cli.recordings.trc_mot import read_trc_mot
+        from bsip_cli.recordings.trc_mot import open_trc_mot
 
-        return read_trc_mot(path)
+        return open_trc_mot(path)
     raise BadDataError(
         f"a recording of type '{suffix}'",
         expected="a .c3d or a .trc file",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,29 +11,21 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.files.force_files import forces_beside
 from bsip_cli.recordings import world
 from bsip_cli.recordings.analog import spike_samples
-from bsip_cli.recordings.assemble import why_no_forces
-from bsip_cli.recordings.model import Finding, Plate, Recording
+from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
+from bsip_cli.recordings.plate_reading import PlateReading
+from bsip_cli.recordings.plate_source import ForceOnPoint, points_that_move
 from bsip_cli.recordings.plates import LOADED_N
-from bsip_cli.recordings.timebase import MOST_HZ, even_grid, onto_grid
+from bsip_cli.recordings.settle import Opened
+from bsip_cli.recordings.timebase import MOST_HZ, Grid, even_grid, onto_grid
 from bsip_cli.recordings.trc import Trc, read_trc
 
 _VALUES_PER_BYTE = 5  # of both files: a grid of forces may need as much memory as c3d_guard allows
-_LARGEST_ROOM = 20.0  # a point of force further away is in mm
+_MM = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class _Action:
-    """All forces of a MOT, lab frame, sign and unit settled, at the MOT's times."""
-
-    names: tuple[str, ...]
-    force_N: np.ndarray  # (n_forces, n, 3), on the body
-    moment_Nm: np.ndarray  # (n_forces, n, 3), about the lab's origin
-    findings: tuple[Finding, ...]
-
-
-def read_trc_mot(path: Path) -> Recording:
-    """Markers from the TRC; plates from the file of forces beside it, if there is one."""
+def open_trc_mot(path: Path) -> Opened:
+    """Markers from the TRC; forces as written in the file beside it, if there is one."""
     trc = read_trc(path)
     time_s, rate_hz, positions, findings = _even_markers(trc, path)
     mot_path = forces_beside(path)
@@ -41,20 +33,21 @@ def read_trc_mot(path: Path) -> Recording:
     most = _VALUES_PER_BYTE * sum(file.stat().st_size for file in (path, mot_path) if file)
     up = _up(trc, mot)
     rotation = world.rotation_to_z_up(up)
-    analog_rate_hz, plates, note, found = _plates(mot, up, rotation, time_s, rate_hz, most)
+    analog_rate_hz, sources, note, found = _forces(mot, rotation, time_s, rate_hz, most)
     turned = world.finding_about(up)
-    return Recording(
+    recording = Recording(
         path=path,
         marker_rate_hz=rate_hz,
         labels=trc.labels,
         markers_m=positions @ rotation.T,
         analog_rate_hz=analog_rate_hz,
-        plates=() if note else plates,
+        plates=(),
         findings=(*trc.findings, *findings, *([turned] if turned else []), *found),
         rotation_world_lab=rotation,
         forces_note=note,
         time0_s=float(time_s[0]),
     )
+    return Opened(recording, sources)
 
 
 def _even_markers(
@@ -82,12 +75,14 @@ def _even_markers(
 def _up(trc: Trc, mot: Mot | None) -> world.Up:
     """From the direction of the forces, the markers telling its sign; else labels; else Y."""
     surface = None
-    if mot is not None and (loaded := _largest_loads(mot)) is not None:
-        force, point = loaded
-        scale = _point_scale(mot)
-        surface = world.up_from_surface(
-            np.abs(force).mean(axis=0)[None], point * scale, trc.positions_m
-        )
+    if mot is not None:
+        force = np.concatenate([f.force_N for f in mot.forces])
+        points = [np.zeros_like(f.force_N) if f.point is None else f.point for f in mot.forces]
+        loaded = np.linalg.norm(np.nan_to_num(force), axis=1) > LOADED_N
+        on_floor = np.concatenate(points)[loaded] * _MM  # at least: what is low is low in any unit
+        if loaded.any():
+            mean = np.abs(force[loaded]).mean(axis=0)
+            surface = world.up_from_surface(mean[None], on_floor, trc.positions_m)
     return (
         surface
         or world.up_from_labels(trc.labels, trc.positions_m)
@@ -95,29 +90,14 @@ def _up(trc: Trc, mot: Mot | None) -> world.Up:
     )
 
 
-def _largest_loads(mot: Mot) -> tuple[np.ndarray, np.ndarray] | None:
-    force = np.concatenate([f.force_N for f in mot.forces])
-    point = np.concatenate([f.point for f in mot.forces])
-    loaded = np.linalg.norm(np.nan_to_num(force), axis=1) > LOADED_N
-    return (force[loaded], point[loaded]) if loaded.any() else None
-
-
-def _point_scale(mot: Mot) -> float:
-    """Metres per length unit of the points of force."""
-    loaded = _largest_loads(mot)
-    far = loaded is not None and np.median(np.abs(loaded[1]).max(axis=1)) > _LARGEST_ROOM
-    return 1e-3 if far else 1.0
-
-
-def _plates(
+def _forces(
     mot: Mot | None,
-    up: world.Up,
     rotation: np.ndarray,
     time_s: np.ndarray,
     marker_rate_hz: float,
     most_values: int,
-) -> tuple[float, tuple[Plate, ...], str, tuple[Finding, ...]]:
-    """Analog rate, plates, the reason for none, findings."""
+) -> tuple[float, tuple[ForceOnPoint, ...], str, tuple[Finding, ...]]:
+    """Analog rate, forces as written, the reason for none, findings."""
     if mot is None:
         return marker_rate_hz, (), "no .mot file of the same name beside the .trc", ()
     grid = even_grid(mot.time_s, float("nan"))
@@ -127,64 +107,54 @@ def _plates(
     if 6 * last * len(mot.forces) > most_values:
         note = f"the .mot has {len(mot.time_s)} rows and {last:.3g} would be needed beside the .trc"
         return marker_rate_hz, (), note, ()
-    action = _action(mot, up)
     analog = replace(grid, time_s=time_s[0] + np.arange(round(last) + 1) / grid.rate_hz)
-    plates = tuple(
-        _plate(name, onto_grid(analog, mot.time_s, np.hstack([force, moment])), rotation)
-        for name, force, moment in zip(action.names, action.force_N, action.moment_Nm, strict=True)
+    if any(force.point is None and force.moment is None for force in mot.forces):
+        note = "the .mot has forces, and neither the points that they act on nor moments"
+        return marker_rate_hz, (), note, mot.findings
+    sources, findings = [], [*mot.findings, *grid.findings]
+    for force in mot.forces:
+        source, found = _source(force, analog, mot.time_s, rotation)
+        sources.append(source)
+        findings += found
+    return grid.rate_hz, tuple(sources), "", tuple(findings)
+
+
+def _source(
+    force: GroundForce, grid: Grid, stamps_s: np.ndarray, rotation: np.ndarray
+) -> tuple[ForceOnPoint, list[Finding]]:
+    """One force on the markers' time, as written, with its faulty samples marked."""
+    loaded = np.linalg.norm(np.nan_to_num(force.force_N), axis=1) > LOADED_N
+    parts = [x for x in (force.force_N, force.point, force.moment) if x is not None]
+    rows = onto_grid(grid, stamps_s, np.hstack(parts))
+    missing = ~np.isfinite(rows).all(axis=1)
+    columns = iter(np.split(rows, len(parts), axis=1))
+    height = [] if force.point is None else force.point[loaded] @ rotation[2]
+    source = ForceOnPoint(
+        name=force.name,
+        force_N=next(columns),
+        points=None if force.point is None else next(columns),
+        moment=None if force.moment is None else next(columns),
+        point_height=float(np.nanmedian(height)) if len(height) else 0.0,
+        points_move=force.point is not None and points_that_move(force.point, loaded),
+        usable=~missing,
+        rotation_world_lab=rotation,
     )
-    findings = [*mot.findings, *grid.findings, *action.findings, *_coverage(plates)]
-    return grid.rate_hz, plates, why_no_forces(plates), tuple(findings)
+    wrench = source.plate(PlateReading()).wrench()  # points alone leap where the load begins
+    spikes = spike_samples(wrench, np.abs(wrench[:, :3]).max(axis=1)) & ~missing
+    source = replace(source, usable=~missing & ~spikes)
+    return source, _coverage(force.name, missing, spikes)
 
 
-def _action(mot: Mot, up: world.Up) -> _Action:
-    scale = _point_scale(mot)
-    force = np.array([f.force_N for f in mot.forces])
-    moment = np.array([_moment_about_origin(f, scale) for f in mot.forces])
-    lift = force @ up.vector()
-    findings = []
-    if scale != 1.0:
-        findings.append(_finding("unit", "points of force beyond 20 m", "m", "read them in mm"))
-    if np.nansum(lift) < 0:
-        force, moment = -force, -moment
-        median = np.nanmedian(lift[np.abs(lift) > LOADED_N / 5])
-        found = f"median vertical force {median:.0f} N: the action on the ground"
-        findings.append(
-            _finding("plate_sign", found, "the force on the body", "reversed forces and torques")
-        )
-    return _Action(tuple(f.name for f in mot.forces), force, moment, tuple(findings))
-
-
-def _moment_about_origin(force: GroundForce, scale_m: float) -> np.ndarray:
-    """p x F + T, (n, 3)."""
-    return np.cross(force.point * scale_m, force.force_N) + force.torque_Nm
-
-
-def _finding(check: str, found: str, expected: str, action: str) -> Finding:
-    return Finding(check, "", found, expected, action, "corrected")
-
-
-def _plate(name: str, wrench: np.ndarray, rotation: np.ndarray) -> Plate:
-    """A plate of unknown outline from its wrench (n, 6), lab frame."""
-    usable = np.isfinite(wrench).all(axis=1) & ~spike_samples(wrench, np.abs(wrench).max(axis=1))
-    return Plate(name, wrench[:, :3] @ rotation.T, wrench[:, 3:] @ rotation.T, None, usable)
-
-
-def _coverage(plates: tuple[Plate, ...]) -> list[Finding]:
-    findings = []
-    for plate in plates:
-        missing = ~np.isfinite(plate.wrench()).all(axis=1)
-        spikes = ~plate.usable & ~missing
-        n = len(missing)
-        if missing.any():
-            found = f"no force for {missing.sum()} of {n} samples of the markers' time"
-            findings.append(_lost("nan", plate, found, "forces as long as the markers"))
-        if spikes.any():
-            found = f"{spikes.sum()} of {n} samples leave their neighbours and come back at once"
-            findings.append(_lost("spike", plate, found, "none"))
+def _coverage(name: str, missing: np.ndarray, spikes: np.ndarray) -> list[Finding]:
+    findings, n = [], len(missing)
+    if missing.any():
+        found = f"no force for {missing.sum()} of {n} samples of the markers' time"
+        findings.append(_lost("nan", name, found, "forces as long as the markers"))
+    if spikes.any():
+        found = f"{spikes.sum()} of {n} samples leave their neighbours and come back at once"
+        findings.append(_lost("spike", name, found, "none"))
     return findings
 
 
-def _lost(kind: str, plate: Plate, found: str, expected: str) -> Finding:
-    action = "marked them unusable"
-    return Finding(f"analog_{kind}", plate.name, found, expected, action, "warning")
+def _lost(kind: str, name: str, found: str, expected: str) -> Finding:
+    return Finding(f"analog_{kind}", name, found, expected, "marked them unusable", "warning")

@@ -9,8 +9,10 @@ from scipy.ndimage import uniform_filter1d
 
 from bsip_cli.recordings.analog import long_runs, runs
 from bsip_cli.recordings.model import Finding, Plate
+from bsip_cli.recordings.plates import LOADED_N, LocalWrench
 
 _WINDOW_S = 0.2
+_PULL_N = -20.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,3 +102,31 @@ def _where_free(
 
 def _finding(plate: Plate, found: str, action: str, level: str) -> Finding:
     return Finding("plate_zero", plate.name, found, "(0, 0, 0) N", action, level)
+
+
+def without_baseline(
+    wrench: LocalWrench,
+    plate: str,
+    down_sign: float,
+    good: np.ndarray,
+    baseline: slice | None,
+) -> tuple[LocalWrench, list[Finding]]:
+    """Subtract the mean of the ZERO samples if it is a pull, which no person can do."""
+    if baseline is None or not good[baseline].all():
+        return wrench, []
+    level_force = wrench.force_N[baseline].mean(axis=0)
+    level_moment = wrench.moment_Nm[baseline].mean(axis=0)
+    level = down_sign * level_force[2]
+    rest = (down_sign * wrench.force_N[:, 2] - level)[good]
+    is_loaded_above = np.percentile(rest, 95) > LOADED_N and np.percentile(rest, 2) > _PULL_N
+    if level > _PULL_N or not is_loaded_above:
+        return wrench, []
+    finding = Finding(
+        check="plate_zero",
+        subject=plate,
+        found=f"{level:.0f} N in the samples of FORCE_PLATFORM:ZERO, a pull",
+        expected="0 N without load",
+        action="subtracted that baseline from all channels",
+        level="corrected",
+    )
+    return LocalWrench(wrench.force_N - level_force, wrench.moment_Nm - level_moment), [finding]

@@ -131,8 +131,9 @@ class Unit:
     def inputs(self) -> dict[str, Path]:
         """Name and path of every file that a unit of a participant reads, but for refused ones."""
         files = self._files_of(self.participant)
-        if self.trial is not None and not self.stage.inputs:
-            files |= {path.name: path for path in self.trial.files}
+        if self.stage.reads_recordings and self.participant is not None:
+            trials = (self.trial,) if self.trial else self.participant.trials
+            files |= {path.name: path for trial in trials for path in trial.files}
         return files | self._files_of_options()
 
     def _files_of(self, participant: Participant | None) -> dict[str, Path]:

@@ -11,25 +11,29 @@ from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.body.names import TRUNK
 from bsip_cli.errors import BadDataError
+from bsip_cli.recordings.assemble import assemble, findings_about
 from bsip_cli.recordings.contacts import ContactWindows, contact_windows, plate_loads
 from bsip_cli.recordings.free_plates import nobody_near
 from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps
 from bsip_cli.recordings.labels import match_labels
 from bsip_cli.recordings.marker_guess import guess_marker_set
 from bsip_cli.recordings.model import Finding, Recording
-from bsip_cli.recordings.read import read_recording
+from bsip_cli.recordings.read import open_recording
 from bsip_cli.recordings.repeated_frames import without_repeats
 from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
 from bsip_cli.recordings.standing_mass import about_mass, plate_mass
 from bsip_cli.recordings.zero import plate_zero, subtract_zero
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH
+from bsip_cli.stages.survey import reading_of
 
 
 def run(unit: Unit) -> None:
     """Read one recording; write markers, wrench, plates, contacts and quality."""
     assert unit.trial is not None
-    recording = _chosen_plates(unit, read_recording(unit.trial.path))
+    opened = open_recording(unit.trial.path).with_plates(unit.config.ingest.plates)
+    session = reading_of(unit, unit.trial)
+    recording = assemble(opened, session)
     marker_set = _marker_set(unit, recording)
     match = match_labels(
         recording.labels,
@@ -54,9 +58,10 @@ def run(unit: Unit) -> None:
     findings += _mass_findings(unit, recording, wrench, contacts, trunk)
     if recording.forces_note:
         unit.warn(f"{unit.name}: kinematics only: {recording.forces_note}")
+    said = findings_about(session)  # once, of all trials
     for finding in findings:
-        if finding.level in ("warning", "excluded", "corrected"):
-            unit.warn(f"{unit.name}: {_sentence(finding)}")
+        if finding.level in ("warning", "excluded", "corrected") and finding not in said:
+            unit.warn(f"{unit.name}: {finding.sentence()}")
     times = recording.time_s()
     facts = {
         "marker_set": marker_set.name,
@@ -68,14 +73,6 @@ def run(unit: Unit) -> None:
     unit.write("plates", _plate_table(recording))
     unit.write("contacts", _contact_table(times, contacts))
     unit.write("quality", _quality_table(marker_set, findings))
-
-
-def _chosen_plates(unit: Unit, recording: Recording) -> Recording:
-    wanted = unit.config.ingest.plates
-    if not wanted:
-        return recording
-    chosen = tuple(plate for plate in recording.plates if plate.name in map(str, wanted))
-    return replace(recording, plates=chosen)
 
 
 def _without_zero(recording: Recording) -> tuple[Recording, list[Finding]]:
@@ -193,13 +190,6 @@ def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:
             )
             findings.append(Finding("marker_gaps", name, found, "every frame", action, "info"))
     return findings
-
-
-def _sentence(finding: Finding) -> str:
-    subject = f" {finding.subject}" if finding.subject else ""
-    expected = f" (expected {finding.expected})" if finding.expected else ""
-    check = finding.check.replace("_", " ")
-    return f"{check}{subject}: {finding.found}{expected}; {finding.action}"
 
 
 # --- tables -----------------------------------------------------------------------------------

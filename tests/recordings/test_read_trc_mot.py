@@ -165,7 +165,8 @@ def test_units_and_faster_forces(tmp_path, unit):
 def test_points_in_mm(tmp_path):
     recording, _, _, moment = _trial(tmp_path, point_scale=1000.0)
     np.testing.assert_allclose(recording.plates[0].moment_Nm, moment, atol=1e-5)
-    assert "unit" in [f.check for f in recording.findings]
+    (about,) = [f for f in recording.findings if f.check == "plate_cop"]
+    assert about.level == "corrected" and "points of force in mm" in about.action
 
 
 def test_action_on_the_ground_is_reversed(tmp_path):

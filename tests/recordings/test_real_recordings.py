@@ -11,12 +11,13 @@ import pytest
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings import c3d_content
+from bsip_cli.recordings.assemble import findings_about
 from bsip_cli.recordings.c3d_content import read_content
 from bsip_cli.recordings.c3d_parameters import numbers, texts
-from bsip_cli.recordings.cop_near_feet import median_distance_m
 from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.read import read_recording
+from bsip_cli.recordings.read import open_recording, read_recording
 from bsip_cli.recordings.resample import wrench_at_marker_rate
+from bsip_cli.recordings.settle import Survey, settle_session
 
 pytestmark = pytest.mark.real
 
@@ -184,19 +185,18 @@ def test_kistlers_polynomial_gives_the_centre_of_pressure_of_ezc3d(real_data, na
     ],
 )
 def test_centre_of_pressure_lies_under_the_feet(real_data, name):
-    recording = _read(real_data / name)
-    distances = [median_distance_m(recording, plate) for plate in recording.plates]
-    assert np.nanmax(distances) < 0.11
+    session = settle_session([Survey.of(open_recording(real_data / name))])
+    found = [verdict.after for verdict in session.plates.values()]
+    assert found and max(one.distance_m for one in found) < 0.06
+    assert [f.check for f in findings_about(session)] == []  # sound: nothing is changed
 
 
-def test_flipped_plate_is_corrected(real_data):
+def test_a_plate_that_no_reading_brings_under_the_feet_is_left_out(real_data):
+    """Its load lies 0.4 m beside them, and the weight does not shift between the plates."""
     recording = _read(real_data / "edge_nimble/JH_01.c3d")
-    assert [np.median(p.force_N[:, 2]) for p in recording.plates] == pytest.approx(
-        [713, 380], abs=1
-    )
-    flips = [f for f in recording.findings if f.check == "plate_sign"]
-    assert [(f.subject, f.level) for f in flips] == [("1", "corrected"), ("1", "warning")]
-    assert "r = 1.00" in flips[1].found  # the weight does not shift between the plates
+    assert [plate.name for plate in recording.plates] == ["2"]
+    (left_out,) = [f for f in recording.findings if f.level == "excluded"]
+    assert left_out.subject == "1" and "beside the feet" in left_out.found
 
 
 @pytest.mark.parametrize(
@@ -208,7 +208,7 @@ def test_layouts_that_ezc3d_alone_misreads(real_data, name, largest_N):
     assert np.max([p.force_N[:, 2].max() for p in recording.plates]) == pytest.approx(
         largest_N, abs=1
     )
-    assert np.nanmax([median_distance_m(recording, p) for p in recording.plates]) < 0.2
+    assert not [f for f in recording.findings if f.level == "excluded"]
 
 
 def test_the_same_trial_in_the_numbers_of_two_processors(real_data):

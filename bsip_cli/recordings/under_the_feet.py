@@ -1,0 +1,262 @@
+"""Is this the force under a foot? What one trial shows of one plate, and how likely a person is.
+
+One measure for every format and every way in which a plate's numbers may be misunderstood: centre
+of pressure against the feet on the ground, against the outline, its sway, and the moments at it.
+The scales are those of 130 sound plates of 40 public recordings: the centre of pressure lies within
+the feet's markers in the median and 85 mm beside them at most (sets with two markers on a foot);
+the vertical moment over the force is 3 mm, in golf swings 60.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from bsip_cli.recordings.plate_source import LeftMoment
+from bsip_cli.recordings.plates import cop_at_height
+
+BESIDE_M = 0.12
+"""Half a foot's length: a centre of pressure so far beside the feet is not under them."""
+
+_DISTANCE_M, _TORQUE_M, _LEVEL_M = 0.03, 0.015, 0.005  # where the likelihood begins to fall
+_LEVER_M = 0.05  # nobody stands nearer to the very middle of a plate but by chance
+_LEAST = 1e-9
+_OUTLINE = -4.6  # an outline is stated wrongly in one laboratory of a hundred
+_BALANCE_M = 0.06  # of the trunk's markers from the centre of pressure: median 40 mm
+_INDEPENDENT, _LEAST_SHARE, _HAIR_M = (
+    3.0,
+    1e-3,
+    1e-5,
+)  # samples that agree by chance, and how nearly
+_MOSTLY = 0.7  # force and acceleration go together, in one recording of seven they do not
+_OFTEN_SEEN, _FEWEST_FRAMES, _SLOW_HZ = 0.9, 10, 5.0
+_FURTHEST_M = 1e4
+_LOW_M = 0.17  # ankles and below
+_LIFT_M = 0.035  # over a marker's own lowest height: the foot is in the air
+_RIM_M = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Feet:
+    """Horizontal places of foot markers on the ground, (n, k, 2); NaN: in the air, unseen."""
+
+    points_m: np.ndarray
+
+    @classmethod
+    def of(cls, markers_m: np.ndarray, frames: np.ndarray, floor_m: float) -> Feet:
+        """From a trial's markers (n_frames, n_markers, 3), world frame, at some frames (n,)."""
+        height = markers_m[..., 2] - floor_m
+        lowest = _lowest(height)
+        feet = np.flatnonzero(lowest < _LOW_M)
+        points = markers_m[np.ix_(frames, feet)][..., :2].copy()
+        points[height[np.ix_(frames, feet)] - lowest[feet] > _LIFT_M] = np.nan
+        return cls(points)
+
+    def on(self, corners_m: np.ndarray | None) -> Feet:
+        """Those on a plate of these corners (4, 3), where any are, else all."""
+        if corners_m is None:
+            return self
+        centre = corners_m.mean(axis=0)[:2]
+        inside: np.ndarray = np.ones(self.points_m.shape[:2], bool)
+        for side in (corners_m[0] - corners_m[1], corners_m[0] - corners_m[3]):
+            length = np.linalg.norm(side[:2])
+            along = (self.points_m - centre) @ side[:2] / length
+            inside &= np.abs(along) <= length / 2 + _RIM_M
+        kept = np.where(inside[..., None], self.points_m, np.nan)
+        some = np.any(inside, axis=1, keepdims=True)
+        return Feet(np.where(some[..., None], kept, self.points_m))
+
+    def distance_m(self, places_m: np.ndarray) -> np.ndarray:
+        """Of places (n, 2) from the smallest area that holds the markers, (n,); NaN without any."""
+        k = self.points_m.shape[1]
+        best = np.full(len(places_m), np.nan)
+        for i in range(k):
+            for j in range(i, k):
+                gap = _to_line(places_m, self.points_m[:, i], self.points_m[:, j])
+                best = np.fmin(best, gap)
+        best[_is_among(places_m, self.points_m)] = 0.0
+        return best
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a reading makes of a plate's numbers in one trial [m]; NaN where it cannot be known.
+
+    distance_m : of the centre of pressure from the feet, mean; outside_m : from the outline, mean;
+    sway_m : its standard deviation; lever_m : its distance from the sensor as the moments have it;
+    torque_m, level_m : vertical and horizontal moment at it over the force, median; level_share :
+    of the horizontal moment as written, what a reading leaves [1].
+    """
+
+    distance_m: float
+    outside_m: float
+    sway_m: float
+    lever_m: float
+    torque_m: float
+    level_m: float
+    level_share: float
+
+    def log_likelihood(self) -> float:
+        """Up to a constant: how likely a person's foot makes such numbers, natural logarithm."""
+        terms = [
+            -2.0 * np.log1p((size / scale) ** 2)
+            for size, scale in (
+                (self.distance_m, _DISTANCE_M),
+                (self.torque_m, _TORQUE_M),
+                (self.level_m, _LEVEL_M),
+            )
+        ]
+        outside = -2.0 * np.log1p((self.outside_m / _DISTANCE_M) ** 2)
+        terms.append(np.clip(outside, _OUTLINE, 0.0))
+        terms.append(2.0 * np.log(np.clip(self.lever_m / _LEVER_M, _LEAST, 1.0)))
+        terms.append(-_INDEPENDENT * np.log(np.maximum(self.level_share, _LEAST_SHARE)))
+        return float(np.nansum(terms))
+
+    @classmethod
+    def mean(cls, found: Sequence[Evidence]) -> Evidence:
+        """Over several trials, of what is known in them."""
+        rows = np.array([[getattr(one, f.name) for f in fields(cls)] for one in found])
+        known = np.isfinite(rows)
+        count = np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+        return cls(*(np.where(known, rows, 0.0).sum(axis=0) / count).tolist())
+
+
+def evidence(
+    force_N: np.ndarray,
+    moment_Nm: np.ndarray,
+    left: LeftMoment | None,
+    lever_m: np.ndarray | None,
+    feet: Feet,
+    corners_m: np.ndarray | None,
+    floor_m: float,
+) -> Evidence:
+    """Of loaded samples: force (n, 3), moment about the world origin (n, 3), feet.
+
+    ``left``: what is left at the points that the file calls centres of pressure; ``lever_m`` (n,):
+    from the sensor to where its moments have the force, None where there is no sensor.
+    """
+    cop = np.clip(cop_at_height(force_N, moment_Nm, floor_m), -_FURTHEST_M, _FURTHEST_M)
+    known = np.isfinite(cop).all(axis=1)
+    if not known.any():
+        return Evidence(*[np.nan] * len(fields(Evidence)))
+    load = np.abs(force_N[:, 2])
+    torque = moment_Nm[:, 2] - cop[:, 0] * force_N[:, 1] + cop[:, 1] * force_N[:, 0]
+    gap = feet.on(corners_m).distance_m(cop)
+    return Evidence(
+        distance_m=float(np.nanmean(gap)) if np.isfinite(gap).any() else np.nan,
+        outside_m=np.nan if corners_m is None else float(np.nanmean(_outside(cop, corners_m))),
+        sway_m=_spread(cop[known]),
+        lever_m=np.nan if lever_m is None else float(np.sqrt(np.nanmean(lever_m**2))),
+        torque_m=float(np.nanmedian(np.abs(torque) / load)),
+        level_m=np.nan if left is None else float(np.nanmedian(left.read / load)),
+        level_share=np.nan if left is None else _share(left, load),
+    )
+
+
+def _spread(places_m: np.ndarray) -> float:
+    """Standard deviation of places (n, 2) about their median, 0 where nothing is known."""
+    known = places_m[np.isfinite(places_m).all(axis=1)]
+    if not len(known):
+        return 0.0
+    return float(np.sqrt(np.mean(np.sum((known - np.median(known, axis=0)) ** 2, axis=1))))
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """The mean of the trunk's markers, which moves much as the centre of mass does, at n samples.
+
+    place_m : horizontal, (n, 2); acceleration_m_s2 : horizontal, below 5 Hz, (n, 2).
+    """
+
+    place_m: np.ndarray
+    acceleration_m_s2: np.ndarray
+
+    @classmethod
+    def of(cls, markers_m: np.ndarray, rate_hz: float, frames: np.ndarray) -> Body:
+        """From a trial's markers (n_frames, n_markers, 3), world frame, at some frames (n,)."""
+        often = np.isfinite(markers_m[..., 0]).mean(axis=0) >= _OFTEN_SEEN
+        nothing = np.full((len(frames), 2), np.nan)
+        if not often.any() or len(markers_m) < _FEWEST_FRAMES:
+            return cls(nothing, nothing)
+        every = np.arange(len(markers_m))
+        place = np.zeros((len(markers_m), 2))
+        for k in np.flatnonzero(often):
+            known = np.isfinite(markers_m[:, k, 0])
+            for i in (0, 1):
+                place[:, i] += np.interp(every, every[known], markers_m[known, k, i])
+        place /= often.sum()
+        low = butter(2, min(_SLOW_HZ, 0.4 * rate_hz), fs=rate_hz, output="sos")
+        smooth = sosfiltfilt(low, place, axis=0, padlen=min(len(place) - 1, round(rate_hz)))
+        acceleration = np.gradient(np.gradient(smooth, axis=0), axis=0) * rate_hz**2
+        return cls(place[frames], acceleration[frames])
+
+    def log_likelihood(self, forces_N: Sequence[np.ndarray], cops_m: Sequence[np.ndarray]) -> float:
+        """Up to a constant: how likely these forces carry and drive this body, natural logarithm.
+
+        ``forces_N`` (n, 3) and ``cops_m`` (n, 2) of each plate, NaN where it is not loaded.
+        """
+        known = [np.isfinite(cop).all(axis=1)[:, None] for cop in cops_m]
+        force = np.array([np.where(k, f, 0.0) for k, f in zip(known, forces_N, strict=True)])
+        cop = np.array([np.where(k, c, 0.0) for k, c in zip(known, cops_m, strict=True)])
+        total = force.sum(axis=0)
+        stands = (total[:, 2] > 0) & np.isfinite(self.place_m).all(axis=1)
+        if not stands.any():
+            return 0.0
+        place = (force[..., 2:] * cop).sum(axis=0)[stands] / total[stands, 2:]
+        gap = np.linalg.norm(np.median(place - self.place_m[stands], axis=0))
+        follows = _correlation(total[stands, :2], self.acceleration_m_s2[stands])
+        return float(-2.0 * np.log1p((gap / _BALANCE_M) ** 2) + np.log1p(_MOSTLY * follows))
+
+
+def _correlation(some: np.ndarray, others: np.ndarray) -> float:
+    """Of two courses of vectors (n, 2) about their means, between -1 and 1."""
+    a, b = some - some.mean(axis=0), others - others.mean(axis=0)
+    size = np.sqrt((a**2).sum() * (b**2).sum())
+    return float((a * b).sum() / size) if size > 0 else 0.0
+
+
+def _share(left: LeftMoment, load_N: np.ndarray) -> float:
+    """Root mean square of what is left over that of what is written, to a hair of the force."""
+    hair = _HAIR_M * load_N.mean()
+    read, written = (np.sqrt(np.nanmean(x**2)) for x in (left.read, left.written))
+    return float((read + hair) / (written + hair))
+
+
+def _lowest(height_m: np.ndarray) -> np.ndarray:
+    """2nd percentile of each marker's heights (n_frames, n_markers), infinite if never seen."""
+    seen = np.isfinite(height_m)
+    columns = zip(height_m.T, seen.T, strict=True)
+    return np.array([np.percentile(z[k], 2) if k.any() else np.inf for z, k in columns])
+
+
+def _to_line(places: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Distance of each place from its line between two points, all (n, 2), (n,)."""
+    along = end - start
+    length2 = (along**2).sum(axis=1)
+    share = ((places - start) * along).sum(axis=1) / np.where(length2 > 0, length2, 1.0)
+    return np.linalg.norm(places - start - np.clip(share, 0, 1)[:, None] * along, axis=1)
+
+
+def _is_among(places: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Whether the points (n, k, 2) surround the place (n, 2): no half plane is without them."""
+    offset = points - places[:, None]
+    angle = np.sort(np.arctan2(offset[..., 1], offset[..., 0]), axis=1)  # NaN last
+    count = np.isfinite(angle).sum(axis=1)
+    first = angle[:, :1]
+    round_ = np.where(np.isfinite(angle), angle, first + 2 * np.pi)
+    gaps = np.diff(np.hstack([round_, first + 2 * np.pi]), axis=1) if points.shape[1] else first
+    return np.asarray((count >= 3) & (gaps.max(axis=1, initial=0.0) < np.pi))
+
+
+def _outside(cop_m: np.ndarray, corners_m: np.ndarray) -> np.ndarray:
+    """Distance of centres of pressure (n, 2) from the outline, 0 inside, (n,)."""
+    centre = corners_m.mean(axis=0)[:2]
+    beyond = np.zeros(len(cop_m))
+    for side in (corners_m[0] - corners_m[1], corners_m[0] - corners_m[3]):
+        length = np.linalg.norm(side[:2])
+        along = np.abs((cop_m - centre) @ side[:2] / length)
+        beyond = np.hypot(beyond, np.maximum(along - length / 2, 0.0))
+    return beyond

@@ -1,0 +1,178 @@
+"""What a plate's numbers mean is found by the feet, for all trials of a session alike."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bsip_cli.recordings.assemble import assemble, findings_about
+from bsip_cli.recordings.handedness import handedness
+from bsip_cli.recordings.settle import Scene, Survey, settle_session
+from bsip_cli.recordings.under_the_feet import Feet
+from tests.recordings.standing_on_two_plates import (
+    LABELS,
+    corners,
+    motion,
+    of_c3d,
+    of_table,
+    opened,
+)
+
+PLACE_OF_LAB = (0.6, 0.2, -0.04)
+FAULTS = {
+    "table, sound": (of_table, {}, ""),
+    "points in mm": (of_table, {"point_scale": 1e3}, "mm"),
+    "points in cm": (of_table, {"point_scale": 1e2}, "cm"),
+    "moments in N mm": (of_table, {"moment_scale": 1e3}, "N mm"),
+    "points in mm, moments in N mm": (
+        of_table,
+        {"point_scale": 1e3, "moment_scale": 1e3},
+        "N mm, read the points",
+    ),
+    "moments about the origin": (of_table, {"about": "origin"}, "laboratory's origin"),
+    "moments about each plate's centre": (of_table, {"about": "fixed"}, "about one point"),
+    "points in mm, moments about the centres in N mm": (
+        of_table,
+        {"about": "fixed", "point_scale": 1e3, "moment_scale": 1e3},
+        "about one point",
+    ),
+    "C3D, sound": (of_c3d, {}, ""),
+    "turned by 90 degrees": (of_c3d, {"turn": 1}, "90 degrees"),
+    "turned by 180 degrees": (of_c3d, {"turn": 2}, "180 degrees"),
+    "turned by 270 degrees": (of_c3d, {"turn": 3}, "270 degrees"),
+    "N m taken for N mm": (of_c3d, {"moment_scale": 1e-3}, "N m, a thousand times"),
+    "N mm taken for N m": (of_c3d, {"moment_scale": 1e3}, "N mm"),
+    "ORIGIN is a place in the lab": (
+        of_c3d,
+        {"origin_m": (0.0, 0.0, -0.04), "stated_origin_m": PLACE_OF_LAB},
+        "for a place",
+    ),
+    "the action on the plate": (of_c3d, {"sign": -1}, ""),
+}
+
+
+def _wrench(recording) -> np.ndarray:
+    return np.array([plate.wrench() for plate in recording.plates])
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_the_forces_of_the_person_come_back(name):
+    make, faults, words = FAULTS[name]
+    _, force, point = motion()
+    trial = opened(make(**faults))
+    session = settle_session([Survey.of(trial)])
+    found = findings_about(session)
+    assert all(words in f.action and f.level == "corrected" for f in found)
+    assert len(found) == (2 if words else 0)
+    wrench = _wrench(assemble(trial, session))
+    np.testing.assert_allclose(wrench[..., :3], force, atol=1e-6)
+    free = np.zeros_like(force)
+    free[..., 2] = 0.002 * force[..., 2]
+    np.testing.assert_allclose(wrench[..., 3:], np.cross(point, force) + free, atol=0.3)
+
+
+def test_exchanged_plates():
+    one, two = of_c3d()
+    trial = opened([replace(one, wrench=two.wrench), replace(two, wrench=one.wrench)])
+    session = settle_session([Survey.of(trial)])
+    assert [v.reading.place_of for v in session.plates.values()] == ["2", "1"]
+    sound = assemble(opened([one, two]), session_of())
+    np.testing.assert_allclose(_total(assemble(trial, session)), _total(sound), atol=1e-9)
+
+
+def _total(recording) -> np.ndarray:
+    return _wrench(recording).sum(axis=0)
+
+
+def session_of():
+    return settle_session([Survey.of(opened(of_c3d()))])
+
+
+@pytest.mark.parametrize("make", [of_c3d, of_table])
+def test_copies_and_sums_count_once(make):
+    one, two = make()
+    sum_ = replace(one, **_renamed(one, "3", _force(one) + _force(two)))
+    copy = replace(two, **_renamed(two, "4", _force(two)))
+    session = settle_session([Survey.of(opened([one, two, sum_, copy]))])
+    assert {n: v.repeats for n, v in session.plates.items() if v.repeats} == {
+        "3": ("1", "2"),
+        "4": ("2",),
+    }
+    assert [p.name for p in assemble(opened([one, two, sum_, copy]), session).plates] == ["1", "2"]
+
+
+def _force(source) -> np.ndarray:
+    return source.force_N if hasattr(source, "force_N") else source.wrench.force_N
+
+
+def _renamed(source, name: str, force: np.ndarray) -> dict:
+    if hasattr(source, "force_N"):
+        return {"name": name, "force_N": force}
+    description = replace(source.description, name=name)
+    return {"description": description, "wrench": replace(source.wrench, force_N=force)}
+
+
+def test_forces_that_no_reading_brings_under_the_feet_are_refused():
+    far = motion()[0] + np.array([3.0, -2.0, 0.0])
+    for make in (of_c3d, of_table):
+        trial = opened(make(), far)
+        session = settle_session([Survey.of(trial)])
+        assert [f.level for f in findings_about(session)] == ["excluded"] * 2
+        assert assemble(trial, session).plates == ()
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_mirrored_laboratory_is_turned_back(axis):
+    mirrored = Scene("all", axis).of(opened(of_table()))
+    markers = mirrored.recording.markers_m
+    mirrored = replace(mirrored, recording=replace(mirrored.recording, markers_m=markers))
+    session = settle_session([Survey.of(mirrored)])
+    assert session.scene.mirrored == "all"
+    there = assemble(mirrored, session)
+    assert handedness(there.labels, there.markers_m).parts["pelvis"] > 0.9
+    expected = _wrench(assemble(opened(of_table()), session_of()))
+    np.testing.assert_allclose(_wrench(there)[..., 2], expected[..., 2])  # up stays up
+
+
+def test_mirrored_markers_alone_leave_the_forces():
+    trial = Scene("markers", 1).of(opened(of_table()))
+    session = settle_session([Survey.of(trial)])
+    assert session.scene == Scene("markers", 1)
+    np.testing.assert_allclose(assemble(trial, session).markers_m, motion()[0])
+
+
+def test_mirrored_forces_alone_leave_the_markers():
+    trial = Scene("forces", 0).of(opened(of_table()))
+    session = settle_session([Survey.of(trial)])
+    assert session.scene == Scene("forces", 0)
+    np.testing.assert_allclose(
+        _wrench(assemble(trial, session)), _wrench(assemble(opened(of_table()), session_of()))
+    )
+
+
+def test_left_and_right_of_one_part_are_said():
+    markers = motion()[0]
+    order = [1, 0, 3, 2, *range(4, len(LABELS))]
+    trial = opened(of_table(), markers[:, order])
+    session = settle_session([Survey.of(trial)])
+    assert session.scene == Scene()
+    (said,) = [f for f in assemble(trial, session).findings if f.check == "labels"]
+    assert said.subject == "pelvis" and said.level == "warning"
+
+
+def test_distance_from_the_feet():
+    square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]] * 3)
+    places = np.array([[0.5, 0.4], [1.5, 0.5], [-3.0, -4.0]])
+    np.testing.assert_allclose(Feet(square).distance_m(places), [0.0, 0.5, 5.0])
+    two = square[:, :2].copy()
+    two[2] = np.nan
+    np.testing.assert_allclose(Feet(two).distance_m(places), [0.4, 0.5**0.5, np.nan])
+
+
+def test_feet_on_the_plate_count_before_all_others():
+    points = np.array([[[0.6, 0.2], [0.6, 0.8]], [[5.0, 5.0], [6.0, 6.0]]])
+    kept = Feet(points).on(corners(0)).points_m
+    assert np.isfinite(kept[0, 0]).all() and np.isnan(kept[0, 1]).all()
+    np.testing.assert_array_equal(kept[1], points[1])

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.units import length_name
 
 _PERSON_M = (0.25, 8.0)  # the markers' extent in one frame: a limb to two people
 _ANYTHING_M = (0.02, 30.0)  # a clearly stated unit is doubted only beyond this
 _FEWEST_MARKERS = 4
 _LARGEST_LAB_M = 100.0
-_SIZES = {1e-3: "mm", 1.0: "m", 1e-2: "cm"}
+_GUESSED_M = (1e-3, 1.0, 1e-2)  # mm, m, cm: what a file may be in that does not say it
 
 
 def settle_unit(
@@ -23,12 +24,12 @@ def settle_unit(
     markers' extent decides where it fits a person in another unit only.
     """
     extent = _extent(positions)
-    fitting = [size for size in _SIZES if _PERSON_M[0] <= extent * size <= _PERSON_M[1]]
+    fitting = [size for size in _GUESSED_M if _PERSON_M[0] <= extent * size <= _PERSON_M[1]]
     if stated_m is not None:
         is_possible = _ANYTHING_M[0] <= extent * stated_m <= _ANYTHING_M[1]
         if is_possible or not fitting:
-            spelt = stated.strip().lower() in _SIZES.values()
-            return stated_m, [] if spelt else [_finding(name, stated, stated_m, extent)]
+            is_plain = stated.strip().lower() in map(length_name, _GUESSED_M)
+            return stated_m, [] if is_plain else [_finding(name, stated, stated_m, extent)]
     size = fitting[0] if fitting else 1e-3 if extent > _PERSON_M[1] else 1.0
     return size, [_finding(name, stated, size, extent)]
 
@@ -68,6 +69,6 @@ def _finding(name: str, stated: str, size: float, extent: float) -> Finding:
         subject="points",
         found=f"{name} '{stated}', and the markers span {extent:.4g} of it",
         expected="m or mm, and the size of a person",
-        action=f"read lengths in {_SIZES[size]}",
+        action=f"read lengths in {length_name(size)}",
         level="corrected",
     )

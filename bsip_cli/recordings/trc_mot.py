@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +12,18 @@ from bsip_cli.files.force_files import forces_beside
 from bsip_cli.recordings import world
 from bsip_cli.recordings.analog import spike_samples
 from bsip_cli.recordings.assemble import why_no_forces
+from bsip_cli.recordings.force_times import UNEVEN, MarkerTimes, settle_force_times
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
 from bsip_cli.recordings.plates import LOADED_N
-from bsip_cli.recordings.timebase import MOST_HZ, even_grid, onto_grid
+from bsip_cli.recordings.timebase import (
+    MOST_HZ,
+    Grid,
+    counted,
+    even_grid,
+    in_seconds,
+    onto_grid,
+)
 from bsip_cli.recordings.trc import Trc, read_trc
 
 _VALUES_PER_BYTE = 5  # of both files: a grid of forces may need as much memory as c3d_guard allows
@@ -61,14 +69,25 @@ def _even_markers(
     trc: Trc, path: Path
 ) -> tuple[np.ndarray, float, np.ndarray, tuple[Finding, ...]]:
     """Times (n,), rate, positions (n, n_markers, 3) on an even grid, and what was done."""
-    if len(trc.time_s) < 2:
+    if len(trc.stamps.values) < 2:
         raise BadDataError(
-            f"{len(trc.time_s)} frame",
+            f"{len(trc.stamps.values)} frame",
             expected="at least 2 frames with times",
             remedy="export the whole trial",
             file=path,
         )
-    grid = even_grid(trc.time_s, trc.rate_hz)
+    stamps, findings = in_seconds(trc.stamps, trc.rates_hz)
+    if stamps is not None and trc.counts_frames:
+        stamps, about = counted(stamps, trc.rates_hz)
+        findings += about
+    if stamps is None:
+        raise BadDataError(
+            "times that count frames, and no DataRate",
+            expected="times in s, or the rate in the header",
+            remedy="export the trial with its rate",
+            file=path,
+        )
+    grid = even_grid(stamps, trc.rates_hz)
     if grid is None:
         raise BadDataError(
             "times that do not increase evenly",
@@ -76,7 +95,7 @@ def _even_markers(
             remedy="export the trial again",
             file=path,
         )
-    return grid.time_s, grid.rate_hz, onto_grid(grid, trc.time_s, trc.positions_m), grid.findings
+    return grid.time_s, grid.rate_hz, onto_grid(grid, trc.positions_m), (*findings, *grid.findings)
 
 
 def _up(trc: Trc, mot: Mot | None) -> world.Up:
@@ -96,8 +115,10 @@ def _up(trc: Trc, mot: Mot | None) -> world.Up:
 
 
 def _largest_loads(mot: Mot) -> tuple[np.ndarray, np.ndarray] | None:
-    force = np.concatenate([f.force_N for f in mot.forces])
-    point = np.concatenate([f.point for f in mot.forces])
+    pairs = [(f.force_N, f.point) for f in mot.forces if f.point is not None]
+    if not pairs:
+        return None
+    force, point = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     loaded = np.linalg.norm(np.nan_to_num(force), axis=1) > LOADED_N
     return (force[loaded], point[loaded]) if loaded.any() else None
 
@@ -120,21 +141,40 @@ def _plates(
     """Analog rate, plates, the reason for none, findings."""
     if mot is None:
         return marker_rate_hz, (), "no .mot file of the same name beside the .trc", ()
-    grid = even_grid(mot.time_s, float("nan"))
+    if note := _unplaced(mot):
+        return marker_rate_hz, (), note, mot.findings
+    settled = settle_force_times(mot.stamps, MarkerTimes(time_s[0], marker_rate_hz, len(time_s)))
+    findings = [*mot.findings, *settled.findings]
+    grid = even_grid(settled.stamps) if settled.stamps is not None else None
     if grid is None:
-        return marker_rate_hz, (), "the times of the .mot do not increase evenly", ()
+        note = settled.note or UNEVEN
+        return marker_rate_hz, (), note, tuple(findings)
     last = float(time_s[-1] - time_s[0]) * grid.rate_hz
     if 6 * last * len(mot.forces) > most_values:
-        note = f"the .mot has {len(mot.time_s)} rows and {last:.3g} would be needed beside the .trc"
-        return marker_rate_hz, (), note, ()
+        rows = len(mot.stamps.values)
+        note = f"the .mot has {rows} rows and {last:.3g} would be needed beside the .trc"
+        return marker_rate_hz, (), note, tuple(findings)
     action = _action(mot, up)
-    analog = replace(grid, time_s=time_s[0] + np.arange(round(last) + 1) / grid.rate_hz)
+    samples_s = time_s[0] + np.arange(round(last) + 1) / grid.rate_hz
     plates = tuple(
-        _plate(name, onto_grid(analog, mot.time_s, np.hstack([force, moment])), rotation)
+        _plate(name, onto_grid(grid, np.hstack([force, moment]), samples_s), rotation)
         for name, force, moment in zip(action.names, action.force_N, action.moment_Nm, strict=True)
     )
-    findings = [*mot.findings, *grid.findings, *action.findings, *_coverage(plates)]
+    findings += [*grid.findings, *action.findings, *_coverage(plates, grid, time_s)]
     return grid.rate_hz, plates, why_no_forces(plates), tuple(findings)
+
+
+def _unplaced(mot: Mot) -> str:
+    """Why the forces have no centre of pressure, or nothing."""
+    bare = [f.name for f in mot.forces if f.point is None and f.moment is None]
+    bare = [name for name in bare if np.nan_to_num(mot.forces[int(name) - 1].force_N).any()]
+    if not bare:
+        return ""
+    which = "" if len(bare) == len(mot.forces) else f" {' and '.join(bare)}"
+    return (
+        f"the .mot has no columns for the point and none for the moment of its forces{which}, "
+        "and without them no centre of pressure is known"
+    )
 
 
 def _action(mot: Mot, up: world.Up) -> _Action:
@@ -142,7 +182,7 @@ def _action(mot: Mot, up: world.Up) -> _Action:
     force = np.array([f.force_N for f in mot.forces])
     moment = np.array([_moment_about_origin(f, scale) for f in mot.forces])
     lift = force @ up.vector()
-    findings = []
+    findings = [*_about_missing(mot)]
     if scale != 1.0:
         findings.append(_finding("unit", "points of force beyond 20 m", "m", "read them in mm"))
     if np.nansum(lift) < 0:
@@ -156,8 +196,25 @@ def _action(mot: Mot, up: world.Up) -> _Action:
 
 
 def _moment_about_origin(force: GroundForce, scale_m: float) -> np.ndarray:
-    """p x F + T, (n, 3)."""
-    return np.cross(force.point * scale_m, force.force_N) + force.torque_Nm
+    """p x F + T, (n, 3); what the file does not have is zero."""
+    moment = np.zeros_like(force.force_N) if force.moment is None else force.moment
+    if force.point is None:
+        return moment
+    return np.cross(force.point * scale_m, force.force_N) + moment
+
+
+def _about_missing(mot: Mot) -> list[Finding]:
+    findings = []
+    for force in mot.forces:
+        if force.moment is None and force.point is not None:
+            found, action = "no columns for its moment", "took the free torque as zero"
+        elif force.point is None and force.moment is not None:
+            found, action = "no columns for its point", "took its moment about the lab's origin"
+        else:
+            continue
+        expected = "force, point and moment of each plate"
+        findings.append(Finding("columns", force.name, found, expected, action, "warning"))
+    return findings
 
 
 def _finding(check: str, found: str, expected: str, action: str) -> Finding:
@@ -170,7 +227,7 @@ def _plate(name: str, wrench: np.ndarray, rotation: np.ndarray) -> Plate:
     return Plate(name, wrench[:, :3] @ rotation.T, wrench[:, 3:] @ rotation.T, None, usable)
 
 
-def _coverage(plates: tuple[Plate, ...]) -> list[Finding]:
+def _coverage(plates: tuple[Plate, ...], grid: Grid, time_s: np.ndarray) -> list[Finding]:
     findings = []
     for plate in plates:
         missing = ~np.isfinite(plate.wrench()).all(axis=1)
@@ -178,7 +235,11 @@ def _coverage(plates: tuple[Plate, ...]) -> list[Finding]:
         n = len(missing)
         if missing.any():
             found = f"no force for {missing.sum()} of {n} samples of the markers' time"
-            findings.append(_lost("nan", plate, found, "forces as long as the markers"))
+            expected = (
+                f"forces as long as the markers, {time_s[0]:.4g} to {time_s[-1]:.4g} s (the file "
+                f"has {grid.samples_s[0]:.4g} to {grid.samples_s[-1]:.4g} s)"
+            )
+            findings.append(_lost("nan", plate, found, expected))
         if spikes.any():
             found = f"{spikes.sum()} of {n} samples leave their neighbours and come back at once"
             findings.append(_lost("spike", plate, found, "none"))

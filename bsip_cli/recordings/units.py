@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
-_LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-_LENGTH_WORDS = {"mete": "m", "milli": "mm", "centi": "cm"}  # meter, metre, millimeters, ...
+_LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+_LENGTH_WORDS = {  # how the words begin: meter, metre, millimeters, inches, feet, ...; C3D cuts them
+    "mete": "m",
+    "metr": "m",
+    "deci": "dm",
+    "centi": "cm",
+    "milli": "mm",
+    "inch": "in",
+    "foot": "ft",
+    "feet": "ft",
+}
+_LENGTH_SIGNS = {'"': "in", "''": "in", "\N{DOUBLE PRIME}": "in", "'": "ft", "\N{PRIME}": "ft"}
 
 
 def length_in_m(unit: str) -> float | None:
@@ -28,8 +38,16 @@ def moment_in_Nm(unit: str) -> float | None:
     return None
 
 
+def length_name(size_m: float) -> str:
+    """The short name of a unit of this size."""
+    return next(name for name, size in _LENGTHS.items() if size == size_m)
+
+
 def _length_name(unit: str) -> str:
-    word = unit.strip().lower()
+    word = unit.strip().lower().strip("[]().").strip()
+    word = _LENGTH_SIGNS.get(word, word)
+    if word[:-1] in _LENGTHS and word.endswith("s"):  # mms, ins
+        word = word[:-1]
     for start, name in _LENGTH_WORDS.items():
         if word.startswith(start):
             return name

@@ -1,0 +1,114 @@
+"""The times of a file of forces against those of the markers beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.timebase import LEAST_HZ, MOST_HZ, UNITS_S, Stamps, about_unit
+
+UNEVEN = "the times of the .mot do not increase evenly"
+_WHAT = "times of the forces"
+_UNIT_NAMES = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "milliseconds": 1e-3}
+_UNIT_NAMES |= {"us": 1e-6, "\N{MICRO SIGN}s": 1e-6, "microseconds": 1e-6}
+
+
+@dataclass(frozen=True)
+class MarkerTimes:
+    """When the markers were seen."""
+
+    first_s: float
+    rate_hz: float
+    n: int
+
+    def lasts_s(self) -> float:
+        return (self.n - 1) / self.rate_hz
+
+    def span(self) -> str:
+        return _span(self.first_s, self.first_s + self.lasts_s())
+
+
+@dataclass(frozen=True, eq=False)
+class ForceTimes:
+    """Stamps in seconds of the markers' clock, or why there are none."""
+
+    stamps: Stamps | None
+    findings: tuple[Finding, ...] = ()
+    note: str = ""
+
+
+def settle_force_times(stamps: Stamps, markers: MarkerTimes) -> ForceTimes:
+    """Unit and zero of the forces' times.
+
+    Of seconds, ms and microseconds that one by which forces and markers last alike; stamps that
+    count rows have the rate that makes a whole number of rows per frame. Forces that lie outside
+    the markers' time but last as long were counted from another zero.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        increase = np.isfinite(stamps.values).all() and stamps.step() > 0
+    if len(stamps.values) < 2 or not increase:
+        return ForceTimes(None, (), UNEVEN)
+    settled = _in_seconds(stamps, markers)
+    return _from_one_zero(settled, markers) if settled.stamps is not None else settled
+
+
+def _in_seconds(stamps: Stamps, markers: MarkerTimes) -> ForceTimes:
+    step, n = stamps.step(), len(stamps.values)
+    stated_s = _UNIT_NAMES.get(stamps.unit.strip().lower())
+    if stated_s is not None and stated_s != 1.0:
+        found = f"in {stamps.unit.strip()}"
+        return ForceTimes(stamps.times(stated_s), (about_unit(found, "read them so", _WHAT),))
+    if stamps.count():
+        ratio = round(n / markers.n)
+        if ratio >= 1 and abs(n - ratio * markers.n) <= ratio:
+            rate_hz = ratio * markers.rate_hz
+            action = f"took the first as the first frame's and {rate_hz:g} Hz"
+            own = stamps.times(1 / rate_hz, float(stamps.values[0]))
+            own = replace(own, values=own.values + markers.first_s)
+            return ForceTimes(own, (about_unit("that count rows", action, _WHAT),))
+    lasts = abs(float(stamps.values[-1] - stamps.values[0]))
+    possible = {
+        name: size
+        for name, size in {"s": 1.0, **UNITS_S}.items()
+        if LEAST_HZ <= 1 / (step * size) <= MOST_HZ
+    }
+    if not possible:
+        return ForceTimes(None, (), UNEVEN)
+    name = min(possible, key=lambda unit: abs(np.log(lasts * possible[unit] / markers.lasts_s())))
+    if name == "s":
+        return ForceTimes(stamps)
+    found = f"in {name}: {step:.4g} from row to row"
+    return ForceTimes(
+        stamps.times(possible[name]), (about_unit(found, f"read them in {name}", _WHAT),)
+    )
+
+
+def _from_one_zero(settled: ForceTimes, markers: MarkerTimes) -> ForceTimes:
+    """Both clocks zeroed alike where nothing else can be; a note where they share no time."""
+    assert settled.stamps is not None
+    times = settled.stamps.values
+    first, last = float(times.min()), float(times.max())
+    near = 1 / markers.rate_hz + settled.stamps.step()
+    markers_last = markers.first_s + markers.lasts_s()
+    if min(last, markers_last) - max(first, markers.first_s) > near:
+        return settled
+    own, theirs = _span(first, last), markers.span()
+    if abs((last - first) - markers.lasts_s()) > near:
+        note = f"the .mot has forces at {own} s, and the markers were seen at {theirs} s"
+        return replace(settled, stamps=None, note=note)
+    moved = replace(settled.stamps, values=times + (markers.first_s - times[0]))
+    finding = Finding(
+        check="time",
+        subject="",
+        found=f"forces at {own} s and markers at {theirs} s: as long, and never at once",
+        expected="one clock",
+        action="took their first samples as simultaneous",
+        level="corrected",
+    )
+    return replace(settled, stamps=moved, findings=(*settled.findings, finding))
+
+
+def _span(first_s: float, last_s: float) -> str:
+    return f"{first_s:.4g} to {last_s:.4g}" if last_s < 1e4 else f"{first_s:.6f} to {last_s:.6f}"

@@ -17,31 +17,20 @@ from bsip_cli.recordings.c3d_points import Points, read_points
 from bsip_cli.recordings.cop_near_feet import Scene
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.plates import local_wrench
-from bsip_cli.recordings.scene_size import settle_unit
-from bsip_cli.recordings.units import length_in_m
 
 
 def read_c3d(path: Path) -> Recording:
     """Markers and plates of a C3D file, SI, Z-up world frame."""
     content = read_content(path)
-    unit_m, unit_findings = _length_unit(content)
-    points = read_points(content, unit_m)
-    plates, plate_findings = read_plates(content, unit_m)
-    up = _up(content, points, plate_surfaces(content.group("FORCE_PLATFORM"), unit_m))
+    points = read_points(content, path)
+    plates, plate_findings = read_plates(content, points.unit_m)
+    up = _up(content, points, plate_surfaces(content.group("FORCE_PLATFORM"), points.unit_m))
     analog_rate_hz = content.rate_hz * content.samples_per_frame
     rotation = world.rotation_to_z_up(up)
     scene = Scene(points.positions_m @ rotation.T, content.rate_hz, analog_rate_hz)
     forces = settle_forces([_source(p, analog_rate_hz) for p in plates], rotation, scene)
-    findings = [*content.findings, *points.findings, *unit_findings, *plate_findings]
+    findings = [*content.findings, *points.findings, *plate_findings]
     return _recording(path, content, points, up, forces, findings)
-
-
-def _length_unit(content: Content) -> tuple[float, list[Finding]]:
-    """Size of the unit of points in metres."""
-    stated = "".join(texts(content.group("POINT"), "UNITS")[:1])
-    known = content.is_valid & (content.positions != 0).any(axis=-1)
-    seen = np.where(known[..., None], content.positions, np.nan)
-    return settle_unit(seen, stated, length_in_m(stated), "POINT:UNITS")
 
 
 def _up(content: Content, points: Points, surfaces: Sequence[np.ndarray]) -> world.Up:

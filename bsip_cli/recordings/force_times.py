@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bsip_cli.recordings.model import Finding
-from bsip_cli.recordings.timebase import LEAST_HZ, MOST_HZ, UNITS_S, Stamps, about_unit
+from bsip_cli.recordings.timebase import MOST_HZ, UNITS_S, Stamps, about_unit
 
 UNEVEN = "the times of the .mot do not increase evenly"
 _WHAT = "times of the forces"
@@ -72,7 +72,7 @@ def _in_seconds(stamps: Stamps, markers: MarkerTimes) -> ForceTimes:
     possible = {
         name: size
         for name, size in {"s": 1.0, **UNITS_S}.items()
-        if LEAST_HZ <= 1 / (step * size) <= MOST_HZ
+        if step * size * MOST_HZ >= 1
     }
     if not possible:
         return ForceTimes(None, (), UNEVEN)
@@ -92,7 +92,8 @@ def _from_one_zero(settled: ForceTimes, markers: MarkerTimes) -> ForceTimes:
     first, last = float(times.min()), float(times.max())
     near = 1 / markers.rate_hz + settled.stamps.step()
     markers_last = markers.first_s + markers.lasts_s()
-    if min(last, markers_last) - max(first, markers.first_s) > near:
+    together = min(last, markers_last) - max(first, markers.first_s)
+    if together > min(near, 0.5 * (last - first)):
         return settled
     own, theirs = _span(first, last), markers.span()
     if abs((last - first) - markers.lasts_s()) > near:

@@ -7,6 +7,7 @@ import numpy as np
 from bsip_cli.recordings.model import Finding
 
 _FRAMES_LOOKED_AT = 500
+_FEWEST_MARKERS = 4  # that make a volume
 _TOLD = 3
 
 
@@ -61,8 +62,9 @@ def _outside(positions: np.ndarray) -> np.ndarray:
     twice = np.flatnonzero(counts[which] > 1)
     pairs = np.unique(np.column_stack([which[twice], marker[twice]]), axis=0)[:, 0]
     shared = np.bincount(pairs, minlength=len(counts)) > 1
-    some = some[~shared[which]]
-    if not len(some):
+    seen = ~shared[which]
+    some, n_seen = some[seen], len(np.unique(marker[seen]))
+    if n_seen < _FEWEST_MARKERS:
         return np.zeros(positions.shape[:2], bool)
     low, high = np.percentile(some, [0.5, 99.5], axis=0)
     width = (high - low).max()

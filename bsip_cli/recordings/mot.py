@@ -6,7 +6,7 @@ import re
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,7 @@ _ROWS = re.compile(r"^(?:nrows\s*=|datarows)\s*(\d{1,12})$", re.IGNORECASE)
 _TIME = re.compile(r"^times?\b|^t$", re.IGNORECASE)
 _MOST_FORCES = 64  # as many plates are read of a C3D file
 _NAMES_TOLD = 12
+_ROWS_LOOKED_AT = 20  # to see how the table is written
 _NO_FORCE = 1e-9  # of the trial's largest force: where its point lies says nothing
 
 
@@ -113,13 +114,14 @@ def _read_table(lines: Iterator[str], first: str, path: Path) -> _Table:
     """The table below the line of names, which may be parted otherwise than its rows."""
     check_names(parted(first, separator_of(first)), "columns", path)
     rows = (line for line in lines if line.strip())
-    row, units = next(rows, ""), ""
-    if row and not any(np.isfinite(number(word)) for word in re.split(r"[\s;,]+", row)):
-        row, units = next(rows, ""), row
-    if not row:
+    top, units = list(islice(rows, _ROWS_LOOKED_AT)), ""
+    if top and not any(np.isfinite(number(word)) for word in re.split(r"[\s;,]+", top[0])):
+        units, *top = top
+    if not top:
         raise _no_table(path)
-    names, dialect = next(agreeing(first, row), (without_end(parted(first, separator_of(first))),
-                                                 Dialect(separator_of(row))))
+    mark = separator_of(first)
+    alone = without_end(parted(first, mark)), Dialect(mark)
+    names, dialect = next(agreeing(first, top), alone)
     if not names or not _TIME.match(names[0]):
         raise BadDataError(
             f"first column '{printable(names[0][:40]) if names else ''}'",
@@ -128,7 +130,7 @@ def _read_table(lines: Iterator[str], first: str, path: Path) -> _Table:
             file=path,
         )
     said = parted(units, separator_of(units))
-    values, digits, is_cut = _values(chain([row], rows), len(names), dialect, path)
+    values, digits, is_cut = _values(chain(top, rows), len(names), dialect, path)
     return _Table(
         names, said if len(said) == len(names) else [""] * len(names), values, digits, is_cut
     )

@@ -11,6 +11,8 @@ _PERSON_M = (0.25, 8.0)  # the markers' extent in one frame: a limb to two peopl
 _ANYTHING_M = (0.02, 30.0)  # a clearly stated unit is doubted only beyond this
 _FEWEST_MARKERS = 4
 _LARGEST_LAB_M = 100.0
+_FASTEST_M_S = 15.0  # half of the markers, half of the time: a sprinter's
+_SMOOTH = 0.2  # of the markers' distance from their middle: their second difference
 _GUESSED_M = (1e-3, 1.0, 1e-2)  # mm, m, cm: what a file may be in that does not say it
 
 
@@ -50,6 +52,31 @@ def without_absurd(positions_m: np.ndarray) -> list[Finding]:
             level="warning",
         )
     ]
+
+
+def move_like_markers(positions_m: np.ndarray, rate_hz: float) -> bool:
+    """Whether positions (n_frames, n_markers, 3) can only be those of markers on a person.
+
+    They are as far apart as a person is large, no two at one place, change from frame to frame,
+    no faster than people, and smoothly. Numbers that are none, or left from another trial's
+    memory, do not.
+    """
+    known = np.isfinite(positions_m).all(axis=-1)
+    if len(known) < 3 or not _PERSON_M[0] <= _extent(positions_m) <= _PERSON_M[1]:
+        return False
+    middle = np.nanmedian(positions_m[known.any(axis=1)], axis=0)
+    middle = middle[np.isfinite(middle).all(axis=1)]
+    if len(np.unique(middle, axis=0)) < max(len(middle), _FEWEST_MARKERS):
+        return False
+    steps = np.diff(positions_m, axis=0)
+    size = np.linalg.norm(steps, axis=-1)
+    size = size[np.isfinite(size)]
+    bend = np.linalg.norm(np.diff(steps, axis=0), axis=-1)
+    bend = bend[np.isfinite(bend)]
+    if not len(bend) or (size > 0).mean() < 0.5:
+        return False
+    spread = float(np.median(np.linalg.norm(middle - middle.mean(axis=0), axis=1)))
+    return bool(np.median(size) * rate_hz < _FASTEST_M_S and np.median(bend) < _SMOOTH * spread)
 
 
 def _extent(positions: np.ndarray) -> float:

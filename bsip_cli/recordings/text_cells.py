@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
 
@@ -41,14 +41,14 @@ def separator_of(line: str) -> str | None:
     return next((mark for mark in _SEPARATORS if mark is None or mark in line), None)
 
 
-def agreeing(heading: str, row: str) -> Iterator[tuple[list[str], Dialect]]:
-    """The heading's names and the row's dialect, wherever both have as many cells."""
+def agreeing(heading: str, rows: Sequence[str]) -> Iterator[tuple[list[str], Dialect]]:
+    """The heading's names and the rows' dialect, wherever the first row has as many cells."""
     for own in _SEPARATORS:
-        cells = without_end(parted(row, own))
+        cells = without_end(parted(rows[0], own))
         for mark in (own, *_SEPARATORS):
             names = without_end(parted(heading, mark))
             if len(names) == len(cells) > 1:
-                yield names, Dialect(own, own != "," and "," in row)
+                yield names, Dialect(own, own != "," and any("," in row for row in rows))
 
 
 def without_end(cells: list[str]) -> list[str]:

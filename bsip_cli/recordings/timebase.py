@@ -13,7 +13,7 @@ from bsip_cli.recordings.model import Finding
 _JITTER = 0.05  # of the sample interval: below it the stamps count as even
 _JUMP = 2.5  # sample intervals: above it the recording is torn
 MOST_HZ = 1e5  # no camera and no plate is faster
-LEAST_HZ = 5.0  # nobody records movement or forces more slowly
+_LONGEST_STEP_S = 1.0  # nobody records movement more slowly
 _SAME = 0.02  # of the sample interval: stamps that all lie on the grid
 _EXACT = 1e-3  # of the sample interval: a stamp that lies on the grid among others that do not
 _AGREE = 0.05  # of the sample interval: steps in another unit that give the stated rate
@@ -83,12 +83,12 @@ def in_seconds(
         for name, size in (*sizes.items(), *(counts.items() if whole else ())):
             if abs(step * size - 1 / rate) <= max(tolerance, stamps.digits[1] * size / 2):
                 return _as_unit(stamps, name, size)
-    if not step > 1 / LEAST_HZ:
+    if not step >= _LONGEST_STEP_S:
         return stamps, ()
     if stamps.count():
         return (_as_unit(stamps, stated[0], 1 / stated[0])) if stated else (None, ())
     for name, size in UNITS_S.items():
-        if step * size <= 1 / LEAST_HZ:
+        if step * size < _LONGEST_STEP_S:
             return _as_unit(stamps, name, size)
     return stamps, ()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 _LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 _LENGTH_WORDS = {  # how the words begin: meter, metre, millimeters, inches, feet, ...; C3D cuts them
     "mete": "m",
@@ -31,10 +33,12 @@ def force_in_N(unit: str) -> float | None:
 
 def moment_in_Nm(unit: str) -> float | None:
     """Size of a moment unit in N m; accepts Nm, N.mm, ntmm, Newton-meters."""
-    word = unit.strip().lower().replace(" ", "").replace(".", "").replace("*", "").replace("-", "")
+    word = re.sub(r"[\W_]", "", unit.lower())
+    size = 1000.0 if word.startswith("kn") else 1.0
     for force in ("newtons", "newton", "nt", "n"):
-        if word.startswith(force):
-            return length_in_m(word[len(force) :])
+        if word.removeprefix("k").startswith(force):
+            length_m = length_in_m(word.removeprefix("k")[len(force) :])
+            return None if length_m is None else size * length_m
     return None
 
 
@@ -44,7 +48,7 @@ def length_name(size_m: float) -> str:
 
 
 def _length_name(unit: str) -> str:
-    word = unit.strip().lower().strip("[]().").strip()
+    word = unit.strip().lower().strip("[](). ")
     word = _LENGTH_SIGNS.get(word, word)
     if word[:-1] in _LENGTHS and word.endswith("s"):  # mms, ins
         word = word[:-1]

@@ -13,7 +13,7 @@ _WORD = re.compile(r"[-_ .](?:grfs?|forces?)$", re.IGNORECASE)
 
 
 def trial_stem(forces: Path) -> str:
-    """The name of the trial whose forces a file holds: 'walk' of walk_grf.mot and walk-Forces.sto."""
+    """The name of the trial whose forces a file holds: 'walk' of walk_grf.mot."""
     return _WORD.sub("", forces.stem)
 
 

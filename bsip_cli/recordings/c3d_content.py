@@ -82,7 +82,7 @@ def read_content(path: Path) -> Content:
 
 
 def _written(raw: bytes, header: Header, layout: Layout, scale: float) -> np.ndarray:
-    """Positions (n_frames, n_points, 3) also of points marked as invalid, for which ezc3d has NaN."""
+    """Positions (n_frames, n_points, 3), also of invalid points, for which ezc3d has NaN."""
     data = raw[layout.start : layout.start + layout.n_bytes]
     words = floats(data, header.processor) if layout.is_float else scale * integers(data)
     points = words.reshape(-1, layout.words_per_frame)[:, : 4 * layout.n_points]

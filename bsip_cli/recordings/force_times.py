@@ -70,9 +70,7 @@ def _in_seconds(stamps: Stamps, markers: MarkerTimes) -> ForceTimes:
             return ForceTimes(own, (about_unit("that count rows", action, _WHAT),))
     lasts = abs(float(stamps.values[-1] - stamps.values[0]))
     possible = {
-        name: size
-        for name, size in {"s": 1.0, **UNITS_S}.items()
-        if step * size * MOST_HZ >= 1
+        name: size for name, size in {"s": 1.0, **UNITS_S}.items() if step * size * MOST_HZ >= 1
     }
     if not possible:
         return ForceTimes(None, (), UNEVEN)

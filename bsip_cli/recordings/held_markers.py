@@ -31,7 +31,7 @@ def held_markers(markers_m: np.ndarray) -> np.ndarray:
     if not same.any():
         return held
     digit_m = _last_digit(markers_m)
-    for marker in np.flatnonzero(same.any(axis=0)):
+    for marker in map(int, np.flatnonzero(same.any(axis=0))):
         still = runs(same[:, marker])
         neighbours = _nearest(markers_m, marker)
         for start, stop in still[np.diff(still, axis=1)[:, 0] >= _LEAST_FRAMES - 1]:
@@ -49,7 +49,7 @@ def held_markers(markers_m: np.ndarray) -> np.ndarray:
 
 def _last_digit(markers_m: np.ndarray) -> float:
     """The smallest step of any coordinate: the size of its last digit."""
-    steps = np.abs(np.diff(markers_m[: 2000], axis=0))
+    steps = np.abs(np.diff(markers_m[:2000], axis=0))
     return float(np.min(steps[steps > 0], initial=np.inf))
 
 

@@ -33,9 +33,7 @@ def without_sentinels(positions: np.ndarray) -> list[Finding]:
     positions[frames[is_none], markers[is_none]] = np.nan
     counts = np.bincount(which[is_none], minlength=len(places))
     often = np.argsort(-counts, kind="stable")[:_TOLD]
-    told = " and ".join(
-        f"({', '.join(f'{x:.7g}' for x in places[k])})" for k in often if counts[k]
-    )
+    told = " and ".join(f"({', '.join(f'{x:.7g}' for x in places[k])})" for k in often if counts[k])
     more = ", and others" if (counts > 0).sum() > _TOLD else ""
     return [
         Finding(

@@ -78,8 +78,14 @@ def read_mot(path: Path) -> Mot:
     findings = row_counts("rows of forces", _stated_rows(header), len(table.values))
     if table.is_cut:
         findings.append(
-            Finding("layout", "", "the last row of forces is cut", "a complete file",
-                    "left that row out", "warning")
+            Finding(
+                "layout",
+                "",
+                "the last row of forces is cut",
+                "a complete file",
+                "left that row out",
+                "warning",
+            )
         )
     times = table.values[:, 0]
     forces, about_columns = _forces(table, path)
@@ -210,7 +216,7 @@ def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Fi
         )
     used = {0}
     read = [_force(str(k + 1), plate, table, used, path) for k, plate in enumerate(plates)]
-    largest = max((np.abs(f.force_N[np.isfinite(f.force_N)]).max(initial=0) for f in read))
+    largest = max(np.abs(f.force_N[np.isfinite(f.force_N)]).max(initial=0) for f in read)
     forces = tuple(_without_idle(force, _NO_FORCE * largest) for force in read)
     return forces, _about_columns([n for i, n in enumerate(table.names) if i not in used])
 
@@ -235,8 +241,8 @@ def _force(
     force, point = found["force"], found.get("point")
     one, other = found.get("torque"), found.get("moment")
     moment = one or other if point else other or one
-    for columns in (force, point, moment):
-        used.update(columns or ())
+    for chosen in (force, point, moment):
+        used.update(chosen or ())
     assert force is not None
     return GroundForce(
         name,

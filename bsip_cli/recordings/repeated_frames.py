@@ -71,9 +71,7 @@ def _about_frames(recording: Recording, frames: np.ndarray) -> Finding:
 
 def _about_markers(recording: Recording, held: np.ndarray) -> Finding:
     own = np.flatnonzero(held.any(axis=0))
-    told = [
-        f"{recording.labels[k]} at {_spans(recording, held[:, k])}" for k in own[:_SPANS_TOLD]
-    ]
+    told = [f"{recording.labels[k]} at {_spans(recording, held[:, k])}" for k in own[:_SPANS_TOLD]]
     more = f" and {len(own) - _SPANS_TOLD} more markers" if len(own) > _SPANS_TOLD else ""
     return Finding(
         check="held_markers",

@@ -9,9 +9,7 @@ from math import isfinite, nan
 
 import numpy as np
 
-_MISSING = re.compile(
-    r"[-+]?(?:nan\b.*|#?n/?a|none|null|1\.#.*|inf|infinity|-|\.)?", re.IGNORECASE
-)
+_MISSING = re.compile(r"[-+]?(?:nan\b.*|#?n/?a|none|null|1\.#.*|inf|infinity|-|\.)?", re.IGNORECASE)
 _SEPARATORS = ("\t", ";", ",", None)  # None: blanks
 
 

@@ -109,7 +109,9 @@ def counted(stamps: Stamps, rates_hz: Sequence[float]) -> tuple[Stamps, tuple[Fi
     return Stamps(np.arange(len(stamps.values)) / rate_hz), (finding,)
 
 
-def _as_unit(stamps: Stamps, name: str | float, size_s: float) -> tuple[Stamps, tuple[Finding, ...]]:
+def _as_unit(
+    stamps: Stamps, name: str | float, size_s: float
+) -> tuple[Stamps, tuple[Finding, ...]]:
     """In seconds, and what was done; a rate as name: they count frames."""
     if name == "s":
         return stamps, ()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 _LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-_LENGTH_WORDS = {  # how the words begin: meter, metre, millimeters, inches, feet, ...; C3D cuts them
+_LENGTH_WORDS = {  # how the words begin: meter, metre, millimeters, inches, feet; C3D cuts them
     "mete": "m",
     "metr": "m",
     "deci": "dm",

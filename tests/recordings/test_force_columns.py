@@ -27,12 +27,21 @@ DIALECTS = {  # force, point, moment of two plates
     "plate in front": ("FP{p}_F{a}", "FP{p}_COP{a}", "FP{p}_M{a}", "1 2"),
     "axis last": ("F{p}{A}", "P{p}{A}", "M{p}{A}", "1 2"),
     "plate last": ("F{a}{p}", "COP_{a}_{p}", "M{a}{p}", "1 2"),
-    "spelt": ("Force Plate {p}.Fx".replace("x", "{a}"), "Force Plate {p} CoP{a}",
-              "Force Plate {p} Free Moment {A}", "A B"),
+    "spelt": (
+        "Force Plate {p}.Fx".replace("x", "{a}"),
+        "Force Plate {p} CoP{a}",
+        "Force Plate {p} Free Moment {A}",
+        "A B",
+    ),
     "camel": ("{p}ForceX".replace("X", "{A}"), "{p}COP{A}", "{p}Torque{A}", "Left Right"),
     "brackets": ("F{a}_{p} (N)", "COP{a}_{p} (m)", "T{a}_{p} (Nm)", "1 2"),
     "visual3d": ("{p}_GRF_{A}", "{p}_COP_{A}", "{p}_FREEMOMENT_{A}", "LEFT RIGHT"),
-    "brand": ("AMTI {p} Force {A}", "AMTI {p} Centre of Pressure {A}", "AMTI {p} Moment {A}", "1 2"),
+    "brand": (
+        "AMTI {p} Force {A}",
+        "AMTI {p} Centre of Pressure {A}",
+        "AMTI {p} Moment {A}",
+        "1 2",
+    ),
     "one letter": ("{p}F{a}", "{p}P{a}", "{p}T{a}", "L R"),
     "upper": ("GROUND_FORCE_{p}_V{A}", "GROUND_FORCE_{p}_P{A}", "GROUND_MOMENT_{p}_M{A}", "1 2"),
 }
@@ -96,7 +105,9 @@ def test_columns_that_are_not_understood_are_named(tmp_path):
     more = {f"emg {k}": np.zeros(N) for k in range(15)} | {"pelvis_tx": np.zeros(N)}
     (finding,) = read_mot(_write(tmp_path / "a.mot", _columns("opensim") | more)).findings
     assert finding.level == "info"
-    assert finding.found.startswith("16 columns of the forces that are not understood: emg 0, emg 1")
+    assert finding.found.startswith(
+        "16 columns of the forces that are not understood: emg 0, emg 1"
+    )
     assert finding.found.endswith("emg 11 and 4 more")
 
 
@@ -127,7 +138,9 @@ def _decimal_commas(text: str) -> str:
 
 
 EDITS = {
-    "blank lines": lambda text: text.replace("endheader\n", "endheader\n\n\n").replace("\n0.3", "\n\n0.3"),
+    "blank lines": lambda text: text.replace("endheader\n", "endheader\n\n\n").replace(
+        "\n0.3", "\n\n0.3"
+    ),
     "no endheader": lambda text: text.split("endheader\n")[1],
     "blanks": lambda text: text.replace("\t", "    "),
     "padded": lambda text: text.replace("\t", "\t      ").replace("\n0", "\n     0"),
@@ -155,7 +168,9 @@ def test_layouts_of_the_table(tmp_path, edit):
 
 
 def test_a_row_of_units_is_kept_as_what_the_file_says(tmp_path):
-    units = "s\t" + "\t".join(["kN"] * 3 + ["mm"] * 3 + ["N.mm"] * 3 + ["N"] * 3 + ["m"] * 3 + [""] * 3)
+    units = "s\t" + "\t".join(
+        ["kN"] * 3 + ["mm"] * 3 + ["N.mm"] * 3 + ["N"] * 3 + ["m"] * 3 + [""] * 3
+    )
     edit = lambda text: text.replace("\n0\t", f"\n{units}\n0\t", 1)  # noqa: E731
     one, other = read_mot(_write(tmp_path / "a.mot", _columns("nexus"), edit)).forces
     assert (one.point_unit, one.moment_unit) == ("mm", "N.mm")
@@ -163,10 +178,14 @@ def test_a_row_of_units_is_kept_as_what_the_file_says(tmp_path):
     np.testing.assert_allclose(one.force_N[:, 0], 1000 * _values()["000"])
     np.testing.assert_allclose(other.force_N[:, 0], _values()["100"])
     with pytest.raises(BadDataError, match="forces in 'V'"):
-        read_mot(_write(tmp_path / "a.mot", _columns("nexus"), lambda t: edit(t).replace("kN", "V")))
+        read_mot(
+            _write(tmp_path / "a.mot", _columns("nexus"), lambda t: edit(t).replace("kN", "V"))
+        )
 
 
-@pytest.mark.parametrize("word", ["nan", "NaN", "NAN", "", "-nan", "inf", "-nan(ind)", "N/A", "1.#QNAN"])
+@pytest.mark.parametrize(
+    "word", ["nan", "NaN", "NAN", "", "-nan", "inf", "-nan(ind)", "N/A", "1.#QNAN"]
+)
 def test_spellings_of_a_missing_number(tmp_path, word):
     path = _write(tmp_path / "a.mot", _columns("opensim"))
     rows = path.read_text().splitlines()
@@ -178,7 +197,9 @@ def test_spellings_of_a_missing_number(tmp_path, word):
 
 
 def test_a_word_amid_the_numbers_is_refused(tmp_path):
-    path = _write(tmp_path / "a.mot", _columns("opensim"), lambda text: text.replace("\t112.5", "\toff"))
+    path = _write(
+        tmp_path / "a.mot", _columns("opensim"), lambda text: text.replace("\t112.5", "\toff")
+    )
     with pytest.raises(BadDataError, match="'off' is no number"):
         read_mot(path)
 

@@ -152,9 +152,7 @@ def test_a_marker_that_never_moves_is_left_alone_where_it_is_no_float(tmp_path):
 def test_held_markers_are_gaps_and_named(tmp_path):
     markers = _walking()
     _held(markers, 4, 60, 90)
-    recording = read_recording(
-        write_c3d(tmp_path / "a.c3d", markers, [f"M{k}" for k in range(K)])
-    )
+    recording = read_recording(write_c3d(tmp_path / "a.c3d", markers, [f"M{k}" for k in range(K)]))
     marked, (finding,) = without_repeats(recording)
     assert finding.check == "held_markers" and "M4 at 0.60 to 0.89 s" in finding.found
     assert np.isnan(marked.markers_m[..., 0]).sum() == 30

@@ -39,7 +39,9 @@ def _trc(tmp_path, stamps, stated_hz=100.0, header=lambda text: text, n=N):
 def _mot(tmp_path, stamps, n=None):
     force, _ = standing_wrench(len(stamps))
     columns = np.hstack([force[:, [0, 2, 1]], 0.2 + 0 * force, 0 * force])
-    path = write_mot(tmp_path / "a.mot", np.arange(len(stamps)), dict(zip(FORCE, columns.T)))
+    path = write_mot(
+        tmp_path / "a.mot", np.arange(len(stamps)), dict(zip(FORCE, columns.T, strict=True))
+    )
     lines = path.read_text().splitlines()
     rows = [line.split("\t")[1:] for line in lines[-len(stamps) :]]
     rows = ["\t".join([stamp, *row]) for stamp, row in zip(stamps, rows, strict=True)]
@@ -61,8 +63,20 @@ def _is_whole(recording, rate_hz, start_s, within_s):
 
 @pytest.mark.parametrize(
     ("rate_hz", "digits"),
-    [(120, 2), (240, 2), (240, 3), (1000 / 3, 3), (59.94, 2), (59.94, 3), (60, 2), (500, 2), (85, 3),
-     (100, 6), (250, 4), (119.88, 2)],
+    [
+        (120, 2),
+        (240, 2),
+        (240, 3),
+        (1000 / 3, 3),
+        (59.94, 2),
+        (59.94, 3),
+        (60, 2),
+        (500, 2),
+        (85, 3),
+        (100, 6),
+        (250, 4),
+        (119.88, 2),
+    ],
 )
 @pytest.mark.parametrize("start_s", [0.0, 12.34, 43_217.508])
 @pytest.mark.parametrize("is_cut", [False, True])
@@ -87,7 +101,9 @@ def test_the_stamps_own_rate_where_the_stated_one_cannot_be(tmp_path, true_hz, s
 @pytest.mark.parametrize("stated", ["", "0", "unknown"])
 def test_without_a_stated_rate(tmp_path, stated):
     stamps = [f"{k / 120:.2f}" for k in range(N)]
-    path = _trc(tmp_path, stamps, 120.0, lambda text: text.replace("120\t120", f"{stated}\t{stated}"))
+    path = _trc(
+        tmp_path, stamps, 120.0, lambda text: text.replace("120\t120", f"{stated}\t{stated}")
+    )
     _is_whole(read_recording(path), 120.0, 0.0, 0.01)
 
 
@@ -136,9 +152,13 @@ def test_every_second_frame_of_an_original_rate(tmp_path):
         text = text.replace("Units\n", "Units\tOrigDataRate\n", 1)
         return text.replace("\tmm\n", "\tmm\t200\n", 1)
 
-    recording = read_recording(_trc(tmp_path, [f"{1 + 2 * k}" for k in range(N)], 100.0, with_original))
+    recording = read_recording(
+        _trc(tmp_path, [f"{1 + 2 * k}" for k in range(N)], 100.0, with_original)
+    )
     _is_whole(recording, 100.0, 0.0, 1e-9)
-    sound = read_recording(_trc(tmp_path, [f"{k / 100:.2f}" for k in range(N)], 100.0, with_original))
+    sound = read_recording(
+        _trc(tmp_path, [f"{k / 100:.2f}" for k in range(N)], 100.0, with_original)
+    )
     assert _said(sound) == []
 
 
@@ -208,7 +228,9 @@ def test_another_zero_of_the_forces_is_corrected_where_it_is_certain(tmp_path):
     recording = _pair(tmp_path, [f"{k / 1000:.3f}" for k in range(10 * N)], 12.3)
     assert recording.plates[0].usable.all()
     ((found, action),) = _said(recording)
-    assert found == "forces at 0 to 3.999 s and markers at 12.3 to 16.29 s: as long, and never at once"
+    assert (
+        found == "forces at 0 to 3.999 s and markers at 12.3 to 16.29 s: as long, and never at once"
+    )
     assert action == "took their first samples as simultaneous"
 
 
@@ -226,7 +248,9 @@ def test_forces_that_cover_a_part_are_said_with_both_times(tmp_path):
     assert "1 to 4.99 s (the file has 0 to 3.999 s)" in finding.expected
 
 
-@pytest.mark.parametrize("stamp", [lambda k: f"{20 * k}", lambda k: f"{20_000 * k}", lambda k: f"{k}"])
+@pytest.mark.parametrize(
+    "stamp", [lambda k: f"{20 * k}", lambda k: f"{20_000 * k}", lambda k: f"{k}"]
+)
 def test_no_grid_is_longer_than_both_files(tmp_path, stamp):
     _mot(tmp_path, [f"{k / 2000:.4f}" for k in range(2000)])
     path = _trc(tmp_path, [stamp(k) for k in range(N)], 50.0)

@@ -175,7 +175,14 @@ def test_a_stated_unit_that_no_person_fits(tmp_path, word):
 
 @pytest.mark.parametrize(
     ("word", "size"),
-    [("N\N{MIDDLE DOT}mm", 1e-3), ("N m", 1.0), ("kN.m", 1e3), ("Nm", 1.0), ("N-mm", 1e-3), ("V", None)],
+    [
+        ("N\N{MIDDLE DOT}mm", 1e-3),
+        ("N m", 1.0),
+        ("kN.m", 1e3),
+        ("Nm", 1.0),
+        ("N-mm", 1e-3),
+        ("V", None),
+    ],
 )
 def test_units_of_moment(word, size):
     assert moment_in_Nm(word) == size

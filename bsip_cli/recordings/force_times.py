@@ -55,7 +55,7 @@ def settle_force_times(stamps: Stamps, markers: MarkerTimes) -> ForceTimes:
 
 
 def _in_seconds(stamps: Stamps, markers: MarkerTimes) -> ForceTimes:
-    step, n = stamps.step(), len(stamps.values)
+    step, n, near_s = stamps.step(), len(stamps.values), 1 / markers.rate_hz
     stated_s = _UNIT_NAMES.get(stamps.unit.strip().lower())
     if stated_s is not None and stated_s != 1.0:
         found = f"in {stamps.unit.strip()}"
@@ -68,6 +68,9 @@ def _in_seconds(stamps: Stamps, markers: MarkerTimes) -> ForceTimes:
             own = stamps.times(1 / rate_hz, float(stamps.values[0]))
             own = replace(own, values=own.values + markers.first_s)
             return ForceTimes(own, (about_unit("that count rows", action, _WHAT),))
+        if stamps.values[0] < 2 or abs(stamps.values[0] / 1e3 - markers.first_s) > near_s:
+            note = f"the times of the .mot count {n} rows, and none of its rates has as many in "
+            return ForceTimes(None, (), f"{note}the {markers.n} frames of the markers")
     lasts = abs(float(stamps.values[-1] - stamps.values[0]))
     possible = {
         name: size for name, size in {"s": 1.0, **UNITS_S}.items() if step * size * MOST_HZ >= 1
@@ -91,10 +94,21 @@ def _from_one_zero(settled: ForceTimes, markers: MarkerTimes) -> ForceTimes:
     near = 1 / markers.rate_hz + settled.stamps.step()
     markers_last = markers.first_s + markers.lasts_s()
     together = min(last, markers_last) - max(first, markers.first_s)
-    if together > min(near, 0.5 * (last - first)):
-        return settled
     own, theirs = _span(first, last), markers.span()
-    if abs((last - first) - markers.lasts_s()) > near:
+    is_as_long = abs((last - first) - markers.lasts_s()) <= near
+    if together > min(near, 0.5 * (last - first)):
+        if not is_as_long or abs(first - markers.first_s) <= near:
+            return settled
+        doubt = Finding(
+            check="time",
+            subject="",
+            found=f"forces at {own} s and markers at {theirs} s: as long, and not at once",
+            expected="one clock",
+            action="took both as written; if they were cut alike, give them the same first time",
+            level="warning",
+        )
+        return replace(settled, findings=(*settled.findings, doubt))
+    if not is_as_long:
         note = f"the .mot has forces at {own} s, and the markers were seen at {theirs} s"
         return replace(settled, stamps=None, note=note)
     moved = replace(settled.stamps, values=times + (markers.first_s - times[0]))

@@ -18,6 +18,7 @@ from bsip_cli.recordings.text_cells import (
     Dialect,
     LastDigit,
     agreeing,
+    dialect_of,
     is_missing,
     number,
     parted,
@@ -62,6 +63,7 @@ class _Table:
     values: np.ndarray  # (n, n_columns), NaN = missing
     time_digits: LastDigit
     is_cut: bool
+    dialect: Dialect
 
 
 def read_mot(path: Path) -> Mot:
@@ -87,6 +89,7 @@ def read_mot(path: Path) -> Mot:
                 "warning",
             )
         )
+    findings += table.dialect.about_commas()
     times = table.values[:, 0]
     forces, about_columns = _forces(table, path)
     stamps = Stamps(times, table.time_digits.sizes(times), _unit(table, 0))
@@ -126,7 +129,7 @@ def _read_table(lines: Iterator[str], first: str, path: Path) -> _Table:
     if not top:
         raise _no_table(path)
     mark = separator_of(first)
-    alone = without_end(parted(first, mark)), Dialect(mark)
+    alone = without_end(parted(first, mark)), dialect_of(mark, top)
     names, dialect = next(agreeing(first, top), alone)
     if not names or not _TIME.match(names[0]):
         raise BadDataError(
@@ -137,9 +140,8 @@ def _read_table(lines: Iterator[str], first: str, path: Path) -> _Table:
         )
     said = parted(units, separator_of(units))
     values, digits, is_cut = _values(chain(top, rows), len(names), dialect, path)
-    return _Table(
-        names, said if len(said) == len(names) else [""] * len(names), values, digits, is_cut
-    )
+    units_of = said if len(said) == len(names) else [""] * len(names)
+    return _Table(names, units_of, values, digits, is_cut, dialect)
 
 
 def _values(

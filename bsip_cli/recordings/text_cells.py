@@ -9,7 +9,10 @@ from math import isfinite, nan
 
 import numpy as np
 
+from bsip_cli.recordings.model import Finding
+
 _MISSING = re.compile(r"[-+]?(?:nan\b.*|#?n/?a|none|null|1\.#.*|inf|infinity|-|\.)?", re.IGNORECASE)
+_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
 _SEPARATORS = ("\t", ";", ",", None)  # None: blanks
 
 
@@ -18,13 +21,26 @@ class Dialect:
     """How a table is written."""
 
     separator: str | None  # None: blanks, any number of them
-    has_decimal_commas: bool = False
+    comma: str = ","  # what a comma within a number means: "." or "" between thousands
 
     def cells(self, line: str) -> list[str]:
         """The cells of a row, empty ones at its end too."""
-        if self.has_decimal_commas:
-            line = line.replace(",", ".")
-        return parted(line, self.separator)
+        return parted(line.replace(",", self.comma), self.separator)
+
+    def about_commas(self) -> list[Finding]:
+        """What is said of commas within numbers."""
+        if self.separator == "," or self.comma == ",":
+            return []
+        found = "decimal commas" if self.comma else "commas between thousands"
+        return [Finding("layout", "", found, "decimal points", "read them so", "corrected")]
+
+
+def dialect_of(separator: str | None, rows: Sequence[str]) -> Dialect:
+    """The dialect of rows: commas in all numbers above 999 only are between thousands."""
+    if separator == "," or not any("," in row for row in rows):
+        return Dialect(separator)
+    cells = [cell for row in rows for cell in parted(row, separator) if "," in cell]
+    return Dialect(separator, "" if all(map(_THOUSANDS.fullmatch, cells)) else ".")
 
 
 def parted(line: str, separator: str | None) -> list[str]:
@@ -46,7 +62,7 @@ def agreeing(heading: str, rows: Sequence[str]) -> Iterator[tuple[list[str], Dia
         for mark in (own, *_SEPARATORS):
             names = without_end(parted(heading, mark))
             if len(names) == len(cells) > 1:
-                yield names, Dialect(own, own != "," and any("," in row for row in rows))
+                yield names, dialect_of(own, rows)
 
 
 def without_end(cells: list[str]) -> list[str]:

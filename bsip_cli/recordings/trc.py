@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from array import array
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, islice
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from bsip_cli.recordings.scene_size import settle_unit, without_absurd
 from bsip_cli.recordings.text_cells import (
     Dialect,
     LastDigit,
+    dialect_of,
     is_missing,
     number,
     parted,
@@ -59,14 +60,12 @@ def read_trc(path: Path) -> Trc:
         )
     fields = _header_fields(above)
     mark = separator_of(heading)
-    names = [printable(name) for name in _names(heading, mark)]
+    names, are_apart = _names(heading, mark)
     check_names([name for name in names if name], "labels", path)
     axes = next(lines, "").split()  # X1, Y1, Z1, X2, ...
-    if len(axes) == 3 * sum(map(bool, names)):
-        names = [name for name in names if name]
     first = list(islice((line for line in lines if line.strip()), _ROWS_LOOKED_AT))
-    dialect = Dialect(mark, mark != "," and any("," in line for line in first))
-    rows = _Rows(names, dialect, path)
+    are_counted = are_apart and len(axes) == 3 * len(names)
+    rows = _Rows(_Heading(names, are_apart, are_counted), dialect_of(mark, first), path)
     rows.read(chain(first, lines))
     labels, positions = rows.labelled()
     about_points = without_sentinels(positions)
@@ -91,18 +90,21 @@ def read_trc(path: Path) -> Trc:
     )
 
 
-def _names(line: str, mark: str | None) -> list[str]:
+def _names(line: str, mark: str | None) -> tuple[list[str], bool]:
     """Names of the trajectories behind 'Frame#' and 'Time', '' for one without a name.
 
-    In a line whose names stand at every third place, an empty place is a trajectory.
+    Names stand three places apart, or another number; where one is missing, a place is empty.
+    False: they stand anyhow, and the empty places say nothing.
     """
     if mark is None:
-        return _HEADER.sub("", line).split()[1:]
-    cells = without_end(parted(line, mark))[2:]
+        return [printable(name) for name in _HEADER.sub("", line).split()[1:]], True
+    cells = [printable(name) for name in without_end(parted(line, mark))[2:]]
     places = [k for k, name in enumerate(cells) if name]
-    if any(place % 3 for place in places):
-        return [cells[place] for place in places]
-    return cells[::3]
+    apart = np.diff(places)
+    step = int(apart.min(initial=3 if len(places) < 2 else len(cells)))
+    if (apart % step).any():
+        return [cells[place] for place in places], False
+    return cells[places[0] % step :: step] if places else [], True
 
 
 def _header_fields(lines: list[str]) -> dict[str, str]:
@@ -129,12 +131,21 @@ def _about_counts(fields: dict[str, str], n_markers: set[int], n_frames: int) ->
     ]
 
 
+@dataclass(frozen=True)
+class _Heading:
+    """The line of names. names : of each place, '' for an empty one."""
+
+    names: list[str]
+    are_apart: bool  # by one number of places, so that an empty place is a trajectory
+    are_counted: bool  # the line below, X1, Y1, ..., has three for each place
+
+
 class _Rows:
     """What has been read of the table; eight bytes for each cell and no more."""
 
-    def __init__(self, names: list[str], dialect: Dialect, path: Path) -> None:
-        self.names, self.dialect, self.path = names, dialect, path
-        self.n_labels = sum(map(bool, names))
+    def __init__(self, heading: _Heading, dialect: Dialect, path: Path) -> None:
+        self.heading, self.dialect, self.path = heading, dialect, path
+        self.n_labels = sum(map(bool, heading.names))
         self.times, self.positions, self.widths = array("d"), array("d"), array("L")
         self.time_digits = LastDigit()
         self.widest = 0
@@ -179,7 +190,7 @@ class _Rows:
                 continue
             cells = self.dialect.cells(line)
             if len(cells) < (n := 2 + 3 * self.n_labels):
-                words = Dialect(None, self.dialect.has_decimal_commas).cells(line)
+                words = replace(self.dialect, separator=None).cells(line)
                 cells = words if len(words) == n else cells
             yield _whole(cells)
 
@@ -209,9 +220,10 @@ class _Rows:
             )
 
     def _fit(self) -> bool:
-        """As many trajectories as labels, or as places in the heading, or more."""
+        """As many trajectories as labels, or as places in the heading, or more behind them."""
         n = self.n_trajectories()
-        return n == self.n_labels or n >= len(self.names)
+        enough = self.n_labels if self.heading.are_counted else len(self.heading.names)
+        return n == self.n_labels or (n >= enough and self.heading.are_apart)
 
     def n_trajectories(self) -> int:
         return (self.widest - 2) // 3
@@ -220,7 +232,7 @@ class _Rows:
         """The labels, and the positions below them (n_frames, n_labels, 3), NaN = missing.
 
         Trajectories behind those that the heading names have no name; nor have the empty places
-        of the heading, if there are as many trajectories as places.
+        of the heading, unless there are only as many trajectories as labels.
         """
         widths, n_columns = np.array(self.widths, np.int64), self.widest - 2
         values = np.frombuffer(self.positions)
@@ -229,11 +241,14 @@ class _Rows:
             whole[np.arange(n_columns) < widths[:, None]] = values
             values = whole
         positions = values.reshape(len(widths), -1, 3)
-        names = self.names
-        if self.n_trajectories() < len(names):
+        names = self.heading.names
+        n_empty = max(len(names) - self.n_trajectories(), 0)
+        if n_empty and self.heading.are_counted:
+            positions = np.pad(positions, ((0, 0), (0, n_empty), (0, 0)), constant_values=np.nan)
+        elif n_empty:
             names = [name for name in names if name]
         kept = [k for k, name in enumerate(names) if name]
-        if kept != list(range(self.n_trajectories())):
+        if kept != list(range(positions.shape[1])):
             positions = positions[:, kept]
         positions[~np.isfinite(positions).all(axis=-1) | (positions == 0).all(axis=-1)] = np.nan
         return tuple(names[k] for k in kept), positions
@@ -259,8 +274,7 @@ class _Rows:
                     "info",
                 )
             )
-        if self.dialect.has_decimal_commas:
-            found.append(_finding("decimal commas", "decimal points", "read them so", "corrected"))
+        found += self.dialect.about_commas()
         if self.n_words:
             found.append(
                 _finding(

@@ -215,6 +215,18 @@ def test_forces_in_ms_at_any_rate(tmp_path, rate_hz):
     assert _said(recording)[0][1] == "read them in ms"
 
 
+@pytest.mark.parametrize(("first", "n_rows"), [(0, 3500), (1, 4300), (0, 700)])
+def test_rows_counted_at_no_rate_are_no_times(tmp_path, first, n_rows):
+    recording = _pair(tmp_path, [f"{first + k}" for k in range(n_rows)])
+    assert recording.plates == () and f"count {n_rows} rows" in recording.forces_note
+
+
+def test_whole_ms_that_begin_with_the_markers(tmp_path):
+    recording = _pair(tmp_path, [f"{12_300 + k}" for k in range(3500)], 12.3)
+    assert recording.analog_rate_hz == 1000.0
+    assert recording.plates[0].usable.mean() == pytest.approx(3500 / 3991, abs=0.01)
+
+
 @pytest.mark.parametrize("digits", [2, 3])
 def test_coarse_stamps_of_the_forces(tmp_path, digits):
     recording = _pair(tmp_path, [f"{k / 1200:.{digits}f}" for k in range(12 * N)])
@@ -244,6 +256,8 @@ def test_another_zero_that_is_not_certain_is_said(tmp_path, n_rows, start_s):
 def test_forces_that_cover_a_part_are_said_with_both_times(tmp_path):
     recording = _pair(tmp_path, [f"{k / 1000:.3f}" for k in range(10 * N)], 1.0)
     assert recording.plates[0].usable.mean() == pytest.approx(0.75, abs=0.01)
+    ((found, _),) = _said(recording)
+    assert found == "forces at 0 to 3.999 s and markers at 1 to 4.99 s: as long, and not at once"
     (finding,) = [f for f in recording.findings if f.check == "analog_nan"]
     assert "1 to 4.99 s (the file has 0 to 3.999 s)" in finding.expected
 

@@ -65,6 +65,26 @@ def test_unnamed_trajectories_between_the_named(tmp_path, place):
     _is_as_written(_read(tmp_path, lines))
 
 
+@pytest.mark.parametrize("before", ["", "\t"])
+@pytest.mark.parametrize("apart", [1, 2, 3])
+@pytest.mark.parametrize("place", [1, 5])
+def test_unnamed_trajectories_where_names_are_not_three_apart(tmp_path, before, apart, place):
+    lines = _lines(tmp_path)
+    names = [*LABELS[:place], "", *LABELS[place:]]
+    lines[3] = "Frame#\tTime\t" + before * (apart > 1) + ("\t" * apart).join(names)
+    at = 2 + 3 * place
+    lines = _rows(lines, lambda k, cells: [*cells[:at], "5", "6", "7", *cells[at:]])
+    _is_as_written(_read(tmp_path, lines))
+
+
+def test_a_heading_whose_empty_places_say_nothing_is_refused(tmp_path):
+    lines = _lines(tmp_path)
+    lines[3] = lines[3].replace("\t\t\tLASI", "\t\t\t\tLASI")
+    _is_as_written(_read(tmp_path, lines))
+    with pytest.raises(BadDataError, match="cells under 8 labels"):
+        _read(tmp_path, _rows(lines, UNNAMED["in all rows"][0]))
+
+
 def test_a_place_of_the_heading_that_the_table_does_not_have(tmp_path):
     lines = _lines(tmp_path)
     lines[3] = lines[3].replace("\t\t\tLASI", "\t\t\t\t\t\tLASI")
@@ -128,6 +148,15 @@ def test_separators_and_decimal_commas(tmp_path, case):
     assert recording.marker_rate_hz == 100.5
     said = [f.found for f in recording.findings if f.check == "layout"]
     assert said == (["decimal commas"] if "decimal" in case else [])
+
+
+def test_commas_between_thousands(tmp_path):
+    def edit(k, cells):
+        return [*cells[:2], *(f"{float(x):,.6f}" for x in cells[2:])]
+
+    recording = _read(tmp_path, _rows(_lines(tmp_path), edit))
+    _is_as_written(recording)
+    assert "commas between thousands" in [f.found for f in recording.findings]
 
 
 def test_missing_cells_between_semicolons(tmp_path):

@@ -22,6 +22,7 @@ class MarkerTimes:
     first_s: float
     rate_hz: float
     n: int
+    unsure_s: float = 0.0  # by how much the first may be off: the last digit that is printed
 
     def lasts_s(self) -> float:
         return (self.n - 1) / self.rate_hz
@@ -37,6 +38,8 @@ class ForceTimes:
     stamps: Stamps | None
     findings: tuple[Finding, ...] = ()
     note: str = ""
+    rates_hz: tuple[float, ...] = ()  # known otherwise than by the stamps
+    is_simultaneous: bool = False  # they begin with the markers, whatever the stamps say
 
 
 def settle_force_times(stamps: Stamps, markers: MarkerTimes) -> ForceTimes:
@@ -51,7 +54,9 @@ def settle_force_times(stamps: Stamps, markers: MarkerTimes) -> ForceTimes:
     if len(stamps.values) < 2 or not increase:
         return ForceTimes(None, (), UNEVEN)
     settled = _in_seconds(stamps, markers)
-    return _from_one_zero(settled, markers) if settled.stamps is not None else settled
+    if settled.stamps is None or settled.is_simultaneous:
+        return settled
+    return _from_one_zero(settled, markers)
 
 
 def _in_seconds(stamps: Stamps, markers: MarkerTimes) -> ForceTimes:
@@ -65,9 +70,9 @@ def _in_seconds(stamps: Stamps, markers: MarkerTimes) -> ForceTimes:
         if ratio >= 1 and abs(n - ratio * markers.n) <= ratio:
             rate_hz = ratio * markers.rate_hz
             action = f"took the first as the first frame's and {rate_hz:g} Hz"
-            own = stamps.times(1 / rate_hz, float(stamps.values[0]))
-            own = replace(own, values=own.values + markers.first_s)
-            return ForceTimes(own, (about_unit("that count rows", action, _WHAT),))
+            own = replace(stamps.times(1 / rate_hz, float(stamps.values[0])), digits=(0.0, 0.0))
+            said = about_unit("that count rows", action, _WHAT)
+            return ForceTimes(own, (said,), rates_hz=(rate_hz,), is_simultaneous=True)
         if stamps.values[0] < 2 or abs(stamps.values[0] / 1e3 - markers.first_s) > near_s:
             note = f"the times of the .mot count {n} rows, and none of its rates has as many in "
             return ForceTimes(None, (), f"{note}the {markers.n} frames of the markers")
@@ -92,35 +97,39 @@ def _from_one_zero(settled: ForceTimes, markers: MarkerTimes) -> ForceTimes:
     times = settled.stamps.values
     first, last = float(times.min()), float(times.max())
     near = 1 / markers.rate_hz + settled.stamps.step()
-    markers_last = markers.first_s + markers.lasts_s()
-    together = min(last, markers_last) - max(first, markers.first_s)
-    own, theirs = _span(first, last), markers.span()
-    is_as_long = abs((last - first) - markers.lasts_s()) <= near
-    if together > min(near, 0.5 * (last - first)):
-        if not is_as_long or abs(first - markers.first_s) <= near:
-            return settled
-        doubt = Finding(
-            check="time",
-            subject="",
-            found=f"forces at {own} s and markers at {theirs} s: as long, and not at once",
-            expected="one clock",
-            action="took both as written; if they were cut alike, give them the same first time",
-            level="warning",
+    is_as_long = abs((last - first) - markers.lasts_s()) <= near + settled.stamps.digits[1]
+    apart_s = abs(first - markers.first_s)
+    overlap_s = min(last, markers.first_s + markers.lasts_s()) - max(first, markers.first_s)
+    is_together = overlap_s > min(near, 0.5 * (last - first))
+    times_are = f"forces at {_span(first, last)} s and markers at {markers.span()} s"
+    if is_as_long and (not is_together or apart_s <= markers.unsure_s):
+        said: tuple[Finding, ...] = (
+            _one_clock(f"{times_are}: as long, and never at once", is_corrected=True),
         )
+        if apart_s <= near or (is_together and np.isfinite(markers.unsure_s)):
+            said = ()  # within what is printed
+        elif is_together:
+            said = (_one_clock(f"{times_are}: as long, and those count frames", is_corrected=True),)
+        return replace(settled, is_simultaneous=True, findings=(*settled.findings, *said))
+    if not is_together:
+        return replace(settled, stamps=None, note=times_are)
+    if apart_s > near and (is_as_long or not np.isfinite(markers.unsure_s)):
+        doubt = _one_clock(f"{times_are}: perhaps from another zero", is_corrected=False)
         return replace(settled, findings=(*settled.findings, doubt))
-    if not is_as_long:
-        note = f"the .mot has forces at {own} s, and the markers were seen at {theirs} s"
-        return replace(settled, stamps=None, note=note)
-    moved = replace(settled.stamps, values=times + (markers.first_s - times[0]))
-    finding = Finding(
+    return settled
+
+
+def _one_clock(found: str, is_corrected: bool) -> Finding:
+    return Finding(
         check="time",
         subject="",
-        found=f"forces at {own} s and markers at {theirs} s: as long, and never at once",
+        found=found,
         expected="one clock",
-        action="took their first samples as simultaneous",
-        level="corrected",
+        action="took their first samples as simultaneous"
+        if is_corrected
+        else "took both as written; if they were cut alike, give them the same first time",
+        level="corrected" if is_corrected else "warning",
     )
-    return replace(settled, stamps=moved, findings=(*settled.findings, finding))
 
 
 def _span(first_s: float, last_s: float) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -18,6 +19,7 @@ _SAME = 0.02  # of the sample interval: stamps that all lie on the grid
 _EXACT = 1e-3  # of the sample interval: a stamp that lies on the grid among others that do not
 _AGREE = 0.05  # of the sample interval: steps in another unit that give the stated rate
 _NEAR = 0.01  # of a stated rate: the stamps' own is the same
+FRAMES = "frames"  # the unit of stamps that count them: their clock's zero is not known
 UNITS_S = {"ms": 1e-3, "microseconds": 1e-6}
 
 
@@ -62,6 +64,14 @@ class Grid:
     samples: slice  # those that were kept
     samples_s: np.ndarray  # (n_kept,), their times
     findings: tuple[Finding, ...]
+
+    def from_time(self, first_s: float) -> Grid:
+        """The same, beginning at another time."""
+        shift_s = first_s - self.time_s[0]
+        samples_s = self.samples_s + shift_s
+        is_even = self.samples_s is self.time_s
+        time_s = samples_s if is_even else self.time_s + shift_s
+        return replace(self, time_s=time_s, samples_s=samples_s)
 
 
 def in_seconds(
@@ -119,20 +129,23 @@ def _as_unit(
         return stamps.times(size_s), (about_unit(f"in {name}", f"read them in {name}"),)
     first = float(stamps.values[0] >= 1)  # frames counted from 1 begin at 0 s
     action = f"took frame {first:g} as 0 s and {name:g} Hz"
-    return stamps.times(size_s, first), (about_unit("that count frames", action),)
+    times = replace(stamps.times(size_s, first), digits=(0.0, 0.0), unit=FRAMES)
+    return times, (about_unit("that count frames", action),)
 
 
 def about_unit(found: str, action: str, what: str = "time stamps") -> Finding:
     return Finding("time", "", f"{what} {found}", "times in s", action, "corrected")
 
 
-def even_grid(stamps: Stamps, rates_hz: Sequence[float] = ()) -> Grid | None:
+def even_grid(
+    stamps: Stamps, rates_hz: Sequence[float] = (), base_hz: float = float("nan")
+) -> Grid | None:
     """The even grid of stamps in seconds (n,); torn stamps give their longest stretch.
 
     Stamps that lie within half of their last digit of even times are even: at the first rate that
-    is stated, if it does, else at their own. ``rates_hz`` as for `in_seconds`. None if the stamps
-    do not increase, are faster than ``MOST_HZ``, or so uneven that the grid would have more times
-    than their largest steps allow.
+    is stated, if it does, else at their own. ``rates_hz`` as for `in_seconds`; their own is likely
+    a multiple of ``base_hz``. None if the stamps do not increase, are faster than ``MOST_HZ``, or so
+    uneven that the grid would have more times than their largest steps allow.
     """
     step_s = stamps.step()
     if not step_s > 0 or 1 / step_s > MOST_HZ:
@@ -144,10 +157,12 @@ def even_grid(stamps: Stamps, rates_hz: Sequence[float] = ()) -> Grid | None:
         return None
     findings = [_torn(steps, start, stop)] if stop - start < len(stamps.values) else []
     kept = replace(stamps, values=stamps.values[start:stop])
-    rate_hz, first_s = _printed_rate(kept, rates_hz) or (0.0, 0.0)
+    rate_hz, first_s = _printed_rate(kept, rates_hz, base_hz) or (0.0, 0.0)
     if rate_hz:
         time_s = first_s + np.arange(stop - start) / rate_hz
         samples_s = time_s
+    elif not np.median(np.diff(kept.values)) > 0:
+        return None
     else:
         rate_hz, time_s, found = _uneven_times(kept.values, stated_hz)
         findings += found
@@ -189,18 +204,19 @@ def _interpolated(time_s: np.ndarray, stamps_s: np.ndarray, column: np.ndarray) 
     return np.interp(time_s, stamps_s, column, left=np.nan, right=np.nan)
 
 
-def _printed_rate(stamps: Stamps, rates_hz: Sequence[float]) -> tuple[float, float] | None:
+def _printed_rate(
+    stamps: Stamps, rates_hz: Sequence[float], base_hz: float
+) -> tuple[float, float] | None:
     """Rate and first time of even times that are printed as the stamps; None if there are none.
 
     With all digits that are printed first, then with those that are used.
     """
     stamps_s, n = stamps.values, len(stamps.values)
-    own_s = (stamps_s[-1] - stamps_s[0]) / (n - 1)
     for digit in stamps.digits:
         room = digit * (1 + 1e-6) + 4 * np.spacing(np.abs(stamps_s).max())
-        if room * 2 > own_s * n:
+        if 2 * room > stamps_s[-1] - stamps_s[0]:
             continue  # hardly a step in all of it
-        for rate_hz in (*rates_hz, *_simple_rates(stamps_s, room)):
+        for rate_hz in chain(rates_hz, _simple_rates(stamps_s, room, base_hz)):
             if rate_hz > 0 and _spread(stamps_s, 1 / rate_hz) <= room:
                 return float(rate_hz), _first(stamps_s, rate_hz, room)
     return None
@@ -218,19 +234,23 @@ def _first(stamps_s: np.ndarray, rate_hz: float, room_s: float) -> float:
     return float(np.clip(stamps_s[0], low, high)) if low <= high else float(own.mean())
 
 
-def _simple_rates(stamps_s: np.ndarray, room_s: float) -> Iterator[float]:
-    """Rates near that of the stamps, the likeliest first: whole Hz, NTSC, whole ms, any."""
+def _simple_rates(stamps_s: np.ndarray, room_s: float, base_hz: float) -> Iterator[float]:
+    """Rates of the stamps, the likeliest first: multiples of a known one, whole Hz, NTSC, any."""
     n = len(stamps_s) - 1
-    period_s = (stamps_s[-1] - stamps_s[0]) / n
-    rate_hz = 1 / period_s
+    own_s = float(stamps_s[-1] - stamps_s[0]) / n
+    bounds = (max(own_s - room_s / n, 0.5 * own_s), own_s + room_s / n)
+    found = minimize_scalar(
+        lambda period: _spread(stamps_s, period), bounds=bounds, options={"xatol": 1e-9 * own_s}
+    )
+    rate_hz = 1 / float(found.x)
+    if base_hz > 0:
+        yield base_hz * round(rate_hz / base_hz)
     yield float(round(rate_hz))
     yield round(1.001 * rate_hz) / 1.001
-    if round(1000 * period_s):
-        yield 1000 / round(1000 * period_s)
+    if round(1000 / rate_hz):
+        yield 1000 / round(1000 / rate_hz)
     yield round(rate_hz, 1)
-    bounds = (max(period_s - room_s / n, 0.5 * period_s), period_s + room_s / n)
-    found = minimize_scalar(lambda period: _spread(stamps_s, period), bounds=bounds)
-    yield 1 / float(found.x)
+    yield rate_hz
 
 
 def _uneven_times(
@@ -255,7 +275,7 @@ def _rate(steps: np.ndarray, stated_rate_hz: float) -> float:
     if stated_rate_hz > 0 and abs(own / stated_rate_hz - 1) < _NEAR:
         return stated_rate_hz
     own = 1 / float(np.mean(steps)) if np.ptp(steps) < np.median(steps) else own
-    return float(round(own)) if abs(own - round(own)) < 1e-3 * own else own
+    return float(round(own)) if abs(own - round(own)) < 1e-4 * own else own
 
 
 def _longest_stretch(steps: np.ndarray, step_s: float, digit_s: float) -> tuple[int, int]:

@@ -111,11 +111,10 @@ def _header_fields(lines: list[str]) -> dict[str, str]:
     """The line of names above the line of values, as a mapping in lower case."""
     if len(lines) < 2:
         return {}
-    names, values = lines[-2].split(), lines[-1].split()
     mark = separator_of(lines[-2])
-    by_mark = without_end(parted(lines[-2], mark)), without_end(parted(lines[-1], mark))
-    if len(values) != len(names) and len(by_mark[0]) >= len(by_mark[1]) > 1:
-        names, values = by_mark
+    names, values = parted(lines[-2], mark), parted(lines[-1], mark)
+    if len(values) < 2:
+        values = lines[-1].split()
     return {name.lower(): text for name, text in zip(names, values, strict=False)}
 
 
@@ -156,10 +155,11 @@ class _Rows:
 
     def read(self, lines: Iterable[str]) -> None:
         last: list[str] = []
-        for cells in self._table(lines):
+        n_of_last = 0
+        for n_written, cells in self._table(lines):
             if last:
                 self.add(last)
-            last = cells
+            last, n_of_last = cells, n_written
         if not last or not self.n_labels:
             raise BadDataError(
                 "no marker data",
@@ -167,7 +167,7 @@ class _Rows:
                 remedy="export the trial again",
                 file=self.path,
             )
-        self.is_cut = len(self.times) > 0 and len(last) < 2 + 3 * self.n_labels
+        self.is_cut = len(self.times) > 0 and n_of_last < 2 + 3 * self.n_labels
         if not self.is_cut:
             self.add(last)
         if not self._fit():
@@ -180,8 +180,8 @@ class _Rows:
                 file=self.path,
             )
 
-    def _table(self, lines: Iterable[str]) -> Iterator[list[str]]:
-        """The cells of each row that is not blank, as many as frame, time and whole markers.
+    def _table(self, lines: Iterable[str]) -> Iterator[tuple[int, list[str]]]:
+        """Of each row that is not blank the number of its cells, and those with something in them.
 
         By blanks where that gives a cell for each label and tabs do not.
         """
@@ -192,7 +192,7 @@ class _Rows:
             if len(cells) < (n := 2 + 3 * self.n_labels):
                 words = replace(self.dialect, separator=None).cells(line)
                 cells = words if len(words) == n else cells
-            yield _whole(cells)
+            yield len(cells), _whole(cells)
 
     def add(self, cells: list[str]) -> None:
         """Editors cut empty cells at the end, whole markers of them; else cells are shifted."""

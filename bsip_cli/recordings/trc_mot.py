@@ -17,6 +17,7 @@ from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.timebase import (
+    FRAMES,
     MOST_HZ,
     Grid,
     counted,
@@ -43,17 +44,17 @@ class _Action:
 def read_trc_mot(path: Path) -> Recording:
     """Markers from the TRC; plates from the file of forces beside it, if there is one."""
     trc = read_trc(path)
-    time_s, rate_hz, positions, findings = _even_markers(trc, path)
+    times, positions, findings = _even_markers(trc, path)
     mot_path = forces_beside(path)
     mot = read_mot(mot_path) if mot_path else None
     most = _VALUES_PER_BYTE * sum(file.stat().st_size for file in (path, mot_path) if file)
     up = _up(trc, mot)
     rotation = world.rotation_to_z_up(up)
-    analog_rate_hz, plates, note, found = _plates(mot, up, rotation, time_s, rate_hz, most)
+    analog_rate_hz, plates, note, found = _plates(mot, up, rotation, times, most)
     turned = world.finding_about(up)
     return Recording(
         path=path,
-        marker_rate_hz=rate_hz,
+        marker_rate_hz=times.rate_hz,
         labels=trc.labels,
         markers_m=positions @ rotation.T,
         analog_rate_hz=analog_rate_hz,
@@ -61,14 +62,12 @@ def read_trc_mot(path: Path) -> Recording:
         findings=(*trc.findings, *findings, *([turned] if turned else []), *found),
         rotation_world_lab=rotation,
         forces_note=note,
-        time0_s=float(time_s[0]),
+        time0_s=times.first_s,
     )
 
 
-def _even_markers(
-    trc: Trc, path: Path
-) -> tuple[np.ndarray, float, np.ndarray, tuple[Finding, ...]]:
-    """Times (n,), rate, positions (n, n_markers, 3) on an even grid, and what was done."""
+def _even_markers(trc: Trc, path: Path) -> tuple[MarkerTimes, np.ndarray, tuple[Finding, ...]]:
+    """Times, positions (n, n_markers, 3) at these even times, and what was done."""
     if len(trc.stamps.values) < 2:
         raise BadDataError(
             f"{len(trc.stamps.values)} frame",
@@ -95,7 +94,14 @@ def _even_markers(
             remedy="export the trial again",
             file=path,
         )
-    return grid.time_s, grid.rate_hz, onto_grid(grid, trc.positions_m), (*findings, *grid.findings)
+    unsure_s = float(np.ptp(stamps.values[grid.samples] - grid.samples_s))
+    times = MarkerTimes(
+        first_s=float(grid.time_s[0]),
+        rate_hz=grid.rate_hz,
+        n=len(grid.time_s),
+        unsure_s=np.inf if stamps.unit == FRAMES else unsure_s,
+    )
+    return times, onto_grid(grid, trc.positions_m), (*findings, *grid.findings)
 
 
 def _up(trc: Trc, mot: Mot | None) -> world.Up:
@@ -134,33 +140,36 @@ def _plates(
     mot: Mot | None,
     up: world.Up,
     rotation: np.ndarray,
-    time_s: np.ndarray,
-    marker_rate_hz: float,
+    markers: MarkerTimes,
     most_values: int,
 ) -> tuple[float, tuple[Plate, ...], str, tuple[Finding, ...]]:
     """Analog rate, plates, the reason for none, findings."""
     if mot is None:
-        return marker_rate_hz, (), "no .mot file of the same name beside the .trc", ()
+        return markers.rate_hz, (), "no .mot file of the same name beside the .trc", ()
     if note := _unplaced(mot):
-        return marker_rate_hz, (), note, mot.findings
-    settled = settle_force_times(mot.stamps, MarkerTimes(time_s[0], marker_rate_hz, len(time_s)))
+        return markers.rate_hz, (), note, mot.findings
+    settled = settle_force_times(mot.stamps, markers)
     findings = [*mot.findings, *settled.findings]
-    grid = even_grid(settled.stamps) if settled.stamps is not None else None
+    grid = None
+    if settled.stamps is not None:
+        grid = even_grid(settled.stamps, settled.rates_hz, markers.rate_hz)
+    if grid is not None and settled.is_simultaneous:
+        grid = grid.from_time(markers.first_s)
     if grid is None:
         note = settled.note or UNEVEN
-        return marker_rate_hz, (), note, tuple(findings)
-    last = float(time_s[-1] - time_s[0]) * grid.rate_hz
+        return markers.rate_hz, (), note, tuple(findings)
+    last = markers.lasts_s() * grid.rate_hz
     if 6 * last * len(mot.forces) > most_values:
         rows = len(mot.stamps.values)
         note = f"the .mot has {rows} rows and {last:.3g} would be needed beside the .trc"
-        return marker_rate_hz, (), note, tuple(findings)
+        return markers.rate_hz, (), note, tuple(findings)
     action = _action(mot, up)
-    samples_s = time_s[0] + np.arange(round(last) + 1) / grid.rate_hz
+    samples_s = markers.first_s + np.arange(round(last) + 1) / grid.rate_hz
     plates = tuple(
         _plate(name, onto_grid(grid, np.hstack([force, moment]), samples_s), rotation)
         for name, force, moment in zip(action.names, action.force_N, action.moment_Nm, strict=True)
     )
-    findings += [*grid.findings, *action.findings, *_coverage(plates, grid, time_s)]
+    findings += [*grid.findings, *action.findings, *_coverage(plates, grid, markers)]
     return grid.rate_hz, plates, why_no_forces(plates), tuple(findings)
 
 
@@ -227,7 +236,7 @@ def _plate(name: str, wrench: np.ndarray, rotation: np.ndarray) -> Plate:
     return Plate(name, wrench[:, :3] @ rotation.T, wrench[:, 3:] @ rotation.T, None, usable)
 
 
-def _coverage(plates: tuple[Plate, ...], grid: Grid, time_s: np.ndarray) -> list[Finding]:
+def _coverage(plates: tuple[Plate, ...], grid: Grid, markers: MarkerTimes) -> list[Finding]:
     findings = []
     for plate in plates:
         missing = ~np.isfinite(plate.wrench()).all(axis=1)
@@ -236,7 +245,7 @@ def _coverage(plates: tuple[Plate, ...], grid: Grid, time_s: np.ndarray) -> list
         if missing.any():
             found = f"no force for {missing.sum()} of {n} samples of the markers' time"
             expected = (
-                f"forces as long as the markers, {time_s[0]:.4g} to {time_s[-1]:.4g} s (the file "
+                f"forces as long as the markers, {markers.span()} s (the file "
                 f"has {grid.samples_s[0]:.4g} to {grid.samples_s[-1]:.4g} s)"
             )
             findings.append(_lost("nan", plate, found, expected))

@@ -17,6 +17,7 @@ MOST_HZ = 1e5  # no camera and no plate is faster
 _LONGEST_STEP_S = 1.0  # nobody records movement more slowly
 _SAME = 0.02  # of the sample interval: stamps that all lie on the grid
 _EXACT = 1e-3  # of the sample interval: a stamp that lies on the grid among others that do not
+_ROOM = 1.01  # of the last digit: rates are stated with six digits
 _AGREE = 0.05  # of the sample interval: steps in another unit that give the stated rate
 _NEAR = 0.01  # of a stated rate: the stamps' own is the same
 FRAMES = "frames"  # the unit of stamps that count them: their clock's zero is not known
@@ -211,9 +212,9 @@ def _printed_rate(
 
     With all digits that are printed first, then with those that are used.
     """
-    stamps_s, n = stamps.values, len(stamps.values)
+    stamps_s = stamps.values
     for digit in stamps.digits:
-        room = digit * (1 + 1e-6) + 4 * np.spacing(np.abs(stamps_s).max())
+        room = _ROOM * digit + 4 * np.spacing(np.abs(stamps_s).max())
         if 2 * room > stamps_s[-1] - stamps_s[0]:
             continue  # hardly a step in all of it
         for rate_hz in chain(rates_hz, _simple_rates(stamps_s, room, base_hz)):

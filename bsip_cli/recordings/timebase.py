@@ -87,13 +87,12 @@ def in_seconds(
     step = stamps.step()
     stated = [rate for rate in rates_hz if np.isfinite(rate) and rate > 0]
     sizes = {"s": 1.0, **UNITS_S}
-    counts = {rate: 1 / rate for rate in stated}
-    whole = bool((stamps.values % 1 == 0).all())
-    for rate in stated[:1]:
-        tolerance = _AGREE / rate
-        for name, size in (*sizes.items(), *(counts.items() if whole else ())):
-            if abs(step * size - 1 / rate) <= max(tolerance, stamps.digits[1] * size / 2):
-                return _as_unit(stamps, name, size)
+    are_whole = bool((stamps.values % 1 == 0).all())
+    counts = {rate: 1 / rate for rate in stated} if are_whole else {}
+    for name, size in (sizes | counts).items() if stated else ():
+        room_s = max(_AGREE / stated[0], stamps.digits[1] * size / 2)
+        if abs(step * size - 1 / stated[0]) <= room_s:
+            return _as_unit(stamps, name, size)
     if not step >= _LONGEST_STEP_S:
         return stamps, ()
     if stamps.count():
@@ -145,8 +144,8 @@ def even_grid(
 
     Stamps that lie within half of their last digit of even times are even: at the first rate that
     is stated, if it does, else at their own. ``rates_hz`` as for `in_seconds`; their own is likely
-    a multiple of ``base_hz``. None if the stamps do not increase, are faster than ``MOST_HZ``, or so
-    uneven that the grid would have more times than their largest steps allow.
+    a multiple of ``base_hz``. None if the stamps do not increase, are faster than ``MOST_HZ``, or
+    so uneven that the grid would have more times than their largest steps allow.
     """
     step_s = stamps.step()
     if not step_s > 0 or 1 / step_s > MOST_HZ:

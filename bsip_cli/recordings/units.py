@@ -43,8 +43,9 @@ def moment_in_Nm(unit: str) -> float | None:
 
 
 def length_name(size_m: float) -> str:
-    """The short name of a unit of this size."""
-    return next(name for name, size in _LENGTHS.items() if size == size_m)
+    """The name of a unit of this size."""
+    name = next(name for name, size in _LENGTHS.items() if size == size_m)
+    return {"in": "inches", "ft": "feet"}.get(name, name)
 
 
 def _length_name(unit: str) -> str:

@@ -153,8 +153,9 @@ def _plates(
     grid = None
     if settled.stamps is not None:
         grid = even_grid(settled.stamps, settled.rates_hz, markers.rate_hz)
-    if grid is not None and settled.is_simultaneous:
-        grid = grid.from_time(markers.first_s)
+        if grid is not None and settled.is_simultaneous:
+            torn_off_s = grid.time_s[0] - settled.stamps.values[0] if grid.samples.start else 0.0
+            grid = grid.from_time(markers.first_s + torn_off_s)
     if grid is None:
         note = settled.note or UNEVEN
         return markers.rate_hz, (), note, tuple(findings)

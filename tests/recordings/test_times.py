@@ -246,6 +246,14 @@ def test_another_zero_of_the_forces_is_corrected_where_it_is_certain(tmp_path):
     assert action == "took their first samples as simultaneous"
 
 
+def test_torn_forces_from_another_zero_keep_their_place(tmp_path):
+    times = np.arange(3500) / 1000 + np.where(np.arange(3500) < 1000, 0, 0.5)
+    plate = _pair(tmp_path, [f"{t:.3f}" for t in times], 12.3).plates[0]
+    force, _ = standing_wrench(3500)
+    np.testing.assert_array_equal(np.flatnonzero(plate.usable), np.arange(1500, 3991))
+    np.testing.assert_allclose(plate.force_N[1500:, 2], force[1000:3491, 2], atol=1e-6)
+
+
 @pytest.mark.parametrize(("n_rows", "start_s"), [(2000, 12.3), (9000, 12.3)])
 def test_another_zero_that_is_not_certain_is_said(tmp_path, n_rows, start_s):
     recording = _pair(tmp_path, [f"{k / 1000:.3f}" for k in range(n_rows)], start_s)

@@ -187,7 +187,7 @@ def _uncorrected(recording: Recording) -> tuple[dict[str, np.ndarray], float]:
         beside = (recording.path.with_suffix(".mot"), _grf(recording.path))
         mot = read_mot(next(path for path in beside if path.is_file()))
         forces = [force.force_N @ up for force in mot.forces]
-        rate_hz = 1 / float(np.median(np.diff(mot.time_s)))
+        rate_hz = 1 / float(np.median(np.diff(mot.stamps.values)))
     return {str(k + 1): force for k, force in enumerate(forces)}, rate_hz
 
 

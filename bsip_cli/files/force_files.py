@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from bsip_cli.errors import BadDataError, printable
 from bsip_cli.files.folders import entries
 
 ENDINGS = (".mot", ".sto")
-_NAMES = tuple(f"{word}{ending}" for word in ("", "_grf", "_forces") for ending in ENDINGS)
+_WORD = re.compile(r"[-_ .](?:grfs?|forces?)$", re.IGNORECASE)
+
+
+def trial_stem(forces: Path) -> str:
+    """The name of the trial whose forces a file holds: 'walk' of walk_grf.mot."""
+    return _WORD.sub("", forces.stem)
 
 
 def forces_beside(trc: Path) -> Path | None:
@@ -19,8 +25,13 @@ def forces_beside(trc: Path) -> Path | None:
     BadDataError
         There are several, and which one is meant cannot be known.
     """
-    wanted = {f"{trc.stem}{name}".casefold() for name in _NAMES}
-    found = [path for path in entries(trc.parent) if path.name.casefold() in wanted]
+    own = trc.stem.casefold()
+    found = [
+        path
+        for path in entries(trc.parent)
+        if path.suffix.lower() in ENDINGS
+        if own in (path.stem.casefold(), trial_stem(path).casefold())
+    ]
     if len(found) > 1:
         raise BadDataError(
             f"there are {' and '.join(printable(path.name) for path in found)} beside it",

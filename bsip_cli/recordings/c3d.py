@@ -16,19 +16,16 @@ from bsip_cli.recordings.c3d_points import Points, read_points
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.plate_source import C3dPlate
 from bsip_cli.recordings.plates import local_wrench
-from bsip_cli.recordings.scene_size import settle_unit
 from bsip_cli.recordings.settle import Opened
-from bsip_cli.recordings.units import length_in_m
 from bsip_cli.recordings.zero import without_baseline
 
 
 def open_c3d(path: Path) -> Opened:
     """Markers of a C3D file, SI, Z-up world frame, and its plates as it describes them."""
     content = read_content(path)
-    unit_m, unit_findings = _length_unit(content)
-    points = read_points(content, unit_m)
-    plates, plate_findings = read_plates(content, unit_m)
-    up = _up(content, points, plate_surfaces(content.group("FORCE_PLATFORM"), unit_m))
+    points = read_points(content, path)
+    plates, plate_findings = read_plates(content, points.unit_m)
+    up = _up(content, points, plate_surfaces(content.group("FORCE_PLATFORM"), points.unit_m))
     rate_hz = content.rate_hz * content.samples_per_frame
     rotation = world.rotation_to_z_up(up)
     opened = [_source(plate, rotation, rate_hz) for plate in plates]
@@ -43,7 +40,6 @@ def open_c3d(path: Path) -> Opened:
         findings=(
             *content.findings,
             *points.findings,
-            *unit_findings,
             *plate_findings,
             *([turned] if turned else []),
             *(finding for _, found in opened for finding in found),
@@ -53,14 +49,6 @@ def open_c3d(path: Path) -> Opened:
         time0_s=content.first_frame / content.rate_hz,
     )
     return Opened(recording, tuple(source for source, _ in opened))
-
-
-def _length_unit(content: Content) -> tuple[float, list[Finding]]:
-    """Size of the unit of points in metres."""
-    stated = "".join(texts(content.group("POINT"), "UNITS")[:1])
-    known = content.is_valid & (content.positions != 0).any(axis=-1)
-    seen = np.where(known[..., None], content.positions, np.nan)
-    return settle_unit(seen, stated, length_in_m(stated), "POINT:UNITS")
 
 
 def _up(content: Content, points: Points, surfaces: Sequence[np.ndarray]) -> world.Up:

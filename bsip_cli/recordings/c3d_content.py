@@ -15,9 +15,10 @@ import numpy as np
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.c3d_agreement import settle_rate, settle_scale
 from bsip_cli.recordings.c3d_guard import Samples, read_by_ezc3d
-from bsip_cli.recordings.c3d_header import BLOCK, read_header
+from bsip_cli.recordings.c3d_header import BLOCK, Header, read_header
 from bsip_cli.recordings.c3d_layout import Layout, settle_layout
 from bsip_cli.recordings.c3d_mend import mended, needs_mending, pieces
+from bsip_cli.recordings.c3d_numbers import floats, integers
 from bsip_cli.recordings.c3d_parameters import Group, Parameters
 from bsip_cli.recordings.c3d_records import parameters_of, read_records
 from bsip_cli.recordings.c3d_scaling import says_unsigned, scaling_of
@@ -33,7 +34,7 @@ class Content:
     parameters: Parameters
     rate_hz: float
     first_frame: int  # counted from 0
-    positions: np.ndarray  # (n_frames, n_points, 3)
+    positions: np.ndarray  # (n_frames, n_points, 3); NaN where invalid, unless all points are
     is_valid: np.ndarray  # (n_frames, n_points) bool: no camera lost the point
     analog: np.ndarray  # (n_channels, n_frames * samples_per_frame)
     analog_scales: np.ndarray  # (n_channels,), size of one converter count
@@ -64,17 +65,28 @@ def read_content(path: Path) -> Content:
         samples = _read_piece(path, raw, layout)
     if header.is_full:
         samples = _without_padding(samples, layout)
+    positions = samples.positions
+    if not (samples.residuals >= 0).any():
+        positions = _written(raw, header, layout, abs(point_scale))[: len(positions)]
     return Content(
         parameters=samples.parameters,
         rate_hz=rate_hz,
         first_frame=max(header.first_frame, 1) - 1,
-        positions=samples.positions,
+        positions=positions,
         is_valid=samples.residuals >= 0,
         analog=samples.analog,
         analog_scales=scaling.scales,
         samples_per_frame=layout.samples_per_frame,
         findings=(*findings, *about_rate, *about_scale),
     )
+
+
+def _written(raw: bytes, header: Header, layout: Layout, scale: float) -> np.ndarray:
+    """Positions (n_frames, n_points, 3), also of invalid points, for which ezc3d has NaN."""
+    data = raw[layout.start : layout.start + layout.n_bytes]
+    words = floats(data, header.processor) if layout.is_float else scale * integers(data)
+    points = words.reshape(-1, layout.words_per_frame)[:, : 4 * layout.n_points]
+    return np.array(points.reshape(len(points), layout.n_points, 4)[..., :3])
 
 
 def _bytes(path: Path) -> bytes:

@@ -6,14 +6,18 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.c3d_content import Content
 from bsip_cli.recordings.c3d_parameters import Group, texts
 from bsip_cli.recordings.labels import is_unlabelled
+from bsip_cli.recordings.missing_points import without_sentinels
 from bsip_cli.recordings.model import Finding
-from bsip_cli.recordings.scene_size import without_absurd
+from bsip_cli.recordings.scene_size import move_like_markers, settle_unit, without_absurd
+from bsip_cli.recordings.units import length_in_m
 
 _OUTPUT_GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _OUTPUT_NAMES = re.compile(
@@ -28,22 +32,58 @@ class Points:
 
     labels: tuple[str, ...]
     positions_m: np.ndarray  # (n_frames, n_markers, 3), lab frame, NaN = missing
+    unit_m: float  # size of the file's unit of length
     findings: tuple[Finding, ...]
 
 
-def read_points(content: Content, unit_m: float) -> Points:
+def read_points(content: Content, path: Path) -> Points:
     """The real markers: model outputs and unlabelled points dropped."""
-    positions = content.positions * unit_m
-    invalid = ~np.isfinite(positions).all(axis=-1) | (positions == 0).all(axis=-1)
-    positions[invalid | ~content.is_valid] = np.nan
     group = content.group("POINT")
-    labels, findings = _labels(group, positions)
-    findings += without_absurd(positions)
+    labels, findings = _labels(group, content.positions.shape[1])
     outputs = _model_outputs(group, labels)
     kept = [i for i, label in enumerate(labels) if i not in outputs and not is_unlabelled(label)]
     if len(kept) < len(labels):
         findings.append(_dropped(labels, outputs, len(kept)))
-    return Points(tuple(labels[i] for i in kept), positions[:, kept], tuple(findings))
+    every = np.where(_written(content.positions)[..., None], content.positions, np.nan)
+    positions = every[:, kept]
+    is_valid = content.is_valid[:, kept]
+    is_ignored = not is_valid.any() and bool(np.isfinite(positions).any())
+    if not is_ignored:
+        positions[~is_valid] = np.nan
+    findings += without_sentinels(positions)
+    stated = "".join(texts(group, "UNITS")[:1])
+    scene = positions if kept else np.where(content.is_valid[..., None], every, np.nan)
+    unit_m, about_unit = settle_unit(scene, stated, length_in_m(stated), "POINT:UNITS")
+    positions *= unit_m
+    findings += [*without_absurd(positions), *about_unit]
+    if is_ignored:
+        findings.append(_about_invalid(positions, content.rate_hz, path))
+    return Points(tuple(labels[i] for i in kept), positions, unit_m, tuple(findings))
+
+
+def _written(positions: np.ndarray) -> np.ndarray:
+    """Points with a position, (n_frames, n_points) bool: three zeros are none."""
+    return np.isfinite(positions).all(axis=-1) & (positions != 0).any(axis=-1)
+
+
+def _about_invalid(positions_m: np.ndarray, rate_hz: float, path: Path) -> Finding:
+    """All points are marked as not seen: what is said if they move as markers do, else refused."""
+    found = f"all {positions_m.shape[1]} points are marked invalid (residual -1) in every frame"
+    if move_like_markers(positions_m, rate_hz):
+        return Finding(
+            check="points",
+            subject="",
+            found=f"{found}, and they move as the markers of a person do",
+            expected="a residual of 0 or more where a point was seen",
+            action="read them all the same",
+            level="warning",
+        )
+    raise BadDataError(
+        f"{found}, and what is written there does not move as markers do",
+        expected="points that the cameras saw",
+        remedy="reconstruct the trial and export it again",
+        file=path,
+    )
 
 
 def _dropped(labels: Sequence[str], outputs: set[int], n_kept: int) -> Finding:
@@ -58,9 +98,9 @@ def _dropped(labels: Sequence[str], outputs: set[int], n_kept: int) -> Finding:
     )
 
 
-def _labels(group: Group, positions: np.ndarray) -> tuple[list[str], list[Finding]]:
+def _labels(group: Group, n_points: int) -> tuple[list[str], list[Finding]]:
     """POINT:LABELS with its continuations; duplicates resolved by POINT:DESCRIPTIONS."""
-    labels = _continued(group, "LABELS", positions.shape[1])
+    labels = _continued(group, "LABELS", n_points)
     counts = Counter(labels)
     twice = [i for i, label in enumerate(labels) if counts[label] > 1 and not is_unlabelled(label)]
     if not twice:

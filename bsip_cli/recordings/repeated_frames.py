@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bsip_cli.recordings.analog import runs
+from bsip_cli.recordings.held_markers import held_markers
 from bsip_cli.recordings.model import Finding, Recording
 
 _NEARLY_ALL = 0.9  # of the markers seen in both frames
@@ -40,26 +41,55 @@ def repeated_frames(markers_m: np.ndarray) -> np.ndarray:
 
 
 def without_repeats(recording: Recording) -> tuple[Recording, list[Finding]]:
-    """The recording with repeated positions as gaps, and a line that says how many and when."""
-    repeated = repeated_frames(recording.markers_m)
-    frames = np.any(repeated, axis=1)
-    if not frames.any():
-        return recording, []
-    spans = runs(frames)
-    times = recording.time_s()
-    told = [_span(times[start], times[stop - 1]) for start, stop in spans[:_SPANS_TOLD]]
-    more = f" and {len(spans) - _SPANS_TOLD} more times" if len(spans) > _SPANS_TOLD else ""
-    finding = Finding(
+    """The recording with repeated positions as gaps, and lines that say how many and when.
+
+    Of all markers at once, and of single ones that are held while others move.
+    """
+    markers, findings = recording.markers_m, []
+    repeated = repeated_frames(markers)
+    if repeated.any():
+        findings.append(_about_frames(recording, np.any(repeated, axis=1)))
+        markers = np.where(repeated[..., None], np.nan, markers)
+    held = held_markers(markers)
+    if held.any():
+        findings.append(_about_markers(recording, held))
+        markers = np.where(held[..., None], np.nan, markers)
+    return (replace(recording, markers_m=markers) if findings else recording), findings
+
+
+def _about_frames(recording: Recording, frames: np.ndarray) -> Finding:
+    return Finding(
         check="repeated_frames",
         subject="",
         found=f"{frames.sum()} of {len(frames)} frames repeat the one before to the last digit, "
-        f"at {', '.join(told)} s{more}",
+        f"at {_spans(recording, frames)}",
         expected="a new picture in every frame of a person who moves",
         action="took them for gaps",
         level="corrected",
     )
-    markers = np.where(repeated[..., None], np.nan, recording.markers_m)
-    return replace(recording, markers_m=markers), [finding]
+
+
+def _about_markers(recording: Recording, held: np.ndarray) -> Finding:
+    own = np.flatnonzero(held.any(axis=0))
+    told = [f"{recording.labels[k]} at {_spans(recording, held[:, k])}" for k in own[:_SPANS_TOLD]]
+    more = f" and {len(own) - _SPANS_TOLD} more markers" if len(own) > _SPANS_TOLD else ""
+    return Finding(
+        check="held_markers",
+        subject=", ".join(recording.labels[k] for k in own),
+        found=f"{held.sum()} positions repeat the last one to the last digit while the markers "
+        f"around move: {'; '.join(told)}{more}",
+        expected="gaps where a marker was not seen",
+        action="took them for gaps",
+        level="corrected",
+    )
+
+
+def _spans(recording: Recording, frames: np.ndarray) -> str:
+    """When the frames are, in seconds."""
+    spans, times = runs(frames), recording.time_s()
+    told = [_span(times[start], times[stop - 1]) for start, stop in spans[:_SPANS_TOLD]]
+    more = f" and {len(spans) - _SPANS_TOLD} more times" if len(spans) > _SPANS_TOLD else ""
+    return f"{', '.join(told)} s{more}"
 
 
 def _moving(markers_m: np.ndarray, both: np.ndarray, enough: np.ndarray) -> np.ndarray:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.units import length_name
 
 _PERSON_M = (0.25, 8.0)  # the markers' extent in one frame: a limb to two people
 _ANYTHING_M = (0.02, 30.0)  # a clearly stated unit is doubted only beyond this
 _FEWEST_MARKERS = 4
 _LARGEST_LAB_M = 100.0
-_SIZES = {1e-3: "mm", 1.0: "m", 1e-2: "cm"}
+_FASTEST_M_S = 15.0  # half of the markers, half of the time: a sprinter's
+_SMOOTH = 0.2  # of the markers' distance from their middle: their second difference
+_GUESSED_M = (1e-3, 1.0, 1e-2)  # mm, m, cm: what a file may be in that does not say it
 
 
 def settle_unit(
@@ -23,12 +26,12 @@ def settle_unit(
     markers' extent decides where it fits a person in another unit only.
     """
     extent = _extent(positions)
-    fitting = [size for size in _SIZES if _PERSON_M[0] <= extent * size <= _PERSON_M[1]]
+    fitting = [size for size in _GUESSED_M if _PERSON_M[0] <= extent * size <= _PERSON_M[1]]
     if stated_m is not None:
         is_possible = _ANYTHING_M[0] <= extent * stated_m <= _ANYTHING_M[1]
         if is_possible or not fitting:
-            spelt = stated.strip().lower() in _SIZES.values()
-            return stated_m, [] if spelt else [_finding(name, stated, stated_m, extent)]
+            is_plain = stated.strip().lower() in map(length_name, _GUESSED_M)
+            return stated_m, [] if is_plain else [_finding(name, stated, stated_m, extent)]
     size = fitting[0] if fitting else 1e-3 if extent > _PERSON_M[1] else 1.0
     return size, [_finding(name, stated, size, extent)]
 
@@ -51,6 +54,31 @@ def without_absurd(positions_m: np.ndarray) -> list[Finding]:
     ]
 
 
+def move_like_markers(positions_m: np.ndarray, rate_hz: float) -> bool:
+    """Whether positions (n_frames, n_markers, 3) can only be those of markers on a person.
+
+    They are as far apart as a person is large, no two at one place, change from frame to frame,
+    no faster than people, and smoothly. Numbers that are none, or left from another trial's
+    memory, do not.
+    """
+    known = np.isfinite(positions_m).all(axis=-1)
+    if len(known) < 3 or not _PERSON_M[0] <= _extent(positions_m) <= _PERSON_M[1]:
+        return False
+    middle = np.nanmedian(positions_m[known.any(axis=1)], axis=0)
+    middle = middle[np.isfinite(middle).all(axis=1)]
+    if len(np.unique(middle, axis=0)) < max(len(middle), _FEWEST_MARKERS):
+        return False
+    steps = np.diff(positions_m, axis=0)
+    size = np.linalg.norm(steps, axis=-1)
+    size = size[np.isfinite(size)]
+    bend = np.linalg.norm(np.diff(steps, axis=0), axis=-1)
+    bend = bend[np.isfinite(bend)]
+    if not len(bend) or (size > 0).mean() < 0.5:
+        return False
+    spread = float(np.median(np.linalg.norm(middle - middle.mean(axis=0), axis=1)))
+    return bool(np.median(size) * rate_hz < _FASTEST_M_S and np.median(bend) < _SMOOTH * spread)
+
+
 def _extent(positions: np.ndarray) -> float:
     """Median over the frames of the largest side of the markers' box; NaN if there are few."""
     known = np.isfinite(positions).all(axis=-1)
@@ -68,6 +96,6 @@ def _finding(name: str, stated: str, size: float, extent: float) -> Finding:
         subject="points",
         found=f"{name} '{stated}', and the markers span {extent:.4g} of it",
         expected="m or mm, and the size of a person",
-        action=f"read lengths in {_SIZES[size]}",
+        action=f"read lengths in {length_name(size)}",
         level="corrected",
     )

@@ -10,7 +10,7 @@ from typing import Literal
 
 from bsip_cli.errors import BadDataError, printable
 from bsip_cli.files.folders import entries, is_folder
-from bsip_cli.files.force_files import ENDINGS, forces_beside
+from bsip_cli.files.force_files import ENDINGS, forces_beside, trial_stem
 from bsip_cli.files.regular import fault_of
 from bsip_cli.schemas import SCHEMAS
 
@@ -167,7 +167,7 @@ class Folder:
 
     def _forces(self, path: Path, names: set[str]) -> None:
         """A table of forces is read with its TRC, spare beside a C3D, and lost without both."""
-        stem = re.sub(r"_(grf|forces)$", "", path.stem, flags=re.IGNORECASE)
+        stem = trial_stem(path)
         beside = {f"{s}{kind}".casefold() for s in (stem, path.stem) for kind in RECORDINGS}
         found = {Path(name).suffix for name in beside & names}
         if ".trc" in found:

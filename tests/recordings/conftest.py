@@ -1,4 +1,4 @@
-"""Small recordings written on the fly, and the folder of real ones."""
+"""Small recordings written on the fly, and the folders of those that others made."""
 
 from __future__ import annotations
 
@@ -7,10 +7,21 @@ from pathlib import Path
 import pytest
 
 
+def _beside_the_repository(name: str) -> Path:
+    places = [folder / "shared" / name for folder in Path(__file__).parents[3:]]
+    found = next((path for path in places if path.is_dir()), None)
+    if found is None:
+        pytest.skip(f"shared/{name} beside the repository is not here")
+    return found
+
+
 @pytest.fixture(scope="session")
 def real_data() -> Path:
     """The folder of real recordings beside the repository; skips where there is none."""
-    path = Path(__file__).parents[2].parent / "shared" / "data"
-    if not path.is_dir():
-        pytest.skip("the real recordings (shared/data beside the repository) are not here")
-    return path
+    return _beside_the_repository("data")
+
+
+@pytest.fixture(scope="session")
+def shared_cases() -> Path:
+    """The folder of small recordings with one circumstance each; skips where there is none."""
+    return _beside_the_repository("cases")

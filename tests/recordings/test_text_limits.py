@@ -98,7 +98,8 @@ def _with_mot(tmp_path: Path, times_s: np.ndarray, n_forces: int = 1):
     markers, labels = standing_markers(N)
     write_trc(tmp_path / "a.trc", np.arange(N) / 100.0, markers, labels)
     force, _ = standing_wrench(len(times_s))
-    names = [name.replace("_v", f"_{k}_v") for k in range(n_forces) for name in FORCE[:3]]
+    kinds = [*FORCE[:3], *FORCE[6:]]
+    names = [name.replace("force_", f"force_{k}_") for k in range(n_forces) for name in kinds]
     columns = {name: force[:, i % 3] for i, name in enumerate(names)}
     write_mot(tmp_path / "a.mot", times_s, columns)
     return read_recording(tmp_path / "a.trc")

@@ -1,0 +1,292 @@
+"""Columns of force tables in the namings of laboratories, with units, gaps and blanks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bsip_cli.errors import BadDataError
+from bsip_cli.recordings.force_columns import meaning_of
+from bsip_cli.recordings.mot import read_mot
+from bsip_cli.recordings.read import read_recording
+from tests.recordings.recording_writers import (
+    Y_UP_FROM_Z_UP,
+    standing_markers,
+    standing_wrench,
+    write_mot,
+    write_trc,
+)
+
+N = 60
+DIALECTS = {  # force, point, moment of two plates
+    "opensim": ("ground_force_{p}_v{a}", "ground_force_{p}_p{a}", "ground_torque_{p}_{a}", "1 2"),
+    "in front": ("{p}_ground_force_v{a}", "{p}_ground_force_p{a}", "{p}_ground_torque_{a}", "l r"),
+    "sides": ("ground_force_{p}_v{a}", "ground_force_{p}_p{a}", "ground_torque_{p}_{a}", "left R"),
+    "vicon": ("Force.F{a}{p}", "CoP.C{a}{p}", "Moment.M{a}{p}", "1 2"),
+    "nexus": ("Plate {p} - Force.F{a}", "Plate {p} - CoP.C{a}", "Plate {p} - Moment.M{a}", "1 2"),
+    "plate in front": ("FP{p}_F{a}", "FP{p}_COP{a}", "FP{p}_M{a}", "1 2"),
+    "axis last": ("F{p}{A}", "P{p}{A}", "M{p}{A}", "1 2"),
+    "plate last": ("F{a}{p}", "COP_{a}_{p}", "M{a}{p}", "1 2"),
+    "spelt": (
+        "Force Plate {p}.Fx".replace("x", "{a}"),
+        "Force Plate {p} CoP{a}",
+        "Force Plate {p} Free Moment {A}",
+        "A B",
+    ),
+    "camel": ("{p}ForceX".replace("X", "{A}"), "{p}COP{A}", "{p}Torque{A}", "Left Right"),
+    "brackets": ("F{a}_{p} (N)", "COP{a}_{p} (m)", "T{a}_{p} (Nm)", "1 2"),
+    "visual3d": ("{p}_GRF_{A}", "{p}_COP_{A}", "{p}_FREEMOMENT_{A}", "LEFT RIGHT"),
+    "brand": (
+        "AMTI {p} Force {A}",
+        "AMTI {p} Centre of Pressure {A}",
+        "AMTI {p} Moment {A}",
+        "1 2",
+    ),
+    "one letter": ("{p}F{a}", "{p}P{a}", "{p}T{a}", "L R"),
+    "upper": ("GROUND_FORCE_{p}_V{A}", "GROUND_FORCE_{p}_P{A}", "GROUND_MOMENT_{p}_M{A}", "1 2"),
+}
+
+
+def _values() -> dict[str, np.ndarray]:
+    """Nine numbers of two plates that tell where they come from: 111 is force x of plate 1."""
+    time = np.arange(N) / 100.0
+    return {
+        f"{plate}{kind}{axis}": 100 * (plate + 1) + 10 * kind + axis + time
+        for plate in range(2)
+        for kind in range(3)
+        for axis in range(3)
+    }
+
+
+def _columns(dialect: str) -> dict[str, np.ndarray]:
+    *names, plates = DIALECTS[dialect]
+    return {
+        names[kind].format(p=name, a=a, A=a.upper()): _values()[f"{plate}{kind}{axis}"]
+        for plate, name in enumerate(plates.split())
+        for kind in range(3)
+        for axis, a in enumerate("xyz")
+    }
+
+
+def _write(path, columns, edit=lambda text: text):
+    write_mot(path, np.arange(N) / 100.0, columns)
+    path.write_text(edit(path.read_text()))
+    return path
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_each_naming_gives_every_column_its_place(tmp_path, dialect):
+    mot = read_mot(_write(tmp_path / "a.mot", _columns(dialect)))
+    assert len(mot.forces) == 2 and mot.findings == ()
+    for plate, force in enumerate(mot.forces):
+        for kind, values in enumerate((force.force_N, force.point, force.moment)):
+            for axis in range(3):
+                np.testing.assert_allclose(values[:, axis], _values()[f"{plate}{kind}{axis}"])
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "pelvis_tilt",
+        "knee_angle_l",
+        "com_vx",
+        "emg_vastus",
+        "x1",
+        "walker_knee_r_on_tibia_r_in_ground_fx",
+        "hip_flexion_moment",
+        "time",
+    ],
+)
+def test_what_is_no_ground_force(name):
+    assert meaning_of(name) is None
+
+
+def test_columns_that_are_not_understood_are_named(tmp_path):
+    more = {f"emg {k}": np.zeros(N) for k in range(15)} | {"pelvis_tx": np.zeros(N)}
+    (finding,) = read_mot(_write(tmp_path / "a.mot", _columns("opensim") | more)).findings
+    assert finding.level == "info"
+    assert finding.found.startswith(
+        "16 columns of the forces that are not understood: emg 0, emg 1"
+    )
+    assert finding.found.endswith("emg 11 and 4 more")
+
+
+@pytest.mark.parametrize(
+    ("lost", "said"),
+    [
+        ("ground_force_1_pz", "only x and y of the point of plate '1'"),
+        ("ground_force_2_vx", "only y and z of the force of plate '2'"),
+        ("ground_torque_2_y", "only x and z of the torque of plate '2'"),
+    ],
+)
+def test_half_a_vector_is_refused(tmp_path, lost, said):
+    columns = _columns("opensim")
+    del columns[lost]
+    with pytest.raises(BadDataError, match=said):
+        read_mot(_write(tmp_path / "a.mot", columns))
+
+
+def test_two_columns_of_one_meaning_are_refused(tmp_path):
+    columns = _columns("opensim") | {"Fx1": np.ones(N)}
+    with pytest.raises(BadDataError, match="columns 'ground_force_1_vx' and 'Fx1', which say the"):
+        read_mot(_write(tmp_path / "a.mot", columns))
+
+
+def _decimal_commas(text: str) -> str:
+    head, table = text.split("endheader")
+    return head + "endheader" + table.replace(".", ",")
+
+
+EDITS = {
+    "blank lines": lambda text: text.replace("endheader\n", "endheader\n\n\n").replace(
+        "\n0.3", "\n\n0.3"
+    ),
+    "no endheader": lambda text: text.split("endheader\n")[1],
+    "blanks": lambda text: text.replace("\t", "    "),
+    "padded": lambda text: text.replace("\t", "\t      ").replace("\n0", "\n     0"),
+    "tab at the end": lambda text: text.replace("\n", "\t\n"),
+    "semicolons": lambda text: text.replace("\t", ";"),
+    "semicolons and decimal commas": lambda text: _decimal_commas(text).replace("\t", ";"),
+    "tabs and decimal commas": _decimal_commas,
+    "commas": lambda text: text.replace("\t", ","),
+    "commas over blanks": lambda text: text.replace("\t", ", "),
+    "a heading with tabs over blanks": lambda text: "Fz2\n0".join(
+        part.replace("\t", "  ") if k else part for k, part in enumerate(text.split("Fz2\n0"))
+    ),
+    "time in capitals": lambda text: text.replace("\ntime\t", "\nTIME\t"),
+    "carriage returns": lambda text: text.replace("\n", "\r\n"),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_layouts_of_the_table(tmp_path, edit):
+    mot = read_mot(_write(tmp_path / "a.sto", _columns("plate in front"), EDITS[edit]))
+    np.testing.assert_allclose(mot.stamps.values, np.arange(N) / 100.0)
+    for plate, force in enumerate(mot.forces):
+        np.testing.assert_allclose(force.force_N[:, 1], _values()[f"{plate}01"])
+        np.testing.assert_allclose(force.moment[:, 2], _values()[f"{plate}22"])
+
+
+def test_a_row_of_units_is_kept_as_what_the_file_says(tmp_path):
+    units = "s\t" + "\t".join(
+        ["kN"] * 3 + ["mm"] * 3 + ["N.mm"] * 3 + ["N"] * 3 + ["m"] * 3 + [""] * 3
+    )
+    edit = lambda text: text.replace("\n0\t", f"\n{units}\n0\t", 1)  # noqa: E731
+    one, other = read_mot(_write(tmp_path / "a.mot", _columns("nexus"), edit)).forces
+    assert (one.point_unit, one.moment_unit) == ("mm", "N.mm")
+    assert (other.point_unit, other.moment_unit) == ("m", "")
+    np.testing.assert_allclose(one.force_N[:, 0], 1000 * _values()["000"])
+    np.testing.assert_allclose(other.force_N[:, 0], _values()["100"])
+    with pytest.raises(BadDataError, match="forces in 'V'"):
+        read_mot(
+            _write(tmp_path / "a.mot", _columns("nexus"), lambda t: edit(t).replace("kN", "V"))
+        )
+
+
+@pytest.mark.parametrize(
+    "word", ["nan", "NaN", "NAN", "", "-nan", "inf", "-nan(ind)", "N/A", "1.#QNAN"]
+)
+def test_spellings_of_a_missing_number(tmp_path, word):
+    path = _write(tmp_path / "a.mot", _columns("opensim"))
+    rows = path.read_text().splitlines()
+    cells = rows[20].split("\t")
+    cells[4:7] = [word] * 3
+    path.write_text("\n".join([*rows[:20], "\t".join(cells), *rows[21:]]))
+    point = read_mot(path).forces[0].point
+    assert np.isnan(point).any(axis=1).sum() == 1 and np.isnan(point[14]).all()
+
+
+def test_a_word_amid_the_numbers_is_refused(tmp_path):
+    path = _write(
+        tmp_path / "a.mot", _columns("opensim"), lambda text: text.replace("\t112.5", "\toff")
+    )
+    with pytest.raises(BadDataError, match="'off' is no number"):
+        read_mot(path)
+
+
+def test_a_cut_last_row_is_left_out_and_said(tmp_path):
+    path = _write(tmp_path / "a.mot", _columns("opensim"), lambda text: text[:-60])
+    mot = read_mot(path)
+    assert len(mot.stamps.values) == N - 1
+    assert [f.found for f in mot.findings][-1] == "the last row of forces is cut"
+
+
+def _standing(tmp_path, keep="vpt", unload=slice(0, 0), nan="pt", edit=lambda columns: columns):
+    """One plate that is unloaded in a stretch, where what ``nan`` names is missing."""
+    markers, labels = standing_markers(N)
+    write_trc(tmp_path / "a.trc", np.arange(N) / 100.0, markers @ Y_UP_FROM_Z_UP.T, labels)
+    force, moment = standing_wrench(N)
+    point = np.column_stack([-moment[:, 1], moment[:, 0], 0 * force[:, 2]]) / force[:, 2:]
+    parts = {"v": force, "p": point, "t": moment - np.cross(point, force)}
+    parts["v"][unload] = parts["t"][unload] = 0
+    for kind in nan:
+        parts[kind][unload] = np.nan
+    names = {"v": "Fx{}", "p": "COPx{}", "t": "Tx{}"}
+    columns = {
+        names[kind].format(1).replace("x", a): (parts[kind] @ Y_UP_FROM_Z_UP.T)[:, i]
+        for kind in keep
+        for i, a in enumerate("xyz")
+    }
+    write_mot(tmp_path / "a.mot", np.arange(N) / 100.0, edit(columns))
+    return read_recording(tmp_path / "a.trc")
+
+
+@pytest.mark.parametrize("nan", ["p", "t", "pt"])
+def test_no_force_needs_no_point(tmp_path, nan):
+    recording = _standing(tmp_path, unload=slice(20, 40), nan=nan)
+    (plate,) = recording.plates
+    assert plate.usable.all() and not plate.wrench()[20:40].any()
+    assert "analog_nan" not in [f.check for f in recording.findings]
+
+
+def test_a_force_that_is_nothing_but_rounding_needs_no_point(tmp_path):
+    def with_rounding(columns):
+        return {k: x + (1e-9 if k.startswith("F") else 0) for k, x in columns.items()}
+
+    plate = _standing(tmp_path, unload=slice(20, 40), edit=with_rounding).plates[0]
+    assert plate.usable.all()
+
+
+def test_a_missing_point_under_load_stays_lost(tmp_path):
+    def without_point(columns):
+        columns["COPy1"][30] = np.nan
+        return columns
+
+    plate = _standing(tmp_path, unload=slice(0, 10), edit=without_point).plates[0]
+    np.testing.assert_array_equal(np.flatnonzero(~plate.usable), [30])
+
+
+def test_forces_without_point_and_moment_are_kinematics_only(tmp_path):
+    recording = _standing(tmp_path, keep="v")
+    assert recording.plates == ()
+    assert "no columns for the point and none for the moment" in recording.forces_note
+
+
+def test_a_missing_moment_is_said(tmp_path):
+    recording = _standing(tmp_path, keep="vp")
+    assert len(recording.plates) == 1
+    (found,) = [f for f in recording.findings if f.check == "columns"]
+    assert (found.level, found.action) == ("warning", "took the free torque as zero")
+
+
+def test_a_missing_point_is_said(tmp_path):
+    recording = _standing(tmp_path, keep="vt")
+    assert "no columns for its point" in [f.found for f in recording.findings]
+
+
+def test_the_case_of_missing_points_without_load(shared_cases):
+    name = "study/sub-01/sub-01_task-steps_run-1.trc"
+    own, reference = (
+        read_recording(shared_cases / folder / name)
+        for folder in ("03-mot-nan-cop-when-unloaded", "00-reference-trc-mot")
+    )
+    for plate, same in zip(own.plates, reference.plates, strict=True):
+        assert plate.usable.all()
+        loaded = plate.force_N[:, 2] > 0
+        np.testing.assert_allclose(plate.wrench()[loaded], same.wrench()[loaded], atol=1e-6)
+
+
+def test_the_case_of_forces_only(shared_cases):
+    folder = shared_cases / "19d-mot-forces-only-person-at-lab-origin/study/sub-01"
+    recording = read_recording(folder / "sub-01_task-static.trc")
+    assert recording.plates == () and "no centre of pressure is known" in recording.forces_note

@@ -7,7 +7,7 @@ import tomllib
 import unicodedata
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 from bsip_cli.body.markersets import LANDMARKS
@@ -29,6 +29,7 @@ class Meaning:
 
     segment: str
     landmark: str
+    weight: float = field(default=1.0, compare=False)  # how far the marker is trusted
 
 
 @dataclass(frozen=True)
@@ -42,12 +43,23 @@ class _Reading:
 
 @dataclass(frozen=True, eq=False)
 class _Language:
-    """Word to what it may stand for, and word to side; the words of all languages among them."""
+    """Word to what it may stand for, and word to side; the words of all languages among them.
+
+    Where it has telltales, one of them must be among the labels: else it may be another language.
+    """
 
     name: str
     words: Mapping[str, frozenset[tuple[str, ...]]]
     sides: Mapping[str, str]
     longest: int
+    telltales: tuple[str, ...]
+
+    def may_be(self, labels: Sequence[str]) -> bool:
+        """Whether labels may be of this language."""
+        if not self.telltales:
+            return True
+        spelt = ["".join(_pieces(label)) for label in labels]
+        return any(telltale in one for telltale in self.telltales for one in spelt)
 
 
 @dataclass(frozen=True)
@@ -57,6 +69,7 @@ class _Grammar:
     landmarks: Mapping[frozenset[str], str]
     segments: Mapping[str, str]  # noun -> segment, without its side
     homes: Mapping[str, str]  # landmark, without its side -> segment, without its side
+    weights: Mapping[str, float]  # of nouns that slide
     fillers: frozenset[str]
     never: frozenset[str]
     numbered: frozenset[str]
@@ -98,8 +111,8 @@ def bones(labels: Sequence[str]) -> int:
 def _meanings(labels: Sequence[str]) -> dict[str, Meaning]:
     labels = list(dict.fromkeys(labels))
     drawn = _drawn_frames(labels)
-    read = [_read_all([n for n in labels if n not in drawn], lang) for lang in _languages()]
-    best = max(read, key=_worth)
+    real = [label for label in labels if label not in drawn]
+    best = max((_read_all(real, lang) for lang in _languages() if lang.may_be(real)), key=_worth)
     return _settled({label: meaning for label, (meaning, _) in best.items()})
 
 
@@ -125,7 +138,7 @@ def _settled(found: Mapping[str, Meaning]) -> dict[str, Meaning]:
         if stems[found[label], _stem(label)] < _CLUSTER:
             holders.setdefault(found[label].landmark, label)
     return {
-        label: meaning if holders.get(meaning.landmark) == label else Meaning(meaning.segment, "")
+        label: meaning if holders.get(meaning.landmark) == label else replace(meaning, landmark="")
         for label, meaning in found.items()
     }
 
@@ -227,13 +240,14 @@ def _means(reading: _Reading, grammar: _Grammar) -> Iterator[tuple[Meaning | Non
         return
     if words & grammar.numbered and not _is_vertebra(reading, grammar):
         return
+    weight = min((grammar.weights.get(word, 1.0) for word in words), default=1.0)
     for known, cost in ((concepts, 0.0), (words, 0.1)):
         name = grammar.landmarks.get(known)
         if name and (full := _sided(name, reading.side, LANDMARKS)):
-            yield Meaning(_sided(grammar.homes[name], reading.side, SEGMENTS), full), cost
+            yield Meaning(_sided(grammar.homes[name], reading.side, SEGMENTS), full, weight), cost
     segments = {grammar.segments[word] for word in words if word in grammar.segments}
     if len(segments) == 1 and (full := _sided(segments.pop(), reading.side, SEGMENTS)):
-        yield Meaning(full, ""), 0.2
+        yield Meaning(full, "", weight), 0.2
 
 
 def _is_vertebra(reading: _Reading, grammar: _Grammar) -> bool:
@@ -269,12 +283,12 @@ def _grammar() -> _Grammar:
             landmarks |= {frozenset(way.split()): name for way in ways}
     segments = {noun: s for s, nouns in data["segments"].items() for noun in nouns.split()}
     kinds = {kind: frozenset(words.split()) for kind, words in data["kinds"].items()}
-    return _Grammar(landmarks, segments, homes, **kinds)
+    return _Grammar(landmarks, segments, homes, data["weights"], **kinds)
 
 
 @cache
 def _languages() -> tuple[_Language, ...]:
-    """Each with the common words and those of the language it extends."""
+    """Each with the common words and those of the language it extends; keypoints without."""
     data = _vocabulary()["languages"]
     return tuple(_language(name, data) for name in data if name != _COMMON)
 
@@ -282,7 +296,7 @@ def _languages() -> tuple[_Language, ...]:
 def _language(name: str, data: Mapping) -> _Language:
     words: dict[str, set[tuple[str, ...]]] = {}
     sides: dict[str, str] = {}
-    for part in (_COMMON, data[name].get("extends", ""), name):
+    for part in (data[name].get("instead_of_common", _COMMON), data[name].get("extends", ""), name):
         table = data.get(part, {})
         for side, spelt in table.get("sides", {}).items():
             sides |= dict.fromkeys(spelt.split(), side[0])
@@ -290,4 +304,5 @@ def _language(name: str, data: Mapping) -> _Language:
             for word in spelt.split():
                 words.setdefault(word, set()).add(tuple(concepts.split()))
     longest = max(map(len, [*words, *sides]))
-    return _Language(name, {word: frozenset(ways) for word, ways in words.items()}, sides, longest)
+    known = {word: frozenset(ways) for word, ways in words.items()}
+    return _Language(name, known, sides, longest, tuple(data[name].get("telltales", ())))

@@ -90,6 +90,11 @@ def found_among(labels: Sequence[str], wanted: Mapping[str, Sequence[str]]) -> s
     return set(_match(named, wanted))
 
 
+def columns_of(labels: Sequence[str], wanted: Mapping[str, Sequence[str]]) -> dict[str, int]:
+    """Wanted marker -> place among distinct labels without prefixes."""
+    return _match({label: i for i, label in enumerate(labels)}, wanted)
+
+
 def is_unlabelled(label: str) -> bool:
     """A point without a name: empty, '*12', 'U3', 'Unlabelled_7'."""
     return bool(_UNLABELLED.match(split(label)[1]))

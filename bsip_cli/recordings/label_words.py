@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import accumulate, chain, pairwise
 
 from bsip_cli.body.markersets import LANDMARKS
 from bsip_cli.body.names import SEGMENTS
@@ -20,6 +21,12 @@ _CLUSTER = 3  # labels that differ by a number only: a cluster, none of which ma
 _AXES = ("0", "1", "2", "3")  # a drawn frame: origin and three axes
 _MOST_WORDS = 7
 _SHORTEST = 3  # letters of a label that has a side: RK and LB may be anything
+_ACROSS = 0.5  # cost of a word that reaches across a separator,
+_LETTER_ACROSS = 1.5  # and of one that takes in a single letter there: S_ACR is no sacrum
+_ALONE = 1.0  # cost of a side whose other side no label has
+_SPECIAL = 0.98  # of the worth of a language that extends another: it must say more
+_NUMBER_LEFT, _TRACKS = 0.1, 0.2  # cost of a meaning that leaves a number aside, or is no bone
+_SIDELESS = 1.0  # or is a bone that has sides, without one
 _NOUN_FIRST = 0.01  # of a word's cost per place: a noun goes before what says where on it
 
 
@@ -39,6 +46,7 @@ class _Reading:
     concepts: tuple[str, ...]
     side: str
     cost: float
+    side_at: tuple[int, int] = (0, 0)  # where the word of the side begins and ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +61,7 @@ class _Language:
     sides: Mapping[str, str]
     longest: int
     telltales: tuple[str, ...]
+    part: float  # of its worth that counts
 
     def may_be(self, labels: Sequence[str]) -> bool:
         """Whether labels may be of this language."""
@@ -112,18 +121,36 @@ def _meanings(labels: Sequence[str]) -> dict[str, Meaning]:
     labels = list(dict.fromkeys(labels))
     drawn = _drawn_frames(labels)
     real = [label for label in labels if label not in drawn]
-    best = max((_read_all(real, lang) for lang in _languages() if lang.may_be(real)), key=_worth)
+    read = {lang: _read_all(real, lang) for lang in _languages() if lang.may_be(real)}
+    best = read[max(read, key=lambda lang: _worth(read[lang]) * lang.part)]
     return _settled({label: meaning for label, (meaning, _) in best.items()})
 
 
 def _read_all(labels: Sequence[str], language: _Language) -> dict[str, tuple[Meaning, float]]:
-    known = {label: _read(label, language) for label in labels}
-    return {label: (one[0], one[1]) for label, one in known.items() if one and one[0]}
+    """Label to the meaning of the cheapest reading and its cost.
+
+    A body has two sides: a reading whose other side is no label of the person's costs more.
+    """
+    spelt = {_spelt(label) for label in labels}
+    found = {}
+    for label in labels:
+        costs = [
+            (meaning, cost + _ALONE * (bool(twins) and not twins & spelt))
+            for meaning, cost, twins in _ways(label, language)
+        ]
+        meaning, cost = min(costs, key=lambda one: one[1], default=(None, 0.0))
+        if meaning is not None:
+            found[label] = meaning, cost
+    return found
 
 
 def _worth(found: Mapping[str, tuple[Meaning, float]]) -> float:
-    """How much a language says: bones count twice, and what takes many words counts less."""
-    return sum((1 + bool(meaning.landmark)) / cost for meaning, cost in found.values())
+    """How much a language says: labels and bones; what takes many words counts less."""
+    bony: dict[str, float] = {}
+    for meaning, cost in found.values():
+        bony[meaning.landmark] = max(bony.get(meaning.landmark, 0.0), 1 / cost)
+    bony.pop("", None)
+    return sum(1 / cost for _, cost in found.values()) + sum(bony.values())
 
 
 def _settled(found: Mapping[str, Meaning]) -> dict[str, Meaning]:
@@ -159,12 +186,26 @@ def _drawn_frames(labels: Sequence[str]) -> set[str]:
 
 
 @cache
-def _read(label: str, language: _Language) -> tuple[Meaning | None, float] | None:
-    """The meaning of the cheapest way to cut a label into words that has one, and its cost."""
-    grammar = _grammar()
-    readings = _readings("".join(_pieces(label)), _seams(label), language)
-    known = [(m, r.cost + m_cost) for r in readings for m, m_cost in _means(r, grammar)]
-    return min(known, key=lambda one: one[1], default=None)
+def _ways(
+    label: str, language: _Language
+) -> tuple[tuple[Meaning | None, float, frozenset[str]], ...]:
+    """What a label may mean: meaning, cost, and how the same on the other side would be spelt."""
+    grammar, spelt = _grammar(), _spelt(label)
+    return tuple(
+        (meaning, reading.cost + cost, _twins(spelt, reading, language))
+        for reading in _readings(label, language)
+        for meaning, cost in _means(reading, grammar)
+    )
+
+
+def _twins(spelt: str, reading: _Reading, language: _Language) -> frozenset[str]:
+    begin, end = reading.side_at
+    others = (word for word, side in language.sides.items() if reading.side not in ("", side))
+    return frozenset(spelt[:begin] + other + spelt[end:] for other in others)
+
+
+def _spelt(label: str) -> str:
+    return "".join(_pieces(label))
 
 
 def _pieces(label: str) -> list[str]:
@@ -175,57 +216,85 @@ def _pieces(label: str) -> list[str]:
     return [part.casefold() for part in parts]
 
 
-def _seams(label: str) -> frozenset[int]:
-    """Places in the joined label where a part ends or begins."""
-    places, at = {0}, 0
-    for piece in _pieces(label):
-        at += len(piece)
-        places.add(at)
-    return frozenset(places)
+@dataclass(frozen=True)
+class _Spelling:
+    """A joined label; places where a part ends or begins, and those of them with a separator."""
+
+    text: str
+    seams: frozenset[int]
+    separators: frozenset[int]
 
 
-def _readings(spelt: str, seams: frozenset[int], language: _Language) -> list[_Reading]:
+def _spelling(label: str) -> _Spelling:
+    parts = [_pieces(part) for part in re.split(r"[\s._-]+", label)]
+    lengths = [[len(piece) for piece in part] for part in parts]
+    separators = {0, *accumulate(map(sum, lengths))}
+    return _Spelling(
+        "".join(map("".join, parts)),
+        frozenset({0, *accumulate(chain.from_iterable(lengths))}),
+        frozenset(separators),
+    )
+
+
+def _readings(label: str, language: _Language) -> list[_Reading]:
     """All ways to cut a label into words with at most one side."""
-    nouns = _grammar().segments
+    nouns, spelling = _grammar().segments, _spelling(label)
     return [
         replace(r, cost=r.cost + _NOUN_FIRST * sum(k for k, c in enumerate(r.concepts) if c in nouns))
-        for r in _cuts(spelt, 0, seams, language, _MOST_WORDS)
-        if len(spelt) >= _SHORTEST or not r.side
+        for r in _cuts(spelling, 0, language, _MOST_WORDS)
+        if len(spelling.text) >= _SHORTEST or not r.side
     ]
 
 
 def _cuts(
-    spelt: str, start: int, seams: frozenset[int], language: _Language, words_left: int
+    spelling: _Spelling, start: int, language: _Language, words_left: int
 ) -> Iterator[_Reading]:
-    if start == len(spelt):
+    if start == len(spelling.text):
         yield _Reading((), "", 0.0)
         return
     if not words_left:
         return
-    for end, concepts, side, cost in _words_at(spelt, start, seams, language):
-        for rest in _cuts(spelt, end, seams, language, words_left - 1):
+    for end, concepts, side, cost in _words_at(spelling, start, language):
+        for rest in _cuts(spelling, end, language, words_left - 1):
             if not (side and rest.side):
-                yield _Reading((*concepts, *rest.concepts), side or rest.side, cost + rest.cost)
+                yield _Reading(
+                    (*concepts, *rest.concepts),
+                    side or rest.side,
+                    cost + rest.cost,
+                    (start, end) if side else rest.side_at,
+                )
 
 
 def _words_at(
-    spelt: str, start: int, seams: frozenset[int], language: _Language
+    spelling: _Spelling, start: int, language: _Language
 ) -> Iterator[tuple[int, tuple[str, ...], str, float]]:
     """Words that begin at a place: where they end, concepts, side, cost.
 
-    A word costs 1; a single letter 0.5 more for each end at which it is not set apart.
+    A word costs 1, more where it reaches across separators; a single letter 0.5 more for each end
+    at which it is not set apart.
     """
-    number = re.match(r"\d+", spelt[start:])
+    text, seams = spelling.text, spelling.seams
+    number = re.match(r"\d+", text[start:])
     if number:
         yield start + number.end(), (str(int(number[0])),), "", 1.0
-        return
-    for end in range(start + 1, min(len(spelt), start + language.longest) + 1):
-        word = spelt[start:end]
-        loose = 0.5 * ((start not in seams) + (end not in seams)) if len(word) == 1 else 0.0
+    for end in range(start + 1, min(len(text), start + language.longest) + 1):
+        word = text[start:end]
+        cost = 1.0 + _reach(spelling, start, end)
+        if len(word) == 1:
+            cost += 0.5 * ((start not in seams) + (end not in seams))
         for concepts in language.words.get(word, ()):
-            yield end, concepts, "", 1.0 + loose
+            yield end, concepts, "", cost
         if word in language.sides:
-            yield end, (), language.sides[word], 1.0 + loose
+            yield end, (), language.sides[word], cost
+
+
+def _reach(spelling: _Spelling, start: int, end: int) -> float:
+    """The cost of a word's reach across separators."""
+    inside = sorted(place for place in spelling.separators if start < place < end)
+    if not inside:
+        return 0.0
+    takes_letter = any(b - a == 1 for a, b in pairwise([start, *inside, end]))
+    return _LETTER_ACROSS if takes_letter else _ACROSS
 
 
 def _means(reading: _Reading, grammar: _Grammar) -> Iterator[tuple[Meaning | None, float]]:
@@ -241,13 +310,16 @@ def _means(reading: _Reading, grammar: _Grammar) -> Iterator[tuple[Meaning | Non
     if words & grammar.numbered and not _is_vertebra(reading, grammar):
         return
     weight = min((grammar.weights.get(word, 1.0) for word in words), default=1.0)
-    for known, cost in ((concepts, 0.0), (words, 0.1)):
+    tracking = _TRACKS
+    for known, cost in ((concepts, 0.0), (words, _NUMBER_LEFT)):
         name = grammar.landmarks.get(known)
         if name and (full := _sided(name, reading.side, LANDMARKS)):
             yield Meaning(_sided(grammar.homes[name], reading.side, SEGMENTS), full, weight), cost
+        elif name and not reading.side:
+            tracking = _SIDELESS
     segments = {grammar.segments[word] for word in words if word in grammar.segments}
     if len(segments) == 1 and (full := _sided(segments.pop(), reading.side, SEGMENTS)):
-        yield Meaning(full, "", weight), 0.2
+        yield Meaning(full, "", weight), tracking
 
 
 def _is_vertebra(reading: _Reading, grammar: _Grammar) -> bool:
@@ -305,4 +377,6 @@ def _language(name: str, data: Mapping) -> _Language:
                 words.setdefault(word, set()).add(tuple(concepts.split()))
     longest = max(map(len, [*words, *sides]))
     known = {word: frozenset(ways) for word, ways in words.items()}
-    return _Language(name, known, sides, longest, tuple(data[name].get("telltales", ())))
+    telltales = tuple(data[name].get("telltales", ()))
+    part = _SPECIAL if "extends" in data[name] else 1.0
+    return _Language(name, known, sides, longest, telltales, part)

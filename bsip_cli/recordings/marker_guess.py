@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -168,7 +169,8 @@ def told_from(labels: Sequence[str], prefix: str = "") -> Guess:
         return Guess(best.marker_set, best)
     in_set = count_of(best.marker_set.wanted() if best.fits else {})
     person = person_of(labels, lambda some: bones(some) + in_set(some), prefix)
-    names = list(dict.fromkeys(person.names.values()))
+    times = Counter(person.names.values())
+    names = [name for name, n in times.items() if n == 1]  # of twins nobody knows which is which
     understood = meanings(names)
     has_centres = any(meaning.landmark in JOINT_CENTRES for meaning in understood.values())
     return _made(names, understood, best if best.fits and not has_centres else None)

@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 _SHARED = 0.2  # of the labels begin or end alike: five people in one file at most
-_FEW = 3  # labels: fewer may be understood by chance once they are cut
+_FEW = 3  # places more that they name: fewer may be chance,
+_ALL = 0.9  # but where nearly all labels are alike up to a separator
+_SEPARATORS = " _.-"
 
 Count = Callable[[Sequence[str]], int]  # how many bones, or wanted markers, these labels name
 
@@ -26,6 +28,11 @@ class Affix:
             and label.endswith(self.tail)
             and len(label) > len(self.head) + len(self.tail)
         )
+
+    @property
+    def is_set_apart(self) -> bool:
+        """Whether a separator stands between it and the name."""
+        return self.head[-1:] in _SEPARATORS and self.tail[:1] in _SEPARATORS
 
     def off(self, label: str) -> str:
         """The name without them."""
@@ -74,14 +81,22 @@ def _of_group(labels: Sequence[str], count: Count) -> list[Affix]:
 
 
 def _best(labels: Sequence[str], least: float, count: Count) -> Affix | None:
-    """The affix whose removal makes the labels name the most, the longest of equals."""
+    """The affix whose removal makes the labels name the most, the longest of equals.
+
+    One of nearly all labels, set apart by a separator, goes first.
+    """
     heads = Counter(label[:k] for label in labels for k in range(1, len(label)))
     tails = Counter(label[-k:] for label in labels for k in range(1, len(label)))
-    candidates = [Affix(head=h) for h, n in heads.items() if n >= least]
-    candidates += [Affix(tail=t) for t, n in tails.items() if n >= least]
-    named = {affix: count(_without(labels, affix)) for affix in candidates}
-    best = max(named, key=lambda a: (named[a], len(a.head) + len(a.tail)), default=None)
-    return best if best is not None and named[best] - count(labels) >= _FEW else None
+    marked = {Affix(head=h): n for h, n in heads.items() if n >= least}
+    marked |= {Affix(tail=t): n for t, n in tails.items() if n >= least}
+    now = count(labels)
+    gains = {affix: count(_without(labels, affix)) - now for affix in marked}
+    of_all = [a for a in marked if a.is_set_apart and marked[a] >= _ALL * len(labels)]
+    for candidates, enough in ((of_all, 1), (marked, _FEW)):
+        better = [affix for affix in candidates if gains[affix] >= enough]
+        if better:
+            return max(better, key=lambda a: (gains[a], len(a.head) + len(a.tail)))
+    return None
 
 
 def _without(labels: Sequence[str], affix: Affix) -> list[str]:

@@ -30,15 +30,15 @@ class LabelList:
         wrong = [
             f"{label}: {found.get(label)} is not {landmark}"
             for label, landmark in self.bones.items()
-            if label not in found or found[label].landmark != landmark
+            if not found.get(label) or found[label].landmark != landmark
         ]
         wrong += [
             f"{label}: {found.get(label)} does not track {segment} only"
             for label, segment in self.tracks.items()
-            if label not in found
+            if not found.get(label)
             or (found[label].segment, found[label].landmark) != (segment, "")
         ]
-        return wrong + [f"{label}: is no marker, {found[label]}" for label in self.nothing & {*found}]
+        return wrong + [f"{label}: is no marker, {found[label]}" for label in self.nothing if found.get(label)]
 
 
 def label_lists() -> list[LabelList]:
@@ -72,8 +72,5 @@ def _both(what: str, spelt: str, sides: list[str]) -> list[tuple[str, str]]:
     spelt = spelt.replace("~", " ")
     if "{s}" not in spelt:
         return [(what, spelt)]
-    return [
-        (what if what == "upper_torso" or what == "lower_torso" or what == "head" else f"{what}_{side}",
-         spelt.replace("{s}", letters))
-        for side, letters in zip("lr", sides, strict=True)
-    ]
+    names = (what, what) if what in SEGMENTS else (f"{what}_l", f"{what}_r")
+    return [(name, spelt.replace("{s}", side)) for name, side in zip(names, sides, strict=True)]

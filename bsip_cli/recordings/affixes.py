@@ -6,9 +6,10 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-_SHARED = 0.2  # of the labels begin or end alike: five people in one file at most
+_HEADS = 0.2  # of the labels begin alike, up to a separator: five people in one file at most
+_TAILS = 0.6  # end alike from a separator on: fewer may be those on the lateral side, KNEE_LAT
 _FEW = 3  # places more that they name: fewer may be chance,
-_ALL = 0.9  # but where nearly all labels are alike up to a separator
+_ALL = 0.9  # of the labels where no separator is, or where one place more is enough
 _SEPARATORS = " _.-"
 
 Count = Callable[[Sequence[str]], int]  # how many bones, or wanted markers, these labels name
@@ -34,6 +35,13 @@ class Affix:
         """Whether a separator stands between it and the name."""
         return self.head[-1:] in _SEPARATORS and self.tail[:1] in _SEPARATORS
 
+    @property
+    def least_share(self) -> float:
+        """The part of a file's labels that must have it."""
+        if not self.is_set_apart:
+            return _ALL
+        return _HEADS if self.head else _TAILS
+
     def off(self, label: str) -> str:
         """The name without them."""
         return label[len(self.head) : len(label) - len(self.tail)].strip()
@@ -51,8 +59,8 @@ def split(label: str) -> tuple[str, str]:
 def affixes(labels: Sequence[str], count: Count) -> tuple[Affix, ...]:
     """One per person of a file, the empty one for labels that have none.
 
-    What stands before a colon is always one. Else it is the longest head or tail, shared by a fifth
-    of the labels, whose removal makes the labels name the most.
+    What stands before a colon is always one. Else it is the longest head or tail that many labels
+    share whose removal makes them name the most.
     """
     groups: dict[str, list[str]] = {}
     for label in labels:
@@ -73,22 +81,22 @@ def owner(label: str, known: Sequence[Affix]) -> Affix | None:
 
 def _of_group(labels: Sequence[str], count: Count) -> list[Affix]:
     found, rest = [], list(dict.fromkeys(labels))
-    least = max(_FEW, _SHARED * len(rest))
-    while (affix := _best(rest, least, count)) is not None:
+    n_labels = len(rest)
+    while (affix := _best(rest, n_labels, count)) is not None:
         found.append(affix)
         rest = [label for label in rest if not affix.marks(label)]
     return [*found, Affix()] if rest or not found else found
 
 
-def _best(labels: Sequence[str], least: float, count: Count) -> Affix | None:
+def _best(labels: Sequence[str], n_labels: int, count: Count) -> Affix | None:
     """The affix whose removal makes the labels name the most, the longest of equals.
 
     One of nearly all labels, set apart by a separator, goes first.
     """
-    heads = Counter(label[:k] for label in labels for k in range(1, len(label)))
-    tails = Counter(label[-k:] for label in labels for k in range(1, len(label)))
-    marked = {Affix(head=h): n for h, n in heads.items() if n >= least}
-    marked |= {Affix(tail=t): n for t, n in tails.items() if n >= least}
+    ends = [Affix(head=label[:k]) for label in labels for k in range(1, len(label))]
+    ends += [Affix(tail=label[-k:]) for label in labels for k in range(1, len(label))]
+    shared = Counter(ends)
+    marked = {a: n for a, n in shared.items() if n >= max(_FEW, a.least_share * n_labels)}
     now = count(labels)
     gains = {affix: count(_without(labels, affix)) - now for affix in marked}
     of_all = [a for a in marked if a.is_set_apart and marked[a] >= _ALL * len(labels)]

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from bsip_cli.body.joint_centres import missing_landmarks
 from bsip_cli.body.markersets import (
     JOINT_CENTRES,
     Marker,
@@ -23,7 +22,12 @@ from bsip_cli.recordings.model import Finding
 
 _ENOUGH = 0.5  # of a set's markers, its optional ones aside
 _MOSTLY, _LEAST = 0.75, 10  # or of the labels, when these are at least so many: half a body
-_CLUSTER = 3  # markers show how a segment turns, and so where its joints are
+_NEEDED = {  # and what would do
+    "lower_torso": "both ASIS, and the PSIS or the sacrum",
+    **{f"thigh_{side}": "the lateral epicondyle of the femur, a cluster" for side in "lr"},
+    **{f"shank_{side}": "the lateral malleolus, a cluster" for side in "lr"},
+    **{f"foot_{side}": "the heel and a metatarsal" for side in "lr"},
+}
 _NAME = "words"
 
 
@@ -84,8 +88,17 @@ class Guess:
         return tuple(m.label for m in self.marker_set.markers if m.is_joint_centre)
 
     def lacking(self) -> list[str]:
-        """What no skeleton can do without and no label is."""
-        return _lacking(self.marker_set.markers)
+        """Segments that must not be held and have no label, with what would do.
+
+        Their landmarks are asked for by the calibrating trial only; whether the trunk may be held
+        is for the scaling's options to say.
+        """
+        marked = {marker.segment for marker in self.marker_set.markers}
+        return [
+            f"the {in_words(segment)} ({serve})"
+            for segment, serve in _NEEDED.items()
+            if segment not in marked
+        ]
 
     def findings(self) -> tuple[Finding, ...]:
         """What a set that was made from the labels takes them for; nothing of a shipped one."""
@@ -150,7 +163,7 @@ def guess_marker_set(labels: Sequence[str], prefix: str = "", source: str = "FIL
     Raises
     ------
     BadDataError
-        No shipped set fits, and the labels do not name what a skeleton cannot do without.
+        No shipped set fits, and the labels leave segments bare that no skeleton can do without.
     """
     guess = told_from(labels, prefix)
     if guess.base is None and (lacking := guess.lacking()):
@@ -215,17 +228,6 @@ def _by_words(understood: Mapping[str, Meaning], known: Collection[Marker]) -> t
     )
 
 
-def _lacking(markers: Sequence[Marker]) -> list[str]:
-    """Landmarks that no skeleton can do without; knees and ankles may come from clusters."""
-    known = {marker.landmark for marker in markers}
-    for side in "lr":
-        segments = [f"{name}_{side}" for name in ("thigh", "shank")]
-        on = [sum(marker.segment == segment for marker in markers) for segment in segments]
-        if min(on) >= _CLUSTER:
-            known |= {f"knee_lateral_{side}", f"malleolus_lateral_{side}"}
-    return missing_landmarks(known)
-
-
 def _no_set(
     guess: Guess, lacking: Sequence[str], labels: Sequence[str], source: str
 ) -> BadDataError:
@@ -234,8 +236,8 @@ def _no_set(
     n_known = len(guess.marker_set.markers)
     return BadDataError(
         f"no known marker set fits ({best.marker_set.name} comes nearest with {best.share:.0%} of "
-        f"its markers) and of {best.labels} labels the words tell {n_known}, but no label for "
-        f"{', '.join(map(in_words, lacking))}; labels are {shown}",
+        f"its markers); of {best.labels} labels the words tell {n_known}, none on "
+        f"{', '.join(lacking)}; labels are {shown}",
         expected="one of " + ", ".join(shipped_names()) + ", or labels that say these places",
         remedy=f"write a marker set (`bsip markers {source}` makes a first one of this file's "
         'labels) and name it in study.toml: marker_set = "my_set.toml"',

@@ -40,7 +40,9 @@ _SIDED = {
     "metatarsal_5",
 }
 JOINT_CENTRES = frozenset(
-    f"{name}_centre_{side}" for name in ("shoulder", "elbow", "hip", "knee", "ankle") for side in "lr"
+    f"{name}_centre_{side}"
+    for name in ("shoulder", "elbow", "hip", "knee", "ankle")
+    for side in "lr"
 )
 LANDMARKS = frozenset(
     {"vertex", "sellion", "forehead", "occiput", "c7", "t10", "suprasternale", "xiphoid", "sacrum"}

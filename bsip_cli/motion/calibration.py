@@ -65,7 +65,11 @@ def calibrate(
     person = _person(skeleton, marker_set, positions, centres, frames, sex, stature, landmarks)
     forward = centres.pelvis_axes[:, 0] * np.array([1.0, 1.0, 0.0])
     return Calibration(
-        person, _pose(person, frames), unit(forward), stature, (*placed, *moved.notes, *centres.notes)
+        person,
+        _pose(person, frames),
+        unit(forward),
+        stature,
+        (*placed, *moved.notes, *centres.notes),
     )
 
 

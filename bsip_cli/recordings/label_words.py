@@ -240,7 +240,9 @@ def _readings(label: str, language: _Language) -> list[_Reading]:
     """All ways to cut a label into words with at most one side."""
     nouns, spelling = _grammar().segments, _spelling(label)
     return [
-        replace(r, cost=r.cost + _NOUN_FIRST * sum(k for k, c in enumerate(r.concepts) if c in nouns))
+        replace(
+            r, cost=r.cost + _NOUN_FIRST * sum(k for k, c in enumerate(r.concepts) if c in nouns)
+        )
         for r in _cuts(spelling, 0, language, _MOST_WORDS)
         if len(spelling.text) >= _SHORTEST or not r.side
     ]
@@ -348,7 +350,8 @@ def _vocabulary() -> dict:
 @cache
 def _grammar() -> _Grammar:
     data = _vocabulary()
-    landmarks, homes = {}, {}
+    landmarks: dict[frozenset[str], str] = {}
+    homes: dict[str, str] = {}
     for segment, rows in data["landmarks"].items():
         for name, ways in rows.items():
             homes[name] = segment

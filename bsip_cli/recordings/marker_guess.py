@@ -242,5 +242,3 @@ def _no_set(
         remedy=f"write a marker set (`bsip markers {source}` makes a first one of this file's "
         'labels) and name it in study.toml: marker_set = "my_set.toml"',
     )
-
-

@@ -35,9 +35,7 @@ markers = {optional}
 {weights}"""
 
 
-def starter_toml(
-    marker_set: MarkerSet, unknown: Sequence[str], source: str, name: str
-) -> str:
+def starter_toml(marker_set: MarkerSet, unknown: Sequence[str], source: str, name: str) -> str:
     """TOML of a marker set, and labels that were not understood as a comment.
 
     What is not printable is left out; ``source`` names the recording, ``name`` the file to be

@@ -203,7 +203,18 @@ def test_ingest_makes_a_set_of_words_and_hands_it_on(bsip, here):
 
 
 def test_ingest_refuses_labels_without_feet_and_leads_to_the_starter(bsip, here):
-    labels = "EIASG EIASD SACRUM GENOUG GENOUD CHEVILLEG CHEVILLED C7 EPAULEG EPAULED".split()
+    labels = [
+        "EIASG",
+        "EIASD",
+        "SACRUM",
+        "GENOUG",
+        "GENOUD",
+        "CHEVILLEG",
+        "CHEVILLED",
+        "C7",
+        "EPAULEG",
+        "EPAULED",
+    ]
     answer = bsip("ingest", study_of(here, {"static": labels}), "--out", here / "out")
     assert answer.code == 3 and "none on the left foot (the heel and a metatarsal)" in answer.err
     command = answer.err.split("`bsip markers ")[1].split("`")[0]

@@ -38,7 +38,9 @@ class LabelList:
             if not found.get(label)
             or (found[label].segment, found[label].landmark) != (segment, "")
         ]
-        return wrong + [f"{label}: is no marker, {found[label]}" for label in self.nothing if found.get(label)]
+        return wrong + [
+            f"{label}: is no marker, {found[label]}" for label in self.nothing if found.get(label)
+        ]
 
 
 def label_lists() -> list[LabelList]:

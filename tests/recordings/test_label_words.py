@@ -64,7 +64,9 @@ def test_lists_of_languages_and_systems(labels: LabelList):
     assert labels.faults(meanings(labels.labels)) == []
 
 
-@pytest.mark.parametrize("affix", ["Anna:{}", "S01_{}", "S01 {}", "subj-{}", "P.{}", "{}_1", "{}-Raw"])
+@pytest.mark.parametrize(
+    "affix", ["Anna:{}", "S01_{}", "S01 {}", "subj-{}", "P.{}", "{}_1", "{}-Raw"]
+)
 @pytest.mark.parametrize("number", [1, 7, 15])
 def test_what_all_labels_begin_or_end_with_does_not_count(affix, number):
     labels = label_lists()[number]

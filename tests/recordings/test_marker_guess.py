@@ -142,7 +142,9 @@ def test_labels_that_several_columns_share_are_no_markers():
 
 
 def test_a_set_survives_as_data():
-    made = guess_marker_set("RASI LASI SACR RKNEE LKNEE RANK LANK RHEE LHEE RTOE LTOE".split())
+    made = guess_marker_set(
+        ["RASI", "LASI", "SACR", "RKNEE", "LKNEE", "RANK", "LANK", "RHEE", "LHEE", "RTOE", "LTOE"]
+    )
     assert MarkerSet.from_data(json.loads(json.dumps(made.marker_set.as_data()))) == made.marker_set
 
 

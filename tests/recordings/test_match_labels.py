@@ -96,7 +96,10 @@ def test_a_prefix_chooses_between_two_people():
         match_labels(labels, WANTED, prefix="Carl")
 
 
-BODY = {name: [] for name in "RASI LASI RKNE LKNE RANK LANK RHEE LHEE C7 T10".split()}
+BODY = {
+    name: []
+    for name in ["RASI", "LASI", "RKNE", "LKNE", "RANK", "LANK", "RHEE", "LHEE", "C7", "T10"]
+}
 
 
 @pytest.mark.parametrize("affix", ["S01_{}", "S01 {}", "Mr.X.{}", "p-{}", "{}_1", "{}-Raw", "X{}"])
@@ -108,7 +111,7 @@ def test_what_all_labels_begin_or_end_with_is_taken_off(affix):
 
 def test_two_people_without_a_colon():
     labels = [f"{person}_{name}" for name in BODY for person in "AB"]
-    with pytest.raises(BadDataError, match="2 people in one file: 'A_' .10 markers., 'B_' .10"):
+    with pytest.raises(BadDataError, match=r"2 people in one file: 'A_' .10 markers., 'B_' .10"):
         match_labels(labels, BODY)
     assert match_labels(labels, BODY, prefix="B").index["LASI"] == labels.index("B_LASI")
 

@@ -83,7 +83,8 @@ def test_the_lower_half_of_a_set_is_enough():
 NEAR = {  # labels of a shipped set, with some of another lab's own
     "plugin_gait": (
         "RASI LASI RPSI LPSI RKNE LKNE RANK LANK RHEE LHEE RTOE LTOE C7 CLAV STRN RSHO LSHO RELB "
-        "LELB RFHD LFHD RBHD LBHD T10 RFIN LFIN RWristLat LWristLat RThighLat LThighLat RShankLat LShankLat R5thMet L5thMet",
+        "LELB RFHD LFHD RBHD LBHD T10 RFIN LFIN RWristLat LWristLat RThighLat LThighLat RShankLat "
+        "LShankLat R5thMet L5thMet",
         {"R5thMet": "metatarsal_5_r", "LWristLat": "styloid_radial_l", "RThighLat": ""},
     ),
     "hansen2017": (

@@ -11,6 +11,7 @@ _TAILS = 0.6  # end alike from a separator on: fewer may be those on the lateral
 _FEW = 3  # places more that they name: fewer may be chance,
 _ALL = 0.9  # of the labels where no separator is, or where one place more is enough
 _SEPARATORS = " _.-"
+_LONGEST = 40  # characters: nobody's name is longer, and hostile labels may be
 
 Count = Callable[[Sequence[str]], int]  # how many bones, or wanted markers, these labels name
 
@@ -93,9 +94,9 @@ def _best(labels: Sequence[str], n_labels: int, count: Count) -> Affix | None:
 
     One of nearly all labels, set apart by a separator, goes first.
     """
-    ends = [Affix(head=label[:k]) for label in labels for k in range(1, len(label))]
-    ends += [Affix(tail=label[-k:]) for label in labels for k in range(1, len(label))]
-    shared = Counter(ends)
+    cuts = [(label, k) for label in labels for k in range(1, min(len(label), _LONGEST))]
+    shared = Counter(Affix(head=label[:k]) for label, k in cuts)
+    shared.update(Affix(tail=label[-k:]) for label, k in cuts)
     marked = {a: n for a, n in shared.items() if n >= max(_FEW, a.least_share * n_labels)}
     now = count(labels)
     gains = {affix: count(_without(labels, affix)) - now for affix in marked}

@@ -19,7 +19,7 @@ from bsip_cli.recordings.affixes import affixes, owner, split
 _COMMON = "common"
 _CLUSTER = 3  # labels that differ by a number only: a cluster, none of which marks a bone
 _AXES = ("0", "1", "2", "3")  # a drawn frame: origin and three axes
-_MOST_WORDS = 7
+_MOST_WORDS, _LONGEST = 7, 60  # of a label that is understood: words, characters
 _SHORTEST = 3  # letters of a label that has a side: RK and LB may be anything
 _ACROSS = 0.5  # cost of a word that reaches across a separator,
 _LETTER_ACROSS = 1.5  # and of one that takes in a single letter there: S_ACR is no sacrum
@@ -120,7 +120,7 @@ def bones(labels: Sequence[str]) -> int:
 def _meanings(labels: Sequence[str]) -> dict[str, Meaning]:
     labels = list(dict.fromkeys(labels))
     drawn = _drawn_frames(labels)
-    real = [label for label in labels if label not in drawn]
+    real = [label for label in labels if label not in drawn and len(label) <= _LONGEST]
     read = {lang: _read_all(real, lang) for lang in _languages() if lang.may_be(real)}
     best = read[max(read, key=lambda lang: _worth(read[lang]) * lang.part)]
     return _settled({label: meaning for label, (meaning, _) in best.items()})

@@ -97,3 +97,8 @@ def test_three_of_a_stem_are_a_cluster_and_only_track(stem):
 def test_drawn_frames_are_no_markers():
     found = meanings(["LHEE", "LHDF0", "LHDF1", "LHDF2", "LHDF3", "LFHD"])
     assert set(found) == {"LHEE", "LFHD"}
+
+
+def test_absurd_labels_take_no_time_and_no_memory():
+    labels = [f"{'lamtrk' * 500}{k}" for k in range(200)] + ["9" * 6000, "²³", "\x00", "L" * 59]
+    assert meanings(labels) == {}

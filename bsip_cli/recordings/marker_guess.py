@@ -110,8 +110,8 @@ class Guess:
         near = f"; {self.base.marker_set.name} fits partly" if self.base else ""
         unknown = f"; not understood: {', '.join(self.unknown)}" if self.unknown else ""
         made = Finding(
-            "marker_set",
-            self.marker_set.name,
+            "labels",
+            "",
             f"no shipped set fits well{near}",
             "one of " + ", ".join(shipped_names()),
             f"made one from the labels: {', '.join(bony)}; {tracking} more only track{unknown}",
@@ -123,7 +123,7 @@ class Guess:
         if not self.centres:
             return ()
         found = Finding(
-            "marker_set",
+            "labels",
             ", ".join(self.centres),
             "keypoints of a markerless system: centres of joints",
             "markers on bony landmarks",

@@ -19,6 +19,7 @@ OF_REAL_FILES = {
     "c3dorg_plate_types/analogfpscale04.c3d": "plugin_gait+words",
     "c3dorg_plate_types/Static Pose.c3d": "words",
     "edge_ezc3d/FP_Type1.c3d": "words",
+    "edge_ezc3d/FP_Type3.c3d": "words",
     "edge_nimble/trial2.c3d": "helen_hayes+words",
     "golf_french/static.c3d": "words",
     "type3_running_kistler/Running_0002.c3d": "words",
@@ -38,7 +39,7 @@ OF_REAL_FILES = {
 }
 OF_NO_SET = (
     "edge_nimble/JH_01.c3d",
-    "edge_ezc3d/FP_Type3.c3d",
+    "edge_c3dorg/Dance.c3d",
     "c3dorg_plate_types/FP1.C3D",
     "edge_custom/Record_12.c3d",
 )

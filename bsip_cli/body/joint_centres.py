@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.body.keypoints import HIP_FRACTIONS, stood_in_for
 from bsip_cli.body.names import in_words
 from bsip_cli.body.stand_ins import whole_arm, with_trunk
 from bsip_cli.errors import BadDataError
 
 # Fractions of the distance between the ASIS, from their middle; X anterior, Y up, Z right.
 _LJC = {"M": (-0.335, -0.032, 0.0), "F": (-0.340, 0.049, 0.0)}
-_HJC = {"M": (-0.095, -0.370, 0.361), "F": (-0.139, -0.336, 0.372)}
 # Fraction of the thorax width (C7 to suprasternale) and angle above that line [degrees].
 _CJC = {"M": (0.55, 8.0), "F": (0.53, 14.0)}
 _SJC = (0.42, -67.0)
@@ -71,7 +71,8 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
     ends: dict[str, np.ndarray] = {}
     for side in "lr":
         outward = right if side == "r" else -right
-        centres[f"shoulder_{side}"] = landmarks[f"acromion_{side}"] + down
+        raised = landmarks[f"acromion_{side}"] + down
+        centres[f"shoulder_{side}"] = landmarks.get(f"shoulder_centre_{side}", raised)
         shoulder, below = centres[f"shoulder_{side}"], unit(waist - centres["neck"])
         arm = whole_arm(landmarks, shoulder, below, side, sex, stature_m)
         notes += arm.notes
@@ -88,7 +89,7 @@ def hip_centres(landmarks: Mapping[str, np.ndarray], sex: str) -> dict[str, np.n
         return None
     axes, middle, width = _pelvis(landmarks)
     return {
-        side: middle + width * (axes @ (_HJC[sex] * np.array([1.0, 1.0, sign])))
+        side: middle + width * (axes @ (HIP_FRACTIONS[sex] * np.array([1.0, 1.0, sign])))
         for side, sign in (("r", 1.0), ("l", -1.0))
     }
 
@@ -106,6 +107,7 @@ _REQUIRED = (
 
 def missing_landmarks(known: Collection[str]) -> list[str]:
     """What has no landmark among the known ones and no skeleton can do without, in words."""
+    known = {*known, *stood_in_for(known)}
     missing = [name for name in _REQUIRED if name not in known]
     missing += [
         f"a metatarsal of the {in_words(f'foot_{side}')}"

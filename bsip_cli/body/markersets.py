@@ -6,7 +6,7 @@ import difflib
 import os
 from collections import Counter
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from math import inf
 from pathlib import Path
 
@@ -39,9 +39,15 @@ _SIDED = {
     "metatarsal_2",
     "metatarsal_5",
 }
+JOINT_CENTRES = frozenset(
+    f"{name}_centre_{side}"
+    for name in ("shoulder", "elbow", "hip", "knee", "ankle")
+    for side in "lr"
+)
 LANDMARKS = frozenset(
     {"vertex", "sellion", "forehead", "occiput", "c7", "t10", "suprasternale", "xiphoid", "sacrum"}
     | {f"{name}_{side}" for name in _SIDED for side in "lr"}
+    | JOINT_CENTRES
 )
 _TABLES = {"description", "also_called", "segments", "weights", "aliases", "optional"}
 
@@ -57,6 +63,17 @@ class Marker:
     optional: bool
     aliases: tuple[str, ...]
 
+    @property
+    def is_joint_centre(self) -> bool:
+        """A keypoint inside the body, not a marker on its skin."""
+        return self.landmark in JOINT_CENTRES
+
+    def also(self, label: str) -> Marker:
+        """The same marker, also under another label."""
+        if label in (self.label, *self.aliases):
+            return self
+        return replace(self, aliases=(*self.aliases, label))
+
 
 @dataclass(frozen=True)
 class MarkerSet:
@@ -71,6 +88,17 @@ class MarkerSet:
     def optional(self) -> frozenset[str]:
         """Labels that a recording may lack without a word."""
         return frozenset(marker.label for marker in self.markers if marker.optional)
+
+    def as_data(self) -> dict:
+        """As JSON can hold it: what :meth:`from_data` reads."""
+        return asdict(self)
+
+    @staticmethod
+    def from_data(data: dict) -> MarkerSet:
+        """The set that was written as data."""
+        rows = [row | {"aliases": tuple(row["aliases"])} for row in data["markers"]]
+        markers = tuple(Marker(**row) for row in rows)
+        return MarkerSet(data["name"], data["description"], markers)
 
 
 def load_marker_set(name: str) -> MarkerSet:

@@ -16,9 +16,8 @@ from bsip_cli.body.names import in_words, without_side
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.config import load_config
 from bsip_cli.errors import UsageError, printable
-from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.labels import LabelMatch, match_labels
-from bsip_cli.recordings.marker_guess import SetFit, fits
+from bsip_cli.recordings.marker_guess import Guess, SetFit, fits, told_from
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.recordings.starter_set import starter_toml
@@ -37,25 +36,19 @@ class Request:
 
 
 def markers_command(request: Request) -> int:
-    """Print everything; write a starter set where asked, or where no set fits.
+    """Print everything; write a starter set where asked, or where no shipped set fits well.
 
-    Returns 0 where the set has all that a skeleton needs, 3 where no set fits or something that a
-    skeleton cannot do without is missing.
+    Returns 0 where the set has all that a skeleton needs, 3 where something that a skeleton cannot
+    do without is missing.
     """
     recording = read_recording(request.file)
     _say([f"{request.file}: {_size(recording)}", *_findings(recording)])
-    chosen = _chosen(request, recording)
-    if chosen is None:
-        understood = meanings([_bare(label) for label in recording.labels])
-        words = {
-            k: f"seems to be {_place(m.segment, m.landmark)}"
-            for k, label in enumerate(recording.labels)
-            if (m := understood.get(_bare(label)))
-        }
-        _say(["", "labels:", *_label_rows(recording, words, "not understood")])
-    complete = chosen is not None and _compared(request, recording, chosen)
-    if chosen is None or request.write is not None:
-        _write_starter(request, recording)
+    guess, chosen = _chosen(request, recording)
+    complete = bool(chosen.markers) and _compared(request, recording, chosen)
+    if not chosen.markers:
+        _say(["", "labels:", *_label_rows(recording, {}, "not understood")])
+    if request.write is not None or not (guess is None or guess.is_shipped):
+        _write_starter(request, guess or told_from(recording.labels, request.prefix))
     return 0 if complete else 3
 
 
@@ -69,7 +62,7 @@ def _compared(request: Request, recording: Recording, chosen: MarkerSet) -> bool
         prefix=request.prefix,
     )
     there = {match.index[m.label]: m for m in chosen.markers if m.label in match.index}
-    words = {k: _meaning(_bare(recording.labels[k]), marker) for k, marker in there.items()}
+    words = {k: _meaning(recording.labels[k], marker) for k, marker in there.items()}
     _say([*_prefix(match), "", "labels:", *_label_rows(recording, words, "not in the set")])
     config = load_config([])
     skeleton = load_skeleton(config.skeleton)
@@ -106,28 +99,33 @@ def _findings(recording: Recording) -> list[str]:
 # --- which set ---------------------------------------------------------------------------------
 
 
-def _chosen(request: Request, recording: Recording) -> MarkerSet | None:
-    """The set that was named, or the one that fits best; None where none fits. Says which."""
+def _chosen(request: Request, recording: Recording) -> tuple[Guess | None, MarkerSet]:
+    """The set that was named, or what the labels tell; says which. No guess where one was named."""
     if request.marker_set != "auto":
         chosen = load_marker_set(request.marker_set)
         _say(["", f"marker set: {chosen.name} ({chosen.description}), as asked"])
-        return chosen
+        return None, chosen
     ranked = fits(recording.labels)
-    best = next((fit for fit in ranked if fit.fits), None)
+    guess = told_from(recording.labels, request.prefix)
+    chosen, best = guess.marker_set, guess.base
     if best is None:
-        _say(["", "marker set: none of the shipped sets fits", *map(_rival, ranked[:_RIVALS])])
-        return None
+        told = f"of {ranked[0].labels} labels the words tell {len(chosen.markers)}"
+        _say(["", f"marker set: none of the shipped sets fits; {told}"])
+        _say([_rival(fit) for fit in ranked[:_RIVALS]])
+        return guess, chosen
     others = [fit for fit in ranked if fit is not best][: _RIVALS - 1]
+    added = len(chosen.markers) - best.found
+    more = "" if guess.is_shipped else f"; {added} more labels by their words"
     _say(
         [
             "",
             f"marker set: {best.marker_set.name} ({best.marker_set.description}), guessed: "
             f"{best.required_found} of its {best.required} markers (optional ones aside), "
-            f"{best.found} of {best.labels} labels",
+            f"{best.found} of {best.labels} labels{more}",
             *map(_rival, others),
         ]
     )
-    return best.marker_set
+    return guess, chosen
 
 
 def _rival(fit: SetFit) -> str:
@@ -152,7 +150,7 @@ def _label_rows(recording: Recording, words: Mapping[int, str], others: str) -> 
 
 
 def _meaning(label: str, marker: Marker) -> str:
-    renamed = "" if marker.label == label else f"{marker.label}: "
+    renamed = "" if label.strip().endswith(marker.label) else f"{marker.label}: "
     return renamed + _place(marker.segment, marker.landmark)
 
 
@@ -186,7 +184,7 @@ def _segment_rows(
 # --- a first set --------------------------------------------------------------------------------
 
 
-def _write_starter(request: Request, recording: Recording) -> None:
+def _write_starter(request: Request, guess: Guess) -> None:
     """Write the labels of the file as a marker set; never over a file that is there.
 
     Raises
@@ -195,8 +193,9 @@ def _write_starter(request: Request, recording: Recording) -> None:
         The file that was asked for is there, or cannot be written.
     """
     target = request.write or Path(f"{request.file.stem.replace(' ', '_')}_markers.toml")
-    labels = [_bare(label) for label in recording.labels if _is_of(label, request.prefix)]
-    text = starter_toml(labels, printable(request.file.name), printable(target.name))
+    text = starter_toml(
+        guess.marker_set, guess.unknown, printable(request.file.name), printable(target.name)
+    )
     try:
         with target.open("x", encoding="utf-8") as file:
             file.write(text)
@@ -219,13 +218,3 @@ def _write_starter(request: Request, recording: Recording) -> None:
             f"with `{again}`, and name it in study.toml",
         ]
     )
-
-
-def _bare(label: str) -> str:
-    return label.rpartition(":")[2].strip()
-
-
-def _is_of(label: str, prefix: str) -> bool:
-    """Whether a label is the person's; everybody's without a prefix."""
-    before = label.rpartition(":")[0]
-    return not prefix or before in ("", prefix.rstrip(":"))

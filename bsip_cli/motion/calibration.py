@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.anthropometry import mean_length_m, stature_m
 from bsip_cli.body.joint_centres import JointCentres, joint_centres, unit
+from bsip_cli.body.keypoints import with_skin
 from bsip_cli.body.markersets import MarkerSet
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
@@ -53,7 +54,7 @@ def calibrate(
     BadDataError
         Landmarks are missing (all are named).
     """
-    landmarks = _landmarks(marker_set, positions)
+    landmarks, placed = with_skin(_landmarks(marker_set, positions), sex)
     moved = functional_landmarks(marker_set, landmarks, positions, trials, sex)
     landmarks |= moved.landmarks
     guess = height_m or _rough_stature(landmarks)
@@ -64,7 +65,11 @@ def calibrate(
     person = _person(skeleton, marker_set, positions, centres, frames, sex, stature, landmarks)
     forward = centres.pelvis_axes[:, 0] * np.array([1.0, 1.0, 0.0])
     return Calibration(
-        person, _pose(person, frames), unit(forward), stature, (*moved.notes, *centres.notes)
+        person,
+        _pose(person, frames),
+        unit(forward),
+        stature,
+        (*placed, *moved.notes, *centres.notes),
     )
 
 

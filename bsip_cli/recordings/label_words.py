@@ -1,15 +1,33 @@
-"""What a label seems to mean: side, segment and landmark, told from laboratories' habits."""
+"""What a label seems to mean: side, segment and landmark, read from words of several languages."""
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Sequence
-from dataclasses import dataclass
+import unicodedata
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
-from itertools import chain
+from itertools import accumulate, chain, pairwise
 
+from bsip_cli.body.markersets import LANDMARKS
+from bsip_cli.body.names import SEGMENTS
 from bsip_cli.config import shipped
+from bsip_cli.recordings.affixes import affixes, owner, split
+
+_COMMON = "common"
+_CLUSTER = 3  # labels that differ by a number only: a cluster, none of which marks a bone
+_AXES = ("0", "1", "2", "3")  # a drawn frame: origin and three axes
+_MOST_WORDS, _LONGEST = 7, 60  # of a label that is understood: words, characters
+_SHORTEST = 3  # letters of a label that has a side: RK and LB may be anything
+_ACROSS = 0.5  # cost of a word that reaches across a separator,
+_LETTER_ACROSS = 1.5  # and of one that takes in a single letter there: S_ACR is no sacrum
+_ALONE = 1.0  # cost of a side whose other side no label has
+_SPECIAL = 0.98  # of the worth of a language that extends another: it must say more
+_NUMBER_LEFT, _TRACKS = 0.1, 0.2  # cost of a meaning that leaves a number aside, or is no bone
+_SIDELESS = 1.0  # or is a bone that has sides, without one
+_NOUN_FIRST = 0.01  # of a word's cost per place: a noun goes before what says where on it
 
 
 @dataclass(frozen=True)
@@ -18,71 +36,350 @@ class Meaning:
 
     segment: str
     landmark: str
+    weight: float = field(default=1.0, compare=False)  # how far the marker is trusted
 
 
 @dataclass(frozen=True)
-class _Habit:
-    """Words that a label may consist of once its side is taken off, and what they mean.
+class _Reading:
+    """A way to cut a label into words: what they stand for, the side (l, r or empty), the cost."""
 
-    ``words`` matches the whole rest; {s} in segment and landmark stands for the side.
+    concepts: tuple[str, ...]
+    side: str
+    cost: float
+    side_at: tuple[int, int] = (0, 0)  # where the word of the side begins and ends
+
+
+@dataclass(frozen=True, eq=False)
+class _Language:
+    """Word to what it may stand for, and word to side; the words of all languages among them.
+
+    Where it has telltales, one of them must be among the labels: else it may be another language.
     """
 
-    words: str
-    segment: str
-    landmark: str = ""
+    name: str
+    words: Mapping[str, frozenset[tuple[str, ...]]]
+    sides: Mapping[str, str]
+    longest: int
+    telltales: tuple[str, ...]
+    part: float  # of its worth that counts
 
-    def means(self, side: str, rest: str) -> Meaning | None:
-        """What the rest of a label means, if these are its words and the side is as needed."""
-        sided = "{s}" in self.segment + self.landmark
-        if sided != bool(side) or not re.fullmatch(self.words, rest):
-            return None
-        return Meaning(self.segment.format(s=side), self.landmark.format(s=side))
-
-
-@cache
-def _habits() -> tuple[_Habit, ...]:
-    rows = tomllib.loads(shipped("label_words.toml").read_text(encoding="utf-8"))["habits"]
-    return tuple(_Habit(row["words"], row["segment"], row.get("landmark", "")) for row in rows)
+    def may_be(self, labels: Sequence[str]) -> bool:
+        """Whether labels may be of this language."""
+        if not self.telltales:
+            return True
+        spelt = ["".join(_pieces(label)) for label in labels]
+        return any(telltale in one for telltale in self.telltales for one in spelt)
 
 
-_SIDES = {"r": "r", "l": "l", "right": "r", "left": "l"}
+@dataclass(frozen=True)
+class _Grammar:
+    """What concepts mean together, whatever the language."""
+
+    landmarks: Mapping[frozenset[str], str]
+    segments: Mapping[str, str]  # noun -> segment, without its side
+    homes: Mapping[str, str]  # landmark, without its side -> segment, without its side
+    weights: Mapping[str, float]  # of nouns that slide
+    fillers: frozenset[str]
+    never: frozenset[str]
+    numbered: frozenset[str]
 
 
 def meanings(labels: Sequence[str]) -> dict[str, Meaning]:
     """Label to meaning, for those that are understood; every landmark has one label at most.
 
-    Of several labels that seem to be one landmark the shortest has it, the others track.
+    What all labels of a person begin or end with does not count, and all are read in the one
+    language that understands most of them. Of several labels that seem to be one landmark the
+    plainest has it, the others track; three or more that differ by a number are a cluster and only
+    track.
     """
-    found = {label: meaning for label in labels if (meaning := meaning_of(label)) is not None}
-    holders: dict[str, str] = {}
-    for label in sorted(found, key=lambda name: (len(name), name)):
-        holders.setdefault(found[label].landmark, label)
-    return {
-        label: meaning if holders[meaning.landmark] == label else Meaning(meaning.segment, "")
-        for label, meaning in found.items()
-    }
+    known = affixes(labels, bones)
+    owned = {label: owner(label, known) for label in labels}
+    bare = {label: a.off(label.strip()) if a else split(label)[1] for label, a in owned.items()}
+    found: dict[str, Meaning] = {}
+    for affix in known:
+        own = {label: bare[label] for label in labels if owned[label] == affix}
+        of_person = _meanings(list(own.values()))
+        found |= {label: of_person[b] for label, b in own.items() if b in of_person}
+    return {label: found[label] for label in labels if label in found}
 
 
 def meaning_of(label: str) -> Meaning | None:
     """One label's meaning, or None; a prefix ``Subject:`` does not count."""
-    readings = _readings(label.rsplit(":", 1)[-1])
-    meant = (habit.means(side, rest) for side, rest in readings for habit in _habits())
-    off_centre = (  # RBAK, RSCAP: one side of a middle segment
-        habit.means("", rest)
-        for side, rest in readings
-        for habit in _habits()
-        if side and not habit.landmark
+    bare = split(label)[1]
+    return _meanings([bare]).get(bare)
+
+
+def bones(labels: Sequence[str]) -> int:
+    """How many landmarks some labels name, taken as they are."""
+    return len({meaning.landmark for meaning in _meanings(labels).values()} - {""})
+
+
+# --- a person's labels ---------------------------------------------------------------------------
+
+
+def _meanings(labels: Sequence[str]) -> dict[str, Meaning]:
+    labels = list(dict.fromkeys(labels))
+    drawn = _drawn_frames(labels)
+    real = [label for label in labels if label not in drawn and len(label) <= _LONGEST]
+    read = {lang: _read_all(real, lang) for lang in _languages() if lang.may_be(real)}
+    best = read[max(read, key=lambda lang: _worth(read[lang]) * lang.part)]
+    return _settled({label: meaning for label, (meaning, _) in best.items()})
+
+
+def _read_all(labels: Sequence[str], language: _Language) -> dict[str, tuple[Meaning, float]]:
+    """Label to the meaning of the cheapest reading and its cost.
+
+    A body has two sides: a reading whose other side is no label of the person's costs more.
+    """
+    spelt = {_spelt(label) for label in labels}
+    found = {}
+    for label in labels:
+        costs = [
+            (meaning, cost + _ALONE * (bool(twins) and not twins & spelt))
+            for meaning, cost, twins in _ways(label, language)
+        ]
+        meaning, cost = min(costs, key=lambda one: one[1], default=(None, 0.0))
+        if meaning is not None:
+            found[label] = meaning, cost
+    return found
+
+
+def _worth(found: Mapping[str, tuple[Meaning, float]]) -> float:
+    """How much a language says: labels and bones; what takes many words counts less."""
+    bony: dict[str, float] = {}
+    for meaning, cost in found.values():
+        bony[meaning.landmark] = max(bony.get(meaning.landmark, 0.0), 1 / cost)
+    bony.pop("", None)
+    return sum(1 / cost for _, cost in found.values()) + sum(bony.values())
+
+
+def _settled(found: Mapping[str, Meaning]) -> dict[str, Meaning]:
+    """One label per landmark; clusters only track."""
+    stems = Counter((found[label], _stem(label)) for label in found)
+
+    def plainness(label: str) -> tuple[bool, int, str]:
+        return label[-1:].isdigit() and stems[found[label], _stem(label)] > 1, len(label), label
+
+    holders: dict[str, str] = {}
+    for label in sorted(found, key=plainness):
+        if stems[found[label], _stem(label)] < _CLUSTER:
+            holders.setdefault(found[label].landmark, label)
+    return {
+        label: meaning if holders.get(meaning.landmark) == label else replace(meaning, landmark="")
+        for label, meaning in found.items()
+    }
+
+
+def _stem(label: str) -> str:
+    return re.sub(r"[\s._-]*\d+$", "", label)
+
+
+def _drawn_frames(labels: Sequence[str]) -> set[str]:
+    """Points of frames that a program drew: a stem with 0, 1, 2 and 3 behind it."""
+    present = set(labels)
+    stems = {label[:-1] for label in labels if label.endswith("0")}
+    drawn = {stem for stem in stems if all(stem + axis in present for axis in _AXES)}
+    return {stem + axis for stem in drawn for axis in _AXES}
+
+
+# --- one label -----------------------------------------------------------------------------------
+
+
+@cache
+def _ways(
+    label: str, language: _Language
+) -> tuple[tuple[Meaning | None, float, frozenset[str]], ...]:
+    """What a label may mean: meaning, cost, and how the same on the other side would be spelt."""
+    grammar, spelt = _grammar(), _spelt(label)
+    return tuple(
+        (meaning, reading.cost + cost, _twins(spelt, reading, language))
+        for reading in _readings(label, language)
+        for meaning, cost in _means(reading, grammar)
     )
-    return next(filter(None, chain(meant, off_centre)), None)
 
 
-def _readings(bare: str) -> list[tuple[str, str]]:
-    """Possible sides (l, r or empty) and what is left, joined and in lower case."""
-    joined = re.sub(r"[\s._-]", "", bare).lower()
-    readings = []
-    for word, side in sorted(_SIDES.items(), key=lambda item: -len(item[0])):
-        if joined.startswith(word) and len(joined) > len(word):
-            readings.append((side, joined[len(word) :]))
-        if re.search(rf"[\s._-]{word}$", bare.lower()):
-            readings.append((side, joined[: -len(word)]))
-    return [*readings, ("", joined)]
+def _twins(spelt: str, reading: _Reading, language: _Language) -> frozenset[str]:
+    begin, end = reading.side_at
+    others = (word for word, side in language.sides.items() if reading.side not in ("", side))
+    return frozenset(spelt[:begin] + other + spelt[end:] for other in others)
+
+
+def _spelt(label: str) -> str:
+    return "".join(_pieces(label))
+
+
+def _pieces(label: str) -> list[str]:
+    """Parts of a label between separators, changes of case and digits; plain lower case."""
+    plain = unicodedata.normalize("NFKD", label.replace("ß", "ss"))
+    plain = "".join(c for c in plain if not unicodedata.combining(c))
+    parts = re.findall(r"\d+|[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\d_a-zA-Z]+|[^\w\s.-]", plain)
+    return [part.casefold() for part in parts]
+
+
+@dataclass(frozen=True)
+class _Spelling:
+    """A joined label; places where a part ends or begins, and those of them with a separator."""
+
+    text: str
+    seams: frozenset[int]
+    separators: frozenset[int]
+
+
+def _spelling(label: str) -> _Spelling:
+    parts = [_pieces(part) for part in re.split(r"[\s._-]+", label)]
+    lengths = [[len(piece) for piece in part] for part in parts]
+    separators = {0, *accumulate(map(sum, lengths))}
+    return _Spelling(
+        "".join(map("".join, parts)),
+        frozenset({0, *accumulate(chain.from_iterable(lengths))}),
+        frozenset(separators),
+    )
+
+
+def _readings(label: str, language: _Language) -> list[_Reading]:
+    """All ways to cut a label into words with at most one side."""
+    nouns, spelling = _grammar().segments, _spelling(label)
+    return [
+        replace(
+            r, cost=r.cost + _NOUN_FIRST * sum(k for k, c in enumerate(r.concepts) if c in nouns)
+        )
+        for r in _cuts(spelling, 0, language, _MOST_WORDS)
+        if len(spelling.text) >= _SHORTEST or not r.side
+    ]
+
+
+def _cuts(
+    spelling: _Spelling, start: int, language: _Language, words_left: int
+) -> Iterator[_Reading]:
+    if start == len(spelling.text):
+        yield _Reading((), "", 0.0)
+        return
+    if not words_left:
+        return
+    for end, concepts, side, cost in _words_at(spelling, start, language):
+        for rest in _cuts(spelling, end, language, words_left - 1):
+            if not (side and rest.side):
+                yield _Reading(
+                    (*concepts, *rest.concepts),
+                    side or rest.side,
+                    cost + rest.cost,
+                    (start, end) if side else rest.side_at,
+                )
+
+
+def _words_at(
+    spelling: _Spelling, start: int, language: _Language
+) -> Iterator[tuple[int, tuple[str, ...], str, float]]:
+    """Words that begin at a place: where they end, concepts, side, cost.
+
+    A word costs 1, more where it reaches across separators; a single letter 0.5 more for each end
+    at which it is not set apart.
+    """
+    text, seams = spelling.text, spelling.seams
+    number = re.match(r"\d+", text[start:])
+    if number:
+        yield start + number.end(), (str(int(number[0])),), "", 1.0
+    for end in range(start + 1, min(len(text), start + language.longest) + 1):
+        word = text[start:end]
+        cost = 1.0 + _reach(spelling, start, end)
+        if len(word) == 1:
+            cost += 0.5 * ((start not in seams) + (end not in seams))
+        for concepts in language.words.get(word, ()):
+            yield end, concepts, "", cost
+        if word in language.sides:
+            yield end, (), language.sides[word], cost
+
+
+def _reach(spelling: _Spelling, start: int, end: int) -> float:
+    """The cost of a word's reach across separators."""
+    inside = sorted(place for place in spelling.separators if start < place < end)
+    if not inside:
+        return 0.0
+    takes_letter = any(b - a == 1 for a, b in pairwise([start, *inside, end]))
+    return _LETTER_ACROSS if takes_letter else _ACROSS
+
+
+def _means(reading: _Reading, grammar: _Grammar) -> Iterator[tuple[Meaning | None, float]]:
+    """What words mean together, with what that costs; None for what is no marker on a body.
+
+    A landmark by the table, dearer where a number is left aside; else the segment of the nouns.
+    """
+    concepts = frozenset(reading.concepts) - grammar.fillers
+    words = frozenset(c for c in concepts if not c.isdigit())
+    if grammar.never & words:
+        yield None, 0.0
+        return
+    if words & grammar.numbered and not _is_vertebra(reading, grammar):
+        return
+    weight = min((grammar.weights.get(word, 1.0) for word in words), default=1.0)
+    tracking = _TRACKS
+    for known, cost in ((concepts, 0.0), (words, _NUMBER_LEFT)):
+        name = grammar.landmarks.get(known)
+        if name and (full := _sided(name, reading.side, LANDMARKS)):
+            yield Meaning(_sided(grammar.homes[name], reading.side, SEGMENTS), full, weight), cost
+        elif name and not reading.side:
+            tracking = _SIDELESS
+    segments = {grammar.segments[word] for word in words if word in grammar.segments}
+    if len(segments) == 1 and (full := _sided(segments.pop(), reading.side, SEGMENTS)):
+        yield Meaning(full, "", weight), tracking
+
+
+def _is_vertebra(reading: _Reading, grammar: _Grammar) -> bool:
+    """A numbered noun with its number behind it and nothing else."""
+    spoken = [c for c in reading.concepts if c not in grammar.fillers]
+    return not reading.side and len(spoken) == 2 and spoken[1].isdigit()
+
+
+def _sided(name: str, side: str, known: Sequence[str] | frozenset[str]) -> str:
+    """The name with its side, where it has sides; empty where the side is missing or too much."""
+    if side and f"{name}_{side}" in known:
+        return f"{name}_{side}"
+    if name not in known:
+        return ""
+    return "" if side and known is LANDMARKS else name
+
+
+# --- the vocabulary ------------------------------------------------------------------------------
+
+
+@cache
+def _vocabulary() -> dict:
+    return tomllib.loads(shipped("label_words.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def _grammar() -> _Grammar:
+    data = _vocabulary()
+    landmarks: dict[frozenset[str], str] = {}
+    homes: dict[str, str] = {}
+    for segment, rows in data["landmarks"].items():
+        for name, ways in rows.items():
+            homes[name] = segment
+            landmarks |= {frozenset(way.split()): name for way in ways}
+    segments = {noun: s for s, nouns in data["segments"].items() for noun in nouns.split()}
+    kinds = {kind: frozenset(words.split()) for kind, words in data["kinds"].items()}
+    return _Grammar(landmarks, segments, homes, data["weights"], **kinds)
+
+
+@cache
+def _languages() -> tuple[_Language, ...]:
+    """Each with the common words and those of the language it extends; keypoints without."""
+    data = _vocabulary()["languages"]
+    return tuple(_language(name, data) for name in data if name != _COMMON)
+
+
+def _language(name: str, data: Mapping) -> _Language:
+    words: dict[str, set[tuple[str, ...]]] = {}
+    sides: dict[str, str] = {}
+    for part in (data[name].get("instead_of_common", _COMMON), data[name].get("extends", ""), name):
+        table = data.get(part, {})
+        for side, spelt in table.get("sides", {}).items():
+            sides |= dict.fromkeys(spelt.split(), side[0])
+        for concepts, spelt in table.get("words", {}).items():
+            for word in spelt.split():
+                words.setdefault(word, set()).add(tuple(concepts.split()))
+    longest = max(map(len, [*words, *sides]))
+    known = {word: frozenset(ways) for word, ways in words.items()}
+    telltales = tuple(data[name].get("telltales", ()))
+    part = _SPECIAL if "extends" in data[name] else 1.0
+    return _Language(name, known, sides, longest, telltales, part)

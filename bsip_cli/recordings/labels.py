@@ -8,11 +8,22 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from bsip_cli.errors import BadDataError
+from bsip_cli.recordings.affixes import Affix, Count, affixes, owner, split
 from bsip_cli.recordings.model import Finding
 
 _UNLABELLED = re.compile(r"^(\*.*|#+|u\d+|unlabell?ed.*|)$", re.IGNORECASE)
 _SECOND_PERSON, _FEW = 0.3, 3  # of the markers the first one has, and at least so many
 _CUT = 4  # characters
+_APART = " :_.-"  # what sets a person's name apart from a marker's
+
+
+@dataclass(frozen=True)
+class Person:
+    """Whose labels count: what they begin or end with, column -> name without it, what was said."""
+
+    affix: Affix
+    names: dict[int, str]
+    findings: tuple[Finding, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -21,7 +32,7 @@ class LabelMatch:
 
     index: dict[str, int]  # canonical name -> column of the recording
     missing: tuple[str, ...]
-    prefix: str  # the common prefix that was stripped, with its colon
+    prefix: str  # what all labels of the person begin or end with, and was taken off
     findings: tuple[Finding, ...]
 
     def share(self) -> float:
@@ -49,7 +60,7 @@ def match_labels(
     optional : wanted markers that nobody misses.
     seen : whether each column has any data; without it a column counts as not there.
     prefix : whose markers count where a file holds several people, as ``Subject:``; empty chooses
-        the only one.
+        the only one. Without a colon too: what all labels of a person begin or end with is found.
 
     Raises
     ------
@@ -58,8 +69,8 @@ def match_labels(
         columns share.
     """
     there = [True] * len(labels) if seen is None else [bool(one) for one in seen]
-    prefix = _wished(labels, prefix) if prefix else _person(labels, wanted, there)
-    bare = {i: b for i, label in enumerate(labels) if (b := _bare(label, prefix)) is not None}
+    person = person_of(labels, count_of(wanted), prefix, there)
+    bare = person.names
     counts = Counter(b for i, b in bare.items() if there[i])
     unique = {b: i for i, b in bare.items() if there[i] and counts[b] == 1}
     index = _match(unique, wanted)
@@ -70,7 +81,7 @@ def match_labels(
     empty = _spelt(missing, wanted, [b for i, b in bare.items() if not there[i]])
     missed = [name for name in missing if name not in optional]
     findings = _findings(len(wanted) - len(optional), missed, shared, empty)
-    return LabelMatch(index, missing, prefix, findings)
+    return LabelMatch(index, missing, str(person.affix), (*person.findings, *findings))
 
 
 def found_among(labels: Sequence[str], wanted: Mapping[str, Sequence[str]]) -> set[str]:
@@ -79,67 +90,105 @@ def found_among(labels: Sequence[str], wanted: Mapping[str, Sequence[str]]) -> s
     return set(_match(named, wanted))
 
 
+def columns_of(labels: Sequence[str], wanted: Mapping[str, Sequence[str]]) -> dict[str, int]:
+    """Wanted marker -> place among distinct labels without prefixes."""
+    return _match({label: i for i, label in enumerate(labels)}, wanted)
+
+
 def is_unlabelled(label: str) -> bool:
     """A point without a name: empty, '*12', 'U3', 'Unlabelled_7'."""
-    return bool(_UNLABELLED.match(label.split(":")[-1].strip()))
+    return bool(_UNLABELLED.match(split(label)[1]))
 
 
-def prefixes(labels: Sequence[str]) -> tuple[str, ...]:
-    """All prefixes 'Subject:' in the order of their first use."""
-    return tuple(dict.fromkeys(_split(label)[0] for label in labels if ":" in label))
+def count_of(wanted: Mapping[str, Sequence[str]]) -> Count:
+    """A count of the wanted markers among labels, case and separators aside."""
+    names = {_joined(spelt): name for name in wanted for spelt in (name, *wanted[name])}
+
+    def count(labels: Sequence[str]) -> int:
+        return len({names[s] for label in labels if (s := _joined(label)) in names})
+
+    return count
 
 
-def _split(label: str) -> tuple[str, str]:
-    """'Subject:RASI' to ('Subject:', 'RASI')."""
-    before, colon, bare = label.strip().rpartition(":")
-    return before + colon, bare.strip()
+def person_of(
+    labels: Sequence[str], count: Count, prefix: str = "", there: Sequence[bool] | None = None
+) -> Person:
+    """The person with the most markers, by ``count``, or the one with a prefix.
+
+    Raises
+    ------
+    BadDataError
+        Two people and no prefix, or no label with the prefix.
+    """
+    named = [
+        label.strip()
+        for i, label in enumerate(labels)
+        if not is_unlabelled(label) and (there is None or there[i])
+    ]
+    known = affixes(named, count)
+    found = {affix: count(_own(named, affix, known)) for affix in known}
+    chosen = _wished(labels, known, prefix) if prefix else max(known, key=found.__getitem__)
+    least = max(_FEW, _SECOND_PERSON * found.get(chosen, 0))
+    rivals = [a for a in known if a != chosen and found[a] >= least]
+    others = [a for a in rivals if a.head != chosen.head]
+    if others and not prefix:
+        raise _several([chosen, *others], found)
+    known = (*known, chosen)
+    joined = {"", chosen.head} - {affix.head for affix in rivals}
+    names = {
+        i: affix.off(label.strip())
+        for i, label in enumerate(labels)
+        if (affix := owner(label, known)) is not None
+        and not is_unlabelled(label)
+        and (affix == chosen or (affix.head in joined and affix not in rivals))
+    }
+    versions = [affix for affix in rivals if affix.head == chosen.head]
+    return Person(chosen, names, tuple(_other_version(chosen, v, found[v]) for v in versions))
 
 
-def _bare(label: str, prefix: str) -> str | None:
-    """The label without the person's prefix; None if it belongs to another or to nothing."""
-    own_prefix, bare = _split(label)
-    if own_prefix not in ("", prefix) or is_unlabelled(bare):
-        return None
-    return bare
+def _own(labels: Sequence[str], affix: Affix, known: Sequence[Affix]) -> list[str]:
+    return [affix.off(label) for label in labels if owner(label, known) == affix]
 
 
-def _wished(labels: Sequence[str], prefix: str) -> str:
-    """The prefix as the labels have it, with or without its colon in the wish."""
-    known = prefixes(labels)
-    for spelling in (prefix, f"{prefix}:"):
-        if spelling in known:
-            return spelling
+def _wished(labels: Sequence[str], known: Sequence[Affix], prefix: str) -> Affix:
+    """What was asked for as the labels have it, with or without what sets it apart."""
+    for affix in known:
+        if prefix and prefix.strip(_APART) in (affix.head.strip(_APART), affix.tail.strip(_APART)):
+            return affix
+    if any(Affix(prefix).marks(label.strip()) for label in labels):
+        return Affix(prefix)
+    names = [str(affix) for affix in known if str(affix)]
     raise BadDataError(
         f"no label begins with '{prefix}'",
-        expected=f"one of {', '.join(known)}" if known else "labels like 'Subject:RASI'",
+        expected=f"one of {', '.join(names)}" if names else "labels like 'Subject:RASI'",
         remedy="correct the prefix",
     )
 
 
-def _person(
-    labels: Sequence[str], wanted: Mapping[str, Sequence[str]], there: Sequence[bool]
-) -> str:
-    """The prefix with the most wanted markers; a second person is refused."""
-    found: dict[str, int] = {}
-    for prefix in ("", *prefixes(labels)):
-        split = [_split(label) for i, label in enumerate(labels) if there[i]]
-        bare = [b for p, b in split if p == prefix and not is_unlabelled(b)]
-        found[prefix] = len(_match({b: i for i, b in enumerate(bare)}, wanted))
-    first = max(found, key=lambda prefix: found[prefix])
-    others = [
-        prefix
-        for prefix, n in found.items()
-        if prefix != first and n >= max(_FEW, _SECOND_PERSON * found[first])
-    ]
-    if others:
-        people = ", ".join(f"'{p}' ({found[p]} markers)" for p in [first, *others])
-        raise BadDataError(
-            f"{1 + len(others)} people in one file: {people}",
-            expected="one person per recording",
-            remedy="export one file per person, or say whose markers count: in study.toml "
-            f'[ingest] prefixes = {{ sub-01 = "{first or others[0]}" }}, for bsip markers --prefix',
-        )
-    return first
+def _several(people: Sequence[Affix], found: Mapping[Affix, int]) -> BadDataError:
+    listed = ", ".join(f"'{affix}' ({found[affix]} markers)" for affix in people)
+    one = str(people[0]) or str(people[1])
+    return BadDataError(
+        f"{len(people)} people in one file: {listed}",
+        expected="one person per recording",
+        remedy="export one file per person, or say whose markers count: in study.toml "
+        f'[ingest] prefixes = {{ sub-01 = "{one}" }}, for bsip markers --prefix',
+    )
+
+
+def _other_version(chosen: Affix, other: Affix, n_found: int) -> Finding:
+    return Finding(
+        "labels",
+        str(chosen) or "without ending",
+        f"{n_found} markers are there twice, once {_ending(other)}",
+        "one column per marker",
+        f"took those {_ending(chosen)}",
+        "warning",
+    )
+
+
+def _ending(affix: Affix) -> str:
+    return f"whose labels end in '{affix.tail}'" if affix.tail else "without an ending"
 
 
 def _match(unique: Mapping[str, int], wanted: Mapping[str, Sequence[str]]) -> dict[str, int]:

@@ -1,14 +1,13 @@
-"""A first marker set for a recording of which no shipped set fits, as TOML to be corrected."""
+"""A first marker set for a recording that no shipped set fits well, as TOML to be corrected."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from bsip_cli.body.markersets import LANDMARKS
+from bsip_cli.body.markersets import LANDMARKS, Marker, MarkerSet
 from bsip_cli.body.names import SEGMENTS
-from bsip_cli.recordings.label_words import Meaning, meanings
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _HEAD = """\
@@ -24,47 +23,51 @@ description = {description}
 [segments]
 """
 _TAIL = """
+# Other names of a marker, in other files.
+[aliases]
+{aliases}
 # Markers that a recording may lack without a warning: those of the static trial only.
 [optional]
-markers = []
+markers = {optional}
 
 # How far a marker is trusted, 1 if it is not named; less where skin or shoulder girdle slides.
 [weights]
 {weights}"""
-_LOOSE = re.compile(r"acromion_[lr]")
 
 
-def starter_toml(labels: Sequence[str], source: str, name: str) -> str:
-    """TOML of a marker set with the labels that are understood, and the others as a comment.
+def starter_toml(marker_set: MarkerSet, unknown: Sequence[str], source: str, name: str) -> str:
+    """TOML of a marker set, and labels that were not understood as a comment.
 
-    ``labels`` without prefixes, what is not printable left out; ``source`` names the recording,
-    ``name`` the file to be written. Without any understood label the segments are comments that
-    show how to fill them in.
+    What is not printable is left out; ``source`` names the recording, ``name`` the file to be
+    written. A segment without markers is a comment that shows how to fill it in.
     """
-    labels = [label for label in dict.fromkeys(labels) if label and label.isprintable()]
-    understood = meanings(labels)
-    lines = [_segment_line(segment, understood) for segment in SEGMENTS]
-    unknown = [label for label in labels if label not in understood]
+    markers = [m for m in marker_set.markers if m.label and m.label.isprintable()]
+    lines = [_segment_line(segment, markers) for segment in SEGMENTS]
+    unknown = [label for label in dict.fromkeys(unknown) if label and label.isprintable()]
     if unknown:
         lines += ["", "# Not understood: add them to the segment they sit on, or leave them out."]
         lines += _wrapped(unknown)
-    loose = [_key(label) for label, m in understood.items() if _LOOSE.fullmatch(m.landmark)]
     head = _HEAD.format(
         source=source,
         name=name,
         landmarks="\n".join(_wrapped(_stems())),
         description=_quoted(f"Made from the labels of {source}"),
     )
-    weights = "".join(f"{key} = 0.5\n" for key in loose)
-    return head + "\n".join(lines) + "\n" + _TAIL.format(weights=weights)
+    aliases = [(m.label, [a for a in m.aliases if a.isprintable()]) for m in markers if m.aliases]
+    tail = _TAIL.format(
+        aliases="".join(f"{_key(label)} = {_listed(names)}\n" for label, names in aliases),
+        optional=_listed([m.label for m in markers if m.optional]),
+        weights="".join(f"{_key(m.label)} = {m.weight:g}\n" for m in markers if m.weight != 1.0),
+    )
+    return head + "\n".join(lines) + "\n" + tail
 
 
-def _segment_line(segment: str, understood: Mapping[str, Meaning]) -> str:
-    members = [
-        f"{_key(label)} = {_quoted(meaning.landmark)}"
-        for label, meaning in understood.items()
-        if meaning.segment == segment
-    ]
+def _listed(labels: Sequence[str]) -> str:
+    return f"[{', '.join(map(_quoted, labels))}]"
+
+
+def _segment_line(segment: str, markers: Sequence[Marker]) -> str:
+    members = [f"{_key(m.label)} = {_quoted(m.landmark)}" for m in markers if m.segment == segment]
     if not members:
         return f'# {segment} = {{ LABEL = "landmark" }}'
     return f"{segment} = {{ {', '.join(members)} }}"

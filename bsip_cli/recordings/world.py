@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.recordings.label_words import Meaning, meanings
 from bsip_cli.recordings.model import Finding
 
-_LOW = re.compile(r"hee|toe|cal|ank|mall|mt\d|fcc|fm\d|mfh|sph|foot", re.IGNORECASE)
-_HIGH = re.compile(r"hd$|head|^c7$|cv7|sho|clav|acr|^[rl]ac$|ster|strn|saj|^ij$", re.IGNORECASE)
+_LOW = ("foot_l", "foot_r", "malleolus_lateral_l", "malleolus_lateral_r")
+_HIGH = ("head", "upper_torso")
 _CLEARLY_ABOVE_M = 0.2
 _CLEAR_SHARE = 0.75  # of all marker positions on one side of the floor
 _AXES = "XYZ"
@@ -55,9 +55,10 @@ def up_from_surface(
 
 
 def up_from_labels(labels: Sequence[str], markers_m: np.ndarray) -> Up | None:
-    """From the feet to the shoulders and head, by the markers' names."""
-    low = _mean_position(labels, markers_m, _LOW)
-    high = _mean_position(labels, markers_m, _HIGH)
+    """From the feet to trunk and head, by what the labels say."""
+    understood = meanings(labels)
+    low = _middle(labels, markers_m, understood, _LOW)
+    high = _middle(labels, markers_m, understood, _HIGH)
     if low is None or high is None:
         return None
     rise = high - low
@@ -65,7 +66,7 @@ def up_from_labels(labels: Sequence[str], markers_m: np.ndarray) -> Up | None:
     sideways = np.delete(np.abs(rise), axis).max()
     if abs(rise[axis]) < max(_CLEARLY_ABOVE_M, 2 * sideways):
         return None
-    return Up(axis, 1 if rise[axis] > 0 else -1, "the feet lie below head and shoulders")
+    return Up(axis, 1 if rise[axis] > 0 else -1, "the feet lie below head and trunk")
 
 
 def up_from_name(name: str) -> Up | None:
@@ -95,10 +96,18 @@ def finding_about(up: Up) -> Finding | None:
     )
 
 
-def _mean_position(
-    labels: Sequence[str], markers_m: np.ndarray, pattern: re.Pattern[str]
+def _middle(
+    labels: Sequence[str],
+    markers_m: np.ndarray,
+    understood: Mapping[str, Meaning],
+    places: Collection[str],
 ) -> np.ndarray | None:
-    chosen = [i for i, label in enumerate(labels) if pattern.search(label.split(":")[-1])]
+    """The median place (3,) [m] of the markers on these segments or landmarks."""
+    chosen = [
+        i
+        for i, label in enumerate(labels)
+        if (m := understood.get(label)) and (m.segment in places or m.landmark in places)
+    ]
     points = markers_m[:, chosen].reshape(-1, 3)
     points = points[np.isfinite(points).all(axis=1)]
     return np.median(points, axis=0) if len(points) else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from shlex import quote
 
 import numpy as np
 import pandas as pd
@@ -34,7 +35,7 @@ def run(unit: Unit) -> None:
     opened = open_recording(unit.trial.path).with_plates(unit.config.ingest.plates)
     session = reading_of(unit, unit.trial)
     recording = assemble(opened, session)
-    marker_set = _marker_set(unit, recording)
+    marker_set, told = _marker_set(unit, recording)
     match = match_labels(
         recording.labels,
         marker_set.wanted(),
@@ -45,7 +46,7 @@ def run(unit: Unit) -> None:
     names = [marker.label for marker in marker_set.markers if marker.label in match.index]
     _require(unit, names)
     recording, repeats = without_repeats(recording)
-    findings = [*recording.findings, *match.findings, *repeats]
+    findings = [*recording.findings, *told, *match.findings, *repeats]
     if unit.config.ingest.zero_unloaded_plates:
         recording, zeroed = _without_zero(recording)
         findings += zeroed
@@ -68,7 +69,8 @@ def run(unit: Unit) -> None:
         "marker_rate_hz": recording.marker_rate_hz,
         "analog_rate_hz": recording.analog_rate_hz,
     }
-    unit.write("markers", _marker_table(times, names, filled), facts)
+    meant = {"marker_set_content": marker_set.as_data()}
+    unit.write("markers", _marker_table(times, names, filled), facts | meant)
     unit.write("wrench", _wrench_table(times, wrench, contacts), facts)
     unit.write("plates", _plate_table(recording))
     unit.write("contacts", _contact_table(times, contacts))
@@ -91,10 +93,14 @@ def _prefix(unit: Unit) -> str:
     return unit.config.ingest.prefixes.get(unit.participant.id, "")
 
 
-def _marker_set(unit: Unit, recording: Recording) -> MarkerSet:
+def _marker_set(unit: Unit, recording: Recording) -> tuple[MarkerSet, tuple[Finding, ...]]:
+    """The set that is configured, or told from the labels, and how."""
     if unit.config.marker_set != "auto":
-        return load_marker_set(unit.config.marker_set)
-    return guess_marker_set(recording.labels)
+        return load_marker_set(unit.config.marker_set), ()
+    assert unit.trial is not None
+    source = quote(str(unit.trial.path))
+    guess = guess_marker_set(recording.labels, _prefix(unit), source)
+    return guess.marker_set, guess.findings()
 
 
 def _require(unit: Unit, names: list[str]) -> None:

@@ -45,7 +45,7 @@ def run(unit: Unit) -> None:
     ]
     still = _calibrating_trial(unit, recorded)
     quiet = _quietest(still)
-    marker_set = load_marker_set(_marker_set_name(unit, still.trial))
+    marker_set = _marker_set(unit, still.trial)
     assert unit.participant is not None
     calibration = calibrate(
         skeleton,
@@ -58,6 +58,7 @@ def run(unit: Unit) -> None:
     _require_markers(unit, marker_set, calibration.person)
     if unit.config.marker_set == "auto":
         unit.warn(f"{unit.name}: marker set {marker_set.name}, told from the labels")
+        _warn_strangers(unit, marker_set, recorded)
     for note in calibration.notes:
         unit.warn(f"{unit.name}: {note}")
     fit = _refine(unit, calibration, recorded, still, quiet)
@@ -111,10 +112,24 @@ def _would_do(marker_set: MarkerSet, segment: str) -> str:
     return ", ".join(m.label for m in marker_set.markers if m.segment == segment)
 
 
-def _marker_set_name(unit: Unit, trial: Trial) -> str:
-    """As configured; what ingest guessed where that was left to it."""
+def _marker_set(unit: Unit, trial: Trial) -> MarkerSet:
+    """As configured; what ingest told from the trial's labels where that was left to it."""
     configured = unit.config.marker_set
-    return unit.facts("markers", trial)["marker_set"] if configured == "auto" else configured
+    if configured != "auto":
+        return load_marker_set(configured)
+    return MarkerSet.from_data(unit.facts("markers", trial)["marker_set_content"])
+
+
+def _warn_strangers(unit: Unit, marker_set: MarkerSet, recorded: list[_Recorded]) -> None:
+    """Of trials whose labels were taken for other markers than the calibrating trial's."""
+    known = {marker.label for marker in marker_set.markers}
+    for one in recorded:
+        strange = [label for label in one.labels if label not in known]
+        if strange:
+            unit.warn(
+                f"{unit.name}: {one.trial.stem} has markers that the calibrating trial's set "
+                f"{marker_set.name} does not know, left out: {', '.join(strange)}"
+            )
 
 
 # --- which frames -----------------------------------------------------------------------------

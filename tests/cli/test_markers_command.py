@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bsip_cli.body.markersets import load_marker_set
+from bsip_cli.artifacts import read_header
+from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.commands.markers import Request, markers_command
 from bsip_cli.errors import BadDataError, UsageError
 
@@ -104,11 +105,11 @@ def test_no_trunk_is_refused_as_scale_does(here, capsys):
 
 def test_an_unknown_set_is_written_down_and_serves(here, capsys):
     path = recording(here, [f"P:{label}" for label in OWN])
-    assert markers_command(asked(path)) == 3
+    assert markers_command(asked(path)) == 0
     said = capsys.readouterr().out
-    assert "none of the shipped sets fits" in said
-    assert "  P:LWrist     seen 100.0 %  seems to be left forearm, left wrist\n" in said
-    assert "  P:Ball#1     seen 100.0 %  not understood\n" in said
+    assert "none of the shipped sets fits; of 20 labels the words tell 19" in said
+    assert "  P:LWrist     seen 100.0 %  left forearm, left wrist\n" in said
+    assert "  P:Ball#1     seen 100.0 %  not in the set\n" in said
     starter = here / "a_trial_markers.toml"
     assert "# Ball#1\n" in starter.read_text(encoding="utf-8")
     landmarks = {m.label: m.landmark for m in load_marker_set(str(starter)).markers}
@@ -133,7 +134,7 @@ def test_labels_without_sense_give_a_template(here):
 def test_nothing_is_written_over(here, capsys):
     path, mine = recording(here, OWN), here / "a_trial_markers.toml"
     mine.write_text("mine", encoding="utf-8")
-    assert markers_command(asked(path)) == 3
+    assert markers_command(asked(path)) == 0
     assert "is there already" in capsys.readouterr().out
     with pytest.raises(UsageError, match="not written over"):
         markers_command(asked(path, write=mine))
@@ -158,6 +159,67 @@ def test_two_people(here, capsys):
     assert "labels of the person with the prefix 'Ben:'" in said
     assert "  Ben:C7      seen 100.0 %  upper torso, c7\n" in said
     assert "  Anna:C7     seen 100.0 %  not in the set\n" in said
+
+
+def test_what_is_missing_is_said_of_a_set_of_words(here, capsys):
+    path = recording(here, [label for label in OWN if "Heel" not in label])
+    assert markers_command(asked(path)) == 3
+    assert "a skeleton cannot be built without: calcaneus_l, calcaneus_r" in capsys.readouterr().out
+
+
+def test_the_starter_of_a_near_miss_holds_both(here):
+    labels = [label for label in HANSEN if label not in ("RMT2", "LMT2")]
+    path = recording(here, [*labels, "RToe", "LToe", "what"])
+    assert markers_command(asked(path)) == 0
+    starter = here / "a_trial_markers.toml"
+    landmarks = {m.label: m.landmark for m in load_marker_set(str(starter)).markers}
+    assert landmarks["RToe"] == "metatarsal_2_r" and landmarks["RKNEL"] == "knee_lateral_r"
+    assert "# what\n" in starter.read_text(encoding="utf-8")
+
+
+def study_of(folder: Path, labels_of_tasks: dict[str, Sequence[str]]) -> Path:
+    """One person with a recording per task."""
+    person = folder / "study" / "sub-01"
+    person.mkdir(parents=True)
+    for task, labels in labels_of_tasks.items():
+        recording(folder, labels).rename(person / f"sub-01_task-{task}.trc")
+    (folder / "study" / "participants.tsv").write_text(
+        "participant_id\tsex\tmass_kg\theight_m\nsub-01\tF\t60\t1.7\n"
+    )
+    return folder / "study"
+
+
+def test_ingest_makes_a_set_of_words_and_hands_it_on(bsip, here):
+    prefixed = [f"S01_{label}" for label in OWN]
+    study = study_of(here, {"static": prefixed, "walking": prefixed[:-2]})
+    answer = bsip("ingest", study, "--out", here / "out")
+    assert answer.code == 0 and "no shipped set fits well" in answer.err
+    assert "RKneeLat = right knee lateral" in answer.err
+    assert "not understood: Ball#1" in answer.err
+    file = here / "out" / "sub-01" / "sub-01_task-static_markers.parquet"
+    facts = read_header(file, "markers")["provenance"]["facts"]
+    made = MarkerSet.from_data(facts["marker_set_content"])
+    assert made.name == "words" and {m.label for m in made.markers} == {*OWN} - {"Ball#1"}
+
+
+def test_ingest_refuses_labels_without_feet_and_leads_to_the_starter(bsip, here):
+    labels = [
+        "EIASG",
+        "EIASD",
+        "SACRUM",
+        "GENOUG",
+        "GENOUD",
+        "CHEVILLEG",
+        "CHEVILLED",
+        "C7",
+        "EPAULEG",
+        "EPAULED",
+    ]
+    answer = bsip("ingest", study_of(here, {"static": labels}), "--out", here / "out")
+    assert answer.code == 3 and "none on the left foot (the heel and a metatarsal)" in answer.err
+    command = answer.err.split("`bsip markers ")[1].split("`")[0]
+    assert bsip("markers", command.strip("'")).code == 3
+    assert (here / "sub-01_task-static_markers.toml").is_file()
 
 
 def test_exit_codes(bsip, here):

@@ -83,6 +83,13 @@ LABS = {
         '[scale]\nmay_be_held = ["head", "upper_arm", "forearm", "hand", "upper_torso"]\n',
         "M\t73.4\t1.639",
     ),
+    "French names": Lab(
+        "golf_french/swing1.c3d",
+        "words",
+        9,
+        ("no shipped set fits well", "EASG = left asis", "not understood: L5"),
+    ),
+    "words of no set, running": Lab("type3_running_kistler/Running_0002.c3d", "words", 9, ()),
     "walks in and out": Lab("edge_btk/Gait.c3d", "helen_hayes", 5, (), (*HEAD, *HANDS)),
 }
 

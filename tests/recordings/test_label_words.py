@@ -7,6 +7,7 @@ import pytest
 from bsip_cli.body.markersets import LANDMARKS, load_marker_set
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.recordings.label_words import Meaning, meaning_of, meanings
+from tests.recordings.label_lists import LabelList, label_lists
 
 SPELLINGS = {
     "knee_lateral_r": "RKNE R.Knee r_knee RKneeLat R_FLE RLFC RLEPI KNE_R RightKnee Subject:RKNEL",
@@ -56,3 +57,48 @@ def test_everything_said_exists():
         for label in labels.split():
             meaning = meaning_of(label)
             assert meaning and meaning.segment in SEGMENTS and meaning.landmark in LANDMARKS
+
+
+@pytest.mark.parametrize("labels", label_lists(), ids=lambda one: one.name)
+def test_lists_of_languages_and_systems(labels: LabelList):
+    assert labels.faults(meanings(labels.labels)) == []
+
+
+@pytest.mark.parametrize(
+    "affix", ["Anna:{}", "S01_{}", "S01 {}", "subj-{}", "P.{}", "{}_1", "{}-Raw"]
+)
+@pytest.mark.parametrize("number", [1, 7, 15])
+def test_what_all_labels_begin_or_end_with_does_not_count(affix, number):
+    labels = label_lists()[number]
+    found = meanings([affix.format(label) for label in labels.labels])
+    assert labels.faults({label: found.get(affix.format(label)) for label in labels.labels}) == []
+
+
+def test_two_people_with_an_underscore_are_each_understood():
+    labels = label_lists()[7]
+    found = meanings([f"{name}_{label}" for label in labels.labels for name in "AB"])
+    for name in "AB":
+        assert labels.faults({n: found.get(f"{name}_{n}") for n in labels.labels}) == []
+
+
+def test_the_other_side_settles_what_a_letter_is():
+    alone = meanings(["CLD", "EASD", "MLD", "CALD", "GENOUD"])
+    pair = meanings(["RLE", "RME", "RLM", "RMM", "LLE", "LME", "LLM", "LMM", "RCA", "LCA"])
+    assert alone["CLD"].landmark == "knee_lateral_r"
+    assert pair["RLE"].landmark == "knee_lateral_r" and pair["LMM"].landmark == "malleolus_medial_l"
+
+
+@pytest.mark.parametrize("stem", ["LTHI", "L_Knee_", "ROberarm", "L.Shank."])
+def test_three_of_a_stem_are_a_cluster_and_only_track(stem):
+    found = meanings([f"{stem}{k}" for k in (1, 2, 3)])
+    assert len(found) == 3 and {meaning.landmark for meaning in found.values()} == {""}
+
+
+def test_drawn_frames_are_no_markers():
+    found = meanings(["LHEE", "LHDF0", "LHDF1", "LHDF2", "LHDF3", "LFHD"])
+    assert set(found) == {"LHEE", "LFHD"}
+
+
+def test_absurd_labels_take_no_time_and_no_memory():
+    labels = [f"{'lamtrk' * 500}{k}" for k in range(200)] + ["9" * 6000, "²³", "\x00", "L" * 59]
+    assert meanings(labels) == {}

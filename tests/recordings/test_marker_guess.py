@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
-from bsip_cli.body.markersets import load_marker_set, shipped_names
+from bsip_cli.body.markersets import MarkerSet, load_marker_set, shipped_names
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.marker_guess import guess_marker_set
 from bsip_cli.recordings.read import read_recording
@@ -14,7 +16,14 @@ OF_REAL_FILES = {
     "biobuddy_ech/right_knee.c3d": "biobuddy_ech",
     "btk_functional_ll/FunctionalWalk.c3d": "plugin_gait",
     "btk_pig/PiG_Motion-FlatFoot-Full.c3d": "plugin_gait",
-    "c3dorg_plate_types/analogfpscale04.c3d": "plugin_gait",
+    "c3dorg_plate_types/analogfpscale04.c3d": "plugin_gait+words",
+    "c3dorg_plate_types/Static Pose.c3d": "words",
+    "edge_ezc3d/FP_Type1.c3d": "words",
+    "edge_ezc3d/FP_Type3.c3d": "words",
+    "edge_nimble/trial2.c3d": "helen_hayes+words",
+    "golf_french/static.c3d": "words",
+    "type3_running_kistler/Running_0002.c3d": "words",
+    "zoo_children/HC030A-static.c3d": "plugin_gait",
     "edge_btk/Gait.c3d": "helen_hayes",
     "ezc3d_rehazenter_qualisys/Qualisys.c3d": "van_sint_jan",
     "hamner_other/run200.trc": "hamner_other",
@@ -22,7 +31,7 @@ OF_REAL_FILES = {
     "ktk_walk_and_serve/walk.c3d": "plugin_gait",
     "motionanalysis_helenhayes/Sample_Jump2.c3d": "helen_hayes",
     "opencap_subject4/squats1.trc": "opencap_subject4",
-    "opensim_walking/walking2.c3d": "hamner_other",
+    "opensim_walking/walking2.c3d": "hamner_other+words",
     "pycgm/Sample_Static.c3d": "plugin_gait",
     "return11_static/c3dfile1.c3d": "return11_static",
     "sprinter_ja1/JA1Gait35.c3d": "sprinter_ja1",
@@ -30,9 +39,9 @@ OF_REAL_FILES = {
 }
 OF_NO_SET = (
     "edge_nimble/JH_01.c3d",
-    "edge_ezc3d/FP_Type3.c3d",
+    "edge_c3dorg/Dance.c3d",
     "c3dorg_plate_types/FP1.C3D",
-    "type3_running_kistler/Running_0002.c3d",
+    "edge_custom/Record_12.c3d",
 )
 
 
@@ -67,7 +76,78 @@ def test_labels_that_fit_no_set_are_refused_with_a_remedy():
 def test_the_lower_half_of_a_set_is_enough():
     labels = "LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE"
     assert guess_marker_set(labels.split()).name == "plugin_gait"
-    assert guess_marker_set([*labels.split(), "LFIB", "RFIB"]).name == "plugin_gait"
+    more = guess_marker_set([*labels.split(), "LFIB", "RFIB"])
+    assert more.base and more.base.marker_set.name == "plugin_gait"
+    assert {m.label: m.segment for m in more.marker_set.markers}["LFIB"] == "shank_l"
+
+
+NEAR = {  # labels of a shipped set, with some of another lab's own
+    "plugin_gait": (
+        "RASI LASI RPSI LPSI RKNE LKNE RANK LANK RHEE LHEE RTOE LTOE C7 CLAV STRN RSHO LSHO RELB "
+        "LELB RFHD LFHD RBHD LBHD T10 RFIN LFIN RWristLat LWristLat RThighLat LThighLat RShankLat "
+        "LShankLat R5thMet L5thMet",
+        {"R5thMet": "metatarsal_5_r", "LWristLat": "styloid_radial_l", "RThighLat": ""},
+    ),
+    "hansen2017": (
+        "RASIS LASIS RPSIS LPSIS C7 T10 XIPH IJ RAC LAC RELB LELB RKNEL LKNEL RKNEM LKNEM RMALL "
+        "LMALL RMALM LMALM RCAL LCAL RToe LToe RFootLat LFootLat",
+        {"RToe": "metatarsal_2_r", "LFootLat": ""},
+    ),
+    "van_sint_jan": (
+        "L_IAS R_IAS L_IPS R_IPS CV7 SJN SXS L_SAJ R_SAJ L_FLE R_FLE L_FME R_FME L_FAL R_FAL L_TAM "
+        "R_TAM L_FCC R_FCC L_FM1 R_FM1 L_FM5 R_FM5 L_HLE R_HLE L_HME R_HME Left_Wrist Right_Wrist",
+        {"Left_Wrist": "wrist_l"},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", NEAR)
+def test_near_misses_are_completed_by_words(name):
+    labels, expected = NEAR[name][0].split(), NEAR[name][1]
+    guess = guess_marker_set(labels)
+    assert guess.name == f"{name}+words" and not guess.unknown and not guess.lacking()
+    landmarks = {m.label: m.landmark for m in guess.marker_set.markers}
+    assert {label: landmarks[label] for label in expected} == expected
+    (finding,) = guess.findings()
+    assert f"{name} fits partly" in finding.found
+
+
+def test_a_set_of_words_says_what_it_took_and_what_not():
+    labels = "EIASG EIASD SACRUM GENOUG GENOUD CHEVILLEG CHEVILLED TALONG TALOND ORTEILG ORTEILD"
+    guess = guess_marker_set([*labels.split(), "C7", "CUISSEG", "CUISSED", "QQQ"], source="a.c3d")
+    (finding,) = guess.findings()
+    assert "GENOUG = left knee lateral" in finding.action and "2 more only track" in finding.action
+    assert finding.action.endswith("not understood: QQQ")
+
+
+@pytest.mark.parametrize(
+    ("without", "named"),
+    [
+        ("TALON ORTEIL", r"the left foot .the heel and a metatarsal., the right foot"),
+        ("SACRUM EIAS", r"the lower torso .both ASIS"),
+        ("GENOU", r"the left thigh .*the right thigh"),
+    ],
+)
+def test_what_is_missing_for_which_segment(without, named):
+    labels = "EIASG EIASD SACRUM GENOUG GENOUD CHEVILLEG CHEVILLED TALONG TALOND ORTEILG ORTEILD"
+    kept = [label for label in labels.split() if not label.startswith(tuple(without.split()))]
+    with pytest.raises(BadDataError, match=named) as caught:
+        guess_marker_set(kept, source="'my trial.c3d'")
+    assert "`bsip markers 'my trial.c3d'`" in caught.value.remedy
+
+
+def test_labels_that_several_columns_share_are_no_markers():
+    labels = [m.label for m in load_marker_set("hansen2017").markers][:-4]
+    guess = guess_marker_set([*labels, "RFoot", "RFoot", "LFoot"])
+    names = [marker.label for marker in guess.marker_set.markers]
+    assert "LFoot" in names and "RFoot" not in names
+
+
+def test_a_set_survives_as_data():
+    made = guess_marker_set(
+        ["RASI", "LASI", "SACR", "RKNEE", "LKNEE", "RANK", "LANK", "RHEE", "LHEE", "RTOE", "LTOE"]
+    )
+    assert MarkerSet.from_data(json.loads(json.dumps(made.marker_set.as_data()))) == made.marker_set
 
 
 @pytest.mark.real

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.labels import match_labels
+from bsip_cli.recordings.marker_guess import guess_marker_set
+from bsip_cli.recordings.read import read_recording
+
+CASE = Path(__file__).parents[2].parent / "shared" / "cases" / "27-underscore-prefix"
 
 WANTED = {"RASIS": ["RASI", "R.ASIS"], "LASIS": ["LASI"], "C7": [], "T10": [], "RCAL": ["RHEE"]}
 
@@ -88,3 +94,44 @@ def test_a_prefix_chooses_between_two_people():
         assert match.index == {"RASIS": 4, "LASIS": 5, "C7": 6, "T10": 7}
     with pytest.raises(BadDataError, match=r"'Carl'.*A:, B:"):
         match_labels(labels, WANTED, prefix="Carl")
+
+
+BODY = {
+    name: []
+    for name in ["RASI", "LASI", "RKNE", "LKNE", "RANK", "LANK", "RHEE", "LHEE", "C7", "T10"]
+}
+
+
+@pytest.mark.parametrize("affix", ["S01_{}", "S01 {}", "Mr.X.{}", "p-{}", "{}_1", "{}-Raw", "X{}"])
+def test_what_all_labels_begin_or_end_with_is_taken_off(affix):
+    match = match_labels([affix.format(name) for name in BODY], BODY)
+    assert list(match.index) == list(BODY) and match.missing == ()
+    assert match.prefix == affix.format("")
+
+
+def test_two_people_without_a_colon():
+    labels = [f"{person}_{name}" for name in BODY for person in "AB"]
+    with pytest.raises(BadDataError, match=r"2 people in one file: 'A_' .10 markers., 'B_' .10"):
+        match_labels(labels, BODY)
+    assert match_labels(labels, BODY, prefix="B").index["LASI"] == labels.index("B_LASI")
+
+
+def test_of_two_versions_of_a_person_one_is_taken_and_said():
+    labels = [*BODY, *(f"{name}_filtered" for name in BODY)]
+    assert list(match_labels(labels, BODY).index.values()) == list(range(len(BODY)))
+    labels = [*(f"{name}_study" for name in BODY), "rank", "lank", "rhee", "lhee", "r_kne"]
+    match = match_labels(labels, BODY)
+    assert list(match.index.values()) == list(range(len(BODY))) and match.prefix == "_study"
+    assert any("are there twice" in finding.found for finding in match.findings)
+
+
+def test_a_set_with_the_affix_in_its_own_labels_keeps_it():
+    wanted = {f"A_{name}": [] for name in BODY}
+    assert match_labels(list(wanted), wanted).prefix == ""
+
+
+@pytest.mark.skipif(not CASE.is_dir(), reason="the cases of users (../shared/cases) are missing")
+def test_the_case_of_an_underscore():
+    file = CASE / "study" / "sub-01" / "sub-01_task-static.c3d"
+    guess = guess_marker_set(read_recording(file).labels)
+    assert guess.is_shipped and guess.name == "hansen2017"

@@ -1,4 +1,4 @@
-"""How often the mass that the plates tell is right: simulated trials of every kind, mass not stated.
+"""How often the mass that the plates tell is right: simulated trials of every kind, none stated.
 
 Each trial is of another person, alone in its session: no static trial, no stature. "Covered" is
 the share of the told masses whose 95 % interval holds the true one.
@@ -10,7 +10,7 @@ import argparse
 import tempfile
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -53,11 +53,13 @@ class Case:
     """One recording: what is simulated, in which laboratory, and which plates are read."""
 
     trial: Trial
-    laboratory: Laboratory = Laboratory()
+    laboratory: Laboratory = field(default_factory=Laboratory)
     plates: tuple[str, ...] = ()
 
 
-def _plain(task: str, low_s: float, high_s: float, person: Person, rng: np.random.Generator) -> Case:
+def _plain(
+    task: str, low_s: float, high_s: float, person: Person, rng: np.random.Generator
+) -> Case:
     return Case(simulate_trial(person, task, rng, float(rng.uniform(low_s, high_s))))
 
 

@@ -120,6 +120,7 @@ STAGES = (
             "plates",
             "skeleton",
             "marker-positions",
+            "person",
             "regression",
         ),
         writes=("overall-diagnosis", "detection"),

@@ -286,7 +286,9 @@ SCHEMAS = {
                     "kg",
                     "mass that the plates tell in all trials, known loads taken off",
                 ),
-                _text("mass_note", "gross disagreement of stated mass and plates, or what is missing"),
+                _text(
+                    "mass_note", "gross disagreement of stated mass and plates, or what is missing"
+                ),
                 Column(
                     "height_m", "float", "m", "stature; estimated from the segments if not given"
                 ),

@@ -125,7 +125,10 @@ def contact_windows(
     mismatch = force_mismatch(feet.total_N, trunk_markers_m, mass_kg, rate_hz, limits)
     valid = feet.measured & ~mismatch
     unexplained = _runs_apart_from(mismatch, feet.beside)
-    reasons = (*feet.reasons, *_force_findings(unexplained, feet.total_N, rate_hz))
+    loaded = feet.measured & (feet.total_N > limits.loaded_N)
+    throughout = bool(loaded.any()) and mismatch[loaded].mean() > 0.5
+    findings = _force_findings(unexplained, feet.total_N, mass_kg, throughout, rate_hz)
+    reasons = (*feet.reasons, *findings)
     valid = long_runs(valid, round(limits.least_window_s * rate_hz))
     return ContactWindows(valid, feet.on_ground, feet.on_plate, reasons)
 
@@ -257,14 +260,18 @@ def _runs_apart_from(mask: np.ndarray, explained: np.ndarray) -> np.ndarray:
     return apart
 
 
-def _force_findings(mismatch: np.ndarray, total_N: np.ndarray, rate_hz: float) -> list[Finding]:
+def _force_findings(
+    mismatch: np.ndarray, total_N: np.ndarray, mass_kg: float, throughout: bool, rate_hz: float
+) -> list[Finding]:
+    """``throughout``: most of the loaded frames do not fit, so that the mass may be wrong."""
     if not mismatch.any():
         return []
-    found = (
-        f"the plates' {np.mean(total_N[mismatch]):.0f} N do not carry the motion: a contact "
-        f"they do not measure (seat, box, hands) {_times(mismatch, rate_hz)}"
-    )
-    return [_finding("", found)]
+    force = f"the plates' {np.mean(total_N[mismatch]):.0f} N do not carry the motion"
+    if throughout:
+        cause = f"the mass of {mass_kg:.1f} kg is wrong, or something bears the person all the time"
+    else:
+        cause = "a contact they do not measure (seat, box, hands)"
+    return [_finding("", f"{force}: {cause} {_times(mismatch, rate_hz)}")]
 
 
 def _finding(subject: str, found: str, action: str = "left these frames out") -> Finding:

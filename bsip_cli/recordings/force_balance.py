@@ -75,9 +75,7 @@ def mean_path(height: np.ndarray) -> np.ndarray | None:
     return np.mean(filled, axis=0)
 
 
-def low_pass(
-    signal: np.ndarray, rate_hz: float, limits: ContactLimits | None = None
-) -> np.ndarray:
+def low_pass(signal: np.ndarray, rate_hz: float, limits: ContactLimits | None = None) -> np.ndarray:
     """Zero phase, order 4."""
     cutoff = min((limits or ContactLimits()).trunk_cutoff_hz, 0.45 * rate_hz)
     sections = butter(2, cutoff, fs=rate_hz, output="sos")

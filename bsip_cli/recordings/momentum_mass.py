@@ -35,6 +35,7 @@ SOFT_SD = 0.15  # soft tissue and the rest, of the spread of the segments' veloc
 IMPACT_SD_S = 0.004  # soft tissue after an impact, times the acceleration [m/s2]
 
 MARGIN_S = 0.5  # of markers about a stretch, for the filter
+EDGE_S = 0.1  # at either end of a recording the filtered velocity is not to be trusted
 NODE_S = 0.2  # the impulse is compared this often
 LONGEST_S = 2.0
 SHORTEST_S = 0.3
@@ -83,8 +84,8 @@ class Stretch:
         """The same less a mass that is known to be carried."""
         own = max(self.mass_kg - load_kg, 1e-3)
         up = self.mass_kg / own
-        shared = {name: tuple(up * np.array(getattr(self, name))) for name in _SHARED}
-        return replace(self, mass_kg=own, own_sd=up * self.own_sd, **shared)
+        common, of_trial = (tuple(up * np.array(each)) for each in (self.common, self.of_trial))
+        return replace(self, mass_kg=own, own_sd=up * self.own_sd, common=common, of_trial=of_trial)
 
     def record(self) -> dict:
         """For an artifact's facts."""
@@ -111,9 +112,7 @@ class SegmentMotion:
     acceleration_m_s2: np.ndarray
 
 
-def segment_motion(
-    markers_m: Mapping[str, np.ndarray], rate_hz: float
-) -> SegmentMotion | None:
+def segment_motion(markers_m: Mapping[str, np.ndarray], rate_hz: float) -> SegmentMotion | None:
     """From markers (n, k, 3) per segment; None without a marker on the trunk."""
     paths = {name: mean_path(each[..., 2]) for name, each in markers_m.items()}
     seen = {
@@ -137,10 +136,7 @@ def segment_motion(
     acceleration = np.gradient(centre) * rate_hz
     hidden = (1.0 - weight.sum()) * float(spread.max())
     own_sd = np.sqrt(
-        STILL_SD_M_S**2
-        + (SOFT_SD * spread) ** 2
-        + (IMPACT_SD_S * acceleration) ** 2
-        + hidden**2
+        STILL_SD_M_S**2 + (SOFT_SD * spread) ** 2 + (IMPACT_SD_S * acceleration) ** 2 + hidden**2
     )
     return SegmentMotion(centre, common, own_sd, acceleration)
 
@@ -180,7 +176,10 @@ def stretches_of(
     counts where the person is upright for a part of it.
     """
     found = []
-    for start, stop in runs(measured):
+    inner = measured.copy()
+    edge = round(EDGE_S * rate_hz)
+    inner[:edge] = inner[len(inner) - edge :] = False
+    for start, stop in runs(inner):
         if (stop - 1 - start) / rate_hz < SHORTEST_S:
             continue
         margin = round(MARGIN_S * rate_hz)

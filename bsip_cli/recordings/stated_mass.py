@@ -76,8 +76,8 @@ class Comparison:
             "a typing mistake, another person's row, a second person or a load on the plates"
         )
         return (
-            f"stated mass and plates do not agree: {where} says {self.stated_kg:g} kg, the plates "
-            f"tell {self.told.words()}; {likely}"
+            f"the stated mass and the plates do not agree: {where} says {self.stated_kg:g} kg, "
+            f"the plates tell {self.told.words()}; {likely}"
         )
 
 
@@ -96,12 +96,10 @@ def mass_finding(told: ToldMass, comparison: Comparison | None, where: str) -> F
         return Finding("plate_mass", "", f"not known: {told.reason}", expected, action, "info")
     if comparison is None:
         return Finding("plate_mass", "", told.words(), "no mass is stated", "", "info")
-    expected = (
-        f"the stated {comparison.total_kg:.2f} kg within {comparison.tolerance_percent:g} %"
-    )
+    expected = f"the stated {comparison.total_kg:.2f} kg within {comparison.tolerance_percent:g} %"
     if comparison.is_gross:
         action = "contacts found with the plates' mass"
-        return Finding("stated_mass", "", comparison.sentence(where), "", action, "warning")
+        return Finding("mass", "", comparison.sentence(where), "", action, "warning")
     level = "info" if comparison.is_small else "warning"
     action = f"left both as they are ({comparison.difference_percent:+.1f} %)"
     return Finding("plate_mass", "", told.words(), expected, action, level)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2, norm
@@ -16,7 +16,7 @@ GAIN_SD = 0.005
 HALF_WIDTH = float(norm.ppf(0.975))
 AGREE_P = 0.01
 LOWER_Z = 3.0
-LEAST_SHARE = 1.0 / 3.0
+LEAST_SHARE = 0.5  # of a trial's time, that must agree
 LEAST_KG, MOST_KG = 10.0, 400.0  # as in participants.tsv
 # Body-mass index of people [kg/m2]: 12 is the lowest that is survived (Henry 2001), 60 the highest
 # that surgery reports as usual; children included.
@@ -28,7 +28,7 @@ _PERCENT = 100.0
 class ToldMass:
     """What the plates tell: mass [kg] with its relative standard deviation, or why none.
 
-    mass_kg is NaN where ``reason`` says why it is not known.
+    mass_kg is NaN where ``reason`` says why it is not known; ``remark`` is what else is to be said.
     """
 
     mass_kg: float
@@ -36,6 +36,7 @@ class ToldMass:
     seconds: float
     stretches: int
     reason: str = ""
+    remark: str = ""
 
     @property
     def is_known(self) -> bool:
@@ -50,7 +51,7 @@ class ToldMass:
         """``70.21 kg (to 1.2 %) in 3.1 s with all contacts on the plates``."""
         return (
             f"{self.mass_kg:.2f} kg (to {self.half_width_percent:.1f} %) in {self.seconds:.1f} s "
-            "with all contacts on the plates"
+            f"with all contacts on the plates{self.remark}"
         )
 
 
@@ -96,13 +97,15 @@ def told_mass(
             kept[name] = agreeing
     if not kept:
         return unknown("; ".join(reasons) or "there is no trial with forces")
-    if len(kept) > 1 and _disagree(kept.values()):
-        at_rest = {name: each for name, each in kept.items() if name in static}
-        if not at_rest or _disagree(at_rest.values()):
-            masses = [_combined([each]).mass for each in kept.values()]
-            return unknown(f"trials tell from {min(masses):.1f} to {max(masses):.1f} kg")
-        kept = at_rest
-    return _judged(list(kept.values()), most_percent, height_m)
+    if not _disagree(kept.values()):
+        return _judged(list(kept.values()), most_percent, height_m)
+    masses = [_combined([each]).mass for each in kept.values()]
+    differ = f"trials tell from {min(masses):.1f} to {max(masses):.1f} kg"
+    at_rest = [each for name, each in kept.items() if name in static]
+    if not at_rest or _disagree(at_rest):
+        return unknown(differ)
+    told = _judged(at_rest, most_percent, height_m)
+    return replace(told, remark=f" ({differ}: the static trial counts)")
 
 
 def _too_little(stretches: Sequence[Stretch], agreeing: Sequence[Stretch]) -> str:

@@ -32,7 +32,7 @@ from bsip_cli.recordings.told_mass import told_mass
 from bsip_cli.recordings.zero import plate_zero, subtract_zero
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH
-from bsip_cli.stages.person_mass import StatedMass, compared, stated_mass
+from bsip_cli.stages.person_mass import VAGUE_PERCENT, StatedMass, compared, stated_mass
 
 
 def run(unit: Unit) -> None:
@@ -174,6 +174,8 @@ def _mass_on_plates(
     """
     options = unit.config.ingest
     told = told_mass({unit.name: stretches}, options.mass_half_width_percent)
+    if stated is not None and not told.is_known:
+        told = told_mass({unit.name: stretches}, VAGUE_PERCENT)
     comparison = compared(unit, stated, told, unit.load_kg())
     about = [mass_finding(told, comparison, stated.source if stated else "")]
     from_plates = stated is None or (comparison is not None and comparison.is_gross)

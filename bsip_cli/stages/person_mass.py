@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from bsip_cli.recordings.momentum_mass import Stretch
 from bsip_cli.recordings.stated_mass import Comparison
 from bsip_cli.recordings.told_mass import ToldMass, told_mass
@@ -14,6 +16,7 @@ from bsip_cli.study.study import Trial
 UNKNOWN = "unknown"
 PLATES = "plates"
 TABLE = "participants.tsv"
+VAGUE_PERCENT = 50.0  # half of an interval that still shows pounds to be no kilograms
 
 
 @dataclass(frozen=True)
@@ -68,25 +71,23 @@ def compared(
 
 def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
     """From what is stated and the stretches that ingest found in these trials; warns."""
-    told = told_mass(
-        {trial.stem: _stretches(unit, trial) for trial in trials},
-        unit.config.ingest.mass_half_width_percent,
-        height_m,
-        {trial.stem for trial in trials if trial.role == "static"},
-    )
+    stretches = {trial.stem: _stretches(unit, trial) for trial in trials}
+    static = {trial.stem for trial in trials if trial.role == "static"}
+    told = told_mass(stretches, unit.config.ingest.mass_half_width_percent, height_m, static)
     stated = stated_mass(unit, *(unit.facts("markers", trial) for trial in trials))
     loads = " and ".join(dict.fromkeys(filter(None, (load_words(unit, t) for t in trials))))
     without = f" without the known load ({loads})" if loads else ""
     if stated is None:
         return _from_plates(unit, told, without)
-    comparison = compared(unit, stated, told, 0.0, height_m)
+    vague = told if told.is_known else told_mass(stretches, VAGUE_PERCENT, height_m, static)
+    comparison = compared(unit, stated, vague, 0.0, height_m)
+    if stated.source != TABLE:
+        unit.warn(f"{unit.name}: mass {stated.mass_kg:.2f} kg taken from {stated.source}")
     if comparison is None:
         return PersonMass(stated.mass_kg, stated.source, told.mass_kg, "")
     if comparison.is_gross:
-        return _gross(unit, stated, comparison)
-    if stated.source != TABLE:
-        unit.warn(f"{unit.name}: mass {stated.mass_kg:.2f} kg taken from {stated.source}")
-    if not comparison.is_small:
+        return _gross(unit, stated, comparison, told.is_known)
+    if told.is_known and not comparison.is_small:
         unit.warn(
             f"{unit.name}: the plates tell {told.words()}{without}, stated are "
             f"{stated.mass_kg:.2f} kg ({comparison.difference_percent:+.1f} %, tolerance "
@@ -111,16 +112,19 @@ def _from_plates(unit: Unit, told: ToldMass, without: str) -> PersonMass:
     return PersonMass(float("nan"), UNKNOWN, float("nan"), note)
 
 
-def _gross(unit: Unit, stated: StatedMass, comparison: Comparison) -> PersonMass:
-    """The plates' mass counts where the mistake in the stated one is plain; else nothing is known
-    to be wrong with either, and the stated one stays."""
+def _gross(unit: Unit, stated: StatedMass, comparison: Comparison, is_sure: bool) -> PersonMass:
+    """Where the mistake in the stated mass is plain, the plates' own counts, if it is sure, or
+    none; else nothing is known to be wrong with either, and the stated one stays."""
     told = comparison.told
-    plain = bool(comparison.likely())
-    used = told.mass_kg if plain else stated.mass_kg
-    source = PLATES if plain else stated.source
-    note = (
-        f"{comparison.sentence(stated.source)}; {used:.2f} kg is used: correct mass_kg in "
-        "participants.tsv"
-    )
+    plates_kg = told.mass_kg if is_sure else float("nan")
+    sentence = comparison.sentence(stated.source)
+    if not comparison.likely():
+        used, source = stated.mass_kg, stated.source
+    elif is_sure:
+        used, source = told.mass_kg, PLATES
+    else:
+        used, source = float("nan"), UNKNOWN
+    what = f"{used:.2f} kg is used" if np.isfinite(used) else "the mass is not known"
+    note = f"{sentence}; {what}: correct mass_kg in participants.tsv"
     unit.warn(f"{unit.name}: {note}")
-    return PersonMass(used, source, told.mass_kg, note)
+    return PersonMass(used, source, plates_kg, note)

@@ -68,6 +68,11 @@ class FootContacts:
     total_N: np.ndarray  # (n_frames,), of all plates
     reasons: tuple[Finding, ...]
 
+    @property
+    def has_both(self) -> bool:
+        """Both feet have markers; a foot without any may stand anywhere."""
+        return set(self.on_ground) == {"l", "r"}
+
 
 def foot_contacts(
     foot_markers_m: Mapping[str, np.ndarray],

@@ -111,7 +111,7 @@ def told_mass(
 def _too_little(stretches: Sequence[Stretch], agreeing: Sequence[Stretch]) -> str:
     """Why a trial tells nothing; empty if it does."""
     if not stretches:
-        return "no stretch in which an upright person has all contacts on the plates"
+        return "no stretch shows an upright person with both feet on the plates"
     all_s, kept_s = (sum(one.seconds for one in some) for some in (stretches, agreeing))
     if kept_s >= LEAST_SHARE * all_s:
         return ""

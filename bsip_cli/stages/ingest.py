@@ -64,7 +64,8 @@ def run(unit: Unit) -> None:
     }
     markers = {one: _markers_on(marker_set, names, filled, (one,)) for one in SEGMENTS}
     feet = _foot_contacts(recording, markers, wrench)
-    stretches = stretches_of(markers, feet.total_N, feet.measured, recording.marker_rate_hz)
+    shown = feet.measured if feet.has_both else np.zeros_like(feet.measured)
+    stretches = stretches_of(markers, feet.total_N, shown, recording.marker_rate_hz)
     trunk = _markers_on(marker_set, names, filled, TRUNK)
     mass, about_mass = _mass_on_plates(unit, stated_mass(unit, facts), stretches)
     if mass is None:

@@ -22,8 +22,8 @@ from bsip_cli.body.names import without_side
 from bsip_cli.recordings.analog import runs
 from bsip_cli.recordings.force_balance import low_pass, mean_path
 
-# Relative spread of a segment's share of the body's mass between people: 5 % (thigh) to 20 %
-# (forearm, hand) in Dumas et al. 2007 and de Leva 1996 (after Zatsiorsky).
+# A segment's share of the body's mass against the table: published regressions err by 10 to 25 %
+# of a segment's mass (configs/default.toml, [prior]), the large segments by less.
 MASS_SHARE_SD = 0.15
 # The centre of mass against the markers' mean, as part of the way to the neighbouring segment: a
 # segment's markers sit at one of its ends or in its middle, its centre at 0.35 to 0.6 of it.

@@ -18,8 +18,8 @@ AGREE_P = 0.01
 LOWER_Z = 3.0
 LEAST_SHARE = 0.5  # of a trial's time, that must agree
 LEAST_KG, MOST_KG = 10.0, 400.0  # as in participants.tsv
-# Body-mass index of people [kg/m2]: 12 is the lowest that is survived (Henry 2001), 60 the highest
-# that surgery reports as usual; children included.
+# Body-mass index of people [kg/m2]: about 12 is the lowest that is survived (James et al. 1988),
+# beyond 60 begins the last class that surgery has a name for.
 BMI_KG_M2 = (12.0, 60.0)
 _PERCENT = 100.0
 

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import ezc3d
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from benchmarks.sections import replace_section
 from bsip_cli.body.gravity import GRAVITY_M_S2
@@ -24,7 +25,6 @@ from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.mot import read_mot
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.recordings.resample import sample_at_frames, wrench_at_marker_rate
-from bsip_cli.recordings.standing_mass import still_frames
 from tests.real.figaroh_csv import convert
 
 SECTION = "every recording"
@@ -139,13 +139,21 @@ def _prepared(path: Path, name: str, data: Path, scratch: Path) -> Path:
     return path
 
 
+def _still(force_N: np.ndarray, usable: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Frames about which the force stays within 3 % of its middle for 0.8 s, (n,) bool."""
+    smooth = uniform_filter1d(np.where(usable, force_N, 0.0), max(1, round(0.1 * rate_hz)))
+    width = max(1, round(0.8 * rate_hz))
+    high, low = maximum_filter1d(smooth, width), minimum_filter1d(smooth, width)
+    return usable & (low > 100.0) & (high - low < 0.06 * high)
+
+
 def _weigh(recording: Recording) -> Weighed | None:
     """Both readings over the frames of quiet standing, else over all usable ones."""
     wrench = wrench_at_marker_rate(recording)
     if not recording.plates or not wrench.usable.any():
         return None
     own = wrench.total[:, 2]
-    still = still_frames(own, wrench.usable, recording.marker_rate_hz)
+    still = _still(own, wrench.usable, recording.marker_rate_hz)
     frames = still if still.any() else wrench.usable
     own_kg = float(own[frames].mean()) / GRAVITY_M_S2
     try:

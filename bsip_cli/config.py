@@ -67,6 +67,8 @@ class Ingest(Section):
     max_gap_s: float = Field(ge=0)
     max_rigid_gap_s: float = Field(ge=0)
     mass_tolerance_percent: float = Field(gt=0)
+    mass_gross_percent: float = Field(gt=0)
+    mass_half_width_percent: float = Field(gt=0)
     zero_unloaded_plates: bool
     plates: tuple[int, ...]
     prefixes: dict[str, str]

@@ -133,6 +133,7 @@ STAGES = (
             "plates",
             "skeleton",
             "marker-positions",
+            "person",
             "regression",
         ),
         writes=("overall-diagnosis", "detection"),

@@ -321,17 +321,23 @@ SCHEMAS = {
         Schema(
             "person",
             "participant",
-            1,
+            2,
             "facts of the person that later stages use",
             (
                 _text("sex", "M or F"),
-                Column("mass_kg", "float", "kg", "mass, from the scale or the plates"),
-                _text("mass_source", "participants.tsv or plates"),
+                Column("mass_kg", "float", "kg", "mass; NaN where it is not known"),
+                _text(
+                    "mass_source",
+                    "participants.tsv, the recording's own entry, plates, or unknown",
+                ),
                 Column(
                     "plate_mass_kg",
                     "float",
                     "kg",
-                    "mass that the plates read in quiet standing, known loads taken off",
+                    "mass that the plates tell in all trials, known loads taken off",
+                ),
+                _text(
+                    "mass_note", "gross disagreement of stated mass and plates, or what is missing"
                 ),
                 Column(
                     "height_m", "float", "m", "stature; estimated from the segments if not given"

@@ -41,12 +41,14 @@ def shown(out: Path) -> Iterator[str]:
         )
     tables = tables_of(out)
     people = sorted(out.glob("sub-*/*_diagnosis.parquet"))
-    if not tables and not people:
+    notes = list(_mass_notes(out))
+    if not tables and not people and not notes:
         raise UsageError(
             "there are no tables and no diagnoses",
             file=out,
             remedy="run `bsip run` first, or name the folder that it was given with --out",
         )
+    yield from ["\n".join(notes)] if notes else []
     yield from ["\n".join(map(printable, tables.split("\n")))] if tables else []
     everybody, unread = [], []
     for folder in sorted(path for path in out.glob("sub-*") if path.is_dir()):
@@ -68,6 +70,19 @@ def shown(out: Path) -> Iterator[str]:
             file=out,
             remedy="run `bsip run` again",
         )
+
+
+def _mass_notes(out: Path) -> Iterator[str]:
+    """Whose mass is not known, or stated grossly otherwise than the plates tell."""
+    for folder in sorted(path for path in out.glob("sub-*") if path.is_dir()):
+        try:
+            person = _table(folder, "person")
+        except BadDataError as error:
+            yield str(error)
+            continue
+        note = "" if person is None else str(person["mass_note"].iloc[0])
+        if note:
+            yield _wrapped(f"{folder.name}: {note}", _width(get_terminal_size().columns))
 
 
 def _person(folder: Path) -> tuple[Searched, str] | None:

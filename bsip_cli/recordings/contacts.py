@@ -13,6 +13,10 @@ from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.plates import cop_at_height
 from bsip_cli.recordings.resample import FrameWrench
 
+NO_MASS = (
+    "whether something else bears the person (seat, box, hands) cannot be told: neither a stated "
+    "mass nor this trial's plates tell what the person weighs"
+)
 _SIDES = {"l": "left", "r": "right"}
 
 
@@ -52,44 +56,86 @@ def plate_loads(recording: Recording, wrench: FrameWrench) -> tuple[PlateLoad, .
     return tuple(loads)
 
 
-def contact_windows(
+@dataclass(frozen=True, eq=False)
+class FootContacts:
+    """What the feet's markers say of the contacts, whatever the person's mass."""
+
+    measured: np.ndarray  # (n_frames,) bool: samples usable, no foot beside the plates
+    on_ground: dict[str, np.ndarray]  # side -> (n_frames,) bool
+    on_plate: dict[str, np.ndarray]  # side -> (n_frames,) bool
+    beside: np.ndarray  # (n_frames,) bool: a foot on the floor beside the plates
+    usable: np.ndarray  # (n_frames,) bool
+    total_N: np.ndarray  # (n_frames,), of all plates
+    reasons: tuple[Finding, ...]
+
+    @property
+    def has_both(self) -> bool:
+        """Both feet have markers; a foot without any may stand anywhere."""
+        return set(self.on_ground) == {"l", "r"}
+
+
+def foot_contacts(
     foot_markers_m: Mapping[str, np.ndarray],
     foot_height0_m: Mapping[str, np.ndarray | None],
     rate_hz: float,
     plates: Sequence[PlateLoad],
-    trunk_markers_m: np.ndarray,
-    mass_kg: float,
+    n_frames: int,
     limits: ContactLimits | None = None,
-) -> ContactWindows:
-    """Frames in which the plates measure all that touches the person.
+) -> FootContacts:
+    """Frames in which no foot stands beside the plates.
 
     ``foot_markers_m`` per side "l"/"r" (n_frames, k, 3); ``foot_height0_m`` per side the
-    standing height of each marker (k,), or None: then the 2nd percentile of its heights;
-    ``trunk_markers_m`` (n_frames, k, 3) stand for the centre of mass.
+    standing height of each marker (k,), or None: then the 2nd percentile of its heights.
     """
     limits = limits or ContactLimits()
-    n_frames = len(trunk_markers_m)
+    nothing = np.zeros(n_frames, bool)
     if not plates:
-        nothing = np.zeros(n_frames, bool)
         reason = _finding("", "no force plate", "no frame is compared")
-        return ContactWindows(nothing, {}, {}, (reason,))
+        return FootContacts(nothing, {}, {}, nothing, nothing, np.zeros(n_frames), (reason,))
     usable = np.logical_and.reduce([plate.usable for plate in plates])
     total = np.sum([plate.force_z_N for plate in plates], axis=0)
-    mismatch = force_mismatch(total, trunk_markers_m, mass_kg, rate_hz, limits)
     on_ground, on_plate, reasons = {}, {}, []
-    valid = usable & ~mismatch
-    explained = np.zeros(n_frames, bool)
+    measured, beside = usable.copy(), nothing
     for side, markers in foot_markers_m.items():
         foot = _Foot.of(markers, foot_height0_m.get(side), rate_hz)
         on_ground[side], on_plate[side] = _touches(foot, plates, rate_hz, limits)
         off = on_ground[side] & ~on_plate[side]
-        valid &= ~off & foot.seen
-        explained |= off
+        measured &= ~off & foot.seen
+        beside = beside | off
         reasons += _foot_findings(side, off, ~foot.seen, rate_hz)
-    unexplained = _runs_apart_from(mismatch, explained)
-    reasons += _force_findings(unexplained, usable, total, rate_hz)
+    if not usable.all():
+        reasons.append(_finding("", f"force samples unusable: {_times(~usable, rate_hz)}"))
+    return FootContacts(measured, on_ground, on_plate, beside, usable, total, tuple(reasons))
+
+
+def contact_windows(
+    feet: FootContacts,
+    trunk_markers_m: np.ndarray,
+    mass_kg: float | None,
+    rate_hz: float,
+    limits: ContactLimits | None = None,
+) -> ContactWindows:
+    """Frames in which the plates measure all that touches the person.
+
+    ``trunk_markers_m`` (n_frames, k, 3) stand for the centre of mass of ``mass_kg``. Where that is
+    None, no frame can be shown to be free of other contacts, and none is valid.
+    """
+    limits = limits or ContactLimits()
+    if not feet.usable.any() or mass_kg is None:
+        reasons = feet.reasons
+        if feet.usable.any():
+            reasons += (_finding("", NO_MASS),)
+        nothing = np.zeros(len(feet.measured), bool)
+        return ContactWindows(nothing, feet.on_ground, feet.on_plate, reasons)
+    mismatch = force_mismatch(feet.total_N, trunk_markers_m, mass_kg, rate_hz, limits)
+    valid = feet.measured & ~mismatch
+    unexplained = _runs_apart_from(mismatch, feet.beside)
+    loaded = feet.measured & (feet.total_N > limits.loaded_N)
+    throughout = bool(loaded.any()) and mismatch[loaded].mean() > 0.5
+    findings = _force_findings(unexplained, feet.total_N, mass_kg, throughout, rate_hz)
+    reasons = (*feet.reasons, *findings)
     valid = long_runs(valid, round(limits.least_window_s * rate_hz))
-    return ContactWindows(valid, on_ground, on_plate, tuple(reasons))
+    return ContactWindows(valid, feet.on_ground, feet.on_plate, reasons)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,18 +266,17 @@ def _runs_apart_from(mask: np.ndarray, explained: np.ndarray) -> np.ndarray:
 
 
 def _force_findings(
-    mismatch: np.ndarray, usable: np.ndarray, total_N: np.ndarray, rate_hz: float
+    mismatch: np.ndarray, total_N: np.ndarray, mass_kg: float, throughout: bool, rate_hz: float
 ) -> list[Finding]:
-    findings = []
-    if mismatch.any():
-        found = (
-            f"the plates' {np.mean(total_N[mismatch]):.0f} N do not carry the motion: a contact "
-            f"they do not measure (seat, box, hands) {_times(mismatch, rate_hz)}"
-        )
-        findings.append(_finding("", found))
-    if not usable.all():
-        findings.append(_finding("", f"force samples unusable: {_times(~usable, rate_hz)}"))
-    return findings
+    """``throughout``: most of the loaded frames do not fit, so that the mass may be wrong."""
+    if not mismatch.any():
+        return []
+    force = f"the plates' {np.mean(total_N[mismatch]):.0f} N do not carry the motion"
+    if throughout:
+        cause = f"the mass of {mass_kg:.1f} kg is wrong, or something bears the person all the time"
+    else:
+        cause = "a contact they do not measure (seat, box, hands)"
+    return [_finding("", f"{force}: {cause} {_times(mismatch, rate_hz)}")]
 
 
 def _finding(subject: str, found: str, action: str = "left these frames out") -> Finding:

@@ -44,7 +44,7 @@ def force_mismatch(
         return np.zeros(len(trunk_markers_m), bool)
     acceleration = np.gradient(velocity) * rate_hz
     needed = mass_kg * (GRAVITY_M_S2 + acceleration)
-    measured = _low_pass(total_force_z_N, rate_hz, limits)
+    measured = low_pass(total_force_z_N, rate_hz, limits)
     weight = mass_kg * GRAVITY_M_S2
     allowed = limits.mismatch_share * (weight + np.abs(needed - weight))
     different = np.abs(measured - needed) > allowed
@@ -55,15 +55,15 @@ def trunk_velocity_m_s(
     trunk_markers_m: np.ndarray, rate_hz: float, limits: ContactLimits | None = None
 ) -> np.ndarray | None:
     """Vertical velocity of the markers' mean (n_frames, k, 3), low-passed, (n_frames,)."""
-    height = _mean_height(trunk_markers_m)
+    height = mean_path(trunk_markers_m[..., 2])
     if height is None:
         return None
-    return np.gradient(_low_pass(height, rate_hz, limits or ContactLimits())) * rate_hz
+    return np.gradient(low_pass(height, rate_hz, limits)) * rate_hz
 
 
-def _mean_height(trunk_markers_m: np.ndarray) -> np.ndarray | None:
-    """Mean height of the markers seen nearly always, gaps interpolated, (n_frames,)."""
-    height = trunk_markers_m[..., 2]
+def mean_path(height: np.ndarray) -> np.ndarray | None:
+    """Mean of one coordinate (n_frames, k) of the markers seen nearly always, gaps interpolated,
+    (n_frames,); None without such a marker."""
     known = np.isfinite(height)
     if not height.size or len(height) < 10:
         return None
@@ -75,9 +75,39 @@ def _mean_height(trunk_markers_m: np.ndarray) -> np.ndarray | None:
     return np.mean(filled, axis=0)
 
 
-def _low_pass(signal: np.ndarray, rate_hz: float, limits: ContactLimits) -> np.ndarray:
+def low_pass(signal: np.ndarray, rate_hz: float, limits: ContactLimits | None = None) -> np.ndarray:
     """Zero phase, order 4."""
-    cutoff = min(limits.trunk_cutoff_hz, 0.45 * rate_hz)
+    cutoff = min((limits or ContactLimits()).trunk_cutoff_hz, 0.45 * rate_hz)
     sections = butter(2, cutoff, fs=rate_hz, output="sos")
     pad = min(len(signal) - 1, round(rate_hz))
     return sosfiltfilt(sections, np.asarray(signal), padlen=pad)
+
+
+def agreeing_mass(
+    total_force_z_N: np.ndarray,
+    trunk_markers_m: np.ndarray,
+    frames: np.ndarray,
+    rate_hz: float,
+    limits: ContactLimits | None = None,
+) -> float | None:
+    """The largest mass [kg] with which the force goes with the trunk's motion in many of the
+    ``frames`` (n_frames,) bool: in half as many as with any other.
+
+    Only good enough to find frames in which something else bears the person; the largest, because
+    what bears a person takes weight off the plates. None without load or trunk markers.
+    """
+    limits = limits or ContactLimits()
+    velocity = trunk_velocity_m_s(trunk_markers_m, rate_hz, limits)
+    if velocity is None:
+        return None
+    reach = GRAVITY_M_S2 + np.gradient(velocity) * rate_hz
+    measured = low_pass(total_force_z_N, rate_hz, limits)
+    loaded = frames & (measured > 5 * limits.loaded_N) & (reach > GRAVITY_M_S2 / 2)
+    if not loaded.any():
+        return None
+    masses = np.sort(measured[loaded] / reach[loaded])
+    near = 1.0 + limits.mismatch_share / 2
+    count = np.searchsorted(masses, masses * near, side="right") - np.searchsorted(
+        masses, masses / near
+    )
+    return float(masses[count >= count.max() / 2].max()) / np.sqrt(near)

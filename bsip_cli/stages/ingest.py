@@ -8,24 +8,33 @@ from shlex import quote
 import numpy as np
 import pandas as pd
 
-from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
-from bsip_cli.body.names import TRUNK
+from bsip_cli.body.names import SEGMENTS, TRUNK
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.assemble import assemble, findings_about
-from bsip_cli.recordings.contacts import ContactWindows, contact_windows, plate_loads
+from bsip_cli.recordings.contacts import (
+    ContactWindows,
+    FootContacts,
+    contact_windows,
+    foot_contacts,
+    plate_loads,
+)
+from bsip_cli.recordings.force_balance import agreeing_mass
 from bsip_cli.recordings.free_plates import nobody_near
 from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps
 from bsip_cli.recordings.labels import match_labels
 from bsip_cli.recordings.marker_guess import guess_marker_set
 from bsip_cli.recordings.model import Finding, Recording
+from bsip_cli.recordings.momentum_mass import Stretch, stretches_of, upright_frames
 from bsip_cli.recordings.read import open_recording
 from bsip_cli.recordings.repeated_frames import without_repeats
 from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
-from bsip_cli.recordings.standing_mass import about_mass, plate_mass
+from bsip_cli.recordings.stated_mass import mass_finding
+from bsip_cli.recordings.told_mass import told_mass
 from bsip_cli.recordings.zero import plate_zero, subtract_zero
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH
+from bsip_cli.stages.person_mass import VAGUE_PERCENT, StatedMass, compared, stated_mass
 from bsip_cli.stages.survey import reading_of
 
 
@@ -53,10 +62,22 @@ def run(unit: Unit) -> None:
     filled = _fill(unit, recording, marker_set, names, match.index)
     findings += _gap_findings(names, filled)
     wrench = wrench_at_marker_rate(recording)
+    facts = {
+        "marker_set": marker_set.name,
+        "marker_rate_hz": recording.marker_rate_hz,
+        "analog_rate_hz": recording.analog_rate_hz,
+    }
+    markers = {one: _markers_on(marker_set, names, filled, (one,)) for one in SEGMENTS}
+    feet = _foot_contacts(recording, markers, wrench)
+    shown = feet.measured if feet.has_both else np.zeros_like(feet.measured)
+    stretches = stretches_of(markers, feet.total_N, shown, recording.marker_rate_hz)
     trunk = _markers_on(marker_set, names, filled, TRUNK)
-    contacts = _contacts(unit, recording, marker_set, names, filled, wrench)
-    findings += contacts.reasons
-    findings += _mass_findings(unit, recording, wrench, contacts, trunk)
+    mass, about_mass = _mass_on_plates(unit, stated_mass(unit, facts), stretches)
+    if mass is None:
+        loaded = feet.measured & upright_frames(markers)
+        mass = agreeing_mass(feet.total_N, trunk, loaded, recording.marker_rate_hz)
+    contacts = contact_windows(feet, trunk, mass, recording.marker_rate_hz)
+    findings = [*about_mass, *findings, *contacts.reasons]
     if recording.forces_note:
         unit.warn(f"{unit.name}: kinematics only: {recording.forces_note}")
     said = findings_about(session)  # once, of all trials
@@ -64,14 +85,10 @@ def run(unit: Unit) -> None:
         if finding.level in ("warning", "excluded", "corrected") and finding not in said:
             unit.warn(f"{unit.name}: {finding.sentence()}")
     times = recording.time_s()
-    facts = {
-        "marker_set": marker_set.name,
-        "marker_rate_hz": recording.marker_rate_hz,
-        "analog_rate_hz": recording.analog_rate_hz,
-    }
     meant = {"marker_set_content": marker_set.as_data()}
     unit.write("markers", _marker_table(times, names, filled), facts | meant)
-    unit.write("wrench", _wrench_table(times, wrench, contacts), facts)
+    known = {"mass_stretches": [one.record() for one in stretches]}
+    unit.write("wrench", _wrench_table(times, wrench, contacts), facts | known)
     unit.write("plates", _plate_table(recording))
     unit.write("contacts", _contact_table(times, contacts))
     unit.write("quality", _quality_table(marker_set, findings))
@@ -141,45 +158,35 @@ def _markers_on(
     return filled.markers_m[:, [k for k, n in enumerate(names) if segment[n] in segments]]
 
 
-def _contacts(unit, recording, marker_set, names, filled, wrench: FrameWrench) -> ContactWindows:
-    feet = {side: _markers_on(marker_set, names, filled, (f"foot_{side}",)) for side in "lr"}
+def _foot_contacts(
+    recording: Recording, markers_m: dict[str, np.ndarray], wrench: FrameWrench
+) -> FootContacts:
+    feet = {side: markers_m[f"foot_{side}"] for side in "lr"}
     feet = {side: markers for side, markers in feet.items() if markers.shape[1]}
-    return contact_windows(
-        feet,
-        dict.fromkeys(feet),
-        recording.marker_rate_hz,
-        plate_loads(recording, wrench),
-        _markers_on(marker_set, names, filled, TRUNK),
-        _mass_kg(unit, wrench),
-    )
+    loads = plate_loads(recording, wrench)
+    rate_hz = recording.marker_rate_hz
+    return foot_contacts(feet, dict.fromkeys(feet), rate_hz, loads, recording.n_frames)
 
 
-def _mass_findings(
-    unit: Unit,
-    recording: Recording,
-    wrench: FrameWrench,
-    contacts: ContactWindows,
-    trunk_markers_m: np.ndarray,
-) -> list[Finding]:
-    """The plates' reading of the person's mass against the stated one, with known loads."""
-    assert unit.participant is not None
-    carried = plate_mass(
-        wrench.total[:, 2], contacts.valid, trunk_markers_m, recording.marker_rate_hz
-    )
-    stated = unit.participant.mass_kg
-    expected = None if stated is None else stated + unit.load_kg()
-    finding = about_mass(carried, expected, unit.config.ingest.mass_tolerance_percent)
-    return [finding] if finding else []
+def _mass_on_plates(
+    unit: Unit, stated: StatedMass | None, stretches: tuple[Stretch, ...]
+) -> tuple[float | None, list[Finding]]:
+    """The mass [kg] on the plates, known loads included, and what is said of it.
 
-
-def _mass_kg(unit: Unit, wrench: FrameWrench) -> float:
-    """Mass on the plates: stated mass and known loads, or what the plates carry in mid-trial."""
-    assert unit.participant is not None
-    if unit.participant.mass_kg is not None:
-        return unit.participant.mass_kg + unit.load_kg()
-    vertical = wrench.total[:, 2]
-    loaded = vertical[vertical > 100.0]
-    return float(np.median(loaded) / GRAVITY_M_S2) if len(loaded) else 70.0
+    The stated one, unless the trial's plates tell for sure a grossly different one; without a
+    stated mass what they tell for sure; else None.
+    """
+    options = unit.config.ingest
+    told = told_mass({unit.name: stretches}, options.mass_half_width_percent)
+    if stated is not None and not told.is_known:
+        told = told_mass({unit.name: stretches}, VAGUE_PERCENT)
+    comparison = compared(unit, stated, told, unit.load_kg())
+    about = [mass_finding(told, comparison, stated.source if stated else "")]
+    from_plates = stated is None or (comparison is not None and comparison.is_gross)
+    if from_plates:
+        return (told.mass_kg if told.is_known else None), about
+    assert stated is not None
+    return stated.mass_kg + unit.load_kg(), about
 
 
 def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:

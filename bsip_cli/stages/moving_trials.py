@@ -24,6 +24,7 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import acceleration_noise
 from bsip_cli.stages.identification_problem import prior_from
+from bsip_cli.stages.person_mass import PLATES
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study.study import Trial
 
@@ -181,6 +182,5 @@ def stated_sd(unit: Unit) -> float:
 
 
 def is_weighed(unit: Unit) -> bool:
-    """Whether somebody has stated the person's mass."""
-    assert unit.participant is not None
-    return unit.participant.mass_kg is not None
+    """Whether the person's mass is a stated one, in a table or in a recording."""
+    return unit.read("person").iloc[0]["mass_source"] != PLATES

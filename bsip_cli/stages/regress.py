@@ -6,6 +6,7 @@ import numpy as np
 
 from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.errors import BadDataError
 from bsip_cli.identification.prior import Spread, prior_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import bsip_table, person_from
@@ -15,6 +16,8 @@ def run(unit: Unit) -> None:
     """Read the skeleton and the person; write regression."""
     skeleton = load_skeleton(unit.config.skeleton)
     facts = unit.read("person").iloc[0]
+    if not np.isfinite(facts["mass_kg"]):
+        raise BadDataError(facts["mass_note"], file=unit.name)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     result = regress(person, facts["sex"], facts["mass_kg"], unit.config.regress.table)
     for segment, note in zip(skeleton.segments, result.notes, strict=True):

@@ -9,17 +9,16 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
-from bsip_cli.body.names import TRUNK, in_words, without_side
+from bsip_cli.body.names import in_words, without_side
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.calibration import Calibration, calibrate
 from bsip_cli.motion.scaling import Refinement, ScalingOptions
 from bsip_cli.motion.scaling_trials import TrialMarkers, refine_over_trials
-from bsip_cli.recordings.standing_mass import PlateMass, plate_mass, rough_mass
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.frames import WRENCH, markers_from, ordered_markers
-from bsip_cli.stages.known_loads import load_words
+from bsip_cli.stages.frames import markers_from, ordered_markers
+from bsip_cli.stages.person_mass import person_mass
 from bsip_cli.study.study import Trial
 
 _QUIET_S = 1.0
@@ -56,15 +55,13 @@ def run(unit: Unit) -> None:
         [dict(zip(one.labels, one.positions.swapaxes(0, 1), strict=True)) for one in recorded],
     )
     _require_markers(unit, marker_set, calibration.person)
+    mass = person_mass(unit, [one.trial for one in recorded], calibration.stature_m)
     if unit.config.marker_set == "auto":
         unit.warn(f"{unit.name}: marker set {marker_set.name}, told from the labels")
         _warn_strangers(unit, marker_set, recorded)
     for note in calibration.notes:
         unit.warn(f"{unit.name}: {note}")
     fit = _refine(unit, calibration, recorded, still, quiet)
-    carried = _plate_mass(unit, still, marker_set)
-    plate_kg = carried.mass_kg - unit.load_kg(still.trial) if carried else float("nan")
-    mass, source = _mass(unit, carried, plate_kg, load_words(unit, still.trial))
     _warn_missing(unit, marker_set, fit.person)
     unit.write("skeleton", _skeleton_table(skeleton, calibration, fit))
     unit.write("marker-positions", _marker_table(skeleton, calibration, fit))
@@ -74,9 +71,10 @@ def run(unit: Unit) -> None:
             [
                 {
                     "sex": unit.participant.sex,
-                    "mass_kg": mass,
-                    "mass_source": source,
-                    "plate_mass_kg": plate_kg,
+                    "mass_kg": mass.mass_kg,
+                    "mass_source": mass.source,
+                    "plate_mass_kg": mass.plate_kg,
+                    "mass_note": mass.note,
                     "height_m": calibration.stature_m,
                     "anterior_x": calibration.anterior[0],
                     "anterior_y": calibration.anterior[1],
@@ -213,55 +211,6 @@ def _refine(
         ScalingOptions(**options.model_dump(exclude={"frames", "may_be_held"})),
         unit.config.ik.model_dump(exclude={"undetermined_sd_rad", "held_sd_rad"}),
     )
-
-
-# --- mass -------------------------------------------------------------------------------------
-
-
-def _plate_mass(unit: Unit, still: _Recorded, marker_set: MarkerSet) -> PlateMass | None:
-    """What the plates carried in the calibrating trial, known loads included."""
-    wrench = unit.read("wrench", still.trial)
-    trunk = [
-        still.labels.index(marker.label)
-        for marker in marker_set.markers
-        if marker.segment in TRUNK and marker.label in still.labels
-    ]
-    step_s = float(np.median(np.diff(still.times))) if len(still.times) > 1 else 1.0
-    force, valid = wrench[WRENCH[2]].to_numpy(), wrench["valid"].to_numpy()
-    carried = plate_mass(force, valid, still.positions[:, trunk], 1.0 / step_s)
-    assert unit.participant is not None
-    if carried is None and unit.participant.mass_kg is None:
-        return rough_mass(force, valid, 1.0 / step_s)
-    return carried
-
-
-def _mass(unit: Unit, carried: PlateMass | None, plate_kg: float, load: str) -> tuple[float, str]:
-    """Mass of the person and where it is from; ``load``: what was taken off the plates' reading."""
-    assert unit.participant is not None
-    stated = unit.participant.mass_kg
-    without = f" without the known load ({load})" if load else ""
-    if stated is None:
-        if not plate_kg > 10:
-            raise BadDataError(
-                "mass_kg is n/a and the plates do not tell it",
-                file=unit.name,
-                expected="a stated mass, or a stretch with all contacts on plates",
-                remedy="put the mass into participants.tsv",
-            )
-        assert carried is not None
-        unit.warn(
-            f"{unit.name}: mass {plate_kg:.2f} kg (to {carried.uncertainty_percent:.1f} %) taken "
-            f"from the plates{without} in {carried.seconds:.1f} s of {carried.manner}"
-        )
-        return plate_kg, "plates"
-    difference = 100 * (plate_kg - stated) / stated
-    limit = unit.config.ingest.mass_tolerance_percent
-    if carried and abs(difference) > limit + carried.uncertainty_percent:
-        unit.warn(
-            f"{unit.name}: the plates read {plate_kg:.2f} kg in {carried.manner}{without}, "
-            f"stated are {stated:.2f} kg ({difference:+.1f} %, tolerance {limit:g} %)"
-        )
-    return stated, "participants.tsv"
 
 
 # --- what is written --------------------------------------------------------------------------

@@ -131,6 +131,7 @@ def test_stages_do_not_know_each_other():
         "stages.identification_problem",
         "stages.known_loads",
         "stages.moving_trials",
+        "stages.person_mass",
         "stages.person_values",
         "stages.reconstructed",
         "stages.report",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2 as GRAVITY
-from bsip_cli.recordings.contacts import PlateLoad, contact_windows
+from bsip_cli.recordings.contacts import PlateLoad, contact_windows, foot_contacts
 
 RATE_HZ = 100.0
 N = 300
@@ -36,15 +36,9 @@ def _plate(force_N: np.ndarray | float, corners=CORNERS, x: float = 0.25) -> Pla
     return PlateLoad("1", corners, force, cop, np.ones(N, bool))
 
 
-def _windows(left, right, plates, trunk=None, height0=HEIGHT0):
-    return contact_windows(
-        {"l": left, "r": right},
-        {"l": height0, "r": height0},
-        RATE_HZ,
-        plates,
-        _trunk() if trunk is None else trunk,
-        MASS_KG,
-    )
+def _windows(left, right, plates, trunk=None, height0=HEIGHT0, mass_kg=MASS_KG):
+    feet = foot_contacts({"l": left, "r": right}, {"l": height0, "r": height0}, RATE_HZ, plates, N)
+    return contact_windows(feet, _trunk() if trunk is None else trunk, mass_kg, RATE_HZ)
 
 
 def test_standing_on_the_plate_is_valid():
@@ -172,3 +166,16 @@ def test_windows_shorter_than_a_tenth_of_a_second_are_dropped():
 
 def test_no_plates_no_windows():
     assert not _windows(_foot(0.1), _foot(0.4), []).valid.any()
+
+
+def test_a_wrong_mass_is_no_seat():
+    """Pounds taken for kilograms: nothing fits, and no seat is invented."""
+    result = _windows(_foot(0.1), _foot(0.4), [_plate(WEIGHT_N)], mass_kg=2.2046 * MASS_KG)
+    (reason,) = result.reasons
+    assert "the mass of 154.3 kg is wrong" in reason.found and "seat" not in reason.found
+
+
+def test_without_a_mass_nothing_is_valid_and_the_reason_is_said():
+    result = _windows(_foot(0.1), _foot(0.4), [_plate(WEIGHT_N)], mass_kg=None)
+    assert not result.valid.any() and result.on_plate["l"].all()
+    assert any("neither a stated mass" in reason.found for reason in result.reasons)

@@ -11,7 +11,6 @@ from bsip_cli.recordings.free_plates import nobody_near
 from bsip_cli.recordings.model import Plate, Recording
 from bsip_cli.recordings.plates import LocalWrench, PlateDescription
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.recordings.standing_mass import about_mass, plate_mass, rough_mass, still_frames
 from bsip_cli.recordings.weight_shift import sign_doubts
 from bsip_cli.recordings.zero import plate_zero
 from tests.recordings.recording_writers import (
@@ -196,50 +195,3 @@ def test_a_large_zero_counts_where_nobody_is_near():
     assert zero.offset[2] == pytest.approx(300.0)
     under = _plate(np.full(4000, 300.0))
     assert not nobody_near(recording, under).any()
-
-
-def test_mass_in_quiet_standing_and_by_momentum():
-    t = np.arange(500) / 100.0
-    everywhere = np.ones(500, bool)
-    trunk = np.ones((500, 2, 3))
-    quiet = plate_mass(70 * 9.80665 + 5 * np.sin(20 * t), everywhere, trunk, 100.0)
-    assert quiet.manner == "quiet standing" and quiet.mass_kg == pytest.approx(70, abs=0.05)
-    trunk[..., 2] += (0.3 * np.cos(2 * np.pi * t / 1.3))[:, None]
-    acceleration = -0.3 * (2 * np.pi / 1.3) ** 2 * np.cos(2 * np.pi * t / 1.3)
-    moving = plate_mass(70 * (9.80665 + acceleration), everywhere, trunk, 100.0)
-    assert "balance of momentum" in moving.manner and moving.mass_kg == pytest.approx(70, rel=0.01)
-    assert plate_mass(0 * t, everywhere, trunk, 100.0) is None
-
-
-def test_a_rough_mass_says_how_rough_it_is():
-    force = np.full(200, 70 * 9.80665)
-    valid = np.zeros(200, bool)
-    valid[20:70] = valid[120:170] = True
-    once, twice = (
-        rough_mass(force, valid & (np.arange(200) < 100), 100.0),
-        rough_mass(force, valid, 100.0),
-    )
-    assert [one.mass_kg for one in (once, twice)] == pytest.approx([70, 70])
-    assert once.uncertainty_percent == pytest.approx(100 * 0.4 / (9.80665 * 0.5))
-    assert twice.uncertainty_percent == pytest.approx(once.uncertainty_percent / np.sqrt(2))
-    assert rough_mass(0 * force, valid, 100.0) is None
-    assert rough_mass(force, np.zeros(200, bool), 100.0) is None
-
-
-def test_still_frames_are_the_longest_calm_stretch():
-    force = np.concatenate([np.full(100, 700.0), np.linspace(700, 900, 100), np.full(200, 905.0)])
-    still = still_frames(force, np.ones(400, bool), 100.0)
-    assert still[200:].all() and not still[:150].any()
-
-
-@pytest.mark.parametrize(
-    ("stated_kg", "level"), [(69.5, "info"), (66.0, "warning"), (None, "info")]
-)
-def test_the_plates_against_the_stated_mass(stated_kg, level):
-    carried = plate_mass(
-        np.full(500, 70 * 9.80665), np.ones(500, bool), np.ones((500, 2, 3)), 100.0
-    )
-    finding = about_mass(carried, stated_kg, 2.0)
-    assert finding.check == "plate_mass" and finding.level == level
-    assert "70.00 kg in 5.0 s" in finding.found
-    assert about_mass(None, 70.0, 2.0) is None

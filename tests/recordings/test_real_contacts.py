@@ -7,7 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from bsip_cli.recordings.contacts import ContactWindows, contact_windows, plate_loads
+from bsip_cli.recordings.contacts import (
+    ContactWindows,
+    contact_windows,
+    foot_contacts,
+    plate_loads,
+)
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.recordings.resample import wrench_at_marker_rate
@@ -29,9 +34,9 @@ def _windows(path: Path, names: tuple[str, str, str], mass_kg: float) -> Contact
     recording = read_recording(path)
     left, right, trunk = (recording.markers_m[:, _columns(recording, name)] for name in names)
     loads = plate_loads(recording, wrench_at_marker_rate(recording))
-    return contact_windows(
-        {"l": left, "r": right}, {}, recording.marker_rate_hz, loads, trunk, mass_kg
-    )
+    rate_hz = recording.marker_rate_hz
+    feet = foot_contacts({"l": left, "r": right}, {}, rate_hz, loads, recording.n_frames)
+    return contact_windows(feet, trunk, mass_kg, rate_hz)
 
 
 @pytest.mark.parametrize(

@@ -146,6 +146,7 @@ class Artifacts:
                     "mass_kg": MASS_KG,
                     "mass_source": "participants.tsv",
                     "plate_mass_kg": 63.1,
+                    "mass_note": "",
                     "height_m": 1.63,
                     "anterior_x": 1.0,
                     "anterior_y": 0.0,

@@ -89,7 +89,7 @@ def test_summary_tells_where_the_table_is_better(text):
         "in moment, lab Z (up)." in text
     )
     assert "basketball (run 1): moment, lab Z (up) 9.00 → 15.30 N m (+70 %)" in text
-    assert "In quiet standing the plates read 63.10 kg (+0.5 %)." in text
+    assert "The plates tell 63.10 kg (+0.5 %)." in text
 
 
 def test_decided_and_undecided_segments_are_named(text):

@@ -25,6 +25,7 @@ _SEXES = {"M": "a man", "F": "a woman"}
 
 def section(record: ParticipantRecord) -> Section:
     blocks: list[Block] = [
+        *_mass_note(record),
         Heading("Is anything wrong?"),
         *verdict(record),
         Heading("Who and what"),
@@ -50,6 +51,12 @@ def all_gains(record: ParticipantRecord) -> tuple[Gain, ...]:
     )
 
 
+def _mass_note(record: ParticipantRecord) -> list[Block]:
+    """A gross disagreement of stated mass and plates comes before everything else."""
+    note = str(record.facts["mass_note"])
+    return [Bullets((f"{note[:1].upper()}{note[1:]}.",), "warning")] if note else []
+
+
 def _who(record: ParticipantRecord) -> str:
     facts = record.facts
     mass, plates = float(facts["mass_kg"]), float(facts["plate_mass_kg"])
@@ -58,11 +65,11 @@ def _who(record: ParticipantRecord) -> str:
         f"(from {facts['mass_source']}) and {number(facts['height_m'], 2)} m."
     )
     if not np.isfinite(plates):
-        return f"{who} No quiet standing on the plates was found to check the mass against."
+        return f"{who} The plates tell no mass for sure to check it against."
     if facts["mass_source"] == "plates":
-        return f"{who} No mass was stated, so what the plates carried is used."
+        return f"{who} What the plates tell of it is used."
     return (
-        f"{who} In quiet standing the plates read {number(plates, 2)} kg "
+        f"{who} The plates tell {number(plates, 2)} kg "
         f"({signed(100.0 * (plates / mass - 1.0), 1)} %)."
     )
 

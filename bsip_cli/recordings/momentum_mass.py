@@ -1,0 +1,272 @@
+"""The mass that the plates tell in stretches of a trial: the balance of momentum.
+
+Over a stretch in which every contact is on the plates the impulse of the vertical force is
+m (g T + dv), dv the change of the centre of mass's vertical velocity. The markers tell dv but for
+what they leave unseen: segments heavier or lighter than the table says, centres of mass elsewhere
+between the joints than the markers, soft tissue. These errors belong to how a segment moves against
+the rest, so that they cancel where the posture moves alike at both ends: between the apexes of
+whole strides, and in quiet stance.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from bsip_cli.body.anthropometry import load_table
+from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.body.names import without_side
+from bsip_cli.recordings.analog import runs
+from bsip_cli.recordings.force_balance import low_pass, mean_path
+
+# A segment's share of the body's mass against the table: published regressions err by 10 to 25 %
+# of a segment's mass (configs/default.toml, [prior]), the large segments by less.
+MASS_SHARE_SD = 0.15
+# The centre of mass against the markers' mean, as part of the way to the neighbouring segment: a
+# segment's markers sit at one of its ends or in its middle, its centre at 0.35 to 0.6 of it.
+PLACE_SD = 0.2
+DELAY_SD_S = 0.003  # between plates and cameras, filters included
+ZERO_SD_N = 2.0  # of all plates together, after their zero is taken off
+STILL_SD_M_S = 0.006  # heart, breath, and noise of markers in quiet stance
+SOFT_SD = 0.15  # soft tissue and the rest, of the spread of the segments' velocities
+IMPACT_SD_S = 0.004  # soft tissue after an impact, times the acceleration [m/s2]
+
+MARGIN_S = 0.5  # of markers about a stretch, for the filter
+EDGE_S = 0.1  # at either end of a recording the filtered velocity is not to be trusted
+NODE_S = 0.2  # the impulse is compared this often
+LONGEST_S = 2.0
+SHORTEST_S = 0.3
+LEAST_MEAN_N = 50.0
+UPRIGHT_COS = 0.8  # pelvis over the shanks, 37 degrees: less is sitting or a deep squat
+UPRIGHT_SHARE = 0.3  # of a stretch
+COMES_AND_GOES = 4.0  # reduced chi-square of the impulses within a stretch: twice the errors
+DOUBTFUL_SD = 0.5
+
+_NEIGHBOUR = {
+    "lower_torso": "upper_torso",
+    "upper_torso": "lower_torso",
+    "head": "upper_torso",
+    "upper_arm": "upper_torso",
+    "forearm": "upper_arm",
+    "hand": "forearm",
+    "thigh": "lower_torso",
+    "shank": "thigh",
+    "foot": "shank",
+}
+_KINDS = tuple(_NEIGHBOUR)
+_SHARED = ("common", "of_trial")
+_ROWS = {"lower_torso": "pelvis", "upper_torso": "torso", "upper_arm": "arm"}
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """One stretch's mass and its relative errors.
+
+    ``own_sd`` : relative, independent of other stretches.
+    ``common`` : relative errors (one standard deviation each) shared by all stretches of a person:
+    per kind of segment its share of the mass and the place of its centre.
+    ``of_trial`` : the same for errors that a trial's stretches share: delay, zero.
+    ``steadiness`` : reduced chi-square of the impulses within it.
+    """
+
+    start_s: float
+    seconds: float
+    mass_kg: float
+    own_sd: float
+    common: tuple[float, ...]
+    of_trial: tuple[float, ...]
+    steadiness: float
+
+    def without(self, load_kg: float) -> Stretch:
+        """The same less a mass that is known to be carried."""
+        own = max(self.mass_kg - load_kg, 1e-3)
+        up = self.mass_kg / own
+        common, of_trial = (tuple(up * np.array(each)) for each in (self.common, self.of_trial))
+        return replace(self, mass_kg=own, own_sd=up * self.own_sd, common=common, of_trial=of_trial)
+
+    def record(self) -> dict:
+        """For an artifact's facts."""
+        return {**asdict(self), **{name: list(getattr(self, name)) for name in _SHARED}}
+
+    @classmethod
+    def of(cls, record: Mapping) -> Stretch:
+        """From an artifact's facts."""
+        shared = {name: tuple(record[name]) for name in _SHARED}
+        return cls(**{**record, **shared})
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentMotion:
+    """Vertical velocity of the centre of mass and of what it is made of.
+
+    velocity_m_s : (n,) of the centre of mass. common : (n, 18) its possible errors, one standard
+    deviation each. own_sd : (n,) of the rest. acceleration_m_s2 : (n,).
+    """
+
+    velocity_m_s: np.ndarray
+    common: np.ndarray
+    own_sd: np.ndarray
+    acceleration_m_s2: np.ndarray
+
+
+def segment_motion(markers_m: Mapping[str, np.ndarray], rate_hz: float) -> SegmentMotion | None:
+    """From markers (n, k, 3) per segment; None without a marker on the trunk."""
+    paths = {name: mean_path(each[..., 2]) for name, each in markers_m.items()}
+    seen = {
+        name: np.gradient(low_pass(path, rate_hz)) * rate_hz
+        for name, path in paths.items()
+        if path is not None
+    }
+    if not {"lower_torso", "upper_torso"} & set(seen):
+        return None
+    share = _shares()
+    weight = np.array([share[without_side(name)] for name in seen])
+    speeds = np.stack(list(seen.values()))
+    centre = weight @ speeds / weight.sum()
+    spread = np.sqrt(weight @ (speeds - centre) ** 2 / weight.sum())
+    common = np.zeros((len(centre), 2 * len(_KINDS)))
+    for name, own, velocity in zip(seen, weight / weight.sum(), speeds, strict=True):
+        k = _KINDS.index(without_side(name))
+        common[:, k] += MASS_SHARE_SD * own * (velocity - centre)
+        near = _neighbour_velocity(name, seen, centre)
+        common[:, len(_KINDS) + k] += PLACE_SD * own * (velocity - near)
+    acceleration = np.gradient(centre) * rate_hz
+    hidden = (1.0 - weight.sum()) * float(spread.max())
+    own_sd = np.sqrt(
+        STILL_SD_M_S**2 + (SOFT_SD * spread) ** 2 + (IMPACT_SD_S * acceleration) ** 2 + hidden**2
+    )
+    return SegmentMotion(centre, common, own_sd, acceleration)
+
+
+def _neighbour_velocity(
+    name: str, seen: Mapping[str, np.ndarray], centre: np.ndarray
+) -> np.ndarray:
+    """Of the nearest seen segment towards the trunk."""
+    side = name[len(without_side(name)) :]
+    kind = without_side(name)
+    for _ in _KINDS:
+        kind = _NEIGHBOUR[kind]
+        for found in (kind + side, kind):
+            if found in seen and found != name:
+                return seen[found]
+    return centre
+
+
+def _shares() -> dict[str, float]:
+    """Share of the body's mass per kind of segment, mean of both sexes."""
+    table = load_table("dumas2007")
+    return {
+        kind: (table["M", row].mass_fraction + table["F", row].mass_fraction) / 2
+        for kind, row in ((kind, _ROWS.get(kind, kind)) for kind in _KINDS)
+    }
+
+
+def stretches_of(
+    markers_m: Mapping[str, np.ndarray],
+    force_z_N: np.ndarray,
+    measured: np.ndarray,
+    rate_hz: float,
+) -> tuple[Stretch, ...]:
+    """What each stretch with all contacts ``measured`` (n,) bool by plates tells.
+
+    ``markers_m`` (n, k, 3) per segment; ``force_z_N`` (n,) is the sum of all plates. A stretch
+    counts where the person is upright for a part of it.
+    """
+    found = []
+    inner = measured.copy()
+    edge = round(EDGE_S * rate_hz)
+    inner[:edge] = inner[len(inner) - edge :] = False
+    for start, stop in runs(inner):
+        if (stop - 1 - start) / rate_hz < SHORTEST_S:
+            continue
+        margin = round(MARGIN_S * rate_hz)
+        part = slice(max(0, start - margin), stop + margin)
+        near = {name: each[part] for name, each in markers_m.items()}
+        motion = segment_motion(near, rate_hz)
+        if motion is None:
+            continue
+        upright = upright_frames(near)
+        pieces = max(1, int(np.ceil((stop - 1 - start) / rate_hz / LONGEST_S)))
+        edges = np.round(np.linspace(start, stop - 1, pieces + 1)).astype(int) - part.start
+        for first, last in itertools.pairwise(edges.tolist()):
+            if upright[first : last + 1].mean() < UPRIGHT_SHARE:
+                continue
+            one = _stretch(force_z_N[part], motion, first, last, rate_hz)
+            if one is not None:
+                found.append(replace(one, start_s=one.start_s + part.start / rate_hz))
+    return tuple(found)
+
+
+def _stretch(
+    force_z_N: np.ndarray, motion: SegmentMotion, first: int, last: int, rate_hz: float
+) -> Stretch | None:
+    seconds = (last - first) / rate_hz
+    count = max(1, round(seconds / NODE_S))
+    nodes = np.unique(np.round(np.linspace(first, last, count + 1)).astype(int))
+    steps = (force_z_N[first:last] + force_z_N[first + 1 : last + 1]) / 2 / rate_hz
+    total = np.concatenate([[0.0], np.cumsum(steps)])
+    impulse = np.diff(total[nodes - first])
+    if impulse.sum() / seconds < LEAST_MEAN_N:
+        return None
+    time = np.diff(nodes) / rate_hz
+    reach = GRAVITY_M_S2 * time + np.diff(motion.velocity_m_s[nodes])
+    difference = np.diff(np.eye(len(nodes)), axis=0)
+    own = (difference * motion.own_sd[nodes] ** 2) @ difference.T
+    common = np.diff(motion.common[nodes], axis=0)
+    weight_N = impulse.sum() / max(float(reach.sum()), 1e-9) * GRAVITY_M_S2
+    if weight_N <= 0:
+        return None
+    delay = DELAY_SD_S * np.diff(motion.acceleration_m_s2[nodes])
+    zero = ZERO_SD_N * GRAVITY_M_S2 / weight_N * time
+    of_trial = np.stack([delay, zero], axis=1)
+    covariance = own + common @ common.T + of_trial @ of_trial.T
+    solved = np.linalg.solve(covariance, reach)
+    weights = solved / (reach @ solved)
+    mass = float(weights @ impulse)
+    own_sd = float(np.sqrt(weights @ own @ weights))
+    if mass <= 0 or 1.0 / np.sqrt(reach @ solved) > DOUBTFUL_SD:
+        return None
+    residual = impulse / mass - reach
+    free = len(impulse) - 1
+    chi = float(residual @ np.linalg.solve(covariance, residual)) / free if free else 1.0
+    return Stretch(
+        float(first / rate_hz),
+        seconds,
+        mass,
+        own_sd * max(1.0, float(np.sqrt(chi))),
+        tuple((weights @ common).tolist()),
+        tuple((weights @ of_trial).tolist()),
+        chi,
+    )
+
+
+def upright_frames(markers_m: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The pelvis is over the middle of both shanks, not behind them, (n,) bool.
+
+    Without markers on both, nothing is known to be upright.
+    """
+    n_frames = len(next(iter(markers_m.values())))
+    pelvis = _mean_point(markers_m, ("lower_torso",))
+    shanks = _mean_point(markers_m, ("shank_l", "shank_r"))
+    if pelvis is None or shanks is None:
+        return np.zeros(n_frames, bool)
+    up = pelvis - shanks
+    return np.asarray(up[:, 2] > UPRIGHT_COS * np.maximum(np.linalg.norm(up, axis=1), 1e-6))
+
+
+def _mean_point(
+    markers_m: Mapping[str, np.ndarray], segments: tuple[str, ...]
+) -> np.ndarray | None:
+    """Mean of the segments' own means (n, 3); None if one is not seen."""
+    points = []
+    for name in segments:
+        seen = markers_m.get(name, np.empty((0, 0, 3)))
+        axes = [mean_path(seen[..., axis]) for axis in range(3)]
+        known = [axis for axis in axes if axis is not None]
+        if len(known) < 3:
+            return None
+        points.append(np.stack(known, axis=1))
+    return np.mean(points, axis=0)

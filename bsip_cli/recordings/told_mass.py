@@ -1,0 +1,185 @@
+"""One mass from the stretches of all trials of a person, or why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from bsip_cli.recordings.momentum_mass import COMES_AND_GOES, Stretch
+
+# Gain of a plate and local gravity: 0.5 % of the range for a plate's linearity and hysteresis
+# (makers' data sheets), 0.27 % between equator and poles for gravity.
+GAIN_SD = 0.005
+HALF_WIDTH = float(norm.ppf(0.975))
+AGREE_P = 0.01
+LOWER_Z = 3.0
+LEAST_SHARE = 0.5  # of a trial's time, that must agree
+LEAST_KG, MOST_KG = 10.0, 400.0  # as in participants.tsv
+# Body-mass index of people [kg/m2]: about 12 is the lowest that is survived (James et al. 1988),
+# beyond 60 begins the last class that surgery has a name for.
+BMI_KG_M2 = (12.0, 60.0)
+_PERCENT = 100.0
+
+
+@dataclass(frozen=True)
+class ToldMass:
+    """What the plates tell: mass [kg] with its relative standard deviation, or why none.
+
+    mass_kg is NaN where ``reason`` says why it is not known; ``remark`` is what else is to be said.
+    """
+
+    mass_kg: float
+    sd: float
+    seconds: float
+    stretches: int
+    reason: str = ""
+    remark: str = ""
+
+    @property
+    def is_known(self) -> bool:
+        return not self.reason
+
+    @property
+    def half_width_percent(self) -> float:
+        """Of the 95 % interval."""
+        return _PERCENT * HALF_WIDTH * self.sd
+
+    def words(self) -> str:
+        """``70.21 kg (to 1.2 %) in 3.1 s with all contacts on the plates``."""
+        return (
+            f"{self.mass_kg:.2f} kg (to {self.half_width_percent:.1f} %) in {self.seconds:.1f} s "
+            f"with all contacts on the plates{self.remark}"
+        )
+
+
+def unknown(reason: str) -> ToldMass:
+    return ToldMass(float("nan"), float("nan"), 0.0, 0, reason)
+
+
+def steady(stretches: Sequence[Stretch]) -> tuple[Stretch, ...]:
+    """Those of one trial's stretches that agree with each other.
+
+    What bears a person beside the plates takes weight off them: where stretches disagree, the
+    lowest goes first.
+    """
+    kept = [one for one in stretches if one.steadiness < COMES_AND_GOES]
+    while len(kept) > 1:
+        whole = _combined([kept])
+        z = (np.array([one.mass_kg for one in kept]) / whole.mass - 1.0) / whole.sds
+        lowest = int(np.argmin(z))
+        if whole.p > AGREE_P or z[lowest] > -LOWER_Z:
+            break
+        del kept[lowest]
+    return tuple(kept)
+
+
+def told_mass(
+    trials: Mapping[str, Sequence[Stretch]],
+    most_percent: float,
+    height_m: float | None = None,
+    static: Collection[str] = (),
+) -> ToldMass:
+    """From the stretches of each trial of a person by its name.
+
+    Trials must agree; where they do not, those that are ``static`` decide, and without one nothing.
+    most_percent : the widest half of the 95 % interval that still counts as known. height_m : the
+    stature, for the body-mass index.
+    """
+    kept, reasons = {}, []
+    for name, stretches in trials.items():
+        agreeing = steady(stretches)
+        if reason := _too_little(stretches, agreeing):
+            reasons.append(f"{name}: {reason}" if len(trials) > 1 else reason)
+        else:
+            kept[name] = agreeing
+    if not kept:
+        return unknown("; ".join(reasons) or "there is no trial with forces")
+    if not _disagree(kept.values()):
+        return _judged(list(kept.values()), most_percent, height_m)
+    masses = [_combined([each]).mass for each in kept.values()]
+    differ = f"trials tell from {min(masses):.1f} to {max(masses):.1f} kg"
+    at_rest = [each for name, each in kept.items() if name in static]
+    if not at_rest or _disagree(at_rest):
+        return unknown(differ)
+    told = _judged(at_rest, most_percent, height_m)
+    return replace(told, remark=f" ({differ}: the static trial counts)")
+
+
+def _too_little(stretches: Sequence[Stretch], agreeing: Sequence[Stretch]) -> str:
+    """Why a trial tells nothing; empty if it does."""
+    if not stretches:
+        return "no stretch shows an upright person with both feet on the plates"
+    all_s, kept_s = (sum(one.seconds for one in some) for some in (stretches, agreeing))
+    if kept_s >= LEAST_SHARE * all_s:
+        return ""
+    return (
+        f"the force does not go with the motion in {all_s - kept_s:.1f} of {all_s:.1f} s: "
+        "something else bears or pushes the person"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Whole:
+    """Masses combined by their covariance: mass [kg], relative sd, probability of so much
+    disagreement, and each one's own relative sd."""
+
+    mass: float
+    sd: float
+    p: float
+    sds: np.ndarray
+
+
+def _combined(trials: Collection[Sequence[Stretch]]) -> _Whole:
+    each = [one for trial in trials for one in trial]
+    mass = np.array([one.mass_kg for one in each])
+    common = np.array([one.common for one in each])
+    covariance = np.diag([one.own_sd**2 for one in each]) + common @ common.T
+    start = 0
+    for trial in trials:
+        part = slice(start, start + len(trial))
+        errors = np.array([one.of_trial for one in trial])
+        covariance[part, part] += errors @ errors.T
+        start = part.stop
+    solved = np.linalg.solve(covariance, np.ones(len(each)))
+    best = float(solved @ mass / solved.sum())
+    away = mass / best - 1.0
+    chi = float(away @ np.linalg.solve(covariance, away))
+    free = len(each) - 1
+    p = float(chi2.sf(chi, free)) if free else 1.0
+    widened = max(1.0, chi / free) if free else 1.0
+    sd = float(np.sqrt(widened / solved.sum()))
+    return _Whole(best, sd, p, np.sqrt(np.diag(covariance)))
+
+
+def _disagree(trials: Collection[Sequence[Stretch]]) -> bool:
+    """Whether the trials, each as a whole, differ by more than their errors."""
+    wholes = [_combined([trial]) for trial in trials]
+    mass = np.array([one.mass for one in wholes])
+    variance = np.array([one.sd for one in wholes]) ** 2 + GAIN_SD**2
+    best = float((mass / variance).sum() / (1.0 / variance).sum())
+    chi = float((((mass / best) - 1.0) ** 2 / variance).sum())
+    return bool(len(wholes) > 1 and chi2.sf(chi, len(wholes) - 1) < AGREE_P)
+
+
+def _judged(
+    kept: Collection[Sequence[Stretch]], most_percent: float, height_m: float | None
+) -> ToldMass:
+    whole = _combined(kept)
+    seconds = sum(one.seconds for trial in kept for one in trial)
+    count = sum(len(trial) for trial in kept)
+    told = ToldMass(whole.mass, float(np.hypot(whole.sd, GAIN_SD)), seconds, count)
+    if not told.half_width_percent <= most_percent:
+        return unknown(
+            f"the plates tell {told.mass_kg:.1f} kg to {told.half_width_percent:.0f} % only, in "
+            f"{seconds:.1f} s with all contacts on them"
+        )
+    low, high = (LEAST_KG, MOST_KG) if height_m is None else np.array(BMI_KG_M2) * height_m**2
+    if not low <= told.mass_kg <= high:
+        stature = "" if height_m is None else f" of {height_m:.2f} m"
+        return unknown(
+            f"the plates tell {told.mass_kg:.1f} kg, a person{stature} has {low:.0f} to {high:.0f}"
+        )
+    return told

@@ -1,0 +1,130 @@
+"""The person's mass: stated, told by the plates of all trials, or not known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.recordings.momentum_mass import Stretch
+from bsip_cli.recordings.stated_mass import Comparison
+from bsip_cli.recordings.told_mass import ToldMass, told_mass
+from bsip_cli.running.unit import Unit
+from bsip_cli.stages.known_loads import load_words
+from bsip_cli.study.study import Trial
+
+UNKNOWN = "unknown"
+PLATES = "plates"
+TABLE = "participants.tsv"
+VAGUE_PERCENT = 50.0  # half of an interval that still shows pounds to be no kilograms
+
+
+@dataclass(frozen=True)
+class StatedMass:
+    """What somebody wrote down, and where."""
+
+    mass_kg: float
+    source: str
+
+
+@dataclass(frozen=True)
+class PersonMass:
+    """mass_kg (NaN if not known), its source, what the plates tell without known loads (NaN if
+    nothing for sure), and a gross disagreement or what is missing in words."""
+
+    mass_kg: float
+    source: str
+    plate_kg: float
+    note: str
+
+
+def stated_mass(unit: Unit, *facts: dict) -> StatedMass | None:
+    """From participants.tsv, else the first entry in the ``facts`` of a recording."""
+    assert unit.participant is not None
+    if unit.participant.mass_kg is not None:
+        return StatedMass(unit.participant.mass_kg, TABLE)
+    known = [one["stated_mass_kg"] for one in facts if one.get("stated_mass_kg") is not None]
+    return StatedMass(known[0], "the recording's own entry") if known else None
+
+
+def compared(
+    unit: Unit,
+    stated: StatedMass | None,
+    told: ToldMass,
+    load_kg: float,
+    height_m: float | None = None,
+) -> Comparison | None:
+    """The stated mass with ``load_kg`` against the plates; None without either."""
+    assert unit.participant is not None
+    if stated is None or not told.is_known:
+        return None
+    options = unit.config.ingest
+    return Comparison(
+        stated.mass_kg,
+        load_kg,
+        told,
+        options.mass_tolerance_percent,
+        options.mass_gross_percent,
+        height_m or unit.participant.height_m,
+    )
+
+
+def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
+    """From what is stated and the stretches that ingest found in these trials; warns."""
+    stretches = {trial.stem: _stretches(unit, trial) for trial in trials}
+    static = {trial.stem for trial in trials if trial.role == "static"}
+    told = told_mass(stretches, unit.config.ingest.mass_half_width_percent, height_m, static)
+    stated = stated_mass(unit, *(unit.facts("markers", trial) for trial in trials))
+    loads = " and ".join(dict.fromkeys(filter(None, (load_words(unit, t) for t in trials))))
+    without = f" without the known load ({loads})" if loads else ""
+    if stated is None:
+        return _from_plates(unit, told, without)
+    vague = told if told.is_known else told_mass(stretches, VAGUE_PERCENT, height_m, static)
+    comparison = compared(unit, stated, vague, 0.0, height_m)
+    if stated.source != TABLE:
+        unit.warn(f"{unit.name}: mass {stated.mass_kg:.2f} kg taken from {stated.source}")
+    if comparison is None:
+        return PersonMass(stated.mass_kg, stated.source, told.mass_kg, "")
+    if comparison.is_gross:
+        return _gross(unit, stated, comparison, told.is_known)
+    if told.is_known and not comparison.is_small:
+        unit.warn(
+            f"{unit.name}: the plates tell {told.words()}{without}, stated are "
+            f"{stated.mass_kg:.2f} kg ({comparison.difference_percent:+.1f} %, tolerance "
+            f"{comparison.tolerance_percent:g} %)"
+        )
+    return PersonMass(stated.mass_kg, stated.source, told.mass_kg, "")
+
+
+def _stretches(unit: Unit, trial: Trial) -> list[Stretch]:
+    """Of a trial, known loads taken off."""
+    load_kg = unit.load_kg(trial)
+    records = unit.facts("wrench", trial)["mass_stretches"]
+    return [Stretch.of(record).without(load_kg) for record in records]
+
+
+def _from_plates(unit: Unit, told: ToldMass, without: str) -> PersonMass:
+    if told.is_known:
+        unit.warn(f"{unit.name}: mass taken from the plates{without}: {told.words()}")
+        return PersonMass(told.mass_kg, PLATES, told.mass_kg, "")
+    note = f"mass is not known: put mass_kg into participants.tsv, because {told.reason}"
+    unit.warn(f"{unit.name}: {note}")
+    return PersonMass(float("nan"), UNKNOWN, float("nan"), note)
+
+
+def _gross(unit: Unit, stated: StatedMass, comparison: Comparison, is_sure: bool) -> PersonMass:
+    """Where the mistake in the stated mass is plain, the plates' own counts, if it is sure, or
+    none; else nothing is known to be wrong with either, and the stated one stays."""
+    told = comparison.told
+    plates_kg = told.mass_kg if is_sure else float("nan")
+    sentence = comparison.sentence(stated.source)
+    if not comparison.likely():
+        used, source = stated.mass_kg, stated.source
+    elif is_sure:
+        used, source = told.mass_kg, PLATES
+    else:
+        used, source = float("nan"), UNKNOWN
+    what = f"{used:.2f} kg is used" if np.isfinite(used) else "the mass is not known"
+    note = f"{sentence}; {what}: correct mass_kg in participants.tsv"
+    unit.warn(f"{unit.name}: {note}")
+    return PersonMass(used, source, plates_kg, note)

@@ -274,7 +274,7 @@ SCHEMAS = {
             1,
             "facts of the person that later stages use",
             (
-                _text("sex", "M or F"),
+                _text("sex", "M, F or other (the mean of both tables)"),
                 Column("mass_kg", "float", "kg", "mass, from the scale or the plates"),
                 _text("mass_source", "participants.tsv or plates"),
                 Column(

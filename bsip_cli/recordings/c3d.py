@@ -12,6 +12,7 @@ from bsip_cli.recordings.analog import check_samples
 from bsip_cli.recordings.assemble import Forces, PlateSource, settle_forces
 from bsip_cli.recordings.c3d_content import Content, read_content
 from bsip_cli.recordings.c3d_parameters import texts
+from bsip_cli.recordings.c3d_person import stated_person
 from bsip_cli.recordings.c3d_plates import PlateChannels, plate_surfaces, read_plates
 from bsip_cli.recordings.c3d_points import Points, read_points
 from bsip_cli.recordings.cop_near_feet import Scene
@@ -76,6 +77,7 @@ def _recording(
 ) -> Recording:
     rotation = world.rotation_to_z_up(up)
     turned = world.finding_about(up)
+    stated, about_person = stated_person(content.parameters)
     return Recording(
         path=path,
         marker_rate_hz=content.rate_hz,
@@ -83,8 +85,9 @@ def _recording(
         markers_m=points.positions_m @ rotation.T,
         analog_rate_hz=content.rate_hz * content.samples_per_frame,
         plates=forces.plates,
-        findings=(*findings, *([turned] if turned else []), *forces.findings),
+        findings=(*findings, *([turned] if turned else []), *forces.findings, *about_person),
         rotation_world_lab=rotation,
         forces_note=forces.note,
         time0_s=content.first_frame / content.rate_hz,
+        stated=stated,
     )

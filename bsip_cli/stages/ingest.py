@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pandas as pd
@@ -11,6 +11,7 @@ from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.body.names import TRUNK
 from bsip_cli.errors import BadDataError
+from bsip_cli.recordings.c3d_person import against_table
 from bsip_cli.recordings.contacts import ContactWindows, contact_windows, plate_loads
 from bsip_cli.recordings.free_plates import nobody_near
 from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps
@@ -63,7 +64,8 @@ def run(unit: Unit) -> None:
         "marker_rate_hz": recording.marker_rate_hz,
         "analog_rate_hz": recording.analog_rate_hz,
     }
-    unit.write("markers", _marker_table(times, names, filled), facts)
+    stated = {f"stated_{name}": value for name, value in asdict(recording.stated).items()}
+    unit.write("markers", _marker_table(times, names, filled), facts | stated)
     unit.write("wrench", _wrench_table(times, wrench, contacts), facts)
     unit.write("plates", _plate_table(recording))
     unit.write("contacts", _contact_table(times, contacts))
@@ -165,8 +167,10 @@ def _mass_findings(
     )
     stated = unit.participant.mass_kg
     expected = None if stated is None else stated + unit.load_kg()
-    finding = about_mass(carried, expected, unit.config.ingest.mass_tolerance_percent)
-    return [finding] if finding else []
+    tolerance = unit.config.ingest.mass_tolerance_percent
+    finding = about_mass(carried, expected, tolerance)
+    said = against_table(recording.stated, stated, unit.participant.height_m, tolerance)
+    return [*said, *([finding] if finding else [])]
 
 
 def _mass_kg(unit: Unit, wrench: FrameWrench) -> float:

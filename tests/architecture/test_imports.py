@@ -53,7 +53,7 @@ ONLY = {
     "commands": {"stages": {"stages.frames"}},
     "running": {"body": {"body.markersets", "body.skeleton"}},
     "stages": {"running": {"running.unit"}},
-    "study": {"body": {"body.skeleton"}},
+    "study": {"body": {"body.quantities", "body.sex_words", "body.skeleton"}},
 }
 
 

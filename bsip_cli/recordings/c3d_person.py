@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -134,9 +134,11 @@ def _pair(
     """Mass and height in the units with which they make a person; None for what stays open."""
     if masses and heights:
         every = _all_units(masses, MASS)
-        pairs = [(m, h) for m in every for h in heights if is_of_people(m.value, h.value)]
+        pairs = _of_people(masses, heights) or _of_people(every, heights)
         heights = tuple(dict.fromkeys(h for _, h in pairs)) or heights
-        if len(heights) == 1 and not is_of_people(masses[0].value, heights[0].value):
+        if len(masses) > 1:
+            masses = tuple(dict.fromkeys(m for m, _ in pairs)) or masses
+        if len(masses) == len(heights) == 1 and not is_of_people(masses[0].value, heights[0].value):
             may_be = " or ".join(f"{m.value:.1f} kg ({m.unit})" for m, _ in pairs)
             found = (
                 f"a mass of {masses[0].value:.4g} kg beside a height of {heights[0].value:.3g} m"
@@ -150,6 +152,12 @@ def _pair(
             findings.append(_unused(f"{quantity.column} that may be {may_be}", "a unit"))
     mass, height = (r[0].value if len(r) == 1 else None for r in (masses, heights))
     return mass, height
+
+
+def _of_people(
+    masses: Iterable[Reading], heights: Sequence[Reading]
+) -> list[tuple[Reading, Reading]]:
+    return [(m, h) for m in masses for h in heights if is_of_people(m.value, h.value)]
 
 
 def _all_units(masses: tuple[Reading, ...], quantity: Quantity) -> list[Reading]:

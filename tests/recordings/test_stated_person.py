@@ -41,6 +41,7 @@ def stated(**groups: dict) -> tuple[StatedPerson, list[str]]:
             (70.488, 1.631, ""),
         ),
         ({"PATIENT": {"MASS": 70500, "STATURE": 1630}}, (70.5, 1.63, "")),
+        ({"SUBJECT": {"WEIGHT": 600, "HEIGHT": 170}}, (61.183, 1.7, "")),  # N, not lb
         ({"PROCESSING": {"BODYMASS": 0, "HEIGHT": 0}}, (None, None, "")),
         ({"PROCESSING": {"BODYMASS": np.nan}}, (None, None, "")),
         ({"EXPERIMENT": {"WEIGHT": 50, "HEIGHT": 1.6}}, (None, None, "")),  # of a robot's target

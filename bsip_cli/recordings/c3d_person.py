@@ -26,7 +26,7 @@ def stated_person(parameters: Parameters) -> tuple[StatedPerson, tuple[Finding, 
     said = {q.column: list(_stated(parameters, q)) for q in (MASS, HEIGHT)}
     masses, heights = (_one(said[q.column], q, findings) for q in (MASS, HEIGHT))
     mass, height = _pair(masses, heights, findings)
-    person = StatedPerson(mass, height, _sex(parameters, findings))
+    person = StatedPerson(mass, height, _sex(parameters, findings), _name(parameters))
     if words := person.words():
         action = "used where participants.tsv says n/a"
         findings.append(Finding("stated_person", "", words, "", action, "info"))
@@ -185,6 +185,18 @@ def _sex(parameters: Parameters, findings: list[Finding]) -> str:
     if len(sexes) > 1:
         findings.append(_unused(f"sexes {', '.join(sorted(said))}", "one"))
     return sexes.pop() if len(sexes) == 1 else ""
+
+
+def _name(parameters: Parameters) -> str:
+    """The subject's, where the file names one alone."""
+    said = {
+        text.strip()
+        for _, group in _groups(parameters)
+        for parameter in _named(group, "name names")
+        for text in texts(group, parameter)
+        if text.strip()
+    }
+    return said.pop() if len(said) == 1 else ""
 
 
 def _differ(values: Iterable[float]) -> bool:

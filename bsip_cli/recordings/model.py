@@ -44,12 +44,14 @@ class Plate:
 class StatedPerson:
     """What a file says of the person; None or empty where it says nothing.
 
-    ``sex`` is M, F or other.
+    ``sex`` is M, F or other; ``name`` is the subject's in the recording program: it serves to tell
+    people apart and is written nowhere.
     """
 
     mass_kg: float | None = None
     height_m: float | None = None
     sex: str = ""
+    name: str = ""
 
     def words(self) -> str:
         """For example ``45.8 kg, 1.48 m``; empty where nothing is stated."""

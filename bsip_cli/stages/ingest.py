@@ -64,7 +64,8 @@ def run(unit: Unit) -> None:
         "marker_rate_hz": recording.marker_rate_hz,
         "analog_rate_hz": recording.analog_rate_hz,
     }
-    stated = {f"stated_{name}": value for name, value in asdict(recording.stated).items()}
+    said = asdict(recording.stated)
+    stated = {f"stated_{name}": said[name] for name in ("mass_kg", "height_m", "sex")}
     unit.write("markers", _marker_table(times, names, filled), facts | stated)
     unit.write("wrench", _wrench_table(times, wrench, contacts), facts)
     unit.write("plates", _plate_table(recording))

@@ -94,10 +94,10 @@ def test_the_table_is_used_and_the_contradiction_said():
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
-        ("zoo_children/HC030A-static.c3d", StatedPerson(45.8, 1.48)),
-        ("btk_pig/PiG_Motion-FlatFoot-Hole.c3d", StatedPerson(66.5, 1.79)),
-        ("btk_pig/PiG_Calibration-FlatFoot-Hole.c3d", StatedPerson()),  # zeros
-        ("golf_french/static.c3d", StatedPerson()),
+        ("zoo_children/HC030A-static.c3d", StatedPerson(45.8, 1.48, name="HC030A")),
+        ("btk_pig/PiG_Motion-FlatFoot-Hole.c3d", StatedPerson(66.5, 1.79, name="ANTO_M")),
+        ("btk_pig/PiG_Calibration-FlatFoot-Hole.c3d", StatedPerson(name="ANTO_M")),  # zeros
+        ("golf_french/static.c3d", StatedPerson(name="Golf_025_")),
     ],
 )
 def test_real_files(name, expected):

@@ -15,7 +15,7 @@ from shlex import quote
 import click
 from tqdm import tqdm
 
-from bsip_cli.commands.init_files import Source, Unused, list_files, read_sources
+from bsip_cli.commands.init_files import NO_RECORDING, Source, Unused, list_files, read_sources
 from bsip_cli.errors import BadDataError, UsageError, not_writable, printable
 from bsip_cli.files.folders import check_path, is_folder
 from bsip_cli.recordings.c3d_person import together
@@ -316,7 +316,7 @@ def _results(out: Path) -> Path:
 
 def _unused_lines(unused: Sequence[Unused]) -> Iterator[str]:
     """What is no recording in one line for all kinds; everything else with its reason."""
-    others = [one for one in unused if one.why == "no recording"]
+    others = [one for one in unused if one.why == NO_RECORDING]
     if others:
         yield f"not used, no recordings: {counted(_kind(one) for one in others)}"
     reasons: dict[str, list[str]] = defaultdict(list)

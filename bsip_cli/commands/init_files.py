@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.files.fingerprints import file_hash
-from bsip_cli.files.folders import is_folder, lies_in
+from bsip_cli.files.folders import entries, is_folder, lies_in
 from bsip_cli.files.force_files import ENDINGS
 from bsip_cli.files.regular import fault_of
 from bsip_cli.recordings.labels import is_unlabelled
@@ -21,11 +21,12 @@ from bsip_cli.recordings.model import Recording, StatedPerson
 from bsip_cli.recordings.mot import read_mot
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.study.new_study import Found
-from bsip_cli.study.trials import RECORDINGS
+from bsip_cli.study.trials import PACKED, RECORDINGS
 
 _FORCES = "grf grfs grw forces force kinetics ground reaction fp plates"
 _MARKERS = "trc marker markers mrk traj trajectories mocap"
 _OF_FILES = frozenset(f"{_FORCES} {_MARKERS}".split())
+NO_RECORDING = "no recording"
 _WINDOW_S = 0.5
 _FASTEST = 90.0  # percentile
 
@@ -120,10 +121,10 @@ def read_sources(
                 kept.append(_source(one, pairs, unused))
         except BadDataError as refusal:
             unused.append(Unused(one.path, _why(refusal), is_fault=True))
-    used = {source.forces for source in kept} | {one.path for one in unused}
-    for one in files:
-        if one.path not in used and one.kind not in RECORDINGS:
-            unused.append(Unused(one.path, _why_not(one, pairs)))
+    done = {source.forces for source in kept} | {one.path for one in unused}
+    c3d = {source.path.stem.casefold() for source in kept if source.forces is None}
+    left = (one for one in files if one.path not in done and one.kind not in RECORDINGS)
+    unused += [_unused(one, pairs, c3d) for one in left]
     return kept, unused
 
 
@@ -133,12 +134,20 @@ def _why(refusal: BadDataError) -> str:
     return f"{refusal.found}{expected}{remedy}"
 
 
-def _why_not(one: Listed, pairs: _Pairs) -> str:
+def _unused(one: Listed, pairs: _Pairs, used: Collection[str]) -> Unused:
+    """Why a file that is no recording is left where it is."""
+    inner = Path(one.path.stem.removesuffix(".tar")).suffix.lower()
+    if one.kind in PACKED and inner in (*RECORDINGS, *ENDINGS):
+        return Unused(one.path, "is packed: unpack it", is_fault=True)
     if one.kind not in ENDINGS:
-        return "no recording"
-    if any(other.path.suffix.lower() == ".c3d" for other in pairs.alike(one)):
-        return "a C3D of its name has forces of its own"
-    return "no TRC of its name beside it"
+        return Unused(one.path, NO_RECORDING)
+    if one.path.stem.casefold() in used:
+        return Unused(one.path, "a C3D of its name has forces of its own")
+    if several := pairs.markers_of(one):
+        names = " and ".join(str(file.path) for file in several)
+        why = f"may belong to {names}: which is meant is not guessed"
+        return Unused(one.path, why if len(several) > 1 else "no forces that could be used")
+    return Unused(one.path, "no TRC of its name is there")
 
 
 class _Pairs:
@@ -160,38 +169,30 @@ class _Pairs:
         ]
         return beside[0] if beside else None
 
-    def alike(self, one: Listed) -> list[Listed]:
-        return [
-            other
-            for other in self.files
-            if other.kind in RECORDINGS and trial_words(other.path) == trial_words(one.path)
-        ]
+    def markers_of(self, table: Listed) -> list[Listed]:
+        """The TRC files of a table's name, from the nearest folder that has one."""
+        return _nearest(table, (file for file in self.files if file.kind == ".trc"))
 
     def forces_of(self, one: Listed) -> list[Path]:
-        """Tables of the trial's name, from the nearest folder that has one."""
-        same = trial_words(one.path)
-        tables = [f for f in self.files if f.kind in ENDINGS and trial_words(f.path) == same]
-        if not tables and not self.files_beside(one):
-            tables = _of_folder(one, same)
-        near = {file.path: _shared_folders(one, file) for file in tables}
-        return sorted(path for path, n in near.items() if n == max(near.values()))
-
-    def files_beside(self, one: Listed) -> bool:
-        """Whether a folder was given, and not the file alone."""
-        return sum(file.path.parent == one.path.parent for file in self.files) > 1
+        """Tables of a TRC's name, from the nearest folder that has one, which no other TRC has."""
+        tables = _nearest(one, (file for file in self.files if file.kind in ENDINGS))
+        is_alone = sum(file.path.parent == one.path.parent for file in self.files) == 1
+        if not tables and is_alone:  # a file was given, and not the folder
+            beside = (p for p in entries(one.path.parent) if p.suffix.lower() in ENDINGS)
+            return [t.path for t in _nearest(one, (Listed(p, one.folders) for p in beside))]
+        return sorted(table.path for table in tables if self.markers_of(table) == [one])
 
 
-def _of_folder(one: Listed, same: tuple[str, ...]) -> list[Listed]:
-    """Tables of its name beside a TRC that was given alone."""
-    beside = one.path.parent.iterdir()
-    found = (path for path in beside if path.suffix.lower() in ENDINGS and path.is_file())
-    return [Listed(path, one.folders) for path in found if trial_words(path) == same]
+def _nearest(one: Listed, others: Iterable[Listed]) -> list[Listed]:
+    """Those of its name that lie beside a file, else in the deepest folder that holds both."""
+    name = trial_words(one.path)
+    near = {other: _nearness(one, other) for other in others if trial_words(other.path) == name}
+    return [other for other, nearness in near.items() if nearness == max(near.values())]
 
 
-def _shared_folders(one: Listed, other: Listed) -> int:
-    """The deeper the folder that holds both, the nearer they are; beside each other is nearest."""
+def _nearness(one: Listed, other: Listed) -> int:
     if one.path.parent == other.path.parent:
-        return 1000
+        return len(one.path.parts)
     pairs = zip(one.folders, other.folders, strict=False)
     return next((k for k, (a, b) in enumerate(pairs) if a != b), 0)
 

@@ -100,10 +100,14 @@ def name_all(
     participant : whose all are, if that is known.
     """
     notes: list[str] = []
-    people = {participant: list(recordings)} if participant else _people(recordings, notes)
+    people = {participant: [*recordings]} if participant else _people(recordings, notes)
     named: list[Named] = []
     for name, own in people.items():
         named += _trials(name, own, notes)
+    without = sorted({*people} - {one.participant for one in named if one.task == "static"})
+    if without:
+        whose = "" if len(without) == len(people) else f" of {', '.join(without)}"
+        notes.append(f"no static trial{whose}: the quietest second of a movement calibrates")
     return tuple(named), tuple(notes)
 
 
@@ -169,7 +173,8 @@ def _are_people(firsts: Sequence[str], recordings: Sequence[Found]) -> bool:
     """Whether the first words of file names are people: called so, or each with a static trial."""
     if len(set(firsts)) < 2 or not all(re.search(r"\d", first) for first in firsts):
         return False
-    if all(_PERSONS.issuperset(w for w in words(first) if w.isalpha()) for first in firsts):
+    letters = [{w for w in words(first) if w.isalpha()} for first in firsts]
+    if all(one and one <= _PERSONS for one in letters):
         return True
     pairs = zip(firsts, recordings, strict=True)
     static = {first for first, one in pairs if _is_called_static(one.stem[len(first) :])}
@@ -215,6 +220,7 @@ def _free(wished: str, taken: Mapping[str, object], own: Sequence[Found]) -> str
 def _trials(participant: str, own: Sequence[Found], notes: list[str]) -> list[Named]:
     """The trials of one person, each with a name of its own."""
     rests = _without_common([_rest(one.stem, participant) for one in own])
+    rests = [rest or _sorting_folder(one) for one, rest in zip(own, rests, strict=True)]
     static = _static(participant, own, notes)
     taken: set[tuple[str, str, int]] = set()
     named = []
@@ -234,7 +240,7 @@ def _trials(participant: str, own: Sequence[Found], notes: list[str]) -> list[Na
 
 def _static(participant: str, own: Sequence[Found], notes: list[str]) -> list[Found]:
     """Those that calibrate: called so and still; else the stillest, if somebody stands there."""
-    called = [one for one in own if _is_called_static(one.stem)]
+    called = [one for one in own if _is_called_static(one.stem) or _is_in_static_folder(one)]
     still = [one for one in called if _is_still(one)]
     moving = [one.path.name for one in called if one not in still]
     if moving:
@@ -248,7 +254,6 @@ def _static(participant: str, own: Sequence[Found], notes: list[str]) -> list[Fo
     if stillest.fastest_m_s < STILL_M_S and len(own) > 1:
         notes.append(f"{participant}: {stillest.path.name} is the stillest and serves as static")
         return [stillest]
-    notes.append(f"{participant}: no static trial; the quietest second of its trials calibrates")
     return []
 
 
@@ -256,8 +261,17 @@ def _is_called_static(stem: str) -> bool:
     return not (_STATIC | _PERHAPS_STATIC).isdisjoint(words(stem))
 
 
+def _is_in_static_folder(one: Found) -> bool:
+    return any(not _STATIC.isdisjoint(words(folder)) for folder in one.folders)
+
+
+def _sorting_folder(one: Found) -> list[str]:
+    """The folder that says what a recording shows whose own name says only whose it is."""
+    return [f for f in one.folders if words(f) and _SORTING.issuperset(words(f))][-1:]
+
+
 def _is_still(one: Found) -> bool:
-    is_clear = not _STATIC.isdisjoint(words(one.stem))
+    is_clear = _is_in_static_folder(one) or not _STATIC.isdisjoint(words(one.stem))
     return (one.median_m_s if is_clear else one.fastest_m_s) < STILL_M_S
 
 

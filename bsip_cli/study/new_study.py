@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,7 +31,7 @@ _SORTING_NAMES = (
     "data daten raw c3d trc mot sto marker markers markerdata force forces forcedata kinetics "
     "kinematics mocap motion dynamic dynamics trial trials recordings session ses gait walk "
     "walking run running jump squat squats export exported opensim vicon qualisys qtm nexus "
-    "inputs input output"
+    "inputs input output condition cond block task tasks"
 )
 _PERSON_NAMES = (
     "s sub subj subject p part participant pat patient pt vp pp proband probandid id sujet "
@@ -48,7 +48,11 @@ _ENOUGH_LABELS = 0.5  # shared, of the recording with fewer: else nothing says t
 _TASK = re.compile(r"task-([A-Za-z0-9]+)")
 _RUN = re.compile(r"run-([0-9]+)")
 _BIDS_PERSON = re.compile(r"(?<![A-Za-z0-9])(sub-[A-Za-z0-9]+)")
-_SESSION = re.compile(r"^ses(?:s?ion)?[-_ ]?([A-Za-z0-9]+)$", re.IGNORECASE)
+_SESSION = re.compile(
+    r"^(?:ses|sess?ion|sitzung|day|tag|jour|visit|visite)(?:[-_ ]+([A-Za-z0-9]+)|([0-9]+))$",
+    re.IGNORECASE,
+)
+_DATE = 6  # digits at least, as in 230105
 
 
 @dataclass(frozen=True)
@@ -141,7 +145,7 @@ def _bids_person(one: Found) -> str:
 def _person_folders(recordings: Sequence[Found]) -> list[str]:
     """The folder that tells each recording's person; empty where folders only sort."""
     telling = [
-        [f for f in one.folders if not _SESSION.match(f) and not _SORTING.issuperset(words(f))]
+        [folder for folder in one.folders if not _SESSION.match(folder) and not _only_sorts(folder)]
         for one in recordings
     ]
     while len({tuple(folders[:1]) for folders in telling}) == 1 and telling[0]:
@@ -156,10 +160,11 @@ def _in_one_folder(recordings: Sequence[Found], notes: list[str]) -> dict[str, l
         groups = _by(recordings, [one.subject for one in recordings])
         notes.append(f"{len(subjects)} people, by the subjects that the files name")
         return {_visible(name, own): own for name, own in groups.items()}
-    firsts = [re.split(r"[\W_]+", one.stem.strip("_- "))[0] for one in recordings]
-    if _are_people(firsts, recordings):
-        notes.append(f"{len(set(firsts))} people, by how the names of their files begin")
-        return _by(recordings, firsts)
+    for where, guess in _GUESSES.items():
+        guessed = [guess(one.stem) for one in recordings]
+        if _are_people(guessed, recordings):
+            notes.append(f"{len(set(guessed))} people, by how the names of their files {where}")
+            return _by(recordings, guessed)
     return {"": list(recordings)}
 
 
@@ -169,16 +174,44 @@ def _visible(subject: str, own: Sequence[Found]) -> str:
     return subject if clean and all(clean in plain(str(one.path)) for one in own) else f"?{subject}"
 
 
-def _are_people(firsts: Sequence[str], recordings: Sequence[Found]) -> bool:
-    """Whether the first words of file names are people: called so, or each with a static trial."""
-    if len(set(firsts)) < 2 or not all(re.search(r"\d", first) for first in firsts):
+def _first(stem: str) -> str:
+    return _parts(stem)[0] if _parts(stem) else ""
+
+
+def _glued(stem: str) -> str:
+    """S01 of S01static."""
+    match = re.match(r"[A-Za-z]*\d+(?=[A-Za-z])", _first(stem))
+    return match[0] if match else ""
+
+
+def _last(stem: str) -> str:
+    """S01 of static_S01; numbers alone are runs."""
+    last = _parts(stem)[-1] if _parts(stem) else ""
+    return last if re.search("[A-Za-z]", last) else ""
+
+
+_GUESSES: Mapping[str, Callable[[str], str]] = {
+    "begin": _first,
+    "begin, before other letters": _glued,
+    "end": _last,
+}
+"""Where in a file's name its person may stand."""
+
+
+def _are_people(guessed: Sequence[str], recordings: Sequence[Found]) -> bool:
+    """Whether words of file names are people: called so, or each with a static trial of its own.
+
+    Of words with digits, like HC07, two with a static trial are enough.
+    """
+    if len(set(guessed)) < 2 or not all(guessed):
         return False
-    letters = [{w for w in words(first) if w.isalpha()} for first in firsts]
-    if all(one and one <= _PERSONS for one in letters):
+    letters = [{w for w in words(one) if w.isalpha()} for one in guessed]
+    have_digits = all(re.search(r"\d", one) for one in guessed)
+    if have_digits and all(one and one <= _PERSONS for one in letters):
         return True
-    pairs = zip(firsts, recordings, strict=True)
-    static = {first for first, one in pairs if _is_called_static(one.stem[len(first) :])}
-    return len(static) > 1
+    pairs = zip(guessed, recordings, strict=True)
+    static = {word for word, one in pairs if _is_called_static(one.stem.replace(word, " ", 1))}
+    return len(static) > 1 and (have_digits or static == set(guessed))
 
 
 def _of_one_marker_set(recordings: Sequence[Found], notes: list[str]) -> list[list[Found]]:
@@ -230,7 +263,7 @@ def _trials(participant: str, own: Sequence[Found], notes: list[str]) -> list[Na
             task = "static"
         elif task.casefold() == "static":
             task = "notstatic"
-        session = next((m[1] for f in one.folders if (m := _SESSION.match(f))), "")
+        session = next((m[1] or m[2] for f in one.folders if (m := _SESSION.match(f))), "")
         while (session, task.casefold(), run) in taken:
             run += 1
         taken.add((session, task.casefold(), run))
@@ -267,7 +300,16 @@ def _is_in_static_folder(one: Found) -> bool:
 
 def _sorting_folder(one: Found) -> list[str]:
     """The folder that says what a recording shows whose own name says only whose it is."""
-    return [f for f in one.folders if words(f) and _SORTING.issuperset(words(f))][-1:]
+    return [
+        folder for folder in one.folders if _only_sorts(folder) and re.search(r"[A-Za-z]", folder)
+    ][-1:]
+
+
+def _only_sorts(folder: str) -> bool:
+    """Whether a folder's name says what lies in it or when it was recorded, and not of whom."""
+    letters = [word for word in words(folder) if word.isalpha()]
+    is_date = not letters and len(re.sub(r"\D", "", folder)) >= _DATE
+    return is_date or (bool(letters) and _SORTING.issuperset(letters))
 
 
 def _is_still(one: Found) -> bool:
@@ -282,15 +324,24 @@ def is_sequence(task: str) -> bool:
 
 def _rest(stem: str, participant: str) -> list[str]:
     """The words of a file's name without the person's."""
-    parts = [part for part in re.split(r"[^\w]+|_", _BIDS_PERSON.sub("", stem)) if part]
+    if _TASK.search(stem):
+        return [stem]
+    parts = _parts(_BIDS_PERSON.sub("", stem))
     letters = participant.removeprefix("sub-").casefold()
-    at = 0
     joined = ""
     for k, part in enumerate(parts):
         joined += plain(part).casefold()
         if joined == letters:
-            at = k + 1
-    return parts[at:] if not _TASK.search(stem) else [stem]
+            return parts[k + 1 :]
+    if letters.isdigit():  # sub-01, which no file is called after
+        return parts
+    if parts and _glued(parts[0]).casefold() == letters:
+        return [parts[0][len(letters) :], *parts[1:]]
+    return [part for part in parts if plain(part).casefold() != letters]
+
+
+def _parts(stem: str) -> list[str]:
+    return [part for part in re.split(r"[\W_]+", stem) if part]
 
 
 def _without_common(rests: list[list[str]]) -> list[list[str]]:

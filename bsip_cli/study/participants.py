@@ -6,6 +6,7 @@ import difflib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from bsip_cli.body.quantities import (
@@ -62,10 +63,11 @@ class PeopleTable:
     rows: tuple[Row, ...]
     notes: tuple[str, ...]
 
-    def cells_of(self, name: str) -> list[str]:
-        """A column from top to bottom."""
-        k = self.columns[name].index
-        return [row.cells[k] for row in self.rows if k < len(row.cells)]
+    @cached_property
+    def sexes(self) -> frozenset[str]:
+        """All that stands in that column, in small letters."""
+        k = self.columns["sex"].index
+        return frozenset(row.cells[k].casefold() for row in self.rows if k < len(row.cells))
 
 
 def named_in(file: Path) -> list[str]:
@@ -173,7 +175,7 @@ def participant_of(row: Row, table: PeopleTable) -> Participant:
             remedy="write n/a where something is unknown",
         )
     cells = {name: row.cells[column.index] for name, column in table.columns.items()}
-    sex = sex_of(cells["sex"], table.columns["sex"].legend, table.cells_of("sex"))
+    sex = sex_of(cells["sex"], table.columns["sex"].legend, table.sexes)
     faults = [] if sex else [_sex_fault(cells["sex"], row.id)]
     mass, height = (_Found(cells.get(q.column, ""), q, table.columns) for q in (MASS, HEIGHT))
     _settle(mass, height)

@@ -65,7 +65,9 @@ def columns_of(header: Sequence[str]) -> Columns:
         own = [column for column in found if column.name == name]
         exact = [column for column in own if column.title == name]
         if len(own) > 1 and len(exact) != 1:
-            faults.append(f"has {len(own)} columns of one meaning: {_listed(own)}")
+            faults.append(
+                f"has {len(own)} columns of one meaning, {_listed(own)}, and none is {name}"
+            )
         elif own:
             known[name] = (exact or own)[0]
             if "?" in known[name].unit:

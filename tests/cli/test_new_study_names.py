@@ -57,6 +57,14 @@ def short(named: Named) -> str:
             ["Anna_ses-1_walk_1", "Anna_ses-2_walk_1", "Ben_ses-1_walk_1"],
         ),
         (
+            ["Trial 1/P1/walk.c3d", "Trial 2/P2/walk.c3d", "20230105/P2/hop.c3d"],
+            ["P1_walk_1", "P2_walk_1", "P2_hop_1"],
+        ),
+        (
+            ["01/Day1/walk.c3d", "02/Day1/walk.c3d", "02/Day2/walk.c3d"],
+            ["01_ses-1_walk_1", "02_ses-1_walk_1", "02_ses-2_walk_1"],
+        ),
+        (
             ["data/static/S1.c3d", "data/walking/S1.c3d", "data/static/S2.c3d"],
             ["S1_static_1", "S1_walking_1", "S2_static_1"],
         ),
@@ -65,6 +73,22 @@ def short(named: Named) -> str:
         (
             ["HC1-static.c3d", "HC1-turn.c3d", "HC2-static.c3d", "HC2-turn.c3d"],
             ["HC1_static_1", "HC1_turn_1", "HC2_static_1", "HC2_turn_1"],
+        ),
+        (
+            ["AB_static.c3d", "AB_walk1.c3d", "CD_static.c3d", "CD_walk1.c3d"],
+            ["AB_static_1", "AB_walk_1", "CD_static_1", "CD_walk_1"],
+        ),
+        (
+            ["K01static.c3d", "K01walk3.c3d", "K02static.c3d"],
+            ["K01_static_1", "K01_walk_3", "K02_static_1"],
+        ),
+        (
+            ["static_VP3.c3d", "walk 2_VP3.c3d", "walk 1_VP4.c3d"],
+            ["VP3_static_1", "VP3_walk_2", "VP4_walk_1"],
+        ),
+        (
+            ["static_1.c3d", "static_2.c3d", "walk_1.c3d", "walk_2.c3d"],  # runs
+            ["01_static_1", "01_static_2", "01_walk_1", "01_walk_2"],
         ),
         (["subj01_walk2.c3d", "subj02_walk1.c3d"], ["subj01_walk_2", "subj02_walk_1"]),
         (

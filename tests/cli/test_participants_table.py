@@ -121,6 +121,8 @@ def test_dialects(empty_study, table, said):
         ("0 1 n/a", " (0=F, 1=M)", ["F", "M", "other"]),
         ("1 2", " [1: male; 2: female]", "MF"),
         ("2 1", " female = 2, male = 1", "FM"),
+        ("1.0 2.0", " (1=F; 2=M)", "FM"),
+        ("M F", " (M/F)", "MF"),
         ("a b", " (a = weiblich / b = männlich)", "FM"),
     ],
 )

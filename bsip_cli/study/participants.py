@@ -59,6 +59,7 @@ class PeopleTable:
 
     file: Path
     width: int
+    separator: str
     columns: Mapping[str, Column]
     rows: tuple[Row, ...]
     notes: tuple[str, ...]
@@ -116,7 +117,8 @@ def read_people(file: Path) -> PeopleTable:
     notes = [*_how_read(file, table), *notes]
     if renamed:
         notes.append(f"{file}: {', '.join(renamed)}, by their folders")
-    return PeopleTable(file, len(table.header), columns.known, tuple(rows), tuple(notes))
+    width, separator = len(table.header), table.separator
+    return PeopleTable(file, width, separator, columns.known, tuple(rows), tuple(notes))
 
 
 def _header_fault(file: Path, faults: Sequence[str]) -> BadDataError:
@@ -124,7 +126,7 @@ def _header_fault(file: Path, faults: Sequence[str]) -> BadDataError:
         "; ".join(faults),
         file=file,
         expected=f"{', '.join(KNOWN)}, separated by tabs",
-        remedy="add what is lacking, and correct the names",
+        remedy="add what is lacking, and give the columns that count these names",
     )
 
 
@@ -168,11 +170,14 @@ def participant_of(row: Row, table: PeopleTable) -> Participant:
             remedy="rename the participant and the folder",
         )
     if len(row.cells) != table.width:
+        is_split = table.separator == "commas" and len(row.cells) > table.width
         raise BadDataError(
             f"the line of {row.id!r} has {len(row.cells)} cells",
             file=table.file,
             expected=f"{table.width}, as many as there are columns",
-            remedy="write n/a where something is unknown",
+            remedy="write points for decimal commas"
+            if is_split
+            else "write n/a where something is unknown",
         )
     cells = {name: row.cells[column.index] for name, column in table.columns.items()}
     sex = sex_of(cells["sex"], table.columns["sex"].legend, table.sexes)

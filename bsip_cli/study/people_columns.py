@@ -17,7 +17,9 @@ REQUIRED = ("participant_id", "sex", "mass_kg")
 KNOWN = (*REQUIRED, "height_m")
 
 _IDS = (
-    "participantid participant subjectid subject subjid subj id patientid patient proband probandid"
+    "participantid participant participantcode subjectid subject subjectcode subjid subj id code "
+    "patientid patient proband probandid probandenid probandennummer probandennr vp vpn sujet "
+    "sujeto soggetto paziente paciente"
 )
 _QUANTITIES = {quantity.column: quantity for quantity in (MASS, HEIGHT)}
 _COLUMN_OF = {

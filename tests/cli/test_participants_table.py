@@ -226,6 +226,12 @@ def test_numbers_that_may_be_anything_are_refused(empty_study, header, row, said
     assert said in refusal
 
 
+def test_decimal_commas_between_commas_are_refused_with_the_reason(empty_study):
+    table = "participant_id,sex,mass_kg,height_m\nsub-01,F,70,5,1.63\nsub-02,M,80.1,1.8\n"
+    found, _, (refusal,) = people(empty_study, table)
+    assert found == [("M", 80.1, 1.8)] and "write points for decimal commas" in refusal
+
+
 def test_names_for_scripts_are_those_of_the_folders(empty_study):
     (empty_study / "participants.tsv").write_text("id;sex;mass\n1;F;70\nsub-02;M;80\n")
     assert named_in(empty_study / "participants.tsv") == ["sub-01", "sub-02"]

@@ -16,6 +16,7 @@ import click
 from tqdm import tqdm
 
 from bsip_cli.commands.init_files import NO_RECORDING, Source, Unused, list_files, read_sources
+from bsip_cli.commands.init_table import is_table, read_tables
 from bsip_cli.errors import BadDataError, UsageError, not_writable, printable
 from bsip_cli.files.folders import check_path, is_folder
 from bsip_cli.recordings.c3d_person import together
@@ -54,6 +55,7 @@ class _Plan:
     people: Mapping[str, StatedPerson]
     markers: _Markers
     unused: tuple[Unused, ...]
+    tables: tuple[Path, ...]
     notes: tuple[str, ...]
 
 
@@ -93,7 +95,8 @@ def init_command(request: Request) -> int:
             expected="C3D files, or TRC files with their MOT or STO beside them",
             remedy="correct what is said of each" if unused else "name the folder they lie in",
         )
-    plan = _planned(sources, unused, participant)
+    tables = [one.path for one in files if is_table(one.path)]
+    plan = _planned(sources, unused, participant, tables)
     _write(request, plan)
     _say(_told(request, plan))
     return 3 if any(one.is_fault for one in unused) else 0
@@ -127,18 +130,26 @@ def _check_out(out: Path) -> None:
 # --- the plan -------------------------------------------------------------------------------------
 
 
-def _planned(sources: Sequence[Source], unused: Sequence[Unused], participant: str) -> _Plan:
+def _planned(
+    sources: Sequence[Source], unused: Sequence[Unused], participant: str, tables: Sequence[Path]
+) -> _Plan:
     all_named, notes = name_all([source.found for source in sources], participant)
     named = {one.found.path: one for one in all_named}
     of: dict[str, dict[str, StatedPerson]] = defaultdict(dict)
     for source in sorted(sources, key=lambda source: named[source.path].stem):
         of[named[source.path].participant][source.path.name] = source.stated
-    people, said = {}, list(notes)
+    in_tables, told = read_tables(tables, of)
+    people, said = {}, [*notes, *told]
     for name, stated in sorted(of.items()):
+        if name in in_tables:
+            stated[in_tables[name][0].name] = in_tables[name][1]
         people[name], contradictions = together(stated)
         said += [f"{name}: {one}" for one in contradictions]
+    used = {file for file, _ in in_tables.values()}
+    left = tuple(one for one in unused if one.path not in used)
     markers = _marker_set(sources, named)
-    return _Plan(named, tuple(sources), people, markers, tuple(unused), (*said, *markers.notes))
+    said += markers.notes
+    return _Plan(named, tuple(sources), people, markers, left, tuple(used), tuple(said))
 
 
 def _marker_set(sources: Sequence[Source], named: Mapping[Path, Named]) -> _Markers:
@@ -246,6 +257,8 @@ def _source_rows(request: Request, plan: _Plan) -> Iterator[tuple[str, ...]]:
     for source, target in _files(plan):
         named = trials[source]
         yield str(target), str(source.absolute()), made, named.participant, named.task, ""
+    for table in plan.tables:
+        yield "participants.tsv", str(table.absolute()), "read", "n/a", "n/a", ""
     for one in sorted(plan.unused, key=lambda one: one.path):
         yield "n/a", str(one.path.absolute()), "not used", "n/a", "n/a", one.why
 
@@ -301,6 +314,8 @@ def _told(request: Request, plan: _Plan) -> Iterator[str]:
             f"no file tells the sex{whose}: write M or F into participants.tsv, else the mean of "
             "both tables is used"
         )
+    if plan.tables:
+        yield f"read of people: {listed(str(table) for table in plan.tables)}"
     yield f"marker set: {plan.markers.name}"
     yield from plan.notes
     yield from _unused_lines(plan.unused)

@@ -159,7 +159,7 @@ def _in_one_folder(recordings: Sequence[Found], notes: list[str]) -> dict[str, l
     if len(subjects) > 1:
         groups = _by(recordings, [one.subject for one in recordings])
         notes.append(f"{len(subjects)} people, by the subjects that the files name")
-        return {_visible(name, own): own for name, own in groups.items()}
+        return {_shown_name(name, groups): own for name, own in groups.items()}
     for where, guess in _GUESSES.items():
         guessed = [guess(one.stem) for one in recordings]
         if _are_people(guessed, recordings):
@@ -168,10 +168,18 @@ def _in_one_folder(recordings: Sequence[Found], notes: list[str]) -> dict[str, l
     return {"": list(recordings)}
 
 
-def _visible(subject: str, own: Sequence[Found]) -> str:
-    """A subject's name where file names show it anyhow; names of people are not spread."""
+def _shown_name(subject: str, groups: Mapping[str, Sequence[Found]]) -> str:
+    """What file names show of a person anyhow; a subject's name alone is not spread."""
     clean = plain(subject)
-    return subject if clean and all(clean in plain(str(one.path)) for one in own) else f"?{subject}"
+    if clean and all(clean in plain(str(one.path)) for one in groups[subject]):
+        return subject
+    for guess in (_first, _glued):
+        said = {name: {guess(one.stem) for one in own} for name, own in groups.items()}
+        if all(len(own) == 1 for own in said.values()):
+            words_of = [word for own in said.values() for word in own]
+            if all(words_of) and len(set(words_of)) == len(groups):
+                return next(iter(said[subject]))
+    return f"?{subject}"
 
 
 def _first(stem: str) -> str:

@@ -142,6 +142,24 @@ def test_a_folder_without_recordings(lab, capsys):
     assert not (lab.parent / "study").exists()
 
 
+def test_a_table_of_people_among_the_files(lab, capsys):
+    for name in ("Anna", "Ben"):
+        (lab / name).mkdir()
+        shutil.copy(STATIC if name == "Anna" else WALK, lab / name / "static.c3d")
+    for path in lab.glob("*.[cCtm]*"):
+        path.unlink()
+    table = "id;sex;weight;height\nAnna;w;60,5;165\nBen;n/a;n/a;1,80\nCleo;w;50;160\n"
+    (lab / "participants.csv").write_text(table)
+    assert made(lab)[0] == 0
+    out = lab.parent / "study"
+    assert rows(out, "participants.tsv")[1:] == [
+        ["sub-Anna", "F", "60.5", "1.65"],
+        ["sub-Ben", "n/a", "n/a", "1.8"],
+    ]
+    assert "participants.csv\tread\t" in (out / "sources.tsv").read_text()
+    assert "height 165 of sub-Anna is taken as cm" in capsys.readouterr().out
+
+
 # --- what is not used, and why --------------------------------------------------------------------
 
 

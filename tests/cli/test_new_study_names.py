@@ -121,6 +121,15 @@ def test_subjects_that_file_names_show_name_the_person():
     assert names(*files) == ["XY_static_1", "XY_turn_1", "ZA_static_1", "ZA_turn_1"]
 
 
+def test_subjects_and_the_beginnings_of_names_agree():
+    files = [
+        found(f"{short}_{what}.c3d", name)
+        for short, name in (("JD", "Jane Doe"), ("MM", "Max Mustermann"))
+        for what in ("turn", "walk1")
+    ]
+    assert names(*files) == ["JD_turn_1", "JD_walk_1", "MM_turn_1", "MM_walk_1"]
+
+
 def test_other_markers_are_other_people_and_it_is_said():
     other = frozenset(f"k{k}" for k in range(30))
     few = frozenset([*sorted(FULL)[:20]])

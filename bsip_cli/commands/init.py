@@ -16,13 +16,12 @@ import click
 from tqdm import tqdm
 
 from bsip_cli.commands.init_files import NO_RECORDING, Source, Unused, list_files, read_sources
+from bsip_cli.commands.init_markers import STARTER, StudyMarkers, study_markers
 from bsip_cli.commands.init_table import is_table, read_tables
 from bsip_cli.errors import BadDataError, UsageError, not_writable, printable
 from bsip_cli.files.folders import check_path, is_folder
 from bsip_cli.recordings.c3d_person import together
-from bsip_cli.recordings.marker_guess import guess_marker_set
 from bsip_cli.recordings.model import StatedPerson
-from bsip_cli.recordings.starter_set import starter_toml
 from bsip_cli.study.new_study import (
     Named,
     check_participant,
@@ -32,7 +31,6 @@ from bsip_cli.study.new_study import (
 )
 from bsip_cli.study.trials import listed
 
-_STARTER = "markers.toml"
 _COLUMNS = ("file", "source", "made", "participant_id", "task", "why")
 
 
@@ -53,18 +51,9 @@ class _Plan:
     named: Mapping[Path, Named]  # by the source's path
     sources: tuple[Source, ...]
     people: Mapping[str, StatedPerson]
-    markers: _Markers
+    markers: StudyMarkers
     unused: tuple[Unused, ...]
     tables: tuple[Path, ...]
-    notes: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class _Markers:
-    """The marker set for study.toml, and the starter's TOML where none fits."""
-
-    name: str
-    starter: str
     notes: tuple[str, ...]
 
 
@@ -147,44 +136,9 @@ def _planned(
         said += [f"{name}: {one}" for one in contradictions]
     used = {file for file, _ in in_tables.values()}
     left = tuple(one for one in unused if one.path not in used)
-    markers = _marker_set(sources, named)
+    markers = study_markers(sources, named)
     said += markers.notes
     return _Plan(named, tuple(sources), people, markers, left, tuple(used), tuple(said))
-
-
-def _marker_set(sources: Sequence[Source], named: Mapping[Path, Named]) -> _Markers:
-    """The one shipped set that recordings fit; several are left to guess; a starter where none."""
-    guessed: dict[str, list[Source]] = defaultdict(list)
-    for source in sources:
-        try:
-            guessed[guess_marker_set(source.labels).name].append(source)
-        except BadDataError:
-            guessed[""].append(source)
-    unknown = guessed.pop("", [])
-    files = listed(source.path.name for source in unknown)
-    if guessed:
-        served = {named[source.path].participant for own in guessed.values() for source in own}
-        is_for_all = len(guessed) == 1 and served.issuperset(
-            named[source.path].participant for source in unknown
-        )
-        name = next(iter(guessed)) if is_for_all else "auto"
-        notes = [f"no shipped marker set fits {files}: ingest may refuse them"] if unknown else []
-        if unknown:
-            notes[0] += (
-                f"; `bsip markers {quote(str(unknown[0].path))}` makes one, which serves in a "
-                "study of their own"
-            )
-        if len(guessed) > 1:
-            notes.append(f"several marker sets, guessed for each recording: {', '.join(guessed)}")
-        return _Markers(name, "", tuple(notes))
-    order = sorted(unknown, key=lambda source: named[source.path].task != "static")
-    labels = [label.rpartition(":")[2].strip() for source in order for label in source.labels]
-    note = (
-        f"no shipped marker set fits: {_STARTER} in the study is a first one, guessed from the "
-        "labels; check it before you trust a number"
-    )
-    toml = starter_toml(labels, printable(order[0].path.name), _STARTER)
-    return _Markers(_STARTER, toml, (note,))
 
 
 # --- what is written ------------------------------------------------------------------------------
@@ -232,7 +186,7 @@ def _texts(request: Request, plan: _Plan) -> dict[str, str]:
         "study.toml": _study_toml(plan),
         "sources.tsv": _table(_source_rows(request, plan)),
     }
-    return texts | ({_STARTER: plan.markers.starter} if plan.markers.starter else {})
+    return texts | ({STARTER: plan.markers.starter} if plan.markers.starter else {})
 
 
 def _people_rows(people: Mapping[str, StatedPerson]) -> Iterator[tuple[str, ...]]:

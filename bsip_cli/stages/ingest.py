@@ -53,6 +53,7 @@ def run(unit: Unit) -> None:
     contacts = _contacts(unit, recording, marker_set, names, filled, wrench)
     findings += contacts.reasons
     findings += _mass_findings(unit, recording, wrench, contacts, trunk)
+    findings += _stated_otherwise(unit, recording)
     if recording.forces_note:
         unit.warn(f"{unit.name}: kinematics only: {recording.forces_note}")
     for finding in findings:
@@ -168,10 +169,16 @@ def _mass_findings(
     )
     stated = unit.participant.mass_kg
     expected = None if stated is None else stated + unit.load_kg()
+    finding = about_mass(carried, expected, unit.config.ingest.mass_tolerance_percent)
+    return [finding] if finding else []
+
+
+def _stated_otherwise(unit: Unit, recording: Recording) -> list[Finding]:
+    """Where the file states another person than participants.tsv."""
+    assert unit.participant is not None
+    mass_kg, height_m = unit.participant.mass_kg, unit.participant.height_m
     tolerance = unit.config.ingest.mass_tolerance_percent
-    finding = about_mass(carried, expected, tolerance)
-    said = against_table(recording.stated, stated, unit.participant.height_m, tolerance)
-    return [*said, *([finding] if finding else [])]
+    return against_table(recording.stated, mass_kg, height_m, tolerance)
 
 
 def _mass_kg(unit: Unit, wrench: FrameWrench) -> float:

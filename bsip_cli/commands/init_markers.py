@@ -1,4 +1,4 @@
-"""The marker set of a study that ``bsip init`` makes: a shipped one, or a first one of the labels."""
+"""The marker set of a study that ``bsip init`` makes: a shipped one, or one of the labels."""
 
 from __future__ import annotations
 

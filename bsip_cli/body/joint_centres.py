@@ -14,15 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsip_cli.body.names import in_words
-from bsip_cli.body.sex_words import OTHER
+from bsip_cli.body.sex_words import OTHER, with_other
 from bsip_cli.body.stand_ins import whole_arm, with_trunk
 from bsip_cli.errors import BadDataError
 
 # Fractions of the distance between the ASIS, from their middle; X anterior, Y up, Z right.
-_LJC = {"M": (-0.335, -0.032, 0.0), "F": (-0.340, 0.049, 0.0)}
-_HJC = {"M": (-0.095, -0.370, 0.361), "F": (-0.139, -0.336, 0.372)}
+_LJC = with_other({"M": (-0.335, -0.032, 0.0), "F": (-0.340, 0.049, 0.0)})
+_HJC = with_other({"M": (-0.095, -0.370, 0.361), "F": (-0.139, -0.336, 0.372)})
 # Fraction of the thorax width (C7 to suprasternale) and angle above that line [degrees].
-_CJC = {"M": (0.55, 8.0), "F": (0.53, 14.0)}
+_CJC = with_other({"M": (0.55, 8.0), "F": (0.53, 14.0)})
 _SJC = (0.42, -67.0)
 # Half breadths for joints with a lateral marker only, as fractions of the stature.
 _HALF_BREADTH = {"elbow": 0.022, "knee": 0.031, "malleolus": 0.022}
@@ -62,7 +62,7 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
     _require(landmarks)
     axes, middle, width = _pelvis(landmarks)
     _require_sides(landmarks, axes[:, 2])
-    waist = middle + width * (axes @ _of(_LJC, sex))
+    waist = middle + width * (axes @ _LJC[sex])
     completed = with_trunk(landmarks, waist, axes, sex, stature_m)
     landmarks, notes = completed.landmarks, list(completed.notes)
     if sex == OTHER:
@@ -71,7 +71,7 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
     assert hips is not None
     centres = {"waist": waist, "hip_r": hips["r"], "hip_l": hips["l"]}
     width, line, right = _thorax(landmarks, axes, centres["waist"], stature_m, notes)
-    part, angle = _of(_CJC, sex)
+    part, angle = _CJC[sex]
     centres["neck"] = landmarks["c7"] + part * width * _turned(line, right, angle)
     down = _SJC[0] * width * _turned(line, right, _SJC[1])
     hinges: dict[str, np.ndarray] = {}
@@ -88,11 +88,6 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
     return JointCentres(centres, axes, hinges, ends, tuple(notes))
 
 
-def _of(table: Mapping[str, tuple[float, ...]], sex: str) -> np.ndarray:
-    """The row of a sex; the mean of both rows for others."""
-    return np.mean([table["M"], table["F"]] if sex == OTHER else [table[sex]], axis=0)
-
-
 def hip_centres(landmarks: Mapping[str, np.ndarray], sex: str) -> dict[str, np.ndarray] | None:
     """Hip joint centres (3,) [m] by side, from the pelvis alone; None without its landmarks."""
     behind = _mean(landmarks, ("psis_l", "psis_r", "sacrum"))
@@ -100,7 +95,7 @@ def hip_centres(landmarks: Mapping[str, np.ndarray], sex: str) -> dict[str, np.n
         return None
     axes, middle, width = _pelvis(landmarks)
     return {
-        side: middle + width * (axes @ (_of(_HJC, sex) * np.array([1.0, 1.0, sign])))
+        side: middle + width * (axes @ (_HJC[sex] * np.array([1.0, 1.0, sign])))
         for side, sign in (("r", 1.0), ("l", -1.0))
     }
 

@@ -10,6 +10,15 @@ Sex = Literal["M", "F", "other"]
 OTHER: Sex = "other"
 """A sex that the tables do not know, or that is not stated: the mean of both tables."""
 
+Row = tuple[float, ...]
+
+
+def with_other(rows: Mapping[str, Row]) -> dict[str, Row]:
+    """A table by sex, with the mean of both rows for others."""
+    mean = tuple((m + f) / 2 for m, f in zip(rows["M"], rows["F"], strict=True))
+    return {**rows, OTHER: mean}
+
+
 COLUMN_NAMES = "sex gender sexe sexo sesso geschlecht genre genero género"
 
 _WORDS: dict[Sex, str] = {

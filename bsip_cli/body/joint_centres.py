@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsip_cli.body.names import in_words
-from bsip_cli.body.sex_words import OTHER, with_other
 from bsip_cli.body.stand_ins import whole_arm, with_trunk
 from bsip_cli.errors import BadDataError
+from bsip_cli.stated.sex_words import OTHER, with_other
 
 # Fractions of the distance between the ASIS, from their middle; X anterior, Y up, Z right.
 _LJC = with_other({"M": (-0.335, -0.032, 0.0), "F": (-0.340, 0.049, 0.0)})

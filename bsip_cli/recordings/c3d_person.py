@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from bsip_cli.body.quantities import HEIGHT, MASS, Quantity, Reading, is_of_people, readings_of
-from bsip_cli.body.sex_words import COLUMN_NAMES, sex_of
 from bsip_cli.recordings.c3d_parameters import Group, Parameters, texts
 from bsip_cli.recordings.model import Finding, StatedPerson
+from bsip_cli.stated.quantities import HEIGHT, MASS, Quantity, Reading, is_of_people, readings_of
+from bsip_cli.stated.sex_words import COLUMN_NAMES, sex_of
 
 _GROUPS = ("PROCESSING", "PATIENT", "PARTICIPANT", "ANTHROPOMETRY", "SUBJECT")
 _SAME = 0.005  # relative: programs round

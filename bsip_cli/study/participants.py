@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from bsip_cli.body.quantities import (
+from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.files.folders import is_folder
+from bsip_cli.stated.quantities import (
     HEIGHT,
     MASS,
     Quantity,
@@ -18,9 +20,7 @@ from bsip_cli.body.quantities import (
     odd_pair,
     readings_of,
 )
-from bsip_cli.body.sex_words import Sex, sex_of
-from bsip_cli.errors import BadDataError, UsageError
-from bsip_cli.files.folders import is_folder
+from bsip_cli.stated.sex_words import Sex, sex_of
 from bsip_cli.study.people_columns import KNOWN, Column, columns_of, count_known, with_sidecar
 from bsip_cli.study.text_table import TextTable, read_text_table
 from bsip_cli.study.trials import MANY, Trial

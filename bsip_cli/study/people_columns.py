@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from bsip_cli.body.quantities import HEIGHT, MASS
-from bsip_cli.body.sex_words import COLUMN_NAMES, Sex, legend_in, legend_of
 from bsip_cli.files.regular import fault_of
+from bsip_cli.stated.quantities import HEIGHT, MASS
+from bsip_cli.stated.sex_words import COLUMN_NAMES, Sex, legend_in, legend_of
 
 REQUIRED = ("participant_id", "sex", "mass_kg")
 KNOWN = (*REQUIRED, "height_m")

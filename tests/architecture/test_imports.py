@@ -19,18 +19,19 @@ ALLOWED = {
     "schemas": "",
     "artifacts": "errors files schemas",
     "pipeline": "schemas",
-    "study": "__init__ artifacts body config errors files schemas",
+    "stated": "",
+    "study": "__init__ artifacts body config errors files schemas stated",
     "running": "__init__ artifacts body config errors files pipeline schemas study",
     "__main__": "cli",
     "commands": "__init__ artifacts body config errors files pipeline recordings report running "
     "schemas stages statistics study",
     "reference": "cli commands config pipeline schemas",
     "cli": "__init__ commands errors pipeline running simulate study",
-    "body": "config errors files",
+    "body": "config errors files stated",
     "dynamics": "body errors",
     "caches": "",
     "motion": "body caches dynamics errors",
-    "recordings": "body config errors files",
+    "recordings": "body config errors files stated",
     "statistics": "errors",
     "identification": "body config dynamics errors statistics",
     "effects": "body dynamics errors motion",
@@ -53,7 +54,7 @@ ONLY = {
     "commands": {"stages": {"stages.frames"}},
     "running": {"body": {"body.markersets", "body.skeleton"}},
     "stages": {"running": {"running.unit"}},
-    "study": {"body": {"body.quantities", "body.sex_words", "body.skeleton"}},
+    "study": {"body": {"body.skeleton"}},
 }
 
 

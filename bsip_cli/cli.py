@@ -292,6 +292,44 @@ def markers(file, marker_set, prefix, write):
 
 
 @cli.command()
+@click.argument(
+    "given",
+    metavar="FILES_OR_FOLDERS...",
+    nargs=-1,
+    required=True,
+    type=click.Path(path_type=Path),
+)
+@click.option(
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="The study's folder: new, or empty. Nothing is ever written over.",
+)
+@click.option(
+    "--participant",
+    default="",
+    metavar="sub-01",
+    help="Whose all these recordings are; without it, folders, the files' subjects and the names "
+    "of files tell people apart.",
+)
+@click.option("--link", is_flag=True, help="Symbolic links instead of copies.")
+def init(given, out, participant, link):
+    """Make a study of recordings: C3D files, and TRC files with their MOT or STO.
+
+    Files get the names that a study needs (sub-01_task-walking_run-1); static trials are told by
+    name and stillness; participants.tsv gets the mass, height and sex that files state, study.toml
+    the roles and the marker set, where no shipped one fits a first one made from the labels;
+    sources.tsv says what came from where, and what was not used and why.
+
+    Exit codes: 0 done; 2 usage, or the study's folder is not empty; 3 a recording cannot be used
+    (the others are).
+    """
+    from bsip_cli.commands.init import Request, init_command
+
+    return init_command(Request(given, out, participant, link))
+
+
+@cli.command()
 @click.argument("out", type=click.Path(path_type=Path))
 def show(out):
     """Print the tables of a finished run, what is wrong in its recordings, and where its reports

@@ -324,7 +324,7 @@ SCHEMAS = {
             2,
             "facts of the person that later stages use",
             (
-                _text("sex", "M or F"),
+                _text("sex", "M, F or other (the mean of both tables)"),
                 Column("mass_kg", "float", "kg", "mass; NaN where it is not known"),
                 _text(
                     "mass_source",

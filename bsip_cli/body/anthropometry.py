@@ -11,8 +11,9 @@ import numpy as np
 
 from bsip_cli.body.inertia import Inertia, nearest_physical_tensor
 from bsip_cli.body.person import Person
+from bsip_cli.stated.sex_words import OTHER
 
-_MEAN_STATURE_M = {"M": 1.77, "F": 1.61}
+_MEAN_STATURE_M = {"M": 1.77, "F": 1.61, OTHER: (1.77 + 1.61) / 2}
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +39,23 @@ class Regression:
 
 @cache
 def load_table(name: str) -> dict[tuple[str, str], TableRow]:
-    """Rows of a shipped table by sex (M, F) and segment, for the right side of the body."""
+    """Rows of a shipped table by sex (M, F, other) and segment, for the right side of the body."""
     file = Path(__file__).parent / "tables" / f"{name}.csv"
     lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line[0] != "#"]
-    return {(row["sex"], row["segment"]): _row(row) for row in csv.DictReader(lines)}
+    rows = {(row["sex"], row["segment"]): _row(row) for row in csv.DictReader(lines)}
+    in_both = [segment for sex, segment in rows if sex == "M" and ("F", segment) in rows]
+    means = {(OTHER, one): _mean(rows["M", one], rows["F", one]) for one in in_both}
+    return rows | means
+
+
+def _mean(one: TableRow, other: TableRow) -> TableRow:
+    """Halfway between two rows; of two tensors that a body can have the mean is one as well."""
+    return TableRow(
+        (one.mass_fraction + other.mass_fraction) / 2,
+        (one.com + other.com) / 2,
+        (one.gyration + other.gyration) / 2,
+        (one.mean_length_m + other.mean_length_m) / 2,
+    )
 
 
 def _row(row: dict[str, str]) -> TableRow:
@@ -67,6 +81,7 @@ def regress(person: Person, sex: str, mass_kg: float, table: str = "dumas2007") 
     Dumas 2007 with the head of its corrigendum: ``com = L c``, ``I_ij = m (r_ij L)^2`` (Hansen
     2017, equations 2 and 3). The masses are normalised to the person's mass; the left side is
     the right side mirrored in Z; a tensor that no body can have becomes the nearest one that can.
+    ``sex`` is M, F or other, for which both tables' rows are averaged.
     """
     rows = load_table(table)
     skeleton = person.skeleton

@@ -17,14 +17,19 @@ from bsip_cli.body.keypoints import HIP_FRACTIONS, stood_in_for
 from bsip_cli.body.names import in_words
 from bsip_cli.body.stand_ins import whole_arm, with_trunk
 from bsip_cli.errors import BadDataError
+from bsip_cli.stated.sex_words import OTHER, with_other
 
 # Fractions of the distance between the ASIS, from their middle; X anterior, Y up, Z right.
-_LJC = {"M": (-0.335, -0.032, 0.0), "F": (-0.340, 0.049, 0.0)}
+_LJC = with_other({"M": (-0.335, -0.032, 0.0), "F": (-0.340, 0.049, 0.0)})
 # Fraction of the thorax width (C7 to suprasternale) and angle above that line [degrees].
-_CJC = {"M": (0.55, 8.0), "F": (0.53, 14.0)}
+_CJC = with_other({"M": (0.55, 8.0), "F": (0.53, 14.0)})
 _SJC = (0.42, -67.0)
 # Half breadths for joints with a lateral marker only, as fractions of the stature.
 _HALF_BREADTH = {"elbow": 0.022, "knee": 0.031, "malleolus": 0.022}
+_MEAN_OF_BOTH = (
+    "sex other or not stated: joint centres, segment masses and inertias are the mean of the "
+    "women's and the men's tables"
+)
 # Used where a marker set has no suprasternale: the sample's thorax width over stature, and the
 # slope of the line C7 to suprasternale below the horizontal [degrees].
 _THORAX_WIDTH, _THORAX_SLOPE = 0.077, -25.0
@@ -60,6 +65,8 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
     waist = middle + width * (axes @ _LJC[sex])
     completed = with_trunk(landmarks, waist, axes, sex, stature_m)
     landmarks, notes = completed.landmarks, list(completed.notes)
+    if sex == OTHER:
+        notes.insert(0, _MEAN_OF_BOTH)
     hips = hip_centres(landmarks, sex)
     assert hips is not None
     centres = {"waist": waist, "hip_r": hips["r"], "hip_l": hips["l"]}

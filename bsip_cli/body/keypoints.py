@@ -12,10 +12,11 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from bsip_cli.body.names import in_words
+from bsip_cli.stated.sex_words import with_other
 
 # Hip joint centre in fractions of the distance of the ASIS, from their middle; X anterior, Y up, Z
 # right.
-HIP_FRACTIONS = {"M": (-0.095, -0.370, 0.361), "F": (-0.139, -0.336, 0.372)}
+HIP_FRACTIONS = with_other({"M": (-0.095, -0.370, 0.361), "F": (-0.139, -0.336, 0.372)})
 _HALF_M = 0.04  # of the distance of the stand-ins across a joint; only middle and direction count
 _ACROMION = 0.11  # above the shoulder's centre, in parts of the length from hips to shoulders
 _ACROSS = {

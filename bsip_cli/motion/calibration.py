@@ -44,7 +44,7 @@ def calibrate(
     Parameters
     ----------
     positions : label to (3,) world position [m], Z up; only markers that are visible.
-    sex : M or F, for the joint-centre regressions.
+    sex : M, F or other, for the joint-centre regressions.
     height_m : stature, or None to estimate it from the long segments.
     trials : of each trial, label to (N, 3) positions [m]: knees and ankles without markers are
         found from their movement there.

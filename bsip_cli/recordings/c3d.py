@@ -11,6 +11,7 @@ from bsip_cli.recordings import world
 from bsip_cli.recordings.analog import check_samples, sample_findings
 from bsip_cli.recordings.c3d_content import Content, read_content
 from bsip_cli.recordings.c3d_parameters import texts
+from bsip_cli.recordings.c3d_person import stated_person
 from bsip_cli.recordings.c3d_plates import PlateChannels, plate_surfaces, read_plates
 from bsip_cli.recordings.c3d_points import Points, read_points
 from bsip_cli.recordings.model import Finding, Recording
@@ -30,6 +31,7 @@ def open_c3d(path: Path) -> Opened:
     rotation = world.rotation_to_z_up(up)
     opened = [_source(plate, rotation, rate_hz) for plate in plates]
     turned = world.finding_about(up)
+    stated, about_person = stated_person(content.parameters)
     recording = Recording(
         path=path,
         marker_rate_hz=content.rate_hz,
@@ -42,11 +44,13 @@ def open_c3d(path: Path) -> Opened:
             *points.findings,
             *plate_findings,
             *([turned] if turned else []),
+            *about_person,
             *(finding for _, found in opened for finding in found),
         ),
         rotation_world_lab=rotation,
         forces_note="",
         time0_s=content.first_frame / content.rate_hz,
+        stated=stated,
     )
     return Opened(recording, tuple(source for source, _ in opened))
 

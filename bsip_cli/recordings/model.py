@@ -52,6 +52,26 @@ class Plate:
         return cop_at_height(self.force_N, self.moment_Nm, height_m)
 
 
+@dataclass(frozen=True)
+class StatedPerson:
+    """What a file says of the person; None or empty where it says nothing.
+
+    ``sex`` is M, F or other; ``name`` is the subject's in the recording program: it serves to tell
+    people apart and is written nowhere.
+    """
+
+    mass_kg: float | None = None
+    height_m: float | None = None
+    sex: str = ""
+    name: str = ""
+
+    def words(self) -> str:
+        """For example ``45.8 kg, 1.48 m``; empty where nothing is stated."""
+        mass = f"{self.mass_kg:.4g} kg" if self.mass_kg is not None else ""
+        height = f"{self.height_m:.4g} m" if self.height_m is not None else ""
+        return ", ".join(filter(None, (mass, height, self.sex and f"sex {self.sex}")))
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Markers and plates of one trial; analog sample 0 and frame 0 are simultaneous."""
@@ -66,6 +86,7 @@ class Recording:
     rotation_world_lab: np.ndarray  # (3, 3), applied to turn the lab frame Z-up
     forces_note: str  # "" or why there are no usable forces
     time0_s: float
+    stated: StatedPerson = StatedPerson()
 
     @property
     def n_frames(self) -> int:

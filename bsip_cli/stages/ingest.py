@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from shlex import quote
 
 import numpy as np
@@ -12,6 +12,7 @@ from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.body.names import SEGMENTS, TRUNK
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.assemble import assemble, findings_about
+from bsip_cli.recordings.c3d_person import against_table
 from bsip_cli.recordings.contacts import (
     ContactWindows,
     FootContacts,
@@ -62,22 +63,24 @@ def run(unit: Unit) -> None:
     filled = _fill(unit, recording, marker_set, names, match.index)
     findings += _gap_findings(names, filled)
     wrench = wrench_at_marker_rate(recording)
+    stated = asdict(recording.stated)
     facts = {
         "marker_set": marker_set.name,
         "marker_rate_hz": recording.marker_rate_hz,
         "analog_rate_hz": recording.analog_rate_hz,
     }
+    person = {f"stated_{name}": stated[name] for name in ("mass_kg", "height_m", "sex")}
     markers = {one: _markers_on(marker_set, names, filled, (one,)) for one in SEGMENTS}
     feet = _foot_contacts(recording, markers, wrench)
     shown = feet.measured if feet.has_both else np.zeros_like(feet.measured)
     stretches = stretches_of(markers, feet.total_N, shown, recording.marker_rate_hz)
     trunk = _markers_on(marker_set, names, filled, TRUNK)
-    mass, about_mass = _mass_on_plates(unit, stated_mass(unit, facts), stretches)
+    mass, about_mass = _mass_on_plates(unit, stated_mass(unit, person), stretches)
     if mass is None:
         loaded = feet.measured & upright_frames(markers)
         mass = agreeing_mass(feet.total_N, trunk, loaded, recording.marker_rate_hz)
     contacts = contact_windows(feet, trunk, mass, recording.marker_rate_hz)
-    findings = [*about_mass, *findings, *contacts.reasons]
+    findings = [*about_mass, *findings, *contacts.reasons, *_stated_otherwise(unit, recording)]
     if recording.forces_note:
         unit.warn(f"{unit.name}: kinematics only: {recording.forces_note}")
     said = findings_about(session)  # once, of all trials
@@ -86,7 +89,7 @@ def run(unit: Unit) -> None:
             unit.warn(f"{unit.name}: {finding.sentence()}")
     times = recording.time_s()
     meant = {"marker_set_content": marker_set.as_data()}
-    unit.write("markers", _marker_table(times, names, filled), facts | meant)
+    unit.write("markers", _marker_table(times, names, filled), facts | meant | person)
     known = {"mass_stretches": [one.record() for one in stretches]}
     unit.write("wrench", _wrench_table(times, wrench, contacts), facts | known)
     unit.write("plates", _plate_table(recording))
@@ -203,6 +206,14 @@ def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:
             )
             findings.append(Finding("marker_gaps", name, found, "every frame", action, "info"))
     return findings
+
+
+def _stated_otherwise(unit: Unit, recording: Recording) -> list[Finding]:
+    """Where the file states another person than participants.tsv."""
+    assert unit.participant is not None
+    mass_kg, height_m = unit.participant.mass_kg, unit.participant.height_m
+    tolerance = unit.config.ingest.mass_tolerance_percent
+    return against_table(recording.stated, mass_kg, height_m, tolerance)
 
 
 # --- tables -----------------------------------------------------------------------------------

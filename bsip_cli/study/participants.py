@@ -2,218 +2,273 @@
 
 from __future__ import annotations
 
-import csv
 import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Literal
 
 from bsip_cli.errors import BadDataError, UsageError
-from bsip_cli.files.regular import fault_of
+from bsip_cli.files.folders import is_folder
+from bsip_cli.stated.quantities import (
+    HEIGHT,
+    MASS,
+    Quantity,
+    Reading,
+    is_of_people,
+    odd_pair,
+    readings_of,
+)
+from bsip_cli.stated.sex_words import Sex, sex_of
+from bsip_cli.study.people_columns import KNOWN, Column, columns_of, count_known, with_sidecar
+from bsip_cli.study.text_table import TextTable, read_text_table
 from bsip_cli.study.trials import MANY, Trial
 
 NAME = re.compile(r"sub-[A-Za-z0-9]+")
-_REQUIRED = ("participant_id", "sex", "mass_kg")
-_KNOWN = (*_REQUIRED, "height_m")
-_MOST_COLUMNS = 1000  # a table of people has tens; a million take minutes and gigabytes
+UNKNOWN = ("", "n/a", "na", "-", "?")
 
 
 @dataclass(frozen=True)
 class Participant:
-    """One row of participants.tsv; mass and height are None where the table says n/a."""
+    """One row of participants.tsv; mass and height are None where the table says n/a.
+
+    ``sex`` is "other" where the table says that, or n/a; ``notes`` say how cells were taken that
+    can be taken in several ways.
+    """
 
     id: str
-    sex: Literal["M", "F"]
+    sex: Sex
     mass_kg: float | None
     height_m: float | None
     trials: tuple[Trial, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the table: whom it is about, as the folder is named, and its cells."""
+
+    id: str
+    cells: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class PeopleTable:
+    """participants.tsv, not yet understood cell by cell; ``notes`` say how it was read."""
+
+    file: Path
+    width: int
+    separator: str
+    columns: Mapping[str, Column]
+    rows: tuple[Row, ...]
+    notes: tuple[str, ...]
+
+    @cached_property
+    def sexes(self) -> frozenset[str]:
+        """All that stands in that column, in small letters."""
+        k = self.columns["sex"].index
+        return frozenset(row.cells[k].casefold() for row in self.rows if k < len(row.cells))
 
 
 def named_in(file: Path) -> list[str]:
     """Whom participants.tsv names, each once, without names that cannot be."""
-    names = (str(row["participant_id"] or "").strip() for row in read_rows(file))
+    names = (row.id for row in read_people(file).rows)
     return [name for name in dict.fromkeys(names) if NAME.fullmatch(name)]
 
 
-def rows_of(chosen: Sequence[str], rows: list[dict[str, str]], file: Path) -> list[dict[str, str]]:
+def rows_of(chosen: Sequence[str], table: PeopleTable) -> list[Row]:
     """The rows of some participants, in their order."""
-    known: dict[str, list[dict[str, str]]] = {}
-    for row in rows:
-        known.setdefault((row["participant_id"] or "").strip(), []).append(row)
+    known: dict[str, list[Row]] = {}
+    for row in table.rows:
+        known.setdefault(row.id, []).append(row)
     unknown = [name for name in chosen if name not in known]
     if unknown:
         near = [n for name in unknown for n in difflib.get_close_matches(name, known)]
         raise UsageError(
             f"no participant {', '.join(unknown)}",
-            file=file,
+            file=table.file,
             expected=f"one of {', '.join(known if len(known) < MANY else near or [*known][:MANY])}",
         )
     return [row for name in dict.fromkeys(chosen) for row in known[name]]
 
 
-def read_rows(file: Path) -> list[dict[str, str]]:
-    """The rows of the table by column; nothing but the columns' names is checked.
+def read_people(file: Path) -> PeopleTable:
+    """The table's rows and columns; of the cells only who is meant is looked at.
 
     Raises
     ------
     BadDataError
-        It cannot be read, is no such table or lacks a column.
+        It cannot be read, is no such table or lacks a column: all faults of its header at once.
     """
-    if fault := fault_of(file):
-        raise _unreadable(file, f"cannot be read: it {fault}")
-    try:
-        with file.open(encoding="utf-8-sig", newline="") as handle:
-            reader = csv.DictReader(handle, delimiter="\t")
-            header = reader.fieldnames or ()
-            _check_count(file, header)
-            rows = list(reader)
-    except OSError as error:
-        raise _unreadable(file, f"cannot be read ({error.strerror or error})") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise BadDataError(
-            f"is not a text table ({error})",
-            file=file,
-            expected="tab-separated UTF-8 text",
-            remedy="save it again as tab-separated text",
-        ) from None
-    if not rows:
-        raise _lacking(file, "names no participant")
-    _check_names(file, header)
-    return rows
+    table = read_text_table(file, count_known)
+    if not table.rows:
+        raise _header_fault(file, ["names no participant"])
+    columns, notes = with_sidecar(columns_of(table.header), file.with_suffix(".json"))
+    if columns.faults:
+        raise _header_fault(file, columns.faults)
+    index = columns.known["participant_id"].index
+    rows, renamed = [], []
+    for cells in table.rows:
+        written = cells[index] if index < len(cells) else ""
+        rows.append(Row(_id_of(written, file.parent), cells))
+        if written.isdigit() and rows[-1].id not in (written, f"sub-{written}"):
+            renamed.append(f"{written} is {rows[-1].id}")
+    notes = [*_how_read(file, table), *notes]
+    if renamed:
+        notes.append(f"{file}: {', '.join(renamed)}, by their folders")
+    width, separator = len(table.header), table.separator
+    return PeopleTable(file, width, separator, columns.known, tuple(rows), tuple(notes))
 
 
-def _unreadable(file: Path, found: str) -> BadDataError:
+def _header_fault(file: Path, faults: Sequence[str]) -> BadDataError:
     return BadDataError(
-        found,
+        "; ".join(faults),
         file=file,
-        expected="a tab-separated table with participant_id, sex, mass_kg, height_m",
-        remedy="write one, a line per participant",
+        expected=f"{', '.join(KNOWN)}, separated by tabs",
+        remedy="add what is lacking, and give the columns that count these names",
     )
 
 
-def _check_count(file: Path, header: Sequence[str]) -> None:
-    if len(header) > _MOST_COLUMNS:
-        raise BadDataError(
-            f"has {len(header)} columns",
-            file=file,
-            expected=f"at most {_MOST_COLUMNS}",
-            remedy="keep participant_id, sex, mass_kg and height_m",
-        )
+def _how_read(file: Path, table: TextTable) -> list[str]:
+    """What of the dialect differs from tab-separated UTF-8."""
+    said = []
+    if table.separator != "tabs":
+        said.append(f"its cells are separated by {table.separator}")
+    if table.encoding == "cp1252":
+        said.append("it is no UTF-8 and was read as Windows-1252 (Latin-1)")
+    return [f"{file}: {' and '.join(said)}"] if said else []
 
 
-def _check_names(file: Path, header: Sequence[str]) -> None:
-    missing = [name for name in _REQUIRED if name not in header]
-    if misspelt := _misspelt(header, _KNOWN):
-        raise BadDataError(
-            "has " + ", ".join(f"a column {name!r} and no {near}" for name, near in misspelt),
-            file=file,
-            expected=", ".join(_KNOWN),
-            remedy="correct the name",
-        )
-    if missing and _is_one_column(header):
-        raise BadDataError(
-            f"has one column, {header[0]!r}",
-            file=file,
-            expected=f"{', '.join(_KNOWN)}, separated by tabs",
-            remedy="put a tab between the cells of every line, no spaces or commas",
-        )
-    if missing:
-        raise _lacking(file, f"has no column {', '.join(missing)}")
+def _id_of(written: str, root: Path) -> str:
+    """The folder that a name means: ``01`` is sub-01 where that is there, and so is Excel's 1."""
+    if NAME.fullmatch(written) or not NAME.fullmatch(f"sub-{written}"):
+        return written
+    if is_folder(root / f"sub-{written}"):
+        return f"sub-{written}"
+    if written.isdigit():
+        found = [path.name for path in root.glob(f"sub-0*{written}") if is_folder(path)]
+        same = [name for name in found if name[4:].lstrip("0") == written.lstrip("0")]
+        if len(same) == 1:
+            return same[0]
+    return written
 
 
-def _lacking(file: Path, found: str) -> BadDataError:
-    expected = "participant_id, sex, mass_kg, height_m, separated by tabs"
-    return BadDataError(found, file=file, expected=expected, remedy="add it")
-
-
-def _is_one_column(header: Sequence[str]) -> bool:
-    """Whether all columns' names have come as one: the table is separated by something else."""
-    return len(header) == 1 and "participant_id" in header[0] and header[0].count("_") > 1
-
-
-def _misspelt(header: Sequence[str], known: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Columns whose names are cut or slightly other than one that is lacking, and that one."""
-    found = []
-    lacking = [name for name in known if name not in header]
-    for name in (name.strip().lower() for name in header if name not in known):
-        cut = [near for near in lacking if len(name) >= 3 and near.startswith(name)]
-        near = cut or difflib.get_close_matches(name, lacking, n=1, cutoff=0.75)
-        found += [(name, near[0])] if near else []
-    return found
-
-
-def participant_of(row: dict[str, str], file: Path) -> Participant:
+def participant_of(row: Row, table: PeopleTable) -> Participant:
     """A row as a participant, still without trials.
 
     Raises
     ------
     BadDataError
-        A cell cannot be used, or is missing.
+        Cells cannot be used, or are missing: all of the row are named.
     """
-    name = (row["participant_id"] or "").strip()
-    if not NAME.fullmatch(name):
+    if not NAME.fullmatch(row.id):
         raise BadDataError(
-            f"participant_id {name!r}",
-            file=file,
+            f"participant_id {row.id!r}",
+            file=table.file,
             expected="sub- and letters or digits",
             remedy="rename the participant and the folder",
         )
-    _check_cells(file, row)
-    sex = (row["sex"] or "").strip().upper()
-    if sex not in ("M", "F"):
+    if len(row.cells) != table.width:
+        is_split = table.separator == "commas" and len(row.cells) > table.width
         raise BadDataError(
-            f"sex {row['sex']!r} of {name}",
-            file=file,
-            expected="M or F",
-            remedy="the tables know these two; choose the nearer one",
+            f"the line of {row.id!r} has {len(row.cells)} cells",
+            file=table.file,
+            expected=f"{table.width}, as many as there are columns",
+            remedy="write points for decimal commas"
+            if is_split
+            else "write n/a where something is unknown",
         )
-    mass_kg = _number(row, "mass_kg", name, file, 10.0, 400.0)
-    height_m = _number(row, "height_m", name, file, 0.5, 2.6)
-    return Participant(name, sex, mass_kg, height_m)  # type: ignore[arg-type]
+    cells = {name: row.cells[column.index] for name, column in table.columns.items()}
+    sex = sex_of(cells["sex"], table.columns["sex"].legend, table.sexes)
+    faults = [] if sex else [_sex_fault(cells["sex"], row.id)]
+    mass, height = (_Found(cells.get(q.column, ""), q, table.columns) for q in (MASS, HEIGHT))
+    _settle(mass, height)
+    faults += [one.fault(row.id) for one in (mass, height) if one.is_lost]
+    if faults:
+        raise _row_fault(table.file, faults)
+    notes = [f"{table.file}: {note}" for one in (mass, height) for note in one.notes(row.id)]
+    if odd := odd_pair(mass.value, height.value):
+        notes.append(f"{table.file}: {row.id}: {odd}")
+    assert sex is not None
+    return Participant(row.id, sex, mass.value, height.value, notes=tuple(notes))
 
 
-def _check_cells(file: Path, row: dict) -> None:
-    """Every line must have a cell for each column: else cells are lost or shifted."""
-    if None in row or None in row.values():
-        n_columns = sum(name is not None for name in row)
-        n_cells = sum(cell is not None for cell in row.values()) - (None in row)
-        n_cells += len(row.get(None, ()))
-        raise BadDataError(
-            f"the line of {row.get('participant_id')!r} has {n_cells} cells",
-            file=file,
-            expected=f"{n_columns}, as many as there are columns, separated by tabs",
-            remedy="write n/a where something is unknown",
+_Clauses = tuple[str, str, str]
+"""What was found, what was expected, what to do."""
+
+
+def _row_fault(file: Path, faults: Sequence[_Clauses]) -> BadDataError:
+    found, expected, remedies = zip(*faults, strict=True)
+    return BadDataError(
+        "; ".join(found),
+        file=file,
+        expected="; ".join(expected),
+        remedy="; ".join(dict.fromkeys(remedies)),
+    )
+
+
+def _sex_fault(text: str, name: str) -> _Clauses:
+    remedy = "write one of them"
+    if text.strip().isdigit():
+        remedy = (
+            "write words, or say what the numbers mean, which differs between laboratories: in the "
+            'header, as in "sex (0=F, 1=M)", or as Levels in participants.json'
         )
+    elif text.strip().casefold() == "m":
+        remedy = "write mujer or man: beside H an M may be either"
+    return f"sex {text!r} of {name}", "M, F, other or n/a", remedy
 
 
-def _number(
-    row: dict[str, str], column: str, name: str, file: Path, low: float, high: float
-) -> float | None:
-    text = (row.get(column) or "n/a").strip()
-    if text.lower() in ("n/a", ""):
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not low <= value <= high:
-        raise BadDataError(
-            f"{column} {text!r} of {name}",
-            file=file,
-            expected=f"a number between {low:g} and {high:g}, or n/a",
-            remedy=_how_to_write(text, low, high),
-        )
-    return value
+class _Found:
+    """A cell with a mass or a height, and what it may mean."""
+
+    def __init__(self, text: str, quantity: Quantity, columns: Mapping[str, Column]) -> None:
+        column = columns.get(quantity.column)
+        self.text, self.quantity = text.strip(), quantity
+        self.title, self.unit = (column.title, column.unit) if column else (quantity.column, "")
+        self.is_known = self.text.casefold() not in UNKNOWN
+        self.readings: tuple[Reading, ...] = ()
+        if self.is_known:
+            self.readings = readings_of(self.text, quantity, self.unit)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether something is written there that has no meaning, or several."""
+        return self.is_known and len(self.readings) != 1
+
+    @property
+    def value(self) -> float | None:
+        return self.readings[0].value if self.readings else None
+
+    def notes(self, name: str) -> list[str]:
+        if not self.readings or self.readings[0].is_stated:
+            return []
+        (taken,) = self.readings
+        return [
+            f"{self.title} {self.text} of {name} is taken as {taken.unit}: {taken.value:.4g} "
+            f"{self.quantity.unit}, since it cannot be in {self.unit or self.quantity.unit}"
+        ]
+
+    def fault(self, name: str) -> _Clauses:
+        q, factor = self.quantity, self.quantity.units[self.unit or self.quantity.unit]
+        unit = f" {self.unit}" if self.unit not in ("", q.unit) else ""
+        expected = f"a number between {q.low / factor:.4g} and {q.high / factor:.4g}{unit}, or n/a"
+        remedy = "correct it"
+        if self.readings:
+            may_be = " or ".join(f"{one.value:.4g} {q.unit} ({one.unit})" for one in self.readings)
+            remedy = f"write the unit: it may be {may_be}"
+        return f"{self.title} {self.text!r} of {name}", expected, remedy
 
 
-def _how_to_write(text: str, low: float, high: float) -> str:
-    """The likely reason why a number is none, or out of range."""
-    try:
-        value = float(text.replace(",", "."))
-    except ValueError:
-        return "correct it"
-    if low <= value <= high:
-        return "write a point for the comma"
-    return "give it in metres" if low <= value / 100 <= high else "correct it"
+def _settle(mass: _Found, height: _Found) -> None:
+    """Of several units keep those with which mass and height are of one person."""
+    if not mass.readings or not height.readings:
+        return
+    pairs = [
+        (m, h) for m in mass.readings for h in height.readings if is_of_people(m.value, h.value)
+    ]
+    if len(mass.readings) > 1:
+        mass.readings = tuple(dict.fromkeys(m for m, _ in pairs)) or mass.readings
+    if len(height.readings) > 1:
+        height.readings = tuple(dict.fromkeys(h for _, h in pairs)) or height.readings

@@ -11,7 +11,7 @@ from pathlib import Path
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.files.folders import check_path, entries, is_folder
 from bsip_cli.files.regular import fault_of
-from bsip_cli.study.participants import NAME, Participant, participant_of, read_rows, rows_of
+from bsip_cli.study.participants import NAME, Participant, Row, participant_of, read_people, rows_of
 from bsip_cli.study.trials import (
     RECORDINGS,
     Fault,
@@ -66,13 +66,11 @@ def load_study(
             "there is no such folder", file=root, remedy="name the folder with participants.tsv"
         )
     check_path(root)
-    table = root / "participants.tsv"
-    rows = read_rows(table)
     loading = _Loading(root, roles)
-    for row in rows_of(chosen, rows, table) if chosen else rows:
+    for row in rows_of(chosen, loading.table) if chosen else loading.table.rows:
         loading.add(row)
     if not chosen:
-        loading.look_around({(row["participant_id"] or "").strip() for row in rows})
+        loading.look_around({row.id for row in loading.table.rows})
     study = Study(root, tuple(loading.participants.values()), tuple(loading.all_notes()))
     return study, loading.refusals
 
@@ -82,16 +80,17 @@ class _Loading:
 
     def __init__(self, root: Path, roles: dict[str, tuple[str, ...]]) -> None:
         self.root, self.roles = root, roles
+        self.table = read_people(root / "participants.tsv")
         self.participants: dict[str, Participant] = {}  # by id in small letters
         self.refusals: list[BadDataError] = []
-        self.notes: list[str] = []
+        self.notes: list[str] = list(self.table.notes)
         self.others: list[Path] = []
         self.spare_forces: list[Path] = []
 
-    def add(self, row: dict[str, str]) -> None:
+    def add(self, row: Row) -> None:
         """A row of participants.tsv, with the folder of that name."""
         try:
-            person = participant_of(row, self.root / "participants.tsv")
+            person = participant_of(row, self.table)
             if (known := self.participants.get(person.id.casefold())) is not None:
                 raise self._twice(person.id, known.id)
             _check_folder(self.root, person.id)
@@ -102,6 +101,7 @@ class _Loading:
         self.others += found.others
         self.spare_forces += found.spare_forces
         self.refusals += found.refusals
+        self.notes += person.notes
         if found.trials:
             person = replace(person, trials=tuple(found.trials))
             self.participants[person.id.casefold()] = person

@@ -25,7 +25,7 @@ _TRIAL = re.compile(
     r"_task-(?P<task>[A-Za-z0-9]+)(_run-(?P<run>[0-9]+))?"
 )
 _SESSION = re.compile(r"ses-(?P<session>[A-Za-z0-9]+)")
-_PACKED = (".gz", ".bz2", ".xz", ".zst", ".zip", ".7z", ".rar", ".tar", ".tgz")
+PACKED = (".gz", ".bz2", ".xz", ".zst", ".zip", ".7z", ".rar", ".tar", ".tgz")
 _NAME_BYTES = 255  # of a file's name, on the file systems of Linux and macOS
 _LONGEST_KIND = max(len(one.file_name) for one in SCHEMAS.values() if one.level == "trial")
 # What an artifact's name has more than the trial's, while it is written; 4194304: the last process.
@@ -122,7 +122,7 @@ class Folder:
                 self._forces(path, names)
             elif session is None and path.name.startswith("ses-") and (no := _fault_of_file(path)):
                 self._session(path, no)
-            elif kind in _PACKED and _is_packed_recording(path, names):
+            elif kind in PACKED and _is_packed_recording(path, names):
                 self.faults.append(Fault(path, "is packed", "the file itself", "unpack it"))
             else:
                 self.others.append(path)

@@ -59,6 +59,15 @@ def test_pelvis_gets_reeds_fractions(sex):
     np.testing.assert_allclose(centres.pelvis_axes, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-12)
 
 
+def test_other_sexes_get_the_mean_of_both_and_it_is_said():
+    man, woman, other = (joint_centres(upright(), sex, STATURE_M) for sex in ("M", "F", "other"))
+    for joint in ("waist", "hip_r", "hip_l"):
+        middle = (man.positions[joint] + woman.positions[joint]) / 2
+        np.testing.assert_allclose(other.positions[joint], middle, atol=1e-12)
+    assert "mean of the women's and the men's tables" in other.notes[0]
+    assert not any("mean of" in note for note in man.notes)
+
+
 @pytest.mark.parametrize(("sex", "part", "angle"), [("M", 0.55, 8.0), ("F", 0.53, 14.0)])
 def test_neck_and_shoulders_lie_at_their_angles_from_the_thorax_line(sex, part, angle):
     landmarks = upright()

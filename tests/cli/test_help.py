@@ -25,7 +25,17 @@ HEAVY = [
     "statsmodels",
 ]
 STAGE_COMMANDS = [*dict.fromkeys(stage.name for stage in STAGES), "run"]
-OTHER_COMMANDS = ["simulate", "inject", "export", "markers", "show", "published", "info", "people"]
+OTHER_COMMANDS = [
+    "init",
+    "simulate",
+    "inject",
+    "export",
+    "markers",
+    "show",
+    "published",
+    "info",
+    "people",
+]
 
 
 @pytest.mark.parametrize(
@@ -33,6 +43,7 @@ OTHER_COMMANDS = ["simulate", "inject", "export", "markers", "show", "published"
     [
         ["--help"],
         ["ingest", "--help"],
+        ["init", "--help"],
         ["simulate", "--help"],
         ["export", "--help"],
         ["markers", "--help"],

@@ -13,7 +13,7 @@ from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import load_config
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.study.participants import read_rows
+from bsip_cli.study.participants import read_people
 
 READERS = {
     "options": lambda path: load_config([path]),
@@ -119,7 +119,7 @@ def test_the_command(bsip, empty_study):
 def test_a_disk_that_fails(tmp_path, monkeypatch, name):
     path = tmp_path / name
     path.write_text("a = 1\n")
-    read = {".toml": READERS["marker set"], ".tsv": read_rows}.get(path.suffix, read_recording)
+    read = {".toml": READERS["marker set"], ".tsv": read_people}.get(path.suffix, read_recording)
     opened = Path.open
 
     def failing(self, *arguments, **options):

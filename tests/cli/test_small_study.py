@@ -573,11 +573,11 @@ def unit_of(run: Run, stage: str, stem: str) -> Unit:
 
 def test_bad_line_of_the_table_does_not_stop_the_others(run, bsip, tmp_path):
     table = run.study / "participants.tsv"
-    table.write_text(table.read_text().replace("sub-02\tF", "sub-02\tfemale"))
+    table.write_text(table.read_text().replace("sub-02\tF", "sub-02\t2"))
     answer = bsip("ingest", run.study, "--out", tmp_path / "new", "--jobs", 2)
     assert answer.code == 3
     (sentence,) = [line for line in answer.err.splitlines() if line.startswith("study: ")]
-    assert f"{table}: sex 'female' of sub-02; expected M or F. To mend it: " in sentence
+    assert f"{table}: sex '2' of sub-02; expected M, F, other or n/a. To mend it: " in sentence
     assert answer.summary.startswith("bsip ingest: 3 done, 1 refused;")
     assert sorted(path.name for path in (tmp_path / "new").iterdir() if path.is_dir()) == ["sub-01"]
 

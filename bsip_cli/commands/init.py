@@ -1,0 +1,300 @@
+"""``bsip init``: a study of a folder of recordings; nothing is moved and nothing written over."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import shutil
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from shlex import quote
+
+import click
+from tqdm import tqdm
+
+from bsip_cli.commands.init_files import NO_RECORDING, Source, Unused, list_files, read_sources
+from bsip_cli.commands.init_markers import STARTER, StudyMarkers, study_markers
+from bsip_cli.commands.init_table import is_table, read_tables
+from bsip_cli.errors import BadDataError, UsageError, not_writable, printable
+from bsip_cli.files.folders import check_path, is_folder
+from bsip_cli.recordings.c3d_person import together
+from bsip_cli.recordings.model import StatedPerson
+from bsip_cli.study.new_study import (
+    Named,
+    check_participant,
+    counted,
+    is_sequence,
+    name_all,
+)
+from bsip_cli.study.trials import listed
+
+_COLUMNS = ("file", "source", "made", "participant_id", "task", "why")
+
+
+@dataclass(frozen=True)
+class Request:
+    """What was asked: where recordings are and the study goes, whose they are, links or copies."""
+
+    given: tuple[Path, ...]
+    out: Path
+    participant: str
+    link: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """Everything that will be written."""
+
+    named: Mapping[Path, Named]  # by the source's path
+    sources: tuple[Source, ...]
+    people: Mapping[str, StatedPerson]
+    markers: StudyMarkers
+    unused: tuple[Unused, ...]
+    tables: tuple[Path, ...]
+    notes: tuple[str, ...]
+
+
+def init_command(request: Request) -> int:
+    """Make the study, and print what lies where and what was not used.
+
+    Returns 0, or 3 where a recording cannot be used.
+
+    Raises
+    ------
+    UsageError
+        Something that is given is not there, the study's folder is not empty or cannot be written,
+        or the participant's name cannot be one.
+    BadDataError
+        No recording can be used.
+    """
+    participant = _participant(request.participant)
+    _check_out(request.out)
+    files = list_files(request.given, request.out)
+    sources, unused = read_sources(
+        files, lambda some: tqdm(some, desc="init", unit="recording", disable=None)
+    )
+    if not sources:
+        _say(_unused_lines(unused))
+        raise BadDataError(
+            "no recording can be used" if unused else "no files",
+            file=", ".join(map(str, request.given)),
+            expected="C3D files, or TRC files with their MOT or STO beside them",
+            remedy="correct what is said of each" if unused else "name the folder they lie in",
+        )
+    tables = [one.path for one in files if is_table(one.path)]
+    plan = _planned(sources, unused, participant, tables)
+    _write(request, plan)
+    _say(_told(request, plan))
+    return 3 if any(one.is_fault for one in unused) else 0
+
+
+def _participant(name: str) -> str:
+    if name and not check_participant(name):
+        raise UsageError(
+            f"--participant {name!r}",
+            expected="sub- and letters or digits",
+            remedy="name it like sub-01",
+        )
+    return check_participant(name) if name else ""
+
+
+def _check_out(out: Path) -> None:
+    check_path(out)
+    try:
+        is_free = not os.path.lexists(out) or (is_folder(out) and not any(out.iterdir()))
+    except OSError as error:
+        raise UsageError(f"cannot be listed ({error.strerror})", file=out) from None
+    if not is_free:
+        raise UsageError(
+            "is there already, and nothing is written over",
+            file=out,
+            expected="a new or an empty folder",
+            remedy="name another one with --out",
+        )
+
+
+# --- the plan -------------------------------------------------------------------------------------
+
+
+def _planned(
+    sources: Sequence[Source], unused: Sequence[Unused], participant: str, tables: Sequence[Path]
+) -> _Plan:
+    all_named, notes = name_all([source.found for source in sources], participant)
+    named = {one.found.path: one for one in all_named}
+    of: dict[str, dict[str, StatedPerson]] = defaultdict(dict)
+    for source in sorted(sources, key=lambda source: named[source.path].stem):
+        of[named[source.path].participant][source.path.name] = source.stated
+    in_tables, told = read_tables(tables, of)
+    people, said = {}, [*notes, *told]
+    for name, stated in sorted(of.items()):
+        if name in in_tables:
+            stated[in_tables[name][0].name] = in_tables[name][1]
+        people[name], contradictions = together(stated)
+        said += [f"{name}: {one}" for one in contradictions]
+    used = {file for file, _ in in_tables.values()}
+    left = tuple(one for one in unused if one.path not in used)
+    markers = study_markers(sources, named)
+    said += markers.notes
+    return _Plan(named, tuple(sources), people, markers, left, tuple(used), tuple(said))
+
+
+# --- what is written ------------------------------------------------------------------------------
+
+
+def _write(request: Request, plan: _Plan) -> None:
+    """Everything into a folder beside, which gets the study's name when it is whole."""
+    out = request.out.absolute()
+    made = out.with_name(f".{out.name}.{os.getpid()}.bsip-part")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        made.mkdir()
+        try:
+            for source, target in _files(plan):
+                place = made / target
+                place.parent.mkdir(parents=True, exist_ok=True)
+                if request.link:
+                    place.symlink_to(source.resolve())
+                else:
+                    shutil.copy2(source, place)
+            for name, text in _texts(request, plan).items():
+                (made / name).write_text(text, encoding="utf-8")
+            if out.is_dir():
+                out.rmdir()  # it is empty
+            made.rename(out)
+        except BaseException:
+            shutil.rmtree(made, ignore_errors=True)
+            raise
+    except OSError as error:
+        raise not_writable(request.out, error) from None
+
+
+def _files(plan: _Plan) -> Iterator[tuple[Path, Path]]:
+    """Each file that is used, and where it goes in the study."""
+    for source in plan.sources:
+        named = plan.named[source.path]
+        for path in filter(None, (source.path, source.forces)):
+            yield path, named.folder / f"{named.stem}{path.suffix.lower()}"
+
+
+def _texts(request: Request, plan: _Plan) -> dict[str, str]:
+    """The small files by name."""
+    texts = {
+        "participants.tsv": _table(_people_rows(plan.people)),
+        "study.toml": _study_toml(plan),
+        "sources.tsv": _table(_source_rows(request, plan)),
+    }
+    return texts | ({STARTER: plan.markers.starter} if plan.markers.starter else {})
+
+
+def _people_rows(people: Mapping[str, StatedPerson]) -> Iterator[tuple[str, ...]]:
+    yield "participant_id", "sex", "mass_kg", "height_m"
+    for name, stated in people.items():
+        mass, height = (
+            "n/a" if value is None else f"{value:.6g}"
+            for value in (stated.mass_kg, stated.height_m)
+        )
+        yield name, stated.sex or "n/a", mass, height
+
+
+def _source_rows(request: Request, plan: _Plan) -> Iterator[tuple[str, ...]]:
+    yield _COLUMNS
+    trials = {
+        path: plan.named[source.path]
+        for source in plan.sources
+        for path in (source.path, source.forces)
+        if path
+    }
+    made = "linked" if request.link else "copied"
+    for source, target in _files(plan):
+        named = trials[source]
+        yield str(target), str(source.absolute()), made, named.participant, named.task, ""
+    for table in plan.tables:
+        yield "participants.tsv", str(table.absolute()), "read", "n/a", "n/a", ""
+    for one in sorted(plan.unused, key=lambda one: one.path):
+        yield "n/a", str(one.path.absolute()), "not used", "n/a", "n/a", one.why
+
+
+def _table(rows: Iterator[tuple[str, ...]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, delimiter="\t", lineterminator="\n")
+    writer.writerows([printable(cell) for cell in row] for row in rows)
+    return text.getvalue()
+
+
+def _study_toml(plan: _Plan) -> str:
+    tasks = sorted({named.task for named in plan.named.values()})
+    sequences = [task for task in tasks if is_sequence(task)]
+    roles = ", ".join(f'"{task}"' for task in sequences or ["sequence"])
+    about = "" if sequences else "  # none here: the trial with most contacts on plates identifies"
+    lines = [
+        "# Made by bsip init; configs/default.toml lists every option with its unit.",
+        f'marker_set = "{plan.markers.name}"',
+        "",
+        "[roles]",
+        'static = ["static"]',
+        f"sequence = [{roles}]{about}",
+    ]
+    moving = Counter(n.participant for n in plan.named.values() if n.task != "static")
+    if moving and max(moving.values()) == 1 and not sequences:
+        lines += [
+            "",
+            "# Nobody has a second movement to validate with: parts of the only one are held out.",
+            "[identify]",
+            "hold_out_fraction = 0.4",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+# --- what is said ---------------------------------------------------------------------------------
+
+
+def _say(lines: Iterator[str]) -> None:
+    for line in lines:
+        click.echo(printable(line))
+
+
+def _told(request: Request, plan: _Plan) -> Iterator[str]:
+    for name, stated in plan.people.items():
+        trials = sorted(n.stem for n in plan.named.values() if n.participant == name)
+        short = listed(stem.removeprefix(f"{name}_") for stem in trials)
+        yield f"{name}: {stated.words() or 'mass, height and sex not stated'}: {short}"
+    lacking = [name for name, one in plan.people.items() if not one.sex]
+    if lacking:
+        whose = "" if len(lacking) == len(plan.people) else f" of {listed(lacking)}"
+        yield (
+            f"no file tells the sex{whose}: write M or F into participants.tsv, else the mean of "
+            "both tables is used"
+        )
+    if plan.tables:
+        yield f"read of people: {listed(str(table) for table in plan.tables)}"
+    yield f"marker set: {plan.markers.name}"
+    yield from plan.notes
+    yield from _unused_lines(plan.unused)
+    files = "linked" if request.link else "copied"
+    n = sum(1 for _ in _files(plan))
+    yield f"{n} files {files}; sources.tsv says what came from where"
+    yield f"next: bsip run {quote(str(request.out))} --out {quote(str(_results(request.out)))}"
+
+
+def _results(out: Path) -> Path:
+    return out / "derivatives" / "bsip"
+
+
+def _unused_lines(unused: Sequence[Unused]) -> Iterator[str]:
+    """What is no recording in one line for all kinds; everything else with its reason."""
+    others = [one for one in unused if one.why == NO_RECORDING]
+    if others:
+        yield f"not used, no recordings: {counted(_kind(one) for one in others)}"
+    reasons: dict[str, list[str]] = defaultdict(list)
+    for one in unused:
+        if one not in others:
+            reasons[one.why].append(one.path.name)
+    for why, names in reasons.items():
+        yield f"not used: {listed(names)}: {why}"
+
+
+def _kind(one: Unused) -> str:
+    return one.path.suffix.lower() or "without an ending"

@@ -1,0 +1,291 @@
+"""The files that ``bsip init`` is given: recordings, the forces that belong to each, all else."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.files.fingerprints import file_hash
+from bsip_cli.files.folders import entries, is_folder, lies_in
+from bsip_cli.files.force_files import ENDINGS
+from bsip_cli.files.regular import fault_of
+from bsip_cli.recordings.labels import is_unlabelled
+from bsip_cli.recordings.model import Recording, StatedPerson
+from bsip_cli.recordings.mot import read_mot
+from bsip_cli.recordings.read import read_recording
+from bsip_cli.study.new_study import Found
+from bsip_cli.study.trials import PACKED, RECORDINGS
+
+_FORCES = "grf grfs grw forces force kinetics ground reaction fp plates"
+_MARKERS = "trc marker markers mrk traj trajectories mocap"
+_OF_FILES = frozenset(f"{_FORCES} {_MARKERS}".split())
+NO_RECORDING = "no recording"
+_WINDOW_S = 0.5
+_FASTEST = 90.0  # percentile
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A file, and the folders that lead to it from where the search began."""
+
+    path: Path
+    folders: tuple[str, ...]
+
+    @property
+    def kind(self) -> str:
+        return self.path.suffix.lower()
+
+
+@dataclass(frozen=True)
+class Unused:
+    """A file that is left where it is, and why."""
+
+    path: Path
+    why: str
+    is_fault: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A recording that can be read, with the forces beside a TRC."""
+
+    found: Found
+    forces: Path | None
+    stated: StatedPerson
+    labels: tuple[str, ...]  # of named markers, as in the file
+
+    @property
+    def path(self) -> Path:
+        return self.found.path
+
+
+def list_files(given: Sequence[Path], out: Path) -> list[Listed]:
+    """All files that are given or lie below given folders, but hidden ones and those in ``out``.
+
+    Raises
+    ------
+    UsageError
+        One is not there, or may not be read.
+    """
+    folders = [path for path in given if is_folder(path)]
+    listed: dict[Path, Listed] = {}
+    for path in given:
+        if path in folders:
+            start = (path.resolve().name,) if len(folders) > 1 else ()
+            found: Iterable[Listed] = _below(path, start, out)
+        elif fault := fault_of(path):
+            raise UsageError(fault, file=path, expected="recordings, or folders with recordings")
+        else:
+            found = [Listed(path, ())]
+        for one in found:
+            listed.setdefault(one.path.absolute(), one)
+    return sorted(listed.values(), key=lambda one: one.path)
+
+
+def _below(folder: Path, start: tuple[str, ...], out: Path) -> Iterator[Listed]:
+    def cannot(error: OSError) -> None:
+        raise UsageError(
+            f"cannot be listed ({error.strerror or error})", file=error.filename or folder
+        )
+
+    for place, inner, names in os.walk(folder, onerror=cannot):
+        here = Path(place)
+        inner[:] = sorted(n for n in inner if not n.startswith(".") and not lies_in(here / n, out))
+        parts = (*start, *here.relative_to(folder).parts)
+        yield from (Listed(here / name, parts) for name in sorted(names) if name[0] != ".")
+
+
+def read_sources(
+    files: Sequence[Listed], progress: Callable[[list[Listed]], Iterable[Listed]]
+) -> tuple[list[Source], list[Unused]]:
+    """Recordings that can be read, and every other file with the reason why it is not used."""
+    unused: list[Unused] = []
+    kept: list[Source] = []
+    pairs = _Pairs(files)
+    hashes: dict[str, Path] = {}
+    for one in progress([file for file in files if file.kind in RECORDINGS]):
+        try:
+            twin = hashes.setdefault(file_hash(one.path), one.path)
+            if twin != one.path:
+                unused.append(Unused(one.path, f"holds the same as {twin.name}"))
+            elif container := pairs.container_of(one):
+                unused.append(Unused(one.path, f"{container.name}, of the same name, is used"))
+            else:
+                kept.append(_source(one, pairs, unused))
+        except BadDataError as refusal:
+            unused.append(Unused(one.path, _why(refusal), is_fault=True))
+    done = {source.forces for source in kept} | {one.path for one in unused}
+    c3d = {source.path.stem.casefold() for source in kept if source.forces is None}
+    left = (one for one in files if one.path not in done and one.kind not in RECORDINGS)
+    unused += [_unused(one, pairs, c3d) for one in left]
+    return kept, unused
+
+
+def _why(refusal: BadDataError) -> str:
+    remedy = f"; {refusal.remedy}" if refusal.remedy else ""
+    expected = f"; expected {refusal.expected}" if refusal.expected else ""
+    return f"{refusal.found}{expected}{remedy}"
+
+
+def _unused(one: Listed, pairs: _Pairs, used: Collection[str]) -> Unused:
+    """Why a file that is no recording is left where it is."""
+    inner = Path(one.path.stem.removesuffix(".tar")).suffix.lower()
+    if one.kind in PACKED and inner in (*RECORDINGS, *ENDINGS):
+        return Unused(one.path, "is packed: unpack it", is_fault=True)
+    if one.kind not in ENDINGS:
+        return Unused(one.path, NO_RECORDING)
+    if one.path.stem.casefold() in used:
+        return Unused(one.path, "a C3D of its name has forces of its own")
+    if several := pairs.markers_of(one):
+        names = " and ".join(str(file.path) for file in several)
+        why = f"may belong to {names}: which is meant is not guessed"
+        return Unused(one.path, why if len(several) > 1 else "no forces that could be used")
+    return Unused(one.path, "no TRC of its name is there")
+
+
+class _Pairs:
+    """Which files are of one trial, by their names and places."""
+
+    def __init__(self, files: Sequence[Listed]) -> None:
+        self.files = files
+
+    def container_of(self, one: Listed) -> Path | None:
+        """The C3D beside a TRC of its name, which holds markers and forces."""
+        if one.kind != ".trc":
+            return None
+        beside = [
+            other.path
+            for other in self.files
+            if other.kind == ".c3d"
+            and other.path.parent == one.path.parent
+            and other.path.stem.casefold() == one.path.stem.casefold()
+        ]
+        return beside[0] if beside else None
+
+    def markers_of(self, table: Listed) -> list[Listed]:
+        """The TRC files of a table's name, from the nearest folder that has one."""
+        return _nearest(table, (file for file in self.files if file.kind == ".trc"))
+
+    def forces_of(self, one: Listed) -> list[Path]:
+        """Tables of a TRC's name, from the nearest folder that has one, which no other TRC has."""
+        tables = _nearest(one, (file for file in self.files if file.kind in ENDINGS))
+        is_alone = sum(file.path.parent == one.path.parent for file in self.files) == 1
+        if not tables and is_alone:  # a file was given, and not the folder
+            beside = (p for p in entries(one.path.parent) if p.suffix.lower() in ENDINGS)
+            return [t.path for t in _nearest(one, (Listed(p, one.folders) for p in beside))]
+        return sorted(table.path for table in tables if self.markers_of(table) == [one])
+
+
+def _nearest(one: Listed, others: Iterable[Listed]) -> list[Listed]:
+    """Those of its name that lie beside a file, else in the deepest folder that holds both."""
+    name = trial_words(one.path)
+    near = {other: _nearness(one, other) for other in others if trial_words(other.path) == name}
+    return [other for other, nearness in near.items() if nearness == max(near.values())]
+
+
+def _nearness(one: Listed, other: Listed) -> int:
+    if one.path.parent == other.path.parent:
+        return len(one.path.parts)
+    pairs = zip(one.folders, other.folders, strict=False)
+    return next((k for k, (a, b) in enumerate(pairs) if a != b), 0)
+
+
+def trial_words(path: Path) -> tuple[str, ...]:
+    """What is left of a file's name without the words for markers and forces."""
+    parts = [part.casefold() for part in re.split(r"[\W_]+", path.stem) if part]
+    return tuple(part for part in parts if part not in _OF_FILES)
+
+
+# --- reading --------------------------------------------------------------------------------------
+
+
+def _source(one: Listed, pairs: _Pairs, unused: list[Unused]) -> Source:
+    """Read a recording as it will lie in the study."""
+    forces = None
+    if one.kind == ".trc":
+        recording, forces = _with_forces(one, _tables(pairs.forces_of(one), unused), unused)
+    else:
+        recording = read_recording(one.path)
+    bare = [label.rpartition(":")[2].strip() for label in recording.labels]
+    seen = np.isfinite(recording.markers_m[..., 0]).any(axis=0)
+    named = [k for k, label in enumerate(bare) if seen[k] and not is_unlabelled(label)]
+    if not named:
+        raise BadDataError(
+            f"{len(bare)} points and no marker with a name that is seen",
+            expected="labelled markers of a person",
+            remedy="label the trial and export it again",
+            file=one.path,
+        )
+    median, fastest = marker_speeds(recording.markers_m[:, named], recording.marker_rate_hz)
+    labels = tuple(recording.labels[k] for k in named)
+    names = frozenset(bare[k].casefold() for k in named)
+    found = Found(one.path, one.folders, recording.stated.name, names, median, fastest)
+    return Source(found, forces, recording.stated, labels)
+
+
+def _tables(paths: Sequence[Path], unused: list[Unused]) -> list[Path]:
+    """Those that hold forces, where several have the trial's name."""
+    if len(paths) < 2:
+        return list(paths)
+    forces = []
+    for path in paths:
+        try:
+            read_mot(path)
+            forces.append(path)
+        except BadDataError as refusal:
+            unused.append(Unused(path, f"no table of forces: {_why(refusal)}"))
+    return forces
+
+
+def _with_forces(
+    one: Listed, tables: Sequence[Path], unused: list[Unused]
+) -> tuple[Recording, Path | None]:
+    """A TRC with its table of forces; without, where that cannot be read or there are several."""
+    if len(tables) > 1:
+        names = " and ".join(path.name for path in tables)
+        why = f"{names} are both forces of {one.path.name}: which are meant is not guessed"
+        unused += [Unused(path, why, is_fault=True) for path in tables]
+        tables = ()
+    if tables:
+        try:
+            return _read_pair(one.path, tables[0]), tables[0]
+        except BadDataError as refusal:
+            recording = _read_pair(one.path, None)  # if it is the markers, this refuses
+            unused.append(Unused(tables[0], _why(refusal), is_fault=True))
+            return recording, None
+    return _read_pair(one.path, None), None
+
+
+def _read_pair(trc: Path, forces: Path | None) -> Recording:
+    """Read both under the names that they will have."""
+    with tempfile.TemporaryDirectory(prefix="bsip-init-") as folder:
+        place = Path(folder) / "trial.trc"
+        place.symlink_to(trc.resolve())
+        if forces is not None:
+            place.with_suffix(forces.suffix.lower()).symlink_to(forces.resolve())
+        return read_recording(place)
+
+
+def marker_speeds(markers_m: np.ndarray, rate_hz: float) -> tuple[float, float]:
+    """Mean speed of markers (n_frames, m, 3) over half a second: median and 90th percentile [m/s].
+
+    Over half a second noise counts for nothing. Infinite where nothing is seen twice.
+    """
+    step = min(max(1, round(_WINDOW_S * rate_hz)), len(markers_m) - 1)
+    if step < 1:
+        return np.inf, np.inf
+    moved = np.linalg.norm(markers_m[step:] - markers_m[:-step], axis=2)
+    seen = np.isfinite(moved)
+    count = seen.sum(axis=1)
+    mean = np.where(seen, moved, 0.0).sum(axis=1)[count > 0] / count[count > 0]
+    if not len(mean):
+        return np.inf, np.inf
+    speed = mean * rate_hz / step
+    return float(np.median(speed)), float(np.percentile(speed, _FASTEST))

@@ -1,0 +1,1 @@
+"""What is stated of a person, in the words and units that people use."""

@@ -1,0 +1,161 @@
+"""Masses and heights as people write them: numbers, units, and which unit can be meant."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from itertools import pairwise
+
+BMI_KG_M2 = (12.0, 40.0)
+"""Body-mass indices that need no word: survival ends at 11 to 13 (Henry 1990, Eur J Clin Nutr 44),
+healthy children go down to 12.9 (WHO 2007, third percentile); obesity of class III begins at 40."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A mass or a height: its column, the limits [SI] of what people have, and units [SI].
+
+    ``names`` are what people call it, in small letters and without blanks.
+    ``guessed`` are units that are looked for where none is stated, ``slips`` those of the same
+    system that are looked for where the stated one cannot be.
+    """
+
+    column: str
+    unit: str
+    low: float
+    high: float
+    units: dict[str, float]
+    guessed: tuple[str, ...]
+    slips: tuple[str, ...]
+    names: str
+
+    def holds(self, value: float) -> bool:
+        return self.low <= value <= self.high
+
+    def unit_spelt(self, text: str) -> str:
+        """A unit as people spell it; empty where it is none of this quantity."""
+        unit = _SPELT.get(text.strip().casefold().rstrip("."), "")
+        return unit if unit in self.units else ""
+
+
+MASS = Quantity(
+    "mass_kg",
+    "kg",
+    10.0,
+    400.0,
+    {"kg": 1.0, "g": 1e-3, "lb": 0.45359237, "st": 6.35029318, "N": 1 / 9.80665},
+    ("kg", "g", "lb", "st", "N"),
+    ("kg", "g"),
+    "mass weight bodymass bodyweight masse gewicht körpergewicht koerpergewicht körpermasse "
+    "koerpermasse poids peso massa massecorporelle",
+)
+HEIGHT = Quantity(
+    "height_m",
+    "m",
+    0.5,
+    2.6,
+    {"m": 1.0, "cm": 0.01, "mm": 1e-3, "in": 0.0254, "ft": 0.3048},
+    ("m", "cm", "mm", "in"),  # 5.4 may be feet or 5 ft 4 in
+    ("m", "cm", "mm"),
+    "height stature bodyheight grösse größe groesse körpergrösse körpergröße koerpergroesse "
+    "taille talla altura estatura altezza statura",
+)
+_SPELLINGS = {
+    "kg": "kg kgs kilo kilos kilogram kilograms kilogramm",
+    "g": "g gram grams gramm",
+    "lb": "lb lbs pound pounds",
+    "st": "st stone stones",
+    "N": "n newton newtons",
+    "m": "m metre metres meter meters mètre metro metros",
+    "cm": "cm centimetre centimetres centimeter centimeters zentimeter",
+    "mm": "mm millimetre millimetres millimeter millimeters",
+    "in": "in inch inches \" ''",
+    "ft": "ft foot feet '",
+}
+_DIGITS = 6  # of a kg or m: 163 cm are 1.63 m
+_SPELT = {spelling: unit for unit, line in _SPELLINGS.items() for spelling in line.split()}
+_BELOW = {"ft": "in", "st": "lb"}  # the unit of a second number that has none, as in 5'4
+_NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[-+]?\d+)?"
+_PART = re.compile(rf"\s*({_NUMBER})\s*((?:[^\W\d_]+|''|['\"])?)\.?", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A number taken in a unit, in SI; ``is_stated``: nobody had to guess."""
+
+    value: float
+    unit: str
+    is_stated: bool
+
+
+def readings_of(text: str, quantity: Quantity, unit: str = "") -> tuple[Reading, ...]:
+    """What a cell may mean, within what people have; nothing if it is no number of this kind.
+
+    ``unit`` is the column's; the one of the cell goes before it. A value that can be in the stated
+    unit (SI, where none is) has this reading alone.
+    """
+    parts = _parts(text)
+    if any(spelt for _, spelt in parts):
+        whole = _sum(parts, quantity)
+        return () if whole is None else _within(quantity, [(whole, quantity.unit)], True)
+    if len(parts) != 1:
+        return ()
+    number, stated = parts[0][0], unit or quantity.unit
+    if first := _within(quantity, [(number * quantity.units[stated], stated)], True):
+        return first
+    others = quantity.guessed if not unit else quantity.slips if unit in quantity.slips else ()
+    return _within(quantity, [(number * quantity.units[u], u) for u in others], False)
+
+
+def _within(quantity: Quantity, values, is_stated: bool) -> tuple[Reading, ...]:
+    near = ((round(value, _DIGITS), unit) for value, unit in values if quantity.holds(value))
+    return tuple(Reading(value, unit, is_stated) for value, unit in near)
+
+
+def _parts(text: str) -> list[tuple[float, str]]:
+    """Numbers with the units behind them; nothing where there is anything else."""
+    parts, at = [], 0
+    text = text.strip()
+    while at < len(text):
+        match = _PART.match(text, at)
+        if match is None:
+            return []
+        parts.append((float(match[1].replace(",", ".")), match[2]))
+        at = match.end()
+    return parts
+
+
+def _sum(parts: list[tuple[float, str]], quantity: Quantity) -> float | None:
+    """A number with its unit, or two as in 5 ft 4 in [SI]; None where units are not understood."""
+    units = [_SPELT.get(spelt.casefold(), "") for _, spelt in parts]
+    if len(parts) > 1 and not parts[-1][1]:
+        units[-1] = _BELOW.get(units[-2], "")
+    if any(unit not in quantity.units for unit in units):
+        return None
+    if any(_BELOW.get(one) != other for one, other in pairwise(units)):
+        return None
+    return sum(n * quantity.units[u] for (n, _), u in zip(parts, units, strict=True))
+
+
+def is_of_people(mass_kg: float, height_m: float) -> bool:
+    """Whether the body-mass index needs no word."""
+    return BMI_KG_M2[0] <= mass_kg / height_m**2 <= BMI_KG_M2[1]
+
+
+def odd_pair(mass_kg: float | None, height_m: float | None) -> str:
+    """What to say of a mass and a height that hardly belong to one person; empty if they do."""
+    if mass_kg is None or height_m is None or is_of_people(mass_kg, height_m):
+        return ""
+    likely = [
+        f"in {unit} the mass would be {value:.1f} kg and the index {value / height_m**2:.1f}"
+        for unit in MASS.guessed
+        if unit != "kg"
+        and MASS.holds(value := mass_kg * MASS.units[unit])
+        and is_of_people(value, height_m)
+    ]
+    return (
+        f"{mass_kg:.4g} kg and {height_m:.4g} m are a body-mass index of "
+        f"{mass_kg / height_m**2:.1f} kg/m2, people have {BMI_KG_M2[0]:g} to {BMI_KG_M2[1]:g}"
+        + "".join(f"; {one}" for one in likely)
+        + ": used as it stands, check both"
+    )

@@ -36,7 +36,7 @@ from bsip_cli.recordings.zero import plate_zero, subtract_zero
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH
 from bsip_cli.stages.person_mass import VAGUE_PERCENT, StatedMass, compared, stated_mass
-from bsip_cli.stages.survey import reading_of
+from bsip_cli.stages.session_reading import reading_of
 
 
 def run(unit: Unit) -> None:

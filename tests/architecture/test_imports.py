@@ -135,6 +135,7 @@ def test_stages_do_not_know_each_other():
         "stages.person_mass",
         "stages.person_values",
         "stages.reconstructed",
+        "stages.session_reading",
         "stages.report",
         "stages.trial_scene",
     }

@@ -48,6 +48,9 @@ _CONFIG = click.option(
     type=click.Path(path_type=Path),
     help="TOML file with options that differ from the study's.",
 )
+_JOBS = click.option(
+    "--jobs", default=1, show_default=True, type=click.IntRange(1), help="Participants at once."
+)
 
 
 def _stage_command(name: str, summary: str) -> click.Command:
@@ -56,9 +59,7 @@ def _stage_command(name: str, summary: str) -> click.Command:
     @_OUT
     @_PARTICIPANT
     @_CONFIG
-    @click.option(
-        "--jobs", default=1, show_default=True, type=click.IntRange(1), help="Participants at once."
-    )
+    @_JOBS
     @click.option("--force", is_flag=True, help="Redo what is up to date.")
     @click.option(
         "--verify",
@@ -89,6 +90,21 @@ for _name in ("report", "run"):
     cli.commands[_name].params.append(
         click.Option(["--group"], is_flag=True, help="Only what is about all participants.")
     )
+
+
+@cli.command()
+@click.argument("study", type=click.Path(path_type=Path))
+@_PARTICIPANT
+@_CONFIG
+@_JOBS
+def check(study, chosen, config_file, jobs):
+    """Say what each recording of a study is taken for, and what fails; nothing is kept.
+
+    Exit codes: those of `bsip ingest`.
+    """
+    from bsip_cli.commands.check import check_study
+
+    return check_study(study, chosen, config_file, jobs)
 
 
 @cli.command()

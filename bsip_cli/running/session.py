@@ -137,9 +137,12 @@ def follow(
     refusals: Iterable[Outcome],
     running: Generator[Outcome, None, None],
     total: int,
-    out: Path,
+    out: Path | None,
 ) -> int:
-    """Tell the user what becomes of the units, with a bar of ``total`` steps; the exit code."""
+    """Tell the user what becomes of the units, with a bar of ``total`` steps; the exit code.
+
+    ``out``: the results' folder, None if they are not kept.
+    """
     outcomes = list(refusals)
     for outcome in outcomes:
         _tell(outcome)
@@ -178,7 +181,7 @@ def _tell(outcome: Outcome) -> None:
         tqdm.write(f"{outcome.stage}: " + "\n".join(map(printable, lines)), file=sys.stderr)
 
 
-def _summary(command: str, outcomes: Iterable[Outcome], out: Path) -> None:
+def _summary(command: str, outcomes: Iterable[Outcome], out: Path | None) -> None:
     states: Counter[str] = Counter(outcome.state for outcome in outcomes)
     words = {
         "done": "done",
@@ -189,9 +192,8 @@ def _summary(command: str, outcomes: Iterable[Outcome], out: Path) -> None:
         "bug": "failed by a bug",
     }
     said = ", ".join(f"{states[state]} {word}" for state, word in words.items() if states[state])
-    click.echo(
-        f"bsip {command}: {said or 'nothing to do'}; results in {printable(str(out))}", err=True
-    )
+    where = f"; results in {printable(str(out))}" if out else ""
+    click.echo(f"bsip {command}: {said or 'nothing to do'}{where}", err=True)
 
 
 def _exit_code(outcomes: Iterable[Outcome]) -> int:

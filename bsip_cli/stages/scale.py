@@ -51,7 +51,7 @@ def run(unit: Unit) -> None:
         marker_set,
         _mean_positions(still, quiet),
         unit.participant.sex,
-        unit.participant.height_m,
+        _height_m(unit, recorded),
         [dict(zip(one.labels, one.positions.swapaxes(0, 1), strict=True)) for one in recorded],
     )
     _require_markers(unit, marker_set, calibration.person)
@@ -85,6 +85,18 @@ def run(unit: Unit) -> None:
         ),
         facts={"marker_set": marker_set.name, "rms_before_m": fit.rms_before_m},
     )
+
+
+def _height_m(unit: Unit, recorded: list[_Recorded]) -> float | None:
+    """As participants.tsv states it, else as the first recording that does; None where none does."""
+    assert unit.participant is not None
+    if unit.participant.height_m is not None:
+        return unit.participant.height_m
+    for one in recorded:
+        if (height_m := unit.facts("markers", one.trial)["stated_height_m"]) is not None:
+            unit.warn(f"{unit.name}: height {height_m:.2f} m, as {one.trial.stem} states it")
+            return float(height_m)
+    return None
 
 
 def _require_markers(unit: Unit, marker_set: MarkerSet, person: Person) -> None:

@@ -1,0 +1,64 @@
+"""What each recording of a study is taken for, and what fails, before anything is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import click
+import numpy as np
+
+from bsip_cli.errors import printable
+from bsip_cli.pipeline import producer, stages_named
+from bsip_cli.running.runner import Manner, run_stages
+from bsip_cli.running.session import follow, open_study
+from bsip_cli.running.unit import Unit
+from bsip_cli.study.study import Participant, Trial
+
+
+def check_study(study: Path, chosen: tuple[str, ...], config_file: Path | None, jobs: int) -> int:
+    """Read a study's recordings, say what is wrong and what each is; the exit code of `ingest`."""
+    stages = stages_named("ingest")
+    with TemporaryDirectory(prefix="bsip-check-") as folder:
+        out = Path(folder) / "results"
+        opened = open_study(study, out, chosen, config_file)
+        running = run_stages(stages, opened.study, out, opened.config, Manner(jobs=jobs))
+        total = sum(1 + len(person.trials) for person in opened.study.participants)
+        code = follow("check", opened.refusals, running, total, None)
+        for person in opened.study.participants:
+            unit = Unit(producer("markers"), opened.study, out, opened.config, person)
+            for line in _about(unit, person):
+                click.echo(printable(line))
+    return code
+
+
+def _about(unit: Unit, person: Participant) -> Iterator[str]:
+    stated = [
+        person.sex,
+        "mass not stated" if person.mass_kg is None else f"{person.mass_kg:g} kg",
+        "height not stated" if person.height_m is None else f"{person.height_m:g} m",
+    ]
+    yield f"{person.id}: {', '.join(stated)}"
+    width = max(len(trial.path.name) for trial in person.trials)
+    for trial in person.trials:
+        yield f"  {trial.path.name:{width}}  {trial.role:10}  {_trial(unit, trial)}"
+
+
+def _trial(unit: Unit, trial: Trial) -> str:
+    """One recording's time, markers and contacts."""
+    assert unit.participant is not None
+    if not unit.stands("contacts", trial, unit.participant):
+        return "refused, see above"
+    facts, contacts = unit.facts("markers", trial), unit.read("contacts", trial)
+    markers = unit.read("markers", trial)
+    seen = markers.loc[np.isfinite(markers["x_m"]), "marker"].nunique()
+    seconds = len(contacts) / facts["marker_rate_hz"]
+    valid = contacts["valid"].sum() / facts["marker_rate_hz"]
+    plates = sum(name.endswith("_fz_N") for name in unit.read("wrench", trial).columns)
+    counted = "1 plate" if plates == 1 else f"{plates} plates"
+    forces = f"{counted}, every contact measured for {valid:.1f} s" if plates else "no forces"
+    return (
+        f"{seconds:.1f} s at {facts['marker_rate_hz']:g} Hz, {seen} markers "
+        f"({facts['marker_set']}), {forces}"
+    )

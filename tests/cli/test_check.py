@@ -1,0 +1,46 @@
+"""`bsip check` says what every recording is taken for, and keeps nothing."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+SAMPLE = Path(__file__).parents[2] / "sample_data"
+
+
+@pytest.fixture
+def study(tmp_path) -> Path:
+    """A sound static trial and a movement, and a recording that holds nothing."""
+    folder = tmp_path / "study" / "sub-01"
+    folder.mkdir(parents=True)
+    for name in ("static", "squat_run-1"):
+        shutil.copy(SAMPLE / "sub-01" / f"sub-01_task-{name}.c3d", folder)
+    (folder / "sub-01_task-steps.c3d").write_bytes(b"")
+    table = "participant_id\tsex\tmass_kg\theight_m\nsub-01\tM\tn/a\tn/a\n"
+    (tmp_path / "study" / "participants.tsv").write_text(table)
+    return tmp_path / "study"
+
+
+def test_says_what_each_recording_is(bsip, study):
+    before = sorted(study.rglob("*"))
+    answer = bsip("check", study)
+    assert answer.code == 3
+    head, *lines = answer.out.splitlines()
+    assert head == "sub-01: M, mass not stated, height not stated"
+    assert [line.split()[0].split("-")[-1] for line in lines] == [
+        "1.c3d",
+        "static.c3d",
+        "steps.c3d",
+    ]
+    squat, static, empty = lines
+    assert "50 Hz, 38 markers (hansen2017), 1 plate, every contact measured for 3.4 s" in squat
+    assert " static " in static and "refused" in empty
+    assert "sub-01_task-steps.c3d" in answer.err and answer.summary.startswith("bsip check: 3 done")
+    assert sorted(study.rglob("*")) == before
+
+
+def test_a_study_that_is_none(bsip, tmp_path):
+    answer = bsip("check", tmp_path / "nowhere")
+    assert answer.code in (2, 3) and "nowhere" in answer.err

@@ -88,7 +88,7 @@ def run(unit: Unit) -> None:
 
 
 def _height_m(unit: Unit, recorded: list[_Recorded]) -> float | None:
-    """As participants.tsv states it, else as the first recording that does; None where none does."""
+    """As participants.tsv states it, else the first recording that does; None without either."""
     assert unit.participant is not None
     if unit.participant.height_m is not None:
         return unit.participant.height_m

@@ -25,7 +25,7 @@ from bsip_cli.recordings.plate_reading import EXCHANGED, ONE_ALONE, REVERSED, Pl
 from bsip_cli.recordings.plate_source import C3dPlate, ForceOnPoint, PlateSource
 from bsip_cli.recordings.plates import LOADED_N, inside_share
 from bsip_cli.recordings.repeated_plates import repeated_plates
-from bsip_cli.recordings.under_the_feet import BESIDE_M, Body, Evidence, Feet, evidence
+from bsip_cli.recordings.under_the_feet import BESIDE_M, Area, Body, Evidence, Feet, evidence
 
 _SURE = 0.95  # probability from which on a repair is made
 _FEW = 100  # samples that each plate of a trial is seen by
@@ -62,13 +62,13 @@ class Opened:
 class Look:
     """What one trial shows: some loaded samples, small however long the trial is.
 
-    ``sources`` by their names at these samples; ``loaded`` (n,) bool for each; ``body`` the mean of
-    the markers; ``push_N`` and ``pull_N`` sums over all samples, as the file has them.
+    ``sources`` by their names at these samples; for each ``loaded`` (n,) bool, the ``feet`` on its
+    place, ``push_N`` and ``pull_N`` summed over all samples as the file has them.
     """
 
     sources: dict[str, PlateSource]
     loaded: dict[str, np.ndarray]
-    feet: Feet
+    feet: dict[str, Area]
     body: Body
     push_N: dict[str, float]
     pull_N: dict[str, float]
@@ -102,10 +102,11 @@ def look_at(opened: Opened) -> Look | None:
     frames = np.round(samples * recording.marker_rate_hz / recording.analog_rate_hz).astype(int)
     samples, frames = samples[frames < recording.n_frames], frames[frames < recording.n_frames]
     floor = opened.sources[0].floor_m(PlateReading())
+    feet = Feet.of(recording.markers_m, frames, floor if abs(floor) < 1.0 else 0.0)
     return Look(
         sources={s.name: s.at(samples) for s in opened.sources},
         loaded={name: mask[samples] for name, mask in heavy.items()},
-        feet=Feet.of(recording.markers_m, frames, floor if abs(floor) < 1.0 else 0.0),
+        feet={s.name: feet.on(s.plate(PlateReading()).corners_m).area() for s in opened.sources},
         body=Body.of(_trunk(recording), recording.marker_rate_hz, frames),
         push_N={name: float(lift[lift > LOADED_N].sum()) for name, lift in lifts.items()},
         pull_N={name: float(-lift[lift < -LOADED_N].sum()) for name, lift in lifts.items()},
@@ -318,7 +319,7 @@ def _read(look: Look, name: str, reading: PlateReading) -> tuple | None:
         plate.moment_Nm[loaded],
         source.at(np.flatnonzero(loaded)).left_at_point(reading),
         None if (lever := source.lever_m(reading)) is None else lever[loaded],
-        Feet(look.feet.points_m[loaded]),
+        look.feet[reading.place_of or name].at(loaded),
         plate.corners_m,
         floor,
     )
@@ -351,7 +352,7 @@ def _better(session: _Session, now: Readings) -> tuple[Readings, float] | None:
     if not alternatives:
         return None
     rarest = max(reading.log_prior() for reading in alternatives)
-    if session.is_all_c3d() and here > rarest - np.log(1 / _SURE - 1):
+    if session.is_all_c3d() and here > rarest + np.log(1 / _SURE - 1):
         return None  # no repair could be surer
     tried = [(now, 0.0), *_repairs(session, now, alternatives)]
     logs = np.array([prior + session.log_likelihood(readings) for readings, prior in tried])

@@ -69,16 +69,59 @@ class Feet:
         some = np.any(inside, axis=1, keepdims=True)
         return Feet(np.where(some[..., None], kept, self.points_m))
 
+    def area(self) -> Area:
+        """The smallest convex area that holds the markers, at each of the n samples."""
+        hulls = [_hull(points[np.isfinite(points).all(axis=1)]) for points in self.points_m]
+        most = max((len(hull) for hull in hulls), default=0)
+        corners = np.full((len(hulls), most + 1, 2), np.nan)
+        for row, hull in zip(corners, hulls, strict=True):
+            row[: len(hull)] = hull
+            row[len(hull) :] = hull[:1] if len(hull) else np.nan  # closed
+        return Area(corners)
+
+
+@dataclass(frozen=True, eq=False)
+class Area:
+    """Convex areas, (n, h + 1, 2): corners counter-clockwise, the first one again; NaN: none."""
+
+    corners_m: np.ndarray
+
+    def at(self, samples: np.ndarray) -> Area:
+        return Area(self.corners_m[samples])
+
     def distance_m(self, places_m: np.ndarray) -> np.ndarray:
-        """Of places (n, 2) from the smallest area that holds the markers, (n,); NaN without any."""
-        k = self.points_m.shape[1]
-        best = np.full(len(places_m), np.nan)
-        for i in range(k):
-            for j in range(i, k):
-                gap = _to_line(places_m, self.points_m[:, i], self.points_m[:, j])
-                best = np.fmin(best, gap)
-        best[_is_among(places_m, self.points_m)] = 0.0
-        return best
+        """Of places (n, 2), 0 inside, NaN where there is no area, (n,)."""
+        start, end = self.corners_m[:, :-1], self.corners_m[:, 1:]
+        if not start.shape[1]:
+            return np.full(len(places_m), np.nan)
+        along, offset = end - start, places_m[:, None] - start
+        length2 = (along**2).sum(axis=-1)
+        share = (offset * along).sum(axis=-1) / np.where(length2 > 0, length2, 1.0)
+        gap = np.linalg.norm(offset - np.clip(share, 0, 1)[..., None] * along, axis=-1).min(axis=1)
+        left = along[..., 0] * offset[..., 1] - along[..., 1] * offset[..., 0]
+        is_area = (length2 > 0).sum(axis=1) >= 3
+        return np.where(is_area & (left >= 0).all(axis=1), 0.0, gap)
+
+
+def _hull(points: np.ndarray) -> np.ndarray:
+    """Corners of the convex hull of points (k, 2), counter-clockwise (Andrew's monotone chain)."""
+    ordered = sorted({(x, y) for x, y in points.tolist()})
+    if len(ordered) < 3:
+        return np.array(ordered).reshape(-1, 2)
+    chains: list[list[tuple[float, float]]] = []
+    for some in (ordered, ordered[::-1]):
+        chain: list[tuple[float, float]] = []
+        for point in some:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0:
+                chain.pop()
+            chain.append(point)
+        chains.append(chain[:-1])
+    return np.array(chains[0] + chains[1])
+
+
+def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    """Positive where a, b, c turn left."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 @dataclass(frozen=True)
@@ -129,11 +172,12 @@ def evidence(
     moment_Nm: np.ndarray,
     left: LeftMoment | None,
     lever_m: np.ndarray | None,
-    feet: Feet,
+    feet: Area,
     corners_m: np.ndarray | None,
     floor_m: float,
 ) -> Evidence:
-    """Of loaded samples: force (n, 3), moment about the world origin (n, 3), feet.
+    """Of loaded samples: force (n, 3), moment about the world origin (n, 3), the feet on
+    its place.
 
     ``left``: what is left at the points that the file calls centres of pressure; ``lever_m`` (n,):
     from the sensor to where its moments have the force, None where there is no sensor.
@@ -144,7 +188,7 @@ def evidence(
         return Evidence(*[np.nan] * len(fields(Evidence)))
     load = np.abs(force_N[:, 2])
     torque = moment_Nm[:, 2] - cop[:, 0] * force_N[:, 1] + cop[:, 1] * force_N[:, 0]
-    gap = feet.on(corners_m).distance_m(cop)
+    gap = feet.distance_m(cop)
     return Evidence(
         distance_m=float(np.nanmean(gap)) if np.isfinite(gap).any() else np.nan,
         outside_m=np.nan if corners_m is None else float(np.nanmean(_outside(cop, corners_m))),
@@ -230,25 +274,6 @@ def _lowest(height_m: np.ndarray) -> np.ndarray:
     seen = np.isfinite(height_m)
     columns = zip(height_m.T, seen.T, strict=True)
     return np.array([np.percentile(z[k], 2) if k.any() else np.inf for z, k in columns])
-
-
-def _to_line(places: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Distance of each place from its line between two points, all (n, 2), (n,)."""
-    along = end - start
-    length2 = (along**2).sum(axis=1)
-    share = ((places - start) * along).sum(axis=1) / np.where(length2 > 0, length2, 1.0)
-    return np.linalg.norm(places - start - np.clip(share, 0, 1)[:, None] * along, axis=1)
-
-
-def _is_among(places: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Whether the points (n, k, 2) surround the place (n, 2): no half plane is without them."""
-    offset = points - places[:, None]
-    angle = np.sort(np.arctan2(offset[..., 1], offset[..., 0]), axis=1)  # NaN last
-    count = np.isfinite(angle).sum(axis=1)
-    first = angle[:, :1]
-    round_ = np.where(np.isfinite(angle), angle, first + 2 * np.pi)
-    gaps = np.diff(np.hstack([round_, first + 2 * np.pi]), axis=1) if points.shape[1] else first
-    return np.asarray((count >= 3) & (gaps.max(axis=1, initial=0.0) < np.pi))
 
 
 def _outside(cop_m: np.ndarray, corners_m: np.ndarray) -> np.ndarray:

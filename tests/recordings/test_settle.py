@@ -165,10 +165,10 @@ def test_left_and_right_of_one_part_are_said():
 def test_distance_from_the_feet():
     square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]] * 3)
     places = np.array([[0.5, 0.4], [1.5, 0.5], [-3.0, -4.0]])
-    np.testing.assert_allclose(Feet(square).distance_m(places), [0.0, 0.5, 5.0])
+    np.testing.assert_allclose(Feet(square).area().distance_m(places), [0.0, 0.5, 5.0])
     two = square[:, :2].copy()
     two[2] = np.nan
-    np.testing.assert_allclose(Feet(two).distance_m(places), [0.4, 0.5**0.5, np.nan])
+    np.testing.assert_allclose(Feet(two).area().distance_m(places), [0.4, 0.5**0.5, np.nan])
 
 
 def test_feet_on_the_plate_count_before_all_others():

@@ -14,6 +14,7 @@ from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.calibration import Calibration, calibrate
+from bsip_cli.motion.plausible_body import Doubt, doubts_about, words_of
 from bsip_cli.motion.scaling import Refinement, ScalingOptions
 from bsip_cli.motion.scaling_trials import TrialMarkers, refine_over_trials
 from bsip_cli.running.unit import Unit
@@ -46,12 +47,13 @@ def run(unit: Unit) -> None:
     quiet = _quietest(still)
     marker_set = _marker_set(unit, still.trial)
     assert unit.participant is not None
+    height_m = _height_m(unit, recorded)
     calibration = calibrate(
         skeleton,
         marker_set,
         _mean_positions(still, quiet),
         unit.participant.sex,
-        _height_m(unit, recorded),
+        height_m,
         [dict(zip(one.labels, one.positions.swapaxes(0, 1), strict=True)) for one in recorded],
     )
     _require_markers(unit, marker_set, calibration.person)
@@ -62,6 +64,9 @@ def run(unit: Unit) -> None:
     for note in calibration.notes:
         unit.warn(f"{unit.name}: {note}")
     fit = _refine(unit, calibration, recorded, still, quiet)
+    _doubt(
+        unit, doubts_about(fit.person, fit.poses.q, unit.participant.sex, height_m, mass.mass_kg)
+    )
     _warn_missing(unit, marker_set, fit.person)
     unit.write("skeleton", _skeleton_table(skeleton, calibration, fit))
     unit.write("marker-positions", _marker_table(skeleton, calibration, fit))
@@ -97,6 +102,19 @@ def _height_m(unit: Unit, recorded: list[_Recorded]) -> float | None:
             unit.warn(f"{unit.name}: height {height_m:.2f} m, as {one.trial.stem} states it")
             return float(height_m)
     return None
+
+
+def _doubt(unit: Unit, doubts: list[Doubt]) -> None:
+    """What no person can be is refused, what few are is said."""
+    for one in doubts:
+        unit.warn(f"{unit.name}: is this a person? {words_of([one])}")
+    if gross := [one for one in doubts if one.is_gross]:
+        raise BadDataError(
+            words_of(gross),
+            file=unit.name,
+            expected="a person",
+            remedy="check units and labels of the recordings (`bsip check` says how they are read)",
+        )
 
 
 def _require_markers(unit: Unit, marker_set: MarkerSet, person: Person) -> None:

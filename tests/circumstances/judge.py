@@ -1,0 +1,147 @@
+"""The outcome of a circumstance: right, repaired, refused, said; or wrong, one of three ways."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from tests.circumstances.comparison import Comparison, compare
+from tests.circumstances.generator import Circumstance
+from tests.circumstances.hidden import hidden
+from tests.circumstances.taken import Taken, Word
+
+GRAVITY = 9.81
+RIGHT, REPAIRED, REFUSED, SAID = "right", "repaired", "refused", "said"
+MISNAMED = "refused, matter not named"
+WRONGLY_REPAIRED, WRONG, DISTURBED = "wrongly repaired", "wrong without a word", "sound disturbed"
+CRASHED = "crashed"
+OUTCOMES = (
+    RIGHT, REPAIRED, REFUSED, SAID, MISNAMED, WRONGLY_REPAIRED, WRONG, DISTURBED, CRASHED,
+)  # fmt: skip
+
+# Words that name a matter. Wide on purpose: the wording is not what is examined.
+NAMES = {
+    "rate": r"\bHz\b|\brates?\b|\btimes?\b|time.?stamp|clock|\bms\b|\bframes? (number|rate)",
+    "labels": r"label|marker.?set|no marker|markers? .*(missing|not|twice|double)|unknown marker",
+    "scale": r"\bunits?\b|statur|\btall\b|\bheight\b|inch|\bcm\b|lengths?\b|\bscale",
+    "handedness": r"mirror|handed|wrong side",
+    "vertical": r"vertical|\bup\b|upright",
+    "markers": r"missing|\bgaps?\b|invalid|residual|\bheld\b|slip|jump|repeat|frozen|marker",
+    "force": r"\bforces?\b|\bsigns?\b|\bunits?\b|plates?\b|mirror",
+    "cop": r"pressure|moments?\b|torque|origin|corner|\bpoints?\b|\bfoot\b|\bfeet\b|exchang|plate",
+    "moment": r"pressure|moments?\b|torque|origin|corner|\bsigns?\b|plate",
+    "mass": r"stated.*\b(kg|mass)|\bmass\b.*(stated|participants)|pound|\blbs?\b",
+    "table": r"\bcolumns?\b|force (table|file)|no (ground )?force",
+    "person": r"participants|\bsex\b",
+    "height": r"\bheight|statur|\btall\b",
+}
+# What names a kind of circumstance when forces, a trial or a person are refused.
+OF_KIND = {
+    "length unit": ("scale", "cop"),
+    "moment unit": ("moment",),
+    "moment reference": ("moment", "cop"),
+    "axes": ("vertical", "cop"),
+    "mirrored": ("handedness", "cop"),
+    "signs": ("force", "moment"),
+    "plates": ("force", "cop"),
+    "plate type": ("moment",),
+    "time": ("rate",),
+    "labels": ("labels",),
+    "missing": ("markers", "labels"),
+    "force table": ("table",),
+    "person": ("person", "mass", "height"),
+}
+# A foot beside the plates: no word for what is wrong with the numbers.
+_CONTACT = re.compile(r"(^|: )contacts\b", re.I)
+_USUAL = re.compile(r"^(up_axis|marker_set|marker_gaps)|: (up axis|marker gaps)", re.I)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """wrong : by quantity, what was found. said : the words that count."""
+
+    circumstance: str
+    id: int
+    kinds: tuple[str, ...]
+    things: tuple[str, ...]
+    outcome: str
+    wrong: dict[str, str]
+    said: tuple[str, ...]
+
+
+def judge(circumstance: Circumstance, taken: Taken) -> Judgement:
+    """Compare with the truth and read the words."""
+    news = [word for word in taken.words if word.level != "info"]
+    comparisons = _comparisons(circumstance, taken)
+    wrong: dict[str, str] = {}
+    for name, comparison in comparisons.items():
+        for quantity, found in comparison.wrong.items():
+            wrong.setdefault(quantity, f"{name}: {found}")
+    trials = {trial.name for trial in circumstance.truth.trials}
+    is_whole = set(comparisons) == trials and all(
+        c.has_markers and c.has_forces for c in comparisons.values()
+    )
+    if taken.exit_code == 1:
+        outcome = CRASHED
+    elif circumstance.is_sound:
+        outcome = _of_sound(wrong, is_whole, news)
+    else:
+        outcome = _of_changed(circumstance, wrong, is_whole, news)
+    return Judgement(
+        str(circumstance),
+        circumstance.id,
+        circumstance.kinds,
+        tuple(thing.id for thing in circumstance.things),
+        outcome,
+        wrong,
+        tuple(dict.fromkeys(f"{w.level}: {w.text}" for w in news)),
+    )
+
+
+def _comparisons(circumstance: Circumstance, taken: Taken) -> dict[str, Comparison]:
+    truth = circumstance.truth
+    found = {}
+    for k, trial in enumerate(truth.trials):
+        if trial.name in taken.trials:
+            lost = hidden(
+                trial.markers_m.shape[:2],
+                circumstance.export.hidden_share,
+                circumstance.gap_seed(k),
+            )
+            found[trial.name] = compare(
+                taken.trials[trial.name], trial, truth.labels, lost, truth.mass_kg * GRAVITY
+            )
+    return found
+
+
+def _of_sound(wrong: dict[str, str], is_whole: bool, news: list[Word]) -> str:
+    false = [w for w in news if not _USUAL.search(w.text) and not _CONTACT.search(w.text)]
+    return RIGHT if is_whole and not wrong and not false else DISTURBED
+
+
+def _of_changed(
+    circumstance: Circumstance, wrong: dict[str, str], is_whole: bool, news: list[Word]
+) -> str:
+    telling = [w for w in news if not _CONTACT.search(w.text)]
+    unseen = {t.name: "not shown by the numbers" for t in circumstance.things if t.name}
+    unsaid = [q for q in {**wrong, **unseen} if not _names(q, telling)]
+    is_named = any(_names(q, telling) for kind in circumstance.kinds for q in OF_KIND[kind])
+    if wrong:
+        corrected = [w for w in telling if w.level == "corrected"]
+        if any(_names(quantity, corrected) for quantity in wrong):
+            return WRONGLY_REPAIRED
+        if unsaid:
+            return WRONG
+        return SAID if is_whole or is_named else MISNAMED
+    if not is_whole:
+        return REFUSED if is_named else MISNAMED
+    if unsaid:
+        return WRONG
+    fresh = [w for w in telling if not _USUAL.search(w.text)]
+    return REPAIRED if fresh else RIGHT
+
+
+def _names(quantity: str, words: list[Word]) -> bool:
+    pattern = re.compile(NAMES[quantity], re.I)
+    usual = quantity != "vertical"
+    return any(pattern.search(w.text) for w in words if not (usual and _USUAL.search(w.text)))

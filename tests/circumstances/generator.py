@@ -10,7 +10,7 @@ import numpy as np
 
 from tests.circumstances.c3d_export import write_c3d
 from tests.circumstances.export import Y_UP, Export
-from tests.circumstances.sound import LABORATORIES, PEOPLE, Session, sessions
+from tests.circumstances.sound import LABORATORIES, PEOPLE, Session, sound_session
 from tests.circumstances.text_export import write_mot, write_trc
 from tests.circumstances.things import KINDS, THINGS, Thing, pick
 
@@ -84,7 +84,7 @@ def draw(seed: int, number: int, only: str = "") -> Circumstance:
 
 def _session(rng: np.random.Generator) -> Session:
     laboratory = pick(rng, LABORATORIES)
-    session = sessions(laboratory)[int(rng.integers(PEOPLE))]
+    session = sound_session(laboratory, int(rng.integers(PEOPLE)))
     session = session.with_movement(pick(rng, LABORATORIES[laboratory][1]))
     turns = tuple(int(k) for k in rng.integers(0, 4, len(session.plates)))
     session = session.with_turned_plates(turns)

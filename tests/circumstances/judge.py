@@ -26,7 +26,7 @@ NAMES = {
     "scale": r"\bunits?\b|statur|\btall\b|\bheight\b|inch|\bcm\b|lengths?\b|\bscale",
     "handedness": r"mirror|handed|wrong side",
     "vertical": r"vertical|\bup\b|upright",
-    "markers": r"missing|\bgaps?\b|invalid|residual|\bheld\b|slip|jump|repeat|frozen|marker",
+    "markers": r"missing|\bgaps?\b|invalid|residual|\bheld\b|slip|jump|repeat|frozen",
     "force": r"\bforces?\b|\bsigns?\b|\bunits?\b|plates?\b|mirror",
     "cop": r"pressure|moments?\b|torque|origin|corner|\bpoints?\b|\bfoot\b|\bfeet\b|exchang|plate",
     "moment": r"pressure|moments?\b|torque|origin|corner|\bsigns?\b|plate",
@@ -47,7 +47,7 @@ OF_KIND = {
     "plate type": ("moment",),
     "time": ("rate",),
     "labels": ("labels",),
-    "missing": ("markers", "labels"),
+    "missing": ("markers",),
     "force table": ("table",),
     "person": ("person", "mass", "height"),
 }
@@ -58,7 +58,10 @@ _USUAL = re.compile(r"^(up_axis|marker_set|marker_gaps)|: (up axis|marker gaps)"
 
 @dataclass(frozen=True)
 class Judgement:
-    """wrong : by quantity, what was found. said : the words that count."""
+    """wrong : by quantity, what was found. named : by quantity, the word that names it.
+
+    said : all words that are more than information.
+    """
 
     circumstance: str
     id: int
@@ -66,6 +69,7 @@ class Judgement:
     things: tuple[str, ...]
     outcome: str
     wrong: dict[str, str]
+    named: dict[str, str]
     said: tuple[str, ...]
 
 
@@ -81,20 +85,35 @@ def judge(circumstance: Circumstance, taken: Taken) -> Judgement:
     is_whole = set(comparisons) == trials and all(
         c.has_markers and c.has_forces for c in comparisons.values()
     )
+    # What must be named: what is wrong in the artifacts, and what these cannot show.
+    asked = [*wrong, *(t.name for t in circumstance.things if t.name)]
+    telling = [w for w in news if not _CONTACT.search(w.text)]
+    named = {q: word for q in asked if (word := _naming(q, telling))}
+    all_named = set(asked) == set(named)
     if taken.exit_code == 1:
         outcome = CRASHED
     elif circumstance.is_sound:
-        outcome = _of_sound(wrong, is_whole, news)
+        outcome = _of_sound(wrong, is_whole, telling)
+    elif wrong:
+        is_told = is_whole or _is_told(circumstance, telling)
+        outcome = _of_wrong(wrong, telling, all_named, is_told)
+    elif not is_whole:
+        # Who is refused before anything is read is refused for one matter, not for all.
+        is_told = _is_told(circumstance, telling) and (all_named or not comparisons)
+        outcome = REFUSED if is_told else MISNAMED
+    elif not all_named:
+        outcome = WRONG
     else:
-        outcome = _of_changed(circumstance, wrong, is_whole, news)
+        outcome = REPAIRED if any(not _USUAL.search(w.text) for w in telling) else RIGHT
     return Judgement(
-        str(circumstance),
-        circumstance.id,
-        circumstance.kinds,
-        tuple(thing.id for thing in circumstance.things),
-        outcome,
-        wrong,
-        tuple(dict.fromkeys(f"{w.level}: {w.text}" for w in news)),
+        circumstance=str(circumstance),
+        id=circumstance.id,
+        kinds=circumstance.kinds,
+        things=tuple(thing.id for thing in circumstance.things),
+        outcome=outcome,
+        wrong=wrong,
+        named=named,
+        said=tuple(dict.fromkeys(f"{w.level}: {w.text}" for w in news)),
     )
 
 
@@ -114,34 +133,27 @@ def _comparisons(circumstance: Circumstance, taken: Taken) -> dict[str, Comparis
     return found
 
 
-def _of_sound(wrong: dict[str, str], is_whole: bool, news: list[Word]) -> str:
-    false = [w for w in news if not _USUAL.search(w.text) and not _CONTACT.search(w.text)]
-    return RIGHT if is_whole and not wrong and not false else DISTURBED
+def _of_sound(wrong: dict[str, str], is_whole: bool, telling: list[Word]) -> str:
+    is_quiet = all(_USUAL.search(w.text) for w in telling)
+    return RIGHT if is_whole and not wrong and is_quiet else DISTURBED
 
 
-def _of_changed(
-    circumstance: Circumstance, wrong: dict[str, str], is_whole: bool, news: list[Word]
-) -> str:
-    telling = [w for w in news if not _CONTACT.search(w.text)]
-    unseen = {t.name: "not shown by the numbers" for t in circumstance.things if t.name}
-    unsaid = [q for q in {**wrong, **unseen} if not _names(q, telling)]
-    is_named = any(_names(q, telling) for kind in circumstance.kinds for q in OF_KIND[kind])
-    if wrong:
-        corrected = [w for w in telling if w.level == "corrected"]
-        if any(_names(quantity, corrected) for quantity in wrong):
-            return WRONGLY_REPAIRED
-        if unsaid:
-            return WRONG
-        return SAID if is_whole or is_named else MISNAMED
-    if not is_whole:
-        return REFUSED if is_named else MISNAMED
-    if unsaid:
+def _of_wrong(wrong: dict[str, str], telling: list[Word], all_named: bool, is_told: bool) -> str:
+    corrected = [w for w in telling if w.level == "corrected"]
+    if any(_naming(quantity, corrected) for quantity in wrong):
+        return WRONGLY_REPAIRED
+    if not all_named:
         return WRONG
-    fresh = [w for w in telling if not _USUAL.search(w.text)]
-    return REPAIRED if fresh else RIGHT
+    return SAID if is_told else MISNAMED
 
 
-def _names(quantity: str, words: list[Word]) -> bool:
+def _is_told(circumstance: Circumstance, telling: list[Word]) -> bool:
+    """A word names the matter for which forces, a trial or the person may have been refused."""
+    return any(_naming(q, telling) for kind in circumstance.kinds for q in OF_KIND[kind])
+
+
+def _naming(quantity: str, words: list[Word]) -> str:
+    """The first word that names a quantity, or nothing."""
     pattern = re.compile(NAMES[quantity], re.I)
-    usual = quantity != "vertical"
-    return any(pattern.search(w.text) for w in words if not (usual and _USUAL.search(w.text)))
+    found = (w.text for w in words if pattern.search(w.text))
+    return next((t for t in found if quantity == "vertical" or not _USUAL.search(t)), "")

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
+from itertools import product
 from pathlib import Path
 
 from tests.circumstances.generator import draw, write
@@ -27,8 +28,8 @@ from tests.circumstances.judge import (
     Judgement,
     judge,
 )
-from tests.circumstances.sound import LABORATORIES, sessions
-from tests.circumstances.taken import ingest
+from tests.circumstances.sound import LABORATORIES, PEOPLE, sound_session
+from tests.circumstances.taken import Taken, ingest
 from tests.circumstances.things import KINDS
 
 BATCH = 20
@@ -38,9 +39,9 @@ WORST = (CRASHED, DISTURBED, WRONGLY_REPAIRED, WRONG, MISNAMED)
 def examined(
     seed: int, ids: Sequence[int], jobs: int = 1, only: str = "", folder: Path | None = None
 ) -> list[Judgement]:
-    """Judge the circumstances `ids` of a seed; folder : keeps studies and results."""
-    for laboratory in LABORATORIES:
-        sessions(laboratory)  # before the processes part, so that each has them
+    """Judge the circumstances `ids` of a seed; folder : keeps study and results of one."""
+    for laboratory, person in product(LABORATORIES, range(PEOPLE)):
+        sound_session(laboratory, person)  # before the processes part, so that each has them
     tasks = [(seed, batch, only, folder) for batch in _batches(seed, ids, only)]
     if jobs == 1:
         return [j for task in tasks for j in _examine(task)]
@@ -60,10 +61,17 @@ def _examine(task: tuple[int, list[int], str, Path | None]) -> list[Judgement]:
     seed, ids, only, kept = task
     circumstances = [draw(seed, number, only) for number in ids]
     with tempfile.TemporaryDirectory() as passing:
-        folder = kept / f"from-{ids[0]}" if kept else Path(passing)
+        folder = kept or Path(passing)
         write(circumstances, folder / "study")
         taken = ingest(folder / "study", folder / "out")
-        return [judge(c, taken[c.participant]) for c in circumstances]
+    if len(ids) > 1 and _cannot_be_told_apart(taken):
+        return [j for number in ids for j in _examine((seed, [number], only, kept))]
+    return [judge(c, taken[c.participant]) for c in circumstances]
+
+
+def _cannot_be_told_apart(taken: dict[str, Taken]) -> bool:
+    """A bug, or a refusal of the whole study: whose?"""
+    return any(t.exit_code == 1 or not (t.words or t.trials) for t in taken.values())
 
 
 def share(judgements: list[Judgement], *outcomes: str) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from dataclasses import dataclass, replace
 from functools import cache
@@ -13,7 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from bsip_cli.simulate.options import Laboratory, Rates, Richness, StudyOptions
-from bsip_cli.simulate.study import simulate_study
+from bsip_cli.simulate.study import simulate_participant
 
 RATES = {"default": Rates(marker_hz=200, analog_hz=1000)}
 DURATIONS_S = {"static": 2.0, "squat": 3.0, "steps": 3.6, "walking": 2.0}
@@ -129,8 +128,8 @@ def _linear(old_s: np.ndarray, values: np.ndarray, new_s: np.ndarray) -> np.ndar
 
 
 @cache
-def sessions(laboratory: str) -> tuple[Session, ...]:
-    """The people in one laboratory; simulated once per process."""
+def sound_session(laboratory: str, number: int) -> Session:
+    """Person `number` in one laboratory; simulated once per process."""
     lab, movements = LABORATORIES[laboratory]
     options = StudyOptions(
         participants=PEOPLE,
@@ -142,30 +141,31 @@ def sessions(laboratory: str) -> tuple[Session, ...]:
         laboratory=lab,
         sexes="MFFM",
     )
-    with tempfile.TemporaryDirectory() as folder:
-        simulate_study(Path(folder), options)
-        rows = (Path(folder) / "participants.tsv").read_text().splitlines()[1:]
-        return tuple(
-            _session(laboratory, Path(folder), row.split("\t"), lab.plate_depth_m) for row in rows
-        )
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        (folder / "truth").mkdir()
+        known = simulate_participant(folder, options, number + 1)
+        plates, trials, labels = [], [], ()
+        for stem, record in known.trials.items():
+            content = ezc3d.c3d(str(folder / known.participant / f"{stem}.c3d"))
+            labels = tuple(content["parameters"]["POINT"]["LABELS"]["value"])
+            corners = content["parameters"]["FORCE_PLATFORM"]["CORNERS"]["value"] / 1000.0
+            plates = [Plate(corners[:, :, k].T, lab.plate_depth_m) for k in range(corners.shape[2])]
+            measured = float(str(record["all_contacts_measured_share"]))
+            trials.append(_trial(stem.split("_", 1)[1], content, plates, measured))
+    person = known.person
+    return Session(
+        laboratory,
+        person.sex,
+        float(person.mass_kg),
+        float(person.stature_m),
+        labels,
+        tuple(plates),
+        tuple(trials),
+    )
 
 
-def _session(laboratory: str, folder: Path, row: list[str], depth_m: float) -> Session:
-    known = json.loads((folder / "truth" / f"{row[0]}_truth.json").read_text())["trials"]
-    files = sorted((folder / row[0]).glob("*.c3d"), key=lambda f: "static" not in f.name)
-    plates, trials, labels = [], [], ()
-    for file in files:
-        content = ezc3d.c3d(str(file))
-        labels = tuple(content["parameters"]["POINT"]["LABELS"]["value"])
-        corners = content["parameters"]["FORCE_PLATFORM"]["CORNERS"]["value"] / 1000.0
-        plates = [Plate(corners[:, :, k].T, depth_m) for k in range(corners.shape[2])]
-        measured = float(known[file.stem]["all_contacts_measured_share"])
-        trials.append(_trial(file, content, plates, measured))
-    sex, mass, height = row[1], float(row[2]), float(row[3])
-    return Session(laboratory, sex, mass, height, labels, tuple(plates), tuple(trials))
-
-
-def _trial(file: Path, content: ezc3d.c3d, plates: list[Plate], measured_share: float) -> Trial:
+def _trial(name: str, content: ezc3d.c3d, plates: list[Plate], measured_share: float) -> Trial:
     points = content["data"]["points"][:3].transpose(2, 1, 0) / 1000.0
     channels = content["data"]["analogs"][0].T
     parameters = content["parameters"]
@@ -174,7 +174,7 @@ def _trial(file: Path, content: ezc3d.c3d, plates: list[Plate], measured_share: 
         for k, plate in enumerate(plates)
     ]
     return Trial(
-        name=file.stem.split("_", 1)[1],
+        name=name,
         time_s=np.arange(len(points)) / parameters["POINT"]["RATE"]["value"][0],
         markers_m=points,
         analog_s=np.arange(len(channels)) / parameters["ANALOG"]["RATE"]["value"][0],

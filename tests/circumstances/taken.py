@@ -83,11 +83,15 @@ def _read(
 
 
 def _quality(trial: str, table: pd.DataFrame) -> list[Word]:
+    rows = table.astype(str).to_dict("records")
     return [
         Word(
-            trial, r.level, r.check, f"{r.check} {r.subject}: {r.found} ({r.expected}); {r.action}"
+            trial,
+            row["level"],
+            row["check"],
+            f"{row['check']} {row['subject']}: {row['found']} ({row['expected']}); {row['action']}",
         )
-        for r in table.itertuples()
+        for row in rows
     ]
 
 

@@ -11,6 +11,7 @@ from tests.circumstances.hidden import stored_points
 from tests.circumstances.sound import Session, Trial
 
 LOADED_N = 15.0
+_Three = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def write_trc(path: Path, session: Session, trial: Trial, export: Export, seed: int) -> None:
@@ -94,13 +95,13 @@ def write_mot(path: Path, trial: Trial, export: Export, centres_m: np.ndarray) -
     path.write_text("\n".join(lines) + "\n")
 
 
-def _columns(seen: Trial, k: int, centre: np.ndarray, up: np.ndarray, export: Export):
+def _columns(seen: Trial, k: int, centre: np.ndarray, up: np.ndarray, export: Export) -> _Three:
     return _columns_of(seen.force_N[:, k], seen.moment_Nm[:, k], centre, up, export)
 
 
 def _columns_of(
     force: np.ndarray, moment: np.ndarray, centre: np.ndarray, up: np.ndarray, export: Export
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> _Three:
     """(n, 3) each: force, point on the floor, and the moment about the export's reference."""
     vertical = force @ up
     loaded = np.abs(vertical) > LOADED_N

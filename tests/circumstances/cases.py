@@ -45,8 +45,7 @@ class Case:
     def is_whole(self) -> bool:
         """Markers and forces of every trial are passed on."""
         return bool(self.taken.trials) and all(
-            _compared(trial, self.truth[name]).has_forces
-            for name, trial in self.taken.trials.items()
+            _compared(trial, self.truth[name]).is_whole for name, trial in self.taken.trials.items()
         )
 
     def says(self, pattern: str) -> bool:

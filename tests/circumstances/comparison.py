@@ -19,16 +19,29 @@ FORCE_RMS_SHARE = 0.05  # of the body's weight
 MARKER_M, MARKER_SHARE = 0.03, 0.001
 LABELS_SHARE = 0.9
 TILT_DEG = 2.0
+# Forces of so much of the measured time are numbers that are passed on; so much is most of it.
+SOME_SHARE, MOST_SHARE = 0.1, 0.7
 LOADED_SHARE = 0.12  # of the body's weight: a plate's centre of pressure is judged
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """wrong : quantities whose numbers are wrong, with what was found. has_forces : passed on."""
+    """wrong : quantities whose numbers are wrong, with what was found.
+
+    kept_share : of the time that the plates measured every contact, in which forces are passed on.
+    """
 
     wrong: dict[str, str]
     has_markers: bool
-    has_forces: bool
+    kept_share: float
+
+    @property
+    def has_forces(self) -> bool:
+        return self.kept_share > SOME_SHARE
+
+    @property
+    def is_whole(self) -> bool:
+        return self.has_markers and self.kept_share > MOST_SHARE
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +74,7 @@ def compare(
     frames = _truth_frames(taken, truth)
     common = [name for name in labels if np.isfinite(taken.markers_m.get(name, np.nan)).any()]
     if len(common) < 6:
-        return Comparison(wrong, False, False)
+        return Comparison(wrong, False, 0.0)
     if len(common) < LABELS_SHARE * len(labels):
         wrong["labels"] = f"{len(common)} of {len(labels)} markers"
     columns = [labels.index(name) for name in common]
@@ -71,10 +84,10 @@ def compare(
     lab = _fitted(points, true, seen)
     wrong |= _markers(lab, points, true)
     use = taken.valid & np.isfinite(taken.wrench).all(axis=1)
-    has_forces = use.mean() > 0.1 * min(truth.measured_share, 1.0)
-    if has_forces:
+    kept_share = float(use.mean() / truth.measured_share)
+    if kept_share > SOME_SHARE:
         wrong |= _forces(lab, taken, truth, frames, use, weight_N)
-    return Comparison(wrong, True, bool(has_forces))
+    return Comparison(wrong, True, kept_share)
 
 
 def _rate(taken: TakenTrial, truth: Trial) -> dict[str, str]:

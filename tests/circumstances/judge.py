@@ -19,6 +19,7 @@ OUTCOMES = (
     RIGHT, REPAIRED, REFUSED, SAID, MISNAMED, WRONGLY_REPAIRED, WRONG, DISTURBED, CRASHED,
 )  # fmt: skip
 
+_PLATES = r"plates? .*(turned|cop(y|ies)\b|\bsum\b|twice|same|virtual|exchange|counted|combined)"
 # Words that name a matter. Wide on purpose: the wording is not what is examined.
 NAMES = {
     "rate": r"\bHz\b|\brates?\b|\btimes?\b|time.?stamp|clock|\bms\b|\bframes? (number|rate)",
@@ -27,9 +28,9 @@ NAMES = {
     "handedness": r"mirror|handed|wrong side",
     "vertical": r"vertical|\bup\b|upright",
     "markers": r"missing|\bgaps?\b|invalid|residual|\bheld\b|slip|jump|repeat|frozen",
-    "force": r"\bforces?\b|\bsigns?\b|\bunits?\b|plates?\b|mirror",
-    "cop": r"pressure|moments?\b|torque|origin|corner|\bpoints?\b|\bfoot\b|\bfeet\b|exchang|plate",
-    "moment": r"pressure|moments?\b|torque|origin|corner|\bsigns?\b|plate",
+    "force": rf"\bforces?\b(?! plate)|\bsigns?\b|\bunits?\b|mirror|never loaded|{_PLATES}",
+    "cop": rf"pressure|moments?\b|torque|origin|corner|points? of|no points?|mirror|{_PLATES}",
+    "moment": rf"pressure|moments?\b|torque|origin|corner|\bsigns?\b|mirror|{_PLATES}",
     "mass": r"stated.*\b(kg|mass)|\bmass\b.*(stated|participants)|pound|\blbs?\b",
     "table": r"\bcolumns?\b|force (table|file)|no (ground )?force",
     "person": r"participants|\bsex\b",
@@ -56,9 +57,12 @@ _CONTACT = re.compile(r"(^|: )contacts\b", re.I)
 _USUAL = re.compile(r"^(up_axis|marker_set|marker_gaps)|: (up axis|marker gaps)", re.I)
 
 
+Wrong = dict[tuple[str, str], str]  # by trial and quantity
+
+
 @dataclass(frozen=True)
 class Judgement:
-    """wrong : by quantity, what was found. named : by quantity, the word that names it.
+    """wrong : by trial and quantity, what was found. named : the same, the word that names it.
 
     said : all words that are more than information.
     """
@@ -77,18 +81,17 @@ def judge(circumstance: Circumstance, taken: Taken) -> Judgement:
     """Compare with the truth and read the words."""
     news = [word for word in taken.words if word.level != "info"]
     comparisons = _comparisons(circumstance, taken)
-    wrong: dict[str, str] = {}
-    for name, comparison in comparisons.items():
-        for quantity, found in comparison.wrong.items():
-            wrong.setdefault(quantity, f"{name}: {found}")
+    wrong = {
+        (name, quantity): found
+        for name, comparison in comparisons.items()
+        for quantity, found in comparison.wrong.items()
+    }
     trials = {trial.name for trial in circumstance.truth.trials}
-    is_whole = set(comparisons) == trials and all(
-        c.has_markers and c.has_forces for c in comparisons.values()
-    )
+    is_whole = set(comparisons) == trials and all(c.is_whole for c in comparisons.values())
     # What must be named: what is wrong in the artifacts, and what these cannot show.
-    asked = [*wrong, *(t.name for t in circumstance.things if t.name)]
+    asked = [*wrong, *(("", t.name) for t in circumstance.things if t.name)]
     telling = [w for w in news if not _CONTACT.search(w.text)]
-    named = {q: word for q in asked if (word := _naming(q, telling))}
+    named = {which: word for which in asked if (word := _naming(*which, telling))}
     all_named = set(asked) == set(named)
     if taken.exit_code == 1:
         outcome = CRASHED
@@ -111,8 +114,8 @@ def judge(circumstance: Circumstance, taken: Taken) -> Judgement:
         kinds=circumstance.kinds,
         things=tuple(thing.id for thing in circumstance.things),
         outcome=outcome,
-        wrong=wrong,
-        named=named,
+        wrong={" ".join(which): found for which, found in wrong.items()},
+        named={" ".join(which): word for which, word in named.items()},
         said=tuple(dict.fromkeys(f"{w.level}: {w.text}" for w in news)),
     )
 
@@ -133,14 +136,14 @@ def _comparisons(circumstance: Circumstance, taken: Taken) -> dict[str, Comparis
     return found
 
 
-def _of_sound(wrong: dict[str, str], is_whole: bool, telling: list[Word]) -> str:
+def _of_sound(wrong: Wrong, is_whole: bool, telling: list[Word]) -> str:
     is_quiet = all(_USUAL.search(w.text) for w in telling)
     return RIGHT if is_whole and not wrong and is_quiet else DISTURBED
 
 
-def _of_wrong(wrong: dict[str, str], telling: list[Word], all_named: bool, is_told: bool) -> str:
+def _of_wrong(wrong: Wrong, telling: list[Word], all_named: bool, is_told: bool) -> str:
     corrected = [w for w in telling if w.level == "corrected"]
-    if any(_naming(quantity, corrected) for quantity in wrong):
+    if any(_naming(*which, corrected) for which in wrong):
         return WRONGLY_REPAIRED
     if not all_named:
         return WRONG
@@ -149,11 +152,15 @@ def _of_wrong(wrong: dict[str, str], telling: list[Word], all_named: bool, is_to
 
 def _is_told(circumstance: Circumstance, telling: list[Word]) -> bool:
     """A word names the matter for which forces, a trial or the person may have been refused."""
-    return any(_naming(q, telling) for kind in circumstance.kinds for q in OF_KIND[kind])
+    return any(_naming("", q, telling) for kind in circumstance.kinds for q in OF_KIND[kind])
 
 
-def _naming(quantity: str, words: list[Word]) -> str:
-    """The first word that names a quantity, or nothing."""
+def _naming(trial: str, quantity: str, words: list[Word]) -> str:
+    """The first word that names a quantity, or nothing.
+
+    Numbers of one trial are not named by what is said of another.
+    """
     pattern = re.compile(NAMES[quantity], re.I)
-    found = (w.text for w in words if pattern.search(w.text))
+    found = (w.text for w in words if trial in ("", w.trial) or not w.trial)
+    found = (text for text in found if pattern.search(text))
     return next((t for t in found if quantity == "vertical" or not _USUAL.search(t)), "")

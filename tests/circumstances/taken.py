@@ -68,11 +68,15 @@ def _read(
     """What is below a participant's folder and said of it, or of nobody in particular."""
     others = [name for name in people if name != participant]
     own = [line for line in lines if not any(other in line for other in others)]
-    words = [Word("", "printed", "", line) for line in own if not _SUMMARY.match(line)]
+    words = [
+        Word(_trial_in(line, participant), "printed", "", line)
+        for line in own
+        if not _SUMMARY.match(line)
+    ]
     trials = {}
     for file in sorted(folder.rglob("*.parquet")):
         stem, kind = file.stem.rsplit("_", 1)
-        name = stem.removeprefix(f"{participant}_")
+        name = "" if stem == participant else stem.removeprefix(f"{participant}_")
         if kind == "quality":
             words += _quality(name, pd.read_parquet(file))
         elif kind.startswith("refusal"):
@@ -80,6 +84,12 @@ def _read(
         elif kind == "wrench":
             trials[name] = _trial(file, file.with_name(f"{stem}_markers.parquet"))
     return Taken(exit_code, trials, tuple(words))
+
+
+def _trial_in(line: str, participant: str) -> str:
+    """The trial that a printed line is about, or nothing."""
+    found = re.search(rf"{participant}_(task-\w+(?:-\d+)?)", line)
+    return found[1] if found else ""
 
 
 def _quality(trial: str, table: pd.DataFrame) -> list[Word]:

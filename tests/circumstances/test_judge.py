@@ -136,12 +136,16 @@ def outcome_of(circumstance, change, *words, exit_code=0):
     return judge(circumstance, Taken(exit_code, trials, words)).outcome
 
 
-def word(level, text):
-    return Word("task-static", level, "", text)
+def word(level, text, trial=""):
+    return Word(trial, level, "", text)
 
 
 def nothing_valid(taken):
     return replace(taken, valid=np.zeros(len(taken.time_s), bool))
+
+
+def mostly_lost(taken):
+    return replace(taken, valid=np.arange(len(taken.time_s)) < 0.5 * len(taken.time_s))
 
 
 UNIT = "ANALOG:UNITS says N mm, moments fit N m"
@@ -156,8 +160,10 @@ UNIT = "ANALOG:UNITS says N mm, moments fit N m"
         (beside, [word("excluded", "contacts: a foot beside the plates; moment")], WRONG),
         (beside, [word("info", UNIT)], WRONG),
         (beside, [word("warning", UNIT)], SAID),
+        (beside, [word("warning", UNIT, "task-static")], WRONG),
         (beside, [word("corrected", UNIT)], WRONGLY_REPAIRED),
         (nothing_valid, [word("excluded", UNIT)], REFUSED),
+        (mostly_lost, [], MISNAMED),
         (nothing_valid, [word("excluded", "the left hand holds something")], MISNAMED),
     ],
 )

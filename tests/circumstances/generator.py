@@ -56,7 +56,7 @@ class Circumstance:
 
     @property
     def needs_own_table(self) -> bool:
-        return "person" in self.kinds
+        return any(thing.slot == "table" for thing in self.things)
 
     def gap_seed(self, trial: int) -> int:
         """Where markers are hidden in a trial."""

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from itertools import product
@@ -40,13 +41,23 @@ def examined(
     seed: int, ids: Sequence[int], jobs: int = 1, only: str = "", folder: Path | None = None
 ) -> list[Judgement]:
     """Judge the circumstances `ids` of a seed; folder : keeps study and results of one."""
-    for laboratory, person in product(LABORATORIES, range(PEOPLE)):
-        sound_session(laboratory, person)  # before the processes part, so that each has them
     tasks = [(seed, batch, only, folder) for batch in _batches(seed, ids, only)]
     if jobs == 1:
-        return [j for task in tasks for j in _examine(task)]
+        return _counted(map(_examine, tasks), len(ids))
+    for laboratory, person in product(LABORATORIES, range(PEOPLE)):
+        sound_session(laboratory, person)  # before the processes part, so that each has them
     with ProcessPoolExecutor(jobs) as pool:
-        return sorted((j for some in pool.map(_examine, tasks) for j in some), key=lambda j: j.id)
+        return _counted(pool.map(_examine, tasks), len(ids))
+
+
+def _counted(batches: Iterable[list[Judgement]], number: int) -> list[Judgement]:
+    """All judgements by id, with a count of them on a terminal."""
+    judgements: list[Judgement] = []
+    for batch in batches:
+        judgements += batch
+        if sys.stderr.isatty():
+            print(f"\r{len(judgements)} of {number}", end="", file=sys.stderr)
+    return sorted(judgements, key=lambda j: j.id)
 
 
 def _batches(seed: int, ids: Sequence[int], only: str) -> Iterator[list[int]]:

@@ -19,7 +19,7 @@ OUTCOMES = (
     RIGHT, REPAIRED, REFUSED, SAID, MISNAMED, WRONGLY_REPAIRED, WRONG, DISTURBED, CRASHED,
 )  # fmt: skip
 
-_PLATES = r"plates? .*(turned|cop(y|ies)\b|\bsum\b|twice|same|virtual|exchange|counted|combined)"
+_PLATES = r"\bframe\b|plates? .*(turned|cop(y|ies)\b|\bsum\b|twice|same|virtual|exchange|combined)"
 # Words that name a matter. Wide on purpose: the wording is not what is examined.
 NAMES = {
     "rate": r"\bHz\b|\brates?\b|\btimes?\b|time.?stamp|clock|\bms\b|\bframes? (number|rate)",

@@ -21,16 +21,15 @@ from tests.circumstances.run import examined, share, table
 from tests.circumstances.things import KINDS, THINGS
 
 SEED = 36
-# Shares of what was changed (sound: of the sound). target : of issue 36. today : what this
-# revision keeps at the seed of the long test; it only ever moves towards the target.
-LIMITS = {
-    # outcomes: (at most, target), (at most, today)
-    (WRONG,): (0.0, 0.30),
-    (WRONGLY_REPAIRED,): (0.01, 0.25),
-    (CRASHED,): (0.0, 0.0),
-    (DISTURBED,): (0.0, 0.0),
+# Shares of what was changed (of the sound: disturbed). Today's is what this revision keeps at the
+# seed of the long test; with a better reader it moves towards the target, never away from it.
+AT_MOST = {  # target of issue 36, today
+    WRONG: (0.0, 0.30),
+    WRONGLY_REPAIRED: (0.01, 0.17),
+    CRASHED: (0.0, 0.0),
+    DISTURBED: (0.0, 0.0),
 }
-RIGHT_OR_REPAIRED = (0.85, 0.08)  # at least: target, today
+RIGHT_OR_REPAIRED = (0.85, 0.18)  # at least: target, today
 
 
 @pytest.fixture(scope="module")
@@ -53,9 +52,9 @@ def test_a_hundred_circumstances_keep_the_limits():
     changed = [j for j in judgements if "sound" not in j.kinds]
     sound = [j for j in judgements if "sound" in j.kinds]
     print(table(judgements))
-    for outcomes, (_, today) in LIMITS.items():
-        of = sound if outcomes == (DISTURBED,) else changed
-        assert share(of, *outcomes) <= today, (outcomes, table(judgements))
+    for outcome, (_, today) in AT_MOST.items():
+        of = sound if outcome == DISTURBED else changed
+        assert share(of, outcome) <= today, (outcome, table(judgements))
     assert share(changed, RIGHT, REPAIRED) >= RIGHT_OR_REPAIRED[1], table(judgements)
 
 
@@ -69,7 +68,7 @@ def test_the_same_seed_draws_the_same():
 def test_draws_cover_all_kinds_and_leave_enough_sound():
     drawn = [draw(SEED, number) for number in range(250)]
     counts = Counter(kind for circumstance in drawn for kind in circumstance.kinds)
-    assert counts["sound"] >= 0.15 * 250 * 0.8
+    assert counts["sound"] >= 0.15 * 250
     assert {kind for kind in KINDS if counts[kind] >= 5} == set(KINDS)
     assert {len(c.things) for c in drawn} == {0, 1, 2, 3}
 

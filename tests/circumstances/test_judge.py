@@ -161,6 +161,8 @@ UNIT = "ANALOG:UNITS says N mm, moments fit N m"
         (beside, [word("info", UNIT)], WRONG),
         (beside, [word("warning", UNIT)], SAID),
         (beside, [word("warning", UNIT, "task-static")], WRONG),
+        (beside, [word("warning", "force plates were switched on")], WRONG),
+        (beside, [word("warning", "plate 1: its frame may be wrong")], SAID),
         (beside, [word("corrected", UNIT)], WRONGLY_REPAIRED),
         (nothing_valid, [word("excluded", UNIT)], REFUSED),
         (mostly_lost, [], MISNAMED),

@@ -152,13 +152,24 @@ def _forces(
     true = _truth_wrenches(truth)[frames][use]
     plates = np.stack([lab.wrench(w)[use] for w in taken.plates.values()], axis=1)
     wrong = _one_wrench(lab.wrench(taken.wrench)[use], true.sum(axis=1), weight_N, "all plates")
-    loads = [np.mean(np.abs(true[:, k, 2])) > 0.02 * weight_N for k in range(true.shape[1])]
     plates = np.nan_to_num(plates)
-    cost = np.sum((true[:, :, None, :3] - plates[:, None, :, :3]) ** 2, axis=(0, 3))
+    # Which plate is which: by its forces or by its moments, whichever speaks for the reader.
+    by_plate = [
+        _plate_by_plate(plates, true, part, weight_N) for part in (slice(0, 3), slice(3, 6))
+    ]
+    return min(by_plate, key=len) | wrong
+
+
+def _plate_by_plate(
+    plates: np.ndarray, true: np.ndarray, part: slice, weight_N: float
+) -> dict[str, str]:
+    """Plates (n, plates, 6) against the truth's, paired where these columns differ least."""
+    loaded = np.mean(np.abs(true[:, :, 2]) > 0.02 * weight_N, axis=0) > 0
+    cost = np.sum((true[:, :, None, part] - plates[:, None, :, part]) ** 2, axis=(0, 3))
+    wrong: dict[str, str] = {}
     for k, m in zip(*linear_sum_assignment(cost), strict=True):
-        if loads[k]:
-            found = _one_wrench(plates[:, m], true[:, k], weight_N, f"plate {k + 1}")
-            wrong = found | wrong
+        if loaded[k]:
+            wrong = _one_wrench(plates[:, m], true[:, k], weight_N, f"plate {k + 1}") | wrong
     return wrong
 
 

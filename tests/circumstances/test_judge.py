@@ -99,6 +99,14 @@ def exchanged(taken):
     return with_plates(taken, swap)
 
 
+def renamed(taken):
+    return with_plates(taken, lambda p: {"left": p["2"], "right": p["1"]})
+
+
+def test_plates_may_have_any_name_and_order(circumstance):
+    assert compared(circumstance, renamed).wrong == {}
+
+
 def beside(taken):
     """The centre of pressure 20 mm aside."""
     return with_plates(

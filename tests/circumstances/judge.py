@@ -1,0 +1,166 @@
+"""The outcome of a circumstance: right, repaired, refused, said; or wrong, one of three ways."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from tests.circumstances.comparison import Comparison, compare
+from tests.circumstances.generator import Circumstance
+from tests.circumstances.hidden import hidden
+from tests.circumstances.taken import Taken, Word
+
+GRAVITY = 9.81
+RIGHT, REPAIRED, REFUSED, SAID = "right", "repaired", "refused", "said"
+MISNAMED = "refused, matter not named"
+WRONGLY_REPAIRED, WRONG, DISTURBED = "wrongly repaired", "wrong without a word", "sound disturbed"
+CRASHED = "crashed"
+OUTCOMES = (
+    RIGHT, REPAIRED, REFUSED, SAID, MISNAMED, WRONGLY_REPAIRED, WRONG, DISTURBED, CRASHED,
+)  # fmt: skip
+
+_PLATES = r"\bframe\b|plates? .*(turned|cop(y|ies)\b|\bsum\b|twice|same|virtual|exchange|combined)"
+# Words that name a matter. Wide on purpose: the wording is not what is examined.
+NAMES = {
+    "rate": r"\bHz\b|\brates?\b|\btimes?\b|time.?stamp|clock|\bms\b|\bframes? (number|rate)",
+    "labels": r"label|marker.?set|no marker|markers? .*(missing|not|twice|double)|unknown marker",
+    "scale": r"\bunits?\b|statur|\btall\b|\bheight\b|inch|\bcm\b|lengths?\b|\bscale",
+    "handedness": r"mirror|handed|wrong side",
+    "vertical": r"vertical|\bup\b|upright",
+    "markers": r"missing|\bgaps?\b|invalid|residual|\bheld\b|slip|jump|repeat|frozen",
+    "force": rf"\bforces?\b(?! plate)|\bsigns?\b|\bunits?\b|mirror|never loaded|{_PLATES}",
+    "cop": rf"pressure|moments?\b|torque|origin|corner|points? of|no points?|mirror|{_PLATES}",
+    "moment": rf"pressure|moments?\b|torque|origin|corner|\bsigns?\b|mirror|{_PLATES}",
+    "mass": r"stated.*\b(kg|mass)|\bmass\b.*(stated|participants)|pound|\blbs?\b",
+    "table": r"\bcolumns?\b|force (table|file)|no (ground )?force",
+    "person": r"participants|\bsex\b",
+    "height": r"\bheight|statur|\btall\b",
+}
+# What names a kind of circumstance when forces, a trial or a person are refused.
+OF_KIND = {
+    "length unit": ("scale", "cop"),
+    "moment unit": ("moment",),
+    "moment reference": ("moment", "cop"),
+    "axes": ("vertical", "cop"),
+    "mirrored": ("handedness", "cop"),
+    "signs": ("force", "moment"),
+    "plates": ("force", "cop"),
+    "plate type": ("moment",),
+    "time": ("rate",),
+    "labels": ("labels",),
+    "missing": ("markers",),
+    "force table": ("table",),
+    "person": ("person", "mass", "height"),
+}
+# A foot beside the plates: no word for what is wrong with the numbers.
+_CONTACT = re.compile(r"(^|: )contacts\b", re.I)
+_USUAL = re.compile(r"^(up_axis|marker_set|marker_gaps)|: (up axis|marker gaps)", re.I)
+
+
+Wrong = dict[tuple[str, str], str]  # by trial and quantity
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """wrong : by trial and quantity, what was found. named : the same, the word that names it.
+
+    said : all words that are more than information.
+    """
+
+    circumstance: str
+    id: int
+    kinds: tuple[str, ...]
+    things: tuple[str, ...]
+    outcome: str
+    wrong: dict[str, str]
+    named: dict[str, str]
+    said: tuple[str, ...]
+
+
+def judge(circumstance: Circumstance, taken: Taken) -> Judgement:
+    """Compare with the truth and read the words."""
+    news = [word for word in taken.words if word.level != "info"]
+    comparisons = _comparisons(circumstance, taken)
+    wrong = {
+        (name, quantity): found
+        for name, comparison in comparisons.items()
+        for quantity, found in comparison.wrong.items()
+    }
+    trials = {trial.name for trial in circumstance.truth.trials}
+    is_whole = set(comparisons) == trials and all(c.is_whole for c in comparisons.values())
+    # What must be named: what is wrong in the artifacts, and what these cannot show.
+    asked = [*wrong, *(("", t.name) for t in circumstance.things if t.name)]
+    telling = [w for w in news if not _CONTACT.search(w.text)]
+    named = {which: word for which in asked if (word := _naming(*which, telling))}
+    all_named = set(asked) == set(named)
+    if taken.exit_code == 1:
+        outcome = CRASHED
+    elif circumstance.is_sound:
+        outcome = _of_sound(wrong, is_whole, telling)
+    elif wrong:
+        is_told = is_whole or _is_told(circumstance, telling)
+        outcome = _of_wrong(wrong, telling, all_named, is_told)
+    elif not is_whole:
+        # Who is refused before anything is read is refused for one matter, not for all.
+        is_told = _is_told(circumstance, telling) and (all_named or not comparisons)
+        outcome = REFUSED if is_told else MISNAMED
+    elif not all_named:
+        outcome = WRONG
+    else:
+        outcome = REPAIRED if any(not _USUAL.search(w.text) for w in telling) else RIGHT
+    return Judgement(
+        circumstance=str(circumstance),
+        id=circumstance.id,
+        kinds=circumstance.kinds,
+        things=tuple(thing.id for thing in circumstance.things),
+        outcome=outcome,
+        wrong={" ".join(which): found for which, found in wrong.items()},
+        named={" ".join(which): word for which, word in named.items()},
+        said=tuple(dict.fromkeys(f"{w.level}: {w.text}" for w in news)),
+    )
+
+
+def _comparisons(circumstance: Circumstance, taken: Taken) -> dict[str, Comparison]:
+    truth = circumstance.truth
+    found = {}
+    for k, trial in enumerate(truth.trials):
+        if trial.name in taken.trials:
+            lost = hidden(
+                trial.markers_m.shape[:2],
+                circumstance.export.hidden_share,
+                circumstance.gap_seed(k),
+            )
+            found[trial.name] = compare(
+                taken.trials[trial.name], trial, truth.labels, lost, truth.mass_kg * GRAVITY
+            )
+    return found
+
+
+def _of_sound(wrong: Wrong, is_whole: bool, telling: list[Word]) -> str:
+    is_quiet = all(_USUAL.search(w.text) for w in telling)
+    return RIGHT if is_whole and not wrong and is_quiet else DISTURBED
+
+
+def _of_wrong(wrong: Wrong, telling: list[Word], all_named: bool, is_told: bool) -> str:
+    corrected = [w for w in telling if w.level == "corrected"]
+    if any(_naming(*which, corrected) for which in wrong):
+        return WRONGLY_REPAIRED
+    if not all_named:
+        return WRONG
+    return SAID if is_told else MISNAMED
+
+
+def _is_told(circumstance: Circumstance, telling: list[Word]) -> bool:
+    """A word names the matter for which forces, a trial or the person may have been refused."""
+    return any(_naming("", q, telling) for kind in circumstance.kinds for q in OF_KIND[kind])
+
+
+def _naming(trial: str, quantity: str, words: list[Word]) -> str:
+    """The first word that names a quantity, or nothing.
+
+    Numbers of one trial are not named by what is said of another.
+    """
+    pattern = re.compile(NAMES[quantity], re.I)
+    found = (w.text for w in words if trial in ("", w.trial) or not w.trial)
+    found = (text for text in found if pattern.search(text))
+    return next((t for t in found if quantity == "vertical" or not _USUAL.search(t)), "")

@@ -121,9 +121,11 @@ class Unit:
     ) -> bool:
         """It is there, and no stage up to its own has refused the trial or participant since."""
         before = STAGES[: STAGES.index(producer(kind)) + 1]
-        owners = _owners_of_refusals(participant, trial)
-        return folder.holds(self.path(kind, trial, participant)) and not folder.refusals(
-            owners, before
+        of_trials = [stage for stage in before if stage.level == "trial"]
+        return (
+            folder.holds(self.path(kind, trial, participant))
+            and not folder.refusals(_owners_of_refusals(participant), before)
+            and not (trial and folder.refusals([trial.stem], of_trials))
         )
 
     # --- inputs ------------------------------------------------------------------------------

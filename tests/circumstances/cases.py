@@ -178,7 +178,8 @@ def pounds_first(case: Case) -> str:
     lines = [w.text for w in case.taken.words if w.level == "printed"]
     if case.says("seat, box, hands"):
         return "told as a contact that the plates miss"
-    named = bool(lines) and "110.9" in lines[0] and re.search(r"\b50\.?\d*\b", lines[0])
+    # The number of the plates is asked for; what the pounds come to in kg is nearly the same.
+    named = bool(lines) and "110.9" in lines[0] and re.search(r"plates\D*50\.\d", lines[0])
     return "" if named else f"first line: {lines[:1]}"
 
 
@@ -220,3 +221,9 @@ CHECKS: dict[str, Callable[[Case], str]] = {
     "26b-corners-turned-180": right_and_said(r"turn|corner"),
     "27-underscore-prefix": read_right,
 }
+
+
+def complaint(name: str) -> str:
+    """What is not as right.md asks; a bug is right nowhere, whatever else is said."""
+    case = run(name)
+    return "a bug of bsip" if case.taken.exit_code == 1 else CHECKS[name](case)

@@ -127,7 +127,10 @@ def person_of(
     ]
     known = affixes(named, count)
     found = {affix: count(_own(named, affix, known)) for affix in known}
-    chosen = _wished(labels, known, prefix) if prefix else max(known, key=found.__getitem__)
+    if prefix:
+        chosen = _wished(labels, known, prefix)
+    else:
+        chosen = max(known, key=found.__getitem__, default=Affix())
     least = max(_FEW, _SECOND_PERSON * found.get(chosen, 0))
     rivals = [a for a in known if a != chosen and found[a] >= least]
     others = [a for a in rivals if a.head != chosen.head]

@@ -11,14 +11,14 @@ whole strides, and in quiet stance.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from bsip_cli.body.anthropometry import load_table
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.body.names import without_side
+from bsip_cli.body.names import SEGMENTS, without_side
 from bsip_cli.recordings.analog import runs
 from bsip_cli.recordings.force_balance import low_pass, mean_path
 
@@ -153,6 +153,22 @@ def _neighbour_velocity(
             if found in seen and found != name:
                 return seen[found]
     return centre
+
+
+def shares_of_seen(names: Collection[str]) -> dict[str, float]:
+    """Each seen segment's share of the body's mass, with that of unseen ones beyond it."""
+    shares = _shares()
+    found: dict[str, float] = {}
+    for segment in SEGMENTS:
+        kind = without_side(segment)
+        side, share = segment[len(kind) :], shares[kind]
+        for _ in _KINDS:
+            carrier = next((one for one in (kind + side, kind) if one in names), "")
+            if carrier:
+                found[carrier] = found.get(carrier, 0.0) + share
+                break
+            kind = _NEIGHBOUR[kind]
+    return found
 
 
 def _shares() -> dict[str, float]:

@@ -12,6 +12,7 @@ Reference = Literal["stated", "reversed", "centred", "origin", "fixed"]
 # hundred for a reference point or a turned plate, one in five hundred for corners the other way
 # round (none of 157 plates of 20 laboratories).
 _SCALED, _OTHER_POINT, _TURNED, _MIRRORED = -3.4, -4.6, -4.6, -6.2
+_MOMENTS_REVERSED = -6.2  # without the forces, or these without the moments
 REVERSED = -2.3  # the action on the plate: one in ten
 EXCHANGED = -5.3  # two plates
 ONE_ALONE = -0.7  # one plate of several: what goes wrong, goes wrong for all more often
@@ -46,9 +47,10 @@ class PlateReading:
 
     def log_prior(self) -> float:
         """How rare the repairs are together, natural logarithm, 0 without any."""
-        scaled = (self.moment_scale != 1.0) + (self.point_scale != 1.0)
+        scaled = (abs(self.moment_scale) != 1.0) + (self.point_scale != 1.0)
         return (
             _SCALED * scaled
+            + _MOMENTS_REVERSED * (self.moment_scale < 0)
             + _OTHER_POINT * (self.about != "stated")
             + _TURNED * (self.turn != 0 and not self.mirrored)
             + _MIRRORED * self.mirrored
@@ -57,7 +59,8 @@ class PlateReading:
     def words(self) -> str:
         """What was done about units, reference and axes, as one clause; empty if nothing."""
         done = [
-            _MOMENT_SCALES.get(self.moment_scale, ""),
+            _MOMENT_SCALES.get(abs(self.moment_scale), ""),
+            "reversed the moments against the forces" * (self.moment_scale < 0),
             _POINT_SCALES.get(self.point_scale, ""),
             _ABOUT[self.about],
         ]

@@ -15,6 +15,7 @@ from bsip_cli.recordings.plate_reading import PlateReading, Reference
 from bsip_cli.recordings.plates import LocalWrench, PlateDescription, surface_offset_m, to_world
 
 _THICK_M = 0.3  # no plate's sensors lie so deep under its surface
+_Z = np.array([1.0, 1.0, -1.0])
 _STILL_M = 1e-6  # points that stay where they are, are no centres of pressure
 
 
@@ -75,6 +76,7 @@ class C3dPlate:
     wrench: LocalWrench
     usable: np.ndarray  # (n,) bool
     rotation_world_lab: np.ndarray  # (3, 3)
+    seen_in_mirror: bool = False
 
     @property
     def name(self) -> str:
@@ -101,8 +103,7 @@ class C3dPlate:
         return None
 
     def lever_m(self, reading: PlateReading) -> np.ndarray:
-        wrench = self.wrench.scaled(reading.moment_scale)
-        return np.asarray(np.hypot(*wrench.cop().T))
+        return np.asarray(np.hypot(*self._wrench(reading).cop().T))
 
     def in_place_of(self, other: PlateSource) -> C3dPlate:
         assert isinstance(other, C3dPlate)
@@ -114,12 +115,13 @@ class C3dPlate:
     def mirrored(self, axis: int) -> C3dPlate:
         """Corners alone: what the channels hold is told along them."""
         corners = self.description.corners_m @ _mirror(axis, self.rotation_world_lab)
-        return replace(self, description=replace(self.description, corners_m=corners))
+        description = replace(self.description, corners_m=corners)
+        return replace(self, description=description, seen_in_mirror=True)
 
     def alternatives(self) -> Iterable[PlateReading]:
         """Type 3 has no moments of its own, type 1 no point that they are about."""
         kind = self.description.kind
-        scales = (1.0,) if kind == 3 else (1.0, 1e-3, 1e3)
+        scales = (1.0,) if kind == 3 else (1.0, 1e-3, 1e3, -1.0)
         abouts: tuple[Reference, ...] = ("stated",)
         if kind in (2, 4) and self.description.origin_m[:2].any():
             abouts += ("reversed", "centred")
@@ -150,7 +152,18 @@ class C3dPlate:
         if reading.about != "stated":
             offset = offset * (np.array([-1, -1, 1]) if reading.about == "reversed" else [0, 0, 1])
             offset[2] *= abs(offset[2]) < _THICK_M
-        return self.wrench.scaled(reading.moment_scale).at_surface(offset)
+        return self._wrench(reading).at_surface(offset)
+
+    def _wrench(self, reading: PlateReading) -> LocalWrench:
+        """At the sensor's origin, before the sign of a reading.
+
+        Channels that were mirrored with their laboratory have a frame with z the other way, which
+        is no action on the plate.
+        """
+        wrench = self.wrench.scaled(reading.moment_scale)
+        if self.seen_in_mirror and reading.sign < 0:
+            return LocalWrench(-wrench.force_N * _Z, wrench.moment_Nm * _Z)
+        return wrench
 
 
 @dataclass(frozen=True, eq=False)

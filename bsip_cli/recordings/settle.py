@@ -17,7 +17,6 @@ from typing import Literal
 import numpy as np
 from scipy.special import logsumexp
 
-from bsip_cli.body.names import TRUNK
 from bsip_cli.recordings.handedness import Handedness, handedness
 from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.model import Recording
@@ -29,10 +28,9 @@ from bsip_cli.recordings.under_the_feet import BESIDE_M, Area, Body, Evidence, F
 
 _SURE = 0.95  # probability from which on a repair is made
 _FEW = 100  # samples that each plate of a trial is seen by
-_ALIKE_M = 0.005  # readings whose centres of pressure differ by less are one
+_ALIKE_M = 0.01  # readings whose centres of pressure differ by less are one
 _RIM_M = 0.02
 _MOSTLY_OUTSIDE = 0.2  # share inside the outline
-_FEWEST = 3
 _TOUCHED_N = 20.0
 _PULLS = 3.0  # a force is reversed if it pulls so many times what it pushes
 
@@ -107,7 +105,7 @@ def look_at(opened: Opened) -> Look | None:
         sources={s.name: s.at(samples) for s in opened.sources},
         loaded={name: mask[samples] for name, mask in heavy.items()},
         feet={s.name: feet.on(s.plate(PlateReading()).corners_m).area() for s in opened.sources},
-        body=Body.of(_trunk(recording), recording.marker_rate_hz, frames),
+        body=Body.of(_by_segment(recording), recording.marker_rate_hz, frames),
         push_N={name: float(lift[lift > LOADED_N].sum()) for name, lift in lifts.items()},
         pull_N={name: float(-lift[lift < -LOADED_N].sum()) for name, lift in lifts.items()},
     )
@@ -201,11 +199,14 @@ def _heavy(lift_N: np.ndarray) -> np.ndarray:
     return size > max(LOADED_N, 0.5 * np.percentile(size, 99)) if len(size) else size > 0
 
 
-def _trunk(recording: Recording) -> np.ndarray:
-    """The markers that are understood to sit on pelvis or trunk; all, where these are too few."""
+def _by_segment(recording: Recording) -> dict[str, np.ndarray]:
+    """The markers of each segment (n_frames, k, 3), by what their labels mean."""
     known = meanings(recording.labels)
-    trunk = [k for k, n in enumerate(recording.labels) if n in known and known[n].segment in TRUNK]
-    return recording.markers_m[:, trunk] if len(trunk) >= _FEWEST else recording.markers_m
+    columns: dict[str, list[int]] = {}
+    for k, label in enumerate(recording.labels):
+        if label in known:
+            columns.setdefault(known[label].segment, []).append(k)
+    return {segment: recording.markers_m[:, some] for segment, some in columns.items()}
 
 
 def _without(look: Look, names: Mapping[str, object]) -> Look:
@@ -234,7 +235,7 @@ class _Session:
         return Evidence.mean(found)
 
     def alike(self, some: Readings, others: Readings) -> bool:
-        """Whether the centres of pressure under load are the same to 5 mm."""
+        """Whether the centres of pressure under load are the same to 10 mm."""
         return all(
             np.nanmax(np.abs(one[2] - two[2])[look.loaded[name]], initial=0.0) < _ALIKE_M
             for name in self.names
@@ -347,14 +348,14 @@ def _better(session: _Session, now: Readings) -> tuple[Readings, float] | None:
 
     Readings that give the same centres of pressure are one.
     """
-    here = session.log_likelihood(now)
+    here = _of_signs(now) + session.log_likelihood(now)
     alternatives = session.alternatives()
     if not alternatives:
         return None
     rarest = max(reading.log_prior() for reading in alternatives)
     if session.is_all_c3d() and here > rarest + np.log(1 / _SURE - 1):
         return None  # no repair could be surer
-    tried = [(now, 0.0), *_repairs(session, now, alternatives)]
+    tried = [(now, _of_signs(now)), *_repairs(session, now, alternatives)]
     logs = np.array([prior + session.log_likelihood(readings) for readings, prior in tried])
     seen = sum(1 + len(look.sources) for look in session.looks)
     unknown = _UNKNOWN + _UNKNOWN_EACH * seen  # a fault that no reading mends
@@ -370,21 +371,24 @@ def _repairs(
     session: _Session, now: Readings, alternatives: Mapping[PlateReading, Sequence[str]]
 ) -> Iterator[tuple[Readings, float]]:
     """Readings with one more repair, of all plates or of one, and the logarithm of its prior."""
-    signs = sum(reading.sign < 0 for reading in now.values())
     for reading, names in alternatives.items():
         for some in {tuple(names), *((name,) for name in names)}:
             changed = {n: session.centred(n, _keeping_place(reading, now[n])) for n in some}
             readings = session.signed({**now, **changed})
             alone = ONE_ALONE * (len(some) < len(session.names))
-            more = sum(r.sign < 0 for r in readings.values()) > signs
-            yield readings, reading.log_prior() + alone + REVERSED * more
+            yield readings, reading.log_prior() + alone + _of_signs(readings)
     for one, two in combinations(session.names, 2):
         pair = (session.looks[0].sources.get(one), session.looks[0].sources.get(two))
         if type(pair[0]) is type(pair[1]):
             places = {one: now[two].place_of or two, two: now[one].place_of or one}
             changed = {n: replace(now[n], place_of=places[n] * (places[n] != n)) for n in places}
             if all(n in look.sources for look in session.looks for n in (one, two)):
-                yield {**now, **changed}, EXCHANGED
+                yield {**now, **changed}, EXCHANGED + _of_signs(now)
+
+
+def _of_signs(readings: Readings) -> float:
+    """Logarithm of how rare it is that files hold the action on the plate, where they do."""
+    return REVERSED * any(reading.sign < 0 for reading in readings.values())
 
 
 def _keeping_place(reading: PlateReading, now: PlateReading) -> PlateReading:

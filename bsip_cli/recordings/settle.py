@@ -20,6 +20,7 @@ from scipy.special import logsumexp
 from bsip_cli.recordings.handedness import Handedness, handedness
 from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.person_size import height_m
 from bsip_cli.recordings.plate_reading import EXCHANGED, ONE_ALONE, REVERSED, PlateReading
 from bsip_cli.recordings.plate_source import C3dPlate, ForceOnPoint, PlateSource
 from bsip_cli.recordings.plates import LOADED_N, inside_share
@@ -147,6 +148,7 @@ class Survey:
 
     hands: Handedness
     looks: Mapping[Scene, Look]
+    height_m: float | None
 
     @classmethod
     def of(cls, opened: Opened) -> Survey:
@@ -157,7 +159,8 @@ class Survey:
         if any(isinstance(source, ForceOnPoint) for source in opened.sources):
             scenes += [Scene("forces", 0), Scene("forces", 1)]
         looks = {scene: look_at(scene.of(opened)) for scene in scenes}
-        return cls(hands, {scene: look for scene, look in looks.items() if look is not None})
+        known = {scene: look for scene, look in looks.items() if look is not None}
+        return cls(hands, known, height_m(_by_segment(opened.recording)))
 
 
 def settle_session(trials: Sequence[Survey]) -> SessionReading:

@@ -6,6 +6,7 @@ import pandas as pd
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.assemble import findings_about
+from bsip_cli.recordings.person_size import no_person
 from bsip_cli.recordings.read import open_recording
 from bsip_cli.recordings.settle import Survey, settle_session
 from bsip_cli.running.unit import Unit
@@ -26,12 +27,22 @@ def run(unit: Unit) -> None:
         ]
         if not seen:
             continue
+        _require_size(unit, seen)
         reading = settle_session(seen)
         rows += rows_of(session or "", reading)
         whose = f"{unit.name}, session {session}" if session else unit.name
         for finding in findings_about(reading):
             unit.warn(f"{whose}: {finding.sentence()}")
     unit.write("readings", pd.DataFrame(rows, columns=column_names("readings")))
+
+
+def _require_size(unit: Unit, seen: list[Survey]) -> None:
+    """The markers are those of somebody as tall as stated, or as people are."""
+    assert unit.participant is not None
+    heights = [one.height_m for one in seen if one.height_m is not None]
+    if heights and (fault := no_person(max(heights), unit.participant.height_m)):
+        found, expected, remedy = fault
+        raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
 
 
 def _survey(unit: Unit, trial: Trial) -> Survey | None:

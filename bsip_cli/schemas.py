@@ -178,6 +178,7 @@ SCHEMAS = {
                 _text("place_of", "the plate with which it was exchanged"),
                 *_floats("half_size_x_m half_size_y_m", "m", "half the widened outline", "plate"),
                 _text("refusal", "why the plate was left out"),
+                _text("rivals", "repairs that would each do, apart by |; not told apart"),
                 _text("repeats", "the plates whose copy or sum it is"),
                 *(
                     column

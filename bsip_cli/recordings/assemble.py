@@ -85,6 +85,11 @@ def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
         return [Finding("plate_repeated", name, found, expected, action, "corrected")]
     if verdict.refusal:
         action = "left the plate out: no other unit, point or order of corners explains it"
+        if len(verdict.rivals) > 1:
+            action = (
+                f"left the plate out: either {' or '.join(verdict.rivals)} would do, and these "
+                "trials cannot tell; one with more movement might"
+            )
         return [_about(name, verdict.refusal, action, "excluded")]
     reading, findings = verdict.reading, []
     if words := reading.words():

@@ -29,15 +29,18 @@ from bsip_cli.recordings.under_the_feet import BESIDE_M, Area, Body, Evidence, F
 
 _SURE = 0.95  # probability from which on a repair is made
 _FEW = 100  # samples that each plate of a trial is seen by
-_ALIKE_M = 0.01  # readings whose centres of pressure differ by less are one
+_ALIKE_M = 0.01  # readings whose centres of pressure differ by less are one,
+_ALIKE_N, _ALIKE_SHARE = 5.0, 0.01  # and whose forces differ by less, or by less of the load
 _RIM_M = 0.02
 _MOSTLY_OUTSIDE = 0.2  # share inside the outline
 _TOUCHED_N = 20.0
 _PULLS = 3.0  # a force is reversed if it pulls so many times what it pushes
 
 # Logarithms: how often something else is wrong; how each trial and plate looks then (a person: -1).
-_UNKNOWN, _UNKNOWN_EACH = -5.3, -2.5
+_UNKNOWN, _UNKNOWN_EACH = -5.3, -1.5
 _IN_PART = -2.3  # markers or forces alone are mirrored more rarely than both: one in ten
+
+_UNTOLD = "its numbers are not those of a force under a foot, and are with more than one repair"
 
 Readings = Mapping[str, PlateReading]
 Mirrored = Literal["", "all", "markers", "forces"]
@@ -78,13 +81,15 @@ class Verdict:
     """How a plate is understood, or why it is left out (``refusal``, a clause).
 
     ``before`` and ``after``: what its numbers make as the file says, and as they are understood,
-    where that differs. ``repeats`` names the plates whose copy or sum it is.
+    where that differs. ``rivals``: repairs that would each explain a plate that is left out, and
+    that cannot be told apart. ``repeats`` names the plates whose copy or sum it is.
     """
 
     reading: PlateReading = field(default_factory=PlateReading)
     before: Evidence | None = None
     after: Evidence | None = None
     refusal: str = ""
+    rivals: tuple[str, ...] = ()
     repeats: tuple[str, ...] = ()
 
 
@@ -191,10 +196,10 @@ def settle(looks: Sequence[Look]) -> tuple[dict[str, Verdict], float]:
     names = [name for name in every if name not in repeats]
     session = _Session([_without(look, repeats) for look in looks], names)
     stated = session.signed(dict.fromkeys(names, PlateReading()))
-    chosen, prior = _repaired(session, stated)
+    chosen = _repaired(session, stated)
     verdicts = {name: _verdict(session, stated, chosen, name) for name in names}
     repeated = {name: Verdict(repeats=others) for name, others in repeats.items()}
-    return verdicts | repeated, prior + session.log_likelihood(chosen)
+    return verdicts | repeated, chosen.log_prior + session.log_likelihood(chosen.readings)
 
 
 def _heavy(lift_N: np.ndarray) -> np.ndarray:
@@ -238,9 +243,9 @@ class _Session:
         return Evidence.mean(found)
 
     def alike(self, some: Readings, others: Readings) -> bool:
-        """Whether the centres of pressure under load are the same to 10 mm."""
+        """Whether centres of pressure under load, and forces, are as good as the same."""
         return all(
-            np.nanmax(np.abs(one[2] - two[2])[look.loaded[name]], initial=0.0) < _ALIKE_M
+            _are_alike(one, two, look.loaded[name])
             for name in self.names
             if some[name] != others[name]
             for look, one, two in zip(
@@ -332,32 +337,56 @@ def _read(look: Look, name: str, reading: PlateReading) -> tuple | None:
     return found, plate.force_N, cop
 
 
+def _are_alike(one: tuple, two: tuple, loaded: np.ndarray) -> bool:
+    """Of one plate in a trial: forces (n, 3) and centres of pressure (n, 2) as read twice."""
+    if not loaded.any():
+        return True
+    (_, force, cop), (_, other_force, other_cop) = one, two
+    load = np.abs(force[loaded, 2]).mean()
+    turned = np.abs(force - other_force)[loaded]
+    apart = np.abs(cop - other_cop)[loaded]
+    return bool(
+        np.nanmax(apart, initial=0.0) < _ALIKE_M
+        and np.nanmean(turned) < max(_ALIKE_N, _ALIKE_SHARE * load)
+    )
+
+
 # --- the choice -------------------------------------------------------------------------------
 
 
-def _repaired(session: _Session, stated: Readings) -> tuple[Readings, float]:
-    """The readings after every repair that is sure, one after the other, and their prior."""
-    chosen, prior = stated, 0.0
+@dataclass(frozen=True)
+class _Choice:
+    """Readings with their prior, and, where something is still wrong, the repairs of each plate, in
+    words, that would do and that these trials cannot tell apart."""
+
+    readings: Readings
+    log_prior: float = 0.0
+    rivals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+def _repaired(session: _Session, stated: Readings) -> _Choice:
+    """The readings after every repair that is sure, one after the other."""
+    chosen = _Choice(stated)
     for _ in range(len(session.names) + 1):
-        better = _better(session, chosen)
-        if better is None:
+        better = _better(session, chosen.readings)
+        chosen = replace(better, log_prior=chosen.log_prior + better.log_prior)
+        if better.log_prior == 0.0:
             break
-        chosen, prior = better[0], prior + better[1]
-    return chosen, prior
+    return chosen
 
 
-def _better(session: _Session, now: Readings) -> tuple[Readings, float] | None:
-    """What is surely better than the readings now, with its prior; None if nothing is.
+def _better(session: _Session, now: Readings) -> _Choice:
+    """What is surely better than the readings now; these, with rivals, if nothing is.
 
-    Readings that give the same centres of pressure are one.
+    Readings that give the same forces at the same places are one.
     """
     here = _of_signs(now) + session.log_likelihood(now)
     alternatives = session.alternatives()
     if not alternatives:
-        return None
+        return _Choice(now)
     rarest = max(reading.log_prior() for reading in alternatives)
     if session.is_all_c3d() and here > rarest + np.log(1 / _SURE - 1):
-        return None  # no repair could be surer
+        return _Choice(now)  # no repair could be surer
     tried = [(now, _of_signs(now)), *_repairs(session, now, alternatives)]
     logs = np.array([prior + session.log_likelihood(readings) for readings, prior in tried])
     seen = sum(1 + len(look.sources) for look in session.looks)
@@ -365,9 +394,16 @@ def _better(session: _Session, now: Readings) -> tuple[Readings, float] | None:
     logs -= logsumexp([*logs, unknown])
     best = tried[int(np.argmax(logs))]
     same = [k for k, (r, _) in enumerate(tried) if logs[k] > -12 and session.alike(best[0], r)]
-    if 0 in same or np.exp(logsumexp(logs[same])) < _SURE:
-        return None
-    return best
+    if 0 in same:
+        return _Choice(now)
+    if np.exp(logsumexp(logs[same])) >= _SURE:
+        return _Choice(*best)
+    likely = [readings for k, (readings, _) in enumerate(tried) if logs[k] > np.log(1 - _SURE)]
+    rivals = {
+        name: tuple(dict.fromkeys(r[name].words() for r in likely if r[name] != now[name]))
+        for name in session.names
+    }
+    return _Choice(now, rivals=rivals)
 
 
 def _repairs(
@@ -398,11 +434,14 @@ def _keeping_place(reading: PlateReading, now: PlateReading) -> PlateReading:
     return replace(reading, place_of=now.place_of)
 
 
-def _verdict(session: _Session, stated: Readings, chosen: Readings, name: str) -> Verdict:
-    before, after = (session.evidence(name, readings[name]) for readings in (stated, chosen))
-    if fault := _fault(after):
-        return Verdict(chosen[name], before, after, refusal=fault)
-    return Verdict(session.fits_outline(name, chosen[name]), before, after)
+def _verdict(session: _Session, stated: Readings, chosen: _Choice, name: str) -> Verdict:
+    reading = chosen.readings[name]
+    before, after = session.evidence(name, stated[name]), session.evidence(name, reading)
+    rivals = chosen.rivals.get(name, ())
+    fault = _fault(after) or (_UNTOLD if len(rivals) > 1 else "")
+    if fault:
+        return Verdict(reading, before, after, refusal=fault, rivals=rivals)
+    return Verdict(session.fits_outline(name, reading), before, after)
 
 
 def _fault(found: Evidence) -> str:

@@ -23,7 +23,7 @@ from bsip_cli.recordings.plates import cop_at_height
 BESIDE_M = 0.12
 """Half a foot's length: a centre of pressure so far beside the feet is not under them."""
 
-_DISTANCE_M, _TORQUE_M, _LEVEL_M = 0.03, 0.015, 0.005  # where the likelihood begins to fall
+_DISTANCE_M, _TORQUE_M, _LEVEL_M = 0.03, 0.05, 0.005  # where the likelihood begins to fall
 _LEVER_M = 0.05  # nobody stands nearer to the very middle of a plate but by chance
 _LEAST = 1e-9
 _OUTLINE = -4.6  # an outline is stated wrongly in one laboratory of a hundred

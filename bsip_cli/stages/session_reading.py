@@ -35,6 +35,7 @@ def _row(verdict: Verdict) -> dict:
         "half_size_x_m": half_x,
         "half_size_y_m": half_y,
         "refusal": verdict.refusal,
+        "rivals": "|".join(verdict.rivals),
         "repeats": " ".join(verdict.repeats),
     }
     unknown = Evidence(*[nothing] * len(_EVIDENCE))
@@ -60,7 +61,14 @@ def _verdict(row: dict) -> Verdict:
     before, after = (
         Evidence(*(row[f"{when}_{name}"] for name in _EVIDENCE)) for when in ("before", "after")
     )
-    return Verdict(reading, before, after, row["refusal"], tuple(row["repeats"].split()))
+    return Verdict(
+        reading,
+        before,
+        after,
+        refusal=row["refusal"],
+        rivals=tuple(filter(None, row["rivals"].split("|"))),
+        repeats=tuple(row["repeats"].split()),
+    )
 
 
 def reading_of(unit: Unit, trial: Trial) -> SessionReading:

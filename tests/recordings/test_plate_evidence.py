@@ -99,7 +99,7 @@ def test_corners_in_another_order_are_turned_under_the_feet(tmp_path):
     force, _ = standing_wrench(N * RATIO)
     force[:, :2] = 0.0  # which would have to go with the body's acceleration
     large = 2.5 * (CORNERS_M - CORNERS_M.mean(axis=0)) + [0.5, 0.9, 0.0]
-    point = _swaying([0.1, 0.3, 0.0])
+    point = _swaying([0.2, 0.3, 0.0])
     spec = PlateSpec(force, np.cross(point, force), corners_m=large)
     spec.channels = PlateSpec(spec.force_N, spec.moment_Nm, corners_m=large).channels
     spec.corners_m = np.roll(large, 2, axis=0)

@@ -265,7 +265,8 @@ class _Session:
         """Other readings, and the plates that they are possible for."""
         found: dict[PlateReading, list[str]] = {}
         for name in self.names:
-            for reading in self._sources(name)[0].alternatives():
+            possible = (r for source in self._sources(name) for r in source.alternatives())
+            for reading in dict.fromkeys(possible):
                 if reading != PlateReading():
                     found.setdefault(reading, []).append(name)
         return found

@@ -264,7 +264,7 @@ def test_touched_recording_is_the_same_recording(run, bsip):
     for path in run.study.rglob("*.c3d"):
         os.utime(path)
     answer = bsip("ingest", run.study, "--out", run.out)
-    assert answer.summary.startswith("bsip ingest: 6 up to date;")
+    assert answer.summary.startswith("bsip ingest: 8 up to date;")
     assert run.times() == times
 
 
@@ -276,7 +276,7 @@ def test_changed_recording_runs_again_with_what_reads_it(run, bsip):
     answer = bsip("run", run.study, "--out", run.out, "--jobs", 2)
     assert answer.code == 0
     rewritten = run.rewritten(times)
-    assert owners_of(rewritten, "ingest") == {"sub-01_task-squat_run-1"}
+    assert owners_of(rewritten, "ingest") == {"sub-01", "sub-01_task-squat_run-1"}
     assert owners_of(rewritten, "scale") == {"sub-01"}
     assert owners_of(rewritten, "ik") == {f"sub-01_{trial}" for trial in TRIALS}
     assert owners_of(rewritten, "stats") == {"group"}
@@ -289,7 +289,7 @@ def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
     times = run.times()
     chosen = ("--participant", "sub-01", "--config", own)
     answer = bsip("run", run.study, "--out", run.out, *chosen)
-    assert answer.summary.startswith("bsip run: 11 done, 11 up to date;")
+    assert answer.summary.startswith("bsip run: 11 done, 12 up to date;")
     rewritten = run.rewritten(times)
     assert stages_of(rewritten) == {
         "reconstruct (trial)",
@@ -578,7 +578,7 @@ def test_bad_line_of_the_table_does_not_stop_the_others(run, bsip, tmp_path):
     assert answer.code == 3
     (sentence,) = [line for line in answer.err.splitlines() if line.startswith("study: ")]
     assert f"{table}: sex '2' of sub-02; expected M, F, other or n/a. To mend it: " in sentence
-    assert answer.summary.startswith("bsip ingest: 3 done, 1 refused;")
+    assert answer.summary.startswith("bsip ingest: 4 done, 1 refused;")
     assert sorted(path.name for path in (tmp_path / "new").iterdir() if path.is_dir()) == ["sub-01"]
 
 
@@ -601,7 +601,7 @@ def test_nothing_is_made_without_what_could_not_be_written(run, bsip):
     before = run.files()
     answer = bsip("run", run.study, "--out", run.out, "--participant", "sub-01", "--force")
     assert answer.code == 2
-    assert answer.summary.startswith("bsip run: 1 done, 1 not to be written;")
+    assert answer.summary.startswith("bsip run: 2 done, 1 not to be written;")
     assert run.files() == before
 
 

@@ -138,7 +138,9 @@ def _pair(
         heights = tuple(dict.fromkeys(h for _, h in pairs)) or heights
         if len(masses) > 1:
             masses = tuple(dict.fromkeys(m for m, _ in pairs)) or masses
-        if len(masses) == len(heights) == 1 and not is_usual_pair(masses[0].value, heights[0].value):
+        if len(masses) == len(heights) == 1 and not is_usual_pair(
+            masses[0].value, heights[0].value
+        ):
             may_be = " or ".join(f"{m.value:.1f} kg ({m.unit})" for m, _ in pairs)
             found = (
                 f"a mass of {masses[0].value:.4g} kg beside a height of {heights[0].value:.3g} m"

@@ -185,10 +185,19 @@ def test_every_artifact_says_what_made_it(first_run, stage):
             hashes |= {name: joint_sha256(of_people[name]) for name in named & set(of_people)}
             assert made_by["inputs"] == hashes
             people = [path.name for found in of_people.values() for path in found]
-            kinds = {kind_of(name) for name in [*hashes, *people] if name not in of_people}
-            recording = {path.name.removesuffix(f"_{kind}.parquet").split("_")[-1]}
+            read = {name for name in [*hashes, *people] if name not in of_people}
+            recordings = {name for name in read if name.endswith(".c3d")}
+            kinds = {kind_of(name) for name in read - recordings}
             assert set(stage.reads) <= kinds
-            assert kinds == (set(stage.inputs) or recording)
+            assert kinds == set(stage.inputs)
+            owner = path.name.removesuffix(f"_{kind}.parquet") if stage.reads_recordings else None
+            assert recordings == {name for name in files if is_recording_of(name, owner)}
+
+
+def is_recording_of(name: str, owner: str | None) -> bool:
+    """Of a trial, or any of a participant's."""
+    stem = name.removesuffix(".c3d")
+    return stem != name and owner in (stem, stem.split("_")[0])
 
 
 def read_of(stage: Stage, participant: str, files: dict[str, Path]) -> list[Path]:
@@ -431,8 +440,8 @@ def test_who_is_stale_is_left_out_of_the_group_and_named(run, bsip, command):
     answer = bsip(command[0], run.study, "--out", run.out, *command[1:])
     assert answer.code == 3
     assert answer.err.splitlines()[0] == (
-        "stats: sub-02: left out of the group, since what `bsip ingest` made of "
-        f"sub-02_{TRIALS[0]} is not up to date (other options (participant)); run `bsip run` first"
+        "stats: sub-02: left out of the group, since what `bsip ingest` made of sub-02 is not up "
+        "to date (other options (participant)); run `bsip run` first"
     )
     values = read_artifact(run.path("values", "group"), "values")
     assert set(values["participant"]) == {"sub-01"}
@@ -611,7 +620,8 @@ def test_warnings_are_told_and_kept(run, bsip):
     table.write_text(table.read_text().replace("\tM\t", "\tM\t1", 1))
     answer = bsip("scale", run.study, "--out", run.out, "--participant", "sub-01")
     assert answer.code == 0
-    (told,) = [line for line in answer.err.splitlines() if "the plates read" in line]
+    (told,) = [line for line in answer.err.splitlines() if "do not agree" in line]
+    assert "the plates tell" in told
     kept = read_header(run.path("person"))["provenance"]["messages"]
     assert told.removeprefix("scale: ") in kept
 

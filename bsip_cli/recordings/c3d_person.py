@@ -8,7 +8,7 @@ import numpy as np
 
 from bsip_cli.recordings.c3d_parameters import Group, Parameters, texts
 from bsip_cli.recordings.model import Finding, StatedPerson
-from bsip_cli.stated.quantities import HEIGHT, MASS, Quantity, Reading, is_of_people, readings_of
+from bsip_cli.stated.quantities import HEIGHT, MASS, Quantity, Reading, is_usual_pair, readings_of
 from bsip_cli.stated.sex_words import COLUMN_NAMES, sex_of
 
 _GROUPS = ("PROCESSING", "PATIENT", "PARTICIPANT", "ANTHROPOMETRY", "SUBJECT")
@@ -138,7 +138,9 @@ def _pair(
         heights = tuple(dict.fromkeys(h for _, h in pairs)) or heights
         if len(masses) > 1:
             masses = tuple(dict.fromkeys(m for m, _ in pairs)) or masses
-        if len(masses) == len(heights) == 1 and not is_of_people(masses[0].value, heights[0].value):
+        if len(masses) == len(heights) == 1 and not is_usual_pair(
+            masses[0].value, heights[0].value
+        ):
             may_be = " or ".join(f"{m.value:.1f} kg ({m.unit})" for m, _ in pairs)
             found = (
                 f"a mass of {masses[0].value:.4g} kg beside a height of {heights[0].value:.3g} m"
@@ -157,7 +159,7 @@ def _pair(
 def _of_people(
     masses: Iterable[Reading], heights: Sequence[Reading]
 ) -> list[tuple[Reading, Reading]]:
-    return [(m, h) for m in masses for h in heights if is_of_people(m.value, h.value)]
+    return [(m, h) for m in masses for h in heights if is_usual_pair(m.value, h.value)]
 
 
 def _all_units(masses: tuple[Reading, ...], quantity: Quantity) -> list[Reading]:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from bsip_cli.recordings.momentum_mass import COMES_AND_GOES, Stretch
+from bsip_cli.stated.quantities import BMI_KG_M2
 
 # Gain of a plate and local gravity: 0.5 % of the range for a plate's linearity and hysteresis
 # (makers' data sheets), 0.27 % between equator and poles for gravity.
@@ -18,9 +19,6 @@ AGREE_P = 0.01
 LOWER_Z = 3.0
 LEAST_SHARE = 0.5  # of a trial's time, that must agree
 LEAST_KG, MOST_KG = 10.0, 400.0  # as in participants.tsv
-# Body-mass index of people [kg/m2]: about 12 is the lowest that is survived (James et al. 1988),
-# beyond 60 begins the last class that surgery has a name for.
-BMI_KG_M2 = (12.0, 60.0)
 _PERCENT = 100.0
 
 

@@ -6,9 +6,12 @@ import re
 from dataclasses import dataclass
 from itertools import pairwise
 
-BMI_KG_M2 = (12.0, 40.0)
-"""Body-mass indices that need no word: survival ends at 11 to 13 (Henry 1990, Eur J Clin Nutr 44),
-healthy children go down to 12.9 (WHO 2007, third percentile); obesity of class III begins at 40."""
+BMI_KG_M2 = (12.0, 60.0)
+"""Body-mass indices of people: survival ends at 11 to 13 (Henry 1990, Eur J Clin Nutr 44), healthy
+children go down to 12.9 (WHO 2007, third percentile); beyond 60 begins the last class that surgery
+has a name for."""
+USUAL_BMI_KG_M2 = (12.0, 40.0)
+"""Those that tell which unit is meant where none is stated; obesity of class III begins at 40."""
 
 
 @dataclass(frozen=True)
@@ -137,21 +140,23 @@ def _sum(parts: list[tuple[float, str]], quantity: Quantity) -> float | None:
     return sum(n * quantity.units[u] for (n, _), u in zip(parts, units, strict=True))
 
 
-def is_of_people(mass_kg: float, height_m: float) -> bool:
-    """Whether the body-mass index needs no word."""
-    return BMI_KG_M2[0] <= mass_kg / height_m**2 <= BMI_KG_M2[1]
+def is_usual_pair(mass_kg: float, height_m: float) -> bool:
+    """Whether the body-mass index is one that a unit may be told by."""
+    return USUAL_BMI_KG_M2[0] <= mass_kg / height_m**2 <= USUAL_BMI_KG_M2[1]
 
 
 def odd_pair(mass_kg: float | None, height_m: float | None) -> str:
     """What to say of a mass and a height that hardly belong to one person; empty if they do."""
-    if mass_kg is None or height_m is None or is_of_people(mass_kg, height_m):
+    if mass_kg is None or height_m is None:
+        return ""
+    if BMI_KG_M2[0] <= mass_kg / height_m**2 <= BMI_KG_M2[1]:
         return ""
     likely = [
         f"in {unit} the mass would be {value:.1f} kg and the index {value / height_m**2:.1f}"
         for unit in MASS.guessed
         if unit != "kg"
         and MASS.holds(value := mass_kg * MASS.units[unit])
-        and is_of_people(value, height_m)
+        and is_usual_pair(value, height_m)
     ]
     return (
         f"{mass_kg:.4g} kg and {height_m:.4g} m are a body-mass index of "

@@ -16,7 +16,7 @@ from bsip_cli.stated.quantities import (
     MASS,
     Quantity,
     Reading,
-    is_of_people,
+    is_usual_pair,
     odd_pair,
     readings_of,
 )
@@ -266,7 +266,7 @@ def _settle(mass: _Found, height: _Found) -> None:
     if not mass.readings or not height.readings:
         return
     pairs = [
-        (m, h) for m in mass.readings for h in height.readings if is_of_people(m.value, h.value)
+        (m, h) for m in mass.readings for h in height.readings if is_usual_pair(m.value, h.value)
     ]
     if len(mass.readings) > 1:
         mass.readings = tuple(dict.fromkeys(m for m, _ in pairs)) or mass.readings

@@ -174,23 +174,29 @@ def test_corrupt_recording_is_refused_in_one_sentence(bsip, empty_study, tmp_pat
     assert str(recording) in sentence
     assert "; expected " in sentence
     assert ". To mend it: " in sentence
-    assert summary == f"bsip ingest: 1 refused; results in {out}"
+    assert summary == f"bsip ingest: 1 done, 1 refused; results in {out}"
     written = out / "sub-02" / "sub-02_task-static_refusal-ingest.parquet"
     assert {path.name for path in (out / "sub-02").iterdir()} == {
         ".fingerprints.json",
         ".lock",
+        "sub-02_readings.parquet",
         written.name,
     }
+    assert read_artifact(out / "sub-02" / "sub-02_readings.parquet", "readings").empty
     row = read_artifact(written, "refusal").iloc[0]
     assert (row["stage"], row["kind"]) == ("ingest", "bad data")
     assert row["sentence"] in sentence
 
 
 def test_everybody_refused(bsip, empty_study, tmp_path):
-    """No stage after the refusal fails, and nothing pretends to be done."""
+    """No stage after the refusal fails; done is only the look at each person's recordings."""
     answer = bsip("run", empty_study, "--out", tmp_path / "out", "--jobs", 2)
     assert answer.code == 3
     assert "Traceback" not in answer.err
-    assert " done" not in answer.summary
-    assert "2 refused" in answer.summary
+    assert answer.summary.startswith("bsip run: 2 done, 2 refused, 25 without input;")
+    done = {path.name for path in (tmp_path / "out").glob("*/*.parquet")}
+    assert {name for name in done if "_refusal-" not in name} == {
+        "sub-01_readings.parquet",
+        "sub-02_readings.parquet",
+    }
     assert "sub-01: left out of scale, since its input was refused" in answer.err

@@ -212,13 +212,13 @@ def test_deleted_artifact_is_made_again(done):
 
 
 def test_older_recording_is_another_recording(done):
-    """Of the same size, too."""
+    """Of the same size, too. The session is read anew, then the trial."""
     path = done.recording("sub-01")
     size = path.stat().st_size
     shutil.copy(done.recording("sub-02"), path)
     os.truncate(path, size)
     os.utime(path, (0, 0))
-    assert done.call("ingest").summary.startswith("bsip ingest: 1 done, 1 up to date;")
+    assert done.call("ingest").summary.startswith("bsip ingest: 2 done, 2 up to date;")
 
 
 def test_a_stage_alone_says_what_is_stale_before_it(done, tmp_path):

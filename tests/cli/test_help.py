@@ -26,6 +26,7 @@ HEAVY = [
 ]
 STAGE_COMMANDS = [*dict.fromkeys(stage.name for stage in STAGES), "run"]
 OTHER_COMMANDS = [
+    "check",
     "init",
     "simulate",
     "inject",

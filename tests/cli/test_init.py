@@ -91,7 +91,7 @@ def test_what_comes_out_is_ingested(bsip, lab):
     assert bsip("init", lab, "--out", out, "--participant", "P7").code == 0
     answer = bsip("ingest", out, "--out", out / "derivatives" / "bsip")
     assert answer.code == 0, answer.err
-    assert answer.summary.startswith("bsip ingest: 3 done")
+    assert answer.summary.startswith("bsip ingest: 4 done")  # three trials, one session
 
 
 def test_nothing_is_written_over(lab):

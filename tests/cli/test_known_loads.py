@@ -123,7 +123,8 @@ class Run:
         assert not refusals
         person = study.participants[0]
         trial = next((trial for trial in person.trials if trial.stem == stem), None)
-        first = next(each for each in STAGES if each.name == stage)
+        level = "trial" if stem else "participant"
+        first = next(each for each in STAGES if (each.name, each.level) == (stage, level))
         return Unit(first, study, self.out, config, person, trial)
 
     def perform(self, stage: str, stem: str = "") -> Outcome:

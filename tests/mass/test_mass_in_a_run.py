@@ -63,12 +63,19 @@ class Run:
         found, _ = load_study(self.study, config.roles.model_dump())
         person = found.participants[0]
         trial = next((one for one in person.trials if one.stem == stem), None)
-        first = next(one for one in STAGES if one.name == stage)
+        level = "trial" if stem else "participant"
+        first = next(one for one in STAGES if (one.name, one.level) == (stage, level))
         return Unit(first, found, self.out, config, person, trial)
 
+    def ingest(self, *stems: str) -> list[Outcome]:
+        """The session first, then these trials."""
+        assert self.perform("ingest").state == "done"
+        done = [self.perform("ingest", stem) for stem in stems]
+        assert [one.state for one in done] == ["done"] * len(stems)
+        return done
+
     def until_scale(self, *stems: str) -> Outcome:
-        for stem in stems or (STATIC, SQUAT):
-            assert self.perform("ingest", stem).state == "done"
+        self.ingest(*(stems or (STATIC, SQUAT)))
         done = self.perform("scale")
         assert done.state == "done"
         return done
@@ -119,8 +126,7 @@ def test_where_nothing_tells_the_mass_kinematics_are_made_and_regress_waits(run,
 )
 def test_a_wrong_unit_is_the_first_line_and_no_seat(run, stated, likely):
     run.state(stated)
-    first = run.perform("ingest", STATIC).sentences[0]
-    assert run.perform("ingest", SQUAT).state == "done"
+    first = run.ingest(STATIC, SQUAT)[0].sentences[0]
     done = run.perform("scale")
     for sentence in (first, done.sentences[0]):
         assert "do not agree" in sentence and likely in sentence

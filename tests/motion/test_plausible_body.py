@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.motion.inverse_kinematics import neutral
 from bsip_cli.motion.plausible_body import doubts_about
+from bsip_cli.stated.quantities import BMI_KG_M2, odd_pair
 from tests.body.standing_person import standing
 
 
@@ -63,6 +64,14 @@ def test_stature(person, height_m, said, is_gross):
 @pytest.mark.parametrize(("mass_kg", "said"), [(70.0, 0), (np.nan, 0), (30.0, 1), (250.0, 1)])
 def test_body_mass_index(person, mass_kg, said):
     assert len([d for d in _doubts(person, mass_kg=mass_kg) if "index" in d.found]) == said
+
+
+def test_body_mass_index_has_the_range_of_the_table(person):
+    """What participants.tsv takes without a word is not doubted later, and the other way round."""
+    for index, said in ((BMI_KG_M2[0] + 0.1, 0), (BMI_KG_M2[1] - 0.1, 0), (BMI_KG_M2[1] + 0.1, 1)):
+        found = _doubts(person, height_m=1.77, mass_kg=index * 1.77**2)
+        assert len([one for one in found if "index" in one.found]) == said
+        assert (odd_pair(index * 1.77**2, 1.77) != "") == bool(said)
 
 
 @pytest.mark.parametrize(

@@ -21,8 +21,9 @@ N = 30
 @pytest.fixture
 def path(tmp_path) -> Path:
     markers, labels = standing_markers(N)
-    plate = PlateSpec(*standing_wrench(10 * N))
-    return write_c3d(tmp_path / "a.c3d", markers, labels, [plate, plate])
+    force, moment = standing_wrench(10 * N)
+    plates = [PlateSpec(share * force, share * moment) for share in (0.4, 0.6)]
+    return write_c3d(tmp_path / "a.c3d", markers, labels, plates)
 
 
 def _write(path: Path, place: int, dimensions: int, value: float) -> None:

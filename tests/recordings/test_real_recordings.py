@@ -185,9 +185,11 @@ def test_kistlers_polynomial_gives_the_centre_of_pressure_of_ezc3d(real_data, na
     ],
 )
 def test_centre_of_pressure_lies_under_the_feet(real_data, name):
+    """Of every loaded plate, to a foot's breadth: two markers on a foot tell no more."""
     session = settle_session([Survey.of(open_recording(real_data / name))])
-    found = [verdict.after for verdict in session.plates.values()]
-    assert found and max(one.distance_m for one in found) < 0.06
+    distances = np.array([verdict.after.distance_m for verdict in session.plates.values()])
+    loaded = distances[np.isfinite(distances)]
+    assert len(loaded) and loaded.max() < 0.1
     assert [f.check for f in findings_about(session)] == []  # sound: nothing is changed
 
 

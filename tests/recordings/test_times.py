@@ -38,7 +38,8 @@ def _trc(tmp_path, stamps, stated_hz=100.0, header=lambda text: text, n=N):
 
 def _mot(tmp_path, stamps, n=None):
     force, _ = standing_wrench(len(stamps))
-    columns = np.hstack([force[:, [0, 2, 1]], 0.2 + 0 * force, 0 * force])
+    point = np.array([0.2, 0.0, -0.3])  # between the feet, Y up
+    columns = np.hstack([force[:, [0, 2, 1]], point + 0 * force, 0 * force])
     path = write_mot(
         tmp_path / "a.mot", np.arange(len(stamps)), dict(zip(FORCE, columns.T, strict=True))
     )
@@ -275,6 +276,8 @@ def test_forces_that_cover_a_part_are_said_with_both_times(tmp_path):
     "stamp", [lambda k: f"{20 * k}", lambda k: f"{20_000 * k}", lambda k: f"{k}"]
 )
 def test_no_grid_is_longer_than_both_files(tmp_path, stamp):
+    """8 s of markers ask for eight times the forces' rows, and each is held in some readings: 25
+    times the files, however long they are. Twice as long a grid would go beyond 30."""
     _mot(tmp_path, [f"{k / 2000:.4f}" for k in range(2000)])
     path = _trc(tmp_path, [stamp(k) for k in range(N)], 50.0)
     read_recording(path)
@@ -285,7 +288,8 @@ def test_no_grid_is_longer_than_both_files(tmp_path, stamp):
     finally:
         tracemalloc.stop()
     assert recording.marker_rate_hz == 50.0
-    assert peak < 20 * (path.stat().st_size + (tmp_path / "a.mot").stat().st_size)
+    assert recording.plates
+    assert peak < 30 * (path.stat().st_size + (tmp_path / "a.mot").stat().st_size)
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,8 @@ class PlateSource(Protocol):
         """What is left at the points that the file calls centres of pressure, if it names some."""
 
     def lever_m(self, reading: PlateReading) -> np.ndarray | None:
-        """How far from the sensor its moments have the force, (n,); None where there is none."""
+        """How far from the sensor, or from the origin of its points, the force is, (n,); None where
+        there is neither."""
 
     def in_place_of(self, other: PlateSource) -> PlateSource:
         """This force where the other one is."""
@@ -211,8 +212,11 @@ class ForceOnPoint:
         written = self.moment @ turn.T * reading.moment_scale
         return LeftMoment(np.hypot(*left.T[:2]), np.hypot(*written.T[:2]))
 
-    def lever_m(self, reading: PlateReading) -> None:
-        return None
+    def lever_m(self, reading: PlateReading) -> np.ndarray | None:
+        """From the laboratory's origin, where points in too small a unit come to lie."""
+        if self.points is None:
+            return None
+        return np.linalg.norm(self.points, axis=1) * reading.point_scale
 
     def in_place_of(self, other: PlateSource) -> ForceOnPoint:
         assert isinstance(other, ForceOnPoint)

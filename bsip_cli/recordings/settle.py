@@ -30,7 +30,7 @@ from bsip_cli.recordings.under_the_feet import BESIDE_M, Area, Body, Evidence, F
 _SURE = 0.95  # probability from which on a repair is made
 _FEW = 100  # samples that each plate of a trial is seen by
 _ALIKE_M = 0.01  # readings whose centres of pressure differ by less are one,
-_ALIKE_N, _ALIKE_SHARE = 5.0, 0.01  # and whose forces differ by less, or by less of the load
+_ALIKE_SHARE = 0.03  # if their total forces differ by less than this part of the load
 _RIM_M = 0.02
 _MOSTLY_OUTSIDE = 0.2  # share inside the outline
 _TOUCHED_N = 20.0
@@ -243,19 +243,22 @@ class _Session:
         return Evidence.mean(found)
 
     def alike(self, some: Readings, others: Readings) -> bool:
-        """Whether centres of pressure under load, and forces, are as good as the same."""
-        return all(
-            _are_alike(one, two, look.loaded[name])
-            for name in self.names
-            if some[name] != others[name]
-            for look, one, two in zip(
-                self.looks,
-                self._seen(name, some[name]),
-                self._seen(name, others[name]),
-                strict=True,
-            )
-            if name in look.sources
-        )
+        """Whether they leave the same total force, and each plate's centre of pressure."""
+        changed = [name for name in self.names if some[name] != others[name]]
+        for k, look in enumerate(self.looks):
+            pairs = [
+                (self._seen(name, some[name])[k], self._seen(name, others[name])[k], name)
+                for name in changed
+                if name in look.sources
+            ]
+            apart = [np.abs(one[2] - two[2])[look.loaded[name]] for one, two, name in pairs]
+            if any(np.nanmax(gap, initial=0.0) >= _ALIKE_M for gap in apart):
+                return False
+            turned = np.sum([one[1] - two[1] for one, two, _ in pairs], axis=0)
+            total = np.sum([self._seen(n, some[n])[k][1][:, 2] for n in look.sources], axis=0)
+            if pairs and np.nanmean(np.abs(turned)) > _ALIKE_SHARE * np.nanmean(np.abs(total)):
+                return False
+        return True
 
     def signed(self, readings: Readings) -> dict[str, PlateReading]:
         """With the signs that let the person press: mirrored corners turn a plate's axis over."""
@@ -336,20 +339,6 @@ def _read(look: Look, name: str, reading: PlateReading) -> tuple | None:
     cop = plate.cop_m(floor)
     cop[np.abs(plate.force_N[:, 2]) < _TOUCHED_N] = np.nan
     return found, plate.force_N, cop
-
-
-def _are_alike(one: tuple, two: tuple, loaded: np.ndarray) -> bool:
-    """Of one plate in a trial: forces (n, 3) and centres of pressure (n, 2) as read twice."""
-    if not loaded.any():
-        return True
-    (_, force, cop), (_, other_force, other_cop) = one, two
-    load = np.abs(force[loaded, 2]).mean()
-    turned = np.abs(force - other_force)[loaded]
-    apart = np.abs(cop - other_cop)[loaded]
-    return bool(
-        np.nanmax(apart, initial=0.0) < _ALIKE_M
-        and np.nanmean(turned) < max(_ALIKE_N, _ALIKE_SHARE * load)
-    )
 
 
 # --- the choice -------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.commands.markers import Request, markers_command
 from bsip_cli.errors import BadDataError, UsageError
 
+LINE_M = 1.5
 HANSEN = [marker.label for marker in load_marker_set("hansen2017").markers]
 OWN = [
     "c7",
@@ -47,14 +48,15 @@ def here(tmp_path, monkeypatch):
 
 
 def recording(folder: Path, labels: Sequence[str], empty: Sequence[str] = ()) -> Path:
-    """A TRC file of two frames with markers at different places."""
+    """A TRC file of two frames with markers at different places, on a line as long as a person."""
     path = folder / "a trial.trc"
+    places_mm = 1e3 * LINE_M / np.sqrt(3) * np.arange(len(labels)) / len(labels)
     rows = [
         "\t".join(
             [str(frame + 1), f"{frame / 100:g}"]
             + [
-                "\t\t" if label in empty else f"{k}\t{k + 1}\t{k + 2}"
-                for k, label in enumerate(labels)
+                "\t\t" if label in empty else f"{x:.4f}\t{x + 1:.4f}\t{x + 2:.4f}"
+                for x, label in zip(places_mm, labels, strict=True)
             ]
         )
         for frame in range(2)
@@ -261,6 +263,5 @@ def test_two_people_of_one_recording_in_a_study(bsip, here):
         table = pd.read_parquet(here / "out" / person / f"{person}_task-static_markers.parquet")
         first_y[person] = table.loc[0, ["x_m", "y_m", "z_m"]].to_numpy(dtype=float)
         assert list(table["marker"][:3]) == HANSEN[:3]
-    assert np.linalg.norm(first_y["sub-02"] - first_y["sub-01"]) == pytest.approx(
-        len(HANSEN) * np.sqrt(3) * 1e-3
-    )
+    apart_m = np.linalg.norm(first_y["sub-02"] - first_y["sub-01"])
+    assert apart_m == pytest.approx(LINE_M / 2, abs=1e-5)

@@ -9,7 +9,7 @@ from pathlib import Path
 from shlex import quote
 
 from bsip_cli.commands.init_files import Source
-from bsip_cli.errors import printable
+from bsip_cli.errors import BadDataError, printable
 from bsip_cli.recordings.marker_guess import told_from
 from bsip_cli.recordings.starter_set import starter_toml
 from bsip_cli.study.new_study import Named
@@ -51,8 +51,11 @@ def study_markers(sources: Sequence[Source], named: Mapping[Path, Named]) -> Stu
 
 
 def _shipped(source: Source) -> str:
-    """The shipped set that a recording fits; empty without one."""
-    guess = told_from(source.labels)
+    """The shipped set that a recording fits; empty without one, or with two people in the file."""
+    try:
+        guess = told_from(source.labels)
+    except BadDataError:
+        return ""  # ingest says it of the file
     return guess.name if guess.is_shipped else ""
 
 
@@ -60,7 +63,11 @@ def _starter(sources: Sequence[Source], named: Mapping[Path, Named]) -> StudyMar
     """A first set of all labels, those of static trials first."""
     order = sorted(sources, key=lambda source: named[source.path].task != "static")
     labels = dict.fromkeys(label for source in order for label in source.labels)
-    guess = told_from(tuple(labels))
+    try:
+        guess = told_from(tuple(labels))
+    except BadDataError as several:
+        note = f"no shipped marker set fits, nor one for all recordings together: {several.found}"
+        return StudyMarkers("auto", "", (f"{note}; a study per laboratory may do",))
     note = (
         f"no shipped marker set fits: {STARTER} in the study is a first one, guessed from the "
         "labels; check it before you trust a number"

@@ -40,7 +40,7 @@ from bsip_cli.simulate.plan import Plan
 from bsip_cli.simulate.recording import write_trial
 from bsip_cli.simulate.sketch import sketch_for
 from bsip_cli.simulate.trial import THIN, Trial, simulate_trial, trial_of
-from bsip_cli.stages import ingest
+from bsip_cli.stages import ingest, survey
 from bsip_cli.study.study import load_study
 
 STEM = "sub-01_task-any_run-1"
@@ -183,8 +183,9 @@ def stretches_of_case(kind: str, seed: int, folder: Path) -> tuple[float, list[S
     config = load_config([study / "study.toml"])
     found, _ = load_study(study, config.roles.model_dump())
     participant = found.participants[0]
-    stage = next(stage for stage in STAGES if stage.name == "ingest")
-    unit = Unit(stage, found, folder / "out", config, participant, participant.trials[0])
+    session, trial = (stage for stage in STAGES if stage.name == "ingest")
+    survey.run(Unit(session, found, folder / "out", config, participant))
+    unit = Unit(trial, found, folder / "out", config, participant, participant.trials[0])
     ingest.run(unit)
     records = unit.facts("wrench")["mass_stretches"]
     return person.mass_kg, [Stretch.of(record) for record in records]

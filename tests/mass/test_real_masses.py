@@ -11,7 +11,7 @@ from bsip_cli.pipeline import STAGES
 from bsip_cli.recordings.momentum_mass import Stretch
 from bsip_cli.recordings.told_mass import ToldMass, told_mass
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages import ingest
+from bsip_cli.stages import ingest, survey
 from bsip_cli.study.study import load_study
 
 pytestmark = [pytest.mark.real, pytest.mark.long]
@@ -52,7 +52,9 @@ def told(data: Path, name: str, folder: Path) -> ToldMass:
     config = load_config([])
     found, _ = load_study(study, config.roles.model_dump())
     person = found.participants[0]
-    unit = Unit(STAGES[0], found, folder / f"{source.stem}-out", config, person, person.trials[0])
+    out = folder / f"{source.stem}-out"
+    survey.run(Unit(STAGES[0], found, out, config, person))
+    unit = Unit(STAGES[1], found, out, config, person, person.trials[0])
     ingest.run(unit)
     stretches = [Stretch.of(record) for record in unit.facts("wrench")["mass_stretches"]]
     return told_mass({name: stretches}, config.ingest.mass_half_width_percent)

@@ -140,7 +140,11 @@ def ask(study: Path, out: Path) -> Answer:
         return Answer("refused", tuple(sentences))
     participant = opened.study.participants[0]
     numbers = _stated(asdict(participant))
-    stage = stages_named("ingest")[0]
+    session, stage = stages_named("ingest")
+    first = perform(Unit(session, opened.study, out, opened.config, participant), True)
+    sentences += first.sentences
+    if first.state != "done":
+        return Answer("refused", tuple(sentences))
     for trial in participant.trials:
         outcome = perform(Unit(stage, opened.study, out, opened.config, participant, trial), True)
         sentences += outcome.sentences

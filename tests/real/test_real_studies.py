@@ -83,7 +83,8 @@ def opencap(tmp_path_factory):
 def test_opencap_runs_and_says_what_it_met(opencap):
     done, out = opencap
     assert done.returncode == 0, done.stderr
-    assert "the plates read 60.05 kg in quiet standing, stated are 62.60 kg" in done.stderr
+    assert "the plates tell 60.18 kg (to 1.1 %)" in done.stderr
+    assert "stated are 62.60 kg (-3.9 %, tolerance 2 %)" in done.stderr
     assert "no markers on the head" in done.stderr
     assert (out / "sub-01" / "report.html").exists()
     assert (out / "group" / "tables" / "table2_cop_rmse.csv").exists()

@@ -18,6 +18,11 @@ _ABSURD_N = 15_000.0
 _LIGHTLY_LOADED_N = 20.0
 _PULL_SHARE = 0.2  # of the push's impulse
 _UNLOADED = Verdict()
+_WITHOUT_PLACE = (
+    "this recording lacks the plate with which it was exchanged in the others",
+    "left the plate out",
+    "excluded",
+)
 
 
 def assemble(opened: Opened, session: SessionReading) -> Recording:
@@ -35,6 +40,9 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
         if verdict.refusal or verdict.repeats:
             continue
         if other := verdict.reading.place_of:
+            if other not in by_name:
+                findings.append(_about(source.name, *_WITHOUT_PLACE))
+                continue
             source = source.in_place_of(by_name[other])
         plate = source.plate(verdict.reading)
         if fault := _no_person(plate):

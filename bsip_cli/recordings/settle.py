@@ -40,7 +40,9 @@ _PULLS = 3.0  # a force is reversed if it pulls so many times what it pushes
 _UNKNOWN, _UNKNOWN_EACH = -5.3, -1.5
 _IN_PART = -2.3  # markers or forces alone are mirrored more rarely than both: one in ten
 
-_UNTOLD = "its numbers are not those of a force under a foot, and are with more than one repair"
+_UNTOLD = "its numbers are no force under a foot as they stand, and several corrections make one"
+    "as they stand its numbers are no force under a foot, and several corrections make them one"
+)
 
 Readings = Mapping[str, PlateReading]
 Mirrored = Literal["", "all", "markers", "forces"]

@@ -1,7 +1,8 @@
 """Is this the force under a foot? What one trial shows of one plate, and how likely a person is.
 
 One measure for every format and every way in which a plate's numbers may be misunderstood: centre
-of pressure against the feet on the ground, against the outline, its sway, and the moments at it.
+of pressure against the feet on the ground, against the outline and the sensor, the moments at it,
+and whether these forces carry and drive the body.
 The scales are those of 130 sound plates of 40 public recordings: the centre of pressure lies within
 the feet's markers in the median and 85 mm beside them at most (sets with two markers on a foot);
 the vertical moment over the force is 3 mm, in golf swings 60.
@@ -29,11 +30,8 @@ _LEAST = 1e-9
 _OUTLINE = -4.6  # an outline is stated wrongly in one laboratory of a hundred
 _BALANCE_M = 0.06  # of the centre of mass from the centre of pressure: median 40 mm
 _MOST_OF_IT = 0.5  # of the body's mass
-_INDEPENDENT, _LEAST_SHARE, _HAIR_M = (
-    3.0,
-    1e-3,
-    1e-5,
-)  # samples that agree by chance, and how nearly
+_INDEPENDENT = 3.0  # numbers of a trial that must agree by chance
+_LEAST_SHARE, _HAIR_M = 1e-3, 1e-5  # how nearly they can
 _MOSTLY = 0.9  # force and acceleration go together: r = 0.6 to 0.95 in movement, never surely
 _FEWEST_FRAMES, _SLOW_HZ = 10, 5.0
 _FURTHEST_M = 1e4

@@ -176,3 +176,12 @@ def test_feet_on_the_plate_count_before_all_others():
     kept = Feet(points).on(corners(0)).points_m
     assert np.isfinite(kept[0, 0]).all() and np.isnan(kept[0, 1]).all()
     np.testing.assert_array_equal(kept[1], points[1])
+
+
+def test_a_trial_without_the_exchanged_plate_leaves_its_own_out():
+    one, two = of_c3d()
+    trial = opened([replace(one, wrench=two.wrench), replace(two, wrench=one.wrench)])
+    session = settle_session([Survey.of(trial)])
+    alone = assemble(opened([one]), session)
+    assert alone.plates == ()
+    assert [f.level for f in alone.findings if "lacks the plate" in f.found] == ["excluded"]

@@ -41,8 +41,6 @@ _UNKNOWN, _UNKNOWN_EACH = -5.3, -1.5
 _IN_PART = -2.3  # markers or forces alone are mirrored more rarely than both: one in ten
 
 _UNTOLD = "its numbers are no force under a foot as they stand, and several corrections make one"
-    "as they stand its numbers are no force under a foot, and several corrections make them one"
-)
 
 Readings = Mapping[str, PlateReading]
 Mirrored = Literal["", "all", "markers", "forces"]

@@ -104,7 +104,7 @@ cat > bin/bsip << 'END'
 echo "$6" >> "$CALLS"
 case "$6" in
     sub-01) python3 -c "import time; held = bytearray(3_500_000_000); time.sleep(8)" ;;
-    sub-02) [ "$(grep -c sub-02 "$CALLS")" -gt 1 ] || exec sleep 600 ;;
+    sub-02) [ "$(grep -c sub-02 "$CALLS")" -gt 1 ] || exec sleep 3600 ;;
 esac
 END
 chmod +x bin/bsip

@@ -84,8 +84,12 @@ class Person:
 
 @dataclass(frozen=True, eq=False)
 class MeanSegment:
-    """A row of the mean person: percent of body mass, centre of mass and tensor in lengths."""
+    """A row of the mean person: percent of body mass, centre of mass and tensor in lengths.
 
+    origin : joint centre from which the row's centre of mass is counted.
+    """
+
+    origin: str
     mass_percent: float
     com: np.ndarray
     tensor: np.ndarray
@@ -106,7 +110,11 @@ def _mean_segment(row: dict[str, str]) -> MeanSegment:
     tensor = np.array([[entry["r" + "".join(sorted(i + j))] for j in "xyz"] for i in "xyz"])
     com = np.array([float(row[f"com_{axis}_percent"]) / 100 for axis in "xyz"])
     return MeanSegment(
-        float(row["mass_percent"]), com, nearest_physical(tensor), float(row["mean_length_m"])
+        row["origin"],
+        float(row["mass_percent"]),
+        com,
+        nearest_physical(tensor),
+        float(row["mean_length_m"]),
     )
 
 
@@ -126,7 +134,9 @@ def draw_person(rng: np.random.Generator, richness: Richness, sex: str = "") -> 
     ankle_height = 0.045 * stature
     joints, predicted = _draw_joints(rng, sex, lengths, widths, richness.joint_centre_offset)
     hinges = _draw_hinges(rng, richness.hinge_tilt)
-    inertias = _draw_inertias(rng, sex, mass, lengths, body_mass_index, richness.inertia_variation)
+    inertias = _draw_inertias(
+        rng, sex, mass, lengths, joints["tjc"], body_mass_index, richness.inertia_variation
+    )
     markers = place_markers(
         rng, sex, lengths, joints, predicted, hinges, widths, ankle_height, richness
     )
@@ -214,6 +224,7 @@ def _draw_inertias(
     sex: str,
     mass: float,
     lengths: dict[str, float],
+    tjc: np.ndarray,
     body_mass_index: float,
     scale: float,
 ) -> dict[str, Inertia]:
@@ -236,6 +247,7 @@ def _draw_inertias(
             mean[kind],
             mass * masses[body] / total,
             _table_length(body, lengths, sex),
+            tjc if mean[kind].origin == "TJC" else np.zeros(3),  # others: the body's own origin
             body_mass_index,
             scale,
         )
@@ -263,12 +275,13 @@ def _draw_inertia(
     mean: MeanSegment,
     mass: float,
     length: float,
+    origin: np.ndarray,
     body_mass_index: float,
     scale: float,
 ) -> Inertia:
     mirror = np.array([1.0, 1.0, -1.0 if body.endswith("_l") else 1.0])
     kind = body.removesuffix("_l").removesuffix("_r")
-    com = mirror * mean.com * length
+    com = origin + mirror * mean.com * length
     com = com + scale * COM_SPREAD_M.get(kind, 0.004) * rng.standard_normal(3)
     if body in ("abdomen", "lower_torso"):  # a belly shifts the trunk's mass forward
         com[0] += scale * 0.0015 * (body_mass_index - 23.0)

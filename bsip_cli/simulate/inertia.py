@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.simulate.rotations import from_rotation_vector
-
 
 @dataclass(frozen=True, eq=False)
 class Inertia:
@@ -38,7 +36,7 @@ def tensor_of(moments: np.ndarray) -> np.ndarray:
     return np.trace(moments) * np.eye(3) - moments
 
 
-def nearest_physical(tensor: np.ndarray, least_share: float = 0.03) -> np.ndarray:
+def nearest_physical(tensor: np.ndarray, least_share: float = 0.02) -> np.ndarray:
     """Raise too small principal second moments to a share of the largest one."""
     values, axes = np.linalg.eigh(second_moments(tensor))
     values = np.maximum(values, least_share * values.max())
@@ -46,15 +44,15 @@ def nearest_physical(tensor: np.ndarray, least_share: float = 0.03) -> np.ndarra
 
 
 def varied_tensor(tensor: np.ndarray, rng: np.random.Generator, share: float) -> np.ndarray:
-    """Another physical tensor: axes turned and principal second moments scaled.
+    """Another physical tensor; the mean of many is the given one.
 
-    `share` is the relative standard deviation of the moments; the axes turn by about
-    the same number of radians.
+    It is that of equal points drawn from a normal distribution with the given second moments
+    (Wishart), so many that each moment has the relative standard deviation `share`. The axes of
+    a slender body turn little, those of a round one freely.
     """
-    values, axes = np.linalg.eigh(second_moments(tensor))
-    values = values * np.exp(share * rng.standard_normal(3))
-    axes = from_rotation_vector(share * rng.standard_normal(3)) @ axes
-    return tensor_of(axes @ np.diag(values) @ axes.T)
+    count = max(3, round(2.0 / share**2))
+    points = rng.standard_normal((count, 3)) @ np.linalg.cholesky(second_moments(tensor)).T
+    return tensor_of(points.T @ points / count)
 
 
 def combined(parts: list[tuple[Inertia, np.ndarray]]) -> Inertia:

@@ -31,6 +31,7 @@ SIDES = ("l", "r")
 SIDE_SIGN = {"l": -1.0, "r": 1.0}
 MEAN_STATURE_M = {"M": 1.77, "F": 1.61}
 STATURE_M = {"M": (1.77, 0.07), "F": (1.64, 0.06)}
+BODY_MASS_INDEX = (23.5, 2.8)
 PELVIS_WIDTH_M = {"M": 0.238, "F": 0.240}
 THORAX_WIDTH_M = {"M": 0.150, "F": 0.132}
 HALF_SHOULDER_WIDTH_M = {"M": 0.178, "F": 0.158}
@@ -122,14 +123,14 @@ def draw_person(rng: np.random.Generator, richness: Richness, sex: str = "") -> 
     """Draw a person of the given sex (or of either)."""
     sex = sex or str(rng.choice(["M", "F"]))
     stature = float(np.clip(rng.normal(*STATURE_M[sex]), 1.48, 2.0))
-    body_mass_index = float(np.clip(rng.normal(23.5, 2.8), 19.0, 30.0))
+    body_mass_index = float(np.clip(rng.normal(*BODY_MASS_INDEX), 19.0, 30.0))
     mass = body_mass_index * stature**2
     size = stature / MEAN_STATURE_M[sex]
     lengths = _draw_lengths(rng, sex, size)
     widths = {
-        "pelvis": PELVIS_WIDTH_M[sex] * size * np.exp(0.05 * rng.standard_normal()),
-        "thorax": THORAX_WIDTH_M[sex] * size * np.exp(0.05 * rng.standard_normal()),
-        "shoulder": HALF_SHOULDER_WIDTH_M[sex] * size * np.exp(0.03 * rng.standard_normal()),
+        "pelvis": PELVIS_WIDTH_M[sex] * size * _factor(rng, 0.05),
+        "thorax": THORAX_WIDTH_M[sex] * size * _factor(rng, 0.05),
+        "shoulder": HALF_SHOULDER_WIDTH_M[sex] * size * _factor(rng, 0.03),
     }
     ankle_height = 0.045 * stature
     joints, predicted = _draw_joints(rng, sex, lengths, widths, richness.joint_centre_offset)
@@ -156,17 +157,22 @@ def draw_person(rng: np.random.Generator, richness: Richness, sex: str = "") -> 
     )
 
 
+def _factor(rng: np.random.Generator, spread: float) -> float:
+    """A positive factor whose mean is 1 and whose logarithm has this standard deviation."""
+    return float(np.exp(spread * rng.standard_normal() - 0.5 * spread**2))
+
+
 def _draw_lengths(rng: np.random.Generator, sex: str, size: float) -> dict[str, float]:
     mean = mean_segments(sex)
     lengths = {
-        name: mean[name].length_m * size * np.exp(0.035 * rng.standard_normal())
+        name: mean[name].length_m * size * _factor(rng, 0.035)
         for name in ("head", "thorax", "abdomen")
     }
     lengths["upper_torso"] = lengths["thorax"] + lengths["abdomen"]
     for name in LIMB_LENGTHS:
-        both = mean[name].length_m * size * np.exp(0.035 * rng.standard_normal())
+        both = mean[name].length_m * size * _factor(rng, 0.035)
         for side in SIDES:
-            lengths[f"{name}_{side}"] = both * np.exp(0.005 * rng.standard_normal())
+            lengths[f"{name}_{side}"] = both * _factor(rng, 0.005)
     return {name: float(length) for name, length in lengths.items()}
 
 
@@ -230,13 +236,11 @@ def _draw_inertias(
 ) -> dict[str, Inertia]:
     """True inertial parameters: the mean person's, varied, summing to the mass."""
     mean = mean_segments(sex)
-    common = {
-        name: np.exp(scale * MASS_SPREAD.get(name, 0.11) * rng.standard_normal()) for name in mean
-    }
+    common = {name: _factor(rng, scale * MASS_SPREAD.get(name, 0.11)) for name in mean}
     masses = {
         body: mean[kind].mass_percent
         * common[kind]
-        * (np.exp(0.03 * scale * rng.standard_normal()) if kind != body else 1.0)
+        * (_factor(rng, 0.03 * scale) if kind != body else 1.0)
         for body, kind in _kinds().items()
     }
     total = sum(masses.values())
@@ -284,7 +288,7 @@ def _draw_inertia(
     com = origin + mirror * mean.com * length
     com = com + scale * COM_SPREAD_M.get(kind, 0.004) * rng.standard_normal(3)
     if body in ("abdomen", "lower_torso"):  # a belly shifts the trunk's mass forward
-        com[0] += scale * 0.0015 * (body_mass_index - 23.0)
+        com[0] += scale * 0.0015 * (body_mass_index - BODY_MASS_INDEX[0])
     tensor = np.outer(mirror, mirror) * mean.tensor * mass * length**2
     tensor = varied_tensor(tensor, rng, 0.12 * scale) if scale else tensor
     return Inertia(mass, com, tensor)

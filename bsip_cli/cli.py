@@ -193,6 +193,14 @@ def _effect_options(command: Any) -> Any:
     is_flag=True,
     help="Two plates side by side, one under each foot, instead of one under both.",
 )
+@click.option(
+    "--soft-tissue",
+    default="light",
+    show_default=True,
+    type=click.Choice(["light", "measured"]),
+    help="light: skin moves with the sines of the joints; measured: as published of people, larger "
+    "on trunk and thighs, curved in the pose, with mass that swings at 5 to 11 Hz.",
+)
 @_effect_options
 def simulate(study, preset, **options):
     """Make a study of simulated people whose inertial parameters are known.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
+from scipy.signal import cont2discrete, lfilter
 
 CENTRAL_8 = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])  # weights of +1..+4 samples
 HALF_WIDTH = 4
@@ -32,6 +33,14 @@ def integral(values: np.ndarray, step_s: float) -> np.ndarray:
     """Integral along axis 0 from the first sample (quintic spline)."""
     t = np.arange(len(values)) * step_s
     return make_interp_spline(t, values, k=5).antiderivative()(t)
+
+
+def response(
+    numerator: list[float], denominator: list[float], values: np.ndarray, step_s: float
+) -> np.ndarray:
+    """(T, 3) response of a linear system at rest to values that are linear between samples."""
+    b, a, _ = cont2discrete((numerator, denominator), step_s, method="foh")
+    return lfilter(np.ravel(b), a, values, axis=0)
 
 
 def bridge(start: np.ndarray, end: np.ndarray, duration_s: float, t_s: np.ndarray) -> np.ndarray:

@@ -37,6 +37,7 @@ def simulate_command(
     tasks: Sequence[str] = (),
     run: int = 1,
     plate_per_foot: bool = False,
+    soft_tissue: str = "light",
 ) -> None:
     """Write a simulated study into a new or empty folder."""
     _check_new(study)
@@ -52,6 +53,8 @@ def simulate_command(
     if plate_per_foot:
         laboratory = replace(options.laboratory, plate_per_foot=True)
         options = replace(options, laboratory=laboratory)
+    if soft_tissue == "measured":
+        options = replace(options, richness=replace(options.richness, measured_tissue=True))
     asked = pair_up(effects, sizes, targets)
     options = replace(options, run=run, effects=asked, effect_tasks=tuple(effect_tasks))
     with _writing(study):

@@ -6,10 +6,11 @@ Dumas 2007 and 2018 use them) predict those centres wrongly by the drawn offsets
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bsip_cli.simulate import tissue
 from bsip_cli.simulate.options import Richness
 
 ASIS_FROM_LUMBAR = {"M": (0.335, 0.032, 0.5), "F": (0.340, -0.049, 0.5)}  # pelvis widths
@@ -33,14 +34,17 @@ class Marker:
 
     body : the bone it belongs to.
     position_m : (3,) rest position in the body's frame.
-    skin_gain_m : (3, 6) travel per sine of the proximal (3) and distal (3) joint rotation.
+    skin_gain_m : (3, 12) travel per sine of the proximal (3) and distal (3) joint rotation, and
+        per square of these.
     lag_s2 : travel against the marker's acceleration [m per m/s2].
+    swing_share : of the swing of the tissue under it, if that swings.
     """
 
     body: str
     position_m: np.ndarray
     skin_gain_m: np.ndarray
     lag_s2: float
+    swing_share: float
 
 
 def place_markers(
@@ -73,8 +77,25 @@ def place_markers(
         size = SKIN_SIZE_M.get(body.removesuffix("_l").removesuffix("_r"), OTHER_SKIN_SIZE_M)
         gain = richness.soft_tissue * size * (0.8 * sliding[body] + 0.6 * own) / np.sqrt(3.0)
         lag *= richness.soft_tissue * min(size / 0.007, 1.0)
-        markers[label] = Marker(body, position + error, gain, lag)
-    return markers
+        markers[label] = Marker(body, position + error, np.hstack([gain, 0.0 * gain]), lag, 0.0)
+    return _with_measured_tissue(markers, rng, richness) if richness.measured_tissue else markers
+
+
+def _with_measured_tissue(
+    markers: dict[str, Marker], rng: np.random.Generator, richness: Richness
+) -> dict[str, Marker]:
+    """Larger where `tissue` says so, and curved in the pose; the share of its swing is drawn."""
+    changed = {}
+    for label, marker in markers.items():
+        kind = marker.body.removesuffix("_l").removesuffix("_r")
+        usual = SKIN_SIZE_M.get(kind, OTHER_SKIN_SIZE_M)
+        size = tissue.SKIN_SIZE_M.get(kind, usual)
+        straight = marker.skin_gain_m[:, :6] * size / usual
+        curved = tissue.CURVED_SHARE * richness.soft_tissue * size * rng.standard_normal((3, 6))
+        gain = np.hstack([straight, curved / np.sqrt(3.0)])
+        share = richness.soft_tissue * float(rng.uniform(*tissue.MARKER_SHARE))
+        changed[label] = replace(marker, skin_gain_m=gain, swing_share=share)
+    return changed
 
 
 def _head(lengths: dict[str, float]) -> dict[str, tuple[str, np.ndarray]]:

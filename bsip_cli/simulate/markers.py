@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
+from bsip_cli.simulate.calculus import response
 from bsip_cli.simulate.landmarks import Marker
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.poses import Poses
 from bsip_cli.simulate.rotations import rotate, transpose, unskew
+from bsip_cli.simulate.tissue import Swing
 
 LAG_SMOOTHING_S = 0.02
 DRIFT_SMOOTHING_S = 0.3
@@ -47,7 +49,13 @@ def marker_paths(
     for label, path in paths.items():
         marker = person.markers[label]
         if richness.soft_tissue:
-            path = path + _skin_travel(label, marker, poses) + _lag(marker, path, rate_hz)
+            swing = person.tissue.get(_segment_of(marker.body))
+            late = (
+                _lag(marker, path, rate_hz)
+                if swing is None
+                else _swing(marker, swing, path, rate_hz)
+            )
+            path = path + _skin_travel(label, marker, poses) + late
         paths[label] = path + _noise(len(path), rate_hz, richness, rng)
     return _with_gaps(paths, rate_hz, rng) if richness.gaps else paths
 
@@ -58,7 +66,8 @@ def _skin_travel(label: str, marker: Marker, poses: Poses) -> np.ndarray:
     turns = [
         unskew(transpose(own) @ poses.rotation[body]) for body in _neighbours(label, marker.body)
     ]
-    travel = np.concatenate(turns, axis=1) @ marker.skin_gain_m.T
+    sines = np.concatenate(turns, axis=1)
+    travel = np.hstack([sines, sines**2]) @ marker.skin_gain_m.T
     return rotate(own, travel)
 
 
@@ -76,9 +85,26 @@ def _lag(marker: Marker, path: np.ndarray, rate_hz: float) -> np.ndarray:
     """(T, 3) the soft tissue stays behind when the bone accelerates."""
     if len(path) < 5:
         return np.zeros_like(path)
-    acceleration = np.gradient(np.gradient(path, 1.0 / rate_hz, axis=0), 1.0 / rate_hz, axis=0)
+    acceleration = _acceleration(path, rate_hz)
     smooth = gaussian_filter1d(acceleration, LAG_SMOOTHING_S * rate_hz, axis=0, mode="nearest")
     return -marker.lag_s2 * smooth
+
+
+def _swing(marker: Marker, swing: Swing, path: np.ndarray, rate_hz: float) -> np.ndarray:
+    """(T, 3) the marker's share of a swing that the bone's acceleration drives."""
+    w, z = 2.0 * np.pi * swing.frequency_hz, swing.damping_ratio
+    acceleration = _acceleration(path, rate_hz)
+    return marker.swing_share * response(
+        [-1.0], [1.0, 2.0 * z * w, w * w], acceleration, 1.0 / rate_hz
+    )
+
+
+def _acceleration(path: np.ndarray, rate_hz: float) -> np.ndarray:
+    return np.gradient(np.gradient(path, 1.0 / rate_hz, axis=0), 1.0 / rate_hz, axis=0)
+
+
+def _segment_of(body: str) -> str:
+    return "upper_torso" if body == "thorax" else body
 
 
 def _noise(frames: int, rate_hz: float, richness: Richness, rng: np.random.Generator) -> np.ndarray:

@@ -22,6 +22,8 @@ class Richness:
     """How much the simulated world differs from the model that is fitted to it.
 
     soft_tissue : scale of the markers' motion against the bone (0 = rigid).
+    measured_tissue : whether it is that of measured people (`tissue`): larger on trunk and thighs,
+        curved in the pose, and swinging with part of the segments' mass.
     marker_noise_m : white noise, standard deviation per axis.
     marker_drift_m : slow correlated noise, standard deviation per axis.
     gaps : whether markers get lost for 5 to 40 frames.
@@ -35,6 +37,7 @@ class Richness:
     """
 
     soft_tissue: float = 1.0
+    measured_tissue: bool = False
     marker_noise_m: float = 0.0003
     marker_drift_m: float = 0.0001
     gaps: bool = True

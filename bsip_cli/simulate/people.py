@@ -25,6 +25,7 @@ from bsip_cli.simulate.inertia import (
 from bsip_cli.simulate.landmarks import Marker, place_markers
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.rotations import from_rotation_vector
+from bsip_cli.simulate.tissue import Swing, draw_tissue
 
 BODIES = ("lower_torso", "abdomen", "thorax", *SEGMENTS[2:])
 SIDES = ("l", "r")
@@ -55,6 +56,7 @@ class Person:
     hinges : unit axes (3,) of elbow_* in the upper arm and knee_* in the thigh.
     inertias : of the 16 bodies.
     ankle_height_m : of the ankle joint above the sole.
+    tissue : what of the segments swings on its bone.
     """
 
     sex: str
@@ -69,6 +71,7 @@ class Person:
     pelvis_width_m: float
     thorax_width_m: float
     trunk_bend: float
+    tissue: dict[str, Swing]
 
     def segment_inertias(self) -> dict[str, Inertia]:
         """The 15 fitted segments; the upper torso is the upright sum of its two parts."""
@@ -154,6 +157,7 @@ def draw_person(rng: np.random.Generator, richness: Richness, sex: str = "") -> 
         pelvis_width_m=widths["pelvis"],
         thorax_width_m=widths["thorax"],
         trunk_bend=richness.trunk_bend,
+        tissue=draw_tissue(rng) if richness.measured_tissue else {},
     )
 
 

@@ -10,6 +10,8 @@ import numpy as np
 
 from bsip_cli.errors import UsageError
 from bsip_cli.simulate.asked import effects_of, touches
+from bsip_cli.simulate.effects.places import body_of
+from bsip_cli.simulate.effects.wobbling_mass import WobblingMass
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
 from bsip_cli.simulate.options import ALL_TASKS, MORE_TASKS, Rates, StudyOptions
 from bsip_cli.simulate.people import Person, draw_person
@@ -97,13 +99,14 @@ def simulate_participant(folder: Path, options: StudyOptions, number: int) -> Pa
     for task in options.tasks:
         stem = f"{name}_task-{task}" + ("" if task == "static" else f"_run-{options.run}")
         active = [e for e in effects if touches(e, task, options.effect_tasks)]
+        body = [*wobbling(person), *active]
         trial = simulate_trial(
             person,
             task,
             generator(options, number, MOVEMENT, task),
             options.durations_s.get(task, DEFAULT_DURATION_S[task]),
             ball_mass,
-            active,
+            body,
         )
         measurement = write_trial(
             folder / name / f"{stem}.c3d",
@@ -115,7 +118,7 @@ def simulate_participant(folder: Path, options: StudyOptions, number: int) -> Pa
             generator(options, number, RECORDING, task),
             heading_error,
             name,
-            active,
+            body,
         )
         trials[stem] = trial_record(
             trial, measurement, active, seed_of(options, number, MOVEMENT, task)
@@ -130,6 +133,19 @@ def simulate_participant(folder: Path, options: StudyOptions, number: int) -> Pa
     }
     _write_text(folder / "truth" / f"{name}_truth.json", json.dumps(record, indent=1) + "\n")
     return truth
+
+
+def wobbling(person: Person) -> list[WobblingMass]:
+    """What swings on the person's bones; part of the body, no effect that is hidden in it."""
+    return [
+        WobblingMass(
+            swing.mass_share * person.inertias[body_of(segment)].mass_kg,
+            segment,
+            swing.frequency_hz,
+            swing.damping_ratio,
+        )
+        for segment, swing in person.tissue.items()
+    ]
 
 
 def _participants_table(options: StudyOptions, truths: list[ParticipantTruth]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -40,6 +40,7 @@ def person_record(person: Person) -> dict[str, object]:
         "thorax_width_m": person.thorax_width_m,
         "ankle_height_m": person.ankle_height_m,
         "trunk_bend": person.trunk_bend,
+        "swinging_tissue": {name: asdict(swing) for name, swing in person.tissue.items()},
         "segment_lengths_m": person.lengths_m,
         "joints_in_parent_m": {name: p.tolist() for name, p in person.joints_m.items()},
         "hinge_axes": {name: axis.tolist() for name, axis in person.hinges.items()},

@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter
 
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.errors import UsageError
-from bsip_cli.simulate.calculus import derivative
+from bsip_cli.simulate.calculus import derivative, response
 from bsip_cli.simulate.effects.base import Effect, Target
 from bsip_cli.simulate.effects.places import SEGMENT_NAMES, body_of
 from bsip_cli.simulate.inertia import Inertia
@@ -101,19 +100,11 @@ class Swinging:
         acceleration = derivative(derivative(r, step_s), step_s)
         w, z = 2.0 * np.pi * self.frequency_hz, self.damping_ratio
         denominator = [1.0, 2.0 * z * w, w * w]
-        travel = _response([-1.0], denominator, acceleration, step_s)
-        own = _response([2.0 * z * w, w * w], denominator, acceleration, step_s)
+        travel = response([-1.0], denominator, acceleration, step_s)
+        own = response([2.0 * z * w, w * w], denominator, acceleration, step_s)
         force = self.mass_kg * (own - GRAVITY)
         return force, np.cross(r + travel, force)
 
     def thinned(self, samples: slice) -> Swinging:
         """Follows the poses it is given."""
         return self
-
-
-def _response(
-    numerator: list[float], denominator: list[float], values: np.ndarray, step_s: float
-) -> np.ndarray:
-    """(T, 3) response of a linear system at rest to values that are linear between samples."""
-    b, a, _ = cont2discrete((numerator, denominator), step_s, method="foh")
-    return lfilter(np.ravel(b), a, values, axis=0)

@@ -1,0 +1,58 @@
+"""Estimator ``mass_factor`` (RM+mass): the table's body, all masses and tensors times one number.
+
+What the plates say of the whole mass and no more. OM is compared with it beside RM: an error that
+one number removes is no gain of identification.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.errors import NumericalError
+from bsip_cli.identification.estimator import Estimate, Problem
+
+_NORMAL_95 = 1.96
+
+
+def estimate(problem: Problem) -> Estimate:
+    """Weighted least squares of the measured wrench on the table's, in closed form.
+
+    The standard deviation of the number counts the errors that it leaves, in each component those
+    of the independent samples, trusted as OM trusts them (``trust_ratio``). Single segments keep
+    the table's spread, once the sum of their masses is known.
+
+    Raises
+    ------
+    NumericalError
+        The number is not above 0.
+    """
+    whole, phi, weights = problem.every_equation(), problem.prior.phi, problem.noise.weights()
+    squares = np.einsum("i,cij,j->c", phi, whole.information, phi)
+    factor = float(weights @ (whole.right @ phi) / (weights @ squares))
+    if not factor > 0.0:
+        raise NumericalError(
+            f"the measured forces are {factor:.3g} times those of the table's masses",
+            expected="a number above 0: forces that push the body up where it pushes down",
+            remedy="look at the plates' signs in the quality table of ingest",
+        )
+    larger = (whole.residual_rms(factor * phi) / problem.noise.rms) ** 2
+    sd = problem.trust_ratio * float(np.sqrt(weights @ (squares * larger)) / (weights @ squares))
+    root = _with_known_sum(problem.prior.root)
+    return Estimate(
+        factor * phi, root @ root.T + sd**2 * np.outer(phi, phi), _note(factor, sd, phi)
+    )
+
+
+def _with_known_sum(root: np.ndarray) -> np.ndarray:
+    """A root (P, k) of the covariance once the sum of all masses is known."""
+    total = root[::10].sum(axis=0)
+    return root - np.outer(root @ total, total) / (total @ total)
+
+
+def _note(factor: float, sd: float, phi: np.ndarray) -> str:
+    low, high = factor - _NORMAL_95 * sd, factor + _NORMAL_95 * sd
+    before = float(phi[::10].sum())
+    return (
+        f"all masses and tensors of the table (RM) times {factor:.4f} (95 % interval {low:.4f} to "
+        f"{high:.4f}): {before:.2f} kg become {factor * before:.2f} kg"
+    )

@@ -53,8 +53,8 @@ def _text(name: str, meaning: str) -> Column:
 _TIME = Column("time_s", "float", "s", "time from the start of the recording")
 _METHOD = _text(
     "method",
-    "measured, RM, RM+mass (RM, all masses and tensors times one number), OM, another estimator, or "
-    "OM+<effect>: extended",
+    "measured, RM, RM+mass (RM, all masses and tensors times one number), OM, another estimator, "
+    "or OM+<effect>: extended",
 )
 _SEGMENT = _text("segment", "segment of the skeleton")
 _WRENCH = (

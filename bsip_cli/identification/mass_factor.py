@@ -37,10 +37,10 @@ def estimate(problem: Problem) -> Estimate:
         )
     larger = (whole.residual_rms(factor * phi) / problem.noise.rms) ** 2
     sd = problem.trust_ratio * float(np.sqrt(weights @ (squares * larger)) / (weights @ squares))
-    root = _with_known_sum(problem.prior.root)
-    return Estimate(
-        factor * phi, root @ root.T + sd**2 * np.outer(phi, phi), _note(factor, sd, phi)
-    )
+    before = factor * problem.prior.root
+    root = _with_known_sum(before)
+    covariance = root @ root.T + sd**2 * np.outer(phi, phi)
+    return Estimate(factor * phi, covariance, _note(factor, sd, phi), before @ before.T)
 
 
 def _with_known_sum(root: np.ndarray) -> np.ndarray:

@@ -55,9 +55,7 @@ def run(unit: Unit) -> None:
     tables = [regression.drop(columns="note")]
     for method, result in results.items():
         unit.warn(f"{unit.name}: {method} ({estimators[method]}): {estimates[method].note}")
-        tables.append(
-            bsip_table(method, skeleton.segments, result.values, result.sd, result.share)
-        )
+        tables.append(bsip_table(method, skeleton.segments, result.values, result.sd, result.share))
     unit.write(
         "bsip",
         pd.concat(tables, ignore_index=True),
@@ -86,7 +84,7 @@ def _write_table_only(unit: Unit, regression: pd.DataFrame, recordings: list[Rec
 
 
 def _estimators(unit: Unit) -> dict[str, str]:
-    """Method to estimator: RM+mass always; the first configured one is OM, others go by their names."""
+    """By method: RM+mass always; OM is the first that is configured, others go by their names."""
     first, *others = unit.config.identify.estimators
     return {RM_MASS: "mass_factor", OM: first} | {name: name for name in others}
 

@@ -17,8 +17,8 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH
 from bsip_cli.statistics.fit_measures import fit_measures
+from bsip_cli.statistics.methods import MEASURED
 
-MEASURED = "measured"
 _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 _SHORTEST_HELD_OUT_S = 0.5
 
@@ -159,14 +159,12 @@ def fit_rows(judgement: Judgement, signals: Signals) -> pd.DataFrame:
     """Rows of ``fit``: every method of ``signals`` against the measured one."""
     rows, spans = [], stretches(judgement.judged)
     for method, computed in signals.items():
-        if method == "measured":
+        if method == MEASURED:
             continue
         for component, values in computed.items():
             scale, unit = scale_of(component)
             weight = judgement.body_weight_N if unit == "N" else None
-            fit = fit_measures(
-                signals["measured"][component] * scale, values * scale, spans, weight
-            )
+            fit = fit_measures(signals[MEASURED][component] * scale, values * scale, spans, weight)
             rows.append(
                 {
                     "method": method,

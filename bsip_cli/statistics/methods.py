@@ -6,7 +6,7 @@ RM_MASS = "RM+mass"  # RM, all masses and tensors times one number
 OM = "OM"  # identified
 
 RIVALS = (RM, RM_MASS)
-"""What OM is compared with: what one number for the whole mass does is no gain of identification."""
+"""What OM is compared with: what one number for the whole mass does, identification did not."""
 
 METHODS = (*RIVALS, OM)
 

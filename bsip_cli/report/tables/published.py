@@ -9,7 +9,8 @@ from bsip_cli.report.tables.model import Cell, Column, Row, Table
 from bsip_cli.report.tables.numbers import count, mean_sd
 from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort_comparison import Comparison
-from bsip_cli.statistics.cohort_values import MEASURED, OM, RM, Topic
+from bsip_cli.statistics.cohort_values import Topic
+from bsip_cli.statistics.methods import MEASURED, OM, RM
 from bsip_cli.statistics.published import paper as published
 from bsip_cli.statistics.published.audit import audit
 from bsip_cli.statistics.published.readings import as_meant

@@ -130,7 +130,9 @@ def one_number_alone(quantity: str, rm_mass: float, om: float, over_rm_mass: flo
 
     rm_mass, om : relative change of RM's error by these methods; over_rm_mass : of RM+mass's by OM.
     """
-    if over_rm_mass < -SAME_WITHIN:
+    if min(rm_mass, om) >= -SAME_WITHIN:
+        gained = "neither is better than the table"
+    elif over_rm_mass < -SAME_WITHIN:
         gained = f"OM errs by {number(-100.0 * over_rm_mass, 0)} % less than {RM_MASS}"
     else:
         gained = "identification gains nothing over that number"

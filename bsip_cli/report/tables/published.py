@@ -162,13 +162,16 @@ def _here(tag: str, results: Results, topic: Topic) -> dict[str, Cell]:
     else:
         found = [results.find(topic, "bonferroni_t", MEASURED, method) for method in (OM, RM)]
     values: dict[str, Cell] = {"n": found[0].n}
-    for pair in (*found, results.find(topic, "paired_t", OM, RM_MASS)):
+    for pair in found:
         values |= _means(pair)
-    return values
+    one_number = results.find(topic, "paired_t", OM, RM_MASS)
+    return values | dict(
+        zip(_here_fields(RM_MASS), (one_number.mean_b, one_number.sd_b), strict=True)
+    )
 
 
 def _means(pair: Comparison) -> dict[str, Cell]:
-    names = {method: name for name, method in _METHODS.items()} | {RM_MASS: RM_MASS}
+    names = {method: name for name, method in _METHODS.items()}
     fields = (*_here_fields(names[pair.method_a]), *_here_fields(names[pair.method_b]))
     return dict(zip(fields, (pair.mean_a, pair.sd_a, pair.mean_b, pair.sd_b), strict=True))
 

@@ -495,7 +495,8 @@ SCHEMAS = {
                 Column("effective_samples", "float", "1", "independent samples, all components"),
                 Column("rank", "int", "1", "base parameters found"),
                 Column("condition_number", "float", "1", "of the scaled base regressor"),
-                *_floats("mass_factor mass_factor_sd", "1", "sum of the masses over RM's"),
+                Column("mass_factor", "float", "1", "sum of the masses over RM's"),
+                Column("mass_factor_sd", "float", "1", "its standard deviation"),
                 *_floats("rms_fx_N rms_fy_N rms_fz_N", "N", "residual of the fit"),
                 *_floats(
                     "rms_mx_Nm rms_my_Nm rms_mz_Nm",

@@ -10,8 +10,7 @@ import numpy as np
 
 from bsip_cli.errors import NumericalError
 from bsip_cli.identification.estimator import Estimate, Problem
-
-_NORMAL_95 = 1.96
+from bsip_cli.statistics.normal import Z95
 
 
 def estimate(problem: Problem) -> Estimate:
@@ -50,7 +49,7 @@ def _with_known_sum(root: np.ndarray) -> np.ndarray:
 
 
 def _note(factor: float, sd: float, phi: np.ndarray) -> str:
-    low, high = factor - _NORMAL_95 * sd, factor + _NORMAL_95 * sd
+    low, high = factor - Z95 * sd, factor + Z95 * sd
     before = float(phi[::10].sum())
     return (
         f"all masses and tensors of the table (RM) times {factor:.4f} (95 % interval {low:.4f} to "

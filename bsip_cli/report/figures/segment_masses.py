@@ -22,8 +22,8 @@ from bsip_cli.report.figures.canvas import (
     tidy,
 )
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
+from bsip_cli.statistics.normal import Z95
 
-_NORMAL_95 = 1.96
 _TICKS_KG = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
 
 
@@ -79,7 +79,7 @@ def _draw_masses(axes: Axes, data: SegmentMasses, rows: np.ndarray) -> None:
 
 
 def _draw_differences(axes: Axes, data: SegmentMasses, rows: np.ndarray) -> None:
-    spread = np.nan_to_num(_NORMAL_95 * data.om_sd_kg)
+    spread = np.nan_to_num(Z95 * data.om_sd_kg)
     axes.axvline(0.0, color=ORANGE, lw=1.2, ls="--")
     axes.errorbar(
         data.om_kg - data.rm_kg,

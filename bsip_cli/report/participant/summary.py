@@ -28,9 +28,9 @@ from bsip_cli.report.words import (
     trial_label,
 )
 from bsip_cli.statistics.methods import METHODS, OM, RIVALS, RM, RM_MASS
+from bsip_cli.statistics.normal import Z95
 
 _STRONGEST = 6
-_NORMAL_95 = 1.96
 _SEXES = {"M": "a man", "F": "a woman"}
 
 
@@ -233,7 +233,7 @@ def _one_number(record: ParticipantRecord, means: tuple[PooledGain, ...]) -> lis
     if rows.empty or not found:
         return []
     factor, sd = rows[["mass_factor", "mass_factor_sd"]].iloc[0]
-    low, high = factor - _NORMAL_95 * sd, factor + _NORMAL_95 * sd
+    low, high = factor - Z95 * sd, factor + Z95 * sd
     (mean,) = found
     said = one_number_alone(
         component_label(mean.component),

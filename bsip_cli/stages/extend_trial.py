@@ -26,6 +26,7 @@ from bsip_cli.stages.reconstructed import (
     Wrenches,
     fit_rows,
     judgement_of,
+    over_the_same_frames,
     parameters_of,
     reconstruction_rows,
     scale_of,
@@ -95,8 +96,8 @@ def _amend(unit: Unit, judgement: Judgement, wrenches: Wrenches, signals: Signal
         judgement, {name: wrenches[name] for name in ours}, {name: signals[name] for name in ours}
     )
     unit.amend("reconstruction", rows)
-    compared = {name: signals[name] for name in (MEASURED, *ours)}
-    unit.amend("fit", fit_rows(judgement, compared))
+    compared = over_the_same_frames(signals)
+    unit.amend("fit", fit_rows(judgement, {name: compared[name] for name in (MEASURED, *ours)}))
 
 
 # --- gain -------------------------------------------------------------------------------------

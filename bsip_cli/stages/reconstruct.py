@@ -19,6 +19,7 @@ from bsip_cli.stages.reconstructed import (
     Wrenches,
     fit_rows,
     judgement_of,
+    over_the_same_frames,
     parameters_of,
     reconstruction_rows,
 )
@@ -45,9 +46,10 @@ def run(unit: Unit) -> None:
         reconstruction_rows(judgement, wrenches, signals),
         facts={"loads": loads_record(unit)},
     )
-    unit.write("fit", fit_rows(judgement, signals))
-    unit.write("correlation-difference", _correlations(signals, judgement.judged))
-    unit.write("posturography", _sway(signals, judgement.judged, judgement.times_s))
+    compared = over_the_same_frames(signals)
+    unit.write("fit", fit_rows(judgement, compared))
+    unit.write("correlation-difference", _correlations(compared, judgement.judged))
+    unit.write("posturography", _sway(compared, judgement.judged, judgement.times_s))
 
 
 def _wrenches(

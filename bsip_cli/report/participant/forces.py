@@ -203,12 +203,15 @@ def _valid_frames(trial: TrialRecord) -> int:
 
 def _rmse_words(signals: dict[str, np.ndarray], unit: str) -> str:
     """``RMSE in what is shown: RM 3.2 mm, OM 1.1 mm.``"""
-    parts = []
-    for method in list(signals)[1:]:
-        difference = signals[method] - signals[MEASURED]
-        if np.isfinite(difference).any():
-            rmse = float(np.sqrt(np.nanmean(difference**2)))
-            parts.append(f"{method} {number(rmse, 2)} {unit}")
+    measured, *methods = signals
+    errors = {method: signals[method] - signals[measured] for method in methods}
+    errors = {method: error for method, error in errors.items() if np.isfinite(error).any()}
+    shared = np.isfinite(list(errors.values())).all(axis=0)
+    parts = [
+        f"{method} {number(float(np.sqrt(np.mean(error[shared] ** 2))), 2)} {unit}"
+        for method, error in errors.items()
+        if shared.any()
+    ]
     return f"RMSE in what is shown: {', '.join(parts)}." if parts else "No method was simulated."
 
 

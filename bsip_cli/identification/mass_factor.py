@@ -12,30 +12,37 @@ from bsip_cli.errors import NumericalError
 from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.statistics.normal import Z95
 
+_ROUNDS = 20  # of weights and number
+_QUIETEST = 0.1  # of what OM leaves: no component counts as without error
+
 
 def estimate(problem: Problem) -> Estimate:
     """Weighted least squares of the measured wrench on the table's, in closed form.
 
-    The standard deviation of the number counts the errors that it leaves, in each component those
-    of the independent samples, trusted as OM trusts them (``trust_ratio``). Single segments keep
-    the table's spread, once the sum of their masses is known.
+    Each component counts by the errors that the number itself leaves in it, of the independent
+    samples: the table's centres of mass err in the moments by more than OM does. They are trusted
+    as OM trusts them (``trust_ratio``). Single segments keep the table's spread, once the sum of
+    their masses is known.
 
     Raises
     ------
     NumericalError
         The number is not above 0.
     """
-    whole, phi, weights = problem.every_equation(), problem.prior.phi, problem.noise.weights()
-    squares = np.einsum("i,cij,j->c", phi, whole.information, phi)
-    factor = float(weights @ (whole.right @ phi) / (weights @ squares))
+    whole, phi, noise = problem.every_equation(), problem.prior.phi, problem.noise
+    squares, products = np.einsum("i,cij,j->c", phi, whole.information, phi), whole.right @ phi
+    rms = noise.rms
+    for _ in range(_ROUNDS):
+        weights = noise.effective / noise.samples / rms**2
+        factor = float(weights @ products / (weights @ squares))
+        rms = np.maximum(whole.residual_rms(factor * phi), _QUIETEST * noise.rms)
     if not factor > 0.0:
         raise NumericalError(
             f"the measured forces are {factor:.3g} times those of the table's masses",
             expected="a number above 0: forces that push the body up where it pushes down",
             remedy="look at the plates' signs in the quality table of ingest",
         )
-    larger = (whole.residual_rms(factor * phi) / problem.noise.rms) ** 2
-    sd = problem.trust_ratio * float(np.sqrt(weights @ (squares * larger)) / (weights @ squares))
+    sd = problem.trust_ratio / float(np.sqrt(weights @ squares))
     before = factor * problem.prior.root
     root = _with_known_sum(before)
     covariance = root @ root.T + sd**2 * np.outer(phi, phi)

@@ -20,6 +20,7 @@ import pandas as pd
 from benchmarks.accuracy_measures import TRUTH, force_errors, segment_errors
 from benchmarks.accuracy_study import ONE_ARM, SQUATS, write_study
 from benchmarks.measure import ROOT, markdown, run_child
+from bsip_cli.statistics.methods import OM, RIVALS, RM
 
 ESTIMATORS = ("consistent", "hansen2017", "robert2017", "base")
 RECORDINGS = {
@@ -47,13 +48,13 @@ def identify(study: Path, out: Path, task: str) -> Path:
 
 def named(table: pd.DataFrame) -> pd.DataFrame:
     """The first estimator by its own name instead of OM."""
-    return table.replace({"method": {"OM": ESTIMATORS[0]}})
+    return table.replace({"method": {OM: ESTIMATORS[0]}})
 
 
 def segment_table(found: pd.DataFrame) -> str:
     means = found.groupby("method").mean(numeric_only=True)
     rows = []
-    for method in ("RM", *ESTIMATORS[:-1]):  # base has combinations only
+    for method in (*RIVALS, *ESTIMATORS[:-1]):  # base has combinations only
         row = means.loc[method]
         rows.append(
             [
@@ -75,7 +76,7 @@ def sex_table(found: pd.DataFrame) -> str:
     means = found.groupby(["sex", "method"]).mean(numeric_only=True)
     rows = []
     for sex, people in (("F", "women"), ("M", "men")):
-        for method in ("RM", ESTIMATORS[0]):
+        for method in (*RIVALS, ESTIMATORS[0]):
             row = means.loc[(sex, method)]
             cells = [f"{row['mass']:.3f}", f"{row['centre']:.1f}", f"{row['inertias']:.1f}"]
             rows.append([people, method, *cells, f"{100 * row['all']:.1f}"])
@@ -88,7 +89,7 @@ def coverage_table(found: pd.DataFrame) -> str:
     groups = ["masses", "centres of mass", "tensors", "all"]
     rows = [
         [method, *(f"{100 * means.loc[method, group]:.1f}" for group in groups)]
-        for method in ("RM", *ESTIMATORS[:-1])
+        for method in (*RIVALS, *ESTIMATORS[:-1])
     ]
     return markdown(["95 % intervals that hold the truth [%]", *groups], rows)
 
@@ -109,9 +110,9 @@ def force_table(forces: pd.DataFrame) -> str:
     errors = by_task(forces)
     means = errors.groupby("component").mean()
     rows = []
-    for method in ("RM", *ESTIMATORS, TRUTH):
+    for method in (*RIVALS, *ESTIMATORS, TRUTH):
         cells = [f"{means.loc[component, method]:.1f}" for component in COMPONENTS]
-        ratios = [geometric_mean(errors[method] / errors[other]) for other in ("RM", TRUTH)]
+        ratios = [geometric_mean(errors[method] / errors[other]) for other in (RM, TRUTH)]
         rows.append([method, *cells, *(f"{ratio:.2f}" for ratio in ratios)])
     header = ["RMSE [N, N m, mm]", *COMPONENTS, "over RM's", "over the true parameters'"]
     return markdown(header, rows)
@@ -131,7 +132,7 @@ def floor_table(forces: pd.DataFrame) -> str:
 def notes(out: Path) -> str:
     """What the estimator says of itself: how often it stays near the table, and an example."""
     tables = [pd.read_parquet(path) for path in sorted(out.glob("sub-*/*_identification.parquet"))]
-    said = [str(table["note"].iloc[0]) for table in tables]
+    said = [str(table.set_index("method").loc[OM, "note"]) for table in tables]
     few = sum(LITTLE in note for note in said)
     return f'"{LITTLE}" in {few} of {len(said)} notes of {ESTIMATORS[0]}; the first: "{said[0]}"'
 

@@ -20,6 +20,7 @@ import pandas as pd
 from benchmarks.every_recording import SECTION as EVERY
 from benchmarks.fuzz import SECTION as FUZZ
 from benchmarks.sections import marks, read_section, replace_section
+from bsip_cli.statistics.methods import METHODS
 from tests.real.figaroh_csv import convert
 
 
@@ -185,7 +186,7 @@ def marker_rows(name: str, out: Path) -> list[dict[str, str]]:
 
 
 def force_rows(name: str, out: Path) -> list[dict[str, str]]:
-    """RMSE of RM and OM in each trial with measured forces."""
+    """RMSE of RM, RM+mass and OM in each trial with measured forces."""
     rows = []
     for path in sorted(out.glob("*_fit.parquet")):
         fit = pd.read_parquet(path)
@@ -199,7 +200,7 @@ def force_rows(name: str, out: Path) -> list[dict[str, str]]:
             "samples": str(int(fit["n"].max())),
         }
         for component in _COMPONENTS:
-            values = [f"{rmse.loc[component, m]:.1f}" for m in ("RM", "OM") if m in rmse]
+            values = [f"{rmse.loc[component, m]:.1f}" for m in METHODS if m in rmse]
             row[component] = " / ".join(values)
         rows.append(row)
     return rows
@@ -234,7 +235,7 @@ wrist markers change places at 45.6 s and are put right too. The fingertip marke
 stand out in `opencap_subject4` and `figaroh_human`: the shoulder girdle moves, and this skeleton
 has none.
 
-## Forces and centre of pressure: RM / OM
+## Forces and centre of pressure: RM / RM+mass / OM
 
 RMSE in N, N m and mm. `held out`: data that did not identify OM.
 

@@ -243,7 +243,7 @@ def inject(source, out, participants, seed, **effects):
     "--method",
     default="OM",
     show_default=True,
-    help="Whose inertial parameters: OM, RM or the name of an estimator.",
+    help="Whose inertial parameters: OM, RM+mass, RM or the name of an estimator.",
 )
 @click.option(
     "--format",

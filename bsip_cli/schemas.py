@@ -51,7 +51,11 @@ def _text(name: str, meaning: str) -> Column:
 
 
 _TIME = Column("time_s", "float", "s", "time from the start of the recording")
-_METHOD = _text("method", "measured, RM, OM, another estimator, or OM+<effect>: extended")
+_METHOD = _text(
+    "method",
+    "measured, RM, RM+mass (RM, all masses and tensors times one number), OM, another estimator, "
+    "or OM+<effect>: extended",
+)
 _SEGMENT = _text("segment", "segment of the skeleton")
 _WRENCH = (
     *_floats("fx_N fy_N fz_N", "N", "ground force on the body", "world"),
@@ -480,7 +484,7 @@ SCHEMAS = {
         Schema(
             "identification",
             "participant",
-            1,
+            2,
             "what the identification used and reached",
             (
                 _text("estimator", "name of the estimator"),
@@ -491,6 +495,8 @@ SCHEMAS = {
                 Column("effective_samples", "float", "1", "independent samples, all components"),
                 Column("rank", "int", "1", "base parameters found"),
                 Column("condition_number", "float", "1", "of the scaled base regressor"),
+                Column("mass_factor", "float", "1", "sum of the masses over RM's"),
+                Column("mass_factor_sd", "float", "1", "its standard deviation"),
                 *_floats("rms_fx_N rms_fy_N rms_fz_N", "N", "residual of the fit"),
                 *_floats(
                     "rms_mx_Nm rms_my_Nm rms_mz_Nm",

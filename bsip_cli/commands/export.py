@@ -50,7 +50,7 @@ _READER = Stage(
     writes=(),
     options=("skeleton",),
 )
-_FILE_NAME = re.compile(r"[A-Za-z0-9_-]+")
+_FILE_NAME = re.compile(r"[A-Za-z0-9_+-]+")
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.joint_change import Sized, joint_change, joint_delay_s
 from bsip_cli.effects.scene import Scene
+from bsip_cli.statistics.methods import OM
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,7 @@ def unseen_change_by(causes: Sequence[Cause], scene: Scene, fold: np.ndarray) ->
 
 def method_of(causes: Iterable[Cause]) -> str:
     """``OM+sync_offset+breathing``: the identified model, extended by these."""
-    return "+".join(["OM", *(cause.effect.name for cause in causes)])
+    return "+".join([OM, *(cause.effect.name for cause in causes)])
 
 
 @dataclass(frozen=True)

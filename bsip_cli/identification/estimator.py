@@ -17,9 +17,10 @@ from bsip_cli.identification.prior import Prior
 class Problem:
     """Everything an estimator may use.
 
-    The last three are options of [identify]: how many times worse the data are than they look; the
+    The next three are options of [identify]: how many times worse the data are than they look; the
     sigma% below which a base parameter counts; and how many deviations as large as [prior] says
-    count beside this person's own.
+    count beside this person's own. ``whole``: the equations before the wrench of segments that keep
+    the table's values was taken off; None where no segment does.
     """
 
     equations: NormalEquations
@@ -29,6 +30,11 @@ class Problem:
     trust_ratio: float
     sigma_percent_limit: float = 5.0
     spread_weight: float = 4.0
+    whole: NormalEquations | None = None
+
+    def every_equation(self) -> NormalEquations:
+        """Those of all segments' parameters."""
+        return self.equations if self.whole is None else self.whole
 
     def trusted_equations(self) -> tuple[np.ndarray, np.ndarray]:
         """Information (P, P) and right side (P,), each component in its noise as it is trusted."""
@@ -50,7 +56,7 @@ class Estimate:
 
     def residual_rms(self, problem: Problem) -> np.ndarray:
         """(6,) residual [N, N m] that the estimate leaves in its own data."""
-        return problem.equations.residual_rms(self.phi)
+        return problem.every_equation().residual_rms(self.phi)
 
 
 Estimator = Callable[[Problem], Estimate]

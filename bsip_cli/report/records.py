@@ -10,7 +10,8 @@ import pandas as pd
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
-from bsip_cli.report.words import trial_label
+from bsip_cli.report.words import EXTENDED, method_rank, trial_label
+from bsip_cli.statistics.methods import MEASURED, is_extended
 
 
 @dataclass(frozen=True)
@@ -120,19 +121,16 @@ def messages(origins: Iterable[Origin]) -> tuple[Message, ...]:
     return tuple(dict.fromkeys(said for origin in origins for said in messages_of(origin)))
 
 
-EXTENDED = "OM+causes"  # how reports call OM with every named cause in the model
-
-
 def with_all_causes(table: pd.DataFrame) -> pd.DataFrame:
     """Of the methods OM+<effect>... the last, which contains all causes, as `EXTENDED`."""
-    names = [name for name in table["method"].unique() if name.startswith("OM+")]
+    names = [name for name in table["method"].unique() if is_extended(name)]
     kept = table[~table["method"].isin(names[:-1])]
     return kept.assign(method=kept["method"].replace(names[-1:], EXTENDED)) if names else kept
 
 
 def signals_of(reconstruction: pd.DataFrame, column: str) -> dict[str, np.ndarray]:
     """Label of the method -> values over time; ``measured`` first, all on its clock."""
-    methods = sorted(reconstruction["method"].unique(), key=_rank)
+    methods = sorted(reconstruction["method"].unique(), key=method_rank)
     clock = clock_of(reconstruction)
     courses = reconstruction[["method", "time_s", column]].groupby("method")
     return {
@@ -147,16 +145,11 @@ def signals_of(reconstruction: pd.DataFrame, column: str) -> dict[str, np.ndarra
 
 def clock_of(reconstruction: pd.DataFrame) -> np.ndarray:
     """Times [s] of the measured rows."""
-    times = reconstruction.loc[reconstruction["method"] == "measured", "time_s"]
+    times = reconstruction.loc[reconstruction["method"] == MEASURED, "time_s"]
     return times.drop_duplicates().to_numpy()
 
 
 def flags_of(reconstruction: pd.DataFrame, column: str) -> np.ndarray:
     """A flag of the measured rows over time."""
-    measured = reconstruction[reconstruction["method"] == "measured"]
+    measured = reconstruction[reconstruction["method"] == MEASURED]
     return measured.drop_duplicates("time_s")[column].to_numpy(dtype=bool)
-
-
-def _rank(method: str) -> tuple[int, str]:
-    order = {"measured": 0, "RM": 1, "OM": 2}
-    return order.get(method, len(order)), method

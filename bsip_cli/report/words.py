@@ -7,14 +7,21 @@ import re
 from collections.abc import Sequence
 
 from bsip_cli.body.names import in_words
+from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 
 MISSING = "–"
+EXTENDED = f"{OM}+causes"  # how reports call OM with every named cause in the model
 METHODS = {
-    "measured": "measured",
-    "RM": "RM (table)",
-    "OM": "OM (identified)",
-    "OM+causes": "OM with the causes found",
+    MEASURED: "measured",
+    RM: "RM (table)",
+    RM_MASS: "RM+mass (table times one number)",
+    OM: "OM (identified)",
+    EXTENDED: "OM with the causes found",
 }
+WHAT_METHODS_ARE = (
+    "RM: parameters from an anthropometric table. RM+mass: the same, all masses and tensors times "
+    "one number, the yardstick for OM. OM: parameters identified from"
+)
 COMPONENTS = {
     "cop_ap": "COP, anterior-posterior",
     "cop_ml": "COP, medio-lateral",
@@ -119,6 +126,11 @@ def segment_label(segment: str) -> str:
 
 def component_label(component: str) -> str:
     return COMPONENTS.get(component, component)
+
+
+def method_rank(method: str) -> tuple[int, str]:
+    """By which methods are sorted: measured first, those without a label last."""
+    return (list(METHODS).index(method) if method in METHODS else len(METHODS)), method
 
 
 def method_label(method: str) -> str:

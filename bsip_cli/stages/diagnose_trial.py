@@ -25,6 +25,7 @@ from bsip_cli.stages.diagnosis_rows import nothing
 from bsip_cli.stages.frames import WRENCH, coordinates_from, person_from
 from bsip_cli.stages.known_loads import load_phi
 from bsip_cli.stages.reconstructed import Judgement, judgement_of, parameters_of, scale_of
+from bsip_cli.statistics.methods import OM, RM
 
 _NEEDED = (
     "bsip",
@@ -75,9 +76,9 @@ def _attribution(unit: Unit) -> pd.DataFrame:
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     bsip = unit.read("bsip")
     methods, phi = parameters_of(bsip, person)
-    if not {"RM", "OM"} <= set(methods):
+    if not {RM, OM} <= set(methods):
         return empty_table("attribution")
-    table, found = (phi[:, methods.index(name)] for name in ("RM", "OM"))
+    table, found = (phi[:, methods.index(name)] for name in (RM, OM))
     rm, om = _bodies(table), _bodies(found)
     kinematics, wrench = unit.read("kinematics"), unit.read("wrench")
     judgement = judgement_of(unit, kinematics, wrench)
@@ -86,7 +87,7 @@ def _attribution(unit: Unit) -> pd.DataFrame:
     ground = Ground(judgement.surface_height_m, judgement.anterior, judgement.min_force_N)
     measured = judgement.filtered(wrench[WRENCH].to_numpy())
     parts = attributions(measured, simulated[..., 0], simulated[..., 1:], judgement.judged, ground)
-    bodies = _compared(rm, om, bsip[bsip["method"] == "OM"].set_index("segment"), person)
+    bodies = _compared(rm, om, bsip[bsip["method"] == OM].set_index("segment"), person)
     lines = [line for one in parts for line in _lines(one, bodies, judgement.data)]
     return pd.DataFrame(lines) if lines else empty_table("attribution")
 

@@ -25,6 +25,7 @@ from bsip_cli.stages.identification_problem import (
 )
 from bsip_cli.stages.reconstructed import parameters_of
 from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.statistics.methods import OM, RM
 from bsip_cli.study.study import Trial
 
 _COM = ["com_x_m", "com_y_m", "com_z_m"]
@@ -65,10 +66,10 @@ def _extended(
 ) -> pd.DataFrame:
     """Rows of ``bsip`` per number of causes in the model."""
     methods, parameters = parameters_of(bsip, person)
-    phi = body_beside(unit, parameters[:, methods.index("RM")])
+    phi = body_beside(unit, parameters[:, methods.index(RM)])
     concerned = {stem for cause in causes for stem in cause.trials}
     scenes = {t.stem: scene_of(unit, person, phi, t) for t in trials if t.stem in concerned}
-    rows = bsip[bsip["method"] == "OM"]
+    rows = bsip[bsip["method"] == OM]
     changes: dict[str, np.ndarray] = {}
     tables = []
     for k, cause in enumerate(causes):
@@ -90,20 +91,20 @@ def _identified(
     recordings, _ = recordings_of(unit, person, trials, changes)
     problem, _ = problem_of(unit, person, prior, recordings)
     found = readable(estimate_by(_estimator(unit), problem), prior)
-    return bsip_table("OM", person.skeleton.segments, found.values, found.sd, found.share)
+    return bsip_table(OM, person.skeleton.segments, found.values, found.sd, found.share)
 
 
 def _estimator(unit: Unit) -> str:
     """The one that identified OM, whatever is configured now."""
     known = unit.read("identification").set_index("method")["estimator"]
-    return str(known["OM"])
+    return str(known[OM])
 
 
 # --- what the causes had done -----------------------------------------------------------------
 
 
 def _changes(bsip: pd.DataFrame, extended: pd.DataFrame) -> pd.DataFrame:
-    before = bsip[bsip["method"] == "OM"].set_index("segment")
+    before = bsip[bsip["method"] == OM].set_index("segment")
     tables = [
         _change(before, extended[extended["method"] == method].set_index("segment"), method)
         for method in dict.fromkeys(extended["method"])

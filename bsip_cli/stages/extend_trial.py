@@ -21,17 +21,18 @@ from bsip_cli.stages.frames import WRENCH, person_from
 from bsip_cli.stages.gain_rows import gain_rows
 from bsip_cli.stages.known_loads import load_phi
 from bsip_cli.stages.reconstructed import (
-    MEASURED,
     Judgement,
     Signals,
     Wrenches,
     fit_rows,
     judgement_of,
+    over_the_same_frames,
     parameters_of,
     reconstruction_rows,
     scale_of,
 )
 from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.statistics.methods import MEASURED, OM, RM, is_extended
 
 
 def run(unit: Unit) -> None:
@@ -51,7 +52,7 @@ def run(unit: Unit) -> None:
     fold = blocks.fold_of(judgement.times_s)
     raw: Wrenches = {
         MEASURED: measured[WRENCH].to_numpy(),
-        "OM": scene.wrench_of(parameters["OM"]),
+        OM: scene.wrench_of(parameters[OM]),
     }
     for place, k in enumerate(own):
         among = [causes[j] for j in own[: place + 1]]
@@ -84,19 +85,19 @@ def _scene(
     """The trial with the body beside which the causes were sized; parameters (10 n,) of OM and of
     each extended model, loads included."""
     methods, phi = parameters_of(pd.concat([unit.read("bsip"), extended]), person)
-    scene = scene_of(unit, person, body_beside(unit, phi[:, methods.index("RM")]))
+    scene = scene_of(unit, person, body_beside(unit, phi[:, methods.index(RM)]))
     carried = phi + load_phi(unit, person)[:, None]
     return scene, dict(zip(methods, carried.T, strict=True))
 
 
 def _amend(unit: Unit, judgement: Judgement, wrenches: Wrenches, signals: Signals) -> None:
-    ours = [name for name in signals if name.startswith("OM+")]
+    ours = [name for name in signals if is_extended(name)]
     rows = reconstruction_rows(
         judgement, {name: wrenches[name] for name in ours}, {name: signals[name] for name in ours}
     )
     unit.amend("reconstruction", rows)
-    compared = {name: signals[name] for name in (MEASURED, *ours)}
-    unit.amend("fit", fit_rows(judgement, compared))
+    compared = over_the_same_frames(signals)
+    unit.amend("fit", fit_rows(judgement, {name: compared[name] for name in (MEASURED, *ours)}))
 
 
 # --- gain -------------------------------------------------------------------------------------
@@ -112,7 +113,7 @@ def _errors(
     for component in signals[MEASURED]:
         scale, _ = scale_of(component)
         measured, before, after = (
-            scale * signals[name][component][judged] for name in (MEASURED, "OM", method)
+            scale * signals[name][component][judged] for name in (MEASURED, OM, method)
         )
         errors[component] = block_errors(measured, before, after, numbers)
     return errors

@@ -29,6 +29,7 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.report import files_frame, origin_of, refusals_of, write_figures, write_text
 from bsip_cli.statistics.cohort import Criteria
+from bsip_cli.statistics.methods import OM
 from bsip_cli.study.study import Participant
 
 
@@ -90,8 +91,8 @@ def _missing_sentence(gone: dict) -> str:
 def _member(unit: Unit, participant: Participant) -> Member:
     return Member(
         participant.id,
-        _first_row(unit, "person", participant),
-        _first_row(unit, "identification", participant),
+        _shown(unit, "person", participant),
+        _shown(unit, "identification", participant, OM),
         unit.path("report-files", participant=participant).exists(),
         refusals_of(unit, participant),
         _searched(unit, participant),
@@ -106,10 +107,14 @@ def _searched(unit: Unit, participant: Participant) -> Searched | None:
     return searched(participant.id, diagnosis, facts)
 
 
-def _first_row(unit: Unit, kind: str, participant: Participant) -> dict[str, Any] | None:
+def _shown(
+    unit: Unit, kind: str, participant: Participant, method: str = ""
+) -> dict[str, Any] | None:
+    """What is shown of the first row, of those of a method."""
     if not unit.path(kind, participant=participant).exists():
         return None
     rows = unit.read(kind, participant=participant)
+    rows = rows[rows["method"] == method] if method else rows
     return None if rows.empty else {name: rows[name].iloc[0] for name in SHOWN[kind]}
 
 

@@ -137,6 +137,6 @@ def problem_of(
     for _ in range(_WEIGHT_ROUNDS):
         likely = likeliest(prior, *equations.weighted(noise.weights()))
         noise = noise_of(residual_series(model, recordings, cutoff, reference, likely))
-        equations = accumulate(model, recordings, cutoff, reference, noise.weights_at)
-        equations = equations.with_known(prior.phi, known)
-    return Problem(equations, noise, prior, basis, *judgement), reference
+        whole = accumulate(model, recordings, cutoff, reference, noise.weights_at)
+        equations = whole.with_known(prior.phi, known)
+    return Problem(equations, noise, prior, basis, *judgement, whole), reference

@@ -1,4 +1,4 @@
-"""identify: inertial parameters that explain the measured ground forces (OM)."""
+"""identify: inertial parameters that explain the measured ground forces (OM), and RM+mass."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ from bsip_cli.stages.identification_problem import (
     usable_frames,
 )
 from bsip_cli.stages.known_loads import load_words, loads_record
+from bsip_cli.statistics.methods import OM, RM_MASS
 from bsip_cli.study.study import Trial
 
 _SHORTEST_S = 0.5
@@ -48,17 +49,13 @@ def run(unit: Unit) -> None:
         return
     _tell_of_fixed(unit, person)
     problem, reference = problem_of(unit, person, prior, recordings)
-    estimates: dict[str, Estimate] = {
-        str(name): estimate_by(name, problem) for name in unit.config.identify.estimators
-    }
-    methods = _methods(unit)
-    results = {name: readable(estimate, prior) for name, estimate in estimates.items()}
+    estimators = _estimators(unit)
+    estimates = {method: estimate_by(name, problem) for method, name in estimators.items()}
+    results = {method: readable(estimate, prior) for method, estimate in estimates.items()}
     tables = [regression.drop(columns="note")]
-    for name, result in results.items():
-        unit.warn(f"{unit.name}: {methods[name]} ({name}): {estimates[name].note}")
-        tables.append(
-            bsip_table(methods[name], skeleton.segments, result.values, result.sd, result.share)
-        )
+    for method, result in results.items():
+        unit.warn(f"{unit.name}: {method} ({estimators[method]}): {estimates[method].note}")
+        tables.append(bsip_table(method, skeleton.segments, result.values, result.sd, result.share))
     unit.write(
         "bsip",
         pd.concat(tables, ignore_index=True),
@@ -70,9 +67,8 @@ def run(unit: Unit) -> None:
     )
     unit.write("base-parameters", _base_table(skeleton, problem))
     found = excitation(problem)
-    share = next(iter(results.values())).share
-    unit.write("excitation", _excitation_table(person, problem, found, share))
-    unit.write("identification", _summary(problem, found, estimates, methods, blocks))
+    unit.write("excitation", _excitation_table(person, problem, found, results[OM].share))
+    unit.write("identification", _summary(problem, found, estimates, estimators, blocks))
     unit.write("used-blocks", blocks)
 
 
@@ -87,10 +83,10 @@ def _write_table_only(unit: Unit, regression: pd.DataFrame, recordings: list[Rec
         unit.write(kind, empty_table(kind))
 
 
-def _methods(unit: Unit) -> dict[str, str]:
-    """The first estimator is OM, the others go by their names."""
-    names = unit.config.identify.estimators
-    return {name: "OM" if k == 0 else name for k, name in enumerate(names)}
+def _estimators(unit: Unit) -> dict[str, str]:
+    """By method: RM+mass always; OM is the first that is configured, others go by their names."""
+    first, *others = unit.config.identify.estimators
+    return {RM_MASS: "mass_factor", OM: first} | {name: name for name in others}
 
 
 # --- which data -------------------------------------------------------------------------------
@@ -189,22 +185,25 @@ def _summary(
     problem: Problem,
     found: Excitation,
     estimates: dict[str, Estimate],
-    methods: dict[str, str],
+    estimators: dict[str, str],
     blocks: pd.DataFrame,
 ) -> pd.DataFrame:
     names = [f"rms_{name}" for name in WRENCH]
+    table_kg = float(problem.prior.phi[::10].sum())
     rows = []
-    for name, estimate in estimates.items():
+    for method, estimate in estimates.items():
         rows.append(
             {
-                "estimator": name,
-                "method": methods[name],
+                "estimator": estimators[method],
+                "method": method,
                 "trials": ", ".join(blocks["trial"].unique()),
                 "samples": problem.equations.samples,
                 "duration_s": problem.equations.duration_s,
                 "effective_samples": float(problem.noise.effective.sum()),
                 "rank": problem.basis.rank,
                 "condition_number": found.condition_number,
+                "mass_factor": float(estimate.phi[::10].sum()) / table_kg,
+                "mass_factor_sd": float(np.sqrt(estimate.covariance[::10, ::10].sum())) / table_kg,
                 **dict(zip(names, estimate.residual_rms(problem), strict=True)),
                 "note": estimate.note,
             }

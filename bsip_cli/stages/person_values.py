@@ -11,7 +11,8 @@ import pandas as pd
 
 from bsip_cli.statistics.cohort import DATA_SHARE
 from bsip_cli.statistics.cohort_correlations import CorrelationRun
-from bsip_cli.statistics.cohort_values import DIFFERENCE, MEASURED, OM, RM, Value
+from bsip_cli.statistics.cohort_values import DIFFERENCE, Value
+from bsip_cli.statistics.methods import MEASURED, METHODS, OM, RM
 from bsip_cli.study.study import Participant, Trial
 
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -61,7 +62,7 @@ def _rows(frame: pd.DataFrame, *methods: str) -> list[dict[str, Any]]:
 
 def masses(participant: Participant, bsip: pd.DataFrame) -> Iterator[Value]:
     person = (participant.id, "", "all", "", "", "table1")
-    for row in _rows(bsip, OM, RM):
+    for row in _rows(bsip, *METHODS):
         segment, method = row["segment"], row["method"]
         yield Value(*person, segment, method, row["mass_kg"], "kg")
         if method == OM:
@@ -83,9 +84,9 @@ def centres(participant: Participant, bsip: pd.DataFrame) -> Iterator[Value]:
 def values_of(recording: Recording) -> list[Value]:
     values: list[Value] = []
     if "fit" in recording.frames:
-        rows = _rows(recording.frames["fit"], OM, RM)
+        rows = _rows(recording.frames["fit"], *METHODS)
         fits = {(row["method"], row["component"]): row for row in rows}
-        for method in (OM, RM):
+        for method in METHODS:
             values += _cop_errors(recording, method, fits)
             values += _force_errors(recording, method, fits)
             values += _residuals(recording, method, fits)
@@ -129,7 +130,7 @@ def _residuals(recording: Recording, method: str, fits: dict) -> Iterator[Value]
 
 
 def _sway(recording: Recording, frame: pd.DataFrame) -> Iterator[Value]:
-    for row in _rows(frame, MEASURED, OM, RM):
+    for row in _rows(frame, MEASURED, *METHODS):
         for variable, (column, unit) in SWAY.items():
             yield recording.value("table3", variable, row["method"], row[column], unit)
 

@@ -16,16 +16,17 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH, coordinates_from, person_from
 from bsip_cli.stages.known_loads import load_phi, loads_record
 from bsip_cli.stages.reconstructed import (
-    MEASURED,
     Wrenches,
     fit_rows,
     judgement_of,
+    over_the_same_frames,
     parameters_of,
     reconstruction_rows,
 )
 from bsip_cli.statistics.correlation_tests import fisher_z_difference, williams_t
 from bsip_cli.statistics.effective_samples import effective_samples_of_pair
 from bsip_cli.statistics.fit_measures import fit_measures
+from bsip_cli.statistics.methods import MEASURED
 from bsip_cli.statistics.posturography import posturography
 
 
@@ -45,9 +46,10 @@ def run(unit: Unit) -> None:
         reconstruction_rows(judgement, wrenches, signals),
         facts={"loads": loads_record(unit)},
     )
-    unit.write("fit", fit_rows(judgement, signals))
-    unit.write("correlation-difference", _correlations(signals, judgement.judged))
-    unit.write("posturography", _sway(signals, judgement.judged, judgement.times_s))
+    compared = over_the_same_frames(signals)
+    unit.write("fit", fit_rows(judgement, compared))
+    unit.write("correlation-difference", _correlations(compared, judgement.judged))
+    unit.write("posturography", _sway(compared, judgement.judged, judgement.times_s))
 
 
 def _wrenches(
@@ -67,11 +69,11 @@ def _wrenches(
 
 def _correlations(signals, judged) -> pd.DataFrame:
     rows = []
-    methods = [name for name in signals if name != "measured"]
+    methods = [name for name in signals if name != MEASURED]
     spans = stretches(judged)
     for a, b in combinations(methods, 2):
-        for component in signals["measured"]:
-            x, y, z = (signals[name][component] for name in ("measured", a, b))
+        for component in signals[MEASURED]:
+            x, y, z = (signals[name][component] for name in (MEASURED, a, b))
             r_a, r_b, r_ab = (
                 fit_measures(p, q, spans).pearson_r for p, q in ((x, y), (x, z), (y, z))
             )

@@ -17,8 +17,8 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH
 from bsip_cli.statistics.fit_measures import fit_measures
+from bsip_cli.statistics.methods import MEASURED, METHODS
 
-MEASURED = "measured"
 _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 _SHORTEST_HELD_OUT_S = 0.5
 
@@ -63,6 +63,21 @@ class Judgement:
         signals["cop_ap"], signals["cop_ml"] = anterior_and_right(cop, self.anterior)
         signals["grf_vertical"] = signals["fz"]
         return signals
+
+
+def over_the_same_frames(signals: Signals) -> Signals:
+    """The signals with centres of pressure only where the measured force and every method that is
+    compared have one: near take-off a newton decides whether there is one, and its error is large.
+    """
+    compared = [signals[name] for name in (MEASURED, *METHODS) if name in signals]
+    known = np.isfinite([one["cop_ap"] for one in compared]).all(axis=0)
+    return {
+        name: {
+            component: np.where(known, values, np.nan) if component.startswith("cop") else values
+            for component, values in one.items()
+        }
+        for name, one in signals.items()
+    }
 
 
 def judgement_of(unit: Unit, kinematics: pd.DataFrame, measured: pd.DataFrame) -> Judgement:
@@ -159,14 +174,12 @@ def fit_rows(judgement: Judgement, signals: Signals) -> pd.DataFrame:
     """Rows of ``fit``: every method of ``signals`` against the measured one."""
     rows, spans = [], stretches(judgement.judged)
     for method, computed in signals.items():
-        if method == "measured":
+        if method == MEASURED:
             continue
         for component, values in computed.items():
             scale, unit = scale_of(component)
             weight = judgement.body_weight_N if unit == "N" else None
-            fit = fit_measures(
-                signals["measured"][component] * scale, values * scale, spans, weight
-            )
+            fit = fit_measures(signals[MEASURED][component] * scale, values * scale, spans, weight)
             rows.append(
                 {
                     "method": method,

@@ -10,6 +10,7 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.identification.prior import Spread, prior_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import bsip_table, person_from
+from bsip_cli.statistics.methods import RM
 
 
 def run(unit: Unit) -> None:
@@ -25,5 +26,5 @@ def run(unit: Unit) -> None:
             unit.warn(f"{unit.name}: {segment}: {note}")
     prior = prior_of(result.inertias, person, Spread(**unit.config.prior.model_dump()))
     values = np.array([inertia.readable() for inertia in prior.inertias])
-    table = bsip_table("RM", skeleton.segments, values, prior.readable_sd, np.zeros_like(values))
+    table = bsip_table(RM, skeleton.segments, values, prior.readable_sd, np.zeros_like(values))
     unit.write("regression", table.assign(note=list(result.notes)))

@@ -17,8 +17,8 @@ class Comparison:
     """A test of method_a against method_b over n participants; differences are a - b.
 
     What cannot be computed is nan, and `reason` says why. `p_holm` corrects for all rows of the
-    same test in the same table. `count_a` and `count_b` are the participants in whom the one or
-    the other method is better, for tests that count.
+    same test with the same method_b in the same table. `count_a` and `count_b` are the participants
+    in whom the one or the other method is better, for tests that count.
     """
 
     topic: Topic
@@ -71,10 +71,10 @@ HOLM_FAMILIES = ("paired_t", "wilcoxon")
 
 def with_holm(comparisons: Sequence[Comparison]) -> tuple[Comparison, ...]:
     """The same comparisons, p_holm filled in where a table asks one question many times."""
-    families: dict[tuple[str, str], list[int]] = defaultdict(list)
+    families: dict[tuple[str, str, str], list[int]] = defaultdict(list)
     for place, row in enumerate(comparisons):
         if row.test in HOLM_FAMILIES and not isnan(row.p_value):
-            families[row.topic.table, row.test].append(place)
+            families[row.topic.table, row.test, row.method_b].append(place)
     corrected = list(comparisons)
     for places in families.values():
         adjusted = adjusted_p_values([comparisons[place].p_value for place in places], "holm")

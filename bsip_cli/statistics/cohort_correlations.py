@@ -12,13 +12,14 @@ from typing import Literal
 import numpy as np
 
 from bsip_cli.statistics.cohort_comparison import Comparison
-from bsip_cli.statistics.cohort_values import OM, RM, Topic, Value
+from bsip_cli.statistics.cohort_values import Topic, Value
 from bsip_cli.statistics.correlation_tests import (
     DependentCorrelations,
     IndependentCorrelations,
     fisher_z_difference,
     williams_t,
 )
+from bsip_cli.statistics.methods import OM, RM
 
 PAIR = f"{OM}-{RM}"
 """In the column of methods: of the difference between the two."""

@@ -1,10 +1,9 @@
-"""OM against RM over the participants: the published t test, and what stands beside it.
-
-All functions take samples of shape (participants,), x of OM and y of RM, in the topic's unit.
-"""
+"""OM against a rival over the participants: the published t test, and what stands beside it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -12,7 +11,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bsip_cli.statistics.cohort_comparison import Comparison
-from bsip_cli.statistics.cohort_values import OM, RM, Topic
+from bsip_cli.statistics.cohort_values import Topic, Value, per_participant
+from bsip_cli.statistics.methods import OM, RIVALS, RM
 from bsip_cli.statistics.normality import NormalityTest, lilliefors_test
 from bsip_cli.statistics.paired_tests import (
     MINIMUM_FOR_WILCOXON,
@@ -25,6 +25,34 @@ from bsip_cli.statistics.paired_tests import (
 from bsip_cli.statistics.samples import finite_pairs, finite_values, mean_of, standard_deviation
 
 Sample = NDArray[np.float64]
+Origin = Literal["published", "added"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """(participants,) values x of OM and y of a rival, in the topic's unit.
+
+    ``origin`` : of the tests that the papers make of OM and RM; with another rival they are added.
+    """
+
+    topic: Topic
+    rival: str
+    x: Sample
+    y: Sample
+    origin: Origin
+
+    def finite(self) -> tuple[Sample, Sample]:
+        """Of the participants with both."""
+        return finite_pairs(self.x, self.y)
+
+
+def pairs_of(topic: Topic, values: Sequence[Value], origin: Origin) -> Iterator[Pair]:
+    """OM with RM, and with each other rival of which there are values."""
+    known = {value.method for value in values}
+    for rival in RIVALS:
+        if rival == RM or rival in known:
+            x, y = per_participant(values, (OM, rival)).T
+            yield Pair(topic, rival, x, y, origin if rival == RM else "added")
 
 
 def description(topic: Topic, method: str, x: Sample) -> Comparison:
@@ -41,15 +69,15 @@ def description(topic: Topic, method: str, x: Sample) -> Comparison:
     )
 
 
-def pair_description(topic: Topic, x: Sample, y: Sample) -> Comparison:
+def pair_description(pair: Pair) -> Comparison:
     """Means and SDs of the participants with both methods, without a test."""
-    x, y = finite_pairs(x, y)
+    x, y = pair.finite()
     return Comparison(
-        topic,
+        pair.topic,
         "description",
-        "published",
+        pair.origin,
         OM,
-        RM,
+        pair.rival,
         n=len(x),
         mean_a=mean_of(x),
         sd_a=standard_deviation(x),
@@ -59,32 +87,29 @@ def pair_description(topic: Topic, x: Sample, y: Sample) -> Comparison:
     )
 
 
-def t_and_rank_tests(
-    topic: Topic, x: Sample, y: Sample, alpha: float, origin: Literal["published", "added"]
-) -> tuple[Comparison, ...]:
+def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
     """Paired t test with Cohen's d as printed; beside it d_z, and Wilcoxon's test."""
-    test = paired_t(x, y, 1.0 - alpha)
-    normality = lilliefors_test(np.subtract(*finite_pairs(x, y)), alpha)
-    published = _t_row(topic, test, origin, normality)
+    test = paired_t(pair.x, pair.y, 1.0 - alpha)
+    normality = lilliefors_test(np.subtract(*pair.finite()), alpha)
     paired_effect = Comparison(
-        topic,
+        pair.topic,
         "d_z",
         "added",
         OM,
-        RM,
+        pair.rival,
         test.n,
         difference=test.mean_difference,
         effect_size=test.d_paired,
         effect_size_name="d_z",
         reason=test.reason,
     )
-    ranks = wilcoxon(x, y)
+    ranks = wilcoxon(pair.x, pair.y)
     by_rank = Comparison(
-        topic,
+        pair.topic,
         "wilcoxon",
         "added",
         OM,
-        RM,
+        pair.rival,
         ranks.n,
         difference=ranks.hodges_lehmann,
         statistic=ranks.w,
@@ -93,21 +118,16 @@ def t_and_rank_tests(
         effect_size_name="rank-biserial",
         reason=ranks.reason,
     )
-    return published, paired_effect, by_rank
+    return _t_row(pair, test, normality), paired_effect, by_rank
 
 
-def _t_row(
-    topic: Topic,
-    test: PairedComparison,
-    origin: Literal["published", "added"],
-    normality: NormalityTest,
-) -> Comparison:
+def _t_row(pair: Pair, test: PairedComparison, normality: NormalityTest) -> Comparison:
     return Comparison(
-        topic,
+        pair.topic,
         "paired_t",
-        origin,
+        pair.origin,
         OM,
-        RM,
+        pair.rival,
         test.n,
         test.mean_x,
         test.sd_x,
@@ -120,22 +140,22 @@ def _t_row(
         df1=test.df,
         p_value=test.p,
         effect_size=test.cohens_d_pooled,
-        effect_size_name="Cohen's d (pooled SD, RM - OM)",
+        effect_size_name=f"Cohen's d (pooled SD, {pair.rival} - OM)",
         lilliefors_p=normality.p_value,
         reason=test.reason or normality.reason,
     )
 
 
-def equivalence(topic: Topic, x: Sample, y: Sample, alpha: float, percent: float) -> Comparison:
+def equivalence(pair: Pair, alpha: float, percent: float) -> Comparison:
     """Do x and y differ by less than so many percent of the mean of y? p of the weaker side."""
-    bound = abs(mean_of(finite_pairs(x, y)[1])) * percent / 100.0
-    test = equivalence_tost(x, y, bound, alpha)
+    bound = abs(mean_of(pair.finite()[1])) * percent / 100.0
+    test = equivalence_tost(pair.x, pair.y, bound, alpha)
     return Comparison(
-        topic,
+        pair.topic,
         "tost",
         "added",
         OM,
-        RM,
+        pair.rival,
         test.n,
         difference=test.mean_difference,
         ci_low=test.ci_low,
@@ -152,27 +172,27 @@ def _weaker_side(test: EquivalenceTest) -> float:
     return test.t_lower if test.t_lower <= -test.t_upper else test.t_upper
 
 
-def smaller_error(topic: Topic, x: Sample, y: Sample) -> Comparison:
+def smaller_error(pair: Pair) -> Comparison:
     """In how many participants each method has the smaller error, with the exact sign test."""
-    x, y = finite_pairs(x, y)
-    om, rm = int(np.sum(x < y)), int(np.sum(y < x))
-    possible = om + rm >= MINIMUM_FOR_WILCOXON
+    x, y = pair.finite()
+    own, other = int(np.sum(x < y)), int(np.sum(y < x))
+    possible = own + other >= MINIMUM_FOR_WILCOXON
     return Comparison(
-        topic,
+        pair.topic,
         "sign",
         "added",
         OM,
-        RM,
+        pair.rival,
         n=len(x),
-        p_value=float(stats.binomtest(om, om + rm).pvalue) if possible else np.nan,
-        effect_size=om / len(x) if len(x) else np.nan,
+        p_value=float(stats.binomtest(own, own + other).pvalue) if possible else np.nan,
+        effect_size=own / len(x) if len(x) else np.nan,
         effect_size_name="share of participants in whom OM has the smaller error",
-        count_a=om,
-        count_b=rm,
+        count_a=own,
+        count_b=other,
         reason=""
         if possible
         else (
             f"The sign test needs {MINIMUM_FOR_WILCOXON} pairs that differ to reach p < 0.05, "
-            f"there are {om + rm}."
+            f"there are {own + other}."
         ),
     )

@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-OM, RM, MEASURED = "OM", "RM", "measured"
+from bsip_cli.statistics.methods import OM, RM
 
-DIFFERENCE = "|OM-RM|"
+DIFFERENCE = f"|{OM}-{RM}|"
 """The method of a value that is how far both are apart."""
 
 OVER_TASKS = ("table2", "table3", "table6")

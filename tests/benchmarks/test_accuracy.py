@@ -48,7 +48,7 @@ def test_intervals_are_counted_per_group():
 
 def test_ratios_are_taken_per_task():
     """A task with large errors does not outweigh the others."""
-    size = {"RM": 2.0, "consistent": 1.0, accuracy_measures.TRUTH: 0.5}
+    size = {"RM": 2.0, "RM+mass": 1.5, "consistent": 1.0, accuracy_measures.TRUTH: 0.5}
     size |= dict.fromkeys(accuracy.ESTIMATORS[1:], 1.0)
     forces = pd.DataFrame(
         [
@@ -72,7 +72,7 @@ def test_one_person(tmp_path):
     accuracy_study.write_study(study, 1, seed=5)
     own = accuracy.identify(study, out, accuracy_study.ONE_ARM)
     found = accuracy.named(accuracy_measures.segment_errors(study, out))
-    assert len(found) == 15 * (1 + len(accuracy.ESTIMATORS))
+    assert len(found) == 15 * (2 + len(accuracy.ESTIMATORS))
     assert found.loc[found["method"] == "consistent", "physical"].all()
     assert accuracy.LITTLE in accuracy.notes(out)
     forces = accuracy.named(

@@ -24,6 +24,7 @@ from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages.frames import person_from
 from bsip_cli.stages.reconstructed import parameters_of
 from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.statistics.methods import MEASURED, METHODS
 from bsip_cli.study.study import load_study
 
 pytestmark = pytest.mark.long
@@ -334,5 +335,5 @@ def test_without_a_cause_nothing_is_added(null_run):
         assert null_run.read(kind).empty
     for stem in (SEQUENCE, SQUAT, STATIC):
         assert null_run.read("gain", stem).empty
-        assert set(null_run.read("fit", stem)["method"]) == {"RM", "OM"}
-        assert set(null_run.read("reconstruction", stem)["method"]) == {"measured", "RM", "OM"}
+        assert set(null_run.read("fit", stem)["method"]) == set(METHODS)
+        assert set(null_run.read("reconstruction", stem)["method"]) == {MEASURED, *METHODS}

@@ -141,6 +141,18 @@ def run(first_run, tmp_path) -> Run:
 # --- what a run leaves --------------------------------------------------------------------------
 
 
+def test_rm_mass_stands_beside_rm_and_om(first_run):
+    """In held-out trials too; one number changes no centre of pressure."""
+    masses = read_artifact(first_run.path("bsip"), "bsip").groupby("method")["mass_kg"].sum()
+    row = read_artifact(first_run.path("identification"), "identification").set_index("method")
+    assert masses["RM+mass"] == pytest.approx(row.loc["RM+mass", "mass_factor"] * masses["RM"])
+    fit = read_artifact(first_run.path("fit", "sub-01_task-squat_run-1"), "fit")
+    assert set(fit["data"]) == {"held_out"}
+    rmse = fit.pivot(index="component", columns="method", values="rmse")
+    assert rmse.loc["cop_ap", "RM+mass"] == pytest.approx(rmse.loc["cop_ap", "RM"])
+    assert (rmse[["RM", "RM+mass", "OM"]] > 0.0).all(axis=None)
+
+
 def test_files_of_a_run(first_run):
     """Exactly these: a new or a lost file is a change that others must hear of."""
     golden = GOLDEN.read_text(encoding="utf-8").splitlines()

@@ -134,7 +134,14 @@ def bsip(rng) -> pd.DataFrame:
                 row |= {name: rng.normal(), f"{name}_sd": 0.1, share_name(name): rng.random()}
             row["mass_kg"] = mass * (1.0 if method == "RM" else rng.normal(1.02, 0.05))
             rows.append(row)
-    return pd.DataFrame(rows)
+    return with_rm_mass(pd.DataFrame(rows), {"mass_kg": 0.96})
+
+
+def with_rm_mass(frame: pd.DataFrame, factors: dict[str, float]) -> pd.DataFrame:
+    """Rows of RM+mass beside RM's: some columns times a number."""
+    rm = frame[frame["method"] == "RM"]
+    more = rm.assign(method="RM+mass", **{name: rm[name] * x for name, x in factors.items()})
+    return pd.concat([frame, more], ignore_index=True)
 
 
 def trial_frames(rng, trial: Trial) -> dict[str, pd.DataFrame]:
@@ -174,8 +181,8 @@ def trial_frames(rng, trial: Trial) -> dict[str, pd.DataFrame]:
         for method in ("measured", *size)
     ]
     return {
-        "fit": pd.DataFrame(fits),
-        "posturography": pd.DataFrame(sway),
+        "fit": with_rm_mass(pd.DataFrame(fits), {"rmse": 0.7, "rmse_percent_bw": 0.7}),
+        "posturography": with_rm_mass(pd.DataFrame(sway), {}),
         "correlation-difference": pd.DataFrame([correlation(rng, c) for c in COMPONENTS]),
     }
 

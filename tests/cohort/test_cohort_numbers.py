@@ -205,7 +205,7 @@ def test_table_5(cohort):
     fit = cohort.all_of("fit")
     correlations = cohort.all_of("correlation-difference")
     table = cohort.table("table5_six_components").set_index(["task", "component", "method"])
-    assert len(table) == len(TASKS) * 6 * 2
+    assert len(table) == len(TASKS) * 6 * 3
     for task in TASKS:
         for component in COMPONENTS:
             chosen = fit[(fit["task"] == task) & (fit["component"] == component)]
@@ -231,6 +231,35 @@ def test_table_5(cohort):
                 (correlations["task"] == task) & (correlations["component"] == component)
             ]
             check_correlations(row, of_component)
+
+
+def test_rm_mass_stands_beside_rm_in_every_table(cohort):
+    """Its mean, and OM tested against it as against RM, in a family of its own."""
+    tables = {
+        "table1_segment_mass": ("rm_mean_kg", 0.96),
+        "table2_cop_rmse": ("rm_mean_mm", 0.7),
+        "table3_posturography": ("rm_mean_mm", 1.0),
+        "table4_cross_validation": ("rm_mean_percent_bw", 0.7),
+        "table6_centres_of_mass": ("rm_mean_N", 0.7),
+    }
+    for name, (column, factor) in tables.items():
+        table = cohort.table(name)
+        beside = table[column.replace("rm_", "rm_mass_")]
+        assert beside.to_numpy() == pytest.approx(factor * table[column].to_numpy(), nan_ok=True)
+        tested = table["rm_mass_p"].dropna()
+        assert len(tested) and cohort.text(name).count("RM+mass M(SD)") == 1
+        assert table["rm_mass_p_holm"].dropna().to_numpy() == pytest.approx(holm(tested.to_numpy()))
+    five = cohort.table("table5_six_components").set_index("method")
+    assert five.loc["RM+mass", "rmse_mean_N"].dropna().to_numpy() == pytest.approx(
+        0.7 * five.loc["RM", "rmse_mean_N"].dropna().to_numpy()
+    )
+    fit = cohort.all_of("fit").query("component == 'grf_vertical' and task == 'walking'")
+    wide = fit.pivot(index="participant", columns="method", values="rmse_percent_bw")
+    row = cohort.table("table4_cross_validation").set_index(["quantity", "task"])
+    row = row.loc["grf_vertical", "walking"]
+    test = stats.ttest_rel(wide["OM"], wide["RM+mass"])
+    assert (row["rm_mass_t"], row["rm_mass_p"]) == pytest.approx((test.statistic, test.pvalue))
+    assert row["rm_mass_om_smaller"] == (wide["OM"] < wide["RM+mass"]).sum()
 
 
 def check_correlations(row, runs: pd.DataFrame) -> None:
@@ -264,7 +293,7 @@ def check_correlations(row, runs: pd.DataFrame) -> None:
 
 def test_csv_holds_what_the_comparisons_hold_to_the_last_digit(cohort):
     comparisons = cohort.group("comparisons")
-    rows = comparisons[(comparisons["table"] == "table1") & (comparisons["test"] == "paired_t")]
+    rows = comparisons.query("table == 'table1' and test == 'paired_t' and method_b == 'RM'")
     expected = rows.set_index("variable").sort_index()
     table = cohort.table("table1_segment_mass").set_index("segment").sort_index()
     names = {"om_mean_kg": "mean_a", "ci_high_kg": "ci_high", "t": "statistic", "p": "p_value"}
@@ -282,11 +311,12 @@ def test_one_unit_in_every_csv_column(cohort):
     assert table.loc[~forces, "rmse_mean_Nm"].notna().all()
 
 
-def test_values_hold_every_run_and_only_om_rm_and_measured(cohort):
+def test_values_hold_every_run_and_only_the_compared_methods(cohort):
     values = cohort.group("values")
-    assert set(values["method"]) == {"OM", "RM", "measured", "OM-RM", "|OM-RM|"}
+    methods = {"OM", "RM", "RM+mass", "measured", "OM-RM", "|OM-RM|"}
+    assert set(values["method"]) == methods
     runs = values.query("table == 'table4' and task == 'throwing' and variable == 'cop_ap'")
-    assert len(runs) == 8 * 2 * 2
+    assert len(runs) == 8 * 2 * 3
     assert set(runs["data"]) == {"held_out"}
     assert set(values.loc[values["table"].isin(["table2", "table3"]), "role"]) == {"sequence"}
     assert not set(values["task"]) & {"static"}

@@ -99,6 +99,15 @@ def test_opencap_om_beats_rm_on_blocks_of_squats_it_has_not_seen(opencap):
     assert rmse.loc["cop_ap", "OM"] < 0.7 * rmse.loc["cop_ap", "RM"]
 
 
+def test_opencap_one_number_does_what_om_does_to_the_vertical_force(opencap):
+    """The plates read 4 % less than the stated mass; what that number does is no gain of OM."""
+    rmse = fit_of(opencap[1], "sub-01_task-squats").loc["fz"]
+    assert rmse["RM+mass"] < 0.4 * rmse["RM"]
+    assert rmse["OM"] > 0.9 * rmse["RM+mass"]
+    bsip = pd.read_parquet(opencap[1] / "sub-01" / "sub-01_bsip.parquet")
+    assert abs(bsip.groupby("method")["mass_kg"].sum()["RM+mass"] - 60.1) < 0.3
+
+
 def test_opencap_chair_and_box_are_contacts_that_no_plate_measures(opencap):
     for stem, share in (("sub-01_task-sitstand", 0.7), ("sub-01_task-dropjump", 0.7)):
         wrench = pd.read_parquet(opencap[1] / "sub-01" / f"{stem}_wrench.parquet")

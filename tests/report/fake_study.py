@@ -12,9 +12,11 @@ import pandas as pd
 from bsip_cli.artifacts import write_artifact
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.schemas import SCHEMAS, bsip_names, share_name
+from bsip_cli.statistics.methods import MEASURED, METHODS, OM, RM, RM_MASS
 from bsip_cli.study.study import Participant, Study, Trial
 
 MASS_KG, GRAVITY = 62.8, 9.80665
+MASS_FACTOR, ONE_NUMBER = 0.96, 0.9  # of RM+mass: its masses, and its errors, over RM's
 EVIL = "<script>alert('$x_1$')</script>"
 TASKS = {"static": "static", "sequence": "sequence", "basketball": "validation"}
 DURATIONS_S = {"static": 2.0, "sequence": 14.0, "basketball": 3.0}
@@ -210,7 +212,7 @@ class Artifacts:
 
     def bsip(self) -> pd.DataFrame:
         rows = []
-        for method in ("RM", "OM"):
+        for method in METHODS:
             for k, name in enumerate(self.skeleton.segments):
                 row = {"method": method, "segment": name}
                 mass, length = MASS_KG * _SHARES[part(name)], _LENGTHS[part(name)]
@@ -224,12 +226,14 @@ class Artifacts:
                     0.0,
                     0.0,
                 ]
-                if method == "OM":
+                if method == RM_MASS:
+                    values[0] *= MASS_FACTOR
+                if method == OM:
                     values = [
                         v + s * abs(v)
                         for v, s in zip(values, self.random.normal(0, 0.08, 10), strict=True)
                     ]
-                share = 0.0 if method == "RM" else min(1.0, 0.07 * (k + 0.5))
+                share = 0.0 if method != OM else min(1.0, 0.07 * (k + 0.5))
                 for column, value in zip(bsip_names(), values, strict=True):
                     row |= {
                         column: value,
@@ -241,21 +245,26 @@ class Artifacts:
 
     def identification(self) -> pd.DataFrame:
         row = {
-            "estimator": "hansen2017",
-            "method": "OM",
             "trials": self.person.trials[1].stem,
             "samples": 1400,
             "duration_s": 13.5,
             "effective_samples": 321.0,
             "rank": 128,
             "condition_number": 812.0,
-            "note": "masses kept positive",
+            "mass_factor": MASS_FACTOR,
+            "mass_factor_sd": 0.002,
         }
         row |= {f"rms_{c}_N": 4.5 for c in ("fx", "fy", "fz")}
         row |= {f"rms_{c}_Nm": 2.25 for c in ("mx", "my", "mz")}
-        return pd.DataFrame([row])
+        one_number = {"estimator": "mass_factor", "method": RM_MASS, "note": "times 0.96"}
+        own = {"estimator": "hansen2017", "method": OM, "note": "masses kept positive"}
+        return pd.DataFrame([one_number | row, own | row])
 
     # --- trial ------------------------------------------------------------------------------
+
+    def sizes(self) -> dict[str, float]:
+        """Of the methods' errors."""
+        return {RM: 1.0, RM_MASS: ONE_NUMBER, OM: self.better}
 
     def times(self, trial: Trial) -> np.ndarray:
         return np.arange(int(DURATIONS_S[trial.task] * RATE_HZ)) / RATE_HZ
@@ -336,7 +345,7 @@ class Artifacts:
             "cop_ml_m": 0.02 * fast - 0.03 * slow,
         }
         parts = []
-        for method, size in (("measured", 0.0), ("RM", 1.0), ("OM", self.better)):
+        for method, size in ((MEASURED, 0.0), *self.sizes().items()):
             part_ = {
                 name: v * (1 + 0.08 * size) + 0.02 * size * np.ptp(v) * fast
                 for name, v in signals.items()
@@ -356,9 +365,9 @@ class Artifacts:
 
     def fit(self, trial: Trial) -> pd.DataFrame:
         rows = []
-        for method, size in (("RM", 1.0), ("OM", self.better)):
+        for method, size in self.sizes().items():
             for k, c in enumerate((*_KINDS, "cop_ap", "cop_ml", "grf_vertical")):
-                worse = 1.7 if (method, c, trial.role) == ("OM", "mz", "validation") else size
+                worse = 1.7 if (method, c, trial.role) == (OM, "mz", "validation") else size
                 unit = "mm" if c.startswith("cop") else "N m" if c.startswith("m") else "N"
                 force = c.startswith("f") or c == "grf_vertical"
                 rows.append(
@@ -476,7 +485,7 @@ def posturography() -> pd.DataFrame:
         "ellipse_area_mm2": 4321.0,
         "duration_s": 13.1,
     }
-    return pd.DataFrame([{"method": m, **row} for m in ("measured", "RM", "OM")])
+    return pd.DataFrame([{"method": m, **row} for m in (MEASURED, *METHODS)])
 
 
 def diagnosis(trials: list[str]) -> pd.DataFrame:

@@ -17,10 +17,11 @@ from bsip_cli.report.participant import diagnosis as diagnosis_section
 from bsip_cli.report.participant.attribution import pooled_shares
 from bsip_cli.report.participant.diagnosis import gain_blocks, ranking
 from bsip_cli.report.participant.residual import residuals_of
-from bsip_cli.report.records import EXTENDED, with_all_causes
+from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.separating import separating_recording
 from bsip_cli.report.usual_sizes import USUAL
 from bsip_cli.report.verdict import change_sentence, gain_sentence, headline, verdict_of
+from bsip_cli.report.words import EXTENDED
 from tests.report.fake_study import attribution, changes, detection, diagnosis, gains
 
 TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]

@@ -86,10 +86,19 @@ def test_numbers_are_those_of_the_artifacts(reports, text):
 def test_summary_tells_where_the_table_is_better(text):
     assert (
         "OM has the smaller error in 7 of 8 components (the vertical force counts once), RM "
-        "in moment, lab Z (up)." in text
+        "or RM+mass in moment, lab Z (up)." in text
     )
-    assert "basketball (run 1): moment, lab Z (up) 9.00 → 15.30 N m (+70 %)" in text
+    worse = "moment, lab Z (up) 8.10 N m with RM+mass, 15.30 with OM (+89 %)"
+    assert f"basketball (run 1): {worse}" in text
     assert "The plates tell 63.10 kg (+0.5 %)." in text
+
+
+def test_summary_tells_what_one_number_alone_does(text):
+    assert (
+        "One number for the whole mass alone (RM+mass) changes RM's error in the vertical ground "
+        "force by −10 %, OM by −70 %: OM errs by 67 % less than RM+mass. RM+mass is RM times 0.960 "
+        "(95 % interval 0.956 to 0.964)" in text
+    )
 
 
 def test_decided_and_undecided_segments_are_named(text):

@@ -11,7 +11,8 @@ from bsip_cli.report.page import render
 from bsip_cli.report.participant import residual
 from bsip_cli.report.participant.diagnosis import verdict
 from bsip_cli.report.participant.document import participant_document
-from bsip_cli.report.records import EXTENDED, ParticipantRecord, TrialRecord
+from bsip_cli.report.records import ParticipantRecord, TrialRecord
+from bsip_cli.report.words import EXTENDED
 from bsip_cli.stages.report import record_of
 from tests.report.fake_study import EVIL, marker_events
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from bsip_cli.report.figures.canvas import plain, runs, thinned
-from bsip_cli.report.gains import Gain, gains_of, pooled_gains
+from bsip_cli.report.gains import Gain, gains_of, one_number_alone, pooled_gains
 from bsip_cli.report.page import _tied
 from bsip_cli.report.windows import hull_of, middle_of_longest
 from bsip_cli.report.words import (
@@ -115,6 +115,9 @@ def test_gains():
                 ("OM", "fx", 6.0),
                 ("RM", "fz", 10.0),
                 ("OM", "fz", 10.05),
+                ("RM", "my", 10.0),
+                ("RM+mass", "my", 5.0),
+                ("OM", "my", 6.0),
                 ("RM", "grf_vertical", 10.0),
                 ("OM", "grf_vertical", 12.0),
                 ("RM", "mz", 3.0),
@@ -122,18 +125,32 @@ def test_gains():
         ]
     )
     gains = {gain.component: gain for gain in gains_of("throw", fit)}
-    assert set(gains) == {"fx", "fz", "grf_vertical"}
+    assert set(gains) == {"fx", "fz", "my", "grf_vertical"}
     assert (gains["fx"].better(), gains["fz"].better()) == ("OM", "")
+    assert gains["my"].better() == "RM+mass"  # OM beats RM, and is no gain of identification
+    assert (gains["my"].change(), gains["my"].over_rival()) == pytest.approx((-0.4, 0.2))
     assert gains["fx"].change() == pytest.approx(-0.4)
-    assert (gains["grf_vertical"].unit, gains["grf_vertical"].rm) == ("% BW", 1.0)
+    assert (gains["grf_vertical"].unit, gains["grf_vertical"].of["RM"]) == ("% BW", 1.0)
     means = pooled_gains([*gains.values(), *gains.values()])
-    assert [m.trials for m in means] == [2, 2, 2]
+    assert [m.trials for m in means] == [2, 2, 2, 2]
     assert {m.component: m.change() for m in means}["fx"] == pytest.approx(-0.4)
 
 
 def test_every_frame_counts_once():
-    long = Gain("long", "fx", "N", 10.0, 8.0, 300, True)
-    short = Gain("short", "fx", "N", 20.0, 2.0, 100, True)
+    long = Gain("fx", "N", {"RM": 10.0, "OM": 8.0}, "long", 300, True)
+    short = Gain("fx", "N", {"RM": 20.0, "OM": 2.0}, "short", 100, True)
     (both,) = pooled_gains([long, short])
-    assert both.rm == pytest.approx(np.sqrt((3 * 10.0**2 + 20.0**2) / 4))
-    assert both.om == pytest.approx(np.sqrt((3 * 8.0**2 + 2.0**2) / 4))
+    assert both.of["RM"] == pytest.approx(np.sqrt((3 * 10.0**2 + 20.0**2) / 4))
+    assert both.of["OM"] == pytest.approx(np.sqrt((3 * 8.0**2 + 2.0**2) / 4))
+
+
+@pytest.mark.parametrize(
+    ("rm_mass", "om", "says"),
+    [
+        (-0.7, -0.6, "gains nothing over that number"),
+        (-0.2, -0.6, "OM errs by 50 % less than RM+mass"),
+        (0.2, 0.1, "neither is better than the table"),
+    ],
+)
+def test_what_one_number_alone_does(rm_mass, om, says):
+    assert says in one_number_alone("force", rm_mass, om, (1 + om) / (1 + rm_mass) - 1)

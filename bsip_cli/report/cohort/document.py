@@ -5,6 +5,7 @@ from __future__ import annotations
 from bsip_cli.report.blocks import Document
 from bsip_cli.report.cohort import diagnoses, gain, limits, people, published_tables, summary
 from bsip_cli.report.cohort.record import CohortRecord
+from bsip_cli.report.words import WHAT_METHODS_ARE
 
 SECTIONS = (
     summary.section,
@@ -19,7 +20,6 @@ SECTIONS = (
 def cohort_document(record: CohortRecord) -> Document:
     return Document(
         title="Cohort: segment inertial parameters and ground forces",
-        subtitle="RM: parameters from an anthropometric table. OM: parameters identified from each "
-        "person's own movement and ground forces.",
+        subtitle=f"{WHAT_METHODS_ARE} each person's own movement and ground forces.",
         sections=tuple(section(record) for section in SECTIONS),
     )

@@ -31,7 +31,7 @@ class Member:
 
 @dataclass(frozen=True, eq=False)
 class CohortRecord:
-    """Attributes: ``ratios`` of the errors of OM and RM; ``task_errors`` of an error's name in
+    """Attributes: ``ratios`` of the errors of the methods; ``task_errors`` of an error's name in
     table 4; ``missing`` sentences on who is in no table; ``table_files`` relative to OUT;
     ``steps`` the stages in order."""
 

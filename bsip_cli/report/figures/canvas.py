@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from bsip_cli.errors import printable
+from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 
 WIDTH_MM = 170.0  # the text width of a page
 INK, SOFT, FAINT = "#1c1c1c", "#6e6e6e", "#d4d4d4"
@@ -37,17 +38,19 @@ _RC: dict[Any, Any] = {
 
 @dataclass(frozen=True)
 class Line:
-    """How a method is drawn."""
+    """How a method is drawn, as a curve or as points."""
 
     colour: str
     style: str
     width: float
+    marker: str = "o"
 
 
 _LINES = {
-    "measured": Line("#7a7a7a", "-", 3.0),
-    "RM": Line(ORANGE, "--", 1.3),
-    "OM": Line(BLUE, "-", 1.1),
+    MEASURED: Line("#7a7a7a", "-", 3.0),
+    RM: Line(ORANGE, "--", 1.3, "s"),
+    RM_MASS: Line(GREEN, ":", 1.5, "D"),
+    OM: Line(BLUE, "-", 1.1),
 }
 _OTHER_LINE = Line(PURPLE, "-.", 1.1)
 

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from bsip_cli.report.figures.canvas import BLUE, ORANGE, SOFT, house_style, new_figure, tidy
+from bsip_cli.statistics.normal import Z95
 
 DECIDED = 0.5  # a share above it: more data than table
 LEAST_SPAN_MM = 2.0
-_NORMAL_95 = 1.96
 _AXES = ("forward (X)", "along the segment, up (Y)", "to the right (Z)")
 
 
@@ -33,7 +33,7 @@ def com_differences(data: ComDifferences) -> Figure:
     figure = new_figure(18.0 + 5.2 * len(rows))
     panels = figure.subplots(1, 3, sharey=True)
     for axis, (axes, title) in enumerate(zip(panels, _AXES, strict=True)):
-        x, spread = data.difference_mm[:, axis], np.nan_to_num(_NORMAL_95 * data.sd_mm[:, axis])
+        x, spread = data.difference_mm[:, axis], np.nan_to_num(Z95 * data.sd_mm[:, axis])
         axes.axvline(0.0, color=ORANGE, lw=1.2, ls="--")
         axes.errorbar(x, rows, xerr=spread, fmt="none", ecolor=SOFT, elinewidth=1.0, capsize=2)
         decided = data.data_share[:, axis] >= DECIDED

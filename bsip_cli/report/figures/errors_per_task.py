@@ -1,7 +1,8 @@
-"""Errors of RM and OM per movement, one pair of points per participant."""
+"""Errors of the methods per movement, points of each participant joined by a line."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,67 +10,64 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from bsip_cli.report.figures.canvas import (
-    BLUE,
     FAINT,
     MANY_PEOPLE,
-    ORANGE,
     house_style,
     legend_above,
+    line_of,
     new_figure,
     plain,
     tidy,
 )
+from bsip_cli.report.words import method_label
+
+_HALF_WIDTH = 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorsPerTask:
-    """(t, p) over tasks and participants, NaN where not known; ``quantity`` with its unit.
-
-    ``data`` (t,) says of each task whether its data were held out.
-    """
+    """Of each method (t, p) over tasks and participants, NaN where not known; ``quantity`` with its
+    unit. ``data`` (t,) says of each task whether its data were held out."""
 
     tasks: tuple[str, ...]
     data: tuple[str, ...]
-    rm: np.ndarray
-    om: np.ndarray
+    errors: Mapping[str, np.ndarray]
     quantity: str
 
 
 @house_style()
 def errors_per_task(data: ErrorsPerTask) -> Figure:
-    """Per task RM and OM side by side, joined by a line for each participant."""
+    """Per task the methods side by side, joined by a line for each participant."""
     figure = new_figure(62)
     axes = figure.add_subplot()
-    people = data.rm.shape[1]
+    people = next(iter(data.errors.values())).shape[1]
+    places = np.linspace(-_HALF_WIDTH, _HALF_WIDTH, len(data.errors))
     many = people > MANY_PEOPLE
     for task in range(len(data.tasks)):
-        left, right = task - 0.18, task + 0.18
-        ends = np.stack(
+        corners = np.stack(
             [
-                np.column_stack([np.full(people, x), errors[task]])
-                for x, errors in ((left, data.rm), (right, data.om))
+                np.column_stack([np.full(people, task + place), errors[task]])
+                for place, errors in zip(places, data.errors.values(), strict=True)
             ],
             axis=1,
         )
-        lines = LineCollection(list(ends), color=FAINT, lw=0.8, zorder=1, rasterized=many)
+        lines = LineCollection(list(corners), color=FAINT, lw=0.8, zorder=1, rasterized=many)
         axes.add_collection(lines)
-        for x, values, colour, marker, label in (
-            (left, data.rm[task], ORANGE, "s", "RM (table)"),
-            (right, data.om[task], BLUE, "o", "OM (identified)"),
-        ):
+        for place, (method, errors) in zip(places, data.errors.items(), strict=True):
+            line, x, values = line_of(method), task + place, errors[task]
             axes.scatter(
-                np.full(len(values), x),
+                np.full(people, x),
                 values,
                 s=14,
-                marker=marker,
-                color=colour,
+                marker=line.marker,
+                color=line.colour,
                 lw=0,
                 rasterized=many,
                 zorder=2,
-                label=label if task == 0 else None,
+                label=method_label(method) if task == 0 else None,
             )
             if np.isfinite(values).any():
-                axes.hlines(np.nanmean(values), x - 0.12, x + 0.12, color=colour, lw=2.0)
+                axes.hlines(np.nanmean(values), x - 0.1, x + 0.1, color=line.colour, lw=2.0)
     names = [f"{plain(task)}\n({how})" for task, how in zip(data.tasks, data.data, strict=True)]
     axes.set_xticks(range(len(names)), names)
     axes.set_xlim(-0.6, len(data.tasks) - 0.4)

@@ -54,5 +54,5 @@ def methods_over_time(data: MethodsOverTime) -> Figure:
     axes.set_xlabel("time [s]")
     axes.set_ylabel(data.quantity)
     tidy(axes)
-    legend_above(axes)
+    legend_above(axes, columns=5)
     return figure

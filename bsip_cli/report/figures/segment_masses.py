@@ -17,11 +17,13 @@ from bsip_cli.report.figures.canvas import (
     SOFT,
     house_style,
     legend_above,
+    line_of,
     new_figure,
     tidy,
 )
+from bsip_cli.statistics.methods import OM, RM, RM_MASS
+from bsip_cli.statistics.normal import Z95
 
-_NORMAL_95 = 1.96
 _TICKS_KG = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
 
 
@@ -31,6 +33,7 @@ class SegmentMasses:
 
     segments: tuple[str, ...]
     rm_kg: np.ndarray
+    rm_mass_kg: np.ndarray
     om_kg: np.ndarray
     om_sd_kg: np.ndarray
     data_share: np.ndarray
@@ -55,9 +58,13 @@ def segment_masses(data: SegmentMasses) -> Figure:
 def _draw_masses(axes: Axes, data: SegmentMasses, rows: np.ndarray) -> None:
     positive = np.where(data.om_kg > 0.0, data.om_kg, np.nan)
     axes.scatter(
-        data.rm_kg, rows, marker="s", s=26, facecolor="white", edgecolor=ORANGE, lw=1.4, label="RM"
+        data.rm_kg, rows, marker="s", s=26, facecolor="white", edgecolor=ORANGE, lw=1.4, label=RM
     )
-    axes.scatter(positive, rows, marker="o", s=16, color=BLUE, label="OM", zorder=3)
+    for method, masses_kg, size in ((RM_MASS, data.rm_mass_kg, 9), (OM, positive, 16)):
+        line = line_of(method)
+        axes.scatter(
+            masses_kg, rows, marker=line.marker, s=size, color=line.colour, label=method, zorder=3
+        )
     axes.set_xscale("log")
     both = np.concatenate([data.rm_kg, positive])
     low, high = np.nanmin(both) / 1.35, np.nanmax(both) * 1.35
@@ -72,7 +79,7 @@ def _draw_masses(axes: Axes, data: SegmentMasses, rows: np.ndarray) -> None:
 
 
 def _draw_differences(axes: Axes, data: SegmentMasses, rows: np.ndarray) -> None:
-    spread = np.nan_to_num(_NORMAL_95 * data.om_sd_kg)
+    spread = np.nan_to_num(Z95 * data.om_sd_kg)
     axes.axvline(0.0, color=ORANGE, lw=1.2, ls="--")
     axes.errorbar(
         data.om_kg - data.rm_kg,

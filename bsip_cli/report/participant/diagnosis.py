@@ -39,6 +39,7 @@ from bsip_cli.report.words import (
     segment_label,
     signed,
 )
+from bsip_cli.statistics.methods import OM
 
 NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 _MOST_IN_FIGURE = 12
@@ -205,7 +206,7 @@ def change_blocks(record: ParticipantRecord) -> list[Block]:
     worth = worth_telling(record.changes)
     if worth.empty:
         return [Paragraph(change_sentence(record.changes))]
-    before = record.method("OM")
+    before = record.method(OM)
     rows = tuple(
         (
             segment_label(r["segment"]),

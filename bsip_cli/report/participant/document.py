@@ -14,6 +14,7 @@ from bsip_cli.report.participant import (
     summary,
 )
 from bsip_cli.report.records import ParticipantRecord
+from bsip_cli.report.words import WHAT_METHODS_ARE
 
 SECTIONS = (
     summary.section,
@@ -30,7 +31,6 @@ SECTIONS = (
 def participant_document(record: ParticipantRecord) -> Document:
     return Document(
         title=f"{record.id}: segment inertial parameters and ground forces",
-        subtitle="RM: parameters from an anthropometric table. OM: parameters identified from this "
-        "person's own movement and ground forces.",
+        subtitle=f"{WHAT_METHODS_ARE} this person's own movement and ground forces.",
         sections=tuple(section(record) for section in SECTIONS),
     )

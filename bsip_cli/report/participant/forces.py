@@ -15,13 +15,14 @@ from bsip_cli.report.records import ParticipantRecord, TrialRecord, clock_of, fl
 from bsip_cli.report.windows import hull_of, middle_of_longest
 from bsip_cli.report.words import (
     COMPONENTS,
-    METHODS,
     component_label,
     method_label,
+    method_rank,
     number,
     percent,
     signed,
 )
+from bsip_cli.statistics.methods import MEASURED, OM
 
 _WINDOW_S = 10.0
 _ROOM_S = 0.2
@@ -56,8 +57,8 @@ def section(record: ParticipantRecord) -> Section:
         (
             Paragraph(
                 "The ground force and its centre of pressure (COP) are computed from the motion "
-                "alone, once with the table's parameters (RM) and once with the identified ones "
-                "(OM), and compared with the plates."
+                "alone, with the table's parameters (RM), with the table's times one number "
+                "(RM+mass) and with the identified ones (OM), and compared with the plates."
             ),
             *_cop_over_time(record),
             *_vertical_force(record),
@@ -87,7 +88,7 @@ def _cop_over_time(record: ParticipantRecord) -> list[Block]:
     clock, shown = clock_of(frame), _with_cop(frame)
     window = middle_of_longest(clock, shown, _WINDOW_S)
     ap, ml = (_cop_mm(frame, name, shown, window) for name in ("ap", "ml"))
-    zero = {"ap": float(np.nanmean(ap["measured"])), "ml": float(np.nanmean(ml["measured"]))}
+    zero = {"ap": float(np.nanmean(ap[MEASURED])), "ml": float(np.nanmean(ml[MEASURED]))}
     when = f"{trial.label}, {clock[window][0]:.1f} to {clock[window][-1]:.1f} s"
     data = _data_of(flags_of(frame, "used")[window])
     blocks: list[Block] = [Heading(f"Centre of pressure: {when}")]
@@ -127,7 +128,7 @@ def _cop_trial(record: ParticipantRecord) -> TrialRecord | None:
 
 def _with_cop(frame: pd.DataFrame) -> np.ndarray:
     """Frames in which all contacts are measured and there is a measured COP."""
-    ap, ml = (signals_of(frame, f"cop_{name}_m")["measured"] for name in ("ap", "ml"))
+    ap, ml = (signals_of(frame, f"cop_{name}_m")[MEASURED] for name in ("ap", "ml"))
     return flags_of(frame, "valid") & np.isfinite(ap) & np.isfinite(ml)
 
 
@@ -163,7 +164,7 @@ def _vertical_force(record: ParticipantRecord) -> list[Block]:
     window = hull_of(valid, int(_ROOM_S / np.median(np.diff(clock))))
     scale = 100.0 / record.body_weight()
     signals = {
-        m: np.where(valid | (m == "measured"), scale * v, np.nan)[window]
+        m: np.where(valid | (m == MEASURED), scale * v, np.nan)[window]
         for m, v in signals_of(frame, "fz_N").items()
     }
     figure = methods_over_time(MethodsOverTime(clock[window], signals, "vertical force [% BW]"))
@@ -202,12 +203,15 @@ def _valid_frames(trial: TrialRecord) -> int:
 
 def _rmse_words(signals: dict[str, np.ndarray], unit: str) -> str:
     """``RMSE in what is shown: RM 3.2 mm, OM 1.1 mm.``"""
-    parts = []
-    for method in list(signals)[1:]:
-        difference = signals[method] - signals["measured"]
-        if np.isfinite(difference).any():
-            rmse = float(np.sqrt(np.nanmean(difference**2)))
-            parts.append(f"{method} {number(rmse, 2)} {unit}")
+    measured, *methods = signals
+    errors = {method: signals[method] - signals[measured] for method in methods}
+    errors = {method: error for method, error in errors.items() if np.isfinite(error).any()}
+    shared = np.isfinite(list(errors.values())).all(axis=0)
+    parts = [
+        f"{method} {number(float(np.sqrt(np.mean(error[shared] ** 2))), 2)} {unit}"
+        for method, error in errors.items()
+        if shared.any()
+    ]
     return f"RMSE in what is shown: {', '.join(parts)}." if parts else "No method was simulated."
 
 
@@ -227,10 +231,13 @@ def _overview(record: ParticipantRecord) -> list[Block]:
     head = ("trial", "data", *(component_label(c) for c in COMPONENTS))
     return [
         Paragraph(
-            "Change of the error (RMSE) when OM replaces RM, in percent: below zero OM "
-            f"follows better (✓). Changes within {percent(SAME_WITHIN)} % count as equal."
+            "Change of the error (RMSE) when OM replaces the better of RM and RM+mass, in percent: "
+            "below zero OM follows better than both (✓). Changes within "
+            f"{percent(SAME_WITHIN)} % count as equal."
         ),
-        Grid(head, tuple(rows), "Change of RMSE from RM to OM [%]", words=2),
+        Grid(
+            head, tuple(rows), "Change of RMSE from the better of RM and RM+mass to OM [%]", words=2
+        ),
     ]
 
 
@@ -238,9 +245,9 @@ def _overview_row(trial: TrialRecord, gains: Sequence[Gain]) -> tuple[str | Cell
     if not gains:
         return ()
     by_name = {gain.component: gain for gain in gains}
-    marks: dict[str, Mark] = {"OM": "better", "RM": "warning", "": ""}
+    marks: dict[str, Mark] = {OM: "better", "": ""}
     cells = [
-        Cell(signed(100.0 * by_name[c].change()), marks[by_name[c].better()])
+        Cell(signed(100.0 * by_name[c].over_rival()), marks.get(by_name[c].better(), "warning"))
         if c in by_name
         else Cell("–")
         for c in COMPONENTS
@@ -267,7 +274,7 @@ def _fit_grids(record: ParticipantRecord) -> list[Block]:
 
 
 def _fit_grid(trial: TrialRecord, fit: pd.DataFrame) -> Grid:
-    methods = sorted(fit["method"].unique(), key=lambda m: (m not in METHODS, m != "RM", m))
+    methods = sorted(fit["method"].unique(), key=method_rank)
     rows = {(row["method"], row["component"]): row for row in fit.to_dict("records")}
     lines: list[tuple[str | Cell, ...]] = []
     for component in (*COMPONENTS, *sorted(set(fit["component"]) - set(COMPONENTS))):

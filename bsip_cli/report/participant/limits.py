@@ -18,7 +18,7 @@ CANNOT_KNOW = (
     "in the identified parameters without making the forces follow worse.",
     "Where the ground force is small the centre of pressure is a quotient of small numbers; it is "
     "computed above a least force only.",
-    "Whether OM is better than RM is judged on data that OM has not seen; on one person and few "
+    "Whether OM is better than RM and RM+mass is judged on data that OM has not seen; on one person and few "
     "trials a difference of a few percent may be chance. The cohort's report tests it.",
 )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import pandas as pd
 
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Heading, Paragraph, Picture, Section
@@ -21,6 +22,7 @@ from bsip_cli.report.words import (
     with_spread,
 )
 from bsip_cli.schemas import share_name
+from bsip_cli.statistics.methods import OM, RM, RM_MASS
 
 DECIDED, FROM_TABLE = 0.8, 0.2
 _COM = ("com_x_m", "com_y_m", "com_z_m")
@@ -29,18 +31,19 @@ _MM, _KG_CM2 = 1e3, 1e4
 
 
 def section(record: ParticipantRecord) -> Section:
-    rm, om = record.method("RM"), record.method("OM")
+    rm, om = record.method(RM), record.method(OM)
     if om.empty or rm.empty:
-        gone = "OM" if om.empty else "RM"
+        gone = OM if om.empty else RM
         blocks: list[Block] = [
             Paragraph(f"There are no parameters of {gone}, so nothing can be compared.", "warning")
         ]
     else:
         om = om.reindex(rm.index)
+        rm_mass_kg = record.method(RM_MASS)["mass_kg"].reindex(rm.index).to_numpy(dtype=float)
         blocks = [
             Paragraph(_in_words(om)),
-            _masses_picture(rm, om),
-            _masses_grid(rm, om),
+            _masses_picture(rm, rm_mass_kg, om),
+            _masses_grid(rm, rm_mass_kg, om),
             Heading("Centres of mass"),
             _com_picture(rm, om),
             _com_grid(rm, om),
@@ -89,30 +92,33 @@ def _labels(frame: pd.DataFrame) -> tuple[str, ...]:
     return tuple(segment_label(name) for name in frame.index)
 
 
-def _masses_picture(rm: pd.DataFrame, om: pd.DataFrame) -> Picture:
+def _masses_picture(rm: pd.DataFrame, rm_mass_kg: np.ndarray, om: pd.DataFrame) -> Picture:
     data = SegmentMasses(
         _labels(rm),
         rm["mass_kg"].to_numpy(),
+        rm_mass_kg,
         om["mass_kg"].to_numpy(),
         om["mass_kg_sd"].to_numpy(),
         om["mass_data_share"].to_numpy(),
     )
     return Picture(
         segment_masses(data),
-        "Segment masses by table and by identification, their difference "
+        "Segment masses by table (RM), by the table times one number (RM+mass) and by identification "
+        "(OM), the difference of OM and RM "
         "with its 95 % interval, and how much of the mass the data decided.",
-        "Points: segment masses of RM and OM; bars: data share.",
+        "Points: segment masses of RM, RM+mass and OM; bars: data share.",
         "masses",
     )
 
 
-def _masses_grid(rm: pd.DataFrame, om: pd.DataFrame) -> Grid:
+def _masses_grid(rm: pd.DataFrame, rm_mass_kg: np.ndarray, om: pd.DataFrame) -> Grid:
     table, own = rm["mass_kg"].to_numpy(dtype=float), om["mass_kg"].to_numpy(dtype=float)
     sd, share = om["mass_kg_sd"].to_numpy(dtype=float), om["mass_data_share"].to_numpy(dtype=float)
     rows = [
         (
             label,
             number(table[k], 3),
+            number(rm_mass_kg[k], 3),
             with_spread(own[k], sd[k], 3),
             signed(100.0 * (own[k] / table[k] - 1.0)),
             _share_cell(share[k]),
@@ -122,14 +128,15 @@ def _masses_grid(rm: pd.DataFrame, om: pd.DataFrame) -> Grid:
     total = (
         "whole body",
         number(table.sum(), 3),
+        number(rm_mass_kg.sum(), 3),
         number(own.sum(), 3),
         signed(100.0 * (own.sum() / table.sum() - 1.0)),
         "",
     )
     return Grid(
-        ("segment", "RM [kg]", "OM [kg] ± sd", "change [%]", "data share [%]"),
+        ("segment", "RM [kg]", "RM+mass [kg]", "OM [kg] ± sd", "change [%]", "data share [%]"),
         (*rows, total),
-        "Segment masses",
+        "Segment masses; the change is that from RM to OM",
     )
 
 
@@ -172,7 +179,8 @@ def _moments_grid(rm: pd.DataFrame, om: pd.DataFrame) -> Grid:
         _MOMENTS,
         _KG_CM2,
         1,
-        "Moments of inertia about the segment's centre of mass, segment axes [kg cm²]",
+        "Moments of inertia about the segment's centre of mass, segment axes [kg cm²]; RM+mass: RM's "
+        "times its number",
         ("about X", "about Y", "about Z"),
     )
 

@@ -14,16 +14,16 @@ from bsip_cli.report.figures.wrench_residual import WrenchResidual, wrench_resid
 from bsip_cli.report.limits import looked_at
 from bsip_cli.report.movement_phases import PHASES, STILL, motion_of, phases_of
 from bsip_cli.report.records import (
-    EXTENDED,
     ParticipantRecord,
     TrialRecord,
     clock_of,
     flags_of,
     signals_of,
 )
-from bsip_cli.report.words import component_label, count, listing, number, percent
+from bsip_cli.report.words import EXTENDED, component_label, count, listing, number, percent
+from bsip_cli.statistics.methods import OM
 
-BEFORE = "OM"
+BEFORE = OM
 _COLUMNS = {
     "fx": ("fx_N", "N", 1.0),
     "fy": ("fy_N", "N", 1.0),
@@ -102,7 +102,7 @@ def residuals_of(frame: pd.DataFrame, component: str) -> dict[str, np.ndarray]:
 def _labels(names: Sequence[str]) -> dict[str, str]:
     """What the legend calls OM, and OM with the causes."""
     if EXTENDED not in names:
-        return {BEFORE: "OM"}
+        return {BEFORE: OM}
     return {BEFORE: "before: OM", EXTENDED: "after: OM with the causes found"}
 
 

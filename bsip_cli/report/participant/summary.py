@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Heading, Mark, Paragraph, Section
-from bsip_cli.report.gains import SAME_WITHIN, Gain, PooledGain, gains_of, pooled_gains
+from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Heading, Paragraph, Section
+from bsip_cli.report.gains import (
+    SAME_WITHIN,
+    Errors,
+    Gain,
+    PooledGain,
+    gains_of,
+    one_number_alone,
+    pooled_gains,
+    relative_change,
+)
 from bsip_cli.report.participant.diagnosis import verdict
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, messages
 from bsip_cli.report.words import (
@@ -18,6 +27,8 @@ from bsip_cli.report.words import (
     signed,
     trial_label,
 )
+from bsip_cli.statistics.methods import METHODS, OM, RIVALS, RM, RM_MASS
+from bsip_cli.statistics.normal import Z95
 
 _STRONGEST = 6
 _SEXES = {"M": "a man", "F": "a woman"}
@@ -33,7 +44,9 @@ def section(record: ParticipantRecord) -> Section:
         Paragraph(_trials(record)),
         Paragraph(_markers(record)),
         *_loads(record),
-        Heading("Do the identified parameters follow the forces better than the table's?"),
+        Heading(
+            "Do the identified parameters follow the forces better than the table's, and one number's?"
+        ),
         *_gain(record),
         Heading("What to mind first"),
         *_warnings(record),
@@ -160,17 +173,21 @@ def _gain(record: ParticipantRecord) -> list[Block]:
                 "warning",
             )
         )
-    blocks += [_verdict(means, bool(held_out)), _mean_grid(means, bool(held_out))]
-    worse = [gain for gain in chosen if gain.better() == "RM"]
+    blocks += [
+        _verdict(means, bool(held_out)),
+        *_one_number(record, means),
+        _mean_grid(means, bool(held_out)),
+    ]
+    worse = [gain for gain in chosen if gain.better() in RIVALS]
     if worse:
         blocks += [
-            Paragraph("OM does not follow better everywhere. The table (RM) is better in:"),
+            Paragraph("OM does not follow better everywhere. RM or RM+mass is better in:"),
             Bullets(_worse(worse), "warning"),
         ]
     else:
         blocks.append(
             Paragraph(
-                "In no trial and component is the table (RM) better by more than "
+                "In no trial and component is RM or RM+mass better by more than "
                 f"{percent(SAME_WITHIN)} %."
             )
         )
@@ -182,19 +199,14 @@ def _verdict(means: tuple[PooledGain, ...], held_out: bool) -> Paragraph:
     parts = []
     for component in ("cop_ap", "cop_ml", "grf_vertical"):
         if component in by_name:
-            mean = by_name[component]
-            parts.append(
-                f"{component_label(component)}: {number(mean.rm, 2)} {mean.unit} with RM, "
-                f"{number(mean.om, 2)} {mean.unit} with OM "
-                f"({signed(100.0 * mean.change())} %)"
-            )
+            parts.append(f"{component_label(component)}: {_by_method(by_name[component])}")
     where = "On data it had not seen" if held_out else "On the data it was fitted to"
     counted = [m for m in means if m.component != "grf_vertical"]  # the same force as fz
-    better = [m for m in counted if m.change() < -SAME_WITHIN]
-    worse = [component_label(m.component) for m in counted if m.change() > SAME_WITHIN]
+    better = [m for m in counted if m.better() == OM]
+    worse = [component_label(m.component) for m in counted if m.better() in RIVALS]
     text = (
         f"{where}, OM has the smaller error in {len(better)} of "
-        f"{count(len(counted), 'component')} (the vertical force counts once), RM in "
+        f"{count(len(counted), 'component')} (the vertical force counts once), RM or RM+mass in "
         f"{listing(worse)}."
     )
     if parts:
@@ -202,32 +214,71 @@ def _verdict(means: tuple[PooledGain, ...], held_out: bool) -> Paragraph:
     return Paragraph(text, "good" if held_out and len(better) > len(counted) / 2 else "warning")
 
 
-def _mean_grid(means: tuple[PooledGain, ...], held_out: bool) -> Grid:
-    rows = tuple(
-        (
-            component_label(m.component),
-            m.unit,
-            Cell(number(m.rm, 2), _mark(m.rm, m.om)),
-            Cell(number(m.om, 2), _mark(m.om, m.rm)),
-            signed(100.0 * m.change()),
-            str(m.om_better),
-            str(m.rm_better),
-            str(m.trials),
-        )
-        for m in means
+def _by_method(errors: Errors) -> str:
+    """``25.2 N with RM, 7.9 N with RM+mass (-69 %), ...``; RM+mass only where it is not RM."""
+    parts = [f"{number(errors.of[RM], 2)} {errors.unit} with {RM}"]
+    for method in (RM_MASS, OM):
+        change = errors.change(method)
+        if method == OM or abs(change) > SAME_WITHIN:
+            error = f"{number(errors.of[method], 2)} {errors.unit} with {method}"
+            parts.append(f"{error} ({signed(100.0 * change)} %)")
+    return ", ".join(parts)
+
+
+def _one_number(record: ParticipantRecord, means: tuple[PooledGain, ...]) -> list[Block]:
+    """What the number for the whole mass is, and does without identification."""
+    table = record.identification
+    rows = table[table["method"] == RM_MASS]
+    found = [m for m in means if m.component == "grf_vertical" and RM_MASS in m.of]
+    if rows.empty or not found:
+        return []
+    factor, sd = rows[["mass_factor", "mass_factor_sd"]].iloc[0]
+    low, high = factor - Z95 * sd, factor + Z95 * sd
+    (mean,) = found
+    said = one_number_alone(
+        component_label(mean.component),
+        mean.change(RM_MASS),
+        mean.change(),
+        relative_change(mean.of[RM_MASS], mean.of[OM]),
     )
+    return [
+        Paragraph(
+            f"{said} RM+mass is RM times {number(factor, 3)} (95 % interval {number(low, 3)} to "
+            f"{number(high, 3)}), fitted to the trials that identified OM; its centre of pressure "
+            "is RM's."
+        )
+    ]
+
+
+def _mean_grid(means: tuple[PooledGain, ...], held_out: bool) -> Grid:
     data = "held-out data" if held_out else "identification data"
     return Grid(
-        ("component", "unit", "RM", "OM", "change [%]", "OM better", "RM better", "all"),
-        rows,
+        ("component", "unit", *METHODS, RM_MASS, OM, "OM better", "RM or RM+mass better", "all"),
+        tuple(map(_mean_row, means)),
         f"RMSE over all frames, {data}; ✓ marks the smaller error",
-        groups=(("", 2), ("RMSE", 3), ("number of trials", 3)),
+        groups=(("", 2), ("RMSE", 3), ("change from RM [%]", 2), ("number of trials", 3)),
         words=2,
     )
 
 
-def _mark(own: float, other: float) -> Mark:
-    return "better" if own < other * (1.0 - SAME_WITHIN) else ""
+def _mean_row(mean: PooledGain) -> tuple[str | Cell, ...]:
+    return (
+        component_label(mean.component),
+        mean.unit,
+        *(_error_cell(mean, method) for method in METHODS),
+        signed(100.0 * mean.change(RM_MASS)),
+        signed(100.0 * mean.change()),
+        str(mean.om_better),
+        str(mean.rival_better),
+        str(mean.trials),
+    )
+
+
+def _error_cell(errors: Errors, method: str) -> Cell:
+    """The error, marked where it is smaller than those of all others."""
+    own = errors.of.get(method, np.nan)
+    others = [error for name, error in errors.of.items() if name != method]
+    return Cell(number(own, 2), "better" if own < min(others) * (1.0 - SAME_WITHIN) else "")
 
 
 def _worse(gains: list[Gain]) -> tuple[str, ...]:
@@ -235,8 +286,9 @@ def _worse(gains: list[Gain]) -> tuple[str, ...]:
     by_trial: dict[str, list[str]] = {}
     for gain in gains:
         by_trial.setdefault(gain.trial, []).append(
-            f"{component_label(gain.component)} {number(gain.rm, 2)} → {number(gain.om, 2)} "
-            f"{gain.unit} ({signed(100.0 * gain.change())} %)"
+            f"{component_label(gain.component)} {number(gain.of[gain.rival()], 2)} {gain.unit} with "
+            f"{gain.rival()}, {number(gain.of[OM], 2)} with OM "
+            f"({signed(100.0 * gain.over_rival())} %)"
         )
     return tuple(f"{trial}: {'; '.join(parts)}" for trial, parts in by_trial.items())
 
@@ -270,7 +322,7 @@ def _refusals(record: ParticipantRecord) -> list[str]:
 
 
 def _undecided(record: ParticipantRecord) -> list[str]:
-    om = record.method("OM")
+    om = record.method(OM)
     if om.empty:
         return ["There are no identified parameters (OM): every statement rests on the table."]
     shares = om["mass_data_share"]

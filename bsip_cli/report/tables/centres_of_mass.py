@@ -37,6 +37,7 @@ def build(results: Results, criteria: Criteria) -> Table:
             Column(("apart_mean", "apart_sd"), _APART, mean_sd(2), in_row_unit=True),
             *paired.t_test(criteria),
             *paired.added_tests(),
+            *paired.against_rm_mass(criteria),
             Column(("reason",)),
         ),
         tuple(_row(results, topic, criteria) for topic in topics),
@@ -47,6 +48,7 @@ def build(results: Results, criteria: Criteria) -> Table:
             "segment's Y axis: its length, of a foot its height. Added: the tests, and each segment. "
             "Residuals are root mean squares of the error as a vector, the moment about the lab's "
             "origin, so that it grows with the plate's distance from there.",
+            paired.LEGEND,
             f"In print, of single people: {'; '.join(_in_print())}.",
             *notes.not_possible(results, named),
         ),
@@ -88,5 +90,5 @@ def _row(results: Results, topic: Topic, criteria: Criteria) -> Row:
     if not is_residual:
         values["n"] = apart.n
     group = "Residual" if is_residual else "Centres of mass along the segments"
-    marks = {paired.P: notes.star(results.find(topic, "paired_t"), criteria.alpha)}
+    marks = paired.marks(results, topic, criteria)
     return Row(values, topic.unit, group, marks)

@@ -28,6 +28,7 @@ def build(results: Results, criteria: Criteria) -> Table:
             *paired.means(),
             *paired.t_test(criteria),
             *paired.added_tests(),
+            *paired.against_rm_mass(criteria),
             *paired.smaller_error(),
             Column(("reason",)),
         ),
@@ -39,8 +40,9 @@ def build(results: Results, criteria: Criteria) -> Table:
                     notes.star_legend(criteria.alpha),
                     "As published: paired t test of OM - RM with its confidence interval; Cohen's d = (RM "
                     "- OM) / pooled SD; Lilliefors' test of the differences. Added: Wilcoxon's signed-rank "
-                    "test; d_z = mean / SD of the differences; in how many participants OM or RM has the "
+                    "test; d_z = mean / SD of the differences; in how many participants OM or its rival has the "
                     "smaller error. AP and ML are the person's own axes.",
+                    paired.LEGEND,
                     notes.normality_legend(criteria.alpha),
                     *notes.not_possible(results, named),
                 ),
@@ -51,5 +53,5 @@ def build(results: Results, criteria: Criteria) -> Table:
 
 def _row(results: Results, topic: Topic, criteria: Criteria) -> Row:
     values = {"axis": topic.variable, **paired.values(results, topic)}
-    marks = {paired.P: notes.star(results.find(topic, "paired_t"), criteria.alpha)}
+    marks = paired.marks(results, topic, criteria)
     return Row(values, topic.unit, marks=marks)

@@ -39,6 +39,7 @@ def build(results: Results, criteria: Criteria) -> Table:
             *paired.means(),
             *paired.t_test(criteria),
             *paired.added_tests(),
+            *paired.against_rm_mass(criteria),
             *paired.smaller_error(),
             Column(("reason",)),
         ),
@@ -52,8 +53,9 @@ def build(results: Results, criteria: Criteria) -> Table:
                     "runs of a movement are averaged for each participant first.",
                     "As published: means and standard deviations. Added: everything else (paired t test of "
                     "OM - RM, Cohen's d = (RM - OM) / pooled SD, Wilcoxon's test, d_z = mean / SD of the "
-                    "differences, in how many participants OM or RM has the smaller error). The same count "
+                    "differences, in how many participants OM or its rival has the smaller error). The same count "
                     "for the six components stands in table 5.",
+                    paired.LEGEND,
                     notes.normality_legend(criteria.alpha),
                     notes.holm_legend(tests, criteria.alpha),
                     *notes.not_possible(results, named),
@@ -71,6 +73,6 @@ def _row(results: Results, topic: Topic, criteria: Criteria) -> Row:
         "label": labels.task(topic),
         **paired.values(results, topic),
     }
-    marks = {paired.P: notes.star(results.find(topic, "paired_t"), criteria.alpha)}
+    marks = paired.marks(results, topic, criteria)
     group = f"{_QUANTITIES[topic.variable]} [{labels.unit(topic.unit)}]"
     return Row(values, topic.unit, group, marks)

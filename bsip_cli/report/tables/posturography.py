@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from itertools import combinations
 
-from bsip_cli.report.tables import labels, notes
+from bsip_cli.report.tables import labels, notes, paired
 from bsip_cli.report.tables.model import Cell, Column, Row, Table
 from bsip_cli.report.tables.numbers import mean_sd, number, p_value
 from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_comparison import Comparison
-from bsip_cli.statistics.cohort_values import MEASURED, OM, RM, Topic
+from bsip_cli.statistics.cohort_values import Topic
+from bsip_cli.statistics.methods import MEASURED, OM, RM
 
 NAME = "table3_posturography"
 
@@ -23,7 +24,7 @@ _NAMES = {
     "rms_ap_origin": "RMS AP",
     "rms_ml_origin": "RMS ML",
 }
-_SHORT = {MEASURED: "fp", OM: "om", RM: "rm"}
+_SHORT = {MEASURED: "fp"} | paired.SHORT
 _PAIRS = tuple(combinations((MEASURED, OM, RM), 2))
 _MARKS = {
     (MEASURED, OM): ("OM M(SD)", "#"),
@@ -42,11 +43,11 @@ def build(results: Results, criteria: Criteria) -> Table:
     alpha = criteria.alpha
     return Table(
         NAME,
-        "Table 3. Sway of the centre of pressure, measured (FP) and simulated (OM, RM), in the "
-        f"identification sequence (task: {tasks}): mean (standard deviation) of "
+        "Table 3. Sway of the centre of pressure, measured (FP) and simulated (OM, RM, RM+mass), in "
+        f"the identification sequence (task: {tasks}): mean (standard deviation) of "
         f"{notes.participants(tests)}.",
-        _columns(),
-        tuple(_row(results, topic, alpha) for topic in results.topics),
+        _columns(criteria),
+        tuple(_row(results, topic, criteria) for topic in results.topics),
         tuple(
             filter(
                 None,
@@ -58,6 +59,7 @@ def build(results: Results, criteria: Criteria) -> Table:
                     "with its post hoc tests. Added: ANOVA for repeated measures, because they are the "
                     "same people, with Greenhouse and Geisser's correction (epsilon); its post hoc tests "
                     "are in the CSV.",
+                    paired.LEGEND,
                     *notes.not_possible(results, named),
                 ),
             )
@@ -70,13 +72,7 @@ def label(topic: Topic) -> str:
     return f"{_NAMES[topic.variable]}{about} [{labels.unit(topic.unit)}]"
 
 
-def _columns() -> tuple[Column, ...]:
-    methods = [
-        Column(
-            (f"{short}_mean", f"{short}_sd"), f"{short.upper()} M(SD)", mean_sd(2), in_row_unit=True
-        )
-        for short in _SHORT.values()
-    ]
+def _columns(criteria: Criteria) -> tuple[Column, ...]:
     post_hoc = [
         Column((f"{kind}_{_SHORT[a]}_{_SHORT[b]}",))
         for kind in ("bonferroni_p", "repeated_bonferroni_p")
@@ -86,7 +82,8 @@ def _columns() -> tuple[Column, ...]:
         Column(("variable",)),
         Column(("label",), "Variable", text=True),
         Column(("n",)),
-        *methods,
+        Column(("fp_mean", "fp_sd"), "FP M(SD)", mean_sd(2), in_row_unit=True),
+        *paired.means(),
         Column(("f",), "F", number(2)),
         Column(("df1",)),
         Column(("df2",)),
@@ -100,14 +97,16 @@ def _columns() -> tuple[Column, ...]:
         Column(("repeated_epsilon",), "epsilon", number(2)),
         Column(("repeated_partial_eta_squared",)),
         *post_hoc,
+        *paired.against_rm_mass(criteria),
         Column(("reason",)),
     )
 
 
-def _row(results: Results, topic: Topic, alpha: float) -> Row:
+def _row(results: Results, topic: Topic, criteria: Criteria) -> Row:
     one_way = results.find(topic, "one_way_anova", ALL, "")
     repeated = results.find(topic, "repeated_measures_anova", ALL, "")
     values: dict[str, Cell] = {
+        **paired.values(results, topic),
         "variable": topic.variable,
         "label": label(topic),
         "n": one_way.n,
@@ -125,7 +124,7 @@ def _row(results: Results, topic: Topic, alpha: float) -> Row:
         "repeated_partial_eta_squared": repeated.effect_size,
         "reason": results.reasons(topic),
     }
-    marks: dict[str, str] = {}
+    marks = paired.marks(results, topic, criteria)
     for pair in _PAIRS:
         published = results.find(topic, "bonferroni_t", *pair)
         added = results.find(topic, "bonferroni_paired_t", *pair)
@@ -134,7 +133,7 @@ def _row(results: Results, topic: Topic, alpha: float) -> Row:
         values[f"bonferroni_p_{ending}"] = published.p_value
         values[f"repeated_bonferroni_p_{ending}"] = added.p_value
         heading, sign = _MARKS[pair]
-        marks[heading] = notes.star(published, alpha, sign) + marks.get(heading, "")
+        marks[heading] = notes.star(published, criteria.alpha, sign) + marks.get(heading, "")
     return Row(values, topic.unit, marks=marks)
 
 

@@ -9,7 +9,8 @@ from bsip_cli.report.tables.model import Cell, Column, Row, Table
 from bsip_cli.report.tables.numbers import count, mean_sd
 from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort_comparison import Comparison
-from bsip_cli.statistics.cohort_values import MEASURED, OM, RM, Topic
+from bsip_cli.statistics.cohort_values import Topic
+from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 from bsip_cli.statistics.published import paper as published
 from bsip_cli.statistics.published.audit import audit
 from bsip_cli.statistics.published.readings import as_meant
@@ -19,7 +20,7 @@ COMPARED = "hansen2017"
 """The paper whose tables this study's tables 1 to 4 repeat."""
 
 _PAIRED = ("table1", "table2", "table4")
-_METHODS = {"FP": MEASURED, "OM": OM, "RM": RM}
+_METHODS = {"FP": MEASURED, "OM": OM, "RM": RM}  # in print
 _MOVED = "†"
 _DIGITS = 9  # more than print has, fewer than the arithmetic of its rounding
 
@@ -98,6 +99,7 @@ def _columns(table: published.PrintedTable) -> Iterator[Column]:
         if method in _METHODS:
             yield Column(_here_fields(method), f"{method} here", mean_sd(2))
         yield Column(_printed_fields(method), _in_print(method), mean_sd(2))
+    yield Column(_here_fields(RM_MASS), f"{RM_MASS} here", mean_sd(2))
     yield Column(("unit",), "unit here", text=True)
     yield Column(("printed_unit",), "unit in print", text=True)
 
@@ -111,6 +113,7 @@ def _beside_row(
 ) -> Row:
     topic = _topic(results, row)
     values: dict[str, Cell] = {"row": row.name, "unit": "", "n": nan, "printed_unit": row.unit}
+    values |= dict.fromkeys(_here_fields(RM_MASS), nan)
     for method in table.methods:
         values |= dict.fromkeys(_here_fields(method), nan) | _printed_values(method, true)
     if topic is not None:
@@ -128,7 +131,7 @@ def _printed_fields(method: str) -> tuple[str, str]:
 
 
 def _column(method: str) -> str:
-    return method.lower().replace(" ", "_")
+    return method.lower().replace(" ", "_").replace("+", "_")
 
 
 def _in_print(method: str) -> str:
@@ -161,7 +164,10 @@ def _here(tag: str, results: Results, topic: Topic) -> dict[str, Cell]:
     values: dict[str, Cell] = {"n": found[0].n}
     for pair in found:
         values |= _means(pair)
-    return values
+    one_number = results.find(topic, "paired_t", OM, RM_MASS)
+    return values | dict(
+        zip(_here_fields(RM_MASS), (one_number.mean_b, one_number.sd_b), strict=True)
+    )
 
 
 def _means(pair: Comparison) -> dict[str, Cell]:

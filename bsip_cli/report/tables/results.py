@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from bsip_cli.statistics.cohort_comparison import Comparison, joined
-from bsip_cli.statistics.cohort_values import OM, RM, Topic
+from bsip_cli.statistics.cohort_values import Topic
+from bsip_cli.statistics.methods import OM, RM
 
 
 class Results:

@@ -7,7 +7,8 @@ from bsip_cli.report.tables.model import Column, Row, Table
 from bsip_cli.report.tables.numbers import number, p_value
 from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import DATA_SHARE, Criteria
-from bsip_cli.statistics.cohort_values import OM, Topic
+from bsip_cli.statistics.cohort_values import Topic
+from bsip_cli.statistics.methods import OM
 
 NAME = "table1_segment_mass"
 
@@ -19,8 +20,8 @@ def build(results: Results, criteria: Criteria) -> Table:
     named = {topic: labels.segment(topic.variable) for topic in segments}
     return Table(
         NAME,
-        "Table 1. Mass of the segments [kg], identified from ground forces (OM) and from the "
-        f"regression (RM): mean (standard deviation) of {notes.participants(tests)}.",
+        "Table 1. Mass of the segments [kg], identified from ground forces (OM), from the regression "
+        f"(RM), and from the regression times one number (RM+mass): mean (standard deviation) of {notes.participants(tests)}.",
         _columns(criteria),
         tuple(_row(results, topic, criteria) for topic in segments),
         tuple(
@@ -37,6 +38,7 @@ def build(results: Results, criteria: Criteria) -> Table:
                     "0 (the mass is the regression's) to 1 (the data alone decide), mean over participants."
                     " Masses behind spherical joints are not decided by the data alone: the ground forces "
                     "hold them only in combinations, and nearness to the regression splits these.",
+                    paired.LEGEND,
                     notes.normality_legend(criteria.alpha),
                     notes.holm_legend(tests, criteria.alpha),
                     *notes.not_possible(results, named),
@@ -53,6 +55,7 @@ def _columns(criteria: Criteria) -> tuple[Column, ...]:
         *paired.means(),
         *paired.t_test(criteria),
         *paired.added_tests(),
+        *paired.against_rm_mass(criteria),
         Column(("equivalence_bound",), in_row_unit=True),
         Column(("equivalence_t",)),
         Column(("equivalence_p",), "equivalence p", p_value),
@@ -75,5 +78,5 @@ def _row(results: Results, topic: Topic, criteria: Criteria) -> Row:
         "mass_data_share": share.mean_a,
         "mass_data_share_sd": share.sd_a,
     }
-    marks = {paired.P: notes.star(results.find(topic, "paired_t"), criteria.alpha)}
+    marks = paired.marks(results, topic, criteria)
     return Row(values, topic.unit, marks=marks)

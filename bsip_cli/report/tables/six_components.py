@@ -8,7 +8,8 @@ from bsip_cli.report.tables.numbers import count, counts_of, mean_sd, number, p_
 from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_comparison import Comparison, joined
-from bsip_cli.statistics.cohort_values import OM, RM, Topic
+from bsip_cli.statistics.cohort_values import Topic
+from bsip_cli.statistics.methods import OM, RM, RM_MASS
 
 NAME = "table5_six_components"
 
@@ -33,7 +34,7 @@ def build(results: Results, criteria: Criteria) -> Table:
         "Table 5. Six components of the ground wrench about the world origin, simulated against "
         f"measured: mean (standard deviation) of {notes.participants(tests)}.",
         _columns(),
-        tuple(_row(results, topic, method) for topic in errors for method in (OM, RM)),
+        tuple(_row(results, topic, method) for topic in errors for method in paired.SHORT),
         tuple(
             filter(
                 None,
@@ -46,8 +47,9 @@ def build(results: Results, criteria: Criteria) -> Table:
                     f"(p < {criteria.alpha:g}) by Williams' t.",
                     "As published: RMSE, r, M, P, C, and Fisher's z, which takes the two correlations for "
                     "independent. Added: Williams' t, because they share the measured signal; in how many "
-                    "participants OM or RM has the smaller RMSE (a paired t test of the RMSE is in the "
-                    "CSV). Several runs of a movement are averaged for each participant first.",
+                    "participants OM or its rival has the smaller RMSE (paired t tests of the RMSE are in "
+                    "the CSV). Several runs of a movement are averaged for each participant first.",
+                    paired.LEGEND,
                     *notes.not_possible(results, named),
                 ),
             )
@@ -68,11 +70,20 @@ def _columns() -> tuple[Column, ...]:
         Column(("m_mean", "m_sd"), "M", mean_sd(3)),
         Column(("p_mean", "p_sd"), "P", mean_sd(3)),
         Column(("c_mean", "c_sd"), "C", mean_sd(3)),
-        Column(("om_smaller", "rm_smaller", "n_paired"), paired.BETTER, counts_of),
+        Column(("om_smaller", "rm_smaller", "n_paired"), "smaller error OM : RM", counts_of),
         Column(("om_smaller_share",)),
         Column(("sign_test_p",)),
         Column(("rmse_t",)),
         Column(("rmse_t_p",)),
+        Column(
+            ("rm_mass_om_smaller", "rm_mass_smaller", "rm_mass_n_paired"),
+            "smaller error OM : RM+mass",
+            counts_of,
+        ),
+        Column(("rm_mass_om_smaller_share",)),
+        Column(("rm_mass_sign_test_p",)),
+        Column(("rm_mass_rmse_t",)),
+        Column(("rm_mass_rmse_t_p",)),
         Column(("williams_t_median",), "Williams t", number(2)),
         Column(("williams_p_median",), "p", p_value),
         Column(("williams_om_better", "williams_rm_better", "williams_n"), _DIFFER, counts_of),
@@ -95,7 +106,7 @@ def _sibling(topic: Topic, measure: str) -> Topic:
 
 
 def _row(results: Results, topic: Topic, method: str) -> Row:
-    """OM's row carries the tests of OM against RM; RM's leaves them empty."""
+    """OM's row carries the tests of OM against its rivals; theirs leave them empty."""
     name = _NAMES[_component(topic)]
     tests = _tests(results, topic)
     values: dict[str, Cell] = {
@@ -109,7 +120,9 @@ def _row(results: Results, topic: Topic, method: str) -> Row:
     }
     for measure, short in _MEASURES.items():
         test = "paired_t" if measure == "rmse" else "description"
-        values |= _mean_and_sd(short, results.find(_sibling(topic, measure), test), method)
+        rival = RM if method == OM else method
+        pair = results.find(_sibling(topic, measure), test, OM, rival)
+        values |= _mean_and_sd(short, pair, method)
     return Row(values, topic.unit, labels.task(topic))
 
 
@@ -119,17 +132,11 @@ def _mean_and_sd(name: str, pair: Comparison, method: str) -> dict[str, Cell]:
 
 
 def _tests(results: Results, topic: Topic) -> dict[str, Cell]:
-    error, sign = results.find(topic, "paired_t"), results.find(topic, "sign")
     williams = results.find(_sibling(topic, "r"), "williams_t")
     fisher = results.find(_sibling(topic, "r"), "fisher_z")
     return {
-        "om_smaller": sign.count_a,
-        "rm_smaller": sign.count_b,
-        "n_paired": sign.n,
-        "om_smaller_share": sign.effect_size,
-        "sign_test_p": sign.p_value,
-        "rmse_t": error.statistic,
-        "rmse_t_p": error.p_value,
+        **_smaller_error(results, topic, RM, ""),
+        **_smaller_error(results, topic, RM_MASS, "rm_mass_"),
         "williams_t_median": williams.statistic,
         "williams_p_median": williams.p_value,
         "williams_om_better": williams.count_a,
@@ -140,4 +147,17 @@ def _tests(results: Results, topic: Topic) -> dict[str, Cell]:
         "fisher_om_better": fisher.count_a,
         "fisher_rm_better": fisher.count_b,
         "reason": joined(results.reasons(topic), results.reasons(_sibling(topic, "r"))),
+    }
+
+
+def _smaller_error(results: Results, topic: Topic, rival: str, before: str) -> dict[str, Cell]:
+    error, sign = (results.find(topic, test, OM, rival) for test in ("paired_t", "sign"))
+    return {
+        f"{before}om_smaller": sign.count_a,
+        f"{paired.SHORT[rival]}_smaller": sign.count_b,
+        f"{before}n_paired": sign.n,
+        f"{before}om_smaller_share": sign.effect_size,
+        f"{before}sign_test_p": sign.p_value,
+        f"{before}rmse_t": error.statistic,
+        f"{before}rmse_t_p": error.p_value,
     }

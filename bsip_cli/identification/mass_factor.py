@@ -1,0 +1,64 @@
+"""Estimator ``mass_factor`` (RM+mass): the table's body, all masses and tensors times one number.
+
+What the plates say of the whole mass and no more. OM is compared with it beside RM: an error that
+one number removes is no gain of identification.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bsip_cli.errors import NumericalError
+from bsip_cli.identification.estimator import Estimate, Problem
+from bsip_cli.statistics.normal import Z95
+
+_ROUNDS = 20  # of weights and number
+_QUIETEST = 0.1  # of what OM leaves: no component counts as without error
+
+
+def estimate(problem: Problem) -> Estimate:
+    """Weighted least squares of the measured wrench on the table's, in closed form.
+
+    Each component counts by the errors that the number itself leaves in it, of the independent
+    samples: the table's centres of mass err in the moments by more than OM does. They are trusted
+    as OM trusts them (``trust_ratio``). Single segments keep the table's spread, once the sum of
+    their masses is known.
+
+    Raises
+    ------
+    NumericalError
+        The number is not above 0.
+    """
+    whole, phi, noise = problem.every_equation(), problem.prior.phi, problem.noise
+    squares, products = np.einsum("i,cij,j->c", phi, whole.information, phi), whole.right @ phi
+    rms = noise.rms
+    for _ in range(_ROUNDS):
+        weights = noise.effective / noise.samples / rms**2
+        factor = float(weights @ products / (weights @ squares))
+        rms = np.maximum(whole.residual_rms(factor * phi), _QUIETEST * noise.rms)
+    if not factor > 0.0:
+        raise NumericalError(
+            f"the measured forces are {factor:.3g} times those of the table's masses",
+            expected="a number above 0: forces that push the body up where it pushes down",
+            remedy="look at the plates' signs in the quality table of ingest",
+        )
+    sd = problem.trust_ratio / float(np.sqrt(weights @ squares))
+    before = factor * problem.prior.root
+    root = _with_known_sum(before)
+    covariance = root @ root.T + sd**2 * np.outer(phi, phi)
+    return Estimate(factor * phi, covariance, _note(factor, sd, phi), before @ before.T)
+
+
+def _with_known_sum(root: np.ndarray) -> np.ndarray:
+    """A root (P, k) of the covariance once the sum of all masses is known."""
+    total = root[::10].sum(axis=0)
+    return root - np.outer(root @ total, total) / (total @ total)
+
+
+def _note(factor: float, sd: float, phi: np.ndarray) -> str:
+    low, high = factor - Z95 * sd, factor + Z95 * sd
+    before = float(phi[::10].sum())
+    return (
+        f"all masses and tensors of the table (RM) times {factor:.4f} (95 % interval {low:.4f} to "
+        f"{high:.4f}): {before:.2f} kg become {factor * before:.2f} kg"
+    )

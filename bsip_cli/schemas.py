@@ -165,12 +165,13 @@ SCHEMAS = {
         Schema(
             "readings",
             "participant",
-            1,
+            2,
             "how the numbers of a session's recordings are understood, one row per plate",
             (
                 _text("session", "of the recordings; empty without sessions"),
-                _text("mirrored", "what was mirrored: all, markers, forces or nothing (empty)"),
+                _text("moved", "what is in other axes: all, markers, forces or nothing (empty)"),
                 Column("axis", "int", "", "of the world that was mirrored: 0 for X, 1 for Y"),
+                Column("quarter_turns", "int", "90 degrees", "by which it was turned instead"),
                 _text("plate", "its name; empty if no plate was loaded"),
                 Column("moment_scale", "float", "1", "what the moments are multiplied with"),
                 Column("point_scale", "float", "1", "what the points of force are multiplied with"),
@@ -180,6 +181,7 @@ SCHEMAS = {
                 Column("reversed_round", "bool", "", "corners taken in the other direction round"),
                 Column("sign", "int", "", "-1 where the file holds the action on the plate"),
                 _text("place_of", "the plate with which it was exchanged"),
+                _text("reversed_channel", "the one channel whose sign is the other"),
                 *_floats("half_size_x_m half_size_y_m", "m", "half the widened outline", "plate"),
                 _text("refusal", "why the plate was left out"),
                 _text("rivals", "repairs that would each do, apart by |; not told apart"),

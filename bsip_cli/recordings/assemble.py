@@ -70,17 +70,18 @@ def findings_about(session: SessionReading) -> list[Finding]:
 
 
 def _about_scene(scene: Scene) -> list[Finding]:
-    if not scene.mirrored:
+    if not scene.moved:
         return []
-    what = {"all": "markers and forces", "markers": "the markers", "forces": "the forces"}
-    found = "left and right are exchanged all over the body: a left-handed laboratory frame"
-    if scene.mirrored == "forces":
-        found = "the forces lie under the feet in a mirror only"
-    action = (
-        f"reversed the {'XY'[scene.axis]} axis of {what[scene.mirrored]}, in all trials; if "
-        "instead left and right labels are exchanged, rename them"
-    )
-    return [Finding("mirrored", "", found, "a right-handed frame", action, "corrected")]
+    if scene.moved == "forces":
+        check, expected = "frame", "markers and forces in one frame"
+        found = "the forces lie under the feet and go with the motion in another frame only"
+        action = f"{scene.words()}, in all trials"
+    else:
+        check, expected = "mirrored", "a right-handed frame"
+        found = "left and right are exchanged all over the body: a left-handed laboratory frame"
+        action = f"{scene.words()}, in all trials; if instead left and right labels are exchanged, "
+        action += "rename them"
+    return [Finding(check, "", found, expected, action, "corrected")]
 
 
 def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
@@ -93,10 +94,10 @@ def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
         return [Finding("plate_repeated", name, found, expected, action, "corrected")]
     if verdict.refusal:
         action = "left the plate out: no other unit, point or order of corners explains it"
-        if len(verdict.rivals) > 1:
+        if verdict.rivals:
             action = (
-                f"left the plate out: either {' or '.join(verdict.rivals)} would do, and these "
-                "trials cannot tell; one with more movement might"
+                f"left the plate out: {' or '.join(verdict.rivals)}: these trials cannot tell; one "
+                "with more movement might"
             )
         return [_about(name, verdict.refusal, action, "excluded")]
     reading, findings = verdict.reading, []

@@ -5,14 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
+CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 Reference = Literal["stated", "reversed", "centred", "origin", "fixed"]
 
 # Natural logarithms of how often a laboratory's files need a repair, beside being as they say. Only
 # their order of magnitude counts: one in thirty for units, which exporters confuse most, one in a
 # hundred for a reference point or a turned plate, one in five hundred for corners the other way
 # round (none of 157 plates of 20 laboratories).
-_SCALED, _OTHER_POINT, _TURNED, _MIRRORED = -3.4, -4.6, -4.6, -6.2
-_MOMENTS_REVERSED = -6.2  # without the forces, or these without the moments
+_SCALED, _OTHER_POINT, TURNED, MIRRORED = -3.4, -4.6, -4.6, -6.2
+_MOMENTS_REVERSED = -6.2  # without the forces, or these without the moments, or one channel
 REVERSED = -2.3  # the action on the plate: one in ten
 EXCHANGED = -5.3  # two plates
 ONE_ALONE = -0.7  # one plate of several: what goes wrong, goes wrong for all more often
@@ -32,6 +35,7 @@ class PlateReading:
     mirrored : the corners are taken in the other direction round.
     sign : -1 where the numbers are the action on the plate.
     place_of : the plate whose place (C3D), or points and moments (MOT), belong to this one's force.
+    reversed_channel : one of CHANNELS whose sign is the other, as written; "" if none.
     half_size_m : half the outline's sides where the stated outline is too small.
     """
 
@@ -43,6 +47,7 @@ class PlateReading:
     mirrored: bool = False
     sign: int = 1
     place_of: str = ""
+    reversed_channel: str = ""
     half_size_m: tuple[float, float] | None = None
 
     def log_prior(self) -> float:
@@ -50,11 +55,19 @@ class PlateReading:
         scaled = (abs(self.moment_scale) != 1.0) + (self.point_scale != 1.0)
         return (
             _SCALED * scaled
-            + _MOMENTS_REVERSED * (self.moment_scale < 0)
+            + _MOMENTS_REVERSED * ((self.moment_scale < 0) + bool(self.reversed_channel))
             + _OTHER_POINT * (self.about != "stated")
-            + _TURNED * (self.turn != 0 and not self.mirrored)
-            + _MIRRORED * self.mirrored
+            + TURNED * (self.turn != 0 and not self.mirrored)
+            + MIRRORED * self.mirrored
         )
+
+    def force_signs(self) -> np.ndarray:
+        """Of Fx, Fy, Fz, (3,)."""
+        return np.array([-1.0 if name == self.reversed_channel else 1.0 for name in CHANNELS[:3]])
+
+    def moment_signs(self) -> np.ndarray:
+        """Of Mx, My, Mz, (3,)."""
+        return np.array([-1.0 if name == self.reversed_channel else 1.0 for name in CHANNELS[3:]])
 
     def words(self) -> str:
         """What was done about units, reference and axes, as one clause; empty if nothing."""
@@ -64,6 +77,8 @@ class PlateReading:
             _POINT_SCALES.get(self.point_scale, ""),
             _ABOUT[self.about],
         ]
+        if self.reversed_channel:
+            done.append(f"reversed {self.reversed_channel}")
         if self.place_of:
             done.append(f"exchanged its place with that of {self.place_of}")
         if self.mirrored:

@@ -8,14 +8,16 @@ from itertools import product
 from typing import Protocol
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.recordings.cop_polynomial import correct_cop
 from bsip_cli.recordings.model import Finding, Plate
-from bsip_cli.recordings.plate_reading import PlateReading, Reference
+from bsip_cli.recordings.plate_reading import CHANNELS, PlateReading, Reference
 from bsip_cli.recordings.plates import LocalWrench, PlateDescription, surface_offset_m, to_world
 
 _THICK_M = 0.3  # no plate's sensors lie so deep under its surface
 _Z = np.array([1.0, 1.0, -1.0])
+_HARDLY = 0.05  # of a bell: less of it has points
 _STILL_M = 1e-6  # points that stay where they are, are no centres of pressure
 
 
@@ -29,11 +31,14 @@ class PlateSource(Protocol):
     def usable(self) -> np.ndarray:
         """Samples that can be believed, (n,) bool."""
 
-    def lift_N(self) -> np.ndarray:
-        """Vertical force as the file gives it, world frame, (n,)."""
+    def lift_N(self, reading: PlateReading = PlateReading()) -> np.ndarray:
+        """Vertical force, world frame, before the sign of a reading, (n,)."""
 
     def at(self, samples: np.ndarray) -> PlateSource:
         """These samples alone."""
+
+    def smoothed(self, sigma: float) -> PlateSource:
+        """Averaged with a bell of a standard deviation of so many samples."""
 
     def plate(self, reading: PlateReading) -> Plate:
         """In the world frame."""
@@ -51,8 +56,8 @@ class PlateSource(Protocol):
     def floor_m(self, reading: PlateReading) -> float:
         """Height of the surface, world frame."""
 
-    def mirrored(self, axis: int) -> PlateSource:
-        """With one axis of the world (0 or 1) reversed, as if seen in a mirror."""
+    def moved(self, change: np.ndarray) -> PlateSource:
+        """In other axes of the world (3, 3), turned or as if seen in a mirror."""
 
     def alternatives(self) -> Iterable[PlateReading]:
         """Other ways to understand the numbers, sign and size of the outline aside."""
@@ -83,15 +88,17 @@ class C3dPlate:
     def name(self) -> str:
         return self.description.name
 
-    def lift_N(self) -> np.ndarray:
-        return (
-            self.wrench.force_N
-            @ (self.rotation_world_lab @ self.description.rotation_lab_plate())[2]
-        )
+    def lift_N(self, reading: PlateReading = PlateReading()) -> np.ndarray:
+        axes = self.rotation_world_lab @ self.read_description(reading).rotation_lab_plate()
+        return np.asarray(self.wrench.force_N * reading.force_signs() @ axes[2])
 
     def at(self, samples: np.ndarray) -> C3dPlate:
         part = LocalWrench(self.wrench.force_N[samples], self.wrench.moment_Nm[samples])
         return replace(self, wrench=part, usable=self.usable[samples])
+
+    def smoothed(self, sigma: float) -> C3dPlate:
+        parts = (_smooth(x, self.usable, sigma) for x in (self.wrench.force_N, self.wrench.moment_Nm))
+        return replace(self, wrench=LocalWrench(*parts))
 
     def plate(self, reading: PlateReading) -> Plate:
         description = self.read_description(reading)
@@ -113,11 +120,12 @@ class C3dPlate:
     def floor_m(self, reading: PlateReading) -> float:
         return float((self.description.corners_m @ self.rotation_world_lab.T)[:, 2].mean())
 
-    def mirrored(self, axis: int) -> C3dPlate:
+    def moved(self, change: np.ndarray) -> C3dPlate:
         """Corners alone: what the channels hold is told along them."""
-        corners = self.description.corners_m @ _mirror(axis, self.rotation_world_lab)
+        corners = self.description.corners_m @ _in_lab(change, self.rotation_world_lab).T
         description = replace(self.description, corners_m=corners)
-        return replace(self, description=description, seen_in_mirror=True)
+        in_mirror = self.seen_in_mirror != (np.linalg.det(change) < 0)
+        return replace(self, description=description, seen_in_mirror=bool(in_mirror))
 
     def alternatives(self) -> Iterable[PlateReading]:
         """Type 3 has no moments of its own, type 1 no point that they are about."""
@@ -128,6 +136,8 @@ class C3dPlate:
             abouts += ("reversed", "centred")
         for scale, about, turn, mirrored in product(scales, abouts, range(4), (False, True)):
             yield PlateReading(moment_scale=scale, about=about, turn=turn, mirrored=mirrored)
+        for channel in CHANNELS:
+            yield PlateReading(reversed_channel=channel)
 
     def findings(self, reading: PlateReading) -> list[Finding]:
         return list(correct_cop(self._at_surface(reading), self.read_description(reading))[1])
@@ -161,7 +171,10 @@ class C3dPlate:
         Channels that were mirrored with their laboratory have a frame with z the other way, which
         is no action on the plate.
         """
-        wrench = self.wrench.scaled(reading.moment_scale)
+        wrench = LocalWrench(
+            self.wrench.force_N * reading.force_signs(),
+            self.wrench.moment_Nm * reading.moment_signs() * reading.moment_scale,
+        )
         if self.seen_in_mirror and reading.sign < 0:
             return LocalWrench(-wrench.force_N * _Z, wrench.moment_Nm * _Z)
         return wrench
@@ -183,8 +196,8 @@ class ForceOnPoint:
     usable: np.ndarray  # (n,) bool
     rotation_world_lab: np.ndarray  # (3, 3)
 
-    def lift_N(self) -> np.ndarray:
-        return self.force_N @ self.rotation_world_lab[2]
+    def lift_N(self, reading: PlateReading = PlateReading()) -> np.ndarray:
+        return np.asarray(self._force_N(reading) @ self.rotation_world_lab[2])
 
     def at(self, samples: np.ndarray) -> ForceOnPoint:
         def some(values: np.ndarray | None) -> np.ndarray | None:
@@ -198,9 +211,23 @@ class ForceOnPoint:
             usable=self.usable[samples],
         )
 
+    def smoothed(self, sigma: float) -> ForceOnPoint:
+        """Points where there are any: zero says that there is no force."""
+        points = self.points
+        if points is not None:
+            there = self.usable & np.nan_to_num(points).any(axis=1)
+            weight = _smooth(np.ones_like(points), there, sigma)
+            points = _smooth(points, there, sigma) / np.maximum(weight, _HARDLY)
+        return replace(
+            self,
+            force_N=_smooth(self.force_N, self.usable, sigma),
+            points=points,
+            moment=None if self.moment is None else _smooth(self.moment, self.usable, sigma),
+        )
+
     def plate(self, reading: PlateReading) -> Plate:
         turn = self.rotation_world_lab
-        force, moment = self.force_N @ turn.T, self._moment_Nm(reading) @ turn.T
+        force, moment = self._force_N(reading) @ turn.T, self._moment_Nm(reading) @ turn.T
         return Plate(self.name, reading.sign * force, reading.sign * moment, None, self.usable)
 
     def left_at_point(self, reading: PlateReading) -> LeftMoment | None:
@@ -225,24 +252,27 @@ class ForceOnPoint:
     def floor_m(self, reading: PlateReading) -> float:
         return self.point_height * reading.point_scale
 
-    def mirrored(self, axis: int) -> ForceOnPoint:
+    def moved(self, change: np.ndarray) -> ForceOnPoint:
         """A moment turns the other way round in a mirror."""
-        mirror = _mirror(axis, self.rotation_world_lab)
+        change = _in_lab(change, self.rotation_world_lab)
+        moment = None if self.moment is None else self.moment @ change.T * np.linalg.det(change)
         return replace(
             self,
-            force_N=self.force_N @ mirror,
-            points=None if self.points is None else self.points @ mirror,
-            moment=None if self.moment is None else -self.moment @ mirror,
+            force_N=self.force_N @ change.T,
+            points=None if self.points is None else self.points @ change.T,
+            moment=moment,
         )
 
     def alternatives(self) -> Iterable[PlateReading]:
         points = (1.0, 1e-3, 1e-2) if self.points is not None else (1.0,)
-        moments = (1.0, 1e-3) if self.moment is not None else (1.0,)
+        moments = (1.0, 1e-3, -1.0) if self.moment is not None else (1.0,)
         abouts: tuple[Reference, ...] = ("stated",)
         if self.moment is not None and self.points is not None and self.points_move:
             abouts += ("origin", "fixed")
         for point, moment, about in product(points, moments, abouts):
             yield PlateReading(moment_scale=moment, point_scale=point, about=about)
+        for channel in CHANNELS[:3]:
+            yield PlateReading(reversed_channel=channel)
 
     def findings(self, reading: PlateReading) -> list[Finding]:
         return []
@@ -255,7 +285,7 @@ class ForceOnPoint:
         for one in trials:
             left = one._scaled_moment(reading) - one._at_origin(reading)
             known = one.usable & np.isfinite(left).all(axis=1)
-            forces.append(one.force_N[known] @ turn.T)
+            forces.append(one._force_N(reading)[known] @ turn.T)
             lefts.append(left[known] @ turn.T)
         force, left = np.concatenate(forces), np.concatenate(lefts)
         zero = np.zeros(len(force))
@@ -297,24 +327,31 @@ class ForceOnPoint:
             return left
         left = left - self._at_origin(reading)
         if reading.centre_m is not None:
-            left = left + np.cross(np.array(reading.centre_m), self.force_N)
+            left = left + np.cross(np.array(reading.centre_m), self._force_N(reading))
         return left
 
     def _at_origin(self, reading: PlateReading) -> np.ndarray:
         """Moment of the force at its point about the lab's origin, (n, 3)."""
         assert self.points is not None
-        return np.asarray(np.cross(self.points * reading.point_scale, self.force_N))
+        return np.asarray(np.cross(self.points * reading.point_scale, self._force_N(reading)))
+
+    def _force_N(self, reading: PlateReading) -> np.ndarray:
+        return self.force_N * reading.force_signs()
 
     def _scaled_moment(self, reading: PlateReading) -> np.ndarray:
         assert self.moment is not None
         return self.moment * reading.moment_scale
 
 
-def _mirror(axis: int, rotation_world_lab: np.ndarray) -> np.ndarray:
-    """Reverses one axis of the world, in the lab frame, (3, 3)."""
-    signs = np.ones(3)
-    signs[axis] = -1.0
-    return np.asarray(rotation_world_lab.T @ np.diag(signs) @ rotation_world_lab)
+def _in_lab(change: np.ndarray, rotation_world_lab: np.ndarray) -> np.ndarray:
+    """A change of the world's axes, as one of the lab's, (3, 3)."""
+    return np.asarray(rotation_world_lab.T @ change @ rotation_world_lab)
+
+
+def _smooth(values: np.ndarray, usable: np.ndarray, sigma: float) -> np.ndarray:
+    """Averaged over samples (n, k), with nothing where they are not usable."""
+    known = np.where(usable[:, None], np.nan_to_num(values), 0.0)
+    return np.asarray(gaussian_filter1d(known, sigma, axis=0, mode="nearest"))
 
 
 def points_that_move(point: np.ndarray, loaded: np.ndarray) -> bool:

@@ -49,6 +49,5 @@ def _is_sum(trials: Sequence[Mapping[str, PlateSource]], name: str, terms: Seque
 
 
 def _force(source: PlateSource) -> np.ndarray:
-    """Vertical and horizontal size of the force, whichever way the plate lies, (n, 2)."""
-    lift = source.lift_N()
-    return np.where(source.usable, lift, 0.0)[:, None]
+    """Size of the vertical force, whichever way the plate lies and its signs are, (n,)."""
+    return np.where(source.usable, np.abs(source.lift_N()), 0.0)

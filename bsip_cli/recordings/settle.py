@@ -12,25 +12,42 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
 
+from bsip_cli.recordings.body_motion import (
+    SMOOTH_S,
+    Body,
+    Harmony,
+    Match,
+    balance_log_likelihood,
+)
 from bsip_cli.recordings.handedness import Handedness, handedness
 from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.person_size import height_m
-from bsip_cli.recordings.plate_reading import EXCHANGED, ONE_ALONE, REVERSED, PlateReading
+from bsip_cli.recordings.plate_reading import (
+    EXCHANGED,
+    MIRRORED,
+    ONE_ALONE,
+    REVERSED,
+    TURNED,
+    PlateReading,
+)
 from bsip_cli.recordings.plate_source import C3dPlate, ForceOnPoint, PlateSource
 from bsip_cli.recordings.plates import LOADED_N, inside_share
 from bsip_cli.recordings.repeated_plates import repeated_plates
-from bsip_cli.recordings.under_the_feet import BESIDE_M, Area, Body, Evidence, Feet, evidence
+from bsip_cli.recordings.under_the_feet import BESIDE_M, Area, Evidence, Feet, evidence
 
 _SURE = 0.95  # probability from which on a repair is made
+_RATHER = 0.5  # probability from which on the file is believed
+_LEAST_LIKELY = -12.0  # logarithm: less adds nothing
 _FEW = 100  # samples that each plate of a trial is seen by
 _ALIKE_M = 0.01  # readings whose centres of pressure differ by less are one,
-_ALIKE_SHARE = 0.03  # if their total forces differ by less than this part of the load
+_ALIKE_SHARE = 0.03  # if their forces differ by less than this part of the load,
+_ALIKE_TORQUE_M = 0.003  # and their vertical moments by less than this times the load
 _RIM_M = 0.02
 _MOSTLY_OUTSIDE = 0.2  # share inside the outline
 _TOUCHED_N = 20.0
@@ -43,7 +60,7 @@ _IN_PART = -2.3  # markers or forces alone are mirrored more rarely than both: o
 _UNTOLD = "its numbers are no force under a foot as they stand, and several corrections make one"
 
 Readings = Mapping[str, PlateReading]
-Mirrored = Literal["", "all", "markers", "forces"]
+Moved = Literal["", "all", "markers", "forces"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,16 +81,34 @@ class Opened:
 class Look:
     """What one trial shows: some loaded samples, small however long the trial is.
 
-    ``sources`` by their names at these samples; for each ``loaded`` (n,) bool, the ``feet`` on its
-    place, ``push_N`` and ``pull_N`` summed over all samples as the file has them.
+    ``sources`` by their names at these samples, and ``smooth`` averaged over as long as the
+    ``body``; for each ``loaded`` (n,) bool; the ``feet``.
     """
 
     sources: dict[str, PlateSource]
+    smooth: dict[str, PlateSource]
     loaded: dict[str, np.ndarray]
-    feet: dict[str, Area]
+    feet: Feet
     body: Body
-    push_N: dict[str, float]
-    pull_N: dict[str, float]
+
+    def areas(self) -> dict[str, Area]:
+        """Of the feet on each plate's place."""
+        places = {n: s.plate(PlateReading()).corners_m for n, s in self.sources.items()}
+        return {name: self.feet.on(corners).area() for name, corners in places.items()}
+
+    def seen_in(self, scene: Scene) -> Look:
+        """In the axes of a scene."""
+        changed = self
+        if scene.moved in ("all", "markers"):
+            body, feet = self.body.moved(scene.change()), self.feet.moved(scene.change())
+            changed = replace(changed, body=body, feet=feet)
+        if scene.moved in ("all", "forces"):
+            sources, smooth = (
+                {name: source.moved(scene.change()) for name, source in some.items()}
+                for some in (self.sources, self.smooth)
+            )
+            changed = replace(changed, sources=sources, smooth=smooth)
+        return changed
 
 
 @dataclass(frozen=True)
@@ -95,9 +130,8 @@ class Verdict:
 
 def look_at(opened: Opened) -> Look | None:
     """What a trial shows of its plates; None if none is loaded."""
-    recording = opened.recording
-    lifts = {s.name: np.where(s.usable, s.lift_N(), 0.0) for s in opened.sources}
-    heavy = {name: _heavy(lift) for name, lift in lifts.items()}
+    recording, sources = opened.recording, opened.sources
+    heavy = {s.name: _heavy(np.where(s.usable, s.lift_N(), 0.0)) for s in sources}
     chosen = [np.flatnonzero(mask) for mask in heavy.values()]
     chosen = [some[:: max(1, len(some) // _FEW)] for some in chosen if len(some)]
     if not chosen:
@@ -105,38 +139,66 @@ def look_at(opened: Opened) -> Look | None:
     samples = np.unique(np.concatenate(chosen))
     frames = np.round(samples * recording.marker_rate_hz / recording.analog_rate_hz).astype(int)
     samples, frames = samples[frames < recording.n_frames], frames[frames < recording.n_frames]
-    floor = opened.sources[0].floor_m(PlateReading())
-    feet = Feet.of(recording.markers_m, frames, floor if abs(floor) < 1.0 else 0.0)
+    floor = sources[0].floor_m(PlateReading())
+    sigma = SMOOTH_S * recording.analog_rate_hz
     return Look(
-        sources={s.name: s.at(samples) for s in opened.sources},
+        sources={s.name: s.at(samples) for s in sources},
+        smooth={s.name: s.smoothed(sigma).at(samples) for s in sources},
         loaded={name: mask[samples] for name, mask in heavy.items()},
-        feet={s.name: feet.on(s.plate(PlateReading()).corners_m).area() for s in opened.sources},
+        feet=Feet.of(recording.markers_m, frames, floor if abs(floor) < 1.0 else 0.0),
         body=Body.of(_by_segment(recording), recording.marker_rate_hz, frames),
-        push_N={name: float(lift[lift > LOADED_N].sum()) for name, lift in lifts.items()},
-        pull_N={name: float(-lift[lift < -LOADED_N].sum()) for name, lift in lifts.items()},
     )
 
 
 @dataclass(frozen=True)
 class Scene:
-    """What is mirrored along an axis of the world: nothing, all, the markers or the forces."""
+    """In what axes the world is written that are not those of the person: all of it, the markers
+    or the forces alone; mirrored along an ``axis``, or turned about the vertical."""
 
-    mirrored: Mirrored = ""
+    moved: Moved = ""
     axis: int = 0
+    quarter_turns: int = 0
+
+    def change(self) -> np.ndarray:
+        """From the axes as written to those of the person, (3, 3)."""
+        if self.quarter_turns:
+            c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][self.quarter_turns]
+            return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return np.diag([-1.0 if k == self.axis else 1.0 for k in range(3)])
 
     def of(self, opened: Opened) -> Opened:
         """The recording put right."""
         recording, sources = opened.recording, opened.sources
-        if self.mirrored in ("all", "markers"):
-            markers = recording.markers_m.copy()
-            markers[..., self.axis] *= -1.0
+        if self.moved in ("all", "markers"):
+            markers = recording.markers_m @ self.change().T
             recording = replace(recording, markers_m=markers)
-        if self.mirrored in ("all", "forces"):
-            sources = tuple(source.mirrored(self.axis) for source in sources)
+        if self.moved in ("all", "forces"):
+            sources = tuple(source.moved(self.change()) for source in sources)
         return Opened(recording, sources)
 
+    def of_markers(self) -> tuple[bool, int]:
+        """What is done to the markers."""
+        is_moved = self.moved in ("all", "markers")
+        return is_moved, self.axis * is_moved
+
     def log_prior(self) -> float:
-        return {"": 0.0, "all": 0.0, "markers": _IN_PART, "forces": _IN_PART}[self.mirrored]
+        if self.moved == "forces":
+            return TURNED if self.quarter_turns else MIRRORED
+        return _IN_PART if self.moved == "markers" else 0.0
+
+    def words(self) -> str:
+        """What is done, as a clause."""
+        what = {"all": "markers and forces", "markers": "the markers", "forces": "the forces"}
+        if self.quarter_turns:
+            return f"turned {what[self.moved]} by {90 * self.quarter_turns} degrees"
+        return f"reversed the {'XY'[self.axis]} axis of {what[self.moved]}"
+
+
+_MIRRORS = (Scene("all"), Scene("markers", 0), Scene("markers", 1))
+_FORCES_MOVED = (
+    *(Scene("forces", axis) for axis in (0, 1)),
+    *(Scene("forces", quarter_turns=turns) for turns in (1, 2, 3)),
+)
 
 
 @dataclass(frozen=True)
@@ -152,54 +214,28 @@ class Survey:
     """What is kept of a trial until all of a session are seen: small, however long it is."""
 
     hands: Handedness
-    looks: Mapping[Scene, Look]
+    look: Look | None
     height_m: float | None
 
     @classmethod
     def of(cls, opened: Opened) -> Survey:
         hands = handedness(opened.recording.labels, opened.recording.markers_m)
-        scenes = [Scene()]
-        if hands.is_mirrored:
-            scenes += [Scene("all"), Scene("markers", 0), Scene("markers", 1)]
-        if any(isinstance(source, ForceOnPoint) for source in opened.sources):
-            scenes += [Scene("forces", 0), Scene("forces", 1)]
-        looks = {scene: look_at(scene.of(opened)) for scene in scenes}
-        known = {scene: look for scene, look in looks.items() if look is not None}
-        return cls(hands, known, height_m(_by_segment(opened.recording)))
+        return cls(hands, look_at(opened), height_m(_by_segment(opened.recording)))
 
 
 def settle_session(trials: Sequence[Survey]) -> SessionReading:
     """The scene and the plates' readings that make a person of a session."""
-    hands = Handedness.of_all([trial.hands for trial in trials])
-    scenes = [Scene("all"), Scene("markers", 0), Scene("markers", 1)]
-    if not hands.is_mirrored:
-        plates, _ = settle(_seen(trials, Scene()))
-        if not any(verdict.refusal for verdict in plates.values()):
-            return SessionReading(Scene(), plates)
-        scenes = [Scene(), Scene("forces", 0), Scene("forces", 1)]
-    seen = {scene: _seen(trials, scene) for scene in scenes}
-    most = max(map(len, seen.values()))
-    settled = [(scene, *settle(some)) for scene, some in seen.items() if len(some) == most]
-    good = [one for one in settled if not any(verdict.refusal for verdict in one[1].values())]
-    scene, plates, _ = max(good or settled[:1], key=lambda one: one[0].log_prior() + one[2])
-    return SessionReading(scene, plates)
-
-
-def _seen(trials: Sequence[Survey], scene: Scene) -> list[Look]:
-    return [trial.looks[scene] for trial in trials if scene in trial.looks]
-
-
-def settle(looks: Sequence[Look]) -> tuple[dict[str, Verdict], float]:
-    """A verdict for each plate of a session, and how likely all that they read is (logarithm)."""
+    looks = [trial.look for trial in trials if trial.look is not None]
+    is_mirrored = Handedness.of_all([trial.hands for trial in trials]).is_mirrored
+    scenes = _MIRRORS if is_mirrored else (Scene(), *_FORCES_MOVED)
+    if not looks:
+        return SessionReading(scenes[0])
     repeats = repeated_plates([look.sources for look in looks])
-    every = dict.fromkeys(name for look in looks for name in look.sources)
-    names = [name for name in every if name not in repeats]
-    session = _Session([_without(look, repeats) for look in looks], names)
-    stated = session.signed(dict.fromkeys(names, PlateReading()))
-    chosen = _repaired(session, stated)
-    verdicts = {name: _verdict(session, stated, chosen, name) for name in names}
+    worlds = [_World.of(scene, looks, repeats) for scene in scenes]
+    chosen = _repaired(worlds)
+    verdicts = {name: _verdict(worlds[0], chosen, name) for name in worlds[0].names}
     repeated = {name: Verdict(repeats=others) for name, others in repeats.items()}
-    return verdicts | repeated, chosen.log_prior + session.log_likelihood(chosen.readings)
+    return SessionReading(chosen.world.scene, verdicts | repeated)
 
 
 def _heavy(lift_N: np.ndarray) -> np.ndarray:
@@ -217,48 +253,64 @@ def _by_segment(recording: Recording) -> dict[str, np.ndarray]:
     return {segment: recording.markers_m[:, some] for segment, some in columns.items()}
 
 
-def _without(look: Look, names: Mapping[str, object]) -> Look:
-    return replace(look, sources={n: s for n, s in look.sources.items() if n not in names})
+class _Seen(NamedTuple):
+    """A plate as read in one trial: at n samples, and smooth, (n, 6) about the world's origin."""
+
+    evidence: Evidence
+    force_N: np.ndarray
+    cop_m: np.ndarray
+    torque_Nm: np.ndarray
+    smooth: np.ndarray
 
 
 @dataclass(eq=False)
-class _Session:
-    """What readings make of all trials; each plate is read once in each way."""
+class _World:
+    """A scene, and what readings make of all trials in it; each plate is read once in each way."""
 
+    scene: Scene
     looks: Sequence[Look]
     names: Sequence[str]
-    _known: dict[tuple[str, PlateReading], list] = field(default_factory=dict)
+    areas: Sequence[Mapping[str, Area]]
+    _known: dict[tuple[str, PlateReading], list[_Seen | None]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, scene: Scene, looks: Sequence[Look], repeats: Collection[str]) -> _World:
+        """Without plates that repeat others."""
+        seen = [look.seen_in(scene) if scene.moved else look for look in looks]
+        kept = [
+            replace(look, sources={n: s for n, s in look.sources.items() if n not in repeats})
+            for look in seen
+        ]
+        names = list(dict.fromkeys(name for look in kept for name in look.sources))
+        return cls(scene, kept, names, [look.areas() for look in kept])
+
+    def stated(self) -> dict[str, PlateReading]:
+        """As the files say."""
+        return self.signed(dict.fromkeys(self.names, PlateReading()))
 
     def log_likelihood(self, readings: Readings) -> float:
         total = 0.0
         for k, look in enumerate(self.looks):
-            seen = [self._seen(name, readings[name])[k] for name in look.sources]
-            total += sum(one.log_likelihood() for one, _, _ in seen)
-            total += look.body.log_likelihood([f for _, f, _ in seen], [cop for *_, cop in seen])
-        return total
+            seen = [self.seen(name, readings[name])[k] for name in look.sources]
+            total += sum(one.evidence.log_likelihood() for one in seen if one)
+        matches = self._matches(readings)
+        total += sum(map(balance_log_likelihood, matches))
+        return total + Harmony.of(matches).log_likelihood()
+
+    def harmony(self, readings: Readings) -> Harmony:
+        return Harmony.of(self._matches(readings))
+
+    def _matches(self, readings: Readings) -> list[Match]:
+        found = []
+        for k, look in enumerate(self.looks):
+            seen = [self.seen(name, readings[name])[k] for name in look.sources]
+            total = np.sum([one.smooth for one in seen if one], axis=0)
+            found.append(look.body.match(total) if seen else Match())
+        return found
 
     def evidence(self, name: str, reading: PlateReading) -> Evidence:
         """Mean over the trials in which the plate is loaded."""
-        found = [one for one, *_ in filter(None, self._seen(name, reading))]
-        return Evidence.mean(found)
-
-    def alike(self, some: Readings, others: Readings) -> bool:
-        """Whether they leave the same total force, and each plate's centre of pressure."""
-        changed = [name for name in self.names if some[name] != others[name]]
-        for k, look in enumerate(self.looks):
-            pairs = [
-                (self._seen(name, some[name])[k], self._seen(name, others[name])[k], name)
-                for name in changed
-                if name in look.sources
-            ]
-            apart = [np.abs(one[2] - two[2])[look.loaded[name]] for one, two, name in pairs]
-            if any(np.nanmax(gap, initial=0.0) >= _ALIKE_M for gap in apart):
-                return False
-            turned = np.sum([one[1] - two[1] for one, two, _ in pairs], axis=0)
-            total = np.sum([self._seen(n, some[n])[k][1][:, 2] for n in look.sources], axis=0)
-            if pairs and np.nanmean(np.abs(turned)) > _ALIKE_SHARE * np.nanmean(np.abs(total)):
-                return False
-        return True
+        return Evidence.mean([one.evidence for one in self.seen(name, reading) if one])
 
     def signed(self, readings: Readings) -> dict[str, PlateReading]:
         """With the signs that let the person press: mirrored corners turn a plate's axis over."""
@@ -298,33 +350,35 @@ class _Session:
         x, y = np.maximum(np.nanpercentile(np.abs(cop), 99, axis=0) + _RIM_M, stated).tolist()
         return replace(reading, half_size_m=(x, y))
 
-    def is_all_c3d(self) -> bool:
-        return all(isinstance(self._sources(name)[0], C3dPlate) for name in self.names)
-
     def _sources(self, name: str) -> list[PlateSource]:
         return [look.sources[name] for look in self.looks if name in look.sources]
 
     def _signed(self, name: str, reading: PlateReading) -> PlateReading:
-        push = sum(look.push_N.get(name, 0.0) for look in self.looks)
-        pull = sum(look.pull_N.get(name, 0.0) for look in self.looks)
-        if reading.mirrored:
-            push, pull = pull, push
+        push = pull = 0.0
+        for look in self.looks:
+            if name in look.sources:
+                lift = look.sources[name].lift_N(reading)[look.loaded[name]]
+                push, pull = push + lift.clip(min=0).sum(), pull + (-lift).clip(min=0).sum()
         return replace(reading, sign=-1 if pull > _PULLS * push else 1)
 
-    def _seen(self, name: str, reading: PlateReading) -> list:
-        """Evidence, force (n, 3) and centre of pressure (n, 2) in each trial; None without it."""
+    def seen(self, name: str, reading: PlateReading) -> list[_Seen | None]:
+        """In each trial; None without the plate."""
         key = (name, reading)
         if key not in self._known:
-            self._known[key] = [_read(look, name, reading) for look in self.looks]
+            pairs = zip(self.looks, self.areas, strict=True)
+            self._known[key] = [_read(look, areas, name, reading) for look, areas in pairs]
         return self._known[key]
 
 
-def _read(look: Look, name: str, reading: PlateReading) -> tuple | None:
+def _read(
+    look: Look, areas: Mapping[str, Area], name: str, reading: PlateReading
+) -> _Seen | None:
     if name not in look.sources:
         return None
-    source = look.sources[name]
-    if reading.place_of:
-        source = source.in_place_of(look.sources[reading.place_of])
+    source, smooth = look.sources[name], look.smooth[name]
+    if other := reading.place_of:
+        source = source.in_place_of(look.sources[other])
+        smooth = smooth.in_place_of(look.smooth[other])
     plate, floor = source.plate(reading), source.floor_m(reading)
     loaded = look.loaded[name]
     found = evidence(
@@ -332,13 +386,15 @@ def _read(look: Look, name: str, reading: PlateReading) -> tuple | None:
         plate.moment_Nm[loaded],
         source.at(np.flatnonzero(loaded)).left_at_point(reading),
         None if (lever := source.lever_m(reading)) is None else lever[loaded],
-        look.feet[reading.place_of or name].at(loaded),
+        areas[reading.place_of or name].at(loaded),
         plate.corners_m,
         floor,
     )
     cop = plate.cop_m(floor)
     cop[np.abs(plate.force_N[:, 2]) < _TOUCHED_N] = np.nan
-    return found, plate.force_N, cop
+    x, y = cop.T
+    torque = plate.moment_Nm[:, 2] - x * plate.force_N[:, 1] + y * plate.force_N[:, 0]
+    return _Seen(found, plate.force_N, cop, torque, np.nan_to_num(smooth.plate(reading).wrench()))
 
 
 # --- the choice -------------------------------------------------------------------------------
@@ -346,92 +402,145 @@ def _read(look: Look, name: str, reading: PlateReading) -> tuple | None:
 
 @dataclass(frozen=True)
 class _Choice:
-    """Readings with their prior, and, where something is still wrong, the repairs of each plate, in
-    words, that would do and that these trials cannot tell apart."""
+    """Readings in a world, with their prior; and, where these trials cannot tell them from others,
+    the repairs of each plate that would do, in words."""
 
+    world: _World
     readings: Readings
-    log_prior: float = 0.0
     rivals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
+    def log_posterior(self) -> float:
+        """But for a constant."""
+        return self.log_prior() + self.world.log_likelihood(self.readings)
 
-def _repaired(session: _Session, stated: Readings) -> _Choice:
+    def log_prior(self) -> float:
+        """How rare it is that so much is wrong at once, logarithm."""
+        readings = list(self.readings.values())
+        repairs: dict[PlateReading, int] = {}
+        for reading in readings:
+            repair = replace(reading, centre_m=None, place_of="", sign=1)
+            repairs[repair] = repairs.get(repair, 0) + 1
+        alone = sum(n < len(readings) for repair, n in repairs.items() if repair != PlateReading())
+        return (
+            self.world.scene.log_prior()
+            + sum(repair.log_prior() for repair in repairs)
+            + ONE_ALONE * alone
+            + EXCHANGED * sum(bool(reading.place_of) for reading in readings) / 2
+            + REVERSED * any(reading.sign < 0 for reading in readings)
+        )
+
+    def words(self, name: str) -> str:
+        """What is done to a plate's numbers, as a clause."""
+        scene = self.world.scene
+        done = (scene.words() if scene.moved == "forces" else "", self.readings[name].words())
+        return ", ".join(filter(None, done)) or "as they stand"
+
+    def is_alike(self, other: _Choice) -> bool:
+        """Whether both leave the same forces at the same places under the same body."""
+        return self.world.scene.of_markers() == other.world.scene.of_markers() and all(
+            self._is_alike(other, name) for name in self.world.names
+        )
+
+    def _is_alike(self, other: _Choice, name: str) -> bool:
+        some = self.world.seen(name, self.readings[name])
+        others = other.world.seen(name, other.readings[name])
+        for look, one, two in zip(self.world.looks, some, others, strict=True):
+            if one is None or two is None or not (loaded := look.loaded[name]).any():
+                continue
+            load = np.abs(one.force_N[loaded, 2]).mean()
+            apart = np.linalg.norm((one.force_N - two.force_N)[loaded], axis=1)
+            gap = np.abs(one.cop_m - two.cop_m)[loaded]
+            torque = np.abs(one.torque_Nm - two.torque_Nm)[loaded]
+            if np.nanmax(gap, initial=0.0) >= _ALIKE_M or apart.mean() > _ALIKE_SHARE * load:
+                return False
+            if np.isfinite(torque).any() and np.nanmedian(torque) > _ALIKE_TORQUE_M * load:
+                return False
+        return True
+
+
+def _repaired(worlds: Sequence[_World]) -> _Choice:
     """The readings after every repair that is sure, one after the other."""
-    chosen = _Choice(stated)
-    for _ in range(len(session.names) + 1):
-        better = _better(session, chosen.readings)
-        chosen = replace(better, log_prior=chosen.log_prior + better.log_prior)
-        if better.log_prior == 0.0:
-            break
+    chosen = _Choice(worlds[0], worlds[0].stated())
+    for _ in range(len(chosen.world.names) + 2):
+        better = _better(chosen, worlds)
+        if better.readings == chosen.readings and better.world is chosen.world:
+            return better
+        chosen, worlds = better, [better.world]
     return chosen
 
 
-def _better(session: _Session, now: Readings) -> _Choice:
+def _better(now: _Choice, worlds: Sequence[_World]) -> _Choice:
     """What is surely better than the readings now; these, with rivals, if nothing is.
 
-    Readings that give the same forces at the same places are one.
+    Other worlds are looked at as stated; with repairs of their own only if nothing else is sure.
     """
-    here = _of_signs(now) + session.log_likelihood(now)
-    alternatives = session.alternatives()
-    if not alternatives:
-        return _Choice(now)
-    rarest = max(reading.log_prior() for reading in alternatives)
-    if session.is_all_c3d() and here > rarest + np.log(1 / _SURE - 1):
-        return _Choice(now)  # no repair could be surer
-    tried = [(now, _of_signs(now)), *_repairs(session, now, alternatives)]
-    logs = np.array([prior + session.log_likelihood(readings) for readings, prior in tried])
-    seen = sum(1 + len(look.sources) for look in session.looks)
+    others = [_Choice(world, world.stated()) for world in worlds if world is not now.world]
+    found = _surest([now, *others, *_repairs(now)])
+    if found.rivals and others:
+        further = [one for other in others for one in _repairs(other)]
+        found = _surest([now, *others, *_repairs(now), *further])
+    return found
+
+
+def _surest(tried: Sequence[_Choice]) -> _Choice:
+    """The surest; the first, with rivals, if none is sure."""
+    now = tried[0]
+    logs = np.array([one.log_posterior() for one in tried])
+    seen = sum(1 + len(look.sources) for look in now.world.looks)
     unknown = _UNKNOWN + _UNKNOWN_EACH * seen  # a fault that no reading mends
     logs -= logsumexp([*logs, unknown])
     best = tried[int(np.argmax(logs))]
-    same = [k for k, (r, _) in enumerate(tried) if logs[k] > -12 and session.alike(best[0], r)]
+    likely = [k for k in range(len(tried)) if logs[k] > _LEAST_LIKELY]
+    same = [k for k in likely if best.is_alike(tried[k])]
     if 0 in same:
-        return _Choice(now)
+        return now
     if np.exp(logsumexp(logs[same])) >= _SURE:
-        return _Choice(*best)
-    likely = [readings for k, (readings, _) in enumerate(tried) if logs[k] > np.log(1 - _SURE)]
+        return best
+    like_now = {0, *(k for k in likely if now.is_alike(tried[k]))}
+    if np.exp(logsumexp(logs[list(like_now)])) >= _RATHER:
+        return now
+    some = [tried[k] for k in likely if logs[k] > np.log(1 - _SURE)]
     rivals = {
-        name: tuple(dict.fromkeys(r[name].words() for r in likely if r[name] != now[name]))
-        for name in session.names
+        name: tuple(dict.fromkeys(one.words(name) for one in some)) for name in now.world.names
     }
-    return _Choice(now, rivals=rivals)
+    return replace(now, rivals=rivals)
 
 
-def _repairs(
-    session: _Session, now: Readings, alternatives: Mapping[PlateReading, Sequence[str]]
-) -> Iterator[tuple[Readings, float]]:
-    """Readings with one more repair, of all plates or of one, and the logarithm of its prior."""
-    for reading, names in alternatives.items():
+def _repairs(now: _Choice) -> Iterator[_Choice]:
+    """One more repair, of all plates or of one."""
+    world = now.world
+    for reading, names in world.alternatives().items():
         for some in {tuple(names), *((name,) for name in names)}:
-            changed = {n: session.centred(n, _keeping_place(reading, now[n])) for n in some}
-            readings = session.signed({**now, **changed})
-            alone = ONE_ALONE * (len(some) < len(session.names))
-            yield readings, reading.log_prior() + alone + _of_signs(readings)
-    for one, two in combinations(session.names, 2):
-        pair = (session.looks[0].sources.get(one), session.looks[0].sources.get(two))
-        if type(pair[0]) is type(pair[1]):
-            places = {one: now[two].place_of or two, two: now[one].place_of or one}
-            changed = {n: replace(now[n], place_of=places[n] * (places[n] != n)) for n in places}
-            if all(n in look.sources for look in session.looks for n in (one, two)):
-                yield {**now, **changed}, EXCHANGED + _of_signs(now)
+            changed = {n: world.centred(n, _with(reading, now.readings[n])) for n in some}
+            yield _Choice(world, world.signed({**now.readings, **changed}))
+    for one, two in combinations(world.names, 2):
+        if all(n in look.sources for look in world.looks for n in (one, two)):
+            places = {
+                one: now.readings[two].place_of or two,
+                two: now.readings[one].place_of or one,
+            }
+            changed = {
+                n: replace(now.readings[n], place_of=places[n] * (places[n] != n)) for n in places
+            }
+            yield _Choice(world, {**now.readings, **changed})
 
 
-def _of_signs(readings: Readings) -> float:
-    """Logarithm of how rare it is that files hold the action on the plate, where they do."""
-    return REVERSED * any(reading.sign < 0 for reading in readings.values())
+def _with(repair: PlateReading, now: PlateReading) -> PlateReading:
+    """One more repair of a plate's numbers, which may be exchanged or have a channel reversed."""
+    if repair.reversed_channel:
+        return replace(now, reversed_channel=repair.reversed_channel)
+    return replace(repair, place_of=now.place_of, reversed_channel=now.reversed_channel)
 
 
-def _keeping_place(reading: PlateReading, now: PlateReading) -> PlateReading:
-    return replace(reading, place_of=now.place_of)
-
-
-def _verdict(session: _Session, stated: Readings, chosen: _Choice, name: str) -> Verdict:
-    reading = chosen.readings[name]
-    before, after = session.evidence(name, stated[name]), session.evidence(name, reading)
+def _verdict(as_stated: _World, chosen: _Choice, name: str) -> Verdict:
+    world, reading = chosen.world, chosen.readings[name]
+    before = as_stated.evidence(name, as_stated.stated()[name])
+    after = world.evidence(name, reading)
     rivals = chosen.rivals.get(name, ())
-    fault = _fault(after) or (_UNTOLD if len(rivals) > 1 else "")
+    fault = _fault(after) or (_UNTOLD if rivals else "")
     if fault:
         return Verdict(reading, before, after, refusal=fault, rivals=rivals)
-    return Verdict(session.fits_outline(name, reading), before, after)
+    return Verdict(world.fits_outline(name, reading), before, after)
 
 
 def _fault(found: Evidence) -> str:

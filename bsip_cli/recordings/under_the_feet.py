@@ -1,8 +1,7 @@
 """Is this the force under a foot? What one trial shows of one plate, and how likely a person is.
 
 One measure for every format and every way in which a plate's numbers may be misunderstood: centre
-of pressure against the feet on the ground, against the outline and the sensor, the moments at it,
-and whether these forces carry and drive the body.
+of pressure against the feet on the ground, against the outline and the sensor, the moments at it.
 The scales are those of 130 sound plates of 40 public recordings: the centre of pressure lies within
 the feet's markers in the median and 85 mm beside them at most (sets with two markers on a foot);
 the vertical moment over the force is 3 mm, in golf swings 60.
@@ -10,14 +9,11 @@ the vertical moment over the force is 3 mm, in golf swings 60.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
-from bsip_cli.recordings.force_balance import mean_path
-from bsip_cli.recordings.momentum_mass import shares_of_seen
 from bsip_cli.recordings.plate_source import LeftMoment
 from bsip_cli.recordings.plates import cop_at_height
 
@@ -28,12 +24,8 @@ _DISTANCE_M, _TORQUE_M, _LEVEL_M = 0.03, 0.05, 0.005  # where the likelihood beg
 _LEVER_M = 0.05  # nobody stands nearer to the very middle of a plate but by chance
 _LEAST = 1e-9
 _OUTLINE = -4.6  # an outline is stated wrongly in one laboratory of a hundred
-_BALANCE_M = 0.06  # of the centre of mass from the centre of pressure: median 40 mm
-_MOST_OF_IT = 0.5  # of the body's mass
 _INDEPENDENT = 3.0  # numbers of a trial that must agree by chance
 _LEAST_SHARE, _HAIR_M = 1e-3, 1e-5  # how nearly they can
-_MOSTLY = 0.9  # force and acceleration go together: r = 0.6 to 0.95 in movement, never surely
-_FEWEST_FRAMES, _SLOW_HZ = 10, 5.0
 _FURTHEST_M = 1e4
 _LOW_M = 0.17  # ankles and below
 _LIFT_M = 0.035  # over a marker's own lowest height: the foot is in the air
@@ -69,6 +61,10 @@ class Feet:
         kept = np.where(inside[..., None], self.points_m, np.nan)
         some = np.any(inside, axis=1, keepdims=True)
         return Feet(np.where(some[..., None], kept, self.points_m))
+
+    def moved(self, change: np.ndarray) -> Feet:
+        """In other axes of the world (3, 3)."""
+        return Feet(self.points_m @ change[:2, :2].T)
 
     def area(self) -> Area:
         """The smallest convex area that holds the markers, at each of the n samples."""
@@ -207,68 +203,6 @@ def _spread(places_m: np.ndarray) -> float:
     if not len(known):
         return 0.0
     return float(np.sqrt(np.mean(np.sum((known - np.median(known, axis=0)) ** 2, axis=1))))
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """The centre of mass, as the segments' markers tell it, at n samples.
-
-    place_m : horizontal, (n, 2); acceleration_m_s2 : horizontal, below 5 Hz, (n, 2).
-    """
-
-    place_m: np.ndarray
-    acceleration_m_s2: np.ndarray
-
-    @classmethod
-    def of(cls, markers_m: Mapping[str, np.ndarray], rate_hz: float, frames: np.ndarray) -> Body:
-        """From a trial's markers (n_frames, k, 3) per segment, world frame, at some frames (n,).
-
-        NaN where too little of the body is seen.
-        """
-        paths = {name: _mean_path(markers) for name, markers in markers_m.items()}
-        weights = shares_of_seen([name for name, path in paths.items() if path is not None])
-        nothing = np.full((len(frames), 2), np.nan)
-        if sum(weights.values()) < _MOST_OF_IT:
-            return cls(nothing, nothing)
-        place = sum(share * np.asarray(paths[name]) for name, share in weights.items())
-        place = np.asarray(place) / sum(weights.values())
-        if len(place) < _FEWEST_FRAMES:
-            return cls(nothing, nothing)
-        low = butter(2, min(_SLOW_HZ, 0.4 * rate_hz), fs=rate_hz, output="sos")
-        smooth = sosfiltfilt(low, place, axis=0, padlen=min(len(place) - 1, round(rate_hz)))
-        acceleration = np.gradient(np.gradient(smooth, axis=0), axis=0) * rate_hz**2
-        return cls(place[frames], acceleration[frames])
-
-    def log_likelihood(self, forces_N: Sequence[np.ndarray], cops_m: Sequence[np.ndarray]) -> float:
-        """Up to a constant: how likely these forces carry and drive this body, natural logarithm.
-
-        ``forces_N`` (n, 3) and ``cops_m`` (n, 2) of each plate, NaN where it is not loaded.
-        """
-        known = [np.isfinite(cop).all(axis=1)[:, None] for cop in cops_m]
-        force = np.array([np.where(k, f, 0.0) for k, f in zip(known, forces_N, strict=True)])
-        cop = np.array([np.where(k, c, 0.0) for k, c in zip(known, cops_m, strict=True)])
-        total = force.sum(axis=0)
-        stands = (total[:, 2] > 0) & np.isfinite(self.place_m).all(axis=1)
-        if not stands.any():
-            return 0.0
-        place = (force[..., 2:] * cop).sum(axis=0)[stands] / total[stands, 2:]
-        gap = np.linalg.norm(np.median(place - self.place_m[stands], axis=0))
-        follows = _correlation(total[stands, :2], self.acceleration_m_s2[stands])
-        return float(-2.0 * np.log1p((gap / _BALANCE_M) ** 2) + np.log1p(_MOSTLY * follows))
-
-
-def _mean_path(markers_m: np.ndarray) -> np.ndarray | None:
-    """Horizontal mean place (n_frames, 2) of a segment's markers; None if none is seen often."""
-    axes = [mean_path(markers_m[..., axis]) for axis in (0, 1)]
-    known = [axis for axis in axes if axis is not None]
-    return np.stack(known, axis=1) if len(known) == 2 else None
-
-
-def _correlation(some: np.ndarray, others: np.ndarray) -> float:
-    """Of two courses of vectors (n, 2) about their means, between -1 and 1."""
-    a, b = some - some.mean(axis=0), others - others.mean(axis=0)
-    size = np.sqrt((a**2).sum() * (b**2).sum())
-    return float((a * b).sum() / size) if size > 0 else 0.0
 
 
 def _share(left: LeftMoment, load_N: np.ndarray) -> float:

@@ -17,7 +17,7 @@ _EVIDENCE = tuple(field.name for field in fields(Evidence))
 
 def rows_of(session: str, reading: SessionReading) -> list[dict]:
     """One row per plate; one without a name where none was loaded."""
-    scene = {"session": session, "mirrored": reading.scene.mirrored, "axis": reading.scene.axis}
+    scene = {"session": session, **asdict(reading.scene)}
     plates = reading.plates or {"": Verdict()}
     return [scene | {"plate": name} | _row(verdict) for name, verdict in plates.items()]
 
@@ -56,6 +56,7 @@ def _verdict(row: dict) -> Verdict:
         mirrored=bool(row["reversed_round"]),
         sign=int(row["sign"]),
         place_of=row["place_of"],
+        reversed_channel=row["reversed_channel"],
         half_size_m=None if pd.isna(half[0]) else half,
     )
     before, after = (
@@ -77,5 +78,6 @@ def reading_of(unit: Unit, trial: Trial) -> SessionReading:
     rows = table[table["session"] == (trial.session or "")].to_dict("records")
     if not rows:
         return SessionReading()
-    scene = Scene(rows[0]["mirrored"], int(rows[0]["axis"]))
+    moved, axis, turns = (rows[0][name] for name in ("moved", "axis", "quarter_turns"))
+    scene = Scene(moved, int(axis), int(turns))
     return SessionReading(scene, {row["plate"]: _verdict(row) for row in rows if row["plate"]})

@@ -33,13 +33,13 @@ def motion() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     acceleration = np.gradient(np.gradient(shift)) * RATE_HZ**2
     force = np.zeros((2, N, 3))
     force[..., 2] = 600.0 * share
-    force[..., 1] = -0.1 * 60.0 * acceleration * share
+    force[..., 1] = -0.26 * 60.0 * acceleration * share
     force[..., 0] = 6.0 * np.cos(time_s) * share
     point = np.zeros((2, N, 3))
     point[..., 0] = 0.52 + sway
     point[..., 1] = np.array([[0.37], [0.63]]) + 0.005 * np.sin(5 * time_s)
     markers = np.repeat(_PLACES_M[None], N, axis=0)
-    markers[:, :4, 1] -= 0.1 * shift[:, None]
+    markers[:, :4, 1] -= 0.26 * shift[:, None]  # as the centre of pressure
     markers[:, :4, 0] += sway[:, None]
     return markers, force, point
 

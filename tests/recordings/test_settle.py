@@ -129,7 +129,7 @@ def test_a_mirrored_laboratory_is_turned_back(axis):
     markers = mirrored.recording.markers_m
     mirrored = replace(mirrored, recording=replace(mirrored.recording, markers_m=markers))
     session = settle_session([Survey.of(mirrored)])
-    assert session.scene.mirrored == "all"
+    assert session.scene.moved == "all"
     there = assemble(mirrored, session)
     assert handedness(there.labels, there.markers_m).parts["pelvis"] > 0.9
     expected = _wrench(assemble(opened(of_table()), session_of()))

@@ -172,6 +172,7 @@ SCHEMAS = {
                 _text("moved", "what is in other axes: all, markers, forces or nothing (empty)"),
                 Column("axis", "int", "", "of the world that was mirrored: 0 for X, 1 for Y"),
                 Column("quarter_turns", "int", "90 degrees", "by which it was turned instead"),
+                Column("corners_only", "bool", "", "of C3D: channels were not mirrored with them"),
                 _text("plate", "its name; empty if no plate was loaded"),
                 Column("moment_scale", "float", "1", "what the moments are multiplied with"),
                 Column("point_scale", "float", "1", "what the points of force are multiplied with"),

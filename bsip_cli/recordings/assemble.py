@@ -101,6 +101,11 @@ def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
             )
         return [_about(name, verdict.refusal, action, "excluded")]
     reading, findings = verdict.reading, []
+    if verdict.rivals:
+        found = f"its vertical moment: {' or '.join(verdict.rivals)}: these trials cannot tell"
+        action = "took it as it stands; a movement that turns the body would tell"
+        expected = "one that turns the body as the markers do"
+        findings.append(Finding("plate_moment", name, found, expected, action, "warning"))
     if words := reading.words():
         assert verdict.before is not None and verdict.after is not None
         action = f"{words}: {_words(verdict.after)}"

@@ -45,7 +45,7 @@ UPRIGHT_SHARE = 0.3  # of a stretch
 COMES_AND_GOES = 4.0  # reduced chi-square of the impulses within a stretch: twice the errors
 DOUBTFUL_SD = 0.5
 
-_NEIGHBOUR = {
+NEIGHBOUR = {
     "lower_torso": "upper_torso",
     "upper_torso": "lower_torso",
     "head": "upper_torso",
@@ -56,7 +56,8 @@ _NEIGHBOUR = {
     "shank": "thigh",
     "foot": "shank",
 }
-_KINDS = tuple(_NEIGHBOUR)
+"""The segment that a segment hangs on, or nearly so."""
+_KINDS = tuple(NEIGHBOUR)
 _SHARED = ("common", "of_trial")
 _ROWS = {"lower_torso": "pelvis", "upper_torso": "torso", "upper_arm": "arm"}
 
@@ -148,7 +149,7 @@ def _neighbour_velocity(
     side = name[len(without_side(name)) :]
     kind = without_side(name)
     for _ in _KINDS:
-        kind = _NEIGHBOUR[kind]
+        kind = NEIGHBOUR[kind]
         for found in (kind + side, kind):
             if found in seen and found != name:
                 return seen[found]
@@ -167,7 +168,7 @@ def shares_of_seen(names: Collection[str]) -> dict[str, float]:
             if carrier:
                 found[carrier] = found.get(carrier, 0.0) + share
                 break
-            kind = _NEIGHBOUR[kind]
+            kind = NEIGHBOUR[kind]
     return found
 
 

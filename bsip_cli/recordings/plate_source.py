@@ -56,8 +56,9 @@ class PlateSource(Protocol):
     def floor_m(self, reading: PlateReading) -> float:
         """Height of the surface, world frame."""
 
-    def moved(self, change: np.ndarray) -> PlateSource:
-        """In other axes of the world (3, 3), turned or as if seen in a mirror."""
+    def moved(self, change: np.ndarray, corners_only: bool = False) -> PlateSource:
+        """In other axes of the world (3, 3), turned or as if seen in a mirror; what channels hold
+        is mirrored too unless ``corners_only``."""
 
     def alternatives(self) -> Iterable[PlateReading]:
         """Other ways to understand the numbers, sign and size of the outline aside."""
@@ -82,7 +83,7 @@ class C3dPlate:
     wrench: LocalWrench
     usable: np.ndarray  # (n,) bool
     rotation_world_lab: np.ndarray  # (3, 3)
-    seen_in_mirror: bool = False
+    z_up: bool = False
 
     @property
     def name(self) -> str:
@@ -120,12 +121,14 @@ class C3dPlate:
     def floor_m(self, reading: PlateReading) -> float:
         return float((self.description.corners_m @ self.rotation_world_lab.T)[:, 2].mean())
 
-    def moved(self, change: np.ndarray) -> C3dPlate:
-        """Corners alone: what the channels hold is told along them."""
+    def moved(self, change: np.ndarray, corners_only: bool = False) -> C3dPlate:
+        """A mirrored plate's z points out of the floor."""
         corners = self.description.corners_m @ _in_lab(change, self.rotation_world_lab).T
         description = replace(self.description, corners_m=corners)
-        in_mirror = self.seen_in_mirror != (np.linalg.det(change) < 0)
-        return replace(self, description=description, seen_in_mirror=bool(in_mirror))
+        if np.linalg.det(change) > 0 or corners_only:
+            return replace(self, description=description)
+        wrench = LocalWrench(self.wrench.force_N * _Z, -self.wrench.moment_Nm * _Z)
+        return replace(self, description=description, wrench=wrench, z_up=not self.z_up)
 
     def alternatives(self) -> Iterable[PlateReading]:
         """Type 3 has no moments of its own, type 1 no point that they are about."""
@@ -163,21 +166,16 @@ class C3dPlate:
         if reading.about != "stated":
             offset = offset * (np.array([-1, -1, 1]) if reading.about == "reversed" else [0, 0, 1])
             offset[2] *= abs(offset[2]) < _THICK_M
+        if self.z_up:
+            offset = offset * _Z
         return self._wrench(reading).at_surface(offset)
 
     def _wrench(self, reading: PlateReading) -> LocalWrench:
-        """At the sensor's origin, before the sign of a reading.
-
-        Channels that were mirrored with their laboratory have a frame with z the other way, which
-        is no action on the plate.
-        """
-        wrench = LocalWrench(
+        """At the sensor's origin, before the sign of a reading."""
+        return LocalWrench(
             self.wrench.force_N * reading.force_signs(),
             self.wrench.moment_Nm * reading.moment_signs() * reading.moment_scale,
         )
-        if self.seen_in_mirror and reading.sign < 0:
-            return LocalWrench(-wrench.force_N * _Z, wrench.moment_Nm * _Z)
-        return wrench
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,7 +250,7 @@ class ForceOnPoint:
     def floor_m(self, reading: PlateReading) -> float:
         return self.point_height * reading.point_scale
 
-    def moved(self, change: np.ndarray) -> ForceOnPoint:
+    def moved(self, change: np.ndarray, corners_only: bool = False) -> ForceOnPoint:
         """A moment turns the other way round in a mirror."""
         change = _in_lab(change, self.rotation_world_lab)
         moment = None if self.moment is None else self.moment @ change.T * np.linalg.det(change)

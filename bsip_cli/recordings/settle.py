@@ -57,7 +57,9 @@ _PULLS = 3.0  # a force is reversed if it pulls so many times what it pushes
 _UNKNOWN, _UNKNOWN_EACH = -5.3, -1.5
 _IN_PART = -2.3  # markers or forces alone are mirrored more rarely than both: one in ten
 
+_AS_IT_IS = "taken as they stand"
 _UNTOLD = "its numbers are no force under a foot as they stand, and several corrections make one"
+_AGAINST = "its force is not one that carries and drives the body that the markers show"
 
 Readings = Mapping[str, PlateReading]
 Moved = Literal["", "all", "markers", "forces"]
@@ -104,7 +106,7 @@ class Look:
             changed = replace(changed, body=body, feet=feet)
         if scene.moved in ("all", "forces"):
             sources, smooth = (
-                {name: source.moved(scene.change()) for name, source in some.items()}
+                {name: source.moved(scene.change(), scene.corners_only) for name, source in some.items()}
                 for some in (self.sources, self.smooth)
             )
             changed = replace(changed, sources=sources, smooth=smooth)
@@ -116,8 +118,8 @@ class Verdict:
     """How a plate is understood, or why it is left out (``refusal``, a clause).
 
     ``before`` and ``after``: what its numbers make as the file says, and as they are understood,
-    where that differs. ``rivals``: repairs that would each explain a plate that is left out, and
-    that cannot be told apart. ``repeats`` names the plates whose copy or sum it is.
+    where that differs. ``rivals``: repairs that would each explain a plate, and that cannot be
+    told apart: it is left out, or, if only the vertical moment differs, doubted. ``repeats`` names the plates whose copy or sum it is.
     """
 
     reading: PlateReading = field(default_factory=PlateReading)
@@ -153,11 +155,15 @@ def look_at(opened: Opened) -> Look | None:
 @dataclass(frozen=True)
 class Scene:
     """In what axes the world is written that are not those of the person: all of it, the markers
-    or the forces alone; mirrored along an ``axis``, or turned about the vertical."""
+    or the forces alone; mirrored along an ``axis``, or turned about the vertical.
+
+    corners_only : of a C3D the channels were not mirrored with the plates' corners.
+    """
 
     moved: Moved = ""
     axis: int = 0
     quarter_turns: int = 0
+    corners_only: bool = False
 
     def change(self) -> np.ndarray:
         """From the axes as written to those of the person, (3, 3)."""
@@ -173,7 +179,8 @@ class Scene:
             markers = recording.markers_m @ self.change().T
             recording = replace(recording, markers_m=markers)
         if self.moved in ("all", "forces"):
-            sources = tuple(source.moved(self.change()) for source in sources)
+            change = self.change()
+            sources = tuple(source.moved(change, self.corners_only) for source in sources)
         return Opened(recording, sources)
 
     def of_markers(self) -> tuple[bool, int]:
@@ -194,7 +201,12 @@ class Scene:
         return f"reversed the {'XY'[self.axis]} axis of {what[self.moved]}"
 
 
-_MIRRORS = (Scene("all"), Scene("markers", 0), Scene("markers", 1))
+_MIRRORS = (
+    Scene("all"),
+    Scene("all", corners_only=True),
+    Scene("markers", 0),
+    Scene("markers", 1),
+)
 _FORCES_MOVED = (
     *(Scene("forces", axis) for axis in (0, 1)),
     *(Scene("forces", quarter_turns=turns) for turns in (1, 2, 3)),
@@ -403,11 +415,14 @@ def _read(
 @dataclass(frozen=True)
 class _Choice:
     """Readings in a world, with their prior; and, where these trials cannot tell them from others,
-    the repairs of each plate that would do, in words."""
+    the repairs of each plate that would do, in words, which may differ in the vertical moment
+    only; or none makes a person."""
 
     world: _World
     readings: Readings
     rivals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    only_torque: bool = False
+    is_no_person: bool = False
 
     def log_posterior(self) -> float:
         """But for a constant."""
@@ -433,15 +448,16 @@ class _Choice:
         """What is done to a plate's numbers, as a clause."""
         scene = self.world.scene
         done = (scene.words() if scene.moved == "forces" else "", self.readings[name].words())
-        return ", ".join(filter(None, done)) or "as they stand"
+        return ", ".join(filter(None, done)) or _AS_IT_IS
 
-    def is_alike(self, other: _Choice) -> bool:
-        """Whether both leave the same forces at the same places under the same body."""
+    def is_alike(self, other: _Choice, torque: bool = True) -> bool:
+        """Whether both leave the same forces (and vertical moments) at the same places under the
+        same body."""
         return self.world.scene.of_markers() == other.world.scene.of_markers() and all(
-            self._is_alike(other, name) for name in self.world.names
+            self._is_alike(other, name, torque) for name in self.world.names
         )
 
-    def _is_alike(self, other: _Choice, name: str) -> bool:
+    def _is_alike(self, other: _Choice, name: str, with_torque: bool) -> bool:
         some = self.world.seen(name, self.readings[name])
         others = other.world.seen(name, other.readings[name])
         for look, one, two in zip(self.world.looks, some, others, strict=True):
@@ -453,7 +469,7 @@ class _Choice:
             torque = np.abs(one.torque_Nm - two.torque_Nm)[loaded]
             if np.nanmax(gap, initial=0.0) >= _ALIKE_M or apart.mean() > _ALIKE_SHARE * load:
                 return False
-            if np.isfinite(torque).any() and np.nanmedian(torque) > _ALIKE_TORQUE_M * load:
+            if with_torque and np.isfinite(torque).any() and np.nanmedian(torque) > _ALIKE_TORQUE_M * load:
                 return False
         return True
 
@@ -472,13 +488,13 @@ def _repaired(worlds: Sequence[_World]) -> _Choice:
 def _better(now: _Choice, worlds: Sequence[_World]) -> _Choice:
     """What is surely better than the readings now; these, with rivals, if nothing is.
 
-    Other worlds are looked at as stated; with repairs of their own only if nothing else is sure.
+    Repairs in other worlds are tried only where the files cannot be taken as they are.
     """
     others = [_Choice(world, world.stated()) for world in worlds if world is not now.world]
-    found = _surest([now, *others, *_repairs(now)])
-    if found.rivals and others:
-        further = [one for other in others for one in _repairs(other)]
-        found = _surest([now, *others, *_repairs(now), *further])
+    tried = [now, *others, *_repairs(now)]
+    found = _surest(tried)
+    if others and (found is not now or now.world.scene.moved):
+        found = _surest([*tried, *(one for other in others for one in _repairs(other))])
     return found
 
 
@@ -488,10 +504,13 @@ def _surest(tried: Sequence[_Choice]) -> _Choice:
     logs = np.array([one.log_posterior() for one in tried])
     seen = sum(1 + len(look.sources) for look in now.world.looks)
     unknown = _UNKNOWN + _UNKNOWN_EACH * seen  # a fault that no reading mends
-    logs -= logsumexp([*logs, unknown])
+    shares = logs
+    logs = logs - logsumexp([*logs, unknown])
     best = tried[int(np.argmax(logs))]
     likely = [k for k in range(len(tried)) if logs[k] > _LEAST_LIKELY]
     same = [k for k in likely if best.is_alike(tried[k])]
+    if unknown - logsumexp([*shares, unknown]) > np.log(_SURE):
+        return replace(now, is_no_person=True)
     if 0 in same:
         return now
     if np.exp(logsumexp(logs[same])) >= _SURE:
@@ -500,10 +519,10 @@ def _surest(tried: Sequence[_Choice]) -> _Choice:
     if np.exp(logsumexp(logs[list(like_now)])) >= _RATHER:
         return now
     some = [tried[k] for k in likely if logs[k] > np.log(1 - _SURE)]
-    rivals = {
-        name: tuple(dict.fromkeys(one.words(name) for one in some)) for name in now.world.names
-    }
-    return replace(now, rivals=rivals)
+    words = {name: dict.fromkeys(one.words(name) for one in some) for name in now.world.names}
+    rivals = {name: tuple(all_) for name, all_ in words.items() if set(all_) != {_AS_IT_IS}}
+    in_torque = all(now.is_alike(one, torque=False) for one in some)
+    return replace(now, rivals=rivals, only_torque=in_torque)
 
 
 def _repairs(now: _Choice) -> Iterator[_Choice]:
@@ -537,10 +556,12 @@ def _verdict(as_stated: _World, chosen: _Choice, name: str) -> Verdict:
     before = as_stated.evidence(name, as_stated.stated()[name])
     after = world.evidence(name, reading)
     rivals = chosen.rivals.get(name, ())
-    fault = _fault(after) or (_UNTOLD if rivals else "")
+    fault = _fault(after)
+    if not fault and not chosen.only_torque:
+        fault = _UNTOLD if rivals else _AGAINST if chosen.is_no_person else ""
     if fault:
         return Verdict(reading, before, after, refusal=fault, rivals=rivals)
-    return Verdict(world.fits_outline(name, reading), before, after)
+    return Verdict(world.fits_outline(name, reading), before, after, rivals=rivals)
 
 
 def _fault(found: Evidence) -> str:

@@ -78,6 +78,7 @@ def reading_of(unit: Unit, trial: Trial) -> SessionReading:
     rows = table[table["session"] == (trial.session or "")].to_dict("records")
     if not rows:
         return SessionReading()
-    moved, axis, turns = (rows[0][name] for name in ("moved", "axis", "quarter_turns"))
-    scene = Scene(moved, int(axis), int(turns))
+    first = rows[0]
+    turns, corners_only = int(first["quarter_turns"]), bool(first["corners_only"])
+    scene = Scene(first["moved"], int(first["axis"]), turns, corners_only)
     return SessionReading(scene, {row["plate"]: _verdict(row) for row in rows if row["plate"]})

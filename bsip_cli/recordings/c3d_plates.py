@@ -24,6 +24,8 @@ class PlateChannels:
 
 
 _MOST_PLATES = 64
+_PLATE_UNITS = ("mm", "cm", "in", "m")
+_USUAL_SIDES_M = (0.3, 0.95)  # of plates as they are sold: so that one unit alone can fit
 _VOLTS = {"V", "v", "Volts", "volts", "mV"}
 
 
@@ -79,12 +81,10 @@ def _read_plate(
 ) -> tuple[PlateChannels, list[Finding]]:
     group = content.group("FORCE_PLATFORM")
     kind = _kind(group, index)
-    corners = _slab(group, "CORNERS", index, (3, 4)).T * length_unit_m
-    if not corners_are_plausible(corners):
-        raise _UnusablePlateError(
-            f"corners that are no plate: {_sides(corners)}", "a rectangle of 0.1 to 5 m"
-        )
-    origin = _slab(group, "ORIGIN", index, (3,)) * length_unit_m
+    written = _slab(group, "CORNERS", index, (3, 4)).T
+    plate_unit_m, about_size = _plate_unit(written, length_unit_m, index)
+    corners = written * plate_unit_m
+    origin = _slab(group, "ORIGIN", index, (3,)) * plate_unit_m
     if kind == 3 and not origin[:2].all():
         raise _UnusablePlateError(
             "a type 3 plate whose ORIGIN lacks the distances of the sensors",
@@ -102,7 +102,32 @@ def _read_plate(
         counts=raw / np.where(scales == 0, 1.0, scales),
         baseline=_baseline(group, content.samples_per_frame, len(raw)),
     )
-    return plate, _about_units(content, kind, index, rows)
+    return plate, [*about_size, *_about_units(content, kind, index, rows)]
+
+
+def _plate_unit(
+    written: np.ndarray, length_unit_m: float, index: int
+) -> tuple[float, list[Finding]]:
+    """Size of the unit of corners (4, 3): the points', or the one that makes them a plate."""
+    if corners_are_plausible(written * length_unit_m):
+        return length_unit_m, []
+    sizes = {name: size for name in _PLATE_UNITS if (size := length_in_m(name)) is not None}
+    fitting = {name: size for name, size in sizes.items() if _is_usual_plate(written * size)}
+    sides = _sides(written * length_unit_m)
+    if len(fitting) != 1:
+        raise _UnusablePlateError(
+            f"corners that are no plate: {sides}", "a rectangle of 0.1 to 5 m"
+        )
+    ((name, size),) = fitting.items()
+    expected = "a rectangle of 0.1 to 5 m in the unit of the points"
+    action = f"read CORNERS and ORIGIN in {name}: {_sides(written * size)}"
+    return size, [Finding("unit", str(index + 1), sides, expected, action, "corrected")]
+
+
+def _is_usual_plate(corners_m: np.ndarray) -> bool:
+    low, high = _USUAL_SIDES_M
+    sides = _side_lengths(corners_m)
+    return corners_are_plausible(corners_m) and bool(low <= sides.min() and sides.max() <= high)
 
 
 def _check_scales(scales: np.ndarray) -> None:
@@ -228,6 +253,9 @@ def _baseline(group: Group, samples_per_frame: int, n_samples: int) -> slice | N
     return slice(start, stop) if stop <= n_samples else None
 
 
+def _side_lengths(corners_m: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(np.roll(corners_m, -1, axis=0) - corners_m, axis=1)
+
+
 def _sides(corners_m: np.ndarray) -> str:
-    sides = np.linalg.norm(np.roll(corners_m, -1, axis=0) - corners_m, axis=1)
-    return "sides of " + ", ".join(f"{side:.3g}" for side in sides) + " m"
+    return "sides of " + ", ".join(f"{side:.3g}" for side in _side_lengths(corners_m)) + " m"

@@ -17,7 +17,6 @@ from bsip_cli.recordings.labels import is_unlabelled
 from bsip_cli.recordings.missing_points import without_sentinels
 from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.scene_size import move_like_markers, settle_unit, without_absurd
-from bsip_cli.recordings.units import length_in_m
 
 _OUTPUT_GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _OUTPUT_NAMES = re.compile(
@@ -53,7 +52,8 @@ def read_points(content: Content, path: Path) -> Points:
     findings += without_sentinels(positions)
     stated = "".join(texts(group, "UNITS")[:1])
     scene = positions if kept else np.where(content.is_valid[..., None], every, np.nan)
-    unit_m, about_unit = settle_unit(scene, stated, length_in_m(stated), "POINT:UNITS")
+    names = [labels[i] for i in kept] if kept else labels
+    unit_m, about_unit = settle_unit(scene, names, stated, "POINT:UNITS")
     positions *= unit_m
     findings += [*without_absurd(positions), *about_unit]
     if is_ignored:

@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from bsip_cli.recordings.label_words import meanings
+
 _FEW = 100  # frames that are looked at
 _LEAST, _MOST = 0.65, 1.5  # of the stated height: people sit, and markers sit on hats
-_PEOPLE_M = (0.6, 2.4)  # from one year on
+PEOPLE_M = (0.6, 2.4)  # from one year on
 # The highest marker's distance from the feet over the stature, by the part that it sits on.
 _PARTS = {"head": 0.95, "upper_torso": 0.82, "lower_torso": 0.56}
 _UNITS_M = {"mm": 1e-3, "cm": 1e-2, "in": 0.0254, "dm": 0.1, "ft": 0.3048, "m": 1.0}
+
+
+def by_segment(labels: Sequence[str], markers: np.ndarray) -> dict[str, np.ndarray]:
+    """The markers (n_frames, n_markers, 3) of each segment, by what their labels mean."""
+    known = meanings(labels)
+    columns: dict[str, list[int]] = {}
+    for k, label in enumerate(labels):
+        if label in known:
+            columns.setdefault(known[label].segment, []).append(k)
+    return {segment: markers[:, some] for segment, some in columns.items()}
 
 
 def height_m(markers_m: Mapping[str, np.ndarray]) -> float | None:
@@ -33,7 +45,7 @@ def height_m(markers_m: Mapping[str, np.ndarray]) -> float | None:
 
 def no_person(height_m: float, stated_m: float | None) -> tuple[str, str, str] | None:
     """What was found, what was expected, what to do; None where it may be a person."""
-    low, high = _PEOPLE_M if stated_m is None else (_LEAST * stated_m, _MOST * stated_m)
+    low, high = PEOPLE_M if stated_m is None else (_LEAST * stated_m, _MOST * stated_m)
     if low <= height_m <= high:
         return None
     expected = "0.6 to 2.4 m" if stated_m is None else f"the stated {stated_m:.2f} m"

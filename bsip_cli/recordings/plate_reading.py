@@ -88,6 +88,8 @@ class PlateReading:
         return ", ".join(filter(None, done))
 
 
+AS_STATED = PlateReading()
+
 _MOMENT_SCALES = {
     1e-3: "read the moments in N mm",
     1e3: "read the moments in N m, a thousand times what their unit says",

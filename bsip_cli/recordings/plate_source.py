@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.recordings.cop_polynomial import correct_cop
 from bsip_cli.recordings.model import Finding, Plate
-from bsip_cli.recordings.plate_reading import CHANNELS, PlateReading, Reference
+from bsip_cli.recordings.plate_reading import AS_STATED, CHANNELS, PlateReading, Reference
 from bsip_cli.recordings.plates import LocalWrench, PlateDescription, surface_offset_m, to_world
 
 _THICK_M = 0.3  # no plate's sensors lie so deep under its surface
@@ -31,7 +31,7 @@ class PlateSource(Protocol):
     def usable(self) -> np.ndarray:
         """Samples that can be believed, (n,) bool."""
 
-    def lift_N(self, reading: PlateReading = PlateReading()) -> np.ndarray:
+    def lift_N(self, reading: PlateReading = AS_STATED) -> np.ndarray:
         """Vertical force, world frame, before the sign of a reading, (n,)."""
 
     def at(self, samples: np.ndarray) -> PlateSource:
@@ -89,7 +89,7 @@ class C3dPlate:
     def name(self) -> str:
         return self.description.name
 
-    def lift_N(self, reading: PlateReading = PlateReading()) -> np.ndarray:
+    def lift_N(self, reading: PlateReading = AS_STATED) -> np.ndarray:
         axes = self.rotation_world_lab @ self.read_description(reading).rotation_lab_plate()
         return np.asarray(self.wrench.force_N * reading.force_signs() @ axes[2])
 
@@ -98,7 +98,9 @@ class C3dPlate:
         return replace(self, wrench=part, usable=self.usable[samples])
 
     def smoothed(self, sigma: float) -> C3dPlate:
-        parts = (_smooth(x, self.usable, sigma) for x in (self.wrench.force_N, self.wrench.moment_Nm))
+        parts = (
+            _smooth(x, self.usable, sigma) for x in (self.wrench.force_N, self.wrench.moment_Nm)
+        )
         return replace(self, wrench=LocalWrench(*parts))
 
     def plate(self, reading: PlateReading) -> Plate:
@@ -194,7 +196,7 @@ class ForceOnPoint:
     usable: np.ndarray  # (n,) bool
     rotation_world_lab: np.ndarray  # (3, 3)
 
-    def lift_N(self, reading: PlateReading = PlateReading()) -> np.ndarray:
+    def lift_N(self, reading: PlateReading = AS_STATED) -> np.ndarray:
         return np.asarray(self._force_N(reading) @ self.rotation_world_lab[2])
 
     def at(self, samples: np.ndarray) -> ForceOnPoint:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bsip_cli.recordings.model import Finding
-from bsip_cli.recordings.units import length_name
+from bsip_cli.recordings.person_size import PEOPLE_M, by_segment, height_m
+from bsip_cli.recordings.units import length_in_m, length_name
 
 _PERSON_M = (0.25, 8.0)  # the markers' extent in one frame: a limb to two people
 _ANYTHING_M = (0.02, 30.0)  # a clearly stated unit is doubted only beyond this
@@ -13,18 +16,23 @@ _FEWEST_MARKERS = 4
 _LARGEST_LAB_M = 100.0
 _FASTEST_M_S = 15.0  # half of the markers, half of the time: a sprinter's
 _SMOOTH = 0.2  # of the markers' distance from their middle: their second difference
+_USUAL_M = 1.6
+_INCH_M = 0.0254
 _GUESSED_M = (1e-3, 1.0, 1e-2)  # mm, m, cm: what a file may be in that does not say it
 
 
 def settle_unit(
-    positions: np.ndarray, stated: str, stated_m: float | None, name: str
+    positions: np.ndarray, labels: Sequence[str], stated: str, name: str
 ) -> tuple[float, list[Finding]]:
     """Size of the unit in metres, and a finding where the file's statement cannot be taken.
 
     ``positions`` (n_frames, n_markers, 3) as written, NaN = missing; ``stated`` is the file's
-    word and ``stated_m`` its size, None if it is unknown; ``name`` is the word's place. The
-    markers' extent decides where it fits a person in another unit only.
+    word and ``name`` its place. The stature that the labels tell decides, of markers that say
+    none their extent, where it fits a person in another unit only.
     """
+    stated_m = length_in_m(stated)
+    if (tall := height_m(by_segment(labels, positions))) is not None:
+        return _by_stature(tall, stated, stated_m, name)
     extent = _extent(positions)
     fitting = [size for size in _GUESSED_M if _PERSON_M[0] <= extent * size <= _PERSON_M[1]]
     if stated_m is not None:
@@ -34,6 +42,26 @@ def settle_unit(
             return stated_m, [] if is_plain else [_finding(name, stated, stated_m, extent)]
     size = fitting[0] if fitting else 1e-3 if extent > _PERSON_M[1] else 1.0
     return size, [_finding(name, stated, size, extent)]
+
+
+def _by_stature(
+    tall: float, stated: str, stated_m: float | None, name: str
+) -> tuple[float, list[Finding]]:
+    """The stated unit if it makes a person; else the one that makes a person most like others."""
+    low, high = PEOPLE_M
+    fitting = [size for size in (*_GUESSED_M, _INCH_M) if low <= tall * size <= high]
+    if stated_m is not None and (low <= tall * stated_m <= high or not fitting):
+        is_plain = stated.strip().lower() in map(length_name, _GUESSED_M)
+        size, is_said = stated_m, not is_plain
+    else:
+        usual = [abs(np.log(tall * size / _USUAL_M)) for size in fitting]
+        size, is_said = fitting[int(np.argmin(usual))] if fitting else 1e-3, True
+    found = f"{name} '{stated}', and the markers are those of a person {tall:.4g} of it tall"
+    action = f"read lengths in {length_name(size)}: {tall * size:.2f} m"
+    about = Finding(
+        "unit", "points", found, "m or mm, and the size of a person", action, "corrected"
+    )
+    return size, [about] if is_said else []
 
 
 def without_absurd(positions_m: np.ndarray) -> list[Finding]:

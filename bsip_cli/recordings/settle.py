@@ -25,9 +25,8 @@ from bsip_cli.recordings.body_motion import (
     balance_log_likelihood,
 )
 from bsip_cli.recordings.handedness import Handedness, handedness
-from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.person_size import height_m
+from bsip_cli.recordings.person_size import by_segment, height_m
 from bsip_cli.recordings.plate_reading import (
     EXCHANGED,
     MIRRORED,
@@ -106,7 +105,10 @@ class Look:
             changed = replace(changed, body=body, feet=feet)
         if scene.moved in ("all", "forces"):
             sources, smooth = (
-                {name: source.moved(scene.change(), scene.corners_only) for name, source in some.items()}
+                {
+                    name: source.moved(scene.change(), scene.corners_only)
+                    for name, source in some.items()
+                }
                 for some in (self.sources, self.smooth)
             )
             changed = replace(changed, sources=sources, smooth=smooth)
@@ -119,7 +121,8 @@ class Verdict:
 
     ``before`` and ``after``: what its numbers make as the file says, and as they are understood,
     where that differs. ``rivals``: repairs that would each explain a plate, and that cannot be
-    told apart: it is left out, or, if only the vertical moment differs, doubted. ``repeats`` names the plates whose copy or sum it is.
+    told apart: it is left out, or, if only the vertical moment differs, doubted. ``repeats`` names
+    the plates whose copy or sum it is.
     """
 
     reading: PlateReading = field(default_factory=PlateReading)
@@ -148,7 +151,9 @@ def look_at(opened: Opened) -> Look | None:
         smooth={s.name: s.smoothed(sigma).at(samples) for s in sources},
         loaded={name: mask[samples] for name, mask in heavy.items()},
         feet=Feet.of(recording.markers_m, frames, floor if abs(floor) < 1.0 else 0.0),
-        body=Body.of(_by_segment(recording), recording.marker_rate_hz, frames),
+        body=Body.of(
+            by_segment(recording.labels, recording.markers_m), recording.marker_rate_hz, frames
+        ),
     )
 
 
@@ -231,8 +236,10 @@ class Survey:
 
     @classmethod
     def of(cls, opened: Opened) -> Survey:
-        hands = handedness(opened.recording.labels, opened.recording.markers_m)
-        return cls(hands, look_at(opened), height_m(_by_segment(opened.recording)))
+        labels, markers = opened.recording.labels, opened.recording.markers_m
+        return cls(
+            handedness(labels, markers), look_at(opened), height_m(by_segment(labels, markers))
+        )
 
 
 def settle_session(trials: Sequence[Survey]) -> SessionReading:
@@ -253,16 +260,6 @@ def settle_session(trials: Sequence[Survey]) -> SessionReading:
 def _heavy(lift_N: np.ndarray) -> np.ndarray:
     size = np.abs(lift_N)
     return size > max(LOADED_N, 0.5 * np.percentile(size, 99)) if len(size) else size > 0
-
-
-def _by_segment(recording: Recording) -> dict[str, np.ndarray]:
-    """The markers of each segment (n_frames, k, 3), by what their labels mean."""
-    known = meanings(recording.labels)
-    columns: dict[str, list[int]] = {}
-    for k, label in enumerate(recording.labels):
-        if label in known:
-            columns.setdefault(known[label].segment, []).append(k)
-    return {segment: recording.markers_m[:, some] for segment, some in columns.items()}
 
 
 class _Seen(NamedTuple):
@@ -382,9 +379,7 @@ class _World:
         return self._known[key]
 
 
-def _read(
-    look: Look, areas: Mapping[str, Area], name: str, reading: PlateReading
-) -> _Seen | None:
+def _read(look: Look, areas: Mapping[str, Area], name: str, reading: PlateReading) -> _Seen | None:
     if name not in look.sources:
         return None
     source, smooth = look.sources[name], look.smooth[name]
@@ -469,7 +464,11 @@ class _Choice:
             torque = np.abs(one.torque_Nm - two.torque_Nm)[loaded]
             if np.nanmax(gap, initial=0.0) >= _ALIKE_M or apart.mean() > _ALIKE_SHARE * load:
                 return False
-            if with_torque and np.isfinite(torque).any() and np.nanmedian(torque) > _ALIKE_TORQUE_M * load:
+            if (
+                with_torque
+                and np.isfinite(torque).any()
+                and np.nanmedian(torque) > _ALIKE_TORQUE_M * load
+            ):
                 return False
         return True
 

@@ -27,7 +27,6 @@ from bsip_cli.recordings.text_cells import (
 )
 from bsip_cli.recordings.text_lines import check_names, head_of, row_counts, text_lines
 from bsip_cli.recordings.timebase import Stamps
-from bsip_cli.recordings.units import length_in_m
 
 _HEADER = re.compile(r"^\s*frame\s*#", re.IGNORECASE)
 _ROWS_LOOKED_AT = 20  # to see how the table is written
@@ -70,7 +69,7 @@ def read_trc(path: Path) -> Trc:
     labels, positions = rows.labelled()
     about_points = without_sentinels(positions)
     unit = fields.get("units", "")
-    size, about_unit = settle_unit(positions, unit, length_in_m(unit), "Units")
+    size, about_unit = settle_unit(positions, labels, unit, "Units")
     positions *= size
     findings = (
         *_about_counts(fields, {len(labels), rows.n_trajectories()}, len(rows.times)),

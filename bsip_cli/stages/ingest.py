@@ -54,7 +54,7 @@ def run(unit: Unit) -> None:
         prefix=_prefix(unit),
     )
     names = [marker.label for marker in marker_set.markers if marker.label in match.index]
-    _require(unit, names)
+    _require(unit, names, recording)
     recording, repeats = without_repeats(recording)
     findings = [*recording.findings, *told, *match.findings, *repeats]
     if unit.config.ingest.zero_unloaded_plates:
@@ -123,7 +123,14 @@ def _marker_set(unit: Unit, recording: Recording) -> tuple[MarkerSet, tuple[Find
     return guess.marker_set, guess.findings()
 
 
-def _require(unit: Unit, names: list[str]) -> None:
+def _require(unit: Unit, names: list[str], recording: Recording) -> None:
+    if recording.labels and not np.isfinite(recording.markers_m).any():
+        raise BadDataError(
+            f"all {len(recording.labels)} markers are missing or marked invalid in every frame",
+            file=unit.name,
+            expected="positions of markers",
+            remedy="reconstruct the trial and export it again",
+        )
     if not names:
         raise BadDataError(
             "none of the marker set's labels is in the file",

@@ -25,7 +25,7 @@ class PlateChannels:
 
 _MOST_PLATES = 64
 _PLATE_UNITS = ("mm", "cm", "in", "m")
-_USUAL_SIDES_M = (0.3, 0.95)  # of plates as they are sold: so that one unit alone can fit
+_USUAL_SIDES_M = (0.35, 1.25)  # of plates as they are sold: so that one unit alone can fit
 _VOLTS = {"V", "v", "Volts", "volts", "mV"}
 
 

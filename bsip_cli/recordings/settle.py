@@ -41,7 +41,8 @@ from bsip_cli.recordings.repeated_plates import repeated_plates
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Area, Evidence, Feet, evidence
 
 _SURE = 0.95  # probability from which on a repair is made
-_RATHER = 0.5  # probability from which on the file is believed
+_RATHER = 0.9  # probability from which on the file is believed
+_SURELY_NOBODY = 0.999  # probability from which on no reading is believed
 _LEAST_LIKELY = -12.0  # logarithm: less adds nothing
 _FEW = 100  # samples that each plate of a trial is seen by
 _ALIKE_M = 0.01  # readings whose centres of pressure differ by less are one,
@@ -502,13 +503,15 @@ def _surest(tried: Sequence[_Choice]) -> _Choice:
     now = tried[0]
     logs = np.array([one.log_posterior() for one in tried])
     seen = sum(1 + len(look.sources) for look in now.world.looks)
-    unknown = _UNKNOWN + _UNKNOWN_EACH * seen  # a fault that no reading mends
+    # A fault that no reading mends, in forces that go with the motion as well as any.
+    goes = max(one.world.harmony(one.readings).log_likelihood() for one in tried)
+    unknown = _UNKNOWN + _UNKNOWN_EACH * seen + max(goes, 0.0)
     shares = logs
     logs = logs - logsumexp([*logs, unknown])
     best = tried[int(np.argmax(logs))]
     likely = [k for k in range(len(tried)) if logs[k] > _LEAST_LIKELY]
     same = [k for k in likely if best.is_alike(tried[k])]
-    if unknown - logsumexp([*shares, unknown]) > np.log(_SURE):
+    if unknown - logsumexp([*shares, unknown]) > np.log(_SURELY_NOBODY):
         return replace(now, is_no_person=True)
     if 0 in same:
         return now

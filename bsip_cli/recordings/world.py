@@ -46,9 +46,9 @@ def up_from_surface(
     """
     axis = int(np.argmax(np.abs(normals).sum(axis=0)))
     seen = markers_m[np.isfinite(markers_m).all(axis=-1)]
-    if not len(seen):
+    if not len(seen) or not np.isfinite(points_on_floor_m[:, axis]).any():
         return None
-    above = float(np.mean(seen[:, axis] > np.median(points_on_floor_m[:, axis])))
+    above = float(np.mean(seen[:, axis] > np.nanmedian(points_on_floor_m[:, axis])))
     if 1 - _CLEAR_SHARE < above < _CLEAR_SHARE:
         return None
     return Up(axis, 1 if above > 0.5 else -1, "the markers lie above the force plates")

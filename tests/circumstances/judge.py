@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from dataclasses import dataclass
 
 from tests.circumstances.comparison import Comparison, compare
@@ -54,6 +55,8 @@ OF_KIND = {
 }
 # A foot beside the plates: no word for what is wrong with the numbers.
 _CONTACT = re.compile(r"(^|: )contacts\b", re.I)
+# A mirror put right asks for a look at the labels, and does nothing to them.
+_NO_REPAIR_OF: defaultdict[str, tuple[str, ...]] = defaultdict(tuple, labels=("mirrored",))
 _USUAL = re.compile(r"^(up_axis|marker_set|marker_gaps)|: (up axis|marker gaps)", re.I)
 
 
@@ -143,7 +146,10 @@ def _of_sound(wrong: Wrong, is_whole: bool, telling: list[Word]) -> str:
 
 def _of_wrong(wrong: Wrong, telling: list[Word], all_named: bool, is_told: bool) -> str:
     corrected = [w for w in telling if w.level == "corrected"]
-    if any(_naming(*which, corrected) for which in wrong):
+    own = {
+        which: [w for w in corrected if w.check not in _NO_REPAIR_OF[which[1]]] for which in wrong
+    }
+    if any(_naming(*which, words) for which, words in own.items()):
         return WRONGLY_REPAIRED
     if not all_named:
         return WRONG

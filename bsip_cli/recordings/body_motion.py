@@ -34,7 +34,7 @@ _BANDWIDTH_HZ = 3.0
 _MOST_NUMBERS = 12.0  # that count as independent, however long a session is
 _CLOSEST = 0.97  # correlation
 # Below these, movement is noise of markers and plates [m/s2; m2/s2].
-_FLOORS = {"force": 0.01, "level": 0.01, "vertical": 0.005}
+_FLOORS = {"force": 0.03, "level": 0.03, "vertical": 0.015}
 # Of the way from a segment's markers, which mark its lower joint or the top of the trunk, to those
 # of the segment that it hangs on: about there is its centre of mass.
 _TO_NEIGHBOUR = dict.fromkeys(("thigh", "shank", "upper_arm", "forearm"), 0.5) | {

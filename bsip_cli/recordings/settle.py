@@ -54,7 +54,7 @@ _TOUCHED_N = 20.0
 _PULLS = 3.0  # a force is reversed if it pulls so many times what it pushes
 
 # Logarithms: how often something else is wrong; how each trial and plate looks then (a person: -1).
-_UNKNOWN, _UNKNOWN_EACH = -5.3, -1.5
+_UNKNOWN, _UNKNOWN_EACH = -6.2, -1.5
 _IN_PART = -2.3  # markers or forces alone are mirrored more rarely than both: one in ten
 
 _AS_IT_IS = "taken as they stand"
@@ -503,16 +503,15 @@ def _surest(tried: Sequence[_Choice]) -> _Choice:
     now = tried[0]
     logs = np.array([one.log_posterior() for one in tried])
     seen = sum(1 + len(look.sources) for look in now.world.looks)
-    # A fault that no reading mends, in forces that go with the motion as well as any.
-    goes = max(one.world.harmony(one.readings).log_likelihood() for one in tried)
-    unknown = _UNKNOWN + _UNKNOWN_EACH * seen + max(goes, 0.0)
-    shares = logs
-    logs = logs - logsumexp([*logs, unknown])
+    unknown = _UNKNOWN + _UNKNOWN_EACH * seen  # a fault that no reading mends
     best = tried[int(np.argmax(logs))]
+    # Forces that go with the motion may still lie beside the feet.
+    goes = max(best.world.harmony(best.readings).log_likelihood(), 0.0)
+    if unknown + goes - logsumexp([*logs, unknown + goes]) > np.log(_SURELY_NOBODY):
+        return replace(now, is_no_person=True)
+    logs -= logsumexp([*logs, unknown])
     likely = [k for k in range(len(tried)) if logs[k] > _LEAST_LIKELY]
     same = [k for k in likely if best.is_alike(tried[k])]
-    if unknown - logsumexp([*shares, unknown]) > np.log(_SURELY_NOBODY):
-        return replace(now, is_no_person=True)
     if 0 in same:
         return now
     if np.exp(logsumexp(logs[same])) >= _SURE:

@@ -10,7 +10,7 @@ plate is left out.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from itertools import combinations
 from typing import Literal, NamedTuple
 
@@ -28,6 +28,7 @@ from bsip_cli.recordings.handedness import Handedness, handedness
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.person_size import by_segment, height_m
 from bsip_cli.recordings.plate_reading import (
+    AS_STATED,
     EXCHANGED,
     MIRRORED,
     ONE_ALONE,
@@ -95,7 +96,7 @@ class Look:
 
     def areas(self) -> dict[str, Area]:
         """Of the feet on each plate's place."""
-        places = {n: s.plate(PlateReading()).corners_m for n, s in self.sources.items()}
+        places = {n: s.plate(AS_STATED).corners_m for n, s in self.sources.items()}
         return {name: self.feet.on(corners).area() for name, corners in places.items()}
 
     def seen_in(self, scene: Scene) -> Look:
@@ -145,7 +146,7 @@ def look_at(opened: Opened) -> Look | None:
     samples = np.unique(np.concatenate(chosen))
     frames = np.round(samples * recording.marker_rate_hz / recording.analog_rate_hz).astype(int)
     samples, frames = samples[frames < recording.n_frames], frames[frames < recording.n_frames]
-    floor = sources[0].floor_m(PlateReading())
+    floor = sources[0].floor_m(AS_STATED)
     sigma = SMOOTH_S * recording.analog_rate_hz
     return Look(
         sources={s.name: s.at(samples) for s in sources},
@@ -296,7 +297,7 @@ class _World:
 
     def stated(self) -> dict[str, PlateReading]:
         """As the files say."""
-        return self.signed(dict.fromkeys(self.names, PlateReading()))
+        return self.signed(dict.fromkeys(self.names, AS_STATED))
 
     def log_likelihood(self, readings: Readings) -> float:
         total = 0.0
@@ -332,7 +333,7 @@ class _World:
         for name in self.names:
             possible = (r for source in self._sources(name) for r in source.alternatives())
             for reading in dict.fromkeys(possible):
-                if reading != PlateReading():
+                if reading != AS_STATED:
                     found.setdefault(reading, []).append(name)
         return found
 
@@ -431,7 +432,7 @@ class _Choice:
         for reading in readings:
             repair = replace(reading, centre_m=None, place_of="", sign=1)
             repairs[repair] = repairs.get(repair, 0) + 1
-        alone = sum(n < len(readings) for repair, n in repairs.items() if repair != PlateReading())
+        alone = sum(n < len(readings) for repair, n in repairs.items() if repair != AS_STATED)
         return (
             self.world.scene.log_prior()
             + sum(repair.log_prior() for repair in repairs)
@@ -445,6 +446,18 @@ class _Choice:
         scene = self.world.scene
         done = (scene.words() if scene.moved == "forces" else "", self.readings[name].words())
         return ", ".join(filter(None, done)) or _AS_IT_IS
+
+    def goes_beyond(self, other: _Choice) -> bool:
+        """Whether all repairs of another choice are made, and more."""
+        if other.world is not self.world and other.world.scene.moved:
+            return False
+        return all(
+            mine == theirs or theirs == default
+            for name, reading in other.readings.items()
+            for mine, theirs, default in zip(
+                astuple(self.readings[name]), astuple(reading), astuple(AS_STATED), strict=True
+            )
+        )
 
     def is_alike(self, other: _Choice, torque: bool = True) -> bool:
         """Whether both leave the same forces (and vertical moments) at the same places under the
@@ -514,7 +527,9 @@ def _surest(tried: Sequence[_Choice]) -> _Choice:
     same = [k for k in likely if best.is_alike(tried[k])]
     if 0 in same:
         return now
-    if np.exp(logsumexp(logs[same])) >= _SURE:
+    # A further fault that the trials do not show is no more likely here than in a sound file.
+    unlikely = [k for k in likely if logs[k] < np.log(1 - _SURE) and tried[k].goes_beyond(best)]
+    if np.exp(logsumexp(logs[sorted({*same, *unlikely})])) >= _SURE:
         return best
     like_now = {0, *(k for k in likely if now.is_alike(tried[k]))}
     if np.exp(logsumexp(logs[list(like_now)])) >= _RATHER:

@@ -9,6 +9,7 @@ import pytest
 
 from bsip_cli.recordings.assemble import assemble, findings_about
 from bsip_cli.recordings.handedness import handedness
+from bsip_cli.recordings.plate_reading import PlateReading
 from bsip_cli.recordings.settle import Scene, Survey, settle_session
 from bsip_cli.recordings.under_the_feet import Feet
 from tests.recordings.standing_on_two_plates import (
@@ -150,6 +151,33 @@ def test_mirrored_forces_alone_leave_the_markers():
     np.testing.assert_allclose(
         _wrench(assemble(trial, session)), _wrench(assemble(opened(of_table()), session_of()))
     )
+
+
+@pytest.mark.parametrize("turns", [1, 2, 3])
+def test_forces_in_turned_axes_are_turned_back(turns):
+    trial = Scene("forces", quarter_turns=turns).of(opened(of_table()))
+    session = settle_session([Survey.of(trial)])
+    assert session.scene == Scene("forces", quarter_turns=4 - turns)
+    np.testing.assert_allclose(
+        _wrench(assemble(trial, session)),
+        _wrench(assemble(opened(of_table()), session_of())),
+        atol=1e-9,
+    )
+
+
+@pytest.mark.parametrize("corners_only", [False, True])
+def test_a_mirrored_c3d_mirrors_its_channels_or_its_corners(corners_only):
+    """Mirrored twice is nothing: also the sensor's depth."""
+    sources = opened(of_c3d())
+    scene = Scene("all", 1, corners_only=corners_only)
+    twice = scene.of(scene.of(sources))
+    sound = [source.plate(PlateReading()).wrench() for source in sources.sources]
+    again = [source.plate(PlateReading()).wrench() for source in twice.sources]
+    np.testing.assert_allclose(again, sound, atol=1e-9)
+    once = [source.plate(PlateReading()) for source in scene.of(sources).sources]
+    mirrored_force = np.array(sound)[..., :3] * [1.0, -1.0, 1.0]
+    if not corners_only:
+        np.testing.assert_allclose([p.force_N for p in once], mirrored_force, atol=1e-9)
 
 
 def test_left_and_right_of_one_part_are_said():

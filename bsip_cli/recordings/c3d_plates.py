@@ -26,6 +26,7 @@ class PlateChannels:
 _MOST_PLATES = 64
 _PLATE_UNITS = ("mm", "cm", "in", "m")
 _USUAL_SIDES_M = (0.35, 1.25)  # of plates as they are sold: so that one unit alone can fit
+_INCH_M = 0.0254
 _VOLTS = {"V", "v", "Volts", "volts", "mV"}
 
 
@@ -221,7 +222,8 @@ def _size(unit: str, kind: int, position: int, length_unit_m: float) -> float:
         return force_in_N(unit) or 1.0
     if kind == 1 and position < 5:
         return length_in_m(unit) or length_unit_m
-    return moment_in_Nm(unit) or length_unit_m
+    # Nobody measures moments in N times inches: N mm, or, as the feet tell, N m.
+    return moment_in_Nm(unit) or (1e-3 if length_unit_m == _INCH_M else length_unit_m)
 
 
 def _units(group: Group, rows: np.ndarray) -> list[str]:

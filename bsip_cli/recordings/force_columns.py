@@ -66,7 +66,7 @@ def meaning_of(name: str) -> Meaning | None:
     plate = [name for token in tokens if (name := token["number"] or token["other"])]
     plate += [word[0] for word in words if _WORDS.get(word) == "side"]
     letter = axes[0][:-1]
-    if letter == "v" and "force" not in said and "ground" not in words:
+    if letter == "v" and "force" not in said and not {"ground", "fp"} & set(words):
         return None  # a velocity
     quantity = _LETTERS[letter] if letter else said[-1] if said else ""
     if not quantity and (alone := next((part for part in plate if part in _LETTERS), "")):

@@ -34,7 +34,7 @@ class PlateReading:
     turn : the corners are moved on by so many places (each 90 degrees).
     mirrored : the corners are taken in the other direction round.
     sign : -1 where the numbers are the action on the plate.
-    place_of : the plate whose place (C3D), or points and moments (MOT), belong to this one's force.
+    place_of : the plate whose place (C3D), or points (MOT), belong to this one's force and moment.
     reversed_channel : one of CHANNELS whose sign is the other, as written; "" if none.
     half_size_m : half the outline's sides where the stated outline is too small.
     """

@@ -304,8 +304,8 @@ class ForceOnPoint:
         return replace(reading, centre_m=(x, y, z))
 
     def with_force(self, other: ForceOnPoint) -> ForceOnPoint:
-        """These points and moments with another force."""
-        return replace(self, name=other.name, force_N=other.force_N)
+        """These points with another force and its moment."""
+        return replace(self, name=other.name, force_N=other.force_N, moment=other.moment)
 
     def _moment_Nm(self, reading: PlateReading) -> np.ndarray:
         """About the lab's origin, lab frame, (n, 3)."""

@@ -532,7 +532,7 @@ def _surest(tried: Sequence[_Choice]) -> _Choice:
     if np.exp(logsumexp(logs[sorted({*same, *unlikely})])) >= _SURE:
         return best
     like_now = {0, *(k for k in likely if now.is_alike(tried[k]))}
-    if np.exp(logsumexp(logs[list(like_now)])) >= _RATHER:
+    if np.exp(logsumexp(logs[list(like_now)])) >= (_SURE if now.world.scene.moved else _RATHER):
         return now
     some = [tried[k] for k in likely if logs[k] > np.log(1 - _SURE)]
     words = {name: dict.fromkeys(one.words(name) for one in some) for name in now.world.names}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
 from dataclasses import dataclass
 
 from tests.circumstances.comparison import Comparison, compare
@@ -55,8 +54,8 @@ OF_KIND = {
 }
 # A foot beside the plates: no word for what is wrong with the numbers.
 _CONTACT = re.compile(r"(^|: )contacts\b", re.I)
-# A mirror put right asks for a look at the labels, and does nothing to them.
-_NO_REPAIR_OF: defaultdict[str, tuple[str, ...]] = defaultdict(tuple, labels=("mirrored",))
+# A mirror put right, gaps and held markers speak of labels and markers and do nothing to labels.
+_CORRECT_LABELS = ("labels", "marker_set")
 _USUAL = re.compile(r"^(up_axis|marker_set|marker_gaps)|: (up axis|marker gaps)", re.I)
 
 
@@ -146,10 +145,8 @@ def _of_sound(wrong: Wrong, is_whole: bool, telling: list[Word]) -> str:
 
 def _of_wrong(wrong: Wrong, telling: list[Word], all_named: bool, is_told: bool) -> str:
     corrected = [w for w in telling if w.level == "corrected"]
-    own = {
-        which: [w for w in corrected if w.check not in _NO_REPAIR_OF[which[1]]] for which in wrong
-    }
-    if any(_naming(*which, words) for which, words in own.items()):
+    of_labels = [w for w in corrected if w.check in _CORRECT_LABELS]
+    if any(_naming(*w, of_labels if w[1] == "labels" else corrected) for w in wrong):
         return WRONGLY_REPAIRED
     if not all_named:
         return WRONG

@@ -441,11 +441,10 @@ class _Choice:
             + REVERSED * any(reading.sign < 0 for reading in readings)
         )
 
-    def words(self, name: str) -> str:
-        """What is done to a plate's numbers, as a clause."""
-        scene = self.world.scene
-        done = (scene.words() if scene.moved == "forces" else "", self.readings[name].words())
-        return ", ".join(filter(None, done)) or _AS_IT_IS
+    def words(self, name: str, now: _Choice) -> str:
+        """What is done to a plate's numbers, as a clause; the scene where it is another one."""
+        scene = self.world.scene.words() if self.world is not now.world else ""
+        return ", ".join(filter(None, (scene, self.readings[name].words()))) or _AS_IT_IS
 
     def goes_beyond(self, other: _Choice) -> bool:
         """Whether all repairs of another choice are made, and more."""
@@ -535,7 +534,7 @@ def _surest(tried: Sequence[_Choice]) -> _Choice:
     if np.exp(logsumexp(logs[list(like_now)])) >= (_SURE if now.world.scene.moved else _RATHER):
         return now
     some = [tried[k] for k in likely if logs[k] > np.log(1 - _SURE)]
-    words = {name: dict.fromkeys(one.words(name) for one in some) for name in now.world.names}
+    words = {name: dict.fromkeys(one.words(name, now) for one in some) for name in now.world.names}
     rivals = {name: tuple(all_) for name, all_ in words.items() if set(all_) != {_AS_IT_IS}}
     in_torque = all(now.is_alike(one, torque=False) for one in some)
     return replace(now, rivals=rivals, only_torque=in_torque)

@@ -57,7 +57,7 @@ def _by_stature(
         usual = [abs(np.log(tall * size / _USUAL_M)) for size in fitting]
         size, is_said = fitting[int(np.argmin(usual))] if fitting else 1e-3, True
     found = f"{name} '{stated}', and the markers are those of a person {tall:.4g} of it tall"
-    action = f"read lengths in {length_name(size)}: {tall * size:.2f} m"
+    action = f"read lengths in {length_name(size)}"
     about = Finding(
         "unit", "points", found, "m or mm, and the size of a person", action, "corrected"
     )

@@ -201,7 +201,9 @@ class Scene:
         return _IN_PART if self.moved == "markers" else 0.0
 
     def words(self) -> str:
-        """What is done, as a clause."""
+        """What is done, as a clause; empty if nothing."""
+        if not self.moved:
+            return ""
         what = {"all": "markers and forces", "markers": "the markers", "forces": "the forces"}
         if self.quarter_turns:
             return f"turned {what[self.moved]} by {90 * self.quarter_turns} degrees"

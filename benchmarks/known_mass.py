@@ -24,7 +24,7 @@ from bsip_cli.body.loads import PointMass, load_parameters
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, Load, load_config
-from bsip_cli.identification.difference import Difference, change_of_segment, difference
+from bsip_cli.identification.difference import Difference, change_of_segments, difference
 from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.pipeline import STAGES
 from bsip_cli.running.unit import Unit
@@ -160,7 +160,7 @@ def one_segment(
 ) -> Iterator[Found]:
     """What both recordings together say of the segment that wears the load."""
     i = plain.person.skeleton.index(worn.load.segment)
-    change = change_of_segment(plain.problem, other.problem, i)
+    change = change_of_segments(plain.problem, other.problem, [i])
     position = np.array(worn.load.position_m) + plain.person.origin_in_joint_m[i]
     truth = mass_kg * np.array([1.0, *position])
     half_width = 1.96 * np.sqrt(np.diag(change.covariance))

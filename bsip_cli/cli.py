@@ -353,6 +353,39 @@ def init(given, out, participant, link):
     return init_command(Request(given, out, participant, link))
 
 
+@cli.command("compare-loads")
+@click.argument("study", type=click.Path(path_type=Path))
+@_OUT
+@click.option("--participant", required=True, metavar="sub-01", help="Whose recordings.")
+@_CONFIG
+@click.option(
+    "--with",
+    "heavy",
+    default="",
+    metavar="TASK[,TASK]",
+    help="Tasks, or recordings as squat_run-2, that carry the load; without it, all that move and "
+    "carry a declared one.",
+)
+@click.option(
+    "--without",
+    "plain",
+    default="",
+    metavar="TASK[,TASK]",
+    help="Those to compare with; without it, all that move and carry none.",
+)
+def compare_loads(study, out, participant, config_file, heavy, plain):
+    """Find a load that is known, to see how far its mass can be trusted.
+
+    Two sets of a person's recordings, with and without a load of [[loads]] in study.toml, are
+    identified each on its own with the load left in the forces; printed is what that adds to each
+    segment, with its interval, beside the declared load. Needs the results of `bsip regress` and
+    `bsip ik`; writes sub-XX_load-comparison.parquet.
+    """
+    from bsip_cli.commands.compare_loads import compare_loads as compare
+
+    return compare(study, out, participant, config_file, (heavy, plain))
+
+
 @cli.command()
 @click.argument("out", type=click.Path(path_type=Path))
 def show(out):

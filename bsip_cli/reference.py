@@ -246,8 +246,10 @@ def artifacts_page() -> str:
         parts += _stage_parts(stage)
     written = {kind for stage in STAGES for kind in stage.writes}
     parts += ["## Beside them"]
+    places = {"refusal": "OUT/sub-XX/…_refusal-STAGE.parquet"}
     for kind in [kind for kind in SCHEMAS if kind not in written]:
-        parts += _schema_parts(SCHEMAS[kind], "OUT/sub-XX/…_refusal-STAGE.parquet")
+        place = places.get(kind) or _PLACES[SCHEMAS[kind].level].format(kind=kind)
+        parts += _schema_parts(SCHEMAS[kind], place)
     return _page("The artifacts", parts)
 
 

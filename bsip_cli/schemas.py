@@ -752,6 +752,34 @@ SCHEMAS = {
                 _text("unit", "unit of the value"),
             ),
         ),
+        Schema(
+            "load-comparison",
+            "participant",
+            1,
+            "what a person's parameters gain by declared loads, of `bsip compare-loads`",
+            (
+                _text(
+                    "analysis",
+                    "two identifications: their difference, all segments free; loaded segments: of "
+                    "both recordings together, all other segments the same",
+                ),
+                _text("segment", "segment of the skeleton, or all"),
+                _text(
+                    "quantity",
+                    "m, mcx mcy mcz (first moment) and Ixx .. Izz about the segment's joint; "
+                    "cx cy cz: centre of what was added, from the segment's origin; in its frame",
+                ),
+                _text("unit", "of the numbers"),
+                *_floats("difference ci_low ci_high", "as unit", "with less without, and 95 %"),
+                Column("declared", "float", "as unit", "of the declared loads"),
+                Column(
+                    "expected",
+                    "float",
+                    "as unit",
+                    "what the analysis should show of the declared loads",
+                ),
+            ),
+        ),
         Schema("comparisons", "cohort", 1, "tests between the methods", _COMPARISON),
         Schema(
             "tables-files",

@@ -12,12 +12,13 @@ of covariance R C. The difference of a recording b from a recording a is therefo
 - the person's own deviation where the two motions resolve it differently;
 - the noise of both.
 
-If the change is known to sit on one segment only, both recordings together give that segment's
-change without this blur: ``change_of_segment``.
+If the change is known to sit on certain segments only, both recordings together give their change
+without this blur: ``change_of_segments``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,7 +38,7 @@ class Difference:
 
 @dataclass(frozen=True, eq=False)
 class SegmentChange:
-    """Change (10,) of one segment's parameters about its joint, and its covariance (10, 10)."""
+    """Change (10 k,) of k segments' parameters about their joints, and its covariance."""
 
     phi: np.ndarray
     covariance: np.ndarray
@@ -58,20 +59,21 @@ def difference(a: Estimate, b: Estimate, prior_covariance: np.ndarray) -> Differ
     return Difference(b.phi - a.phi, covariance, seen_b)
 
 
-def change_of_segment(a: Problem, b: Problem, segment: int) -> SegmentChange:
-    """The change of one segment that explains how b's wrench differs from a's; all else the same.
+def change_of_segments(a: Problem, b: Problem, segments: Sequence[int]) -> SegmentChange:
+    """The change of these segments that explains how b's wrench differs from a's; else the same.
 
     Generalised least squares for the person's deviation from the table (common to both, with the
-    prior) and the ten parameters of the segment (free in b, zero in a); the former is marginalised.
-    ``segment`` is an index. Both problems need the same prior.
+    prior) and the ten parameters of each segment (free in b, zero in a); the former is
+    marginalised. ``segments`` are indices, none the parent of another: what a joint connects
+    shares its mass. Both problems need the same prior.
     """
     (information_a, right_a), (information_b, right_b) = (_about_table(p) for p in (a, b))
-    part = slice(10 * segment, 10 * segment + 10)
+    part = (10 * np.asarray(segments)[:, None] + np.arange(10)).ravel()
     root = a.prior.root
     inner = np.eye(root.shape[1]) + root.T @ (information_a + information_b) @ root
     common = root @ np.linalg.solve(inner, root.T)  # covariance of the common deviation
     seen = information_b[:, part]
-    precision = information_b[part, part] - seen.T @ common @ seen
+    precision = information_b[np.ix_(part, part)] - seen.T @ common @ seen
     right = right_b[part] - seen.T @ common @ (right_a + right_b)
     scale = 1 / np.sqrt(np.diag(precision))  # kg beside kg m2
     covariance = np.outer(scale, scale) * np.linalg.inv(np.outer(scale, scale) * precision)
@@ -86,12 +88,20 @@ def _about_table(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
 
 def _resolved(estimate: Estimate, prior_covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Resolution R = 1 - C P^-1 (P, P), and the noise's covariance R C, along the directions in
-    which C is a part w of the prior; a w above 1 (C is linearised elsewhere) counts as 1."""
-    scale = np.sqrt(np.diag(prior_covariance))  # kg beside kg m2
-    root = np.linalg.cholesky(prior_covariance / np.outer(scale, scale)) * scale[:, None]
+    which C is a part w of the prior; a w above 1 (C is linearised elsewhere) counts as 1.
+
+    Of parameters that keep the table's values, which have no spread, nothing is resolved.
+    """
+    free = np.flatnonzero(np.diag(prior_covariance) > 0)
+    among = np.ix_(free, free)
+    prior, covariance = prior_covariance[among], estimate.covariance[among]
+    scale = np.sqrt(np.diag(prior))  # kg beside kg m2
+    root = np.linalg.cholesky(prior / np.outer(scale, scale)) * scale[:, None]
     inverse = np.linalg.inv(root / scale[:, None]) / scale
-    part, directions = np.linalg.eigh(inverse @ estimate.covariance @ inverse.T)
+    part, directions = np.linalg.eigh(inverse @ covariance @ inverse.T)
     part = np.clip(part, 0.0, 1.0)
     axes = root @ directions
-    resolution = (axes * (1 - part)) @ (directions.T @ inverse)
-    return resolution, (axes * (part * (1 - part))) @ axes.T
+    resolution, noise = np.zeros((2, *prior_covariance.shape))
+    resolution[among] = (axes * (1 - part)) @ (directions.T @ inverse)
+    noise[among] = (axes * (part * (1 - part))) @ axes.T
+    return resolution, noise

@@ -51,7 +51,7 @@ MAY_ALSO = {"recordings.c3d_guard": {"subprocess"}}
 ONLY = {
     "simulate": {"body": {"body.names", "body.markersets"}},
     "cli": {"simulate": {"simulate.command"}},
-    "commands": {"stages": {"stages.frames"}},
+    "commands": {"stages": {"stages.frames", "stages.known_loads", "stages.load_comparison"}},
     "running": {"body": {"body.markersets", "body.skeleton"}},
     "stages": {"running": {"running.unit"}},
     "study": {"body": {"body.skeleton"}},

@@ -27,6 +27,7 @@ HEAVY = [
 STAGE_COMMANDS = [*dict.fromkeys(stage.name for stage in STAGES), "run"]
 OTHER_COMMANDS = [
     "check",
+    "compare-loads",
     "init",
     "simulate",
     "inject",

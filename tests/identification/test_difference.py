@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.body.loads import PointMass, load_parameters
-from bsip_cli.identification.difference import change_of_segment, difference
+from bsip_cli.identification.difference import change_of_segments, difference
 from bsip_cli.identification.estimator import Estimate, Problem
 from tests.identification.synthetic_identification import problem_of, regressor, world
 
@@ -84,8 +84,20 @@ def test_a_segments_own_mass_is_blurred_and_the_total_is_not():
 def test_change_of_one_segment_returns_the_load_within_its_interval():
     i = world().person.skeleton.index(SHANK)
     truth = load_phi()[10 * i : 10 * i + 10]
-    found = [change_of_segment(a, b, i) for a, b in draws((1, 2))]
+    found = [change_of_segments(a, b, [i]) for a, b in draws((1, 2))]
     scores = [(f.phi - truth) / np.sqrt(np.diag(f.covariance)) for f in found]
     np.testing.assert_allclose(np.std(scores, axis=0), 1.0, atol=0.15)
     np.testing.assert_allclose(np.mean(scores, axis=0), 0.0, atol=0.25)
     assert np.sqrt(found[0].covariance[0, 0]) < 0.05
+
+
+def test_nothing_is_resolved_of_a_segment_that_keeps_the_table():
+    fixed = np.repeat(np.arange(15) == world().person.skeleton.index("head"), 10)
+    root = np.where(fixed[:, None] | fixed, 0.0, world().prior.root)
+    a, b = (
+        gaussian(replace(problem, prior=replace(problem.prior, root=root)))
+        for problem in next(draws((1, 2)))
+    )
+    found = difference(a, b, root @ root.T)
+    assert not found.covariance[fixed].any() and not found.resolution[fixed].any()
+    assert np.isfinite(found.phi).all() and (np.diag(found.covariance)[~fixed] > 0).all()

@@ -20,6 +20,17 @@ SEGMENTS = (
     "foot_r",
 )
 
+_JOINTS = {
+    "lower_torso": "root",
+    "upper_torso": "waist",
+    "head": "neck",
+    "upper_arm": "shoulder",
+    "forearm": "elbow",
+    "hand": "wrist",
+    "thigh": "hip",
+    "shank": "knee",
+    "foot": "ankle",
+}
 TRUNK = ("lower_torso", "upper_torso")
 _SIDES = {"_l": "left", "_r": "right"}
 
@@ -39,6 +50,12 @@ def the_joint(name: str) -> str:
 def without_side(name: str) -> str:
     """The kind of segment: upper_arm for upper_arm_l; what has no side, itself."""
     return name[:-2] if name[-2:] in _SIDES else name
+
+
+def joint_of(segment: str) -> str:
+    """The joint that a segment hangs on: shoulder_l for upper_arm_l."""
+    kind = without_side(segment)
+    return _JOINTS[kind] + segment[len(kind) :]
 
 
 def mirrored(name: str) -> str:

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
+from bsip_cli.body.names import SEGMENTS, joint_of
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
 from bsip_cli.files.regular import read_toml
@@ -16,6 +17,7 @@ from bsip_cli.files.regular import read_toml
 JointType = Literal["free", "spherical", "revolute"]
 
 _KEYS = ("name", "parent", "joint", "type", "table")
+_HINGES = ("elbow", "knee", "ankle")  # joints whose axis landmarks give
 _Q_PARTS = {
     "free": ("tx", "ty", "tz", "qx", "qy", "qz", "qw"),
     "spherical": ("qx", "qy", "qz", "qw"),
@@ -131,6 +133,7 @@ def load_skeleton(name: str) -> Skeleton:
             expected="[[segments]] with name, parent, joint, type and table",
         ) from None
     _check(skeleton, file)
+    _check_known(skeleton, file)
     return skeleton
 
 
@@ -145,4 +148,26 @@ def _check(skeleton: Skeleton, file: Path) -> None:
             file=file,
             expected="the free base first, every parent before its children, joints of type "
             "spherical or revolute, and every name once",
+        )
+
+
+def _check_known(skeleton: Skeleton, file: Path) -> None:
+    """Exactly the segments whose frames, inertias and tables exist, each on its joint."""
+    faults = [f"no {name}" for name in SEGMENTS if name not in skeleton.segments]
+    for name, joint, kind in zip(
+        skeleton.segments, skeleton.joints, skeleton.joint_types, strict=True
+    ):
+        if name not in SEGMENTS:
+            faults.append(f"{name}, of which neither frame nor mass is known")
+        elif joint != joint_of(name):
+            faults.append(f"{name} on {joint} instead of {joint_of(name)}")
+        elif kind == "revolute" and not joint.startswith(_HINGES):
+            faults.append(f"a hinge at {joint}, of which no axis is known")
+    if faults:
+        raise UsageError(
+            f"a skeleton that cannot be built: {', '.join(faults)}",
+            file=file,
+            expected=f"the segments {', '.join(SEGMENTS)}, each on its joint as in "
+            "configs/skeletons/hansen2017.toml; the types of joints may differ",
+            remedy="change these lines",
         )

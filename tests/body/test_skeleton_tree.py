@@ -2,6 +2,7 @@ import pytest
 
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.config import shipped
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.errors import UsageError
 
@@ -53,11 +54,35 @@ def test_sides():
     assert sides == ["l", "r", "", ""]
 
 
-def test_a_small_tree_of_ones_own(tmp_path):
-    skeleton = load_skeleton(written(tmp_path, GOOD))
+SHIPPED = shipped("skeletons", "hansen2017.toml").read_text(encoding="utf-8")
+ELBOW = 'joint = "elbow_l"\ntype = '
+
+
+def test_a_tree_of_ones_own(tmp_path):
+    text = SHIPPED.replace(f'{ELBOW}"revolute"', f'{ELBOW}"spherical"')
+    skeleton = load_skeleton(written(tmp_path, text))
     assert skeleton.name == "tree"
-    assert skeleton.parents == (-1, 0)
-    assert len(skeleton.v_names) == 9
+    assert len(skeleton.v_names) == 42
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            SHIPPED + row("clavicle_l", "upper_torso", "sternoclavicular_l", "spherical"),
+            "clavicle_l, of which neither frame nor mass is known",
+        ),
+        (GOOD, "no upper_torso, no head, no upper_arm_l"),
+        (SHIPPED.replace('"neck"', '"atlas"'), "head on atlas instead of neck"),
+        (
+            SHIPPED.replace('"neck"\ntype = "spherical"', '"neck"\ntype = "revolute"'),
+            "a hinge at neck, of which no axis is known",
+        ),
+    ],
+)
+def test_a_body_that_cannot_be_built_is_refused(tmp_path, text, said):
+    with pytest.raises(UsageError, match=said):
+        load_skeleton(written(tmp_path, text))
 
 
 CHILD = row("shank_l", "thigh_l", "knee_l", "revolute")
@@ -84,7 +109,7 @@ BAD = {
 @pytest.mark.parametrize("text", BAD.values(), ids=BAD.keys())
 def test_bad_trees_are_refused(tmp_path, text):
     file = written(tmp_path, text)
-    with pytest.raises(UsageError) as caught:
+    with pytest.raises(UsageError, match=r"not a tree|not a skeleton|TOML") as caught:
         load_skeleton(file)
     assert "tree.toml" in str(caught.value)
     assert caught.value.expected

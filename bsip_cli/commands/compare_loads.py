@@ -7,7 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import click
+import pandas as pd
 
+from bsip_cli.artifacts import remove
 from bsip_cli.errors import BadDataError, BsipError, UsageError, printable
 from bsip_cli.pipeline import Stage
 from bsip_cli.report.tables.markdown import to_markdown
@@ -66,6 +68,7 @@ def _compare(units: list[Unit], names: tuple[str, str]) -> Generator[Outcome, No
             with held_alone(unit.out / unit.name):
                 compared(unit, loads_off, _sets(unit, names))
         except BsipError as error:
+            remove(unit.path("load-comparison"))  # an older one would pass for this one
             unit.warn(str(error))
             said = tuple(unit.messages)
             yield Outcome(_READER.name, unit.name, "refused", said, error.exit_code)
@@ -183,6 +186,7 @@ def _tables(unit: Unit) -> Iterator[Table]:
                 "Difference: with less without, and its 95 % interval. m: mass; mc: first moment "
                 "and I: inertia about the segment's joint; c: centre of what was added, from the "
                 "segment's origin, in the segment's frame (X anterior, Y up, Z right).",
+                *_not_shown(loaded),
             ),
         )
     masses = rows[(rows["analysis"] == TWO) & (rows["quantity"] == "m")]
@@ -197,6 +201,17 @@ def _tables(unit: Unit) -> Iterator[Table]:
             f"First moments and tensors of all segments: {unit.path('load-comparison')}",
         ),
     )
+
+
+def _not_shown(loaded: pd.DataFrame) -> Iterator[str]:
+    """Where a load cannot be told from none."""
+    masses = loaded[loaded["quantity"] == "m"]
+    none = masses[(masses["ci_low"] <= 0) & (masses["ci_high"] >= 0)]
+    for segment in none["segment"]:
+        yield (
+            f"On the {segment_label(segment)} these recordings show no load: the mass may be zero. "
+            "Longer ones that move the segment more have narrower intervals."
+        )
 
 
 def _row(values: dict) -> Row:

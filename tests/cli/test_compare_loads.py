@@ -55,10 +55,13 @@ RUN_2 = load(tasks=["squat"], runs=[2])
 )
 def test_sets_that_cannot_be_compared(bsip, finished, declared, options, said):
     study, out = finished
+    earlier = out / "sub-01" / "sub-01_load-comparison.parquet"
+    earlier.write_bytes(b"")
     (study / "study.toml").write_text(declared)
     answer = bsip("compare-loads", study, "--out", out, "--participant", "sub-01", *options)
     assert (answer.code, answer.out) == (2, "")
     assert said in answer.err.splitlines()[0]
+    assert not earlier.exists()
 
 
 def test_names_the_command_to_run_first(bsip, empty_study, tmp_path):
@@ -94,6 +97,7 @@ def test_a_simulated_kilogram_comes_back(bsip, tmp_path):
         answer = bsip("compare-loads", study, "--out", out, *who, *sets)
         assert answer.code == 0, answer.err
         assert "whole body" in answer.out
+        assert ("the mass may be zero" in answer.out) == (run == 3)
         path = out / "sub-01" / "sub-01_load-comparison.parquet"
         return read_artifact(path, "load-comparison"), answer.err
 

@@ -1,292 +1,145 @@
 """Known masses on known segments of simulated people: do they come back?
 
 Every person is recorded five times in one session with the same markers: twice with nothing, with
-0.5 kg on the right wrist, with 1 kg on the right shank and with 2 kg on the trunk, each time in
-another sequence of movements with other noise. The simulator carries the mass as a part of the body
-that wears it. At first nobody tells the identification of the mass: it should come back. Declared
-as a known load it should leave no more trace than there is between the two recordings with nothing.
+0.5 kg on the right forearm, with 1 kg on the right shank and with 2 kg on the trunk, each time in
+another sequence of movements with other noise. `bsip compare-loads` looks for the mass in the
+forces; the second recording with nothing is declared to carry each of them, and should show none.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib
+import json
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from benchmarks.measure import ROOT, markdown, run_child
-from bsip_cli.body.loads import PointMass, load_parameters
-from bsip_cli.body.person import Person
-from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.config import Config, Load, load_config
-from bsip_cli.identification.difference import Difference, change_of_segments, difference
-from bsip_cli.identification.estimator import Estimate, Problem
-from bsip_cli.pipeline import STAGES
-from bsip_cli.running.unit import Unit
-from bsip_cli.simulate import people, recording, study, trial
-from bsip_cli.simulate.inertia import Inertia, combined
-from bsip_cli.simulate.options import StudyOptions
-from bsip_cli.stages import identification_problem
-from bsip_cli.stages.frames import person_from
-from bsip_cli.study.study import load_study
+from bsip_cli.artifacts import read_artifact
 
-ESTIMATORS = ("consistent", "hansen2017")
-NOTHING = "nothing"
+LOADS = {2: ("forearm_r", 0.5), 3: ("shank_r", 1.0), 4: ("upper_torso", 2.0)}  # by run
 PLAIN_RUN, AGAIN_RUN = 1, 5
+ONE, TWO = "loaded segments", "two identifications"
 BAD_DATA = 3  # some trial was refused, the rest is done
 
 
 @dataclass(frozen=True)
-class Worn:
-    """A load, the run that it is worn in, and the simulator's body that wears it."""
+class Compared:
+    """One comparison's table; ``carried``: whether the declared load was there."""
 
-    run: int
-    name: str
-    body: str
-    load: Load
+    segment: str
+    declared_kg: float
+    carried: bool
+    table: pd.DataFrame
 
-
-def _worn(run: int, name: str, body: str, segment: str, mass_kg: float, position_m: tuple) -> Worn:
-    return Worn(
-        run, name, body, Load(segment=segment, mass_kg=mass_kg, position_m=position_m, runs=(run,))
-    )
-
-
-LOADS = (
-    _worn(2, "0.5 kg, right wrist", "forearm_r", "forearm_r", 0.5, (0.0, -0.22, 0.03)),
-    _worn(3, "1 kg, right shank", "shank_r", "shank_r", 1.0, (0.03, -0.25, 0.02)),
-    _worn(4, "2 kg, trunk", "thorax", "upper_torso", 2.0, (0.10, -0.20, 0.0)),
-)
+    def rows(self, analysis: str, segment: str, *quantities: str) -> pd.DataFrame:
+        """Rows with the truth as it should be shown."""
+        table = self.table
+        where = (table["analysis"] == analysis) & (table["segment"] == segment)
+        chosen = table[where & table["quantity"].isin(quantities)]
+        return chosen.assign(truth=chosen["expected"] * self.carried)
 
 
-# --- the recordings -----------------------------------------------------------------------------
+# --- the recordings and comparisons -------------------------------------------------------------
 
 
-def with_load(person: people.Person, worn: Worn) -> people.Person:
-    """The person, one body of whom is heavier by the load."""
-    point = Inertia(worn.load.mass_kg, np.array(worn.load.position_m), np.zeros((3, 3)))
-    whole = combined([(person.inertias[worn.body], np.zeros(3)), (point, np.zeros(3))])
-    return replace(person, inertias={**person.inertias, worn.body: whole})
+def bsip(*arguments: object) -> None:
+    command = [sys.executable, "-m", "bsip_cli", *map(str, arguments)]
+    run_child(command, folder=ROOT, allowed=BAD_DATA)
 
 
-def write_study(folder: Path, seed: int, duration_s: float) -> None:
-    """One person: static, runs 1 and 5 with nothing, runs 2 to 4 with a load each."""
-    options = StudyOptions(
-        participants=1,
-        seed=seed,
-        sexes="MF"[seed % 2],
-        tasks=("static", "sequence"),
-        durations_s={"static": 3.0, "sequence": duration_s},
-    )
-    study.simulate_study(folder, options)
-    person = study.participant_person(options, 1)
-    bodies = {AGAIN_RUN: person} | {worn.run: with_load(person, worn) for worn in LOADS}
-    for run, body in bodies.items():
-        moved = trial.simulate_trial(
-            body, "sequence", np.random.default_rng([seed, run, 0]), duration_s
-        )
-        recording.write_trial(
-            folder / "sub-01" / f"sub-01_task-sequence_run-{run}.c3d",
-            moved,
-            person,
-            options.rates_of("sequence"),
-            options.laboratory,
-            options.richness,
-            np.random.default_rng([seed, run, 1]),
-        )
+def record(folder: Path, seed: int, duration_s: float, run: int) -> list[float]:
+    """Write one run into the study of run 1; where its load sits, in the segment's frame."""
+    segment, mass_kg = LOADS.get(run, ("", 0.0))
+    hidden = ("--effect", "added_mass", "--size", mass_kg, "--target", segment)
+    root = folder / f"run-{run}"
+    drawn = ("--participants", 1, "--seed", seed, "--run", run, "--sequence-s", duration_s)
+    tasks = ("--task", "static", "--task", "sequence")
+    more = (*hidden, "--effect-tasks", "sequence") if segment else ()
+    bsip("simulate", root, *drawn, *tasks, *more)
+    name = f"sub-01/sub-01_task-sequence_run-{run}.c3d"
+    (root / name).replace(folder / f"run-{PLAIN_RUN}" / name)
+    truth = json.loads((root / "truth" / "sub-01_truth.json").read_text(encoding="utf-8"))
+    return truth["effects"][0]["position_m"] if segment else []
 
 
-# --- the identifications ------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Identified:
-    """One run's problem and what every estimator made of it."""
-
-    person: Person
-    problem: Problem
-    estimates: dict[str, Estimate]
-
-
-def identified(folder: Path, out: Path, run: int, loads: tuple[Load, ...]) -> Identified:
-    """Parameters from one run alone, with these loads declared."""
-    config = load_config([folder / "study.toml"]).model_copy(update={"loads": loads})
-    unit = _unit(folder, out, config)
-    skeleton = load_skeleton(config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    prior = identification_problem.prior_from(unit, unit.read("regression"), person)
-    trials = [one for one in unit.trials("kinematics", "wrench") if one.run == run]
-    recordings, _ = identification_problem.recordings_of(unit, person, trials)
-    problem, _ = identification_problem.problem_of(unit, person, prior, recordings)
-    estimates = {
-        name: importlib.import_module(f"bsip_cli.identification.{name}").estimate(problem)
-        for name in ESTIMATORS
-    }
-    return Identified(person, problem, estimates)
-
-
-def _unit(folder: Path, out: Path, config: Config) -> Unit:
-    found, _ = load_study(folder, config.roles.model_dump())
-    stage = next(stage for stage in STAGES if stage.name == "identify")
-    return Unit(stage, found, out, config, found.participants[0])
-
-
-# --- the comparison -----------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Found:
-    """A quantity of one person and load: value, half of its 95 % interval, and the truth."""
-
-    load: str
-    method: str
-    quantity: str
-    value: float
-    half_width: float
-    truth: float
-
-    @property
-    def is_inside(self) -> bool:
-        return abs(self.value - self.truth) <= self.half_width
-
-
-def one_segment(
-    plain: Identified, other: Identified, worn: Worn, mass_kg: float
-) -> Iterator[Found]:
-    """What both recordings together say of the segment that wears the load."""
-    i = plain.person.skeleton.index(worn.load.segment)
-    change = change_of_segments(plain.problem, other.problem, [i])
-    position = np.array(worn.load.position_m) + plain.person.origin_in_joint_m[i]
-    truth = mass_kg * np.array([1.0, *position])
-    half_width = 1.96 * np.sqrt(np.diag(change.covariance))
-    for k, quantity in enumerate(("mass", *["first moment"] * 3)):
-        name = worn.name if mass_kg else NOTHING
-        yield Found(name, "one segment", quantity, change.phi[k], half_width[k], truth[k])
-
-
-def two_identifications(plain: Identified, other: Identified, worn: Worn) -> Iterator[Found]:
-    """Differences of the estimates; of the segment's own mass as far as the wrench resolves it."""
-    n = len(plain.person.skeleton.segments)
-    i = plain.person.skeleton.index(worn.load.segment)
-    point = PointMass(worn.load.segment, worn.load.mass_kg, np.array(worn.load.position_m))
-    truth = load_parameters([point], plain.person)
-    for method, change in _differences(plain, other):
-        total, own = np.zeros(10 * n), np.zeros(10 * n)
-        total[::10], own[10 * i] = 1.0, 1.0
-        for quantity, row in (("total mass", total), ("own mass", own)):
-            half_width = 1.96 * float(np.sqrt(row @ change.covariance @ row))
-            shown = float(row @ change.resolution @ truth)
-            yield Found(worn.name, method, quantity, float(row @ change.phi), half_width, shown)
-
-
-def traces(plain: Identified, other: Identified, name: str) -> Iterator[Found]:
-    """What of all segments differs, where nothing should."""
-    for method, change in _differences(plain, other):
-        half_width = 1.96 * np.sqrt(np.diag(change.covariance))
-        for k, value in enumerate(change.phi):
-            if k % 10 < 4:
-                quantity = "first moments" if k % 10 else "masses"
-                yield Found(name, method, quantity, float(value), float(half_width[k]), 0.0)
-
-
-def _differences(plain: Identified, other: Identified) -> Iterator[tuple[str, Difference]]:
-    root = plain.problem.prior.root
-    for method in ESTIMATORS:
-        a, b = plain.estimates[method], other.estimates[method]
-        yield method, difference(a, b, root @ root.T)
-
-
-def person(folder: Path, seed: int, duration_s: float) -> Iterator[Found]:
-    """Simulate one person, identify every run, compare."""
-    recordings, out = folder / f"study-{seed}", folder / f"out-{seed}"
-    write_study(recordings, seed, duration_s)
+def person(folder: Path, seed: int, duration_s: float) -> Iterator[Compared]:
+    """Simulate one person, and compare every run with the first."""
+    study, out = folder / f"run-{PLAIN_RUN}", folder / "out"
+    places = {run: record(folder, seed, duration_s, run) for run in (PLAIN_RUN, AGAIN_RUN, *LOADS)}
     for stage in ("ingest", "scale", "ik", "regress"):
-        command = [sys.executable, "-m", "bsip_cli", stage, str(recordings), "--out", str(out)]
-        run_child(command, folder=ROOT, allowed=BAD_DATA)
-    plain = identified(recordings, out, PLAIN_RUN, ())
-    again = identified(recordings, out, AGAIN_RUN, ())
-    yield from traces(plain, again, NOTHING)
+        bsip(stage, study, "--out", out)
     for worn in LOADS:
-        hidden = identified(recordings, out, worn.run, ())
-        declared = identified(recordings, out, worn.run, (worn.load,))
-        yield from one_segment(plain, hidden, worn, worn.load.mass_kg)
-        yield from one_segment(plain, again, worn, 0.0)
-        yield from two_identifications(plain, hidden, worn)
-        yield from traces(plain, hidden, f"{worn.name}, not declared")
-        yield from traces(plain, declared, f"{worn.name}, declared")
+        for run in (worn, AGAIN_RUN):
+            yield compared(study, out, run, worn, places[worn])
+
+
+def compared(study: Path, out: Path, run: int, worn: int, position_m: list[float]) -> Compared:
+    """A run beside the first, declared to carry the load that run ``worn`` carries."""
+    segment, mass_kg = LOADS[worn]
+    config = out.parent / "loads.toml"
+    config.write_text(
+        f'[[loads]]\nsegment = "{segment}"\n'
+        f"mass_kg = {mass_kg}\nposition_m = {position_m}\nruns = [{run}]\n",
+        encoding="utf-8",
+    )
+    sets = ("--with", f"sequence_run-{run}", "--without", f"sequence_run-{PLAIN_RUN}")
+    who = ("--out", out, "--participant", "sub-01", "--config", config)
+    bsip("compare-loads", study, *who, *sets)
+    path = out / "sub-01" / "sub-01_load-comparison.parquet"
+    table = read_artifact(path, "load-comparison")
+    return Compared(segment, mass_kg, run == worn, table)
 
 
 # --- the tables ---------------------------------------------------------------------------------
 
 
-def chosen(rows: list[Found], load: str, method: str, quantity: str) -> list[Found]:
-    return [r for r in rows if (r.load, r.method, r.quantity) == (load, method, quantity)]
+def inside(rows: pd.DataFrame) -> str:
+    held = (rows["ci_low"] <= rows["truth"]) & (rows["truth"] <= rows["ci_high"])
+    return f"{held.sum()} of {len(rows)}"
 
 
-def inside(rows: list[Found]) -> str:
-    return f"{sum(row.is_inside for row in rows)} of {len(rows)}"
-
-
-def mean_of(rows: list[Found]) -> str:
+def mean_of(rows: pd.DataFrame) -> str:
     """Mean, its spread over people, and the mean half-width of the interval."""
-    values = [row.value for row in rows]
-    half_width = np.mean([row.half_width for row in rows])
-    return f"{np.mean(values):.3f} (sd {np.std(values, ddof=1):.3f}) ± {half_width:.3f}"
+    half_width = (rows["ci_high"] - rows["ci_low"]).mean() / 2
+    mean, spread = rows["difference"].mean(), rows["difference"].std()
+    return f"{mean:.3f} (sd {spread:.3f}) ± {half_width:.3f}"
 
 
-def table_one_segment(rows: list[Found]) -> str:
+def table_one_segment(found: list[Compared]) -> str:
     lines = []
-    for load in (*(worn.name for worn in LOADS), NOTHING):
-        masses = chosen(rows, load, "one segment", "mass")
-        moments = chosen(rows, load, "one segment", "first moment")
-        error = 1000 * np.sqrt(np.mean([(row.value - row.truth) ** 2 for row in moments]))
-        lines.append([load, mean_of(masses), inside(masses), f"{error:.0f}", inside(moments)])
-    return markdown(
-        ["load", "mass found [kg]", "inside", "first moment, RMS error [g m]", "inside"], lines
-    )
-
-
-def table_differences(rows: list[Found]) -> str:
-    lines = []
-    for worn in LOADS:
-        for method in ESTIMATORS:
-            total = chosen(rows, worn.name, method, "total mass")
-            own = chosen(rows, worn.name, method, "own mass")
-            resolved = f"{np.mean([row.truth for row in own]):.3f}"
-            lines.append(
-                [
-                    worn.name,
-                    method,
-                    mean_of(total),
-                    inside(total),
-                    mean_of(own),
-                    resolved,
-                    inside(own),
-                ]
+    for carried in (True, False):
+        for segment, mass_kg in LOADS.values():
+            chosen = [one for one in found if (one.segment, one.carried) == (segment, carried)]
+            masses, moments = (
+                pd.concat([one.rows(ONE, segment, *names) for one in chosen])
+                for names in (["m"], ["mcx", "mcy", "mcz"])
             )
-    header = ["load", "estimator", "total mass [kg]", "inside", "segment's own mass [kg]"]
-    return markdown([*header, "of it resolved", "inside"], lines)
+            error = 1000 * np.sqrt(((moments["difference"] - moments["truth"]) ** 2).mean())
+            name = f"{mass_kg:g} kg, {segment}" if carried else f"nothing, {segment}"
+            lines.append([name, mean_of(masses), inside(masses), f"{error:.0f}", inside(moments)])
+    header = ["load", "mass found [kg]", "inside", "first moment, RMS error [g m]", "inside"]
+    return markdown(header, lines)
 
 
-def table_traces(rows: list[Found]) -> str:
+def table_differences(found: list[Compared]) -> str:
     lines = []
-    names = [f"{worn.name}, {how}" for worn in LOADS for how in ("not declared", "declared")]
-    for name in (NOTHING, *names):
-        for method in ESTIMATORS:
-            cells: list[object] = [name, method]
-            for quantity in ("masses", "first moments"):
-                found = chosen(rows, name, method, quantity)
-                rms = np.sqrt(np.mean([row.value**2 for row in found]))
-                share = np.mean([row.is_inside for row in found])
-                cells += [f"{rms:.3f}", f"{100 * share:.0f}"]
-            lines.append(cells)
-    header = ["load", "estimator", "masses, RMS [kg]", "inside [%]"]
-    return markdown([*header, "first moments, RMS [kg m]", "inside [%]"], lines)
+    for segment, mass_kg in LOADS.values():
+        chosen = [one for one in found if one.carried and one.segment == segment]
+        total, own = (
+            pd.concat([one.rows(TWO, where, "m") for one in chosen]) for where in ("all", segment)
+        )
+        whole = pd.concat([one.table[one.table["analysis"] == TWO] for one in chosen])
+        cells = [mean_of(total), inside(total), mean_of(own), f"{own['truth'].mean():.3f}"]
+        every = inside(whole.assign(truth=whole["expected"]))
+        lines.append([f"{mass_kg:g} kg, {segment}", *cells, inside(own), every])
+    header = ["load", "total mass [kg]", "inside", "segment's own mass [kg]", "of it resolved"]
+    return markdown([*header, "inside", "all parameters inside"], lines)
 
 
 def main() -> None:
@@ -295,12 +148,12 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=60.0, help="length of each sequence")
     parser.add_argument("--seed", type=int, default=101, help="of the first person")
     options = parser.parse_args()
-    rows: list[Found] = []
+    found: list[Compared] = []
     for seed in range(options.seed, options.seed + options.people):
         with tempfile.TemporaryDirectory() as folder:
-            rows += person(Path(folder), seed, options.seconds)
+            found += person(Path(folder), seed, options.seconds)
         print(f"person {seed} done", file=sys.stderr, flush=True)
-    print(f"\n{table_one_segment(rows)}\n\n{table_differences(rows)}\n\n{table_traces(rows)}")
+    print(f"\n{table_one_segment(found)}\n\n{table_differences(found)}")
 
 
 if __name__ == "__main__":

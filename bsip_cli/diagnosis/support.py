@@ -64,7 +64,7 @@ class Support:
             p_value,
             self.gain.interval(),
             self._numbers(),
-            self._sentence(),
+            f"{self.words()}, and what else may be wrong in this trial is not asked",
         )
 
     def _numbers(self) -> tuple[Number, ...]:
@@ -79,14 +79,15 @@ class Support:
             *(Number(name, "N", x, x - Z95 * e, x + Z95 * e) for name, x, e in rows),
         )
 
-    def _sentence(self) -> str:
+    def words(self) -> str:
+        """What was found."""
         hands = " and ".join(in_words(hand) for hand in self.hands)
         verb = "stand" if len(self.hands) > 1 else "stands"
         return (
             f"{hands} {verb} still within {1000 * self.hand_moves_m:.0f} mm while the trunk moves "
             f"by {1000 * self.trunk_moves_m:.0f} mm, and the plates miss "
             f"{np.linalg.norm(self.force_N):.0f} N of the trial's mean force: something beside "
-            "them bears it, and what else may be wrong in this trial is not asked"
+            "them bears it"
         )
 
 

@@ -9,6 +9,8 @@ from bsip_cli.artifacts import empty_table
 from bsip_cli.body.names import in_words as segment_in_words
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.diagnosis.evidence import slow
+from bsip_cli.diagnosis.support import support_of
 from bsip_cli.dynamics.base_parameters import expressions
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.identification.base import base_parameters
@@ -29,6 +31,7 @@ from bsip_cli.stages.identification_problem import (
     usable_frames,
 )
 from bsip_cli.stages.known_loads import load_words, loads_record
+from bsip_cli.stages.trial_scene import motion_and_wrench_of
 from bsip_cli.statistics.methods import OM, RM_MASS
 from bsip_cli.study.study import Trial
 
@@ -41,7 +44,8 @@ def run(unit: Unit) -> None:
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     regression = unit.read("regression")
     prior = prior_from(unit, regression, person)
-    trials = _identification_trials(unit)
+    contacts = _external_contacts(unit, person, prior.phi)
+    trials = _identification_trials(unit, contacts)
     recordings, blocks = recordings_of(unit, person, trials)
     _tell_of_loads(unit, [trial for trial in trials if trial.stem in set(blocks["trial"])])
     if duration_s(recordings) < _SHORTEST_S:
@@ -92,24 +96,50 @@ def _estimators(unit: Unit) -> dict[str, str]:
 # --- which data -------------------------------------------------------------------------------
 
 
-def _identification_trials(unit: Unit) -> list[Trial]:
-    """The trials with the role; without one, the trial with most valid frames."""
+def _external_contacts(unit: Unit, person: Person, phi: np.ndarray) -> dict[str, str]:
+    """What the balance of forces with the table's body (10 n,) shows beside the plates, in words,
+    by trial."""
+    found = {}
+    for trial in unit.trials("kinematics", "wrench"):
+        if usable_frames(unit, trial).any():
+            support = support_of(slow(motion_and_wrench_of(unit, person, phi, trial)))
+            if support is not None:
+                found[trial.stem] = support.words()
+    return found
+
+
+def _identification_trials(unit: Unit, contacts: dict[str, str]) -> list[Trial]:
+    """The trials with the role; without one, the trial with most valid frames. Never one with an
+    external contact: the body would be made to bear what the contact bears."""
     ready = unit.trials("kinematics", "wrench")
     named = [trial for trial in ready if trial.role == "sequence"]
-    if named:
-        return named
-    counts = {trial.stem: int(usable_frames(unit, trial).sum()) for trial in ready}
-    moving = [t for t in ready if t.role != "static" and counts[t.stem] > 0] or list(ready)
-    if not any(counts.values()):
-        return []
-    chosen = max(moving, key=lambda trial: counts[trial.stem])
-    unit.warn(f"{unit.name}: no trial of an identification task; {chosen.stem} identifies")
-    if len(ready) == 1 and unit.config.identify.hold_out_fraction == 0:
-        unit.warn(
-            f"{unit.name}: no other trial validates, so the fit is judged on the data it was made "
-            "from; identify.hold_out_fraction would keep blocks out"
-        )
-    return [chosen]
+    chosen = [trial for trial in named if trial.stem not in contacts]
+    if not chosen:
+        counts = {trial: int(usable_frames(unit, trial).sum()) for trial in ready}
+        measured = [trial for trial in ready if counts[trial] > 0]
+        moving = [trial for trial in measured if trial.role != "static"] or measured
+        free = [trial for trial in moving if trial.stem not in contacts]
+        chosen = [max(free, key=lambda trial: counts[trial])] if free else []
+    _tell_of_contacts(unit, named or list(ready), chosen, contacts)
+    if chosen and not named:
+        unit.warn(f"{unit.name}: no trial of an identification task; {chosen[0].stem} identifies")
+        if len(ready) == 1 and unit.config.identify.hold_out_fraction == 0:
+            unit.warn(
+                f"{unit.name}: no other trial validates, so the fit is judged on the data it was "
+                "made from; identify.hold_out_fraction would keep blocks out"
+            )
+    return chosen
+
+
+def _tell_of_contacts(
+    unit: Unit, asked: list[Trial], chosen: list[Trial], contacts: dict[str, str]
+) -> None:
+    instead = ", ".join(trial.stem for trial in chosen)
+    used = f"{instead} identifies instead" if chosen else "no trial is left to identify from"
+    for trial in asked:
+        if trial.stem in contacts:
+            found = contacts[trial.stem]
+            unit.warn(f"{unit.name}: {trial.stem} does not identify: {found}; {used}")
 
 
 def _tell_of_loads(unit: Unit, trials: list[Trial]) -> None:

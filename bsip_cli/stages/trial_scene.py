@@ -24,28 +24,34 @@ def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = 
 
     Known loads are part of what is simulated. The markers bear the labels that the poses rest on.
     """
-    kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
-    plates = _plates(unit.read("plates", trial), wrench)
     times, labels, positions = markers_from(unit.read("markers", trial))
     markers = ordered_markers(labels, positions, person.markers)
     markers = with_labels_put_right(
         markers, times, person.markers, unit.read("marker-events", trial)
     )
-    q, v, a = coordinates_from(kinematics, person.skeleton)
-    valid = wrench["valid"].to_numpy() & kinematics["determined"].to_numpy()
-    scene = Scene(
+    scene = motion_and_wrench_of(unit, person, phi, trial)
+    return replace(
+        scene,
+        plates=_plates(unit.read("plates", trial), unit.read("wrench", trial)),
+        robust_limit_m=unit.config.ik.robust_limit_m,
+        residual_m=marker_residuals(person, scene.q, markers),
+    )
+
+
+def motion_and_wrench_of(
+    unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = None
+) -> Scene:
+    """The same without single plates and without markers."""
+    kinematics, wrench = unit.read("kinematics", trial), unit.read("wrench", trial)
+    return Scene(
         kinematics["time_s"].to_numpy(),
         person,
-        q,
-        v,
-        a,
+        *coordinates_from(kinematics, person.skeleton),
         phi + load_phi(unit, person, trial),
-        plates,
-        valid,
-        robust_limit_m=unit.config.ik.robust_limit_m,
+        plates=(),
+        valid=wrench["valid"].to_numpy() & kinematics["determined"].to_numpy(),
         wrench=wrench[WRENCH].to_numpy(),
     )
-    return replace(scene, residual_m=marker_residuals(person, q, markers))
 
 
 def with_labels_put_right(

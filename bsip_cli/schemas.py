@@ -487,7 +487,7 @@ SCHEMAS = {
         Schema(
             "identification",
             "participant",
-            2,
+            3,
             "what the identification used and reached",
             (
                 _text("estimator", "name of the estimator"),
@@ -507,6 +507,21 @@ SCHEMAS = {
                     "residual of the fit, about the middle of the motion",
                 ),
                 _text("note", "what a reader should mind"),
+                Column(
+                    "distance",
+                    "float",
+                    "1",
+                    "squared distance of the body from the table in the spread of people, all "
+                    "segments together; empty for RM+mass",
+                ),
+                Column(
+                    "probability",
+                    "float",
+                    "1",
+                    "part of people whose body, identified from such data, is as far or further",
+                ),
+                Column("rare", "bool", "", "below 1 in 100: do not use these parameters"),
+                _text("farthest", "the segments that make half of the distance, in words"),
             ),
         ),
         Schema(

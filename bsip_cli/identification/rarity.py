@@ -29,6 +29,11 @@ class Rarity:
     def is_rare(self) -> bool:
         return self.probability < RARE
 
+    def farthest(self) -> list[int]:
+        """The fewest segments that make half of the distance, the largest share first."""
+        order = np.argsort(-self.shares)[: np.count_nonzero(self.shares)]
+        return order[: int(np.searchsorted(self.shares[order].cumsum(), 0.5)) + 1].tolist()
+
 
 def rarity_of(prior: Prior, estimate: Estimate) -> Rarity:
     """Of the free segments' parameters.

@@ -19,6 +19,7 @@ from bsip_cli.identification.equations import Recording
 from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.identification.excitation import Excitation, excitation
 from bsip_cli.identification.movement_gain import advice
+from bsip_cli.identification.rarity import RARE, Rarity, rarity_of
 from bsip_cli.identification.uncertainty import readable
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH, bsip_table, person_from
@@ -49,7 +50,7 @@ def run(unit: Unit) -> None:
     recordings, blocks = recordings_of(unit, person, trials)
     _tell_of_loads(unit, [trial for trial in trials if trial.stem in set(blocks["trial"])])
     if duration_s(recordings) < _SHORTEST_S:
-        _write_table_only(unit, regression, recordings)
+        _write_table_only(unit, regression, recordings, contacts)
         return
     _tell_of_fixed(unit, person)
     problem, reference = problem_of(unit, person, prior, recordings)
@@ -60,6 +61,7 @@ def run(unit: Unit) -> None:
     for method, result in results.items():
         unit.warn(f"{unit.name}: {method} ({estimators[method]}): {estimates[method].note}")
         tables.append(bsip_table(method, skeleton.segments, result.values, result.sd, result.share))
+    rarity = _rarity(unit, skeleton, problem, estimates)
     unit.write(
         "bsip",
         pd.concat(tables, ignore_index=True),
@@ -72,19 +74,30 @@ def run(unit: Unit) -> None:
     unit.write("base-parameters", _base_table(skeleton, problem))
     found = excitation(problem)
     unit.write("excitation", _excitation_table(person, problem, found, results[OM].share))
-    unit.write("identification", _summary(problem, found, estimates, estimators, blocks))
+    unit.write(
+        "identification",
+        _summary(problem, found, estimates, estimators, blocks).assign(**rarity),
+        facts={"external_contacts": contacts},
+    )
     unit.write("used-blocks", blocks)
 
 
-def _write_table_only(unit: Unit, regression: pd.DataFrame, recordings: list[Recording]) -> None:
+def _write_table_only(
+    unit: Unit,
+    regression: pd.DataFrame,
+    recordings: list[Recording],
+    contacts: dict[str, str],
+) -> None:
     """Without forces that belong to the motion the table's values stand alone."""
     unit.warn(
         f"{unit.name}: {duration_s(recordings):.2f} s of motion with every contact on a plate, "
         f"needed are {_SHORTEST_S:g} s: nothing is identified, the table (RM) stands alone"
     )
     unit.write("bsip", regression.drop(columns="note"))
-    for kind in ("base-parameters", "excitation", "identification", "used-blocks"):
+    for kind in ("base-parameters", "excitation", "used-blocks"):
         unit.write(kind, empty_table(kind))
+    empty = empty_table("identification")
+    unit.write("identification", empty, facts={"external_contacts": contacts})
 
 
 def _estimators(unit: Unit) -> dict[str, str]:
@@ -160,6 +173,39 @@ def _tell_of_fixed(unit: Unit, person: Person) -> None:
 
 
 # --- the estimate -----------------------------------------------------------------------------
+
+
+def _rarity(
+    unit: Unit, skeleton: Skeleton, problem: Problem, estimates: dict[str, Estimate]
+) -> pd.DataFrame:
+    """Columns of ``identification``: whose body is rarer than people allow; RM+mass is the table's
+    body, for which its number stands."""
+    rows = []
+    for method, estimate in estimates.items():
+        if method == RM_MASS:
+            rows.append((np.nan, np.nan, False, ""))
+            continue
+        found = rarity_of(problem.prior, estimate)
+        words = _farthest_in_words(skeleton, found, estimate.phi[::10], problem.prior.phi[::10])
+        rows.append((found.distance, found.probability, found.is_rare, words))
+        if found.is_rare:
+            unit.warn(
+                f"{unit.name}: do not use {method}: a body like this is rarer than 1 in "
+                f"{1 / RARE:.0f} people, most by {words}"
+            )
+    return pd.DataFrame(rows, columns=["distance", "probability", "rare", "farthest"])
+
+
+def _farthest_in_words(
+    skeleton: Skeleton, found: Rarity, masses_kg: np.ndarray, table_kg: np.ndarray
+) -> str:
+    """The segments that make half of the distance, with their masses (n,)."""
+    parts = [
+        f"the {segment_in_words(skeleton.segments[i])} ({100 * found.shares[i]:.0f} % of the "
+        f"distance from the table; {masses_kg[i]:.2f} kg, table {table_kg[i]:.2f} kg)"
+        for i in found.farthest()
+    ]
+    return ", ".join(parts)
 
 
 def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:

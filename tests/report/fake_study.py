@@ -254,6 +254,7 @@ class Artifacts:
             "mass_factor": MASS_FACTOR,
             "mass_factor_sd": 0.002,
         }
+        row |= {"distance": 9.0, "probability": 0.4, "rare": False, "farthest": "the head"}
         row |= {f"rms_{c}_N": 4.5 for c in ("fx", "fy", "fz")}
         row |= {f"rms_{c}_Nm": 2.25 for c in ("mx", "my", "mz")}
         one_number = {"estimator": "mass_factor", "method": RM_MASS, "note": "times 0.96"}

@@ -241,9 +241,8 @@ def inject(source, out, participants, seed, **effects):
 @_PARTICIPANT
 @click.option(
     "--method",
-    default="OM",
-    show_default=True,
-    help="Whose inertial parameters: OM, RM+mass, RM or the name of an estimator.",
+    help="Whose inertial parameters: OM, RM+mass, RM or the name of an estimator; without it, what "
+    "`bsip choose` found best over all movements.",
 )
 @click.option(
     "--format",

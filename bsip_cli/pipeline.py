@@ -214,6 +214,15 @@ STAGES = (
         part="gain",
     ),
     Stage(
+        "choose",
+        "participant",
+        "Which parameters to use, by the errors in movements that OM never saw.",
+        reads=("identification", "used-blocks", "fit", "reconstruction"),
+        writes=("choice",),
+        options=("roles",),
+        module="bsip_cli.stages.choose",
+    ),
+    Stage(
         "stats",
         "cohort",
         "Tests and summaries over all participants.",
@@ -258,6 +267,7 @@ STAGES = (
             "attribution",
             "overall-gain",
             "bsip-change",
+            "choice",
         ),
         writes=("report-files",),
         options=("skeleton", "loads", "roles"),

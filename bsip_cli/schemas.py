@@ -105,6 +105,19 @@ def share_name(name: str) -> str:
     return f"{_without_unit(name)}_data_share"
 
 
+def _ratio(name: str, meaning: str) -> tuple[Column, ...]:
+    return (
+        Column(f"ratio_{name}", "float", "1", f"{meaning}, geometric mean of eight components"),
+        Column(
+            f"log_error_{name}",
+            "float",
+            "1",
+            "standard error of its logarithm: between trials (of one trial: from its independent "
+            "samples; of all: between movements), widened by Student's t; nan where nothing tells",
+        ),
+    )
+
+
 _COMPARISON = (
     _text("table", "table of the papers it belongs to"),
     _text("variable", "what is compared"),
@@ -706,6 +719,26 @@ SCHEMAS = {
             "what the extended model gains over all trials that the causes concern",
             _GAIN,
             "gain",
+        ),
+        Schema(
+            "choice",
+            "participant",
+            1,
+            "which parameters to use, over all movements (the first row) and in each",
+            (
+                _text("movement", "task of the trials, or all"),
+                _text("use", "OM, RM+mass or RM"),
+                *_ratio("om", "OM's error over RM's"),
+                *_ratio("rm_mass", "RM+mass's error over RM's"),
+                *_ratio("om_rm_mass", "OM's error over RM+mass's"),
+                Column("trials", "int", "1", "that judge"),
+                _text(
+                    "data",
+                    "whole_trials that OM never saw; held_out: seconds of the identification "
+                    "trials, where there is no other trial; none",
+                ),
+                _text("reason", "in words"),
+            ),
         ),
         Schema(
             "correlation-difference",

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli import __version__
-from bsip_cli.artifacts import remove, write_atomically
+from bsip_cli.artifacts import is_made_from, remove, write_atomically
 from bsip_cli.body.exports.body_map import (
     BodyMap,
     check_segments,
@@ -34,6 +34,7 @@ from bsip_cli.errors import BadDataError, BsipError, UsageError
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.files.regular import check_regular
 from bsip_cli.pipeline import Stage
+from bsip_cli.report.choice import headline
 from bsip_cli.running.lock import held_alone
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import follow, open_study
@@ -49,19 +50,20 @@ _READER = Stage(
     reads=("skeleton", "marker-positions", "bsip"),
     writes=(),
     options=("skeleton",),
+    reads_if_there=("choice",),
 )
 _FILE_NAME = re.compile(r"[A-Za-z0-9_+-]+")
 
 
 @dataclass(frozen=True)
 class Request:
-    """What the user asks for; no ``formats`` are all of them.
+    """What the user asks for; no ``formats`` are all of them, no ``method`` is the person's choice.
 
     ``model_file`` is an OpenSim model to be given the inertias, ``model_bodies`` names its map;
     ``repair`` replaces tensors that no body can have by the nearest possible ones.
     """
 
-    method: str
+    method: str | None = None
     formats: tuple[str, ...] = ()
     model_file: Path | None = None
     model_bodies: str | None = None
@@ -155,7 +157,11 @@ def _export(
     errors: list[BsipError] = []
     try:
         with held_alone(unit.out / unit.name):
-            body = _identified(unit, skeleton, request.method)
+            method = request.method
+            if method is None:
+                method, note = _chosen(unit)
+                notes.append(note)
+            body = _identified(unit, skeleton, method)
             if request.repair:
                 known = body.made_of
                 body = body.repaired()
@@ -187,6 +193,27 @@ def _outcome(unit: Unit, written: list[str], notes: list[str], errors: list[Bsip
 
 def _write(text: str, path: Path) -> None:
     path.write_bytes(text.encode())
+
+
+def _chosen(unit: Unit) -> tuple[str, str]:
+    """The method that `bsip choose` found best over all movements, and why.
+
+    Raises
+    ------
+    UsageError
+        It has not chosen, or of an earlier identification.
+    """
+    path = unit.path("choice")
+    if not unit.has("choice") or not is_made_from(path, unit.path("identification")):
+        raise UsageError(
+            "says not which parameters to use, or of an earlier identification",
+            file=path,
+            expected="the result of `bsip choose`",
+            remedy="run `bsip choose` or `bsip run`, or name a method with --method",
+        )
+    choice = unit.read("choice")
+    first = choice.iloc[0]
+    return str(first["use"]), f"{headline(choice)}; {first['reason']}"
 
 
 def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson:

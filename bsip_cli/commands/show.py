@@ -11,6 +11,7 @@ import pandas as pd
 
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
 from bsip_cli.errors import BadDataError, UsageError, printable
+from bsip_cli.report.choice import headline
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.shared import SHARED, Searched, searched, shared_causes
 from bsip_cli.report.tables.build import show as tables_of
@@ -41,7 +42,7 @@ def shown(out: Path) -> Iterator[str]:
         )
     tables = tables_of(out)
     people = sorted(out.glob("sub-*/*_diagnosis.parquet"))
-    notes = list(_mass_notes(out))
+    notes = [*_mass_notes(out), *_choices(out)]
     if not tables and not people and not notes:
         raise UsageError(
             "there are no tables and no diagnoses",
@@ -83,6 +84,19 @@ def _mass_notes(out: Path) -> Iterator[str]:
         note = "" if person is None else str(person["mass_note"].iloc[0])
         if note:
             yield _wrapped(f"{folder.name}: {note}", _width(get_terminal_size().columns))
+
+
+def _choices(out: Path) -> Iterator[str]:
+    """Which parameters to use, a line per person."""
+    for folder in sorted(path for path in out.glob("sub-*") if path.is_dir()):
+        try:
+            choice = _table(folder, "choice")
+        except BadDataError as error:
+            yield str(error)
+            continue
+        if choice is not None:
+            text = f"{folder.name}: {headline(choice)}; {choice['reason'].iloc[0]}"
+            yield _wrapped(text, _width(get_terminal_size().columns))
 
 
 def _person(folder: Path) -> tuple[Searched, str] | None:

@@ -10,9 +10,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.words import COMPONENTS, number, signed
-from bsip_cli.statistics.methods import METHODS, OM, RIVALS, RM, RM_MASS
-
-SAME_WITHIN = 0.01  # errors that differ by less count as equal
+from bsip_cli.statistics.methods import METHODS, OM, RIVALS, RM, RM_MASS, SAME_WITHIN
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ class TrialRecord:
 class ParticipantRecord:
     """One participant; ``facts`` is the single row of the ``person`` artifact, ``loads`` the known
     loads as (trial label, words). ``diagnosis``, ``detection``, ``gains`` and ``changes`` (of a model
-    extended by what was found) are None where their stages have not run; ``too_short_s``: trials that
+    extended by what was found), and ``choice`` are None where their stages have not run; ``too_short_s``: trials that
     had no part in the diagnosis, with the seconds of them that can be used."""
 
     id: str
@@ -83,6 +83,7 @@ class ParticipantRecord:
     detection: pd.DataFrame | None = None
     gains: pd.DataFrame | None = None
     changes: pd.DataFrame | None = None
+    choice: pd.DataFrame | None = None
 
     def mass_kg(self) -> float:
         return float(self.facts["mass_kg"])

@@ -3,7 +3,7 @@
 Reads quality, contacts, skeleton, marker-positions, person, kinematics, marker-residuals,
 marker-events, bsip, base-parameters, excitation, identification, reconstruction, fit,
 posturography; where they are there overall-diagnosis, detection, attribution, overall-gain,
-bsip-change. Writes report-files.
+bsip-change, choice. Writes report-files.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ _TABLES = {  # field of a trial's record: kind of artifact
 _FOUND = {  # field of a participant's record: kind that is there only if its stage has run
     "diagnosis": "overall-diagnosis",
     "detection": "detection",
+    "choice": "choice",
 }
 
 

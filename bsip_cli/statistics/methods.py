@@ -10,6 +10,8 @@ RIVALS = (RM, RM_MASS)
 
 METHODS = (*RIVALS, OM)
 
+SAME_WITHIN = 0.01  # errors that differ by less count as equal
+
 
 def is_extended(method: str) -> bool:
     """OM with causes that the diagnosis named in the model: ``OM+<effect>``."""

@@ -14,12 +14,13 @@ import pinocchio as pin
 import pytest
 
 from bsip_cli import __version__
-from bsip_cli.artifacts import write_artifact
+from bsip_cli.artifacts import empty_table, write_artifact
 from bsip_cli.body.exports.formats import FORMATS
 from bsip_cli.body.exports.identified import IdentifiedPerson, plain_names, xml_comment
 from bsip_cli.cli import cli
 from bsip_cli.errors import BadDataError
 from bsip_cli.running.provenance import file_hash
+from bsip_cli.schemas import column_names
 from bsip_cli.stages.frames import bsip_table
 from tests.exports.exported_person import identified_person
 from tests.exports.test_osim_given import draw, inertias_in
@@ -59,6 +60,17 @@ def readable(body: IdentifiedPerson) -> np.ndarray:
     return np.array([inertia.readable() for inertia in body.inertias])
 
 
+def write_choice(made: Results, participant: str, use: str = "OM") -> None:
+    """As `choose` would, from the identification that is there."""
+    source = made.artifact("identification", participant)
+    write_artifact(source, "identification", empty_table("identification"), NOTES)
+    names = column_names("choice")
+    row = dict.fromkeys(names, 0.5) | {"movement": "all", "use": use, "trials": 3}
+    frame = pd.DataFrame([row | {"data": "whole_trials", "reason": "it errs less"}])
+    notes = NOTES | {"made_by": {"inputs": {source.name: file_hash(source)}}}
+    write_artifact(made.artifact("choice", participant), "choice", frame, notes)
+
+
 def impossible(values: np.ndarray, segment: int) -> np.ndarray:
     """Izz beyond Ixx + Iyy."""
     changed = values.copy()
@@ -77,6 +89,7 @@ def results(tmp_path) -> Results:
         write_person(made, name)
         values = readable(identified_person())
         made.write_inertias({"RM": values, "OM": values * 1.0}, name)
+        write_choice(made, name)
     (made.study / "participants.tsv").write_text("\n".join(lines) + "\n")
     return made
 
@@ -120,7 +133,8 @@ def test_writes_every_format_of_everybody(results):
     assert (done.returncode, done.stdout) == (0, "")
     wanted = {f"{s}/export/{s}_OM{e}" for s in ("sub-01", "sub-02") for e in ENDINGS}
     assert results.files() == wanted
-    first, _, summary = done.stderr.splitlines()
+    why, first, *_, summary = done.stderr.splitlines()
+    assert why == "export: sub-01: use OM; it errs less"
     assert first.startswith(f"export: sub-01: {results.out / 'sub-01' / 'export'}: sub-01_OM.urdf")
     assert summary == f"bsip export: 2 done; results in {results.out}"
 
@@ -140,6 +154,22 @@ def test_every_file_says_what_made_it(results):
         for kind in ("bsip", "skeleton", "marker-positions"):
             path = results.artifact(kind)
             assert f"{path.name} sha256 {file_hash(path)}" in text
+
+
+def test_the_choice_is_the_default_and_must_be_of_this_identification(results):
+    write_choice(results, "sub-01", use="RM")
+    only = ("--participant", "sub-01", "--format", "csv")
+    assert results.call(*only).returncode == 0
+    assert results.files() == {"sub-01/export/sub-01_RM.csv"}
+    write_artifact(
+        results.artifact("identification"),
+        "identification",
+        empty_table("identification"),
+        NOTES | {"facts": {"made": "anew"}},
+    )
+    done = results.call(*only)
+    assert done.returncode == 2 and "run `bsip choose`" in done.stderr
+    assert results.call(*only, "--method", "OM").returncode == 0
 
 
 def test_twice_gives_the_same_bytes_and_no_rest(results):

@@ -119,6 +119,7 @@ class Artifacts:
         self.write("base-parameters", base_parameters())
         self.write("excitation", excitation(self.skeleton))
         self.write("identification", self.identification(), None, f"mind {EVIL}")
+        self.write("choice", choice())
         moving = [trial.stem for trial in self.person.trials[1:]]
         self.write("overall-diagnosis", diagnosis(moving))
         self.write("detection", detection(moving))
@@ -388,6 +389,19 @@ class Artifacts:
                     }
                 )
         return pd.DataFrame(rows)
+
+
+def choice() -> pd.DataFrame:
+    """OM over all, RM in walking."""
+    ratios = {"ratio_om": 0.6, "ratio_rm_mass": 0.9, "ratio_om_rm_mass": 0.67}
+    known = ratios | {name.replace("ratio", "log_error"): 0.1 for name in ratios}
+    known |= {"trials": 2, "data": "whole_trials"}
+    return pd.DataFrame(
+        [
+            {"movement": "all", "use": OM, "reason": "it errs less", **known},
+            {"movement": "basketball", "use": RM, "reason": f"mind {EVIL}", **known},
+        ]
+    )
 
 
 def quality() -> pd.DataFrame:

@@ -83,6 +83,12 @@ def test_numbers_are_those_of_the_artifacts(reports, text):
         assert number(row["schwer_c"], 3) in text
 
 
+def test_the_summary_begins_with_which_parameters_to_use(text):
+    assert text.index("Which parameters to use") < text.index("Is anything wrong?")
+    assert "Use OM (in basketball: RM). It errs less." in text
+    assert "0.60 (0.54 to 0.66)" in text  # one standard error of the logarithm to either side
+
+
 def test_summary_tells_where_the_table_is_better(text):
     assert (
         "OM has the smaller error in 7 of 8 components (the vertical force counts once), RM "

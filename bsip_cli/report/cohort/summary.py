@@ -8,7 +8,7 @@ from bsip_cli.report.blocks import Block, Bullets, Grid, Heading, Paragraph, Sec
 from bsip_cli.report.cohort import diagnoses
 from bsip_cli.report.cohort.ratios import Ratios
 from bsip_cli.report.cohort.record import CohortRecord
-from bsip_cli.report.gains import SAME_WITHIN, one_number_alone
+from bsip_cli.report.gains import one_number_alone
 from bsip_cli.report.words import (
     component_label,
     count,
@@ -16,7 +16,7 @@ from bsip_cli.report.words import (
     percent,
     signed,
 )
-from bsip_cli.statistics.methods import OM, RM_MASS
+from bsip_cli.statistics.methods import OM, RM_MASS, SAME_WITHIN
 
 
 def section(record: CohortRecord) -> Section:

@@ -10,7 +10,7 @@ import pandas as pd
 from bsip_cli.report.blocks import Block, Cell, Grid, Heading, Mark, Paragraph, Picture, Section
 from bsip_cli.report.figures.cop_path import CopPath, cop_path
 from bsip_cli.report.figures.methods_over_time import MethodsOverTime, methods_over_time
-from bsip_cli.report.gains import SAME_WITHIN, Gain, gains_of
+from bsip_cli.report.gains import Gain, gains_of
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, clock_of, flags_of, signals_of
 from bsip_cli.report.windows import hull_of, middle_of_longest
 from bsip_cli.report.words import (
@@ -22,7 +22,7 @@ from bsip_cli.report.words import (
     percent,
     signed,
 )
-from bsip_cli.statistics.methods import MEASURED, OM
+from bsip_cli.statistics.methods import MEASURED, OM, SAME_WITHIN
 
 _WINDOW_S = 10.0
 _ROOM_S = 0.2

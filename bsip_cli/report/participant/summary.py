@@ -6,7 +6,6 @@ import numpy as np
 
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Heading, Paragraph, Section
 from bsip_cli.report.gains import (
-    SAME_WITHIN,
     Errors,
     Gain,
     PooledGain,
@@ -15,6 +14,7 @@ from bsip_cli.report.gains import (
     pooled_gains,
     relative_change,
 )
+from bsip_cli.report.participant import choice
 from bsip_cli.report.participant.diagnosis import verdict
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, messages
 from bsip_cli.report.words import (
@@ -27,7 +27,7 @@ from bsip_cli.report.words import (
     signed,
     trial_label,
 )
-from bsip_cli.statistics.methods import METHODS, OM, RIVALS, RM, RM_MASS
+from bsip_cli.statistics.methods import METHODS, OM, RIVALS, RM, RM_MASS, SAME_WITHIN
 from bsip_cli.statistics.normal import Z95
 
 _STRONGEST = 6
@@ -37,6 +37,7 @@ _SEXES = {"M": "a man", "F": "a woman"}
 def section(record: ParticipantRecord) -> Section:
     blocks: list[Block] = [
         *_mass_note(record),
+        *choice.blocks(record),
         Heading("Is anything wrong?"),
         *verdict(record),
         Heading("Who and what"),

@@ -1,0 +1,100 @@
+"""Which parameters follow the measured forces best: errors of methods compared in pairs.
+
+The error of a method in a trial is the geometric mean of the RMSE in all components, so that
+newtons, newton metres and millimetres count alike; two methods are compared by the difference of
+its logarithms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm, t
+
+from bsip_cli.statistics.effective_samples import effective_samples
+from bsip_cli.statistics.methods import OM, RM, RM_MASS, SAME_WITHIN
+from bsip_cli.statistics.stretches import Stretches
+
+COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
+PAIRS = ((OM, RM), (OM, RM_MASS), (RM_MASS, RM))
+
+Pair = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Of the logarithms of two methods' errors, and its standard error; that is widened by
+    Student's t where few trials or samples tell it, so that it always means the same confidence
+    (84 % to one side), and is nan where nothing tells it."""
+
+    log: float
+    error: float
+
+    @classmethod
+    def of_ratio(cls, ratio: float, error: float) -> Difference:
+        return cls(float(np.log(ratio)), error)
+
+    def is_better(self) -> bool:
+        """The first errs less, by more than the standard error and than what counts as equal."""
+        return self.log < -self.error and self.log < np.log(1 - SAME_WITHIN)
+
+    @property
+    def ratio(self) -> float:
+        return float(np.exp(self.log))
+
+    def interval(self) -> tuple[float, float]:
+        """Of the ratio, one standard error to either side."""
+        return float(np.exp(self.log - self.error)), float(np.exp(self.log + self.error))
+
+
+Differences = Mapping[Pair, Difference]
+
+
+def between(logs: Sequence[float]) -> Difference:
+    """From as many independent differences: of trials of a movement, or of movements."""
+    n = len(logs)
+    error = float(np.std(logs, ddof=1)) / np.sqrt(n) if n > 1 else np.nan
+    return Difference(float(np.mean(logs)), error * _widened(n))
+
+
+def within(first: np.ndarray, second: np.ndarray, stretches: Stretches) -> Difference:
+    """From one trial: residuals (N, components) of two methods, nan where there is none.
+
+    The mean logarithm of the RMSE is linearised in the squared residuals; its change over time is
+    a series whose independent samples give the standard error.
+    """
+    (log, slopes), (other_log, other_slopes) = (_log_error(r, stretches) for r in (first, second))
+    series = slopes - other_slopes
+    n = effective_samples(series, stretches)
+    error = float(np.nanstd(series)) / np.sqrt(n)
+    return Difference(log - other_log, error * _widened(n))
+
+
+def chosen(differences: Differences, is_rare: bool) -> str:
+    """OM where it is better than both others and a likely body, else RM+mass where it is better
+    than RM, else RM."""
+    better = {pair for pair, one in differences.items() if one.is_better()}
+    if {(OM, RM), (OM, RM_MASS)} <= better and not is_rare:
+        return OM
+    return RM_MASS if (RM_MASS, RM) in better else RM
+
+
+def _widened(n: float) -> float:
+    """By how much Student's t of n samples widens one standard error of a known spread."""
+    return float(t.ppf(norm.cdf(1.0), n - 1)) if n > 1 else np.nan
+
+
+def _log_error(residuals: np.ndarray, stretches: Stretches) -> tuple[float, np.ndarray]:
+    """Mean logarithm of the RMSE, and how each frame (N,) moves it; nan outside the stretches."""
+    squares = np.full(residuals.shape, np.nan)
+    for start, stop in stretches:
+        squares[start:stop] = residuals[start:stop] ** 2
+    frames = int(np.isfinite(squares).any(axis=1).sum())
+    counts = np.isfinite(squares).sum(axis=0)
+    squares, counts = squares[:, counts > 0], counts[counts > 0]
+    means = np.nanmean(squares, axis=0)
+    slopes = 0.5 * np.nan_to_num(squares / means - 1) * frames / counts
+    slopes[~np.isfinite(squares).any(axis=1)] = np.nan
+    return float(0.5 * np.log(means).mean()), slopes.mean(axis=1)

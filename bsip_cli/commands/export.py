@@ -204,7 +204,7 @@ def _chosen(unit: Unit) -> tuple[str, str]:
         It has not chosen, or of an earlier identification.
     """
     path = unit.path("choice")
-    if not unit.has("choice") or not is_made_from(path, unit.path("identification")):
+    if not path.exists() or not is_made_from(path, unit.path("identification")):
         raise UsageError(
             "says not which parameters to use, or of an earlier identification",
             file=path,

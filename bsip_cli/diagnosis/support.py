@@ -31,6 +31,7 @@ STILLER = 3.0  # times that the trunk moves further than such a hand
 UNBALANCED = 0.01  # of body weight: missing mean horizontal force
 LIGHTER = 0.02  # of body weight: missing mean vertical force
 SURE = 4.0  # standard errors
+SHORTEST_S = 2.0  # of measured contacts: what fewer seconds show is no mean of a trial
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +93,10 @@ class Support:
 
 
 def support_of(scene: Scene) -> Support | None:
-    """What the hands hold on to throughout a trial; None if they hold on to nothing."""
+    """What the hands hold on to throughout a trial; None if they hold on to nothing, or if its
+    measured part is too short to tell."""
+    if scene.valid.sum() < SHORTEST_S * scene.rate_hz:
+        return None
     paths = {name: _path_m(scene, name) for name in HANDS if name in scene.bodies}
     missing = (scene.predicted - scene.measured)[scene.valid, :3]
     weight = scene.mass_kg * GRAVITY_M_S2

@@ -25,6 +25,7 @@ from bsip_cli.diagnosis.scale_mass import (
 from bsip_cli.diagnosis.selection import select
 from bsip_cli.diagnosis.signatures import signatures_of
 from bsip_cli.diagnosis.stated_mass import loaded_plate, stated_mass_findings
+from bsip_cli.diagnosis.support import SHORTEST_S
 from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.scene import Scene
@@ -35,7 +36,6 @@ from bsip_cli.stages.diagnosis_facts import detection_rows, facts_of
 from bsip_cli.stages.diagnosis_rows import rows_of
 from bsip_cli.stages.frames import person_from
 from bsip_cli.stages.moving_trials import (
-    SHORTEST_S,
     LookedAt,
     is_weighed,
     moving_trials,

@@ -114,10 +114,9 @@ def _external_contacts(unit: Unit, person: Person, phi: np.ndarray) -> dict[str,
     by trial."""
     found = {}
     for trial in unit.trials("kinematics", "wrench"):
-        if usable_frames(unit, trial).any():
-            support = support_of(slow(motion_and_wrench_of(unit, person, phi, trial)))
-            if support is not None:
-                found[trial.stem] = support.words()
+        support = support_of(slow(motion_and_wrench_of(unit, person, phi, trial)))
+        if support is not None:
+            found[trial.stem] = support.words()
     return found
 
 

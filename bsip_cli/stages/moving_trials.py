@@ -15,7 +15,7 @@ from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.held_out import FOLDS, Gain
 from bsip_cli.diagnosis.marker_proof import BEND, Proof, Slip, proofs_of
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
-from bsip_cli.diagnosis.support import support_of
+from bsip_cli.diagnosis.support import SHORTEST_S, support_of
 from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.marker_shift import BEFORE_S
 from bsip_cli.effects.scene import Scene
@@ -28,7 +28,6 @@ from bsip_cli.stages.person_mass import PLATES
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study.study import Trial
 
-SHORTEST_S = 2.0
 # Of the spreads an offset is judged against: 17 mm for a marker that is trusted to 5.
 _FAR_OFF = 3.5
 _READ_TO_PERCENT = 0.3  # standard deviation of what the same plates read in another trial

@@ -50,7 +50,7 @@ OPTIONS = StudyOptions(
 TRIALS = ("task-sequence_run-1", "task-squat_run-1", "task-static")
 GOLDEN = Path(__file__).with_name("files_of_a_run.txt")
 FITTED_ONLY = "diagnosis_causes"  # a figure of those people of whom a cause was fitted in full
-UNITS = 2 * (3 * 5 + 8) + 3  # 5 stages per trial, 8 per participant, 3 of the cohort
+UNITS = 2 * (3 * 5 + 9) + 3  # 5 stages per trial, 9 per participant, 3 of the cohort
 
 
 @dataclass(frozen=True)
@@ -242,6 +242,7 @@ def test_show_prints_the_tables(first_run, bsip):
     assert str(first_run.out / "sub-02" / "report.html") in answer.out
     assert answer.out.count("| ") > 20
     assert "Is anything wrong: sub-01" in answer.out
+    assert [f"sub-0{k}: use " in answer.out for k in (1, 2)] == [True, True]
 
 
 def test_info_tells_what_made_an_artifact(first_run, bsip):

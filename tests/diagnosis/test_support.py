@@ -70,3 +70,9 @@ def test_who_moves_freely_does_not_hold_on_whatever_the_plates_say():
     heavier = replace(scene, wrench=1.1 * scene.predicted)
     assert support_of(scene) is None
     assert support_of(heavier) is None
+
+
+def test_too_few_measured_seconds_tell_nothing():
+    scene = moving()
+    for count in (0, 1, 150):
+        assert support_of(replace(scene, valid=np.arange(len(scene.valid)) < count)) is None

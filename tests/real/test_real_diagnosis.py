@@ -36,6 +36,11 @@ def diagnosis_of(study: Path, out: Path) -> pd.DataFrame:
     return table[table["verdict"] != "rejected"]
 
 
+def identifying(out: Path) -> set[str]:
+    """Trials that identified OM."""
+    return set(pd.read_parquet(out / "sub-01" / "sub-01_used-blocks.parquet")["trial"])
+
+
 def study_on_two_plates(folder: Path, **names: str) -> Path:
     """Trials of one person; in the files y is up and z sideways."""
     files = {
@@ -68,6 +73,7 @@ def test_a_mass_hidden_in_one_recording_is_not_told_of_the_other(tmp_path):
     bsip("inject", study, tmp_path / "copy", *hidden, "--effect-tasks", "squats")
     found = diagnosis_of(tmp_path / "copy", tmp_path / "out")
     assert "unmeasured_contact" not in set(found["effect"])
+    assert identifying(tmp_path / "out") == {"sub-01_task-squats"}
     masses = found[(found["effect"] == "added_mass") & (found["parameter"] == "mass")]
     assert set(masses["trials"]) == {"sub-01_task-squats"}
     assert (masses["ci_low"] < 1.0).all() and (masses["ci_high"] > 1.0).all()
@@ -87,3 +93,4 @@ def test_hands_on_a_rail_are_the_missing_kilograms(tmp_path):
     borne = found[found["parameter"] == "force_z"].set_index("trials")["estimate"]
     assert abs(borne["sub-01_task-righthip"] - 52) < 3
     assert abs(borne["sub-01_task-rightknee"] - 46) < 3
+    assert identifying(tmp_path / "out") == set()

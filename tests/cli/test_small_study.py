@@ -312,13 +312,14 @@ def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
     times = run.times()
     chosen = ("--participant", "sub-01", "--config", own)
     answer = bsip("run", run.study, "--out", run.out, *chosen)
-    assert answer.summary.startswith("bsip run: 11 done, 12 up to date;")
+    assert answer.summary.startswith("bsip run: 12 done, 12 up to date;")
     rewritten = run.rewritten(times)
     assert stages_of(rewritten) == {
         "reconstruct (trial)",
         "diagnose (trial)",
         "extend (trial)",
         "extend (participant, gain)",
+        "choose (participant)",
         "report (participant)",
     }
     assert all("sub-01" in name for name in rewritten)

@@ -5,18 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from bsip_cli.body.inertia import Inertia, readable_jacobian
 from bsip_cli.body.person import Person
 
+# How the readable parameters of a left segment go with the right one's: Z points to the right on
+# both sides of the body.
+_MIRROR = np.array([1.0, 1, 1, -1, 1, 1, 1, 1, -1, -1])
+_SIDEWAYS = 3  # the coordinate that points to the side
+
 
 @dataclass(frozen=True)
 class Spread:
-    """Standard deviations of people about the table, as in configs/default.toml, [prior]."""
+    """How people stray from the table, as in configs/default.toml, [prior]."""
 
     mass_sd_percent: float
     com_sd_percent: float
+    midline_sd_m: float
     inertia_sd_percent: float
+    left_right_correlation: float
     total_mass_sd_percent: float
 
 
@@ -31,8 +39,9 @@ class Prior:
     phi : (10 n,) mean, about the joint centres (Pinocchio's order).
     root : (10 n, 10 n) S with covariance S S^T.
     readable_sd : (n, 10) the same spread for mass, centre of mass and tensor.
-    spread_sd : (n, 10) spread of each on its own, before the masses' sum is known to
-        total_mass_sd_kg.
+    white : (10 n, 10 n) turns changes of phi into independent ones of variance 1, before the sum of
+        masses is known: ten per segment, in the order of :meth:`Inertia.readable`.
+    pairs : the segments whose parameters go together: both sides, or one of the midline.
     fixed : (n,) segments that keep the table's values, as those do whose motion no markers show;
         the scale tells about the others.
     """
@@ -42,7 +51,8 @@ class Prior:
     phi: np.ndarray
     root: np.ndarray
     readable_sd: np.ndarray
-    spread_sd: np.ndarray
+    white: np.ndarray
+    pairs: tuple[tuple[int, ...], ...]
     total_mass_sd_kg: float
     fixed: np.ndarray
 
@@ -57,27 +67,23 @@ def prior_of(
     spread: Spread,
     fixed: np.ndarray | None = None,
 ) -> Prior:
-    """Build the prior: parameters spread independently, but the free masses sum to the scale's.
+    """Build the prior: left and right alike, trunk and head not lopsided, a tensor as heavy as its
+    segment, and the free masses' sum as the scale says.
 
     fixed : (n,) segments that keep the table's values; by default those whose motion is unknown.
     """
-    origins = person.origin_in_joint_m
-    n = len(inertias)
-    phi, root = np.empty(10 * n), np.zeros((10 * n, 10 * n))
-    spread_sd = np.empty((n, 10))
-    for i, inertia in enumerate(inertias):
-        block = slice(10 * i, 10 * i + 10)
-        phi[block] = inertia.moved(-origins[i]).phi()
-        spread_sd[i] = _readable_sd(inertia, spread)
-        root[block, block] = np.linalg.solve(readable_jacobian(phi[block]), np.diag(spread_sd[i]))
-    total_mass_sd_kg = spread.total_mass_sd_percent / 100 * float(phi[::10].sum())
+    origins, names = person.origin_in_joint_m, person.skeleton.segments
     fixed = person.without_data() if fixed is None else fixed
-    root = _with_total_mass(root, total_mass_sd_kg, ~fixed)
-    readable_sd = np.empty((n, 10))
-    for i in range(n):
-        block = slice(10 * i, 10 * i + 10)
-        readable_sd[i] = np.linalg.norm(readable_jacobian(phi[block]) @ root[block], axis=1)
-    return Prior(inertias, origins, phi, root, readable_sd, spread_sd, total_mass_sd_kg, fixed)
+    phi = np.concatenate([i.moved(-o).phi() for i, o in zip(inertias, origins, strict=True)])
+    pairs = _pairs(names, fixed)
+    own = _own_spread(inertias, spread, names)
+    readable = block_diag(*(readable_jacobian(part) for part in phi.reshape(-1, 10)))
+    spread_root = np.linalg.solve(readable, own @ _together(pairs, spread.left_right_correlation))
+    total_mass_sd_kg = spread.total_mass_sd_percent / 100 * float(phi[::10].sum())
+    root = _with_total_mass(spread_root, total_mass_sd_kg, ~fixed)
+    readable_sd = np.linalg.norm(readable @ root, axis=1).reshape(-1, 10)
+    white = np.linalg.inv(spread_root)
+    return Prior(inertias, origins, phi, root, readable_sd, white, pairs, total_mass_sd_kg, fixed)
 
 
 def likeliest(prior: Prior, information: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -96,6 +102,49 @@ def _with_total_mass(root: np.ndarray, sd_kg: float, free: np.ndarray) -> np.nda
     variance = total @ total
     shrink = 1.0 - sd_kg / np.sqrt(variance + sd_kg**2)
     return root - shrink * np.outer(root @ total, total) / variance
+
+
+def _pairs(names: tuple[str, ...], fixed: np.ndarray) -> tuple[tuple[int, ...], ...]:
+    """Both sides of a limb where both are free; every other segment alone."""
+    pairs = []
+    for i, name in enumerate(names):
+        other = name.removesuffix("_l") + "_r" if name.endswith("_l") else name[:-2] + "_l"
+        twin = names.index(other) if _has_side(name) and other in names else i
+        if twin == i or fixed[i] or fixed[twin]:
+            pairs.append((i,))
+        elif i < twin:
+            pairs.append((i, twin))
+    return tuple(pairs)
+
+
+def _has_side(name: str) -> bool:
+    return name.endswith(("_l", "_r"))
+
+
+def _together(pairs: tuple[tuple[int, ...], ...], correlation: float) -> np.ndarray:
+    """(10 n, 10 n) root of the correlation of all parameters: a twin's is the mirrored one's."""
+    root = np.eye(10 * sum(map(len, pairs)))
+    for first, second in (pair for pair in pairs if len(pair) == 2):
+        rows = np.arange(10)
+        root[10 * second + rows, 10 * first + rows] = correlation * _MIRROR
+        root[10 * second + rows, 10 * second + rows] = np.sqrt(1 - correlation**2)
+    return root
+
+
+def _own_spread(
+    inertias: tuple[Inertia, ...], spread: Spread, names: tuple[str, ...]
+) -> np.ndarray:
+    """(10 n, 10 n) readable parameters of independent changes: a heavier segment has the heavier
+    tensor too."""
+    blocks = []
+    for inertia, name in zip(inertias, names, strict=True):
+        sd = _readable_sd(inertia, spread)
+        if not _has_side(name):
+            sd[_SIDEWAYS] = min(sd[_SIDEWAYS], spread.midline_sd_m)
+        block = np.diag(sd)
+        block[4:, 0] = spread.mass_sd_percent / 100 * inertia.readable()[4:]
+        blocks.append(block)
+    return block_diag(*blocks)
 
 
 def _readable_sd(inertia: Inertia, spread: Spread) -> np.ndarray:

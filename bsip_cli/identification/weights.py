@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.body.inertia import readable_jacobian
 from bsip_cli.identification import pseudo_inertia
 from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.logdet_fit import Objective, Optimum, minimise
@@ -98,20 +97,15 @@ def _inverse_root(precision: np.ndarray) -> np.ndarray:
 
 
 def _spreads(prior: Prior) -> tuple[np.ndarray, ...]:
+    """Precision of all masses, all centres of mass, and the tensors of every pair."""
     every = tuple(range(len(prior.inertias)))
-    groups = [(every, _MASS), (every, _CENTRE), *(((i,), _TENSOR) for i in every)]
-    return tuple(_spread(prior, segments, members) for segments, members in groups)
+    groups = [(every, _MASS), (every, _CENTRE), *((pair, _TENSOR) for pair in prior.pairs)]
+    return tuple(_precision_of(prior, *group) for group in groups)
 
 
-def _spread(prior: Prior, segments: tuple[int, ...], members: tuple[int, ...]) -> np.ndarray:
-    """Precision of some readable parameters of some segments, linearised about the table."""
-    out = np.zeros((prior.phi.size, prior.phi.size))
-    for i in segments:
-        block = slice(10 * i, 10 * i + 10)
-        jacobian = readable_jacobian(prior.phi[block])[list(members)]
-        scaled = jacobian / prior.spread_sd[i, list(members), None]
-        out[block, block] = scaled.T @ scaled
-    return out
+def _precision_of(prior: Prior, segments: tuple[int, ...], members: tuple[int, ...]) -> np.ndarray:
+    rows = prior.white[[10 * i + k for i in segments for k in members]]
+    return rows.T @ rows
 
 
 def _total_mass(prior: Prior) -> np.ndarray:

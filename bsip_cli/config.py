@@ -126,6 +126,8 @@ class Identify(Section):
     block_s: float = Field(gt=0)
     trust_ratio: float = Field(ge=1)
     sigma_percent_limit: float = Field(gt=0)
+    plate_place_sd_m: float = Field(gt=0)
+    delay_sd_s: float = Field(gt=0)
     spread_weight: float = Field(gt=0)
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.identification.estimator import Estimate, Problem
+from bsip_cli.identification.instruments import GROUPS
 from bsip_cli.identification.weights import Fit, Terms, fit_with_weights, terms_of
 
 # Decided parameters: a sequence that moves everything decides 26 to 41, some squats 8 to 12.
@@ -38,7 +39,7 @@ def estimate(problem: Problem) -> Estimate:
 
 
 def _note(fit: Fit, terms: Terms) -> str:
-    masses, centres, *tensors = 1 / np.sqrt(fit.weights.spread)
+    masses, centres, *tensors = 1 / np.sqrt(fit.weights.spread[: len(terms.spreads) - len(GROUPS)])
     note = (
         f"the data decide as much as {fit.decided:.0f} of {terms.table.size} parameters, the table "
         "the rest; distance from the table in standard deviations among people: masses "

@@ -11,6 +11,8 @@ from scipy import sparse
 
 from bsip_cli.dynamics.lowpass import lowpass_operator, stride_to
 from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
+from bsip_cli.identification import instruments
+from bsip_cli.identification.instruments import Instruments
 
 _ROWS = 100  # outputs per block: some 15 MB of regressor
 _OVERSAMPLING = 2.5  # samples kept per period of the cut-off
@@ -44,6 +46,7 @@ class NormalEquations:
 
     information (6, P, P) = sum w Y_c^T Y_c, right (6, P) = sum w Y_c^T F_c, squares (6,) = sum w
     F_c^2 with weights w of mean 1; ``samples`` per component, ``duration_s`` of motion behind them.
+    Columns of the instruments, where they are asked for, follow the body's parameters.
     """
 
     information: np.ndarray
@@ -51,6 +54,12 @@ class NormalEquations:
     squares: np.ndarray
     samples: int
     duration_s: float
+
+    def of_the_body(self, size: int) -> NormalEquations:
+        """The same, instruments without fault: the first ``size`` columns."""
+        return replace(
+            self, information=self.information[:, :size, :size], right=self.right[:, :size]
+        )
 
     def weighted(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Information (P, P) and right side (P,) with a weight (6,) per component."""
@@ -63,7 +72,10 @@ class NormalEquations:
         """The equations of the other parameters, once some (P,) have the values in ``phi`` (P,).
 
         The known ones' wrench is taken off the measured one; nothing more is said about them.
+        Columns beyond the parameters stay free.
         """
+        beyond = self.right.shape[1] - len(phi)
+        phi, known = np.pad(phi, (0, beyond)), np.pad(known, (0, beyond))
         part = np.where(known, phi, 0.0)
         moved = self.information @ part
         squares = self.squares - 2 * self.right @ part + moved @ part
@@ -106,17 +118,18 @@ def accumulate(
     cutoff_hz: float,
     reference_m: np.ndarray,
     weights_at: Callable[[np.ndarray], np.ndarray] = _alike,
+    beside: Instruments | None = None,
 ) -> NormalEquations:
     """Both sides of the equations through the same low-pass, decimated, weighted and summed.
 
     ``weights_at`` turns noise levels (n,) into weights (n, 6). Memory does not grow with the length
     of the trials.
     """
-    size = 10 * (model.njoints - 1)
+    size = 10 * (model.njoints - 1) + (instruments.COUNT if beside else 0)
     information, right = np.zeros((6, size, size)), np.zeros((6, size))
     squares, samples, duration = np.zeros(6), 0, 0.0
     for recording in recordings:
-        for block in _filtered_blocks(model, recording, cutoff_hz, reference_m):
+        for block in _filtered_blocks(model, recording, cutoff_hz, reference_m, beside):
             root = np.sqrt(weights_at(block.noise_level))
             measured = root * block.measured
             for c in range(6):
@@ -152,7 +165,11 @@ def _left_over(model, recording, cutoff_hz, reference_m, phi):
 
 
 def _filtered_blocks(
-    model: pin.Model, recording: Recording, cutoff_hz: float, reference_m: np.ndarray
+    model: pin.Model,
+    recording: Recording,
+    cutoff_hz: float,
+    reference_m: np.ndarray,
+    beside: Instruments | None = None,
 ) -> Iterator[Samples]:
     stride = stride_to(recording.rate_hz, _OVERSAMPLING * cutoff_hz)
     operator, frames = lowpass_operator(recording.use, recording.rate_hz, cutoff_hz, stride)
@@ -167,6 +184,9 @@ def _filtered_blocks(
         regressor = wrench_regressor(
             model, data, recording.q[part], recording.v[part], recording.a[part], reference_m
         )
+        if beside:
+            columns = beside.columns(regressor, recording.rate_hz)
+            regressor = np.concatenate([regressor, columns], axis=2)
         filtered = rows[:, part] @ regressor.reshape(last - first, -1)
         yield Samples(
             filtered.reshape(rows.shape[0], 6, -1),

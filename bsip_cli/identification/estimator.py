@@ -20,7 +20,8 @@ class Problem:
     The next three are options of [identify]: how many times worse the data are than they look; the
     sigma% below which a base parameter counts; and how many deviations as large as [prior] says
     count beside this person's own. ``whole``: the equations before the wrench of segments that keep
-    the table's values was taken off; None where no segment does.
+    the table's values was taken off; None where no segment does. ``beside``: the equations with the
+    instruments' columns after the parameters.
     """
 
     equations: NormalEquations
@@ -31,6 +32,7 @@ class Problem:
     sigma_percent_limit: float = 5.0
     spread_weight: float = 4.0
     whole: NormalEquations | None = None
+    beside: NormalEquations | None = None
 
     def every_equation(self) -> NormalEquations:
         """Those of all segments' parameters."""
@@ -38,7 +40,14 @@ class Problem:
 
     def trusted_equations(self) -> tuple[np.ndarray, np.ndarray]:
         """Information (P, P) and right side (P,), each component in its noise as it is trusted."""
-        return self.equations.weighted(self.noise.weights() / self.trust_ratio**2)
+        return self.equations.weighted(self._trusted_weights())
+
+    def trusted_with_instruments(self) -> tuple[np.ndarray, np.ndarray]:
+        """The same (P + m, P + m) and (P + m,) with the m columns of the instruments, if any."""
+        return (self.beside or self.equations).weighted(self._trusted_weights())
+
+    def _trusted_weights(self) -> np.ndarray:
+        return self.noise.weights() / self.trust_ratio**2
 
 
 @dataclass(frozen=True, eq=False)

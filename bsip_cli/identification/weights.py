@@ -11,12 +11,14 @@ wider than [prior] says; every tensor has its own, because a table may miss a si
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from bsip_cli.identification import pseudo_inertia
 from bsip_cli.identification.estimator import Problem
+from bsip_cli.identification.instruments import GROUPS
 from bsip_cli.identification.logdet_fit import Objective, Optimum, minimise
 from bsip_cli.identification.prior import Prior
 
@@ -73,17 +75,19 @@ class Fit:
 def terms_of(problem: Problem) -> Terms:
     """Normal equations and priors of a problem, about the table's values."""
     prior = problem.prior
-    information, right = problem.trusted_equations()
-    spreads, fixed = _spreads(prior), _total_mass(prior)
-    root = _inverse_root(sum(spreads, fixed))
+    information, right = problem.trusted_with_instruments()
+    size, beyond = len(prior.phi), len(right) - len(prior.phi)
+    body = [np.pad(one, (0, beyond)) for one in (*_spreads(prior), _total_mass(prior))]
+    spreads = (*body[:-1], *_of_instruments(size, beyond))
+    root = _inverse_root(sum(spreads, body[-1]))
     strength, directions = np.linalg.eigh(root.T @ information @ root)
     axes = root @ directions
     return Terms(
         np.maximum(strength, 0.0),
-        axes.T @ (right - information @ prior.phi),
+        axes.T @ (right - information[:, :size] @ prior.phi),
         tuple(axes.T @ precision @ axes for precision in spreads),
-        axes.T @ fixed @ axes,
-        axes,
+        axes.T @ body[-1] @ axes,
+        axes[:size],
         prior.phi,
         problem.spread_weight,
     )
@@ -101,6 +105,14 @@ def _spreads(prior: Prior) -> tuple[np.ndarray, ...]:
     every = tuple(range(len(prior.inertias)))
     groups = [(every, _MASS), (every, _CENTRE), *((pair, _TENSOR) for pair in prior.pairs)]
     return tuple(_precision_of(prior, *group) for group in groups)
+
+
+def _of_instruments(size: int, beyond: int) -> Iterator[np.ndarray]:
+    """Precision of where the plates are and of when they read, behind ``size`` parameters."""
+    for part in GROUPS if beyond else ():
+        on = np.zeros(size + beyond)
+        on[size:][part] = 1.0
+        yield np.diag(on)
 
 
 def _precision_of(prior: Prior, segments: tuple[int, ...], members: tuple[int, ...]) -> np.ndarray:

@@ -16,6 +16,7 @@ from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.identification.equations import Recording, accumulate, residual_series
 from bsip_cli.identification.estimator import Estimate, Problem
+from bsip_cli.identification.instruments import Instruments
 from bsip_cli.identification.noise import even_noise, noise_of
 from bsip_cli.identification.prior import Prior, Spread, likeliest, prior_of
 from bsip_cli.running.unit import Unit
@@ -132,11 +133,14 @@ def problem_of(
         options.sigma_percent_limit,
         options.spread_weight,
     )
+    instruments = Instruments(options.plate_place_sd_m, options.delay_sd_s, prior.phi)
     equations = accumulate(model, recordings, cutoff, reference).with_known(prior.phi, known)
     noise = even_noise(_FIRST_NOISE, equations.samples)
     for _ in range(_WEIGHT_ROUNDS):
         likely = likeliest(prior, *equations.weighted(noise.weights()))
         noise = noise_of(residual_series(model, recordings, cutoff, reference, likely))
-        whole = accumulate(model, recordings, cutoff, reference, noise.weights_at)
-        equations = whole.with_known(prior.phi, known)
-    return Problem(equations, noise, prior, basis, *judgement, whole), reference
+        joint = accumulate(model, recordings, cutoff, reference, noise.weights_at, instruments)
+        beside = joint.with_known(prior.phi, known)
+        equations = beside.of_the_body(len(prior.phi))
+    whole = joint.of_the_body(len(prior.phi))
+    return Problem(equations, noise, prior, basis, *judgement, whole, beside), reference

@@ -44,7 +44,6 @@ LIMB_LENGTHS = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
 # Standard deviations of the true parameters about the mean person's.
 MASS_SPREAD = {"upper_arm": 0.15, "forearm": 0.15, "hand": 0.15}
 COM_SPREAD_M = {"lower_torso": 0.011, "thorax": 0.012, "abdomen": 0.012, "thigh": 0.007}
-MIDLINE_SPREAD_M = 0.004  # to the side, of trunk and head: organs are lopsided, bodies hardly
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,10 +290,7 @@ def _draw_inertia(
     mirror = np.array([1.0, 1.0, -1.0 if body.endswith("_l") else 1.0])
     kind = body.removesuffix("_l").removesuffix("_r")
     com = origin + mirror * mean.com * length
-    spread = np.full(3, COM_SPREAD_M.get(kind, 0.004))
-    if kind == body:
-        spread[2] = MIDLINE_SPREAD_M
-    com = com + scale * spread * rng.standard_normal(3)
+    com = com + scale * COM_SPREAD_M.get(kind, 0.004) * rng.standard_normal(3)
     if body in ("abdomen", "lower_torso"):  # a belly shifts the trunk's mass forward
         com[0] += scale * 0.0015 * (body_mass_index - BODY_MASS_INDEX[0])
     tensor = np.outer(mirror, mirror) * mean.tensor * mass * length**2

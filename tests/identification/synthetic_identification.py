@@ -25,7 +25,9 @@ RATE_HZ = 100.0
 SPREAD = Spread(
     mass_sd_percent=20.0,
     com_sd_percent=6.0,
+    midline_sd_m=1.0,
     inertia_sd_percent=30.0,
+    left_right_correlation=0.0,
     total_mass_sd_percent=3.0,
 )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import eigh
 
 from bsip_cli.identification.data_share import beforehand
 from bsip_cli.identification.estimator import Problem
@@ -37,9 +38,15 @@ def excitation(problem: Problem) -> Excitation:
     singular = np.sqrt(np.maximum(strength, 0.0))
     smallest = singular[-1]
     condition = float(singular[0] / smallest) if smallest > 0 else float("inf")
-    covariance = beforehand(problem).covariance(information)
-    n = len(problem.prior.inertias)
-    blocks = covariance.reshape(n, 10, n, 10)[np.arange(n), :, np.arange(n)]
-    share = 1.0 - np.einsum("nii->n", blocks) / 10
-    known = (np.linalg.eigvalsh(blocks) < _BETTER_THAN_TABLE).sum(axis=1)
-    return Excitation(singular, condition, share, known)
+    known = beforehand(problem)
+    table, left = (_segments(known.covariance(x)) for x in (0 * information, information))
+    share = 1.0 - np.einsum("nii->n", left) / 10
+    parts = [eigh(*pair, eigvals_only=True) for pair in zip(left, table, strict=True)]
+    combinations = (np.array(parts) < _BETTER_THAN_TABLE).sum(axis=1)
+    return Excitation(singular, condition, share, combinations)
+
+
+def _segments(covariance: np.ndarray) -> np.ndarray:
+    """(n, 10, 10) of each segment's own parameters."""
+    n = len(covariance) // 10
+    return covariance.reshape(n, 10, n, 10)[np.arange(n), :, np.arange(n)]

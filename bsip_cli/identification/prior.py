@@ -106,7 +106,7 @@ def _with_total_mass(root: np.ndarray, sd_kg: float, free: np.ndarray) -> np.nda
 
 def _pairs(names: tuple[str, ...], fixed: np.ndarray) -> tuple[tuple[int, ...], ...]:
     """Both sides of a limb where both are free; every other segment alone."""
-    pairs = []
+    pairs: list[tuple[int, ...]] = []
     for i, name in enumerate(names):
         other = name.removesuffix("_l") + "_r" if name.endswith("_l") else name[:-2] + "_l"
         twin = names.index(other) if _has_side(name) and other in names else i

@@ -103,15 +103,17 @@ def drawn(scale, rng):
     """A physical person off the table by ``scale`` (10,) times what [prior] says; (15, 10)."""
     prior = world().prior
     table = np.array([body.readable() for body in prior.inertias])
-    rows = []
+    root = np.linalg.inv(prior.white)
+    rows: list[np.ndarray] = []
     while len(rows) < len(table):
-        i = len(rows)
-        row = table[i] + scale * prior.spread_sd[i] * rng.normal(size=10)
-        if from_readable(row).is_physical():
-            rows.append(row)
+        block = slice(10 * len(rows), 10 * len(rows) + 10)
+        phi = prior.phi[block] + root[block, block] @ (scale * rng.normal(size=10))
+        body = from_phi(phi).moved(prior.origin_in_joint_m[len(rows)])
+        if body.is_physical():
+            rows.append(body.readable())
     off = sum(row[0] for row in rows) - table[:, 0].sum()
     rows = np.array(rows)
-    share = prior.spread_sd[:, 0] ** 2
+    share = np.square(table[:, 0])
     rows[:, 0] -= off * share / share.sum()  # the scale knows the sum
     return rows
 

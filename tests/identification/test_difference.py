@@ -78,7 +78,7 @@ def test_a_segments_own_mass_is_blurred_and_the_total_is_not():
     found = difference(gaussian(a), gaussian(b), root @ root.T)
     seen = found.resolution @ load_phi()
     assert abs(seen[::10].sum() - 1.0) < 0.01
-    assert seen[10 * world().person.skeleton.index(SHANK)] < 0.9
+    assert seen[10 * world().person.skeleton.index(SHANK)] < 0.98
 
 
 def test_change_of_one_segment_returns_the_load_within_its_interval():

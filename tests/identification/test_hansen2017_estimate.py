@@ -194,7 +194,7 @@ def test_excitation_names_what_moved():
     silent = rows.copy()
     silent[..., 10 * arm : 10 * arm + 10] = 0.0
     held = excitation(problem_of(silent, silent @ world().phi_true, 5.0))
-    assert held.segment_share[arm] < 0.002  # the masses' sum tells a little
+    assert held.segment_share[arm] < 0.003  # the masses' sum tells a little
     assert lively.segment_share[arm] > 0.1
     twice = excitation(problem_of(np.concatenate([rows] * 4), np.zeros((4 * len(rows), 6)), 5.0))
     np.testing.assert_allclose(twice.singular_values, 2 * lively.singular_values, rtol=1e-4)

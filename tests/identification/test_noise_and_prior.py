@@ -1,13 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from bsip_cli.body.inertia import PARAMETERS, from_phi
+from bsip_cli.body.inertia import PARAMETERS, from_phi, readable_jacobian
 from bsip_cli.identification.equations import ResidualSeries
 from bsip_cli.identification.estimator import Estimate
 from bsip_cli.identification.noise import noise_of
+from bsip_cli.identification.prior import prior_of
 from bsip_cli.identification.uncertainty import readable
-from tests.identification.synthetic_identification import world
+from tests.identification.synthetic_identification import SPREAD, world
 
 
 def ar1(a, count, seed):
@@ -92,24 +95,63 @@ def test_the_priors_spread_is_that_of_the_options():
     limbs = [person.skeleton.index(f"{name}_l") for name in ("thigh", "shank", "forearm")]
     np.testing.assert_allclose(rods[limbs], person.lengths_m[limbs], rtol=0.12)
     moments = np.array([np.diag(body.tensor_kgm2) for body in prior.inertias])
-    np.testing.assert_allclose(sd[:, 4:7], 0.30 * moments, rtol=0.05)
-    products = np.sqrt(moments[:, [0, 0, 1]] * moments[:, [1, 2, 2]])
-    np.testing.assert_allclose(sd[:, 7:], 0.15 * products, rtol=0.05)
+    # A tensor strays on its own, and with its segment's mass.
+    part = np.sqrt(known)[:, None] / masses[:, None]
+    np.testing.assert_allclose(sd[:, 4:7], np.hypot(0.30, part) * moments, rtol=0.05)
+    sizes = np.sqrt(moments[:, [0, 0, 1]] * moments[:, [1, 2, 2]])
+    products = np.array([body.readable()[7:] for body in prior.inertias])
+    np.testing.assert_allclose(sd[:, 7:], np.hypot(0.15 * sizes, part * products), rtol=0.05)
     np.testing.assert_allclose(sd, prior.readable_sd, rtol=0.05)
 
 
-def test_only_masses_hang_together_and_their_sum_is_the_scales():
+def test_only_masses_and_tensors_hang_together_and_the_masses_sum_is_the_scales():
     read = scatter()
     alone = 0.20 * np.array([body.mass_kg for body in world().prior.inertias])
     scale = 0.03 * sum(body.mass_kg for body in world().prior.inertias)
     total = read[:, :, 0].sum(axis=1).std() * 1e3
     assert total == pytest.approx((1 / (alone**2).sum() + 1 / scale**2) ** -0.5, rel=0.05)
     correlation = np.corrcoef(read.reshape(len(read), -1).T)
-    others = np.delete(np.arange(150), np.s_[::10])
-    apart = correlation[others] - np.eye(150)[others]
+    centres = [10 * segment + k for segment in range(15) for k in (1, 2, 3)]
+    apart = correlation[centres] - np.eye(150)[centres]
     assert np.abs(apart).max() < 5 / np.sqrt(len(read))
     torso, thigh = (10 * world().person.skeleton.index(s) for s in ("upper_torso", "thigh_l"))
     assert correlation[torso, thigh] < -0.2
+
+
+def test_left_and_right_go_together_and_the_midline_is_not_lopsided():
+    spread = replace(SPREAD, left_right_correlation=0.93, midline_sd_m=0.005)
+    person, bodies = world().person, world().prior.inertias
+    prior = prior_of(bodies, person, spread)
+    read = np.array(
+        [
+            np.concatenate([readable_jacobian(part) @ change for part, change in pairs])
+            for pairs in (
+                list(zip(prior.phi.reshape(-1, 10), column.reshape(-1, 10), strict=True))
+                for column in prior.root.T
+            )
+        ]
+    )
+    covariance = read.T @ read
+    correlation = covariance / np.sqrt(np.outer(*[np.diag(covariance)] * 2))
+    left, right = (10 * person.skeleton.index(f"shank_{side}") for side in "lr")
+    together = correlation[range(left, left + 10), range(right, right + 10)]
+    mirrored = np.array([1, 1, 1, -1, 1, 1, 1])  # mass, centre, moments
+    np.testing.assert_allclose(together[1:7] * mirrored[1:], 0.93, atol=0.05)
+    for name in ("lower_torso", "upper_torso", "head"):
+        i = person.skeleton.index(name)
+        assert prior.readable_sd[i, 3] == pytest.approx(0.005, rel=1e-6)
+
+
+def test_a_limb_without_markers_leaves_its_twin_alone():
+    fixed = np.zeros(15, dtype=bool)
+    fixed[world().person.skeleton.index("hand_l")] = True
+    spread = replace(SPREAD, left_right_correlation=0.93)
+    prior = prior_of(world().prior.inertias, world().person, spread, fixed)
+    hands = [world().person.skeleton.index(f"hand_{side}") for side in "lr"]
+    covariance = prior.root @ prior.root.T
+    first, second = (slice(10 * hand, 10 * hand + 10) for hand in hands)
+    assert np.abs(covariance[first, second]).max() < 1e-12
+    assert all((hand,) in prior.pairs for hand in hands)
 
 
 def test_no_data_no_share_and_all_data_all_share():

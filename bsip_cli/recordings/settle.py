@@ -310,6 +310,11 @@ class _World:
         total += sum(map(balance_log_likelihood, matches))
         return total + Harmony.of(matches).log_likelihood()
 
+    def lever_log_likelihood(self, readings: Readings) -> float:
+        """The part of the likelihood that moments about no lever have, in all trials."""
+        seen = (one for name in self.names for one in self.seen(name, readings[name]) if one)
+        return float(np.nansum([one.evidence.lever_log_likelihood() for one in seen]))
+
     def harmony(self, readings: Readings) -> Harmony:
         return Harmony.of(self._matches(readings))
 
@@ -517,8 +522,9 @@ def _surest(tried: Sequence[_Choice]) -> _Choice:
     now = tried[0]
     logs = np.array([one.log_posterior() for one in tried])
     seen = sum(1 + len(look.sources) for look in now.world.looks)
-    unknown = _UNKNOWN + _UNKNOWN_EACH * seen  # a fault that no reading mends
     best = tried[int(np.argmax(logs))]
+    # A fault that no reading mends; that moments have no lever is none.
+    unknown = _UNKNOWN + _UNKNOWN_EACH * seen + best.world.lever_log_likelihood(best.readings)
     # Forces that go with the motion may still lie beside the feet.
     goes = max(best.world.harmony(best.readings).log_likelihood(), 0.0)
     if unknown + goes - logsumexp([*logs, unknown + goes]) > np.log(_SURELY_NOBODY):

@@ -151,9 +151,14 @@ class Evidence:
         ]
         outside = -2.0 * np.log1p((self.outside_m / _DISTANCE_M) ** 2)
         terms.append(np.clip(outside, _OUTLINE, 0.0))
-        terms.append(2.0 * np.log(np.clip(self.lever_m / _LEVER_M, _LEAST, 1.0)))
+        terms.append(self.lever_log_likelihood())
         terms.append(-_INDEPENDENT * np.log(np.maximum(self.level_share, _LEAST_SHARE)))
         return float(np.nansum(terms))
+
+    def lever_log_likelihood(self) -> float:
+        """The part of how the moments go with a lever about the sensor: it tells readings from one
+        another, and no person from nobody, since a file may give moments about its own origin."""
+        return float(2.0 * np.log(np.clip(self.lever_m / _LEVER_M, _LEAST, 1.0)))
 
     @classmethod
     def mean(cls, found: Sequence[Evidence]) -> Evidence:

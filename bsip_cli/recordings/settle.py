@@ -523,8 +523,8 @@ def _surest(tried: Sequence[_Choice]) -> _Choice:
     logs = np.array([one.log_posterior() for one in tried])
     seen = sum(1 + len(look.sources) for look in now.world.looks)
     best = tried[int(np.argmax(logs))]
-    # A fault that no reading mends; that moments have no lever is none.
-    unknown = _UNKNOWN + _UNKNOWN_EACH * seen + best.world.lever_log_likelihood(best.readings)
+    # A fault that no reading mends; that the file's moments have no lever is none.
+    unknown = _UNKNOWN + _UNKNOWN_EACH * seen + now.world.lever_log_likelihood(now.readings)
     # Forces that go with the motion may still lie beside the feet.
     goes = max(best.world.harmony(best.readings).log_likelihood(), 0.0)
     if unknown + goes - logsumexp([*logs, unknown + goes]) > np.log(_SURELY_NOBODY):

@@ -132,9 +132,7 @@ def test_memory_is_a_small_multiple_of_the_file(tmp_path, blank):
     rng = np.random.default_rng(1)
     n, labels = 2000, [f"M{k}" for k in range(40)]
     person = np.tile(standing_markers(n)[0], (1, 5, 1))  # feet under the force, which else is none
-    markers = person + rng.uniform(
-        -0.02, 0.02, (1, len(labels), 3)
-    )  # shaking, it would need forces
+    markers = person + rng.uniform(-0.02, 0.02, (n, len(labels), 3))
     markers[rng.random(markers.shape[:2]) < blank] = np.nan
     path = write_trc(tmp_path / "a.trc", np.arange(n) / 100.0, markers, labels)
     force, moment = standing_wrench(10 * n)

@@ -14,8 +14,8 @@ from bsip_cli.body.person import Person
 # both sides of the body.
 _MIRROR = np.array([1.0, 1, 1, -1, 1, 1, 1, 1, -1, -1])
 _SIDEWAYS = 3  # the coordinate that points to the side
-# What the table itself may miss: the trunk of 2007 has its centre 19 mm further back than that of the
-# update (Dumas 2015), and its long axis tilted by 40 degrees more, which is a product of inertia.
+# What the table itself may miss: the trunk of 2007 has its centre 19 mm further back than that of
+# 2015 (Dumas 2015), and its long axis tilted by 40 degrees more, which is a product of inertia.
 _EDITIONS_APART_M = {"upper_torso": 0.019}
 _FORWARDS, _TILT = 1, 7  # of the readable parameters: com x, ixy
 

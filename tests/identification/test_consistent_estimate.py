@@ -129,7 +129,7 @@ def test_the_spread_of_a_person_is_found():
     rows = regressor()
     rng = np.random.default_rng(7)
     spreads = []
-    for centres in (0.0, 1.5):
+    for centres in (0.0, 2.0):
         scale = np.array([0.1, *[centres] * 3, *[0.1] * 6])
         true = parameters(drawn(scale, rng))
         measured = rows @ true + rng.normal(0, 1.0, rows.shape[:2])

@@ -322,4 +322,4 @@ def test_order_of_the_runs_does_not_matter(run):
     second = run.read("bsip").query("method == 'OM'")
     for name in bsip_names():
         moved = (second[name] - first[name]).abs() / first[f"{name}_sd"]
-        assert moved.max() < 2e-3, name  # what is left is the solver's tolerance
+        assert moved.max() < 5e-3, name  # what is left is the solver's tolerance

@@ -14,7 +14,6 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.identification.estimator import Estimate, Problem
-from bsip_cli.identification.instruments import GROUPS
 from bsip_cli.identification.weights import Fit, Terms, fit_with_weights, terms_of
 
 # Decided parameters: a sequence that moves everything decides 26 to 41, some squats 8 to 12.
@@ -33,13 +32,14 @@ def estimate(problem: Problem) -> Estimate:
     return Estimate(
         terms.table + shown @ fit.optimum.x,
         shown @ fit.optimum.covariance @ shown.T,
-        _note(fit, terms),
+        _note(fit, terms, 2 + len(problem.prior.pairs)),
         prior_covariance=shown @ fit.prior_covariance @ shown.T,
     )
 
 
-def _note(fit: Fit, terms: Terms) -> str:
-    masses, centres, *tensors = 1 / np.sqrt(fit.weights.spread[: len(terms.spreads) - len(GROUPS)])
+def _note(fit: Fit, terms: Terms, of_the_body: int) -> str:
+    """``of_the_body``: how many of the spreads are; those of the instruments come after them."""
+    masses, centres, *tensors = 1 / np.sqrt(fit.weights.spread[:of_the_body])
     note = (
         f"the data decide as much as {fit.decided:.0f} of {terms.table.size} parameters, the table "
         "the rest; distance from the table in standard deviations among people: masses "

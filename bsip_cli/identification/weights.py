@@ -5,8 +5,9 @@ approximation. The spreads follow MacKay's rule (1992, Bayesian interpolation): 
 mean square of the deviations over the number of them that the data decided; the option
 ``spread_weight`` says how many deviations as large as [prior] says count beside them, so that
 little data leave [prior] as it is. Masses share one spread and centres of mass another, neither
-wider than [prior] says; every tensor has its own, because a table may miss a single one by far
-(Dumas 2007's trunk). The log-det weight is the best of a grid.
+wider than [prior] says; the tensors of a pair of limbs, or of a segment of the midline, have their
+own, because a table may miss a single one by far (Dumas 2007's trunk). Where the plates are and
+when they read are two spreads more. The log-det weight is the best of a grid.
 """
 
 from __future__ import annotations
@@ -39,8 +40,8 @@ class Terms:
     units rounding would hide what the prior says about the latter.
 
     strength, right : of the weighted wrench residual 1/2 x^T diag(strength) x - right^T x.
-    spreads : precision of all masses, of all centres of mass, and of each segment's tensor; fixed :
-    that of the total mass, which keeps its weight. phi = table + shown x.
+    spreads : precision of all masses, of all centres of mass, of each pair's tensors, and of the
+    instruments; fixed : that of the total mass, which keeps its weight. phi = table + shown x.
     """
 
     strength: np.ndarray
@@ -54,7 +55,7 @@ class Terms:
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Of the deviations (2 + n,), 1 as [prior] says, and of the log-det term."""
+    """Of the deviations, one per spread, 1 as the options say, and of the log-det term."""
 
     spread: np.ndarray
     gamma: float

@@ -13,6 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 CANNOT = 77
+LONGEST_S = 600.0  # a minute and a half where nothing hangs
 
 
 @pytest.mark.long
@@ -22,7 +23,8 @@ def test_node_that_dies_and_job_over_its_memory(tmp_path):
     bsip.chmod(0o755)
     snakemake = ROOT / ".venv-cluster" / "bin" / "snakemake"
     script = ROOT / "workflow" / "test_slurm.sh"
-    done = subprocess.run([script, bsip, snakemake, "short"], capture_output=True, text=True)
+    command = [script, bsip, snakemake, "short"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S)
     if done.returncode == CANNOT:
         pytest.skip(done.stderr.splitlines()[-1])
     assert done.returncode == 0, done.stdout + done.stderr

@@ -172,6 +172,26 @@ _DIAGNOSIS = (
     _text("trials", "recordings that show it"),
 )
 
+_ERROR_BUDGET = (
+    _text(
+        "term",
+        "inertial_parameters joint_centres marker_places soft_tissue trunk_and_shoulders smoothing "
+        "fault:<effect> unknown noise; total: all of RM's error",
+    ),
+    _text("target", "segment, joint or plate that makes it; empty: all of them together"),
+    _text("component", "fx fy fz mx my mz cop_ap cop_ml; moments about the middle of the stance"),
+    Column("rms", "float", "as unit", "root mean square of what the term adds"),
+    _text("unit", "N, N m or mm"),
+    Column("share_percent", "float", "%", "of RM's squared error: the term projected on it"),
+    *_floats("share_low share_high", "%", "95 % interval of the share"),
+    Column("gain_percent", "float", "%", "by which the error is smaller on data held out"),
+    *_floats("gain_low gain_high", "%", "95 % interval of the gain"),
+    _text("data", "what was held out; empty where the term has no gain"),
+    _text("trial", "whose error it is; empty: all trials of the person together"),
+    Column("scale", "float", "1", "how many times as large as usual the term is, in the mean"),
+    _text("alike", "terms from which these recordings hardly tell it"),
+)
+
 SCHEMAS = {
     schema.kind: schema
     for schema in (
@@ -586,6 +606,21 @@ SCHEMAS = {
             "what the simulation gets wrong in all trials of a person",
             _DIAGNOSIS,
             "diagnosis",
+        ),
+        Schema(
+            "overall-error-budget",
+            "participant",
+            1,
+            "what makes RM's error in all trials of a person, term by term",
+            _ERROR_BUDGET,
+            "error-budget",
+        ),
+        Schema(
+            "error-budget",
+            "trial",
+            1,
+            "what makes RM's error in this trial, term by term",
+            _ERROR_BUDGET,
         ),
         Schema(
             "detection",

@@ -99,7 +99,7 @@ class Whitening:
         """(6 n, k) of filtered wrenches (n, 6, k): the noise alone is white, nuisances stay."""
         kind = wrenches.dtype
         spread, recursion = self.spread[..., None].astype(kind), self.recursion.astype(kind)
-        return _innovations(wrenches / spread, recursion, self.filter)
+        return innovations(wrenches / spread, recursion, self.filter)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,20 +212,20 @@ def _whitening(filtered: Filtered, beside: np.ndarray, floor: float) -> Whitenin
     left_over = filtered.residual - beside
     recursion = np.zeros((6, _ORDER))
     spread = _course(left_over, level)
-    known = _innovations(nuisances / spread[..., None], recursion, filter_)
+    known = innovations(nuisances / spread[..., None], recursion, filter_)
     for _ in range(_ROUNDS):
-        flat = _innovations((left_over / spread)[..., None], recursion, filter_)
+        flat = innovations((left_over / spread)[..., None], recursion, filter_)
         inner = known.T @ known + np.eye(known.shape[1])
         sizes = np.linalg.solve(inner, np.column_stack([known.T @ flat, known.T]))
         remaining = left_over - nuisances @ sizes[:, 0]
         kept = 1 - (known * sizes[:, 1:].T).sum(axis=1).reshape(-1, 6).mean(axis=0)
         spread = _course(remaining, level)
         series = (remaining / spread).T
-        recursion = np.stack([_recursion(x, filter_.rate_hz, floor) for x in series])
-        innovations = _innovations((remaining / spread)[..., None], recursion, filter_)
-        size = innovations.reshape(-1, 6).std(axis=0) / np.sqrt(kept)
+        recursion = np.stack([recursion_of(x, filter_.rate_hz, floor) for x in series])
+        white = innovations((remaining / spread)[..., None], recursion, filter_)
+        size = white.reshape(-1, 6).std(axis=0) / np.sqrt(kept)
         spread = spread * size * np.maximum(1.0, filtered.least / remaining.std(axis=0))
-        known = _innovations(nuisances / spread[..., None], recursion, filter_)
+        known = innovations(nuisances / spread[..., None], recursion, filter_)
     return Whitening(filter_, spread, recursion, *shrunk(known[:, : filtered.own.shape[2]]))
 
 
@@ -247,7 +247,7 @@ def _course(residual: np.ndarray, level: np.ndarray) -> np.ndarray:
     return noise.rms / np.sqrt(noise.weights_at(level))
 
 
-def _recursion(series: np.ndarray, rate_hz: float, floor: float) -> np.ndarray:
+def recursion_of(series: np.ndarray, rate_hz: float, floor: float) -> np.ndarray:
     """(_ORDER,) autoregression by Yule and Walker, of the smooth part of the spectrum.
 
     A running median over frequencies leaves out lines: an offset or a swing at one frequency is no
@@ -261,7 +261,7 @@ def _recursion(series: np.ndarray, rate_hz: float, floor: float) -> np.ndarray:
     return solve_toeplitz(lags[:-1], lags[1:])
 
 
-def _innovations(columns: np.ndarray, recursion: np.ndarray, filter_: Filter) -> np.ndarray:
+def innovations(columns: np.ndarray, recursion: np.ndarray, filter_: Filter) -> np.ndarray:
     """(6 n, k) innovations of (n, 6, k); a span's first samples stay as they are."""
     out = columns.copy()
     for start, stop in filter_.spans:

@@ -23,7 +23,7 @@ def own_nuisances(
     skin_factor : the skin of a segment slides as a whole this many times as far as the residuals
         of its markers show.
     """
-    skin = skin_draws(scene, _marker_rms_m(scene) / np.sqrt(draws), skin_factor, draws, rng)
+    skin = skin_draws(scene, marker_rms_m(scene) / np.sqrt(draws), skin_factor, draws, rng)
     columns = [skin, wander(scene), smoothing_bias(scene), slack(scene)]
     return np.concatenate(columns, axis=2)
 
@@ -44,7 +44,7 @@ def shared_nuisances(scene: Scene, root: np.ndarray, marker_sd_m: float) -> np.n
     return np.concatenate(columns, axis=2)
 
 
-def _marker_rms_m(scene: Scene) -> np.ndarray:
+def marker_rms_m(scene: Scene) -> np.ndarray:
     """(m,) root mean square of each marker's residuals, per direction."""
     if scene.residual_m is None:
         return np.full(len(scene.person.markers), _UNKNOWN_RMS_M)

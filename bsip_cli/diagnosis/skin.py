@@ -29,7 +29,7 @@ def skin_draws(
     marker_rms_m (m,) : how far each marker slides against the others, root mean square.
     shared : how many times as far all markers of a segment slide together.
     """
-    nearby = _nearby(scene)
+    nearby = nearby_angles(scene)
     mixing = _mixing(scene.person.marker_segments, nearby, marker_rms_m, shared, count, rng)
     at_once = max(1, _FRAMES_AT_ONCE // len(scene.q))
     parts = []
@@ -57,7 +57,7 @@ def skin_inertia(scene: Scene) -> np.ndarray:
     return scene.response.of(np.concatenate(columns, axis=2))
 
 
-def _nearby(scene: Scene) -> list[np.ndarray]:
+def nearby_angles(scene: Scene) -> list[np.ndarray]:
     """(N, j) of each marker: angles of the joints at its segment, of variance 1 together."""
     features = joint_angles(scene.person.skeleton, scene.q)
     found = []

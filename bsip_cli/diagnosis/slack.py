@@ -29,7 +29,7 @@ def slack(scene: Scene) -> np.ndarray:
     """(N, 6, k) change of the wrench for one standard deviation of each small imperfection."""
     instruments = [effect for effect in CATALOGUE if _is_of_instruments(effect)]
     columns = [
-        _share(c) * c.signature(_source(effect, scene))
+        slack_share(c) * c.signature(_source(effect, scene))
         for effect in (*instruments, EFFECTS["over_smoothing"])
         for c in candidates_of(effect, scene)
     ]
@@ -62,7 +62,7 @@ def _is_of_instruments(effect: Effect) -> bool:
     return effect.of_the_plates or isinstance(effect, (Delay, GravityTilt))
 
 
-def _share(candidate: Candidate) -> np.ndarray:
+def slack_share(candidate: Candidate) -> np.ndarray:
     """(k,) or (1,) of the free parameters' typical sizes.
 
     Horizontal forces are all motion, so what the motion's amplitude errs by is their gain.

@@ -61,7 +61,7 @@ class TrialRecord:
 @dataclass(frozen=True, eq=False)
 class ParticipantRecord:
     """One participant; ``facts`` is the single row of the ``person`` artifact, ``loads`` the known
-    loads as (trial label, words). ``diagnosis``, ``detection``, ``gains`` and ``changes`` (of a model
+    loads as (trial label, words). ``diagnosis``, ``detection``, ``budget``, ``gains`` and ``changes`` (of a model
     extended by what was found), and ``choice`` are None where their stages have not run; ``too_short_s``: trials that
     had no part in the diagnosis, with the seconds of them that can be used."""
 
@@ -81,6 +81,7 @@ class ParticipantRecord:
     too_short_s: Mapping[str, float] = field(default_factory=dict)
     diagnosis: pd.DataFrame | None = None
     detection: pd.DataFrame | None = None
+    budget: pd.DataFrame | None = None
     gains: pd.DataFrame | None = None
     changes: pd.DataFrame | None = None
     choice: pd.DataFrame | None = None

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from bsip_cli.report.budget import budget_sentences
 from bsip_cli.report.candidates import UNNAMED, Candidate, candidates_of, causes_of
 from bsip_cli.report.effect_words import EFFECT_WORDS, WEIGHT
 from bsip_cli.report.limits import OF_THE_WEIGHT, limits_of, limits_sentence, looked_at
@@ -66,9 +67,11 @@ def verdict_of(
     gains: pd.DataFrame | None = None,
     changes: pd.DataFrame | None = None,
     too_short_s: Mapping[str, float] | None = None,
+    budget: pd.DataFrame | None = None,
 ) -> Verdict:
     """From the artifacts ``diagnosis`` and ``detection``, and of ``extend`` where it has run
-    ``gain`` and ``bsip-change``, with one method each. ``too_short_s``: stems of trials that had no
+    ``gain`` and ``bsip-change``, with one method each. ``budget``: ``overall-error-budget``, where
+    it is known. ``too_short_s``: stems of trials that had no
     part in it, with the seconds of them that can be used."""
     causes = causes_of(candidates_of(diagnosis))
     everywhere = looked_at(detection, diagnosis)
@@ -77,6 +80,7 @@ def verdict_of(
         bool(causes),
         tuple(cause_text(cause, everywhere) for cause in causes),
         (
+            *(budget_sentences(budget) if budget is not None else ()),
             *(_results(causes, gains, changes) if causes else ()),
             *_seen_in(everywhere),
             *_not_seen_in(too_short_s or {}),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from zlib import crc32
 
 import numpy as np
@@ -13,6 +14,7 @@ from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.loud_noise import with_loud_noise
+from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.diagnosis.rounds import Round, Selection
 from bsip_cli.diagnosis.scale_mass import (
@@ -30,10 +32,12 @@ from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.prior import Prior
+from bsip_cli.report.budget import budget_sentences
 from bsip_cli.report.verdict import verdict_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnosis_facts import detection_rows, facts_of
 from bsip_cli.stages.diagnosis_rows import rows_of
+from bsip_cli.stages.error_budget import error_budget
 from bsip_cli.stages.frames import person_from
 from bsip_cli.stages.moving_trials import (
     LookedAt,
@@ -43,6 +47,7 @@ from bsip_cli.stages.moving_trials import (
     stated_sd,
 )
 from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.study.study import Trial
 
 _ALIKE = 0.5  # part of the difference to the stated mass
 _ATTRIBUTED = "segment_inertia"  # not a cause beside the parameters: they are projected out
@@ -55,7 +60,8 @@ def run(unit: Unit) -> None:
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     prior = prior_of(unit, person)
     standing = _standing(unit, person, prior)
-    asked = _asked(unit, moving_trials(unit, person, prior), standing)
+    moving = moving_trials(unit, person, prior)
+    asked = _asked(unit, moving, standing)
     if asked.selection and standing and _agrees(asked.selection, prior, standing):
         as_read = prior_of(unit, person, standing.share)
         again = _asked(unit, moving_trials(unit, person, as_read), standing, standing.share)
@@ -63,18 +69,33 @@ def run(unit: Unit) -> None:
     told = (*(f for one in asked.looked_at for f in one.told), *_weighed(unit, standing))
     for sentence in filter(None, (one.left_out() for one in asked.looked_at)):
         unit.warn(sentence)
+    findings: tuple[Finding, ...] = told
+    facts: dict = {}
+    limits = empty_table("detection")
     if asked.selection:
-        diagnosis, limits, facts = _answer(asked, asked.selection, told)
-        _write(unit, diagnosis, limits, {**facts, "too_short_s": _too_short(asked)})
-        return
-    if not told:
+        findings, facts = _answer(asked, asked.selection, told)
+        limits = detection_rows(asked.selection)
+    scenes = [(standing.trial, standing.scene)] if standing else []
+    scenes += [(one.trial, one.scene) for one in moving]
+    held = [f.trials[0] for one in moving for f in one.told if one.evidence is None]
+    budget, large = error_budget(unit, prior, scenes, facts.get("causes", []), held)
+    findings = (*_beside(findings, large), *findings)
+    if not asked.selection and not findings:
         unit.warn(
             f"{unit.name}: no trial has {SHORTEST_S:g} s of motion with every contact on a "
             "plate; no movement can be diagnosed"
         )
-    names = _trials_of(told)
-    facts = {"trials": names, "too_short_s": _too_short(asked)}
-    _write(unit, rows_of(told, tuple(names)), empty_table("detection"), facts)
+    names = list(dict.fromkeys([*facts.get("trials", []), *_trials_of(findings)]))
+    facts |= {"trials": names, "too_short_s": _too_short(asked)}
+    _write(unit, rows_of(findings, tuple(names)), limits, facts, budget)
+
+
+def _beside(found: Sequence[Finding], large: Sequence[Finding]) -> Iterator[Finding]:
+    """Large errors, less the trials of which it is told already that something has no name."""
+    told = {t for f in found if f.effect == UNEXPLAINED and f.verdict == "named" for t in f.trials}
+    for one in large:
+        if trials := tuple(t for t in one.trials if t not in told):
+            yield replace(one, trials=trials)
 
 
 @dataclass(frozen=True)
@@ -82,7 +103,7 @@ class Standing:
     """A static trial in which the plates carry the person, and by what part of the stated mass they
     read more."""
 
-    stem: str
+    trial: Trial
     scene: Scene
     share: float
 
@@ -143,26 +164,27 @@ def _agrees(selection: Selection, prior: Prior, standing: Standing) -> bool:
 
 def _answer(
     asked: Asked, selection: Selection, told: tuple[Finding, ...]
-) -> tuple[pd.DataFrame, pd.DataFrame, dict]:
-    """Diagnosis, detection limits and facts, of the moving trials and of what is told already."""
+) -> tuple[tuple[Finding, ...], dict]:
+    """Findings and facts, of the moving trials and of what is told already."""
     found = findings_of(selection, asked.rng)
     findings = (*with_loud_noise(selection, found), *asked.weighed)
     findings = tuple(sorted(findings, key=lambda one: one.verdict == "rejected"))
     facts = facts_of(selection, findings)
-    facts["trials"] = list(dict.fromkeys([*facts["trials"], *_trials_of(told)]))
     proven = [cause for one in asked.looked_at for cause in one.causes()]
     facts["causes"] = [*proven, *facts["causes"]]
     facts["heavier_by"] = asked.heavier_by
-    names = tuple(one.name for one in selection.signatures.evidence.trials)
-    return rows_of((*told, *findings), names), detection_rows(selection), facts
+    return (*told, *findings), facts
 
 
-def _write(unit: Unit, diagnosis: pd.DataFrame, limits: pd.DataFrame, facts: dict) -> None:
-    """Both artifacts, and in words what they say."""
+def _write(
+    unit: Unit, diagnosis: pd.DataFrame, limits: pd.DataFrame, facts: dict, budget: pd.DataFrame
+) -> None:
+    """The artifacts, and in words what they say."""
+    unit.write("overall-error-budget", budget)
     unit.write("overall-diagnosis", diagnosis, facts)
     unit.write("detection", limits)
     said = verdict_of(diagnosis, limits)
-    for sentence in (said.headline, *said.causes, said.limits):
+    for sentence in (said.headline, *said.causes, *budget_sentences(budget), said.limits):
         if sentence:
             unit.warn(f"{unit.name}: {sentence}")
 
@@ -173,7 +195,7 @@ def _standing(unit: Unit, person: Person, prior: Prior) -> Standing | None:
         if trial.role == "static":
             scene = scene_of(unit, person, prior.phi, trial)
             if scene.valid.any():
-                return Standing(trial.stem, scene, weight_share(scene))
+                return Standing(trial, scene, weight_share(scene))
     return None
 
 
@@ -183,7 +205,7 @@ def _weighed(unit: Unit, standing: Standing | None) -> tuple[Finding, ...]:
         return ()
     plate, mass_kg = loaded_plate([standing.scene]), standing.scene.mass_kg
     return stated_mass_findings(
-        standing.share, mass_kg, stated_sd(unit), plate, (standing.stem,), "in quiet standing"
+        standing.share, mass_kg, stated_sd(unit), plate, (standing.trial.stem,), "in quiet standing"
     )
 
 

@@ -43,6 +43,9 @@ _COM_SD = ["com_x_m_sd", "com_y_m_sd", "com_z_m_sd"]
 def run(unit: Unit) -> None:
     """Read the person's diagnosis, motion and both methods; write what concerns this trial."""
     _write_diagnosis(unit)
+    assert unit.trial is not None
+    budget = unit.read("overall-error-budget")
+    unit.write("error-budget", budget[budget["trial"] == unit.trial.stem])
     able = unit.has(*_NEEDED)
     unit.write("attribution", _attribution(unit) if able else empty_table("attribution"))
 

@@ -48,6 +48,7 @@ class LookedAt:
     of it beforehand; or for how long it can be used, where that is too short."""
 
     trial: Trial
+    scene: Scene
     evidence: TrialEvidence | None = None
     proven: tuple[Proven, ...] = ()
     told: tuple[Finding, ...] = ()
@@ -110,11 +111,11 @@ def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial) -> Looked
     scene = scene_of(unit, person, prior.phi, trial)
     measured_s = float(scene.valid.sum()) / scene.rate_hz
     if measured_s < SHORTEST_S:
-        return LookedAt(trial, too_short_s=measured_s)
+        return LookedAt(trial, scene, too_short_s=measured_s)
     fewer = slow(scene)
     held = support_of(fewer)
     if held is not None:
-        return LookedAt(trial, told=(held.finding(trial.stem),))
+        return LookedAt(trial, scene, told=(held.finding(trial.stem),))
     options = unit.config.diagnosis
     rng = np.random.default_rng(crc32(trial.stem.encode()))
     own = own_nuisances(fewer, options.skin_factor, options.skin_draws, rng)
@@ -129,11 +130,11 @@ def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial) -> Looked
 
     proofs = proofs_of(fewer, _slips(unit, trial), rng)
     if not proofs:
-        return LookedAt(trial, evidence_with(own))
+        return LookedAt(trial, scene, evidence_with(own))
     alone = together((evidence_with(own),))
     proven = tuple(Proven(one, fewer, one.gain(alone)) for one in proofs)
     beside = np.concatenate([own, *(one.columns(fewer) for one in proofs)], axis=2)
-    return LookedAt(trial, evidence_with(beside), proven)
+    return LookedAt(trial, scene, evidence_with(beside), proven)
 
 
 def _heavier(prior: Prior, count: int) -> np.ndarray:

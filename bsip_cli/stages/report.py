@@ -2,8 +2,8 @@
 
 Reads quality, contacts, skeleton, marker-positions, person, kinematics, marker-residuals,
 marker-events, bsip, base-parameters, excitation, identification, reconstruction, fit,
-posturography; where they are there overall-diagnosis, detection, attribution, overall-gain,
-bsip-change, choice. Writes report-files.
+posturography; where they are there overall-diagnosis, overall-error-budget, detection,
+attribution, overall-gain, bsip-change, choice. Writes report-files.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ _TABLES = {  # field of a trial's record: kind of artifact
 _FOUND = {  # field of a participant's record: kind that is there only if its stage has run
     "diagnosis": "overall-diagnosis",
     "detection": "detection",
+    "budget": "overall-error-budget",
     "choice": "choice",
 }
 

@@ -19,8 +19,10 @@ from bsip_cli.report.blocks import (
     Section,
     Tone,
 )
+from bsip_cli.report.budget import FIRST, pieces, size_of, trials_of
 from bsip_cli.report.candidates import Candidate, candidates_of
 from bsip_cli.report.figures.candidate_gains import CandidateGains, candidate_gains
+from bsip_cli.report.figures.error_bars import Bar, error_bars
 from bsip_cli.report.participant import attribution, detection, residual
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import (
@@ -51,13 +53,37 @@ def verdict(record: ParticipantRecord) -> list[Block]:
     if record.diagnosis is None or record.detection is None:
         return [Paragraph(NOT_RUN, "note")]
     tables = (record.diagnosis, record.detection, record.gains, record.changes)
-    said = verdict_of(*tables, record.too_short_s)
+    said = verdict_of(*tables, record.too_short_s, record.budget)
     tone: Tone = "warning" if said.found or record.diagnosis.empty else "good"
     blocks: list[Block] = [Paragraph(said.headline, tone)]
     if said.causes:
         blocks.append(Numbered(said.causes))
     rest = (*put_right(record), *said.results, *said.advice, said.limits)
-    return [*blocks, *(Paragraph(text) for text in rest if text)]
+    return [*blocks, *budget_bars(record), *(Paragraph(text) for text in rest if text)]
+
+
+def budget_bars(record: ParticipantRecord) -> list[Block]:
+    """What makes RM's error, trial by trial."""
+    budget = record.budget
+    if budget is None or budget.empty:
+        return []
+    bars = []
+    for stem, label in trials_of(budget):
+        for component in FIRST:
+            size, unit = size_of(budget, stem, component)
+            if np.isfinite(size):
+                parts = tuple((p.label, p.share) for p in pieces(budget, stem, component))
+                name = f"{label}: {component_label(component)}, {number(size, 1)} {unit}"
+                bars.append(Bar(name, parts))
+    caption = (
+        "What makes the error of the table's parameters (RM), and how large it is. Each colour is "
+        "something that a simulation gets wrong; what stands left of zero makes the error smaller "
+        "where it is. Hatched: what nothing explains. Good: little is hatched, and the error is "
+        "small. Much that is hatched in a large error: something is wrong that has no name here; "
+        "look at the recording. A large part of the table's parameters: identified ones (OM) help."
+    )
+    text = "Bars: shares of the squared error by cause."
+    return [Picture(error_bars(bars), caption, text, "error_budget")]
 
 
 def put_right(record: ParticipantRecord) -> tuple[str, ...]:

@@ -1,0 +1,269 @@
+"""One model of what a simulation errs by: r = sum of terms + what is left, over all trials.
+
+Each term is Gaussian, with columns of unit variance times a scale. The scales follow from the data
+by expectation and maximisation (Dempster 1977, J R Stat Soc B 39), each with a hyperprior that it
+is as usual. What is left is an autoregression per component and trial, never quieter than the
+noise of the instruments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from bsip_cli.diagnosis.error_terms import FAULT
+from bsip_cli.diagnosis.evidence import FLOOR, Filter, innovations, recursion_of
+
+# How many observations a hyperprior counts for. With one, a fault has the wide tails of Cauchy: it
+# is hardly there or of any size. With four, ordinary errors are rarely three times the usual.
+_WEIGHT, _WEIGHT_OF_FAULTS = 4.0, 1.0
+_STEPS = 25  # of expectation and maximisation
+_ROUNDS = 3  # of what is left
+_NEGLIGIBLE = 0.5  # that a direction may add to the squared residual, whose noise is one
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """Columns (n, 6, k) that have passed a trial's filter, as :class:`error_terms.Columns`.
+
+    known : (n, 6) what it adds at the values about which the columns are, of a named fault.
+    """
+
+    term: str
+    target: str
+    scale: str
+    own: bool
+    columns: np.ndarray
+    known: np.ndarray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class TrialErrors:
+    """A trial's residual (n, 6) and terms, filtered; noise (6,) that its instruments have."""
+
+    name: str
+    filter: Filter
+    residual: np.ndarray
+    terms: tuple[Term, ...]
+    noise: np.ndarray
+
+
+@dataclass(frozen=True)
+class Part:
+    """Coefficients ``start`` to ``stop`` are a term's at a target, in one trial or in all (-1)."""
+
+    term: str
+    target: str
+    scale: str
+    trial: int
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """Some samples ``rows`` of a trial, and their part (K', K'), (K',) of the white equations."""
+
+    trial: int
+    rows: np.ndarray
+    used: np.ndarray
+    gram: np.ndarray
+    right: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorModel:
+    """The posterior of all coefficients.
+
+    Attributes
+    ----------
+    used : per trial which coefficients (K',) the last axis of its ``columns`` (n, 6, K') is about.
+    known : per trial (n, 6) what named faults add at their sizes; ``known_of`` the same by part.
+    mean (K,), covariance (K, K) : of the coefficients.
+    scales : how many times as large as usual.
+    left : per trial (n, 6) what no term explains.
+    """
+
+    trials: tuple[TrialErrors, ...]
+    parts: tuple[Part, ...]
+    used: tuple[np.ndarray, ...]
+    columns: tuple[np.ndarray, ...]
+    known: dict[tuple[Part, int], np.ndarray]
+    mean: np.ndarray
+    covariance: np.ndarray
+    scales: dict[str, float]
+    left: tuple[np.ndarray, ...]
+    folds: tuple[Fold, ...]
+    adapt: bool
+
+    def of(self, part: Part, trial: int, mean: np.ndarray | None = None) -> np.ndarray:
+        """(n, 6) what a part adds to a trial's simulated wrench, with coefficients (K,)."""
+        used = self.used[trial]
+        here = np.flatnonzero((used >= part.start) & (used < part.stop))
+        x = (self.mean if mean is None else mean)[used[here]]
+        return self.columns[trial][..., here] @ x + self.known.get((part, trial), 0.0)
+
+    @cached_property
+    def without(self) -> tuple[np.ndarray, ...]:
+        """Per fold the coefficients (K,), and their scales, of all other folds."""
+        count = len(self.mean)
+        return tuple(
+            _settled([one for one in self.folds if one is not out], self.parts, count, self.adapt)[
+                0
+            ]
+            for out in self.folds
+        )
+
+
+def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = True) -> ErrorModel:
+    """Fit coefficients, scales and what is left.
+
+    stretches : into so many each trial is cut, of which each is held out in turn.
+    adapt : scales from the data; else everything is as large as usual.
+    """
+    parts, used, columns, known = _laid_out(trials)
+    count = max(part.stop for part in parts)
+    off = [sum((x for (_, t), x in known.items() if t == k), 0.0) for k in range(len(trials))]
+    residual = [one.residual - x for one, x in zip(trials, off, strict=True)]
+    courses = residual
+    for _ in range(_ROUNDS):
+        equations = zip(trials, residual, columns, used, courses, strict=True)
+        folds = tuple(f for t, one in enumerate(equations) for f in _folds(t, *one, stretches))
+        mean, covariance, scales = _settled(folds, parts, count, adapt)
+        told = zip(residual, columns, used, strict=True)
+        left, courses = zip(*(_left(*one, mean, covariance) for one in told), strict=True)
+    return ErrorModel(
+        tuple(trials), parts, used, columns, known, mean, covariance, scales, left, folds, adapt
+    )
+
+
+Laid = tuple[
+    tuple[Part, ...],
+    tuple[np.ndarray, ...],
+    tuple[np.ndarray, ...],
+    dict[tuple[Part, int], np.ndarray],
+]
+
+
+def _laid_out(trials: Sequence[TrialErrors]) -> Laid:
+    """Parts, and per trial which coefficients its columns are about, its columns, what is known."""
+    groups: dict[tuple[str, str, str, int], dict[int, Term]] = {}
+    for t, one in enumerate(trials):
+        for term in one.terms:
+            key = (term.term, term.target, term.scale, t if term.own else -1)
+            groups.setdefault(key, {})[t] = term
+    parts: list[Part] = []
+    known = {}
+    blocks: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in trials]
+    stop = 0
+    for key, terms in groups.items():
+        kept = _squeezed([x.columns for x in terms.values()], [trials[t].noise for t in terms])
+        part = Part(*key, stop, stop + kept[0].shape[2])
+        parts.append(part)
+        stop = part.stop
+        for (t, term), columns in zip(terms.items(), kept, strict=True):
+            blocks[t].append((np.arange(part.start, part.stop), columns))
+            if term.known is not None:
+                known[part, t] = term.known
+    used = tuple(np.concatenate([u for u, _ in one]) for one in blocks)
+    return (
+        tuple(parts),
+        used,
+        tuple(np.concatenate([a for _, a in b], axis=2) for b in blocks),
+        known,
+    )
+
+
+def _squeezed(columns: Sequence[np.ndarray], noises: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """The same covariance by as few columns as matter beside the noise."""
+    white = [a / s[:, None] for a, s in zip(columns, noises, strict=True)]
+    flat = np.concatenate([a.reshape(-1, a.shape[2]) for a in white])
+    values, vectors = np.linalg.eigh(flat.T @ flat)
+    return [one @ vectors[:, values > _NEGLIGIBLE] for one in columns]
+
+
+def _folds(
+    trial: int,
+    one: TrialErrors,
+    residual: np.ndarray,
+    columns: np.ndarray,
+    used: np.ndarray,
+    course: np.ndarray,
+    stretches: int,
+) -> Iterator[Fold]:
+    """White equations of a trial; ``course`` (n, 6) is what may be left of it."""
+    spread = np.maximum(course.std(axis=0), one.noise)
+    share = one.noise / spread
+    memory = [
+        recursion_of(x, one.filter.rate_hz, max(FLOOR, float(s**2)))
+        for x, s in zip((course / spread).T, share, strict=True)
+    ]
+    recursion = np.stack(memory)
+    white = innovations((course / spread)[..., None], recursion, one.filter).reshape(-1, 6)
+    size = (spread * np.maximum(white.std(axis=0), share))[:, None]
+    rows = innovations(columns / size, recursion, one.filter)
+    right = innovations(residual[..., None] / size, recursion, one.filter)[:, 0]
+    for part in np.array_split(np.arange(len(course)), min(stretches, len(course))):
+        at = (6 * part[:, None] + np.arange(6)).ravel()
+        yield Fold(trial, part, used, rows[at].T @ rows[at], rows[at].T @ right[at])
+
+
+def _left(
+    residual: np.ndarray,
+    columns: np.ndarray,
+    used: np.ndarray,
+    mean: np.ndarray,
+    covariance: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 6) what the terms leave, and a course as large as it may be, they being uncertain."""
+    left = residual - columns @ mean[used]
+    inside = covariance[np.ix_(used, used)]
+    doubt = np.stack([((a @ inside) * a).sum() for a in columns.swapaxes(0, 1)])
+    return left, left * np.sqrt(1 + doubt / np.maximum((left**2).sum(axis=0), 1e-12))
+
+
+def _settled(
+    folds: Sequence[Fold], parts: Sequence[Part], count: int, adapt: bool
+) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
+    """Coefficients (K,), their covariance (K, K), and the scales of the largest evidence."""
+    gram, right = np.zeros((count, count)), np.zeros(count)
+    for one in folds:
+        gram[np.ix_(one.used, one.used)] += one.gram
+        right[one.used] += one.right
+    told = np.zeros(count, dtype=bool)  # the others, of a trial that is held out, stay as they are
+    told[np.unique(np.concatenate([one.used for one in folds]))] = True
+    gram, right = gram[np.ix_(told, told)], right[told]
+    place = np.cumsum(told) - 1
+    at: dict[str, np.ndarray] = {}
+    for part in parts:
+        mine = np.arange(part.start, part.stop)
+        mine = place[mine[told[mine]]]
+        at[part.scale] = np.concatenate([at.get(part.scale, mine[:0]), mine])
+    root = np.ones(len(right))
+    mean, covariance = _posterior(gram, right, root)
+    for _ in range(_STEPS if adapt else 0):
+        second = mean**2 + np.diag(covariance)
+        for scale, mine in at.items():
+            weight = _WEIGHT_OF_FAULTS if scale.startswith(FAULT) else _WEIGHT
+            root[mine] = np.sqrt((weight + second[mine].sum()) / (weight + len(mine)))
+        mean, covariance = _posterior(gram, right, root)
+    scales = {s: float(root[x[0]]) if len(x) else 1.0 for s, x in at.items()}
+    if told.all():
+        return mean, covariance, scales
+    whole = np.zeros(count)
+    whole[told] = mean
+    return whole, covariance, scales
+
+
+def _posterior(
+    gram: np.ndarray, right: np.ndarray, root: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (K,) and covariance (K, K) of coefficients with standard deviations ``root`` (K,)."""
+    inner = gram * np.outer(root, root) + np.eye(len(right))
+    inverse = cho_solve(cho_factor(inner, overwrite_a=True), np.eye(len(right)))
+    covariance = inverse * np.outer(root, root)
+    return covariance @ right, covariance

@@ -1,0 +1,179 @@
+"""The terms of the one model of the error: what each may do to a trial's simulated wrench.
+
+A term is a set of columns of unit variance where it is as large as usual; how large it is in these
+recordings follows from the data (``error_model``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.diagnosis.candidates import candidates_of
+from bsip_cli.diagnosis.evidence import LEAST
+from bsip_cli.diagnosis.geometry import joint_errors
+from bsip_cli.diagnosis.nuisances import marker_rms_m
+from bsip_cli.diagnosis.skin import SKIN_HZ, nearby_angles
+from bsip_cli.diagnosis.slack import slack_share
+from bsip_cli.diagnosis.smoothing_bias import smoothing_bias
+from bsip_cli.diagnosis.wander import wander
+from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
+from bsip_cli.effects.catalogue import CATALOGUE
+from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.gravity_tilt import GravityTilt
+from bsip_cli.effects.joint_centre import JointCentre
+from bsip_cli.effects.scene import Scene, standing_place_m
+
+INERTIA, JOINTS, MARKERS = "inertial_parameters", "joint_centres", "marker_places"
+SKIN, TRUNK, SMOOTHING = "soft_tissue", "trunk_and_shoulders", "smoothing"
+FAULT = "fault:"
+# Joints that stand for many: their shift is what a trunk or a shoulder girdle that bends does.
+_BENDING = ("waist", "neck", "shoulder")
+_HEAVIER = 0.01  # usual error of the whole mass, part of it: a scale's, clothes and shoes
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Columns (N, 6, k) of a term at one target, about the world's origin [N, N m].
+
+    own : whether the trial has coefficients of its own; else the person's trials share them.
+    scale : columns of the same scale are as many times larger than usual as each other.
+    """
+
+    term: str
+    target: str
+    scale: str
+    own: bool
+    wrench: np.ndarray
+
+
+def error_terms(
+    scene: Scene, root: np.ndarray, marker_sd_m: float, skin_factor: float
+) -> Iterator[Columns]:
+    """All terms of one trial.
+
+    root : (10 n, 10 n) of the covariance of the inertial parameters. marker_sd_m : of the places
+    of the model's markers on their segments. skin_factor : the skin of a segment slides as a whole
+    this many times as far as the residuals of its markers show.
+    """
+    names, model = scene.person.skeleton.segments, scene.model
+    regressor = wrench_regressor(model, model.createData(), scene.q, scene.v, scene.a, np.zeros(3))
+    yield Columns(INERTIA, "", INERTIA, False, regressor @ root)
+    heavier = _HEAVIER * scene.predicted[..., None]
+    yield Columns(INERTIA, "", f"{INERTIA} in all", False, heavier)
+    joints = joint_errors(scene)
+    for k, joint in enumerate(JointCentre().targets(scene)):
+        term = TRUNK if joint.startswith(_BENDING) else JOINTS
+        yield Columns(term, joint, term, False, joints[..., 3 * k : 3 * k + 3])
+    for segment, places, skin in _of_markers(scene, marker_sd_m, skin_factor):
+        name = names[segment]
+        yield Columns(MARKERS, name, MARKERS, False, places)
+        yield Columns(SKIN, name, f"{SKIN} {name}", True, skin)
+        yield Columns(SKIN, name, f"{SKIN} swings", False, _swinging(scene, segment))
+    yield Columns(SKIN, "", f"{SKIN} of the whole body", False, _swinging_body(scene))
+    yield Columns(SKIN, "", f"{SKIN} wanders", True, wander(scene))
+    yield Columns(SMOOTHING, "", SMOOTHING, True, smoothing_bias(scene))
+    for effect in CATALOGUE:
+        if effect.of_the_plates or isinstance(effect, (Delay, GravityTilt)):
+            yield from _of_instruments(effect, scene)
+
+
+def _of_instruments(effect: Effect, scene: Scene) -> Iterator[Columns]:
+    """Each place of a fault, as far as every laboratory has it; a constant one is the session's."""
+    for one in candidates_of(effect, scene):
+        if not one.scanned:
+            wrench = slack_share(one) * one.signature(_as_simulated(scene))
+            scale = f"{FAULT}{effect.name} {one.target}"
+            yield Columns(FAULT + effect.name, one.target, scale, not effect.of_the_lab, wrench)
+
+
+def _as_simulated(scene: Scene) -> Scene:
+    """The plates read what is simulated: of what they measured, a gain or a delay would explain the
+    residual by itself. Each plate bears its part of the vertical force."""
+    off, total = scene.measured - scene.predicted, scene.measured[:, 2:3]
+    loaded = total > 0
+    plates = []
+    for one in scene.plates:
+        part = np.where(loaded, one.wrench[:, 2:3], 0.0) / np.where(loaded, total, 1.0)
+        plates.append(replace(one, wrench=one.wrench - part * off))
+    return replace(scene, wrench=scene.predicted, plates=tuple(plates))
+
+
+def _of_markers(
+    scene: Scene, sd_m: float, skin_factor: float
+) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+    """Per segment with markers: what markers elsewhere on it do, and what skin that follows the
+    angles of the joints beside it does, each marker as far as its residuals show."""
+    rms, angles = marker_rms_m(scene), nearby_angles(scene)
+    for segment in np.unique(scene.person.marker_segments).tolist():
+        (mine,) = np.nonzero(scene.person.marker_segments == segment)
+        turn = scene.motion.rotation[:, segment][:, None]
+        rate = np.gradient(angles[mine[0]], 1 / scene.rate_hz, axis=0)
+        courses = (angles[mine[0]], rate, np.gradient(rate, 1 / scene.rate_hz, axis=0))
+        parts = [scene.response.parts(scene.pose_response.of(turn, [m])) for m in mine.tolist()]
+        places = sd_m * np.concatenate([one[0] for one in parts], axis=2)
+        together = skin_factor * np.sqrt((rms[mine] ** 2).mean()) * np.sum(parts, axis=0)
+        each = [rms[m] * one for m, one in zip(mine, parts, strict=True)]
+        skin = [_following(one, courses) for one in (*each, together)]
+        yield segment, places, np.concatenate(skin, axis=2)
+
+
+def _following(parts: np.ndarray, courses: Sequence[np.ndarray]) -> np.ndarray:
+    """(N, 6, 3 j) of parts (3, N, 6, 3) for courses s, s' and s'' (N, j) of each angle."""
+    both = sum(p[..., None] * s[:, None, None, :] for p, s in zip(parts, courses, strict=True))
+    return np.asarray(both).reshape(*parts.shape[1:3], -1)
+
+
+def _swinging(scene: Scene, segment: int) -> np.ndarray:
+    """(N, 6, 1) if the skin of a segment stays behind by -a / w^2, held at SKIN_HZ."""
+    (mine,) = np.nonzero(scene.person.marker_segments == segment)
+    behind = -scene.motion.acceleration_m_s2[:, segment] / (2 * np.pi * SKIN_HZ) ** 2
+    errors = np.broadcast_to(behind[:, None, :, None], (len(behind), len(mine), 3, 1))
+    return scene.response.of(scene.pose_response.of(errors, mine.tolist()))
+
+
+def _swinging_body(scene: Scene) -> np.ndarray:
+    """(N, 6, 1) if all soft tissue swings at SKIN_HZ: the wrench' second derivative over w^2."""
+    place = standing_place_m(scene)
+    course = move_moments(scene.predicted, place)
+    bent = np.gradient(np.gradient(course, axis=0), axis=0) * scene.rate_hz**2
+    return move_moments(bent, -place)[..., None] / (2 * np.pi * SKIN_HZ) ** 2
+
+
+def noise_of_instruments(
+    scene: Scene, reference_m: np.ndarray, marker_noise_m: float, rate_hz: float, cutoff_hz: float
+) -> np.ndarray:
+    """(6,) standard deviation of the filtered residual, moments about a point, that white noise of
+    the markers and the plates' own noise make: nothing of it is what a fit leaves over.
+
+    Parameters
+    ----------
+    marker_noise_m : white noise of the markers at ``rate_hz``, as the smoothing has found it.
+    cutoff_hz : of the Gaussian low-pass that the residual has passed, which leaves half of the
+        power there. The spline's own smoothing is not counted: so the noise is not more than this.
+    """
+    person = scene.person
+    joint = np.searchsorted(person.skeleton.v_starts, range(scene.model.nv), side="right") - 1
+    known = ~person.without_data()[joint]
+    information = np.linalg.inv(scene.pose_response.inverse)[:, known][:, :, known]
+    covariance = np.linalg.inv(information)
+    decay = np.log(2) / cutoff_hz**2
+    of_position = np.sqrt(np.pi / decay) / rate_hz
+    of_acceleration = (2 * np.pi) ** 4 * 0.75 * np.sqrt(np.pi) / decay**2.5 / rate_hz
+    response = scene.response
+    variance = of_acceleration * _size(
+        response.to_acceleration[..., known], reference_m, covariance
+    )
+    variance += of_position * _size(response.to_position[..., known], reference_m, covariance)
+    return np.hypot(marker_noise_m * np.sqrt(variance), LEAST * scene.mass_kg * GRAVITY_M_S2)
+
+
+def _size(response: np.ndarray, reference_m: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """(6,) variance, in the median over the frames, of pose errors (N, k, k)."""
+    moved = response.copy()
+    moved[:, 3:] -= np.cross(reference_m, moved[:, :3], axisb=1, axisc=1)
+    return np.median(np.einsum("fik,fkl,fil->fi", moved, covariance, moved), axis=0)

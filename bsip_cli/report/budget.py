@@ -1,0 +1,127 @@
+"""The error budget as people read it: what makes RM's error, in a few words and as bars."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.report.effect_words import EFFECT_WORDS
+from bsip_cli.report.words import component_label, listing, number, trial_label
+
+FIRST = ("fz", "cop_ap", "cop_ml")  # components that a reader asks for first
+REST = "all others"
+UNKNOWN = "unknown"
+_FAULT = "fault:"
+_WORDS = {
+    "inertial_parameters": "the table's segment parameters",
+    "joint_centres": "joint centres",
+    "marker_places": "places of the markers",
+    "soft_tissue": "soft tissue",
+    "trunk_and_shoulders": "trunk and shoulders that bend",
+    "smoothing": "smoothing of the motion",
+    "noise": "noise",
+    "unknown": UNKNOWN,
+}
+_WORTH = 5.0  # percent of the squared error: less is in the rest
+_UNTELLABLE = 2.0  # errors, in N or mm: what makes them is of no interest
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What some terms, told together where they look alike, make of an error [%]."""
+
+    label: str
+    share: float
+    low: float
+    high: float
+
+
+def pieces(budget: pd.DataFrame, trial: str, component: str) -> tuple[Piece, ...]:
+    """The largest first; what is small together, then noise and unknown. Their sum is 100."""
+    rows = budget[
+        (budget["trial"] == trial) & (budget["component"] == component) & (budget["target"] == "")
+    ].set_index("term")
+    found = [_together(rows, terms) for terms in _groups(rows)]
+    large = [one for one in found if abs(one.share) >= _WORTH and one.label not in _last()]
+    large.sort(key=lambda one: -one.share)
+    last = [one for one in found if one.label in _last()]
+    others = 100.0 - sum(one.share for one in (*large, *last))
+    rest = [Piece(REST, others, np.nan, np.nan)] if abs(others) >= 0.5 else []
+    return (*large, *rest, *last)
+
+
+def _last() -> tuple[str, str]:
+    return _WORDS["noise"], UNKNOWN
+
+
+def _groups(rows: pd.DataFrame) -> Iterator[tuple[str, ...]]:
+    """Terms that stand in for each other are one group."""
+    left = [term for term in rows.index if term != "total"]
+    while left:
+        group = [left[0]]
+        for term in group:
+            alike = str(rows.loc[term, "alike"]).split(", ")
+            group += [one for one in alike if one in left and one not in group]
+        left = [term for term in left if term not in group]
+        yield tuple(group)
+
+
+def _together(rows: pd.DataFrame, terms: tuple[str, ...]) -> Piece:
+    label = " or ".join(dict.fromkeys(term_words(term) for term in terms))
+    share, low, high = rows.loc[list(terms), ["share_percent", "share_low", "share_high"]].sum()
+    one = len(terms) == 1  # the sum of two intervals is not that of the sum
+    return Piece(label, float(share), float(low) if one else np.nan, float(high) if one else np.nan)
+
+
+def term_words(term: str) -> str:
+    """A term of the budget in words."""
+    if term.startswith(_FAULT):
+        return EFFECT_WORDS[term.removeprefix(_FAULT)].title
+    return _WORDS[term]
+
+
+def size_of(budget: pd.DataFrame, trial: str, component: str) -> tuple[float, str]:
+    """RM's error of a component, and its unit."""
+    row = _total(budget, trial, component)
+    return float(row["rms"]), str(row["unit"])
+
+
+def _total(budget: pd.DataFrame, trial: str, component: str) -> pd.Series:
+    mine = (budget["trial"] == trial) & (budget["component"] == component)
+    return budget[mine & (budget["term"] == "total")].iloc[0]
+
+
+def budget_sentences(budget: pd.DataFrame) -> tuple[str, ...]:
+    """What makes RM's error in all trials together, one component each, and what that is worth on
+    data held out."""
+    if budget.empty:
+        return ()
+    return tuple(filter(None, (_sentence(budget, component) for component in FIRST)))
+
+
+def _sentence(budget: pd.DataFrame, component: str) -> str:
+    size, unit = size_of(budget, "", component)
+    if not size >= _UNTELLABLE:
+        return ""
+    parts = [f"{one.label} {number(one.share, 0)} %" for one in pieces(budget, "", component)]
+    total = _total(budget, "", component)
+    worth = ""
+    if np.isfinite(total["gain_percent"]):
+        low, high = (number(total[name], 0) for name in ("gain_low", "gain_high"))
+        worth = (
+            f" Put into the model by their sizes in other data, all of them make the error "
+            f"{number(total['gain_percent'], 0)} % smaller ({low} to {high} %)."
+        )
+    return (
+        f"What makes RM's error of {number(size, 1)} {unit} in {component_label(component)}: "
+        f"{listing(parts)}.{worth}"
+    )
+
+
+def trials_of(budget: pd.DataFrame) -> tuple[tuple[str, str], ...]:
+    """Stems and labels of the trials that have a budget; first all of them together."""
+    stems = [stem for stem in budget["trial"].unique() if stem]
+    return (("", "all trials"), *((stem, trial_label(stem)) for stem in stems))

@@ -43,8 +43,8 @@ def ground_of(
 ) -> Ground:
     """What a change of the simulated wrench does to all components.
 
-    With moment m and vertical force f, m / f - m' / f' = (dm - m' / f' df) / f for any change d of the
-    wrench, so that terms add up in the centre of pressure too.
+    With moment m and vertical force f, m / f - m' / f' = (dm - m' / f' df) / f for any change d of
+    the wrench, so that terms add up in the centre of pressure too.
 
     measured, residual : (n, 6) about a point of the plates' surface, the latter less what is
     simulated. anterior : (2,) where the person faces. least_N : vertical force of a contact.

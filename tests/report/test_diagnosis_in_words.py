@@ -7,6 +7,7 @@ import pytest
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.report.blocks import Paragraph
+from bsip_cli.report.budget import budget_sentences, pieces
 from bsip_cli.report.candidates import UNNAMED, candidates_of, causes_of
 from bsip_cli.report.effect_words import EFFECT_WORDS, place_label, size_words
 from bsip_cli.report.figures.wrench_residual import amplitude_spectrum
@@ -22,7 +23,7 @@ from bsip_cli.report.separating import separating_recording
 from bsip_cli.report.usual_sizes import USUAL
 from bsip_cli.report.verdict import change_sentence, gain_sentence, headline, verdict_of
 from bsip_cli.report.words import EXTENDED
-from tests.report.fake_study import attribution, changes, detection, diagnosis, gains
+from tests.report.fake_study import attribution, changes, detection, diagnosis, error_budget, gains
 
 TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]
 
@@ -376,3 +377,18 @@ def test_trials_count_by_their_squared_error():
     row = pooled.loc[("cop_ap", "lower_torso", "centre_of_mass")]
     assert row["share_percent"] == pytest.approx(90.0 * 100 * 25 / (100 * 25 + 300 * 100))
     assert row["rmse"] == pytest.approx(np.sqrt((100 * 25 + 300 * 100) / 400))
+
+
+def test_the_budget_tells_terms_that_look_alike_together_and_adds_up():
+    table = error_budget(["sub-01_task-squat_run-1"])
+    found = pieces(table, "", "fz")
+    assert [one.label for one in found] == [
+        "the table's segment parameters",
+        "soft tissue or smoothing of the motion",
+        "noise",
+        "unknown",
+    ]
+    assert sum(one.share for one in found) == pytest.approx(100.0)
+    (first, *_) = budget_sentences(table)
+    assert first.startswith("What makes RM's error of 20.0 N in force, lab Z (up): the table's")
+    assert "40 % smaller (30 to 50 %)" in first

@@ -69,6 +69,7 @@ def test_no_trial_served(record):
     assert "The pose was not computed in static." in text
     names = [p.name for p in document.pictures()]
     assert names == [
+        "error_budget",
         "diagnosis_causes",
         "diagnosis_limits",
         "diagnosis_masses",
@@ -118,6 +119,7 @@ def test_empty_tables(record):
         changed,
         diagnosis=empty("overall-diagnosis"),
         detection=empty("detection"),
+        budget=empty("overall-error-budget"),
         gains=gains()[:0],
     )
     document = participant_document(with_trials(changed, **{k: empty(v) for k, v in kinds.items()}))

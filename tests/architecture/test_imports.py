@@ -126,6 +126,7 @@ def test_stages_do_not_know_each_other():
     helpers = {
         "stages.diagnosis_facts",
         "stages.diagnosis_rows",
+        "stages.error_budget",
         "stages.found_causes",
         "stages.frames",
         "stages.gain_rows",

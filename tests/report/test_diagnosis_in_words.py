@@ -385,8 +385,8 @@ def test_the_budget_tells_terms_that_look_alike_together_and_adds_up():
     assert [one.label for one in found] == [
         "the table's segment parameters",
         "soft tissue or smoothing of the motion",
-        "noise",
         "unknown",
+        "noise",
     ]
     assert sum(one.share for one in found) == pytest.approx(100.0)
     (first, *_) = budget_sentences(table)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bsip_cli.diagnosis.error_gain import ErrorGain, block_errors, error_gain, pooled
-from bsip_cli.diagnosis.error_model import ErrorModel, Part
+from bsip_cli.diagnosis.error_model import ErrorModel, Part, Term
 from bsip_cli.statistics.normal import Z95
 
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
@@ -112,6 +112,7 @@ class _Budget:
         for term in terms:
             whole = tuple(p for p in here if p.term == term)
             targets = dict.fromkeys(p.target for p in whole)
+            yield from self._inside(term, whole, residual, squares, count)
             for target in ("", *(t for t in targets if t and len(targets) > 1)):
                 parts = tuple(p for p in whole if not target or p.target == target)
                 lines = self._of(parts, residual, squares, count, weights)
@@ -149,6 +150,44 @@ class _Budget:
         for k, name in enumerate(COMPONENTS):
             low, high = share[k] - half[k], share[k] + half[k]
             yield Line("", "", name, rms[k], share[k], low, high, gains[k], scale)
+
+    def _inside(
+        self,
+        term: str,
+        parts: tuple[Part, ...],
+        residual: dict[int, np.ndarray],
+        squares: np.ndarray,
+        count: np.ndarray,
+    ) -> Iterator[Line]:
+        """The targets of terms whose coefficients are several targets' at once."""
+        parts = tuple(p for p in parts if p in self.model.mixed)
+        if not parts:
+            return
+        mine = np.concatenate([np.arange(p.start, p.stop) for p in parts])
+        mixed = np.concatenate([self.model.mixed[p] for p in parts], axis=1)
+        mean, inside = self.model.mean[mine], self.model.covariance[np.ix_(mine, mine)]
+        scale = float(np.mean([self.model.scales[p.scale] for p in parts]))
+        bare = {t: self._bare(parts[0], t) for t in residual}
+        targets = next(iter(bare.values())).targets
+        wide = len(mixed) // len(targets)
+        for k, target in enumerate(targets):
+            at = slice(wide * k, wide * (k + 1))
+            changes, weights = [], np.zeros((len(COMPONENTS), wide))
+            for t, one in residual.items():
+                ground, columns = self.grounds[t], bare[t].columns[..., at]
+                changes.append(ground.seen(columns @ (mixed[at] @ mean)))
+                seen = np.nan_to_num(ground.components * one[:, :, None])
+                weights += np.tensordot(seen, columns, axes=([0, 2], [0, 1]))
+            rms = np.sqrt(_sum(x**2 for x in changes) / count)
+            weights = weights @ mixed[at] / squares[:, None]
+            share = weights @ mean
+            half = Z95 * np.sqrt(np.einsum("ik,kl,il->i", weights, inside, weights))
+            for c, name in enumerate(COMPONENTS):
+                low, high = share[c] - half[c], share[c] + half[c]
+                yield Line(term, target, name, rms[c], share[c], low, high, _NO_GAIN, scale)
+
+    def _bare(self, part: Part, trial: int) -> Term:
+        return next(x for x in self.model.trials[trial].terms if x.scale == part.scale)
 
     def _rest(
         self,

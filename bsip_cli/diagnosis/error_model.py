@@ -39,6 +39,13 @@ class Term:
     own: bool
     columns: np.ndarray
     known: np.ndarray | None = None
+    mixing: np.ndarray | None = None
+    targets: tuple[str, ...] = ()
+
+    @property
+    def of_unit_variance(self) -> np.ndarray:
+        """(n, 6, m)."""
+        return self.columns if self.mixing is None else self.columns @ self.mixing
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +89,8 @@ class ErrorModel:
     Attributes
     ----------
     used : per trial which coefficients (K',) the last axis of its ``columns`` (n, 6, K') is about.
-    known : per trial (n, 6) what named faults add at their sizes; ``known_of`` the same by part.
+    known : (n, 6) what a named fault adds to a trial at its size.
+    mixed : (P, m) of a part, from whose coefficients it turns to those of a term's own columns.
     mean (K,), covariance (K, K) : of the coefficients.
     scales : how many times as large as usual.
     left : per trial (n, 6) what no term explains.
@@ -93,6 +101,7 @@ class ErrorModel:
     used: tuple[np.ndarray, ...]
     columns: tuple[np.ndarray, ...]
     known: dict[tuple[Part, int], np.ndarray]
+    mixed: dict[Part, np.ndarray]
     mean: np.ndarray
     covariance: np.ndarray
     scales: dict[str, float]
@@ -125,7 +134,7 @@ def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = Tru
     stretches : into so many each trial is cut, of which each is held out in turn.
     adapt : scales from the data; else everything is as large as usual.
     """
-    parts, used, columns, known = _laid_out(trials)
+    parts, used, columns, known, mixed = _laid_out(trials)
     count = max(part.stop for part in parts)
     off = [sum((x for (_, t), x in known.items() if t == k), 0.0) for k in range(len(trials))]
     residual = [one.residual - x for one, x in zip(trials, off, strict=True)]
@@ -137,7 +146,18 @@ def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = Tru
         told = zip(residual, columns, used, strict=True)
         left, courses = zip(*(_left(*one, mean, covariance) for one in told), strict=True)
     return ErrorModel(
-        tuple(trials), parts, used, columns, known, mean, covariance, scales, left, folds, adapt
+        tuple(trials),
+        parts,
+        used,
+        columns,
+        known,
+        mixed,
+        mean,
+        covariance,
+        scales,
+        left,
+        folds,
+        adapt,
     )
 
 
@@ -146,44 +166,44 @@ Laid = tuple[
     tuple[np.ndarray, ...],
     tuple[np.ndarray, ...],
     dict[tuple[Part, int], np.ndarray],
+    dict[Part, np.ndarray],
 ]
 
 
 def _laid_out(trials: Sequence[TrialErrors]) -> Laid:
-    """Parts, and per trial which coefficients its columns are about, its columns, what is known."""
+    """Parts; per trial which coefficients its columns are about, and these; what is known, mixed."""
     groups: dict[tuple[str, str, str, int], dict[int, Term]] = {}
     for t, one in enumerate(trials):
         for term in one.terms:
             key = (term.term, term.target, term.scale, t if term.own else -1)
             groups.setdefault(key, {})[t] = term
     parts: list[Part] = []
-    known = {}
+    known, mixed = {}, {}
     blocks: list[list[tuple[np.ndarray, np.ndarray]]] = [[] for _ in trials]
     stop = 0
     for key, terms in groups.items():
-        kept = _squeezed([x.columns for x in terms.values()], [trials[t].noise for t in terms])
-        part = Part(*key, stop, stop + kept[0].shape[2])
+        columns = [x.of_unit_variance for x in terms.values()]
+        turn = _squeezing(columns, [trials[t].noise for t in terms])
+        part = Part(*key, stop, stop + turn.shape[1])
         parts.append(part)
         stop = part.stop
-        for (t, term), columns in zip(terms.items(), kept, strict=True):
-            blocks[t].append((np.arange(part.start, part.stop), columns))
+        for (t, term), unit in zip(terms.items(), columns, strict=True):
+            blocks[t].append((np.arange(part.start, part.stop), unit @ turn))
             if term.known is not None:
                 known[part, t] = term.known
+            if term.mixing is not None:
+                mixed[part] = term.mixing @ turn
     used = tuple(np.concatenate([u for u, _ in one]) for one in blocks)
-    return (
-        tuple(parts),
-        used,
-        tuple(np.concatenate([a for _, a in b], axis=2) for b in blocks),
-        known,
-    )
+    together = tuple(np.concatenate([a for _, a in one], axis=2) for one in blocks)
+    return tuple(parts), used, together, known, mixed
 
 
-def _squeezed(columns: Sequence[np.ndarray], noises: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """The same covariance by as few columns as matter beside the noise."""
+def _squeezing(columns: Sequence[np.ndarray], noises: Sequence[np.ndarray]) -> np.ndarray:
+    """(k, m) that gives the same covariance by as few columns as matter beside the noise."""
     white = [a / s[:, None] for a, s in zip(columns, noises, strict=True)]
     flat = np.concatenate([a.reshape(-1, a.shape[2]) for a in white])
     values, vectors = np.linalg.eigh(flat.T @ flat)
-    return [one @ vectors[:, values > _NEGLIGIBLE] for one in columns]
+    return vectors[:, values > _NEGLIGIBLE]
 
 
 def _folds(

@@ -42,6 +42,8 @@ class Columns:
 
     own : whether the trial has coefficients of its own; else the person's trials share them.
     scale : columns of the same scale are as many times larger than usual as each other.
+    mixing : (k, m) where the columns are not of unit variance, columns @ mixing are; ``targets``
+        have as many of the columns each.
     """
 
     term: str
@@ -49,6 +51,8 @@ class Columns:
     scale: str
     own: bool
     wrench: np.ndarray
+    mixing: np.ndarray | None = None
+    targets: tuple[str, ...] = ()
 
 
 def error_terms(
@@ -62,9 +66,9 @@ def error_terms(
     """
     names, model = scene.person.skeleton.segments, scene.model
     regressor = wrench_regressor(model, model.createData(), scene.q, scene.v, scene.a, np.zeros(3))
-    yield Columns(INERTIA, "", INERTIA, False, regressor @ root)
-    heavier = _HEAVIER * scene.predicted[..., None]
-    yield Columns(INERTIA, "", f"{INERTIA} in all", False, heavier)
+    yield Columns(INERTIA, "", INERTIA, False, regressor, root, names)
+    heavier = _HEAVIER * scene.phi[:, None]
+    yield Columns(INERTIA, "", f"{INERTIA} in all", False, regressor, heavier, names)
     joints = joint_errors(scene)
     for k, joint in enumerate(JointCentre().targets(scene)):
         term = TRUNK if joint.startswith(_BENDING) else JOINTS

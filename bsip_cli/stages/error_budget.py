@@ -13,7 +13,12 @@ from bsip_cli.artifacts import empty_table
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.error_budget import Ground, Line, budget_of, ground_of
 from bsip_cli.diagnosis.error_model import ErrorModel, Term, TrialErrors, error_model
-from bsip_cli.diagnosis.error_terms import FAULT, error_terms, noise_of_instruments
+from bsip_cli.diagnosis.error_terms import (
+    FAULT,
+    Columns,
+    error_terms,
+    noise_of_instruments,
+)
 from bsip_cli.diagnosis.evidence import Filter, filter_of, slow
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.held_out import FOLDS
@@ -135,12 +140,18 @@ def _prepared(
         filter_,
         residual,
         (
-            *(Term(x.term, x.target, x.scale, x.own, filter_(x.wrench)) for x in terms),
+            *(_term(x, filter_) for x in terms),
             *_named(fewer, filter_, [x for x in causes if trial.stem in x["trials"]]),
         ),
         noise_of_instruments(fewer, filter_.reference_m, noise_m, scene.rate_hz, options.cutoff_hz),
     )
     return Prepared(errors, ground, trial.role != "static", weight_N)
+
+
+def _term(x: Columns, filter_: Filter) -> Term:
+    """The columns once they have passed the filter."""
+    wrench = filter_(x.wrench)
+    return Term(x.term, x.target, x.scale, x.own, wrench, mixing=x.mixing, targets=x.targets)
 
 
 def _about_surface(filter_: Filter, scene: Scene) -> Filter:

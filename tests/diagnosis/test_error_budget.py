@@ -36,7 +36,9 @@ def errors_of(scene: Scene, name: str = "a") -> tuple[TrialErrors, Ground]:
     low = filter_of(fewer, CUTOFF_HZ)
     residual = low.one(fewer.measured - fewer.predicted)
     terms = tuple(
-        Term(one.term, one.target, one.scale, one.own, low(one.wrench))
+        Term(
+            one.term, one.target, one.scale, one.own, low(one.wrench), None, one.mixing, one.targets
+        )
         for one in error_terms(fewer, prior_root(), 0.005, 2.0)
     )
     noise = noise_of_instruments(fewer, low.reference_m, MARKER_NOISE_M, scene.rate_hz, CUTOFF_HZ)
@@ -110,6 +112,19 @@ def test_a_heavier_segment_is_a_matter_of_the_parameters():
     for component in ("fz", "cop_ap"):
         share, gain = found["inertial_parameters", component]
         assert share > 0.7 and gain > 40
+
+
+def test_the_segments_add_up_to_the_parameters_and_the_heavier_one_is_the_largest():
+    trial, ground = errors_of(with_heavier(movement(), "upper_torso", 0.15))
+    model = error_model([trial], 5)
+    lines = budget_of(model, [ground], [0], np.random.default_rng(1))
+    for component in COMPONENTS:
+        mine = [x for x in lines if (x.term, x.component) == ("inertial_parameters", component)]
+        (whole,) = (x.share for x in mine if not x.target)
+        parts = {x.target: x.share for x in mine if x.target}
+        assert sum(parts.values()) == pytest.approx(whole, abs=1e-6)
+        if component == "cop_ap":
+            assert max(parts, key=parts.__getitem__) == "upper_torso"
 
 
 def test_noise_alone_is_no_large_error_and_leaves_nothing_unknown():

@@ -649,41 +649,6 @@ SCHEMAS = {
             _DIAGNOSIS,
         ),
         Schema(
-            "attribution",
-            "trial",
-            1,
-            "how much of RM's error which parameters of which segment make",
-            (
-                _text(
-                    "component",
-                    "fx fy fz mx my mz cop_ap cop_ml; moments about the mean measured COP",
-                ),
-                _text("segment", "segment of the skeleton; empty for what OM leaves too"),
-                _text("group", "mass, centre_of_mass, inertia; rest: what OM leaves too"),
-                Column(
-                    "share_percent",
-                    "float",
-                    "%",
-                    "of RM's squared error that goes when these parameters are OM's, the mean of "
-                    "all orders of exchange; below 0: they make the error larger",
-                ),
-                Column(
-                    "difference",
-                    "float",
-                    "as unit",
-                    "RM less OM: mass; distance of the centres of mass; norm of the tensors' "
-                    "difference",
-                ),
-                _text("unit", "of difference"),
-                Column("rmse", "float", "as rmse_unit", "RM's error in this component"),
-                _text("rmse_unit", "N, N m or mm"),
-                Column("n", "int", "1", "samples"),
-                _text("data", "held_out, or identification where no other data are left"),
-                _text("source", "segment and group with their difference, in words"),
-                _text("sentence", "share and source in words"),
-            ),
-        ),
-        Schema(
             "extended-bsip",
             "participant",
             1,

@@ -171,7 +171,7 @@ Laid = tuple[
 
 
 def _laid_out(trials: Sequence[TrialErrors]) -> Laid:
-    """Parts; per trial which coefficients its columns are about, and these; what is known, mixed."""
+    """Parts; per trial the coefficients that its columns are about, and these; known and mixed."""
     groups: dict[tuple[str, str, str, int], dict[int, Term]] = {}
     for t, one in enumerate(trials):
         for term in one.terms:

@@ -9,11 +9,12 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.effect_words import EFFECT_WORDS
-from bsip_cli.report.words import component_label, listing, number, trial_label
+from bsip_cli.report.words import component_label, listing, number, segment_label, trial_label
 
 FIRST = ("fz", "cop_ap", "cop_ml")  # components that a reader asks for first
 REST = "all others"
 UNKNOWN = "unknown"
+TABLE = "inertial_parameters"
 _FAULT = "fault:"
 _WORDS = {
     "inertial_parameters": "the table's segment parameters",
@@ -26,6 +27,7 @@ _WORDS = {
     "unknown": UNKNOWN,
 }
 _WORTH = 5.0  # percent of the squared error: less is in the rest
+_MOST = 4  # segments that are told
 _UNTELLABLE = 2.0  # errors, in N or mm: what makes them is of no interest
 
 
@@ -119,6 +121,19 @@ def _sentence(budget: pd.DataFrame, component: str) -> str:
         f"What makes RM's error of {number(size, 1)} {unit} in {component_label(component)}: "
         f"{listing(parts)}.{worth}"
     )
+
+
+def segment_shares(budget: pd.DataFrame) -> Iterator[tuple[str, str]]:
+    """Per component, which segments of the table make most of RM's error."""
+    rows = budget[(budget["term"] == TABLE) & (budget["target"] != "") & (budget["trial"] == "")]
+    for component, mine in rows.groupby("component", sort=False):
+        largest = mine[mine["share_percent"] >= _WORTH].nlargest(_MOST, "share_percent")
+        parts = [
+            f"{segment_label(r['target'])} {number(r['share_percent'], 0)} % "
+            f"({number(r['share_low'], 0)} to {number(r['share_high'], 0)})"
+            for r in largest.to_dict("records")
+        ]
+        yield component_label(str(component)), "; ".join(parts) or "none"
 
 
 def trials_of(budget: pd.DataFrame) -> tuple[tuple[str, str], ...]:

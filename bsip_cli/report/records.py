@@ -51,7 +51,6 @@ class TrialRecord:
     fit: pd.DataFrame | None
     posturography: pd.DataFrame | None
     marker_events: pd.DataFrame | None = None
-    attribution: pd.DataFrame | None = None
 
     @property
     def label(self) -> str:

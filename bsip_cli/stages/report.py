@@ -3,7 +3,7 @@
 Reads quality, contacts, skeleton, marker-positions, person, kinematics, marker-residuals,
 marker-events, bsip, base-parameters, excitation, identification, reconstruction, fit,
 posturography; where they are there overall-diagnosis, overall-error-budget, detection,
-attribution, overall-gain, bsip-change, choice. Writes report-files.
+overall-gain, bsip-change, choice. Writes report-files.
 """
 
 from __future__ import annotations
@@ -42,7 +42,6 @@ _TABLES = {  # field of a trial's record: kind of artifact
     "reconstruction": "reconstruction",
     "fit": "fit",
     "posturography": "posturography",
-    "attribution": "attribution",
 }
 _FOUND = {  # field of a participant's record: kind that is there only if its stage has run
     "diagnosis": "overall-diagnosis",

@@ -137,7 +137,6 @@ class Artifacts:
         self.write("reconstruction", self.reconstruction(trial), trial)
         self.write("fit", self.fit(trial), trial)
         self.write("posturography", posturography(), trial)
-        self.write("attribution", attribution(self.skeleton), trial)
         self.write("correlation-difference", empty("correlation-difference"), trial)
 
     # --- participant ------------------------------------------------------------------------
@@ -605,23 +604,6 @@ def detection(trials: list[str]) -> pd.DataFrame:
     alone = pd.DataFrame(rows, columns=columns).assign(trials=trials[-1])
     together = alone.assign(trials=", ".join(trials))
     return pd.concat([alone.assign(limit=9 * alone["limit"]), together], ignore_index=True)
-
-
-def attribution(skeleton: Skeleton) -> pd.DataFrame:
-    """All of the error but 10 % in the first segment's centre of mass."""
-    rows = []
-    for component in (*_KINDS, "cop_ap", "cop_ml"):
-        for k, name in enumerate(skeleton.segments):
-            for group in ("mass", "centre_of_mass", "inertia"):
-                share = 90.0 if (k, group) == (0, "centre_of_mass") else 0.0
-                rows.append(
-                    (component, name, group, share, f"{name}'s {group}, 21 mm too far back")
-                )
-        rows.append((component, "", "rest", 10.0, ""))
-    columns = ["component", "segment", "group", "share_percent", "source"]
-    frame = pd.DataFrame(rows, columns=columns)
-    more = {"difference": 0.021, "unit": "m", "rmse": 5.0, "rmse_unit": "mm", "n": 100}
-    return frame.assign(**more, data="held_out", sentence=frame["source"])
 
 
 def gains() -> pd.DataFrame:

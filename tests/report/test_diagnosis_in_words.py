@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.report.blocks import Paragraph
 from bsip_cli.report.budget import budget_sentences, pieces
@@ -15,7 +14,6 @@ from bsip_cli.report.limits import limits_of, limits_sentence
 from bsip_cli.report.movement_phases import PHASES, motion_of, phases_of
 from bsip_cli.report.participant import detection as limits_section
 from bsip_cli.report.participant import diagnosis as diagnosis_section
-from bsip_cli.report.participant.attribution import pooled_shares
 from bsip_cli.report.participant.diagnosis import gain_blocks, ranking
 from bsip_cli.report.participant.residual import residuals_of
 from bsip_cli.report.records import with_all_causes
@@ -23,7 +21,7 @@ from bsip_cli.report.separating import separating_recording
 from bsip_cli.report.usual_sizes import USUAL
 from bsip_cli.report.verdict import change_sentence, gain_sentence, headline, verdict_of
 from bsip_cli.report.words import EXTENDED
-from tests.report.fake_study import attribution, changes, detection, diagnosis, error_budget, gains
+from tests.report.fake_study import changes, detection, diagnosis, error_budget, gains
 
 TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]
 
@@ -316,7 +314,7 @@ def test_changes_of_the_body_lead_with_the_largest():
     assert change_sentence(table[:0]) == ""
 
 
-# --- residual and attribution -------------------------------------------------------------------
+# --- residual and error budget -------------------------------------------------------------------
 
 
 def test_phases_of_the_movement():
@@ -368,15 +366,6 @@ def test_spectrum_peaks_at_the_pace_and_leaves_gaps_out():
     assert frequency[np.argmax(amplitude)] == pytest.approx(3.0)
     assert (amplitude**2).sum() * frequency[0] == pytest.approx(0.5, rel=0.05)
     assert len(amplitude_spectrum(np.full(50, np.nan), 100.0)[0]) == 0
-
-
-def test_trials_count_by_their_squared_error():
-    one = attribution(load_skeleton("hansen2017"))
-    other = one.assign(share_percent=0.0, rmse=10.0, n=300)
-    pooled = pooled_shares([one, other]).set_index(["component", "segment", "group"])
-    row = pooled.loc[("cop_ap", "lower_torso", "centre_of_mass")]
-    assert row["share_percent"] == pytest.approx(90.0 * 100 * 25 / (100 * 25 + 300 * 100))
-    assert row["rmse"] == pytest.approx(np.sqrt((100 * 25 + 300 * 100) / 400))
 
 
 def test_the_budget_tells_terms_that_look_alike_together_and_adds_up():

@@ -73,7 +73,6 @@ def test_no_trial_served(record):
         "diagnosis_causes",
         "diagnosis_limits",
         "diagnosis_masses",
-        "attribution",
         "masses",
         "centres_of_mass",
     ]
@@ -113,7 +112,6 @@ def test_empty_tables(record):
         "fit": "fit",
         "reconstruction": "reconstruction",
         "posturography": "posturography",
-        "attribution": "attribution",
     }
     changed = replace(
         changed,
@@ -128,14 +126,12 @@ def test_empty_tables(record):
     assert "The excitation was not computed." in text
     assert "nobody can say" in text
     assert "The limits of detection are not known." in text
-    assert "RM's errors were not attributed" in text
 
 
 def test_stages_that_have_not_run(record):
     without = replace(record, diagnosis=None, detection=None, gains=None)
-    text = words_of(participant_document(with_trials(without, attribution=None)))
+    text = words_of(participant_document(with_trials(without)))
     assert text.count("run `bsip diagnose`") == 2  # in the summary and in section 2
-    assert "RM's errors were not attributed" in text
 
 
 def test_frames_without_a_pose(record):

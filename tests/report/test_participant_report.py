@@ -64,7 +64,7 @@ def test_all_sections_are_there_in_order(page):
 
 def test_figures_are_whole_pictures_with_words(page):
     figures = svgs(page)
-    assert len(figures) == 24
+    assert len(figures) == 23
     for figure in figures:
         assert ElementTree.fromstring(figure).tag.endswith("svg")
     assert all(re.findall(r'<img src="[^"]+" alt="([^"]+)"', page))

@@ -19,11 +19,11 @@ from bsip_cli.report.blocks import (
     Section,
     Tone,
 )
-from bsip_cli.report.budget import FIRST, pieces, size_of, trials_of
+from bsip_cli.report.budget import FIRST, pieces, segment_shares, size_of, trials_of
 from bsip_cli.report.candidates import Candidate, candidates_of
 from bsip_cli.report.figures.candidate_gains import CandidateGains, candidate_gains
 from bsip_cli.report.figures.error_bars import Bar, error_bars
-from bsip_cli.report.participant import attribution, detection, residual
+from bsip_cli.report.participant import detection, residual
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import (
     LEAST_TOLD,
@@ -117,8 +117,28 @@ def section(record: ParticipantRecord) -> Section:
             Heading("What might have gone unseen"),
             *detection.blocks(record.detection, record.diagnosis),
         ]
-    blocks += [*residual.blocks(record), *attribution.blocks(record)]
+    blocks += [*residual.blocks(record), *_segments(record)]
     return Section("diagnosis", "What the simulation gets wrong", tuple(blocks))
+
+
+def _segments(record: ParticipantRecord) -> list[Block]:
+    """Which segments of the table make RM's error."""
+    if record.budget is None or record.budget.empty:
+        return []
+    return [
+        Heading("Which segments of the table are wrong"),
+        Paragraph(
+            "The part of RM's squared error that goes with the mass, centre of mass and inertia of "
+            "each segment. Neighbours can take each other's part, and a share below zero makes the "
+            "error larger where it is; all segments together are the table's part of the budget."
+        ),
+        Grid(
+            ("component", "largest shares of RM's squared error, with 95 % interval"),
+            tuple(segment_shares(record.budget)),
+            "Segments whose parameters make RM's error, all trials together",
+            words=2,
+        ),
+    ]
 
 
 # --- ranking ------------------------------------------------------------------------------------

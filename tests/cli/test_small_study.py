@@ -312,11 +312,13 @@ def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
     times = run.times()
     chosen = ("--participant", "sub-01", "--config", own)
     answer = bsip("run", run.study, "--out", run.out, *chosen)
-    assert answer.summary.startswith("bsip run: 12 done, 12 up to date;")
+    assert answer.summary.startswith("bsip run: 14 done, 10 up to date;")
     rewritten = run.rewritten(times)
     assert stages_of(rewritten) == {
         "reconstruct (trial)",
+        "diagnose (participant)",
         "diagnose (trial)",
+        "extend (participant)",
         "extend (trial)",
         "extend (participant, gain)",
         "choose (participant)",
@@ -671,7 +673,7 @@ def test_a_static_trial_off_the_plates_weighs_nobody(run):
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     standing = diagnose._standing(unit, person, prior_of(unit, person))
     assert standing is not None
-    assert standing.stem == stem and standing.scene.valid.any() and abs(standing.share) < 0.01
+    assert standing.trial.stem == stem and standing.scene.valid.any() and abs(standing.share) < 0.01
     path = run.path("wrench", stem)
     wrench, notes = read_artifact(path, "wrench"), read_header(path)["provenance"]
     write_artifact(path, "wrench", wrench.assign(valid=False), notes)

@@ -28,7 +28,7 @@ _WORDS = {
 }
 _WORTH = 5.0  # percent of the squared error: less is in the rest
 _MOST = 4  # segments that are told
-_UNTELLABLE = 2.0  # errors, in N or mm: what makes them is of no interest
+LEAST_TOLD_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Piece:
 
 
 def pieces(budget: pd.DataFrame, trial: str, component: str) -> tuple[Piece, ...]:
-    """The largest first; what is small together, then noise and unknown. Their sum is 100."""
+    """The largest first; what is small together, then unknown and noise. Their sum is 100."""
     rows = budget[
         (budget["trial"] == trial) & (budget["component"] == component) & (budget["target"] == "")
     ].set_index("term")
@@ -106,7 +106,7 @@ def budget_sentences(budget: pd.DataFrame) -> tuple[str, ...]:
 
 def _sentence(budget: pd.DataFrame, component: str) -> str:
     size, unit = size_of(budget, "", component)
-    if not size >= _UNTELLABLE:
+    if not size >= LEAST_TOLD_SIZE:
         return ""
     parts = [f"{one.label} {number(one.share, 0)} %" for one in pieces(budget, "", component)]
     total = _total(budget, "", component)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -22,6 +23,7 @@ from bsip_cli.report.figures.canvas import (
 
 _SKY, _YELLOW, _VERMILION = "#56B4E9", "#F0E442", "#8C510A"  # Okabe and Ito, and a brown
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, _SKY, _YELLOW, _VERMILION)
+_LEGEND: dict[str, Any] = {"ncols": 2, "frameon": False, "fontsize": 7.5}
 _FIXED = {"noise": ("#ffffff", ""), "unknown": ("#ffffff", "////"), "all others": (FAINT, "")}
 
 
@@ -41,8 +43,7 @@ def error_bars(bars: Sequence[Bar]) -> Figure:
     labels = list(dict.fromkeys(label for bar in bars for label, _ in bar.shares))
     ordinary = [label for label in labels if label not in _FIXED]
     for label in (*ordinary, *(one for one in _FIXED if one in labels)):
-        place = ordinary.index(label) % len(_COLOURS) if label in ordinary else 0
-        colour, hatch = _FIXED.get(label, (_COLOURS[place], ""))
+        colour, hatch = _FIXED.get(label) or _drawn(ordinary.index(label))
         for row, bar in enumerate(bars):
             share, start = _place(bar, label, (*ordinary, *_FIXED))
             axes.barh(
@@ -61,8 +62,13 @@ def error_bars(bars: Sequence[Bar]) -> Figure:
     axes.set_ylim(len(bars) - 0.5, -0.5)
     axes.set_xlabel("share of the squared error [%]")
     tidy(axes, grid="x")
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, fontsize=7.5)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", **_LEGEND)
     return figure
+
+
+def _drawn(place: int) -> tuple[str, str]:
+    """Colour and hatch of a cause, by its place: those that come late are dotted."""
+    return _COLOURS[place % len(_COLOURS)], "" if place < len(_COLOURS) else "..."
 
 
 def _place(bar: Bar, label: str, order: Sequence[str]) -> tuple[float, float]:

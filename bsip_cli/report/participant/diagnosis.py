@@ -19,7 +19,14 @@ from bsip_cli.report.blocks import (
     Section,
     Tone,
 )
-from bsip_cli.report.budget import FIRST, pieces, segment_shares, size_of, trials_of
+from bsip_cli.report.budget import (
+    FIRST,
+    LEAST_TOLD_SIZE,
+    pieces,
+    segment_shares,
+    size_of,
+    trials_of,
+)
 from bsip_cli.report.candidates import Candidate, candidates_of
 from bsip_cli.report.figures.candidate_gains import CandidateGains, candidate_gains
 from bsip_cli.report.figures.error_bars import Bar, error_bars
@@ -71,7 +78,7 @@ def budget_bars(record: ParticipantRecord) -> list[Block]:
     for stem, label in trials_of(budget):
         for component in FIRST:
             size, unit = size_of(budget, stem, component)
-            if np.isfinite(size):
+            if size >= LEAST_TOLD_SIZE:
                 parts = tuple((p.label, p.share) for p in pieces(budget, stem, component))
                 name = f"{label}: {component_label(component)}, {number(size, 1)} {unit}"
                 bars.append(Bar(name, parts))

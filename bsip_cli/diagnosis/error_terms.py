@@ -56,11 +56,11 @@ class Columns:
 
 
 def error_terms(
-    scene: Scene, root: np.ndarray, marker_sd_m: float, skin_factor: float
+    scene: Scene, root: np.ndarray, landmark_sd_m: float, skin_factor: float
 ) -> Iterator[Columns]:
     """All terms of one trial.
 
-    root : (10 n, 10 n) of the covariance of the inertial parameters. marker_sd_m : of the places
+    root : (10 n, 10 n) of the covariance of the inertial parameters. landmark_sd_m : of the places
     of the model's markers on their segments. skin_factor : the skin of a segment slides as a whole
     this many times as far as the residuals of its markers show.
     """
@@ -73,7 +73,7 @@ def error_terms(
     for k, joint in enumerate(JointCentre().targets(scene)):
         term = TRUNK if joint.startswith(_BENDING) else JOINTS
         yield Columns(term, joint, term, False, joints[..., 3 * k : 3 * k + 3])
-    for segment, places, skin in _of_markers(scene, marker_sd_m, skin_factor):
+    for segment, places, skin in _of_markers(scene, landmark_sd_m, skin_factor):
         name = names[segment]
         yield Columns(MARKERS, name, MARKERS, False, places)
         yield Columns(SKIN, name, f"{SKIN} {name}", True, skin)

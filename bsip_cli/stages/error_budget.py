@@ -126,7 +126,7 @@ def _prepared(
         return None
     measured, residual = _filtered(scene, fewer, filter_, options.cutoff_hz)
     weight_N = scene.mass_kg * GRAVITY_M_S2
-    terms = error_terms(fewer, prior.root, options.marker_sd_m, options.skin_factor)
+    terms = error_terms(fewer, prior.root, options.landmark_sd_m, options.skin_factor)
     ground = ground_of(
         measured,
         residual,

@@ -34,7 +34,6 @@ from bsip_cli.errors import BadDataError, BsipError, UsageError
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.files.regular import check_regular
 from bsip_cli.pipeline import Stage
-from bsip_cli.report.choice import headline
 from bsip_cli.running.lock import held_alone
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import follow, open_study
@@ -211,9 +210,8 @@ def _chosen(unit: Unit) -> tuple[str, str]:
             expected="the result of `bsip choose`",
             remedy="run `bsip choose` or `bsip run`, or name a method with --method",
         )
-    choice = unit.read("choice")
-    first = choice.iloc[0]
-    return str(first["use"]), f"{headline(choice)}; {first['reason']}"
+    first = unit.read("choice").iloc[0]
+    return str(first["use"]), str(first["sentence"])
 
 
 def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import asdict
+
 import numpy as np
 import pandas as pd
 
@@ -10,7 +13,7 @@ from bsip_cli.body.names import in_words as segment_in_words
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.diagnosis.evidence import slow
-from bsip_cli.diagnosis.support import support_of
+from bsip_cli.diagnosis.support import Support, support_of
 from bsip_cli.dynamics.base_parameters import expressions
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.identification.base import base_parameters
@@ -77,7 +80,7 @@ def run(unit: Unit) -> None:
     unit.write(
         "identification",
         _summary(problem, found, estimates, estimators, blocks).assign(**rarity),
-        facts={"external_contacts": contacts},
+        facts={"external_contacts": _as_records(contacts)},
     )
     unit.write("used-blocks", blocks)
 
@@ -86,7 +89,7 @@ def _write_table_only(
     unit: Unit,
     regression: pd.DataFrame,
     recordings: list[Recording],
-    contacts: dict[str, str],
+    contacts: Mapping[str, Support],
 ) -> None:
     """Without forces that belong to the motion the table's values stand alone."""
     unit.warn(
@@ -96,8 +99,12 @@ def _write_table_only(
     unit.write("bsip", regression.drop(columns="note"))
     for kind in ("base-parameters", "excitation", "used-blocks"):
         unit.write(kind, empty_table(kind))
-    empty = empty_table("identification")
-    unit.write("identification", empty, facts={"external_contacts": contacts})
+    facts = {"external_contacts": _as_records(contacts)}
+    unit.write("identification", empty_table("identification"), facts)
+
+
+def _as_records(contacts: Mapping[str, Support]) -> dict[str, dict]:
+    return {stem: asdict(support) for stem, support in contacts.items()}
 
 
 def _estimators(unit: Unit) -> dict[str, str]:
@@ -109,18 +116,17 @@ def _estimators(unit: Unit) -> dict[str, str]:
 # --- which data -------------------------------------------------------------------------------
 
 
-def _external_contacts(unit: Unit, person: Person, phi: np.ndarray) -> dict[str, str]:
-    """What the balance of forces with the table's body (10 n,) shows beside the plates, in words,
-    by trial."""
+def _external_contacts(unit: Unit, person: Person, phi: np.ndarray) -> dict[str, Support]:
+    """What bears part of the body beside the plates, by trial; phi (10 n,) of the table."""
     found = {}
     for trial in unit.trials("kinematics", "wrench"):
         support = support_of(slow(motion_and_wrench_of(unit, person, phi, trial)))
         if support is not None:
-            found[trial.stem] = support.words()
+            found[trial.stem] = support
     return found
 
 
-def _identification_trials(unit: Unit, contacts: dict[str, str]) -> list[Trial]:
+def _identification_trials(unit: Unit, contacts: Mapping[str, Support]) -> list[Trial]:
     """The trials with the role; without one, the trial with most valid frames. Never one with an
     external contact: the body would be made to bear what the contact bears."""
     ready = unit.trials("kinematics", "wrench")
@@ -144,13 +150,13 @@ def _identification_trials(unit: Unit, contacts: dict[str, str]) -> list[Trial]:
 
 
 def _tell_of_contacts(
-    unit: Unit, asked: list[Trial], chosen: list[Trial], contacts: dict[str, str]
+    unit: Unit, asked: list[Trial], chosen: list[Trial], contacts: Mapping[str, Support]
 ) -> None:
     instead = ", ".join(trial.stem for trial in chosen)
     used = f"{instead} identifies instead" if chosen else "no trial is left to identify from"
     for trial in asked:
         if trial.stem in contacts:
-            found = contacts[trial.stem]
+            found = contacts[trial.stem].words()
             unit.warn(f"{unit.name}: {trial.stem} does not identify: {found}; {used}")
 
 

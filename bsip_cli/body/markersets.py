@@ -20,6 +20,8 @@ _SIDED = {
     "occiput",
     "temple",
     "acromion",
+    "acromial_angle",
+    "clavicle",
     "asis",
     "psis",
     "elbow_lateral",

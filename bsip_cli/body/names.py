@@ -1,4 +1,4 @@
-"""The names of the 15 segments, fixed for every table and file, and names as people read them."""
+"""The names of the segments, fixed for every table and file, and names as people read them."""
 
 from __future__ import annotations
 
@@ -19,11 +19,16 @@ SEGMENTS = (
     "foot_l",
     "foot_r",
 )
+"""Segments with mass: every skeleton has them."""
+
+LINKS = ("clavicle_l", "clavicle_r")
+"""Massless rods between segments, which a skeleton may have (Robert 2017)."""
 
 _JOINTS = {
     "lower_torso": "root",
     "upper_torso": "waist",
     "head": "neck",
+    "clavicle": "sternoclavicular",
     "upper_arm": "shoulder",
     "forearm": "elbow",
     "hand": "wrist",

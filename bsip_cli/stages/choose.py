@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from itertools import groupby
 
 import numpy as np
 import pandas as pd
@@ -109,27 +110,31 @@ def _why(use: str, differences: Differences, judges: list[Judge], data: str, is_
         number(float(np.mean([judge.force_N[name] for judge in judges])), 0)
         for name in (OM, RM_MASS, RM)
     )
-    pairs = ", ".join(_compared(*pair, differences[pair]) for pair in _DECIDING[use])
+    decided = [
+        f"{first} errs {listing([_compared(b, differences[a, b]) for a, b in pairs])}"
+        for first, pairs in groupby(_DECIDING[use], lambda pair: pair[0])
+    ]
     rare = " OM is not used: fewer than 1 in 100 people have such a body." if is_rare else ""
     return (
         f"{where} the ground force errs by {om} N with the identified parameters (OM), by {mass} N "
         f"with the table's scaled to the measured weight ({RM_MASS}), by {table} N with the "
-        f"table's own ({RM}). Over forces, moments and centre of pressure together {pairs}.{rare}"
+        f"table's own ({RM}). Over forces, moments and centre of pressure together "
+        f"{listing(decided)}.{rare}"
     )
 
 
-def _compared(first: str, second: str, one: Difference) -> str:
-    """``OM errs less than RM by 30 to 41 %``: one standard error to either side."""
+def _compared(other: str, one: Difference) -> str:
+    """``30 to 41 % less than RM``: one standard error to either side."""
     ends = [100 * (ratio - 1) for ratio in one.interval()]
     if not np.isfinite(ends).all():
         change = 100 * (one.ratio - 1)
-        how = f"{'less' if change < 0 else 'more'} than {second} by {number(abs(change), 0)} %"
-        return f"{first} errs {how} (too few independent samples for an interval)"
+        how = f"{number(abs(change), 0)} % {'less' if change < 0 else 'more'} than {other}"
+        return f"{how} (too few independent samples for an interval)"
     if ends[0] < 0 < ends[1]:
         low, high = (number(abs(end), 0) for end in ends)
-        return f"{first} errs between {low} % less and {high} % more than {second}"
+        return f"between {low} % less and {high} % more than {other}"
     low, high = (number(size, 0) for size in sorted(map(abs, ends)))
-    return f"{first} errs {'less' if ends[1] <= 0 else 'more'} than {second} by {low} to {high} %"
+    return f"{low} to {high} % {'less' if ends[1] <= 0 else 'more'} than {other}"
 
 
 # --- who judges -------------------------------------------------------------------------------

@@ -63,7 +63,9 @@ def run(unit: Unit) -> None:
     tables = [regression.drop(columns="note")]
     for method, result in results.items():
         unit.warn(f"{unit.name}: {method} ({estimators[method]}): {estimates[method].note}")
-        tables.append(bsip_table(method, skeleton.segments, result.values, result.sd, result.share))
+        tables.append(
+            bsip_table(method, skeleton.body_names, result.values, result.sd, result.share)
+        )
     rarity = _rarity(unit, skeleton, problem, estimates)
     unit.write(
         "bsip",
@@ -168,9 +170,10 @@ def _tell_of_loads(unit: Unit, trials: list[Trial]) -> None:
 
 
 def _tell_of_fixed(unit: Unit, person: Person) -> None:
-    fixed = np.flatnonzero(person.without_data())
-    if len(fixed):
-        names = ", ".join(segment_in_words(person.skeleton.segments[i]) for i in fixed)
+    skeleton, lost = person.skeleton, person.without_data()
+    fixed = [skeleton.segments[i] for i in skeleton.bodies if lost[i]]
+    if fixed:
+        names = ", ".join(map(segment_in_words, fixed))
         unit.warn(
             f"{unit.name}: no data for {names}: no markers show how they move, OM keeps the "
             "table's values (RM) there"
@@ -206,7 +209,7 @@ def _farthest_in_words(
 ) -> str:
     """The segments that make half of the distance, with their masses (n,)."""
     parts = [
-        f"the {segment_in_words(skeleton.segments[i])} ({100 * found.shares[i]:.0f} % of the "
+        f"the {segment_in_words(skeleton.body_names[i])} ({100 * found.shares[i]:.0f} % of the "
         f"distance from the table; {masses_kg[i]:.2f} kg, table {table_kg[i]:.2f} kg)"
         for i in found.farthest()
     ]
@@ -215,7 +218,7 @@ def _farthest_in_words(
 
 def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
     fit = base_parameters(problem)
-    named = expressions(problem.basis, skeleton.segments)
+    named = expressions(problem.basis, skeleton.body_names)
     return pd.DataFrame(
         {
             "name": [row[0] for row in named],
@@ -233,7 +236,7 @@ def _excitation_table(
     person: Person, problem: Problem, found: Excitation, share: np.ndarray
 ) -> pd.DataFrame:
     """``share`` (n, 10) are OM's data shares."""
-    names = person.skeleton.segments
+    names = person.skeleton.body_names
     words = [
         "no markers, no data: the table's values" if fixed else in_words(own)
         for fixed, own in zip(problem.prior.fixed, share, strict=True)

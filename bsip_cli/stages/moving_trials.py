@@ -104,7 +104,7 @@ def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:
     known = {"total_mass_sd_percent": sd_percent} if is_weighed(unit) else {}
     table = unit.read("regression").copy()
     table[[name for name in bsip_names() if not name.startswith("com")]] *= 1 + (share or 0.0)
-    none = np.zeros(len(person.skeleton.segments), dtype=bool)
+    none = np.zeros(len(person.skeleton.bodies), dtype=bool)
     return prior_from(unit, table, person, none, **known)
 
 

@@ -110,16 +110,16 @@ def _why(use: str, differences: Differences, judges: list[Judge], data: str, is_
         number(float(np.mean([judge.force_N[name] for judge in judges])), 0)
         for name in (OM, RM_MASS, RM)
     )
-    decided = [
+    decided = "; ".join(
         f"{first} errs {listing([_compared(b, differences[a, b]) for a, b in pairs])}"
         for first, pairs in groupby(_DECIDING[use], lambda pair: pair[0])
-    ]
+    )
     rare = " OM is not used: fewer than 1 in 100 people have such a body." if is_rare else ""
     return (
         f"{where} the ground force errs by {om} N with the identified parameters (OM), by {mass} N "
         f"with the table's scaled to the measured weight ({RM_MASS}), by {table} N with the "
         f"table's own ({RM}). Over forces, moments and centre of pressure together "
-        f"{listing(decided)}.{rare}"
+        f"{decided}.{rare}"
     )
 
 

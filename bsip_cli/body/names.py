@@ -49,7 +49,9 @@ def in_words(name: str) -> str:
 
 def the_joint(name: str) -> str:
     """A joint with its article; the floating base, which is no joint, by what hangs on it."""
-    return "the whole body" if name == "root" else f"the {in_words(name)}"
+    if name == "root":
+        return "the whole body"
+    return f"the {in_words(name)}" + (" joint" if name.startswith("sternoclavicular") else "")
 
 
 def without_side(name: str) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from bsip_cli.simulate.landmarks import Marker, heel_and_toe_m, skin_markers
 from bsip_cli.simulate.options import Richness
-from bsip_cli.simulate.rotations import euler_zxy
+from bsip_cli.simulate.rotations import about_x, about_y, about_z
 
 # Of the joint from the notch of the sternum, thorax axes, right side (Holzbaur 2005), in the width
 # of the thorax; how far it lies from there in people.
@@ -85,4 +85,4 @@ def clavicle_turn(arm_in_thorax: np.ndarray, own_rad: np.ndarray, sign: float) -
     raised, back, turned = (part * angle for angle in RHYTHM_RAD)
     raised = raised + own_rad[:, 0]
     forward = own_rad[:, 1] - back
-    return euler_zxy(np.stack([turned, -sign * raised, sign * forward], axis=1))
+    return about_y(sign * forward) @ about_x(-sign * raised) @ about_z(turned)

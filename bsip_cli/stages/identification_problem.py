@@ -41,7 +41,8 @@ def prior_from(
 
     fixed : as of :func:`prior_of`. other : standard deviations that stand for the configured ones.
     """
-    rows = regression[list(bsip_names())].to_numpy()
+    bodies = list(person.skeleton.body_names)
+    rows = regression.set_index("segment").loc[bodies, list(bsip_names())].to_numpy()
     spread = Spread(**{**unit.config.prior.model_dump(), **other})
     return prior_of(tuple(from_readable(row) for row in rows), person, spread, fixed)
 

@@ -177,7 +177,11 @@ def _check(skeleton: Skeleton, file: Path) -> None:
 def _check_known(skeleton: Skeleton, file: Path) -> None:
     """The segments whose frames, inertias and tables exist, each on its joint."""
     faults = [f"no {name}" for name in SEGMENTS if name not in skeleton.segments]
-    faults += list(filter(None, map(_fault_of, *_columns(skeleton))))
+    tree = skeleton
+    rows = zip(
+        tree.segments, tree.joints, tree.joint_types, tree.table_rows, tree.landmarks, strict=True
+    )
+    faults += [fault for row in rows if (fault := _fault_of(*row))]
     leaves = set(skeleton.segments) - {skeleton.segments[i] for i in skeleton.parents if i >= 0}
     faults += [f"nothing that hangs on {name}" for name in LINKS if name in leaves]
     if faults:
@@ -189,11 +193,6 @@ def _check_known(skeleton: Skeleton, file: Path) -> None:
             "differ",
             remedy="change these lines",
         )
-
-
-def _columns(skeleton: Skeleton) -> tuple[tuple, ...]:
-    one = skeleton
-    return one.segments, one.joints, one.joint_types, one.table_rows, one.landmarks
 
 
 def _fault_of(name: str, joint: str, kind: JointType, row: str, landmarks: tuple[str, ...]) -> str:

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
-from bsip_cli.body.markersets import LANDMARKS
+from bsip_cli.body.landmarks import LANDMARKS
 from bsip_cli.body.names import LINKS, SEGMENTS, joint_of
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError

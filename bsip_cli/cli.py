@@ -201,6 +201,11 @@ def _effect_options(command: Any) -> Any:
     help="light: skin moves with the sines of the joints; measured: as published of people, larger "
     "on trunk and thighs, curved in the pose, with mass that swings at 5 to 11 Hz.",
 )
+@click.option(
+    "--shoulder-girdle",
+    is_flag=True,
+    help="Shoulders that move against the trunk, seen by 51 markers; fitted with 17 segments.",
+)
 @_effect_options
 def simulate(study, preset, **options):
     """Make a study of simulated people whose inertial parameters are known.

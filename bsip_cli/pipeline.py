@@ -135,6 +135,7 @@ STAGES = (
             "marker-positions",
             "person",
             "regression",
+            "identification",
         ),
         writes=("overall-diagnosis", "overall-error-budget", "detection"),
         options=("skeleton", "loads", "roles", "ik", "prior", "diagnosis", "reconstruct"),

@@ -737,7 +737,7 @@ SCHEMAS = {
                     "whole_trials that OM never saw; held_out: seconds of the identification "
                     "trials, where there is no other trial; none",
                 ),
-                _text("reason", "in words"),
+                _text("sentence", "what to use and why, in words"),
             ),
         ),
         Schema(

@@ -31,7 +31,7 @@ class TableRow:
 
 @dataclass(frozen=True)
 class Regression:
-    """RM of one person, per segment of the skeleton in its segment frame, and what was mended."""
+    """RM of one person, per segment with mass in its segment frame, and what was mended."""
 
     inertias: tuple[Inertia, ...]
     notes: tuple[str, ...]
@@ -85,10 +85,11 @@ def regress(person: Person, sex: str, mass_kg: float, table: str = "dumas2007") 
     """
     rows = load_table(table)
     skeleton = person.skeleton
-    chosen = [rows[sex, name] for name in skeleton.table_rows]
+    chosen = [rows[sex, skeleton.table_rows[i]] for i in skeleton.bodies]
+    lengths = person.lengths_m[list(skeleton.bodies)]
     total = sum(row.mass_fraction for row in chosen)
     inertias, notes = [], []
-    for segment, row, length in zip(skeleton.segments, chosen, person.lengths_m, strict=True):
+    for segment, row, length in zip(skeleton.body_names, chosen, lengths, strict=True):
         mirror = np.array([1.0, 1.0, -1.0 if skeleton.side(segment) == "l" else 1.0])
         mass = mass_kg * row.mass_fraction / total
         tensor = mass * length**2 * row.gyration * np.outer(mirror, mirror)

@@ -1,7 +1,7 @@
 """Joint centres from bony landmarks in one standing pose (Reed 1999, as Dumas 2007 uses them).
 
 Positions are world coordinates [m]; ``landmarks`` maps the names of
-:data:`bsip_cli.body.markersets.LANDMARKS` to (3,) positions. The pelvis fractions are those in
+:data:`bsip_cli.body.landmarks.LANDMARKS` to (3,) positions. The pelvis fractions are those in
 the ISB pelvis frame (Dumas and Wojtusch 2018), since the pubis is not marked; the shoulder is the
 2007 edition's, whose angle is measured from the line C7 to suprasternale.
 """
@@ -24,6 +24,9 @@ _LJC = with_other({"M": (-0.335, -0.032, 0.0), "F": (-0.340, 0.049, 0.0)})
 # Fraction of the thorax width (C7 to suprasternale) and angle above that line [degrees].
 _CJC = with_other({"M": (0.55, 8.0), "F": (0.53, 14.0)})
 _SJC = (0.42, -67.0)
+# Sternoclavicular joint from suprasternale, thorax axes, in thorax widths: 6.3, 6.9 and 25.5 mm in
+# the 50th percentile man of the OpenSim arm models (Holzbaur 2005), 136 mm wide as below.
+_SCJ = np.array([0.046, 0.051, 0.187])
 # Half breadths for joints with a lateral marker only, as fractions of the stature.
 _HALF_BREADTH = {"elbow": 0.022, "knee": 0.031, "malleolus": 0.022}
 _MEAN_OF_BOTH = (
@@ -74,9 +77,14 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
     part, angle = _CJC[sex]
     centres["neck"] = landmarks["c7"] + part * width * _turned(line, right, angle)
     down = _SJC[0] * width * _turned(line, right, _SJC[1])
+    sternum = landmarks.get("suprasternale", landmarks["c7"] + width * line)
+    up = unit(centres["neck"] - waist)
+    thorax = np.stack([unit(np.cross(up, right)), up, right], axis=1)
     hinges: dict[str, np.ndarray] = {}
     ends: dict[str, np.ndarray] = {}
-    for side in "lr":
+    for side, sign in (("l", -1.0), ("r", 1.0)):
+        across = width * _SCJ * np.array([1.0, 1.0, sign])
+        centres[f"sternoclavicular_{side}"] = sternum + thorax @ across
         outward = right if side == "r" else -right
         raised = landmarks[f"acromion_{side}"] + down
         centres[f"shoulder_{side}"] = landmarks.get(f"shoulder_centre_{side}", raised)

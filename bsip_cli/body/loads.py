@@ -21,14 +21,16 @@ class PointMass:
 
 
 def load_parameters(loads: Iterable[PointMass], person: Person) -> np.ndarray:
-    """(10 n,) parameters of all loads together about the joint centres (Pinocchio's order).
+    """(10 n,) parameters of all loads together on the n segments with mass, about their joint
+    centres (Pinocchio's order).
 
     The moment of inertia of a load about its own centre is neglected (1 kg of 10 cm has
     0.002 kg m2). Added to a person's parameters they are those of person and loads.
     """
-    phi = np.zeros(10 * len(person.skeleton.segments))
+    skeleton = person.skeleton
+    phi = np.zeros((len(skeleton.bodies), 10))
     for load in loads:
-        i = person.skeleton.index(load.segment)
+        origin_m = person.origin_in_joint_m[skeleton.index(load.segment)]
         point = Inertia(load.mass_kg, load.position_m, np.zeros((3, 3)))
-        phi[10 * i : 10 * i + 10] += point.moved(-person.origin_in_joint_m[i]).phi()
-    return phi
+        phi[skeleton.body_names.index(load.segment)] += point.moved(-origin_m).phi()
+    return phi.ravel()

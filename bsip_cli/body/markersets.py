@@ -10,45 +10,12 @@ from dataclasses import asdict, dataclass, replace
 from math import inf
 from pathlib import Path
 
+from bsip_cli.body.landmarks import JOINT_CENTRES, LANDMARKS
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
 from bsip_cli.files.regular import read_toml
 
-_SIDED = {
-    "forehead",
-    "occiput",
-    "temple",
-    "acromion",
-    "asis",
-    "psis",
-    "elbow_lateral",
-    "elbow_medial",
-    "styloid_radial",
-    "styloid_ulnar",
-    "wrist",
-    "metacarpal_2",
-    "metacarpal_3",
-    "metacarpal_5",
-    "knee_lateral",
-    "knee_medial",
-    "malleolus_lateral",
-    "malleolus_medial",
-    "calcaneus",
-    "metatarsal_1",
-    "metatarsal_2",
-    "metatarsal_5",
-}
-JOINT_CENTRES = frozenset(
-    f"{name}_centre_{side}"
-    for name in ("shoulder", "elbow", "hip", "knee", "ankle")
-    for side in "lr"
-)
-LANDMARKS = frozenset(
-    {"vertex", "sellion", "forehead", "occiput", "c7", "t10", "suprasternale", "xiphoid", "sacrum"}
-    | {f"{name}_{side}" for name in _SIDED for side in "lr"}
-    | JOINT_CENTRES
-)
 _TABLES = {"description", "also_called", "segments", "weights", "aliases", "optional"}
 
 

@@ -1,4 +1,4 @@
-"""The names of the 15 segments, fixed for every table and file, and names as people read them."""
+"""The names of the segments, fixed for every table and file, and names as people read them."""
 
 from __future__ import annotations
 
@@ -19,11 +19,16 @@ SEGMENTS = (
     "foot_l",
     "foot_r",
 )
+"""Segments with mass: every skeleton has them."""
+
+LINKS = ("clavicle_l", "clavicle_r")
+"""Massless rods between segments, which a skeleton may have (Robert 2017)."""
 
 _JOINTS = {
     "lower_torso": "root",
     "upper_torso": "waist",
     "head": "neck",
+    "clavicle": "sternoclavicular",
     "upper_arm": "shoulder",
     "forearm": "elbow",
     "hand": "wrist",
@@ -44,7 +49,9 @@ def in_words(name: str) -> str:
 
 def the_joint(name: str) -> str:
     """A joint with its article; the floating base, which is no joint, by what hangs on it."""
-    return "the whole body" if name == "root" else f"the {in_words(name)}"
+    if name == "root":
+        return "the whole body"
+    return f"the {in_words(name)}" + (" joint" if name.startswith("sternoclavicular") else "")
 
 
 def without_side(name: str) -> str:

@@ -25,7 +25,7 @@ class Person:
     parent_tilt_rad, child_tilt_rad : (n,) tilt of hinges about X; zero for other joints.
     origin_in_joint_m : (n, 3) from the joint centre to the segment's origin, segment axes; only
         the upper torso has one (its joint is the waist, its origin the neck).
-    lengths_m : (n,) lengths that scale the anthropometric table.
+    lengths_m : (n,) lengths that scale the anthropometric table; of a link, joint to joint.
     markers : names; ``marker_segments`` (m,) indices; ``marker_positions_m`` (m, 3) in the
         segment frame; ``marker_weights`` (m,).
     held : (n,) joints that no marker informs.

@@ -9,7 +9,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
-from bsip_cli.body.names import SEGMENTS, joint_of
+from bsip_cli.body.landmarks import LANDMARKS
+from bsip_cli.body.names import LINKS, SEGMENTS, joint_of
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
 from bsip_cli.files.regular import read_toml
@@ -18,6 +19,7 @@ JointType = Literal["free", "spherical", "revolute"]
 
 _KEYS = ("name", "parent", "joint", "type", "table")
 _HINGES = ("elbow", "knee", "ankle")  # joints whose axis landmarks give
+_ROWS = ("pelvis", "torso", "head", "arm", "forearm", "hand", "thigh", "shank", "foot")
 _Q_PARTS = {
     "free": ("tx", "ty", "tz", "qx", "qy", "qz", "qw"),
     "spherical": ("qx", "qy", "qz", "qw"),
@@ -38,7 +40,9 @@ class Skeleton:
     ----------
     parents : index of the parent segment, -1 for the floating base, which comes first.
     joints : name of the joint to the parent.
-    table_rows : row of the anthropometric table that gives the segment's inertia.
+    table_rows : row of the anthropometric table that gives the segment's inertia; empty for links
+        without mass.
+    landmarks : whose markers ride on the segment, whatever segment the marker set names.
     """
 
     name: str
@@ -47,6 +51,24 @@ class Skeleton:
     joints: tuple[str, ...]
     joint_types: tuple[JointType, ...]
     table_rows: tuple[str, ...]
+    landmarks: tuple[tuple[str, ...], ...]
+
+    @cached_property
+    def bodies(self) -> tuple[int, ...]:
+        """Indices of the segments with mass: each has ten parameters, in this order."""
+        return tuple(i for i, row in enumerate(self.table_rows) if row)
+
+    @cached_property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of the segments with mass."""
+        return tuple(self.segments[i] for i in self.bodies)
+
+    def carrying(self, segment: str, landmark: str) -> str:
+        """The segment that a marker rides on, which its set puts on ``segment``."""
+        riding = (
+            s for s, own in zip(self.segments, self.landmarks, strict=True) if landmark in own
+        )
+        return next(riding, segment)
 
     def index(self, segment: str) -> int:
         return self.segments.index(segment)
@@ -125,12 +147,13 @@ def load_skeleton(name: str) -> Skeleton:
             tuple(row["joint"] for row in rows),
             tuple(row["type"] for row in rows),
             tuple(row["table"] for row in rows),
+            tuple(tuple(row.get("landmarks", ())) for row in rows),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise UsageError(
             f"not a skeleton ({error})",
             file=file,
-            expected="[[segments]] with name, parent, joint, type and table",
+            expected="[[segments]] with name, parent, joint, type and table (empty without mass)",
         ) from None
     _check(skeleton, file)
     _check_known(skeleton, file)
@@ -152,22 +175,35 @@ def _check(skeleton: Skeleton, file: Path) -> None:
 
 
 def _check_known(skeleton: Skeleton, file: Path) -> None:
-    """Exactly the segments whose frames, inertias and tables exist, each on its joint."""
+    """The segments whose frames, inertias and tables exist, each on its joint."""
     faults = [f"no {name}" for name in SEGMENTS if name not in skeleton.segments]
-    for name, joint, kind in zip(
-        skeleton.segments, skeleton.joints, skeleton.joint_types, strict=True
-    ):
-        if name not in SEGMENTS:
-            faults.append(f"{name}, of which neither frame nor mass is known")
-        elif joint != joint_of(name):
-            faults.append(f"{name} on {joint} instead of {joint_of(name)}")
-        elif kind == "revolute" and not joint.startswith(_HINGES):
-            faults.append(f"a hinge at {joint}, of which no axis is known")
+    tree = skeleton
+    rows = zip(
+        tree.segments, tree.joints, tree.joint_types, tree.table_rows, tree.landmarks, strict=True
+    )
+    faults += [fault for row in rows if (fault := _fault_of(*row))]
+    leaves = set(skeleton.segments) - {skeleton.segments[i] for i in skeleton.parents if i >= 0}
+    faults += [f"nothing that hangs on {name}" for name in LINKS if name in leaves]
     if faults:
         raise UsageError(
             f"a skeleton that cannot be built: {', '.join(faults)}",
             file=file,
-            expected=f"the segments {', '.join(SEGMENTS)}, each on its joint as in "
-            "configs/skeletons/hansen2017.toml; the types of joints may differ",
+            expected=f"the segments {', '.join(SEGMENTS)}, with {' and '.join(LINKS)} or without, "
+            "each on its joint and with its row as in configs/skeletons; the types of joints may "
+            "differ",
             remedy="change these lines",
         )
+
+
+def _fault_of(name: str, joint: str, kind: JointType, row: str, landmarks: tuple[str, ...]) -> str:
+    """What a segment lacks; empty where nothing."""
+    if name not in SEGMENTS and name not in LINKS:
+        return f"{name}, of which neither frame nor mass is known"
+    if joint != joint_of(name):
+        return f"{name} on {joint} instead of {joint_of(name)}"
+    if kind == "revolute" and not joint.startswith(_HINGES):
+        return f"a hinge at {joint}, of which no axis is known"
+    if (row not in _ROWS) if name in SEGMENTS else row:
+        return f"{name} with the table's row {row!r}"
+    strange = [landmark for landmark in landmarks if landmark not in LANDMARKS]
+    return f"{name} with the unknown landmark {strange[0]}" if strange else ""

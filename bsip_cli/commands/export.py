@@ -34,7 +34,6 @@ from bsip_cli.errors import BadDataError, BsipError, UsageError
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.files.regular import check_regular
 from bsip_cli.pipeline import Stage
-from bsip_cli.report.choice import headline
 from bsip_cli.running.lock import held_alone
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import follow, open_study
@@ -211,9 +210,8 @@ def _chosen(unit: Unit) -> tuple[str, str]:
             expected="the result of `bsip choose`",
             remedy="run `bsip choose` or `bsip run`, or name a method with --method",
         )
-    choice = unit.read("choice")
-    first = choice.iloc[0]
-    return str(first["use"]), f"{headline(choice)}; {first['reason']}"
+    first = unit.read("choice").iloc[0]
+    return str(first["use"]), str(first["sentence"])
 
 
 def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson:
@@ -236,8 +234,8 @@ def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson
             expected=f"one of {', '.join(methods)}",
             remedy="name one of them, or identify with --estimator",
         )
-    rows = _of_skeleton(unit, "bsip", rows[rows["method"] == method], skeleton)
-    geometry = _of_skeleton(unit, "skeleton", tables["skeleton"], skeleton)
+    rows = _in_order(unit, "bsip", rows[rows["method"] == method], skeleton.body_names)
+    geometry = _in_order(unit, "skeleton", tables["skeleton"], skeleton.segments)
     person = person_from(geometry, tables["marker-positions"], skeleton)
     values = rows[list(bsip_names())].to_numpy()
     if not np.isfinite(values).all():
@@ -255,16 +253,16 @@ def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson
     )
 
 
-def _of_skeleton(unit: Unit, kind: str, rows: pd.DataFrame, skeleton: Skeleton) -> pd.DataFrame:
-    """Rows in the order of the skeleton's segments."""
-    if sorted(rows["segment"]) != sorted(skeleton.segments):
+def _in_order(unit: Unit, kind: str, rows: pd.DataFrame, segments: tuple[str, ...]) -> pd.DataFrame:
+    """Rows in the order of these segments of the skeleton."""
+    if sorted(rows["segment"]) != sorted(segments):
         raise BadDataError(
             "its segments are not those of the skeleton",
             file=unit.path(kind),
-            expected=f"each of {', '.join(skeleton.segments)} once",
+            expected=f"each of {', '.join(segments)} once",
             remedy="name the skeleton that the results were made with, or run the stages again",
         )
-    ordered = rows.set_index("segment").loc[list(skeleton.segments)]
+    ordered = rows.set_index("segment").loc[list(segments)]
     return ordered.reset_index()
 
 

@@ -11,7 +11,6 @@ import pandas as pd
 
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
 from bsip_cli.errors import BadDataError, UsageError, printable
-from bsip_cli.report.choice import headline
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.shared import SHARED, Searched, searched, shared_causes
 from bsip_cli.report.tables.build import show as tables_of
@@ -95,7 +94,7 @@ def _choices(out: Path) -> Iterator[str]:
             yield str(error)
             continue
         if choice is not None:
-            text = f"{folder.name}: {headline(choice)}; {choice['reason'].iloc[0]}"
+            text = f"{folder.name}: {choice['sentence'].iloc[0]}"
             yield _wrapped(text, _width(get_terminal_size().columns))
 
 

@@ -64,17 +64,17 @@ def error_terms(
     of the model's markers on their segments. skin_factor : the skin of a segment slides as a whole
     this many times as far as the residuals of its markers show.
     """
-    names, model = scene.person.skeleton.segments, scene.model
+    skeleton, model = scene.person.skeleton, scene.model
     regressor = wrench_regressor(model, model.createData(), scene.q, scene.v, scene.a, np.zeros(3))
-    yield Columns(INERTIA, "", INERTIA, False, regressor, root, names)
+    yield Columns(INERTIA, "", INERTIA, False, regressor, root, skeleton.body_names)
     heavier = _HEAVIER * scene.phi[:, None]
-    yield Columns(INERTIA, "", f"{INERTIA} in all", False, regressor, heavier, names)
+    yield Columns(INERTIA, "", f"{INERTIA} in all", False, regressor, heavier, skeleton.body_names)
     joints = joint_errors(scene)
     for k, joint in enumerate(JointCentre().targets(scene)):
         term = TRUNK if joint.startswith(_BENDING) else JOINTS
         yield Columns(term, joint, term, False, joints[..., 3 * k : 3 * k + 3])
     for segment, places, skin in _of_markers(scene, landmark_sd_m, skin_factor):
-        name = names[segment]
+        name = skeleton.segments[segment]
         yield Columns(MARKERS, name, MARKERS, False, places)
         yield Columns(SKIN, name, f"{SKIN} {name}", True, skin)
         yield Columns(SKIN, name, f"{SKIN} swings", False, _swinging(scene, segment))

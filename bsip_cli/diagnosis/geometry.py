@@ -18,6 +18,7 @@ from bsip_cli.motion.jacobian import coordinate_covariance
 JOINT_SD_M = {
     "waist": 0.04,
     "neck": 0.03,
+    "sternoclavicular": 0.01,
     "shoulder": 0.02,
     "elbow": 0.008,
     "wrist": 0.008,

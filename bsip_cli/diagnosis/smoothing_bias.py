@@ -14,7 +14,11 @@ from scipy.signal import butter, sosfiltfilt
 from bsip_cli.effects.scene import Scene
 
 CUTOFFS_HZ = (3.0, 6.0, 10.0)
-GROUPS = (("root", "hip", "knee", "ankle"), ("waist", "neck"), ("shoulder", "elbow", "wrist"))
+GROUPS = (
+    ("root", "hip", "knee", "ankle"),
+    ("waist", "neck"),
+    ("sternoclavicular", "shoulder", "elbow", "wrist"),
+)
 
 
 def smoothing_bias(scene: Scene) -> np.ndarray:

@@ -9,7 +9,7 @@ the swings of that force would be taken for other causes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,28 +34,30 @@ SURE = 4.0  # standard errors
 SHORTEST_S = 2.0  # of measured contacts: what fewer seconds show is no mean of a trial
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Support:
-    """What hands hold on to in one trial.
+    """What hands hold on to in one trial; as plain numbers, since it is written and read again.
 
     hand_moves_m, trunk_moves_m : root mean square distance from their mean places; of the hands
         that hold on the largest. start_s, end_s : the frames compared.
     force_N, error_N : (3,) mean force on the body, world, all hands together, and standard error.
-    gain : what the mean force takes off the squared residual of forces it has not seen.
+    gain_percent : what the mean force takes off the squared residual of forces it has not seen,
+        and its 95 % interval.
     """
 
-    hands: tuple[str, ...]
+    hands: Sequence[str]
     hand_moves_m: float
     trunk_moves_m: float
     start_s: float
     end_s: float
-    force_N: np.ndarray
-    error_N: np.ndarray
-    gain: Gain
+    force_N: Sequence[float]
+    error_N: Sequence[float]
+    gain_percent: Sequence[float]
 
     def finding(self, trial: str) -> Finding:
         """As the diagnosis prints it."""
-        p_value = float(chi2.sf(((self.force_N / self.error_N) ** 2).sum(), 3))
+        p_value = float(chi2.sf((np.divide(self.force_N, self.error_N) ** 2).sum(), 3))
+        percent, low, high = self.gain_percent
         return Finding(
             UnmeasuredContact.name,
             "+".join(self.hands),
@@ -63,16 +65,16 @@ class Support:
             "named",
             "",
             p_value,
-            self.gain.interval(),
+            (percent, low, high),
             self._numbers(),
             f"{self.words()}, and what else may be wrong in this trial is not asked",
         )
 
     def _numbers(self) -> tuple[Number, ...]:
         size = float(np.linalg.norm(self.force_N))
-        error = float(np.linalg.norm(self.force_N * self.error_N)) / size
+        error = float(np.linalg.norm(np.multiply(self.force_N, self.error_N))) / size
         rows = [("force", size, error)]
-        parts = zip("xyz", self.force_N.tolist(), self.error_N.tolist(), strict=True)
+        parts = zip("xyz", self.force_N, self.error_N, strict=True)
         rows += [(f"force_{axis}", x, e) for axis, x, e in parts]
         times = (("start", self.start_s), ("end", self.end_s))
         return (
@@ -124,9 +126,9 @@ def held_by(
         trunk,
         float(times_s[0]),
         float(times_s[-1]),
-        force,
-        error,
-        _gain(missing_N, times_s),
+        tuple(force.tolist()),
+        tuple(error.tolist()),
+        _gain(missing_N, times_s).interval(),
     )
 
 

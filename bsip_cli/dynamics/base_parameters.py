@@ -39,7 +39,7 @@ def find_basis(model: pin.Model, known: np.ndarray | None = None) -> Basis:
 
     known : (10 n,) parameters that are known and so in no combination; None for none.
     """
-    stacked = random_regressor(model, _STATES).reshape(-1, 10 * (model.njoints - 1))
+    stacked = np.concatenate(random_regressor(model, _STATES))
     if known is not None:
         stacked = stacked * ~known
     scale = np.linalg.norm(stacked, axis=0)

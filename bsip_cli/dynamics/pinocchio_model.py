@@ -10,9 +10,10 @@ from bsip_cli.body.person import Person
 
 
 def pinocchio_model(person: Person) -> pin.Model:
-    """Tree of the person without inertias, in the skeleton's order (joint i + 1 is segment i).
+    """Tree of the person, in the skeleton's order (joint i + 1 is segment i).
 
-    Joint frames sit in the joint centres with the segment's axes; gravity points along -Z.
+    Joint frames sit in the joint centres with the segment's axes; gravity points along -Z. Segments
+    with mass carry 1 kg, which says that there is one: inertial parameters come as ``phi``.
     """
     model = pin.Model()
     model.gravity.linear = np.array([0.0, 0.0, -GRAVITY_M_S2])
@@ -27,4 +28,11 @@ def pinocchio_model(person: Person) -> pin.Model:
         placement = pin.SE3(rotations[i], positions[i])
         index = model.addJoint(skeleton.parents[i] + 1, joint, placement, skeleton.joints[i])
         assert index == i + 1
+        if i in skeleton.bodies:
+            model.inertias[index] = pin.Inertia.FromSphere(1.0, 0.1)
     return model
+
+
+def bodies_of(model: pin.Model) -> list[int]:
+    """Joints whose segment has mass: ``phi`` is ten parameters for each of them, in this order."""
+    return [j for j in range(1, model.njoints) if model.inertias[j].mass > 0]

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pinocchio as pin
 
+from bsip_cli.dynamics.pinocchio_model import bodies_of
+
 
 def wrench_regressor(
     model: pin.Model,
@@ -16,15 +18,18 @@ def wrench_regressor(
     a: np.ndarray,
     reference_m: np.ndarray,
 ) -> np.ndarray:
-    """(N, 6, 10 n) regressor of the ground wrench in world axes about a reference point.
+    """(N, 6, 10 n) regressor of the ground wrench of n segments with mass, in world axes about a
+    reference point.
 
     The six rows of the floating base, which no joint torque enters, turned from the base's frame
     into the world's and moved from the base's origin to ``reference_m`` (3,). Forces [N] come
     first, then moments [N m]; q (N, nq), v and a (N, nv) as Pinocchio has them.
     """
-    rows = np.empty((len(q), 6, 10 * (model.njoints - 1)))
+    columns = (10 * (np.array(bodies_of(model)) - 1)[:, None] + np.arange(10)).ravel()
+    rows = np.empty((len(q), 6, len(columns)))
     for k in range(len(q)):
-        rows[k] = pin.computeJointTorqueRegressor(model, data, q[k], v[k], a[k])[:6]
+        of_all = pin.computeJointTorqueRegressor(model, data, q[k], v[k], a[k])
+        rows[k] = of_all[:6, columns]
     turn = rotations_of(q[:, 3:7])
     rows[:, :3] = turn @ rows[:, :3]
     rows[:, 3:] = turn @ rows[:, 3:] + skew(q[:, :3] - reference_m) @ rows[:, :3]

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from bsip_cli.body.person import Person
-from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.pinocchio_model import bodies_of, pinocchio_model
 from bsip_cli.dynamics.regressor import rotations_of, skew
 
 
@@ -70,8 +70,8 @@ def wrench_response(
 ) -> WrenchResponse:
     """Derivatives of the inverse dynamics of parameters phi (10 n,) along a motion."""
     model = pinocchio_model(person)
-    for i, parameters in enumerate(phi.reshape(-1, 10)):
-        model.inertias[i + 1] = pin.Inertia.FromDynamicParameters(parameters)
+    for joint, parameters in zip(bodies_of(model), phi.reshape(-1, 10), strict=True):
+        model.inertias[joint] = pin.Inertia.FromDynamicParameters(parameters)
     data, nv = model.createData(), model.nv
     base, parts = np.empty((len(q), 6)), np.empty((3, len(q), 6, nv))
     for k in range(len(q)):

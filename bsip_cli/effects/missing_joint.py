@@ -152,6 +152,6 @@ def _wrenches(scene: Scene, target: str) -> np.ndarray:
     moved = displaced(*scene.mass_beyond(i), shift, scene.rate_hz)
     # The part below is shifted by half as much on average.
     middle = scene.motion.point(i, 0.5 * joint)
-    moved -= displaced(0.5 * BELOW * float(scene.phi[10 * i]), middle, shift, scene.rate_hz)
+    moved -= displaced(0.5 * BELOW * float(scene.phi_of(i)[0]), middle, shift, scene.rate_hz)
     markers = scene.markers_beyond(i)
     return moved - scene.response.of(scene.pose_response.of(_errors(scene, target), markers))

@@ -66,7 +66,7 @@ class Scene:
     ----------
     times_s : (N,).
     q, v, a : (N, nq), (N, nv), (N, nv) in Pinocchio's conventions.
-    phi : (10 n,) inertial parameters about the joint centres.
+    phi : (10 n,) inertial parameters of the segments with mass, about their joint centres.
     valid : (N,) frames whose ground contacts are all measured.
     residual_m : (N, m, 3) markers less the model's, in the axes of their segments [m], NaN where
         missing; None if they are not known.
@@ -208,7 +208,8 @@ class Scene:
     @cached_property
     def centre_of_mass_m(self) -> np.ndarray:
         """(N, 3) of the whole body, world."""
-        R, p = self.motion.rotation, self.motion.position_m
+        bodies = list(self.person.skeleton.bodies)
+        R, p = self.motion.rotation[:, bodies], self.motion.position_m[:, bodies]
         masses, moments = self.phi[::10], self.phi.reshape(-1, 10)[:, 1:4]
         total = np.einsum("i,fix->fx", masses, p) + np.einsum("fixy,iy->fx", R, moments)
         return total / masses.sum()
@@ -221,8 +222,14 @@ class Scene:
     def centre_of(self, segment: str) -> np.ndarray:
         """(3,) centre of mass of a segment from its origin [m]."""
         i = self.person.skeleton.index(segment)
-        mass, *moment = self.phi[10 * i : 10 * i + 4]
+        mass, *moment = self.phi_of(i)[:4]
         return np.array(moment) / mass - self.person.origin_in_joint_m[i]
+
+    def phi_of(self, segment: int) -> np.ndarray:
+        """(10,) parameters of a segment about its joint centre; zeros without mass."""
+        bodies = self.person.skeleton.bodies
+        parameters = self.phi.reshape(-1, 10)
+        return parameters[bodies.index(segment)] if segment in bodies else np.zeros(10)
 
     def length_of(self, segment: str) -> float:
         """Length that scales a segment's inertia [m]."""
@@ -231,8 +238,8 @@ class Scene:
     @cached_property
     def bodies(self) -> tuple[str, ...]:
         """Segments that have a mass."""
-        segments = self.person.skeleton.segments
-        return tuple(s for s, m in zip(segments, self.phi[::10], strict=True) if m > 0)
+        names = self.person.skeleton.body_names
+        return tuple(s for s, m in zip(names, self.phi[::10], strict=True) if m > 0)
 
     def markers_beyond(self, segment: int) -> list[int]:
         """Numbers of the markers on a segment and on all that hang on it."""
@@ -250,7 +257,7 @@ class Scene:
         """Mass [kg] of a segment and all that hang on it, and their common centre of mass."""
         mass, total = 0.0, np.zeros((2, len(self.times_s), 3))
         for i in self.beyond(segment):
-            own, *moment = self.phi[10 * i : 10 * i + 4]
+            own, *moment = self.phi_of(i)[:4]
             if own > 0:
                 point = self.motion.point(i, np.array(moment) / own)
                 total += own * np.stack([point.position_m, point.acceleration_m_s2])

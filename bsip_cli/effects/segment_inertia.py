@@ -65,7 +65,7 @@ class SegmentInertia(Effect):
 
 def _phi(scene: Scene, target: str) -> np.ndarray:
     i = scene.person.skeleton.index(target)
-    return scene.phi[10 * i : 10 * i + 10]
+    return scene.phi_of(i)
 
 
 def _share(measured: np.ndarray, before: np.ndarray, after: np.ndarray, valid: np.ndarray) -> float:

@@ -45,7 +45,7 @@ class WobblingMass(Effect):
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         i = scene.person.skeleton.index(target)
-        most = max(0.8 * float(scene.phi[10 * i]), 0.1)
+        most = max(0.8 * float(scene.phi_of(i)[0]), 0.1)
         known_to = MASS_KG if target.endswith("torso") else LIMB_MASS_KG
         return (
             Parameter("mass", "kg", 0.0, most, 4.0, known_to=known_to),

@@ -10,6 +10,7 @@ import pinocchio as pin
 from scipy import sparse
 
 from bsip_cli.dynamics.lowpass import lowpass_operator, stride_to
+from bsip_cli.dynamics.pinocchio_model import bodies_of
 from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
 from bsip_cli.identification import instruments
 from bsip_cli.identification.instruments import Instruments
@@ -125,7 +126,7 @@ def accumulate(
     ``weights_at`` turns noise levels (n,) into weights (n, 6). Memory does not grow with the length
     of the trials.
     """
-    size = 10 * (model.njoints - 1) + (instruments.COUNT if beside else 0)
+    size = 10 * len(bodies_of(model)) + (instruments.COUNT if beside else 0)
     information, right = np.zeros((6, size, size)), np.zeros((6, size))
     squares, samples, duration = np.zeros(6), 0, 0.0
     for recording in recordings:

@@ -38,7 +38,7 @@ class Prior:
 
     Attributes
     ----------
-    inertias : per segment, in the segment frame.
+    inertias : of the n segments with mass, in the segment frame.
     origin_in_joint_m : (n, 3) segment origin seen from the joint; parallel frames.
     phi : (10 n,) mean, about the joint centres (Pinocchio's order).
     root : (10 n, 10 n) S with covariance S S^T.
@@ -76,8 +76,9 @@ def prior_of(
 
     fixed : (n,) segments that keep the table's values; by default those whose motion is unknown.
     """
-    origins, names = person.origin_in_joint_m, person.skeleton.segments
-    fixed = person.without_data() if fixed is None else fixed
+    bodies, names = list(person.skeleton.bodies), person.skeleton.body_names
+    origins = person.origin_in_joint_m[bodies]
+    fixed = person.without_data()[bodies] if fixed is None else fixed
     phi = np.concatenate([i.moved(-o).phi() for i, o in zip(inertias, origins, strict=True)])
     pairs = _pairs(names, fixed)
     own = _own_spread(inertias, spread, names)

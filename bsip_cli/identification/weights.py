@@ -41,7 +41,8 @@ class Terms:
 
     strength, right : of the weighted wrench residual 1/2 x^T diag(strength) x - right^T x.
     spreads : precision of all masses, of all centres of mass, of each pair's tensors, and of the
-    instruments; fixed : that of the total mass, which keeps its weight. phi = table + shown x.
+    instruments; fixed : that of the total mass, which keeps its weight. phi = table + shown x, and
+    beside x (m,) is what the instruments do wrong.
     """
 
     strength: np.ndarray
@@ -49,6 +50,7 @@ class Terms:
     spreads: tuple[np.ndarray, ...]
     fixed: np.ndarray
     shown: np.ndarray
+    beside: np.ndarray
     table: np.ndarray
     spread_weight: float
 
@@ -63,8 +65,8 @@ class Weights:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Optimum with its weights, its evidence, the covariance before the data, and how many
-    parameters the data decided."""
+    """Optimum with its weights, its evidence, the covariance before the data, and how many of the
+    body's parameters the data decided."""
 
     weights: Weights
     optimum: Optimum
@@ -89,6 +91,7 @@ def terms_of(problem: Problem) -> Terms:
         tuple(axes.T @ precision @ axes for precision in spreads),
         axes.T @ body[-1] @ axes,
         axes[:size],
+        axes[size:],
         prior.phi,
         problem.spread_weight,
     )
@@ -178,9 +181,16 @@ def fit_at(terms: Terms, weights: Weights, near: Fit | None = None) -> Fit:
         + 0.5 * np.linalg.slogdet(before)[1]
     )
     root = _inverse_root(before)
-    left = np.linalg.solve(root @ root.T, optimum.covariance)
-    decided = float(np.clip(len(left) - np.trace(left), 0.0, len(left)))
-    return Fit(weights, optimum, float(evidence), root @ root.T, decided)
+    covariance = root @ root.T
+    decided = np.trace(np.eye(len(root)) - np.linalg.solve(covariance, optimum.covariance))
+    # Beforehand nothing ties the instruments to the body or to each other: their share comes off.
+    kept, known = (_variances(terms.beside, one) for one in (optimum.covariance, covariance))
+    decided = max(float(decided - (1 - kept / known).sum()), 0.0)
+    return Fit(weights, optimum, float(evidence), covariance, decided)
+
+
+def _variances(rows: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    return np.sum(rows @ covariance * rows, axis=1)
 
 
 def _updated(terms: Terms, fit: Fit) -> np.ndarray:

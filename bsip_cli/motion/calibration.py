@@ -123,6 +123,8 @@ def _frames(
         "head": (p["neck"], _head(landmarks, p["neck"], torso)),
     }
     for s in "lr":
+        # Rods without mass need no axes of their own: their angles count from this pose.
+        frames[f"clavicle_{s}"] = (p[f"sternoclavicular_{s}"], torso)
         elbow, knee = centres.hinges[f"elbow_{s}"], centres.hinges[f"knee_{s}"]
         upper, fore = p[f"shoulder_{s}"] - p[f"elbow_{s}"], p[f"elbow_{s}"] - p[f"wrist_{s}"]
         thigh, shank = p[f"hip_{s}"] - p[f"knee_{s}"], p[f"knee_{s}"] - p[f"ankle_{s}"]
@@ -200,9 +202,13 @@ def _person(skeleton, marker_set, positions, centres, frames, sex, stature, land
             parent_tilt[i] = _tilt(parent_axes.T @ hinge)
             child_tilt[i] = _tilt(axes.T @ hinge)
     present = [m for m in marker_set.markers if m.label in positions]
-    index = np.array([skeleton.index(m.segment) for m in present])
+    on = [skeleton.carrying(m.segment, m.landmark) for m in present]
+    index = np.array([skeleton.index(segment) for segment in on])
     local = np.array(
-        [frames[m.segment][1].T @ (positions[m.label] - frames[m.segment][0]) for m in present]
+        [
+            frames[segment][1].T @ (positions[m.label] - frames[segment][0])
+            for m, segment in zip(present, on, strict=True)
+        ]
     )
     return Person(
         skeleton,
@@ -215,7 +221,7 @@ def _person(skeleton, marker_set, positions, centres, frames, sex, stature, land
         index,
         local,
         np.array([m.weight for m in present]),
-        ~np.array(skeleton.informed({m.segment for m in present})),
+        ~np.array(skeleton.informed(set(on))),
     )
 
 
@@ -225,12 +231,13 @@ def _tilt(axis: np.ndarray) -> float:
 
 
 def _table_lengths(skeleton, centres, frames, sex, stature, landmarks) -> np.ndarray:
-    """(n,) lengths as the anthropometric table defines them."""
+    """(n,) lengths as the anthropometric table defines them; of a clavicle, joint to joint."""
     p = centres.positions
     lengths: list[float] = []
     for name, row in zip(skeleton.segments, skeleton.table_rows, strict=True):
         side = skeleton.side(name)
         ends = {
+            "": (f"sternoclavicular_{side}", f"shoulder_{side}"),
             "torso": ("neck", "waist"),
             "arm": (f"shoulder_{side}", f"elbow_{side}"),
             "forearm": (f"elbow_{side}", f"wrist_{side}"),

@@ -136,9 +136,9 @@ def _about_joints(person: Person, q: np.ndarray) -> Iterator[Doubt]:
 
 
 def _segments(person: Person) -> Iterator[tuple[str, str, float]]:
-    """Segments with markers: name, row of the table, length [m]."""
+    """Segments with mass and markers: name, row of the table, length [m]."""
     skeleton = person.skeleton
-    for i, name in enumerate(skeleton.segments):
+    for i, name in zip(skeleton.bodies, skeleton.body_names, strict=True):
         if not person.held[i] and name not in _VAGUE:
             yield name, skeleton.table_rows[i], float(person.lengths_m[i])
 

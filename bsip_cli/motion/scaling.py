@@ -161,12 +161,12 @@ def _parameters(person: Person, options: ScalingOptions) -> Iterator[_Parameter]
     skeleton = person.skeleton
     for i in range(len(skeleton.segments)):
         children = _children(person, i)
-        if len(children) == 1 and i > 0:
-            yield _Parameter("length", i, 1, options.length_sd * person.lengths_m[i])
-        if len(children) > 1:
+        if _has_free_joints(person, i):
             for child in _moving_joints(person, i):
                 for axis in range(3):
                     yield _Parameter("joint", child, axis, options.joint_centre_sd_m)
+        elif children and i > 0:
+            yield _Parameter("length", i, 1, options.length_sd * person.lengths_m[i])
         if np.any(person.origin_in_joint_m[i]):
             for axis in range(3):
                 yield _Parameter("origin", i, axis, options.joint_centre_sd_m)
@@ -181,10 +181,15 @@ def _parameters(person: Person, options: ScalingOptions) -> Iterator[_Parameter]
             yield _Parameter("marker", m, axis, options.marker_sd_m)
 
 
-def _moving_joints(person: Person, segment: int) -> list[int]:
-    """Joints on a segment with several that are not its origin by definition.
+def _has_free_joints(person: Person, segment: int) -> bool:
+    """Whether joints on it lie anywhere: of several, and of a rod, whose axes are not along it."""
+    return len(_children(person, segment)) > 1 or segment not in person.skeleton.bodies
 
-    Hips, shoulders and the waist are; the neck is where the upper torso begins.
+
+def _moving_joints(person: Person, segment: int) -> list[int]:
+    """Joints on such a segment that are not its origin by definition.
+
+    Hips, shoulders and the waist are not; the neck is where the upper torso begins.
     """
     joints = _children(person, segment)
     if segment == 0:
@@ -236,6 +241,8 @@ def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> 
     hips = [c for c in _children(person, 0) if np.any(person.joint_in_parent_m[c])]
     if hips:  # the pelvis is as long as its origin is from the hips' middle
         lengths[0] = float(np.hypot(*joints[hips].mean(axis=0)[:2]))
+    for rod in set(range(len(lengths))) - set(person.skeleton.bodies):
+        lengths[rod] = np.linalg.norm(joints[_children(person, rod)[0]])
     return replace(
         person,
         joint_in_parent_m=joints,
@@ -249,7 +256,7 @@ def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> 
 
 def _shifted_joints(person: Person, segment: int) -> list[int]:
     """Joints that move with a segment's bones when its origin is found elsewhere."""
-    return _moving_joints(person, segment) if len(_children(person, segment)) > 1 else []
+    return _moving_joints(person, segment) if _has_free_joints(person, segment) else []
 
 
 # --- the equations ----------------------------------------------------------------------------

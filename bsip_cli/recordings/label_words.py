@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import accumulate, chain, pairwise
 
-from bsip_cli.body.markersets import LANDMARKS
+from bsip_cli.body.landmarks import LANDMARKS
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.config import shipped
 from bsip_cli.recordings.affixes import affixes, owner, split

@@ -6,13 +6,8 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from bsip_cli.body.markersets import (
-    JOINT_CENTRES,
-    Marker,
-    MarkerSet,
-    load_marker_set,
-    shipped_names,
-)
+from bsip_cli.body.landmarks import JOINT_CENTRES
+from bsip_cli.body.markersets import Marker, MarkerSet, load_marker_set, shipped_names
 from bsip_cli.body.names import in_words
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.affixes import affixes, owner

@@ -6,7 +6,8 @@ import json
 import re
 from collections.abc import Sequence
 
-from bsip_cli.body.markersets import LANDMARKS, Marker, MarkerSet
+from bsip_cli.body.landmarks import LANDMARKS
+from bsip_cli.body.markersets import Marker, MarkerSet
 from bsip_cli.body.names import SEGMENTS
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")

@@ -38,6 +38,7 @@ def simulate_command(
     run: int = 1,
     plate_per_foot: bool = False,
     soft_tissue: str = "light",
+    shoulder_girdle: bool = False,
 ) -> None:
     """Write a simulated study into a new or empty folder."""
     _check_new(study)
@@ -55,6 +56,8 @@ def simulate_command(
         options = replace(options, laboratory=laboratory)
     if soft_tissue == "measured":
         options = replace(options, richness=replace(options.richness, measured_tissue=True))
+    if shoulder_girdle:
+        options = replace(options, richness=replace(options.richness, girdle=True))
     asked = pair_up(effects, sizes, targets)
     options = replace(options, run=run, effects=asked, effect_tasks=tuple(effect_tasks))
     with _writing(study):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bsip_cli.simulate.girdle import clavicle_turn
 from bsip_cli.simulate.people import SIDE_SIGN, SIDES, Person
 from bsip_cli.simulate.plan import Plan
 from bsip_cli.simulate.poses import Poses
@@ -51,6 +52,9 @@ def turns_of(person: Person, plan: Plan) -> Turns:
         mirror = np.array([1.0, -sign, sign])
         flexion, deviation, pronation = angles[f"wrist_{side}"].T
         turns[f"upper_arm_{side}"] = euler_zxy(mirror * angles[f"shoulder_{side}"])
+        if f"sternoclavicular_{side}" in person.joints_m:
+            own = angles.get(f"girdle_{side}", np.zeros((len(plan), 2)))
+            turns[f"clavicle_{side}"] = clavicle_turn(turns[f"upper_arm_{side}"], own, sign)
         turns[f"forearm_{side}"] = about_axis(
             person.hinges[f"elbow_{side}"], angles[f"elbow_{side}"]
         )
@@ -99,6 +103,12 @@ def _arm(
     joints = person.joints_m
     upper, lower, hand = (f"{name}_{side}" for name in ("upper_arm", "forearm", "hand"))
     origin[upper] = origin["thorax"] + rotate(rotation["thorax"], joints[f"shoulder_{side}"])
+    if (clavicle := f"clavicle_{side}") in turns:
+        joint = joints[f"sternoclavicular_{side}"]
+        rotation[clavicle] = rotation["thorax"] @ turns[clavicle]
+        origin[clavicle] = origin["thorax"] + rotate(rotation["thorax"], joint)
+        rod = joints[f"shoulder_{side}"] - joint
+        origin[upper] = origin[clavicle] + rotate(rotation[clavicle], rod)
     rotation[upper] = rotation["thorax"] @ turns[upper]
     origin[lower] = origin[upper] + rotate(rotation[upper], joints[f"elbow_{side}"])
     rotation[lower] = rotation[upper] @ turns[lower]

@@ -23,6 +23,7 @@ SKIN_SIZE_M = {  # travel of a marker against the bone for a large joint movemen
     "upper_arm": 0.007,
     "forearm": 0.005,
     "thorax": 0.005,
+    "clavicle": 0.005,
     "lower_torso": 0.005,
 }
 OTHER_SKIN_SIZE_M = 0.0015
@@ -67,6 +68,13 @@ def place_markers(
     for side, sign in (("l", -1.0), ("r", 1.0)):
         places |= _arm(side, sign, lengths, joints, errors, hinges, widths)
         places |= _leg(side, sign, lengths, hinges, ankle_height)
+    return skin_markers(places, rng, richness)
+
+
+def skin_markers(
+    places: dict[str, tuple[str, np.ndarray]], rng: np.random.Generator, richness: Richness
+) -> dict[str, Marker]:
+    """Markers at these places of bodies, palpated with an error, on skin that slides."""
     bodies = sorted({body for body, _ in places.values()})
     sliding = {body: rng.standard_normal((3, 6)) for body in bodies}
     markers = {}

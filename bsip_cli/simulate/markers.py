@@ -24,6 +24,7 @@ NEIGHBOURS = {
     "lower_torso": ("thigh_l", "thigh_r"),
     "thorax": ("lower_torso", "head"),
     "head": ("thorax", "thorax"),
+    "clavicle": ("thorax", "upper_arm"),
     "upper_arm": ("thorax", "forearm"),
     "forearm": ("upper_arm", "hand"),
     "hand": ("forearm", "forearm"),

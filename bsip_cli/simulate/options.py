@@ -33,6 +33,7 @@ class Richness:
     joint_centre_offset : scale of the true joint centres' distance from the regressions.
     placement_error_m : marker placement, standard deviation per axis.
     inertia_variation : scale of the person's distance from the mean person.
+    girdle : whether the shoulders move against the thorax, seen by 51 markers instead of 38.
     trunk_bend : share of the waist rotation that happens at T12/L1 (0 = stiff trunk).
     """
 
@@ -48,6 +49,7 @@ class Richness:
     joint_centre_offset: float = 1.0
     placement_error_m: float = 0.005
     inertia_variation: float = 1.0
+    girdle: bool = False
     trunk_bend: float = 0.0
 
     @staticmethod

@@ -16,6 +16,7 @@ from importlib.resources import files
 import numpy as np
 
 from bsip_cli.body.names import SEGMENTS
+from bsip_cli.simulate.girdle import with_girdle
 from bsip_cli.simulate.inertia import (
     Inertia,
     combined,
@@ -52,7 +53,8 @@ class Person:
 
     lengths_m : per segment (limbs per side), joint to joint; the foot heel to metatarsals.
     joints_m : (3,) of each joint in its parent's frame: tjc and cjc in the abdomen,
-        neck (always zero), shoulder_* in the thorax, hip_* in lower_torso, and so on.
+        neck (always zero), shoulder_* in the thorax, hip_* in lower_torso, and so on;
+        sternoclavicular_* in the thorax, if the shoulders move against it.
     hinges : unit axes (3,) of elbow_* in the upper arm and knee_* in the thigh.
     inertias : of the 16 bodies.
     ankle_height_m : of the ankle joint above the sole.
@@ -144,6 +146,10 @@ def draw_person(rng: np.random.Generator, richness: Richness, sex: str = "") -> 
     markers = place_markers(
         rng, sex, lengths, joints, predicted, hinges, widths, ankle_height, richness
     )
+    if richness.girdle:
+        joints, markers = with_girdle(
+            rng, joints, markers, lengths, hinges, widths["thorax"], ankle_height, richness
+        )
     return Person(
         sex=sex,
         stature_m=stature,

@@ -19,7 +19,6 @@ from bsip_cli.simulate.recording import SIMULATION_HZ, write_trial
 from bsip_cli.simulate.trial import simulate_trial
 from bsip_cli.simulate.truth import ParticipantTruth, StudyTruth, person_record, trial_record
 
-MARKER_SET = "hansen2017"
 HEADING_SPREAD_RAD = np.deg2rad(2.0)
 SCALE_SPREAD_KG = 0.1
 # Which stream of random numbers serves what, so that no draw depends on another's count.
@@ -37,7 +36,7 @@ def simulate_study(folder: Path, options: StudyOptions) -> StudyTruth:
         for number in range(1, options.participants + 1)
     ]
     _write_text(folder / "participants.tsv", _participants_table(options, truths))
-    _write_text(folder / "study.toml", f'marker_set = "{MARKER_SET}"\n')
+    _write_text(folder / "study.toml", _settings(options))
     return StudyTruth(tuple(truths))
 
 
@@ -146,6 +145,12 @@ def wobbling(person: Person) -> list[WobblingMass]:
         )
         for segment, swing in person.tissue.items()
     ]
+
+
+def _settings(options: StudyOptions) -> str:
+    if options.richness.girdle:
+        return 'marker_set = "robert17"\nskeleton = "robert17"\n'
+    return 'marker_set = "hansen2017"\n'
 
 
 def _participants_table(options: StudyOptions, truths: list[ParticipantTruth]) -> str:

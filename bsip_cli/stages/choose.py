@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from itertools import groupby
 
 import numpy as np
 import pandas as pd
 
+from bsip_cli.diagnosis.support import Support
 from bsip_cli.dynamics.lowpass import stretches
-from bsip_cli.report.choice import ALL, reason_of
+from bsip_cli.report.words import count, listing, number
 from bsip_cli.running.unit import Unit
 from bsip_cli.statistics.choice import (
     COMPONENTS,
@@ -24,20 +27,30 @@ from bsip_cli.statistics.choice import (
     chosen,
     within,
 )
-from bsip_cli.statistics.methods import MEASURED, METHODS, OM, RM
+from bsip_cli.statistics.methods import MEASURED, METHODS, OM, RM, RM_MASS
 from bsip_cli.study.study import Trial
 
 _SIGNALS = ["fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm", "cop_ap_m", "cop_ml_m"]
 _COLUMNS = {PAIRS[0]: "om", PAIRS[2]: "rm_mass", PAIRS[1]: "om_rm_mass"}
 _UNKNOWN = dict.fromkeys(PAIRS, Difference(np.nan, np.nan))
+_ALL = "all"  # movements
+_FORCE = ["fx", "fy", "fz"]
+_WHERE = {
+    "whole_trials": "in {trials} that OM had not seen",
+    "held_out": "in seconds held out of the trials that identified OM, which share their constant "
+    "errors (no other trial is there)",
+}
+_DECIDING = {OM: PAIRS[:2], RM_MASS: (PAIRS[2], PAIRS[1]), RM: PAIRS}
 
 
 @dataclass(frozen=True)
 class Judge:
-    """A trial that may judge: its mean logarithm of the error by method; what it tells alone."""
+    """A trial that may judge: its mean logarithm of the error, and the RMSE of its ground force, by
+    method; what it tells alone."""
 
     trial: Trial
     log_error: dict[str, float]
+    force_N: dict[str, float]
     alone: Callable[[Pair], Difference]
 
 
@@ -45,8 +58,8 @@ def run(unit: Unit) -> None:
     """A row over all movements, and one per movement."""
     identification = unit.read("identification").set_index("method")
     if identification.empty:
-        why = "nothing was identified: the table's parameters stand alone"
-        unit.write("choice", pd.DataFrame([_row(ALL, RM, _UNKNOWN, 0, "none", why)]))
+        said = f"Use {RM}: nothing was identified, the table's parameters stand alone."
+        unit.write("choice", pd.DataFrame([_row(_ALL, RM, _UNKNOWN, 0, "none", said)]))
         return
     judges, data = _judges(unit)
     is_rare = bool(identification.loc[OM, "rare"])
@@ -54,24 +67,74 @@ def run(unit: Unit) -> None:
     for judge in judges:
         by_movement.setdefault(judge.trial.task, []).append(judge)
     of_each = {movement: _differences(trials) for movement, trials in by_movement.items()}
-    counts = {movement: len(trials) for movement, trials in by_movement.items()}
-    found = {ALL: _over_all(of_each), **of_each}
+    found = {_ALL: _over_all(of_each), **of_each}
+    use = {movement: chosen(differences, is_rare) for movement, differences in found.items()}
     rows = []
     for movement, differences in found.items():
-        use, n = chosen(differences, is_rare), counts.get(movement, len(judges))
-        why = reason_of(differences, is_rare, n, data)
-        rows.append(_row(movement, use, differences, n, data, why))
-    unit.warn(f"{unit.name}: use {rows[0]['use']}: {rows[0]['reason']}")
+        judging = by_movement.get(movement, judges)
+        said = f"{_use(movement, use)}: {_why(use[movement], differences, judging, data, is_rare)}"
+        rows.append(_row(movement, use[movement], differences, len(judging), data, said))
+    unit.warn(f"{unit.name}: {rows[0]['sentence']}")
     unit.write("choice", pd.DataFrame(rows))
 
 
 def _row(
-    movement: str, use: str, differences: Differences, trials: int, data: str, why: str
+    movement: str, use: str, differences: Differences, trials: int, data: str, said: str
 ) -> dict:
     ratios = {f"ratio_{name}": differences[pair].ratio for pair, name in _COLUMNS.items()}
     errors = {f"log_error_{name}": differences[pair].error for pair, name in _COLUMNS.items()}
-    known = {"movement": movement, "use": use, "trials": trials, "data": data, "reason": why}
+    known = {"movement": movement, "use": use, "trials": trials, "data": data, "sentence": said}
     return known | ratios | errors
+
+
+# --- in words ---------------------------------------------------------------------------------
+
+
+def _use(movement: str, use: dict[str, str]) -> str:
+    """``Use RM+mass (for steps and walking: OM)``; of one movement ``Use OM for steps``."""
+    if movement != _ALL:
+        return f"Use {use[movement]} for {movement}"
+    others = [
+        f"for {listing(sorted(name for name in use if use[name] == other))}: {other}"
+        for other in sorted(set(use.values()) - {use[_ALL]})
+    ]
+    return f"Use {use[_ALL]}" + (f" ({'; '.join(others)})" if others else "")
+
+
+def _why(use: str, differences: Differences, judges: list[Judge], data: str, is_rare: bool) -> str:
+    """Ground forces in newtons, then what decided."""
+    if not judges:
+        return "no trial is left to judge by, so the table's parameters stand."
+    where = _WHERE[data].format(trials=count(len(judges), "trial"))
+    om, mass, table = (
+        number(float(np.mean([judge.force_N[name] for judge in judges])), 0)
+        for name in (OM, RM_MASS, RM)
+    )
+    decided = "; ".join(
+        f"{first} errs {listing([_compared(b, differences[a, b]) for a, b in pairs])}"
+        for first, pairs in groupby(_DECIDING[use], lambda pair: pair[0])
+    )
+    rare = " OM is not used: fewer than 1 in 100 people have such a body." if is_rare else ""
+    return (
+        f"{where} the ground force errs by {om} N with the identified parameters (OM), by {mass} N "
+        f"with the table's scaled to the measured weight ({RM_MASS}), by {table} N with the "
+        f"table's own ({RM}). Over forces, moments and centre of pressure together "
+        f"{decided}.{rare}"
+    )
+
+
+def _compared(other: str, one: Difference) -> str:
+    """``30 to 41 % less than RM``: one standard error to either side."""
+    ends = [100 * (ratio - 1) for ratio in one.interval()]
+    if not np.isfinite(ends).all():
+        change = 100 * (one.ratio - 1)
+        how = f"{number(abs(change), 0)} % {'less' if change < 0 else 'more'} than {other}"
+        return f"{how} (too few independent samples for an interval)"
+    if ends[0] < 0 < ends[1]:
+        low, high = (number(abs(end), 0) for end in ends)
+        return f"between {low} % less and {high} % more than {other}"
+    low, high = (number(size, 0) for size in sorted(map(abs, ends)))
+    return f"{low} to {high} % {'less' if ends[1] <= 0 else 'more'} than {other}"
 
 
 # --- who judges -------------------------------------------------------------------------------
@@ -83,11 +146,12 @@ def _judges(unit: Unit) -> tuple[list[Judge], str]:
     Forces that an external contact bears judge nobody.
     """
     own = set(unit.read("used-blocks")["trial"])
-    contacts = unit.facts("identification").get("external_contacts", {})
+    contacts = unit.facts("identification")["external_contacts"]
     moving = [t for t in unit.trials("fit", "reconstruction") if t.role != "static"]
     for trial in moving:
         if trial.stem in contacts:
-            unit.warn(f"{unit.name}: {trial.stem} does not judge: {contacts[trial.stem]}")
+            found = Support(**contacts[trial.stem]).words()
+            unit.warn(f"{unit.name}: {trial.stem} does not judge: {found}")
     judges = [_judge(unit, trial) for trial in moving if trial.stem not in contacts]
     known = [judge for judge in judges if judge is not None]
     unseen = [judge for judge in known if judge.trial.stem not in own]
@@ -103,11 +167,13 @@ def _judge(unit: Unit, trial: Trial) -> Judge | None:
     if errors.empty:
         return None
     logs = np.log(errors).mean()
+    force_N = np.sqrt((errors.reindex(_FORCE) ** 2).sum())
     components = [COMPONENTS.index(name) for name in errors.index]
-    return Judge(trial, logs.to_dict(), lambda pair: _within(unit, trial, pair, components))
+    alone = partial(_within, unit, trial, components)
+    return Judge(trial, logs.to_dict(), force_N.to_dict(), alone)
 
 
-def _within(unit: Unit, trial: Trial, pair: Pair, components: list[int]) -> Difference:
+def _within(unit: Unit, trial: Trial, components: list[int], pair: Pair) -> Difference:
     rows = unit.read("reconstruction", trial)
     measured = rows[rows["method"] == MEASURED]
     judged = measured["valid"].to_numpy() & ~measured["used"].to_numpy()

@@ -91,7 +91,7 @@ def _identified(
     recordings, _ = recordings_of(unit, person, trials, changes)
     problem, _ = problem_of(unit, person, prior, recordings)
     found = readable(estimate_by(_estimator(unit), problem), prior)
-    return bsip_table(OM, person.skeleton.segments, found.values, found.sd, found.share)
+    return bsip_table(OM, person.skeleton.body_names, found.values, found.sd, found.share)
 
 
 def _estimator(unit: Unit) -> str:

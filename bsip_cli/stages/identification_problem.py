@@ -41,7 +41,8 @@ def prior_from(
 
     fixed : as of :func:`prior_of`. other : standard deviations that stand for the configured ones.
     """
-    rows = regression[list(bsip_names())].to_numpy()
+    bodies = list(person.skeleton.body_names)
+    rows = regression.set_index("segment").loc[bodies, list(bsip_names())].to_numpy()
     spread = Spread(**{**unit.config.prior.model_dump(), **other})
     return prior_of(tuple(from_readable(row) for row in rows), person, spread, fixed)
 
@@ -134,13 +135,14 @@ def problem_of(
         options.spread_weight,
     )
     instruments = Instruments(options.plate_place_sd_m, options.delay_sd_s, prior.phi)
-    equations = accumulate(model, recordings, cutoff, reference).with_known(prior.phi, known)
-    noise = even_noise(_FIRST_NOISE, equations.samples)
-    for _ in range(_WEIGHT_ROUNDS):
+    joint = accumulate(model, recordings, cutoff, reference)
+    noise = even_noise(_FIRST_NOISE, joint.samples)
+    for left in reversed(range(_WEIGHT_ROUNDS)):
+        equations = joint.with_known(prior.phi, known)
         likely = likeliest(prior, *equations.weighted(noise.weights()))
         noise = noise_of(residual_series(model, recordings, cutoff, reference, likely))
-        joint = accumulate(model, recordings, cutoff, reference, noise.weights_at, instruments)
-        beside = joint.with_known(prior.phi, known)
-        equations = beside.of_the_body(len(prior.phi))
-    whole = joint.of_the_body(len(prior.phi))
+        last = None if left else instruments  # the weights need the body alone
+        joint = accumulate(model, recordings, cutoff, reference, noise.weights_at, last)
+    beside, whole = joint.with_known(prior.phi, known), joint.of_the_body(len(prior.phi))
+    equations = beside.of_the_body(len(prior.phi))
     return Problem(equations, noise, prior, basis, *judgement, whole, beside), reference

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import asdict
+
 import numpy as np
 import pandas as pd
 
@@ -10,7 +13,7 @@ from bsip_cli.body.names import in_words as segment_in_words
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.diagnosis.evidence import slow
-from bsip_cli.diagnosis.support import support_of
+from bsip_cli.diagnosis.support import Support, support_of
 from bsip_cli.dynamics.base_parameters import expressions
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.identification.base import base_parameters
@@ -60,7 +63,9 @@ def run(unit: Unit) -> None:
     tables = [regression.drop(columns="note")]
     for method, result in results.items():
         unit.warn(f"{unit.name}: {method} ({estimators[method]}): {estimates[method].note}")
-        tables.append(bsip_table(method, skeleton.segments, result.values, result.sd, result.share))
+        tables.append(
+            bsip_table(method, skeleton.body_names, result.values, result.sd, result.share)
+        )
     rarity = _rarity(unit, skeleton, problem, estimates)
     unit.write(
         "bsip",
@@ -77,7 +82,7 @@ def run(unit: Unit) -> None:
     unit.write(
         "identification",
         _summary(problem, found, estimates, estimators, blocks).assign(**rarity),
-        facts={"external_contacts": contacts},
+        facts={"external_contacts": _as_records(contacts)},
     )
     unit.write("used-blocks", blocks)
 
@@ -86,7 +91,7 @@ def _write_table_only(
     unit: Unit,
     regression: pd.DataFrame,
     recordings: list[Recording],
-    contacts: dict[str, str],
+    contacts: Mapping[str, Support],
 ) -> None:
     """Without forces that belong to the motion the table's values stand alone."""
     unit.warn(
@@ -96,8 +101,12 @@ def _write_table_only(
     unit.write("bsip", regression.drop(columns="note"))
     for kind in ("base-parameters", "excitation", "used-blocks"):
         unit.write(kind, empty_table(kind))
-    empty = empty_table("identification")
-    unit.write("identification", empty, facts={"external_contacts": contacts})
+    facts = {"external_contacts": _as_records(contacts)}
+    unit.write("identification", empty_table("identification"), facts)
+
+
+def _as_records(contacts: Mapping[str, Support]) -> dict[str, dict]:
+    return {stem: asdict(support) for stem, support in contacts.items()}
 
 
 def _estimators(unit: Unit) -> dict[str, str]:
@@ -109,18 +118,17 @@ def _estimators(unit: Unit) -> dict[str, str]:
 # --- which data -------------------------------------------------------------------------------
 
 
-def _external_contacts(unit: Unit, person: Person, phi: np.ndarray) -> dict[str, str]:
-    """What the balance of forces with the table's body (10 n,) shows beside the plates, in words,
-    by trial."""
+def _external_contacts(unit: Unit, person: Person, phi: np.ndarray) -> dict[str, Support]:
+    """What bears part of the body beside the plates, by trial; phi (10 n,) of the table."""
     found = {}
     for trial in unit.trials("kinematics", "wrench"):
         support = support_of(slow(motion_and_wrench_of(unit, person, phi, trial)))
         if support is not None:
-            found[trial.stem] = support.words()
+            found[trial.stem] = support
     return found
 
 
-def _identification_trials(unit: Unit, contacts: dict[str, str]) -> list[Trial]:
+def _identification_trials(unit: Unit, contacts: Mapping[str, Support]) -> list[Trial]:
     """The trials with the role; without one, the trial with most valid frames. Never one with an
     external contact: the body would be made to bear what the contact bears."""
     ready = unit.trials("kinematics", "wrench")
@@ -144,13 +152,13 @@ def _identification_trials(unit: Unit, contacts: dict[str, str]) -> list[Trial]:
 
 
 def _tell_of_contacts(
-    unit: Unit, asked: list[Trial], chosen: list[Trial], contacts: dict[str, str]
+    unit: Unit, asked: list[Trial], chosen: list[Trial], contacts: Mapping[str, Support]
 ) -> None:
     instead = ", ".join(trial.stem for trial in chosen)
     used = f"{instead} identifies instead" if chosen else "no trial is left to identify from"
     for trial in asked:
         if trial.stem in contacts:
-            found = contacts[trial.stem]
+            found = contacts[trial.stem].words()
             unit.warn(f"{unit.name}: {trial.stem} does not identify: {found}; {used}")
 
 
@@ -162,9 +170,10 @@ def _tell_of_loads(unit: Unit, trials: list[Trial]) -> None:
 
 
 def _tell_of_fixed(unit: Unit, person: Person) -> None:
-    fixed = np.flatnonzero(person.without_data())
-    if len(fixed):
-        names = ", ".join(segment_in_words(person.skeleton.segments[i]) for i in fixed)
+    skeleton, lost = person.skeleton, person.without_data()
+    fixed = [skeleton.segments[i] for i in skeleton.bodies if lost[i]]
+    if fixed:
+        names = ", ".join(map(segment_in_words, fixed))
         unit.warn(
             f"{unit.name}: no data for {names}: no markers show how they move, OM keeps the "
             "table's values (RM) there"
@@ -200,7 +209,7 @@ def _farthest_in_words(
 ) -> str:
     """The segments that make half of the distance, with their masses (n,)."""
     parts = [
-        f"the {segment_in_words(skeleton.segments[i])} ({100 * found.shares[i]:.0f} % of the "
+        f"the {segment_in_words(skeleton.body_names[i])} ({100 * found.shares[i]:.0f} % of the "
         f"distance from the table; {masses_kg[i]:.2f} kg, table {table_kg[i]:.2f} kg)"
         for i in found.farthest()
     ]
@@ -209,7 +218,7 @@ def _farthest_in_words(
 
 def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
     fit = base_parameters(problem)
-    named = expressions(problem.basis, skeleton.segments)
+    named = expressions(problem.basis, skeleton.body_names)
     return pd.DataFrame(
         {
             "name": [row[0] for row in named],
@@ -227,7 +236,7 @@ def _excitation_table(
     person: Person, problem: Problem, found: Excitation, share: np.ndarray
 ) -> pd.DataFrame:
     """``share`` (n, 10) are OM's data shares."""
-    names = person.skeleton.segments
+    names = person.skeleton.body_names
     words = [
         "no markers, no data: the table's values" if fixed else in_words(own)
         for fixed, own in zip(problem.prior.fixed, share, strict=True)

@@ -43,7 +43,8 @@ def compared(unit: Unit, loads_off: Unit, sets: tuple[Sequence[Trial], Sequence[
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     declared = load_phi(unit, person, sets[0][0]) - load_phi(unit, person, sets[1][0])
-    loaded = [i for i, own in enumerate(declared.reshape(-1, 10)) if own.any()]
+    bodies = [k for k, own in enumerate(declared.reshape(-1, 10)) if own.any()]
+    loaded = [skeleton.bodies[k] for k in bodies]
     _check_seen(unit, person, loaded)
     prior = prior_from(unit, unit.read("regression"), person)
     heavy, plain = (_problem(loads_off, person, prior, trials) for trials in sets)
@@ -51,7 +52,7 @@ def compared(unit: Unit, loads_off: Unit, sets: tuple[Sequence[Trial], Sequence[
     a, b = (estimate_by(estimator, problem) for problem in (plain, heavy))
     change = difference(a, b, prior.root @ prior.root.T)
     one = _Block(TWO, change.phi, change.covariance, declared, change.resolution @ declared)
-    rows = [one.total(), *one.rows(skeleton.segments)]
+    rows = [one.total(), *one.rows(skeleton.body_names)]
     if any(skeleton.parents[i] in loaded for i in loaded):
         unit.warn(
             f"{unit.name}: loads on {_names(person, loaded)}, of which a joint connects some: the "
@@ -59,8 +60,8 @@ def compared(unit: Unit, loads_off: Unit, sets: tuple[Sequence[Trial], Sequence[
             "identifications"
         )
     else:
-        part = (10 * np.array(loaded)[:, None] + np.arange(10)).ravel()
-        own = change_of_segments(plain, heavy, loaded)
+        part = (10 * np.array(bodies)[:, None] + np.arange(10)).ravel()
+        own = change_of_segments(plain, heavy, bodies)
         both = _Block(LOADED, own.phi, own.covariance, declared[part], declared[part])
         names = [skeleton.segments[i] for i in loaded]
         rows += [*both.rows(names), *both.centres(names, person.origin_in_joint_m[loaded])]

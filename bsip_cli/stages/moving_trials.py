@@ -15,7 +15,7 @@ from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.held_out import FOLDS, Gain
 from bsip_cli.diagnosis.marker_proof import BEND, Proof, Slip, proofs_of
 from bsip_cli.diagnosis.nuisances import own_nuisances, shared_nuisances
-from bsip_cli.diagnosis.support import SHORTEST_S, support_of
+from bsip_cli.diagnosis.support import SHORTEST_S, Support
 from bsip_cli.diagnosis.together import together
 from bsip_cli.effects.marker_shift import BEFORE_S
 from bsip_cli.effects.scene import Scene
@@ -72,7 +72,8 @@ class LookedAt:
 def moving_trials(unit: Unit, person: Person, prior: Prior) -> tuple[LookedAt, ...]:
     """The evidence of trials that move, and what hands or markers tell of them beforehand."""
     moving = (t for t in unit.trials("kinematics", "wrench") if t.role != "static")
-    looked_at = [_looked_at(unit, person, prior, trial) for trial in moving]
+    contacts = unit.facts("identification")["external_contacts"]
+    looked_at = [_looked_at(unit, person, prior, t, contacts.get(t.stem)) for t in moving]
     bent = sum(any(_is_bend(proven) for proven in one.proven) for one in looked_at)
     return tuple(
         replace(one, told=(*one.told, *_told(one, f"M{k}", bent > 1)))
@@ -103,19 +104,21 @@ def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:
     known = {"total_mass_sd_percent": sd_percent} if is_weighed(unit) else {}
     table = unit.read("regression").copy()
     table[[name for name in bsip_names() if not name.startswith("com")]] *= 1 + (share or 0.0)
-    none = np.zeros(len(person.skeleton.segments), dtype=bool)
+    none = np.zeros(len(person.skeleton.bodies), dtype=bool)
     return prior_from(unit, table, person, none, **known)
 
 
-def _looked_at(unit: Unit, person: Person, prior: Prior, trial: Trial) -> LookedAt:
+def _looked_at(
+    unit: Unit, person: Person, prior: Prior, trial: Trial, contact: dict | None
+) -> LookedAt:
+    """``contact``: what a hand holds on to there, as ``identify`` has written it."""
     scene = scene_of(unit, person, prior.phi, trial)
     measured_s = float(scene.valid.sum()) / scene.rate_hz
     if measured_s < SHORTEST_S:
         return LookedAt(trial, scene, too_short_s=measured_s)
+    if contact is not None:
+        return LookedAt(trial, scene, told=(Support(**contact).finding(trial.stem),))
     fewer = slow(scene)
-    held = support_of(fewer)
-    if held is not None:
-        return LookedAt(trial, scene, told=(held.finding(trial.stem),))
     options = unit.config.diagnosis
     rng = np.random.default_rng(crc32(trial.stem.encode()))
     own = own_nuisances(fewer, options.skin_factor, options.skin_draws, rng)

@@ -106,17 +106,18 @@ def judgement_of(unit: Unit, kinematics: pd.DataFrame, measured: pd.DataFrame) -
 
 
 def parameters_of(bsip: pd.DataFrame, person: Person) -> tuple[list[str], np.ndarray]:
-    """Methods and their parameters (10 n, k) about the joint centres."""
+    """Methods and the parameters (10 n, k) of the segments with mass, about the joint centres."""
     methods = list(dict.fromkeys(bsip["method"]))
+    origins = person.origin_in_joint_m[list(person.skeleton.bodies)]
     columns = []
     for method in methods:
         rows = bsip[bsip["method"] == method].set_index("segment")
-        rows = rows.loc[list(person.skeleton.segments), list(bsip_names())].to_numpy()
+        rows = rows.loc[list(person.skeleton.body_names), list(bsip_names())].to_numpy()
         columns.append(
             np.concatenate(
                 [
                     from_readable(row).moved(-origin).phi()
-                    for row, origin in zip(rows, person.origin_in_joint_m, strict=True)
+                    for row, origin in zip(rows, origins, strict=True)
                 ]
             )
         )

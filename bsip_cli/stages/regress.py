@@ -21,10 +21,10 @@ def run(unit: Unit) -> None:
         raise BadDataError(facts["mass_note"], file=unit.name)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     result = regress(person, facts["sex"], facts["mass_kg"], unit.config.regress.table)
-    for segment, note in zip(skeleton.segments, result.notes, strict=True):
+    for segment, note in zip(skeleton.body_names, result.notes, strict=True):
         if note:
             unit.warn(f"{unit.name}: {segment}: {note}")
     prior = prior_of(result.inertias, person, Spread(**unit.config.prior.model_dump()))
     values = np.array([inertia.readable() for inertia in prior.inertias])
-    table = bsip_table(RM, skeleton.segments, values, prior.readable_sd, np.zeros_like(values))
+    table = bsip_table(RM, skeleton.body_names, values, prior.readable_sd, np.zeros_like(values))
     unit.write("regression", table.assign(note=list(result.notes)))

@@ -118,13 +118,11 @@ def _doubt(unit: Unit, doubts: list[Doubt]) -> None:
 
 
 def _require_markers(unit: Unit, marker_set: MarkerSet, person: Person) -> None:
-    """Every segment has markers on it or beyond it, or may be held."""
+    """Every segment with mass has markers on it or beyond it, or may be held."""
     allowed = unit.config.scale.may_be_held
-    lost = [
-        name
-        for name, held in zip(person.skeleton.segments, person.held, strict=True)
-        if held and without_side(name) not in allowed
-    ]
+    skeleton = person.skeleton
+    held = [skeleton.segments[i] for i in skeleton.bodies if person.held[i]]
+    lost = [name for name in held if without_side(name) not in allowed]
     if not lost:
         return
     serve = [f"{_would_do(marker_set, name) or 'some'} on the {in_words(name)}" for name in lost]

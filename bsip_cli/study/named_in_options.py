@@ -26,7 +26,7 @@ def check_prefixes(prefixes: Mapping[str, str], study: Study) -> None:
 
 
 def check_segments(loads: Sequence[Load], skeleton: Skeleton) -> None:
-    """Every load sits on a segment of the skeleton.
+    """Every load sits on a segment of the skeleton that has mass.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def check_segments(loads: Sequence[Load], skeleton: Skeleton) -> None:
         The first load that does not, with the nearest known name.
     """
     for k, load in enumerate(loads):
-        _check_names(f"loads.{k}.segment", [load.segment], skeleton.segments)
+        _check_names(f"loads.{k}.segment", [load.segment], skeleton.body_names)
 
 
 def check_trials(loads: Sequence[Load], study: Study) -> None:

@@ -71,11 +71,22 @@ def standing(sex: str = "M") -> Calibration:
 
 
 @cache
-def tilted_person() -> Person:
+def with_girdle() -> Calibration:
+    """The same with clavicles, which more markers show."""
+    places = standing_markers()
+    for side, out in (("R", -1.0), ("L", 1.0)):
+        places[f"{side}CLA"] = np.array([0.06, 0.10 * out, 1.47])
+        places[f"{side}AA"] = np.array([-0.06, 0.18 * out, 1.44])
+    skeleton, marker_set = load_skeleton("robert17"), load_marker_set("robert17")
+    return calibrate(skeleton, marker_set, places, "M", HEIGHT_M)
+
+
+@cache
+def tilted_person(girdle: bool = False) -> Person:
     """The person with hinges that lean, and joints off the planes of symmetry."""
     from dataclasses import replace
 
-    person = standing().person
+    person = (with_girdle() if girdle else standing()).person
     rng = np.random.default_rng(2)
     hinges = np.array([kind == "revolute" for kind in person.skeleton.joint_types])
     return replace(
@@ -88,11 +99,12 @@ def tilted_person() -> Person:
 def random_poses(person: Person, count: int, spread_rad: float, seed: int) -> np.ndarray:
     """(count, nq) poses about the standing one, base moved by about a metre."""
     model, rng = pinocchio_model(person), np.random.default_rng(seed)
+    first = standing().q if len(person.skeleton.segments) == 15 else with_girdle().q
     return np.stack(
         [
             pin.integrate(
                 model,
-                standing().q,
+                first,
                 np.concatenate([rng.normal(0, 0.7, 3), rng.normal(0, spread_rad, model.nv - 3)]),
             )
             for _ in range(count)

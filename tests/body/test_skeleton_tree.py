@@ -48,6 +48,25 @@ def test_entries_stand_where_pinocchio_has_them():
     assert [model.joints[i + 1].idx_v for i in range(15)] == list(skeleton.v_starts)
 
 
+def test_seventeen_segments_of_which_fifteen_have_mass():
+    """Robert 2017: clavicles are massless rods between the trunk and the arms."""
+    skeleton = load_skeleton("robert17")
+    assert len(skeleton.segments) == 17 and len(skeleton.v_names) == 46
+    assert {*skeleton.segments} - {*skeleton.body_names} == {"clavicle_l", "clavicle_r"}
+    assert {*skeleton.body_names} == {*SEGMENTS}
+    assert skeleton.body_names == tuple(skeleton.segments[i] for i in skeleton.bodies)
+    arm = skeleton.segments[skeleton.parents[skeleton.index("upper_arm_r")]]
+    assert arm == "clavicle_r"
+
+
+def test_a_marker_rides_on_the_link_that_its_landmark_moves_with():
+    plain, girdle = load_skeleton("hansen2017"), load_skeleton("robert17")
+    for landmark, rides in (("acromion_r", "clavicle_r"), ("c7", "upper_torso"), ("", "head")):
+        named = "head" if not landmark else "upper_torso"
+        assert girdle.carrying(named, landmark) == rides
+        assert plain.carrying(named, landmark) == named
+
+
 def test_sides():
     skeleton = load_skeleton("hansen2017")
     sides = [skeleton.side(name) for name in ("foot_l", "foot_r", "head", "lower_torso")]
@@ -55,7 +74,20 @@ def test_sides():
 
 
 SHIPPED = shipped("skeletons", "hansen2017.toml").read_text(encoding="utf-8")
+ROBERT = shipped("skeletons", "robert17.toml").read_text(encoding="utf-8")
+CLAVICLE = row("clavicle_l", "upper_torso", "sternoclavicular_l", "spherical", "")
 ELBOW = 'joint = "elbow_l"\ntype = '
+
+
+def test_one_clavicle_is_enough(tmp_path):
+    """A tree of one's own with 16 segments."""
+    arm = 'name = "upper_arm_l"\nparent = "upper_torso"'
+    assert arm in SHIPPED
+    with_rod = SHIPPED.replace(f"[[segments]]\n{arm}", CLAVICLE + f"[[segments]]\n{arm}")
+    skeleton = load_skeleton(
+        written(tmp_path, with_rod.replace(arm, arm.replace("upper_torso", "clavicle_l")))
+    )
+    assert len(skeleton.segments) == 16 and len(skeleton.bodies) == 15
 
 
 def test_a_tree_of_ones_own(tmp_path):
@@ -69,9 +101,18 @@ def test_a_tree_of_ones_own(tmp_path):
     ("text", "said"),
     [
         (
-            SHIPPED + row("clavicle_l", "upper_torso", "sternoclavicular_l", "spherical"),
-            "clavicle_l, of which neither frame nor mass is known",
+            SHIPPED + row("abdomen", "lower_torso", "lumbar", "spherical"),
+            "abdomen, of which neither frame nor mass is known",
         ),
+        (SHIPPED + CLAVICLE, "nothing that hangs on clavicle_l"),
+        (
+            ROBERT.replace('type = "spherical"\ntable = ""', 'type = "revolute"\ntable = ""'),
+            "a hinge",
+        ),
+        (ROBERT.replace('table = ""', 'table = "arm"'), "clavicle_l with the table's row 'arm'"),
+        (ROBERT.replace('table = "hand"', 'table = ""'), "hand_l with the table's row ''"),
+        (SHIPPED.replace('table = "hand"', 'table = "paw"'), "hand_l with the table's row 'paw'"),
+        (ROBERT.replace('"acromion_l"', '"wing"'), "clavicle_l with the unknown landmark wing"),
         (GOOD, "no upper_torso, no head, no upper_arm_l"),
         (SHIPPED.replace('"neck"', '"atlas"'), "head on atlas instead of neck"),
         (

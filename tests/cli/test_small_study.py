@@ -242,7 +242,7 @@ def test_show_prints_the_tables(first_run, bsip):
     assert str(first_run.out / "sub-02" / "report.html") in answer.out
     assert answer.out.count("| ") > 20
     assert "Is anything wrong: sub-01" in answer.out
-    assert [f"sub-0{k}: use " in answer.out for k in (1, 2)] == [True, True]
+    assert [f"sub-0{k}: Use " in answer.out for k in (1, 2)] == [True, True]
 
 
 def test_info_tells_what_made_an_artifact(first_run, bsip):

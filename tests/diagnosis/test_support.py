@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 
 import numpy as np
 
@@ -76,3 +77,10 @@ def test_too_few_measured_seconds_tell_nothing():
     scene = moving()
     for count in (0, 1, 150):
         assert support_of(replace(scene, valid=np.arange(len(scene.valid)) < count)) is None
+
+
+def test_what_was_found_survives_being_written():
+    found = held(0.001, 0.10, 0.016, FORCE_N)
+    assert found is not None
+    again = Support(**json.loads(json.dumps(asdict(found))))
+    assert again.finding("trial") == found.finding("trial") and again.words() == found.words()

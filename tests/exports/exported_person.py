@@ -18,9 +18,12 @@ MADE_OF = ("bsip 0 export: participant sub-01, method OM", "made -- of <nothing>
 
 
 @cache
-def identified_person() -> IdentifiedPerson:
-    """RM of the person with every centre of mass and tensor moved away from symmetry."""
-    person, rng = tilted_person(), np.random.default_rng(5)
+def identified_person(girdle: bool = False) -> IdentifiedPerson:
+    """RM of the person with every centre of mass and tensor moved away from symmetry.
+
+    girdle : with clavicles, which have no mass.
+    """
+    person, rng = tilted_person(girdle), np.random.default_rng(5)
     inertias = tuple(_uneven(each, rng) for each in regress(person, "M", 71.3).inertias)
     return IdentifiedPerson(person, inertias, "sub-01", "OM", MADE_OF)
 
@@ -34,7 +37,7 @@ def _uneven(inertia: Inertia, rng: np.random.Generator) -> Inertia:
 def our_model(body: IdentifiedPerson) -> pin.Model:
     """Pinocchio's model of the person with inertias, built without any export."""
     model = pinocchio_model(body.person)
-    for i, inertia in enumerate(body.inertias):
+    for i, inertia in zip(body.person.skeleton.bodies, body.inertias, strict=True):
         com = inertia.com_m + body.person.origin_in_joint_m[i]
         model.inertias[i + 1] = pin.Inertia(inertia.mass_kg, com, inertia.tensor_kgm2)
     return model

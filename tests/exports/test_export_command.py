@@ -66,7 +66,7 @@ def write_choice(made: Results, participant: str, use: str = "OM") -> None:
     write_artifact(source, "identification", empty_table("identification"), NOTES)
     names = column_names("choice")
     row = dict.fromkeys(names, 0.5) | {"movement": "all", "use": use, "trials": 3}
-    frame = pd.DataFrame([row | {"data": "whole_trials", "reason": "it errs less"}])
+    frame = pd.DataFrame([row | {"data": "whole_trials", "sentence": "Use OM: it errs less."}])
     notes = NOTES | {"made_by": {"inputs": {source.name: file_hash(source)}}}
     write_artifact(made.artifact("choice", participant), "choice", frame, notes)
 
@@ -134,7 +134,7 @@ def test_writes_every_format_of_everybody(results):
     wanted = {f"{s}/export/{s}_OM{e}" for s in ("sub-01", "sub-02") for e in ENDINGS}
     assert results.files() == wanted
     why, first, *_, summary = done.stderr.splitlines()
-    assert why == "export: sub-01: use OM; it errs less"
+    assert why == "export: sub-01: Use OM: it errs less."
     assert first.startswith(f"export: sub-01: {results.out / 'sub-01' / 'export'}: sub-01_OM.urdf")
     assert summary == f"bsip export: 2 done; results in {results.out}"
 

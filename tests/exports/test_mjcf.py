@@ -7,9 +7,14 @@ import pinocchio as pin
 import pytest
 
 from bsip_cli.body.exports.mjcf import mjcf_text
-from tests.exports.exported_person import joint_frames, our_model, poses
+from tests.exports.exported_person import identified_person, joint_frames, our_model, poses
 
 mujoco = pytest.importorskip("mujoco", reason="the mujoco package is not installed")
+
+
+@pytest.fixture(scope="module")
+def identified():
+    return identified_person()
 
 
 @pytest.fixture(scope="module")
@@ -98,3 +103,12 @@ def test_markers_are_sites(read, identified):
         body = read.body(int(site.bodyid[0])).name
         assert body == person.skeleton.segments[person.marker_segments[k]]
         assert site.pos == pytest.approx(person.markers_in_joint_m()[k], abs=1e-12)
+
+
+def test_clavicles_weigh_next_to_nothing():
+    """MuJoCo refuses a body that moves and has no mass."""
+    body = identified_person(girdle=True)
+    read = mujoco.MjModel.from_xml_string(mjcf_text(body))
+    assert (read.nv, read.nbody) == (46, 18)
+    assert read.body_mass.sum() == pytest.approx(body.mass_kg, abs=1e-5)
+    assert read.body("clavicle_l").mass[0] < 1e-5

@@ -33,7 +33,7 @@ def numbers(row: dict[str, str], names: str) -> np.ndarray:
 def test_rows_hold_the_inertias_in_the_axes_they_name(identified):
     rows = rows_of(visual3d_csv_text(identified))
     assert set(rows) == set(SEGMENTS) == set(VISUAL3D_SEGMENTS)
-    names = identified.person.skeleton.segments
+    names = identified.person.skeleton.body_names
     for segment, inertia in zip(names, identified.inertias, strict=True):
         row = rows[segment]
         words = [part.split() for part in row["axes"].split(", ")]
@@ -53,13 +53,15 @@ def test_rows_hold_the_inertias_in_the_axes_they_name(identified):
 def test_known_thigh_head_and_foot(identified):
     """By hand: the axial axis is the segment's own, and the fraction counts from its origin."""
     skeleton = identified.person.skeleton
-    inertias, lengths = list(identified.inertias), np.full(15, 0.5)
+    inertias, lengths = list(identified.inertias), np.full(len(skeleton.segments), 0.5)
     for name, com in (
         ("thigh_r", (0.01, -0.2, 0.03)),
         ("head", (0.01, 0.1, 0.0)),
         ("foot_r", (0.06, -0.02, 0.005)),
     ):
-        inertias[skeleton.index(name)] = Inertia(2.0, np.array(com), np.diag([0.3, 0.1, 0.25]))
+        inertias[skeleton.body_names.index(name)] = Inertia(
+            2.0, np.array(com), np.diag([0.3, 0.1, 0.25])
+        )
     person = replace(identified.person, lengths_m=lengths)
     rows = rows_of(visual3d_csv_text(replace(identified, person=person, inertias=tuple(inertias))))
     columns = "cg_x_m cg_y_m cg_z_m cg_axial_m cg_axial_fraction ixx_kgm2 iyy_kgm2 izz_kgm2"

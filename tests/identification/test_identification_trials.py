@@ -30,7 +30,7 @@ def chosen(contacts: tuple[str, ...], **frames: int) -> tuple[list[str], list[st
         ),
         config=SimpleNamespace(identify=SimpleNamespace(hold_out_fraction=0.0)),
     )
-    held = {f"sub-01_task-{task}": HAND for task in contacts}
+    held = {f"sub-01_task-{task}": SimpleNamespace(words=lambda: HAND) for task in contacts}
     return [trial.task for trial in _identification_trials(unit, held)], said
 
 

@@ -13,6 +13,7 @@ from bsip_cli.identification.equations import accumulate
 from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.instruments import Instruments
 from bsip_cli.identification.noise import even_noise
+from bsip_cli.identification.weights import fit_with_weights, terms_of
 from tests.identification.synthetic_identification import RATE_HZ, recording, regressor, world
 
 ASIDE_M, LATE_S = 0.03, 0.02
@@ -76,3 +77,19 @@ def test_a_body_of_the_table_stays_one_without_a_fault():
     wrench = predicted_wrench(model, q, *still, found[:, None], np.zeros(3))[..., 0]
     expected = predicted_wrench(model, q, *still, world().prior.phi[:, None], np.zeros(3))[..., 0]
     np.testing.assert_allclose(wrench[:, 2], expected[:, 2], rtol=0.005)
+
+
+def test_decided_parameters_are_those_of_the_body():
+    """What the data tell of plates and clock does not count: the trace of the body alone."""
+    terms = terms_of(problem_with(aside, True))
+    fit = fit_with_weights(terms)
+    before, after = (
+        terms.shown @ one @ terms.shown.T for one in (fit.prior_covariance, fit.optimum.covariance)
+    )
+    scale = np.sqrt(np.diag(before))
+    kept = np.trace(
+        np.linalg.solve(before / np.outer(scale, scale), after / np.outer(scale, scale))
+    )
+    assert fit.decided == pytest.approx(len(before) - kept, abs=0.01)
+    whole = np.trace(np.linalg.solve(fit.prior_covariance, fit.optimum.covariance))
+    assert 1 < len(fit.prior_covariance) - whole - fit.decided < instruments.COUNT

@@ -26,9 +26,10 @@ def test_every_kind_of_parameter_is_there():
     assert len(set(parameters)) == len(parameters)
 
 
+@pytest.mark.parametrize("girdle", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
-def test_columns_equal_finite_differences(kind):
-    person = tilted_person()
+def test_columns_equal_finite_differences(kind, girdle):
+    person = tilted_person(girdle)
     parameters = tuple(_parameters(person, OPTIONS))
     q = random_poses(person, 3, 0.7, seed=1)
     R, p = tree_of(person).forward(q)
@@ -60,3 +61,16 @@ def test_lengths_follow_the_geometry():
     shank = person.skeleton.index("shank_l")
     hip_to_knee = [np.linalg.norm(one.joint_in_parent_m[shank]) for one in (person, longer)]
     assert hip_to_knee[1] - hip_to_knee[0] == pytest.approx(0.02, abs=1e-9)
+
+
+def test_a_clavicle_is_as_long_as_its_joints_are_apart():
+    """Its shoulder lies anywhere: it moves along three axes, and no table is scaled."""
+    person = tilted_person(girdle=True)
+    parameters = tuple(_parameters(person, OPTIONS))
+    clavicle, arm = (person.skeleton.index(name) for name in ("clavicle_l", "upper_arm_l"))
+    assert not [p for p in parameters if p.kind == "length" and p.index == clavicle]
+    x = np.array([0.02 * (p.kind == "joint" and p.index == arm) for p in parameters])
+    moved = _with(person, parameters, x)
+    np.testing.assert_allclose(moved.joint_in_parent_m[arm], person.joint_in_parent_m[arm] + 0.02)
+    length = np.linalg.norm(moved.joint_in_parent_m[arm])
+    assert moved.lengths_m[clavicle] == pytest.approx(length)

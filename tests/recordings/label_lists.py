@@ -6,7 +6,7 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-from bsip_cli.body.markersets import LANDMARKS
+from bsip_cli.body.landmarks import LANDMARKS
 from bsip_cli.body.names import SEGMENTS
 
 _FILE = Path(__file__).with_name("label_lists.toml")

@@ -398,8 +398,8 @@ def choice() -> pd.DataFrame:
     known |= {"trials": 2, "data": "whole_trials"}
     return pd.DataFrame(
         [
-            {"movement": "all", "use": OM, "reason": "it errs less", **known},
-            {"movement": "basketball", "use": RM, "reason": f"mind {EVIL}", **known},
+            {"movement": "all", "use": OM, "sentence": "Use OM: it errs less.", **known},
+            {"movement": "basketball", "use": RM, "sentence": f"mind {EVIL}", **known},
         ]
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,14 +10,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bsip_cli.report.choice import headline
+from bsip_cli.diagnosis.support import Support
 from bsip_cli.stages import choose
-from bsip_cli.statistics.choice import COMPONENTS
+from bsip_cli.statistics.choice import COMPONENTS, Difference
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 from bsip_cli.study.study import Trial
 
 SIGNALS = choose._SIGNALS
 ERRORS = {RM: 1.0, RM_MASS: 0.9, OM: 0.5}
+RAIL = asdict(
+    Support(
+        ("hand_l",), 0.001, 0.02, 0.0, 9.0, (0.0, 5.0, 40.0), (1.0, 1.0, 1.0), (60.0, 50.0, 70.0)
+    )
+)
 SEEN, UNSEEN = "sequence", "walking"
 
 
@@ -61,7 +67,7 @@ def chosen(trials: dict[str, dict], *, rare=False, contacts=(), identified=True)
         read=read,
         warn=lambda text: None,
         trials=lambda *kinds: tuple(made.values()),
-        facts=lambda kind: {"external_contacts": dict.fromkeys(contacts, "a hand holds on")},
+        facts=lambda kind: {"external_contacts": dict.fromkeys(contacts, RAIL)},
         write=lambda kind, frame: written.append(frame),
     )
     choose.run(unit)
@@ -86,7 +92,35 @@ def test_where_om_fails_another_is_said():
     good, bad = {"steps_1": ERRORS, "steps_2": worse(0.52)}, {"run_1": worse(1.5)}
     table = chosen(good | bad | {"run_2": worse(1.6)})
     assert dict(table["use"]) == {"all": RM_MASS, "steps": OM, "run": RM_MASS}
-    assert headline(table) == "use RM+mass (in steps: OM)"
+    assert table.loc["all", "sentence"].startswith(
+        "Use RM+mass (for steps: OM): in 4 trials that OM"
+    )
+    assert table.loc["run", "sentence"].startswith("Use RM+mass for run: in 2 trials that OM")
+
+
+def test_the_sentence_says_newtons_and_what_decides():
+    """Each of the three force components errs by 1, 0.9 and 0.5 N."""
+    large = {method: 10 * error for method, error in ERRORS.items()}
+    two = chosen({"squats_1": large, "squats_2": worse(0.55) | {RM: 10, RM_MASS: 9, OM: 5.5}})
+    assert two.loc["squats", "sentence"] == (
+        "Use OM for squats: in 2 trials that OM had not seen the ground force errs by 9 N with the "
+        "identified parameters (OM), by 16 N with the table's scaled to the measured weight "
+        "(RM+mass), by 17 N with the table's own (RM). Over forces, moments and centre of pressure "
+        "together OM errs 43 to 52 % less than RM and 36 to 47 % less than RM+mass."
+    )
+
+
+@pytest.mark.parametrize(
+    ("log", "error", "words"),
+    [
+        (np.log(0.8), 0.05, "16 to 24 % less than RM"),
+        (np.log(1.2), 0.05, "14 to 26 % more than RM"),
+        (0.0, 0.05, "between 5 % less and 5 % more than RM"),
+        (np.log(0.8), np.nan, "20 % less than RM (too few independent samples for an interval)"),
+    ],
+)
+def test_a_comparison_in_words(log, error, words):
+    assert choose._compared(RM, Difference(log, error)) == words
 
 
 def test_the_trials_that_identified_do_not_judge():
@@ -97,14 +131,14 @@ def test_the_trials_that_identified_do_not_judge():
 def test_held_out_seconds_count_only_where_there_is_no_other_trial_and_it_is_said():
     alone = chosen({SEEN: ERRORS}, rare=None)
     assert list(alone["data"]) == ["held_out", "held_out"] and set(alone["use"]) == {OM}
-    assert "only on held-out seconds" in alone.loc["all", "reason"]
+    assert "in seconds held out of the trials that identified" in alone.loc["all", "sentence"]
     assert list(chosen({SEEN: ERRORS, UNSEEN: ERRORS}, rare=None).index) == ["all", UNSEEN]
 
 
 def test_a_marked_body_is_never_used_and_it_is_said():
     table = chosen({UNSEEN: ERRORS, "squat": ERRORS}, rare=True)
     assert OM not in set(table["use"])
-    assert "rarer than 1 in 100" in table.loc["all", "reason"]
+    assert "fewer than 1 in 100 people" in table.loc["all", "sentence"]
 
 
 def test_a_hand_on_a_rail_judges_nobody():
@@ -114,4 +148,4 @@ def test_a_hand_on_a_rail_judges_nobody():
 
 def test_without_identification_the_table_stands():
     table = chosen({UNSEEN: {RM: 1.0}}, identified=False)
-    assert list(table["use"]) == [RM] and "nothing was identified" in table["reason"].iloc[0]
+    assert list(table["use"]) == [RM] and "nothing was identified" in table["sentence"].iloc[0]

@@ -85,7 +85,7 @@ def test_numbers_are_those_of_the_artifacts(reports, text):
 
 def test_the_summary_begins_with_which_parameters_to_use(text):
     assert text.index("Which parameters to use") < text.index("Is anything wrong?")
-    assert "Use OM (in basketball: RM). It errs less." in text
+    assert "Use OM: it errs less." in text
     assert "0.60 (0.54 to 0.66)" in text  # one standard error of the logarithm to either side
 
 

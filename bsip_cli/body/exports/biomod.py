@@ -33,7 +33,7 @@ def biomod_text(body: IdentifiedPerson) -> str:
     lines = ["version 4", *(f"// {line}" for line in (*body.made_of, *_NOTES)), ""]
     lines += [f"gravity {numbers([0.0, 0.0, -GRAVITY_M_S2])}", ""]
     lines += ["segment base", "    translations xyz", "    mass 0", "endsegment", ""]
-    for i in range(len(body.inertias)):
+    for i in range(len(body.person.skeleton.segments)):
         lines += [*_segment_lines(body, i), ""]
     lines += _marker_lines(body)
     return "\n".join(lines)

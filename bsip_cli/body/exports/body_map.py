@@ -78,17 +78,17 @@ def fitting_map(bodies: Iterable[str]) -> BodyMap | None:
 
 
 def check_segments(body_map: BodyMap, skeleton: Skeleton) -> None:
-    """Every segment of the skeleton goes into exactly one group.
+    """Every segment of the skeleton that has mass goes into exactly one group.
 
     Raises
     ------
     UsageError
-        A segment is missing, stands twice, or is not one of the skeleton.
+        A segment is missing, stands twice, or is not one with mass of the skeleton.
     """
     named = [segment for group in body_map.groups for segment in group.segments]
     jointed = {segment for group in body_map.groups for segment, _ in group.joints}
-    unknown = sorted({*named, *jointed} - set(skeleton.segments))
-    lost = [segment for segment in skeleton.segments if segment not in named]
+    unknown = sorted({*named, *jointed} - set(skeleton.body_names))
+    lost = [segment for segment in skeleton.body_names if segment not in named]
     twice = sorted({segment for segment in named if named.count(segment) > 1})
     faults = (("unknown", unknown), ("left out", lost), ("more than once", twice))
     said = [f"{fault}: {', '.join(found)}" for fault, found in faults if found]

@@ -23,7 +23,7 @@ class IdentifiedPerson:
 
     Attributes
     ----------
-    inertias : per segment of the skeleton, in its segment frame.
+    inertias : per segment with mass, in its segment frame.
     made_of : lines that say what the numbers come from; they stand in every file.
     """
 
@@ -42,8 +42,11 @@ class IdentifiedPerson:
         return sum(inertia.mass_kg for inertia in self.inertias)
 
     def in_joint(self, i: int) -> Inertia:
-        """Inertia of segment ``i`` seen from its joint centre, segment axes."""
-        return self.inertias[i].moved(-self.person.origin_in_joint_m[i])
+        """Inertia of segment ``i`` seen from its joint centre, segment axes; zeros without mass."""
+        bodies = self.person.skeleton.bodies
+        if i not in bodies:
+            return Inertia(0.0, np.zeros(3), np.zeros((3, 3)))
+        return self.inertias[bodies.index(i)].moved(-self.person.origin_in_joint_m[i])
 
     def check_bodies(self) -> None:
         """Simulators take real bodies only.
@@ -53,8 +56,7 @@ class IdentifiedPerson:
         BadDataError
             A segment has an inertia that no body can have.
         """
-        names = self.person.skeleton.segments
-        bodies = zip(names, self.inertias, strict=True)
+        bodies = zip(self.person.skeleton.body_names, self.inertias, strict=True)
         impossible = [name for name, inertia in bodies if not inertia.is_physical()]
         if impossible:
             raise BadDataError(
@@ -68,7 +70,9 @@ class IdentifiedPerson:
     def repaired(self) -> IdentifiedPerson:
         """With the nearest tensors that bodies can have; ``made_of`` says which were changed."""
         inertias, said = list(self.inertias), []
-        for i, (name, old) in enumerate(zip(self.person.skeleton.segments, inertias, strict=True)):
+        for i, (name, old) in enumerate(
+            zip(self.person.skeleton.body_names, inertias, strict=True)
+        ):
             if old.is_physical() or old.mass_kg <= 0:  # a mass is not mended
                 continue
             tensor = nearest_physical_tensor(old.tensor_kgm2)

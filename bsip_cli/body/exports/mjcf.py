@@ -13,13 +13,16 @@ from bsip_cli.body.exports.identified import (
     xml_comment,
 )
 from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.body.inertia import Inertia
 
 _MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # the order of fullinertia
 _NOTES = (
     "SI units, Z up. Body frames: origin at the joint to the parent, axes of the segment (X",
     "anterior, Y up, Z right); at qpos0 the person stands upright, facing along X. Sites are the",
-    "markers. There are no geoms, no limits and no actuators.",
+    "markers. There are no geoms, no limits and no actuators. MuJoCo moves no body without mass:",
+    "massless rods (clavicles), where the skeleton has them, weigh a milligram.",
 )
+_ROD = Inertia(1e-6, np.zeros(3), 1e-9 * np.eye(3))
 
 
 def mjcf_text(body: IdentifiedPerson) -> str:
@@ -63,7 +66,7 @@ def _add_body(above: ET.Element, body: IdentifiedPerson, i: int) -> ET.Element:
     else:
         axis = numbers(person.hinge_axes()[i])
         ET.SubElement(element, "joint", name=name, type="hinge", axis=axis)
-    inertia = body.in_joint(i)
+    inertia = body.in_joint(i) if i in skeleton.bodies else _ROD
     ET.SubElement(
         element,
         "inertial",

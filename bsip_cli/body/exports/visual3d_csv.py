@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from bsip_cli.body.exports.identified import IdentifiedPerson
+from bsip_cli.body.inertia import Inertia
 
 # Visual3D's default names of segments; what it lacks stays empty.
 VISUAL3D_SEGMENTS = {
@@ -45,21 +46,22 @@ _NOTES = (
 
 
 def visual3d_csv_text(body: IdentifiedPerson) -> str:
-    """One row per segment; lines that begin with ``#`` say what made it and which axes it has."""
+    """One row per segment with mass; lines that begin with ``#`` say what made it, and its axes."""
     text = io.StringIO()
     for line in (*body.made_of, *_NOTES):
         text.write(f"# {line}\n")
-    rows = [_row(body, i) for i in range(len(body.inertias))]
+    rows = [
+        _row(body, *one) for one in zip(body.person.skeleton.bodies, body.inertias, strict=True)
+    ]
     table = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     table.writeheader()
     table.writerows(rows)
     return text.getvalue()
 
 
-def _row(body: IdentifiedPerson, i: int) -> dict[str, Any]:
-    """Column to value of one segment."""
-    skeleton = body.person.skeleton
-    inertia, length = body.inertias[i], body.person.lengths_m[i]
+def _row(body: IdentifiedPerson, i: int, inertia: Inertia) -> dict[str, Any]:
+    """Column to value of segment ``i``."""
+    skeleton, length = body.person.skeleton, body.person.lengths_m[i]
     lies = skeleton.table_rows[i] == "foot"
     turn = _LYING if lies else _UPRIGHT
     cg, moments = turn @ inertia.com_m, turn @ inertia.tensor_kgm2 @ turn.T

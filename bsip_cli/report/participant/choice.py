@@ -5,9 +5,8 @@ from __future__ import annotations
 import pandas as pd
 
 from bsip_cli.report.blocks import Block, Grid, Heading, Paragraph
-from bsip_cli.report.choice import headline
 from bsip_cli.report.records import ParticipantRecord
-from bsip_cli.report.words import MISSING, capital, number
+from bsip_cli.report.words import MISSING, number
 from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import OM, RM
 
@@ -21,10 +20,7 @@ def blocks(record: ParticipantRecord) -> list[Block]:
     first = record.choice.iloc[0]
     said: list[Block] = [
         Heading("Which parameters to use"),
-        Paragraph(
-            f"{capital(headline(record.choice))}. {capital(str(first['reason']))}.",
-            "warning" if first["use"] == RM else "good",
-        ),
+        Paragraph(str(first["sentence"]), "warning" if first["use"] == RM else "good"),
     ]
     rare = record.identification[record.identification["rare"].astype(bool)]
     said += [

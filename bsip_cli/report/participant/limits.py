@@ -12,8 +12,9 @@ CANNOT_KNOW = (
     "plus a rule that splits it: nearness to the table. Read every mass with its data share.",
     "The frames of a recording are not independent of each other. Standard deviations and counts "
     "of independent samples allow for it; the number of frames would promise far too much.",
-    "The model has rigid segments and ideal joints. Soft tissue, breathing, a moving shoulder "
-    "girdle or a spine that bends in several places end up in the parameters or in the residual.",
+    "The model has rigid segments and ideal joints. Soft tissue, breathing, a spine that bends in "
+    "several places and, in a skeleton without clavicles, a moving shoulder girdle end up in the "
+    "parameters or in the residual.",
     "An error that is the same in all trials (a heavier plate reading, something carried) can hide "
     "in the identified parameters without making the forces follow worse.",
     "Where the ground force is small the centre of pressure is a quotient of small numbers; it is "

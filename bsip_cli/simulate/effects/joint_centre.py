@@ -17,7 +17,7 @@ JOINTS = tuple(
 LANDMARKS = {
     "knee": ("KNEL", "KNEM"),
     "ankle": ("MALL", "MALM"),
-    "elbow": ("ELB",),
+    "elbow": ("ELB", "ELBM"),
 }
 
 
@@ -51,11 +51,9 @@ class JointCentre(Effect):
             joints = {**person.joints_m, self.joint: person.joints_m[self.joint] + self.shift_m}
             return replace(person, joints_m=joints)
         markers = dict(person.markers)
-        for name in LANDMARKS[kind]:
-            marker = markers[side.upper() + name]
-            markers[side.upper() + name] = replace(
-                marker, position_m=marker.position_m - self.shift_m
-            )
+        for label in {side.upper() + name for name in LANDMARKS[kind]} & set(markers):
+            marker = markers[label]
+            markers[label] = replace(marker, position_m=marker.position_m - self.shift_m)
         return replace(person, markers=markers)
 
     def place(self) -> str:

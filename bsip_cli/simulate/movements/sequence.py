@@ -33,7 +33,11 @@ def sequence(person: Person, rng: np.random.Generator, duration_s: float, _ball:
     sketch = sketch_for(person, duration_s)
     cycles = max(1, round(duration_s / CYCLE_S))
     _fill(sketch, rng, LOWER_TRACK, cycles, duration_s)
-    _fill(sketch, rng, UPPER_TRACK, cycles, duration_s)
+    upper = UPPER_TRACK
+    if "sternoclavicular_r" in person.joints_m:
+        sketch.angles |= {f"girdle_{side}": np.zeros((len(sketch.t_s), 2)) for side in SIDES}
+        upper = (*UPPER_TRACK, (_shrugs, 3.2))
+    _fill(sketch, rng, upper, cycles, duration_s)
     calm = window(sketch.t_s, 0.0, duration_s, 0.8)
     for angle in sketch.angles.values():
         for column in np.atleast_2d(angle.T):
@@ -204,6 +208,15 @@ def _head(sketch: Sketch, rng: np.random.Generator, start: float, end: float) ->
     for axis in range(3):
         wave = _wave(sketch, rng, start, end, (0.5, 1.3))
         sketch.angles["neck"][:, axis] += size[axis] * wave
+
+
+def _shrugs(sketch: Sketch, rng: np.random.Generator, start: float, end: float) -> None:
+    """Raise the shoulders, and bring them forward and back."""
+    for side in SIDES:
+        size = np.deg2rad(rng.uniform([10, 10], [20, 20]))
+        for axis in range(2):
+            wave = _wave(sketch, rng, start, end, (0.5, 1.4))
+            sketch.angles[f"girdle_{side}"][:, axis] += size[axis] * wave
 
 
 def _free(sketch: Sketch, rng: np.random.Generator, start: float, end: float) -> None:

@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from bsip_cli.recordings.frame_change import FrameChange
 from bsip_cli.recordings.handedness import handedness
 from bsip_cli.recordings.model import Finding, Plate, Recording
+from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.plates import LOADED_N
-from bsip_cli.recordings.settle import Opened, Scene, SessionReading, Verdict
+from bsip_cli.recordings.settle import SessionReading, Verdict
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
 from bsip_cli.recordings.weight_shift import sign_doubts
 
@@ -27,7 +29,7 @@ _WITHOUT_PLACE = (
 
 def assemble(opened: Opened, session: SessionReading) -> Recording:
     """The recording with its plates, understood as all trials of the session say."""
-    opened = session.scene.of(opened)
+    opened = session.frame.of(opened)
     recording = opened.recording
     findings = [*findings_about(session), *_about_sides(recording)]
     if recording.forces_note:
@@ -66,20 +68,20 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
 def findings_about(session: SessionReading) -> list[Finding]:
     """What was decided for all trials of a session alike."""
     plates = (_about_plate(name, verdict) for name, verdict in session.plates.items())
-    return [*_about_scene(session.scene), *(finding for found in plates for finding in found)]
+    return [*_about_frame(session.frame), *(finding for found in plates for finding in found)]
 
 
-def _about_scene(scene: Scene) -> list[Finding]:
-    if not scene.moved:
+def _about_frame(frame: FrameChange) -> list[Finding]:
+    if not frame.moved:
         return []
-    if scene.moved == "forces":
+    if frame.moved == "forces":
         check, expected = "frame", "markers and forces in one frame"
         found = "the forces lie under the feet and go with the motion in another frame only"
-        action = f"{scene.words()}, in all trials"
+        action = f"{frame.words()}, in all trials"
     else:
         check, expected = "mirrored", "a right-handed frame"
         found = "left and right are exchanged all over the body: a left-handed laboratory frame"
-        action = f"{scene.words()}, in all trials; if instead left and right labels are exchanged, "
+        action = f"{frame.words()}, in all trials; if instead left and right labels are exchanged, "
         action += "rename them"
     return [Finding(check, "", found, expected, action, "corrected")]
 

@@ -8,7 +8,8 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.assemble import findings_about
 from bsip_cli.recordings.person_size import no_person
 from bsip_cli.recordings.read import open_recording
-from bsip_cli.recordings.settle import Survey, settle_session
+from bsip_cli.recordings.settle import settle_session
+from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
 from bsip_cli.stages.session_reading import rows_of
@@ -36,7 +37,7 @@ def run(unit: Unit) -> None:
     unit.write("readings", pd.DataFrame(rows, columns=column_names("readings")))
 
 
-def _require_size(unit: Unit, seen: list[Survey]) -> None:
+def _require_size(unit: Unit, seen: list[TrialSamples]) -> None:
     """The markers are those of somebody as tall as stated, or as people are."""
     assert unit.participant is not None
     heights = [one.height_m for one in seen if one.height_m is not None]
@@ -45,10 +46,10 @@ def _require_size(unit: Unit, seen: list[Survey]) -> None:
         raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
 
 
-def _survey(unit: Unit, trial: Trial) -> Survey | None:
+def _survey(unit: Unit, trial: Trial) -> TrialSamples | None:
     """None where the recording cannot be read: its own turn will say why."""
     try:
         opened = open_recording(trial.path)
     except BadDataError:
         return None
-    return Survey.of(opened.with_plates(unit.config.ingest.plates))
+    return TrialSamples.of(opened.with_plates(unit.config.ingest.plates))

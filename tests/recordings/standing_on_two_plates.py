@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.plate_source import C3dPlate, ForceOnPoint, PlateSource, points_that_move
 from bsip_cli.recordings.plates import LocalWrench, PlateDescription
-from bsip_cli.recordings.settle import Opened
 
 N, RATE_HZ = 400, 100.0
 LABELS = ["RASI", "LASI", "RPSI", "LPSI", "RHEE", "RTOE", "RANK", "LHEE", "LTOE", "LANK"]

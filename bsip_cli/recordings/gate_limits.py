@@ -1,0 +1,29 @@
+"""What decides how a session's numbers are understood; options of `ingest`, with their reasons."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_T3_MEDIAN = 0.7649  # of the size of Student's t with three degrees of freedom
+
+
+@dataclass(frozen=True)
+class GateLimits:
+    """The defaults are those of configs/default.toml."""
+
+    believed_percent: float = 90.0
+    corrected_percent: float = 95.0
+    balance_median_m: float = 0.015
+    complete_share: float = 0.15
+    marker_noise_m: float = 0.001
+    independent_numbers: float = 12.0
+
+    def balance_scale_m(self) -> float:
+        """Where a density (1 + (gap / scale)^2)^-2, Student's with three degrees of freedom, has
+        the median of sound recordings."""
+        return float(np.sqrt(3.0) / _T3_MEDIAN) * self.balance_median_m
+
+
+USUAL = GateLimits()

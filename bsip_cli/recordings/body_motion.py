@@ -129,7 +129,7 @@ class Balance:
             return cls()
         mass = wrench[known, 2] / needed[known]
         whole = np.percentile(mass, 90)
-        known[known] = np.abs(mass / whole - 1.0) < limits.complete_share
+        known[known] = np.abs(mass / whole - 1.0) < limits.complete_percent / 100
         member = body.trial[known] == np.arange(body.trial.max() + 1)[:, None]
         seconds = member @ body.lasts_s[known]
         member = member[seconds >= _INDEPENDENT_S].astype(float)

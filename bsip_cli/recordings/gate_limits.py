@@ -1,4 +1,4 @@
-"""What decides how a session's numbers are understood; options of `ingest`, with their reasons."""
+"""What decides how a session's numbers are understood."""
 
 from __future__ import annotations
 
@@ -11,18 +11,17 @@ _T3_MEDIAN = 0.7649  # of the size of Student's t with three degrees of freedom
 
 @dataclass(frozen=True)
 class GateLimits:
-    """The defaults are those of configs/default.toml."""
+    """Options of `ingest`; their reasons are in configs/default.toml, whose values these are."""
 
     believed_percent: float = 90.0
     corrected_percent: float = 95.0
-    balance_median_m: float = 0.015
-    complete_share: float = 0.15
+    balance_median_m: float = 0.024
+    complete_percent: float = 15.0
     marker_noise_m: float = 0.001
     independent_numbers: float = 12.0
 
     def balance_scale_m(self) -> float:
-        """Where a density (1 + (gap / scale)^2)^-2, Student's with three degrees of freedom, has
-        the median of sound recordings."""
+        """Where the density (1 + (gap / scale)^2)^-2, Student's, begins to fall."""
         return float(np.sqrt(3.0) / _T3_MEDIAN) * self.balance_median_m
 
 

@@ -325,10 +325,8 @@ def _with_outline(fit: PlateFit) -> PlateReading:
         for one, plate in zip(fit.trials, plates, strict=True)
         if plate.corners_m is not None
     ]
-    if not offsets:
-        return fit.reading
-    along, half = np.concatenate([each for each, _ in offsets]), offsets[0][1]
-    if not (along > half).any(axis=1).mean() > _MOSTLY_OUTSIDE:
+    along = np.concatenate([each for each, _ in offsets] or [np.zeros((0, 2))])
+    if not len(along) or (along > (half := offsets[0][1])).any(axis=1).mean() < _MOSTLY_OUTSIDE:
         return fit.reading
     x, y = np.maximum(np.nanpercentile(along, 99, axis=0) + _RIM_M, half).tolist()
     return replace(fit.reading, half_size_m=(x, y))

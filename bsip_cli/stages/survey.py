@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import pandas as pd
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.assemble import findings_about
+from bsip_cli.recordings.gate_limits import GateLimits
 from bsip_cli.recordings.person_size import no_person
 from bsip_cli.recordings.read import open_recording
 from bsip_cli.recordings.settle import settle_session
@@ -20,6 +23,8 @@ def run(unit: Unit) -> None:
     """Look at every recording of the participant; write readings, decided for each session."""
     assert unit.participant is not None
     rows: list[dict] = []
+    options = unit.config.ingest
+    limits = GateLimits(**{one.name: getattr(options, one.name) for one in fields(GateLimits)})
     for session in dict.fromkeys(trial.session for trial in unit.participant.trials):
         seen = [
             survey
@@ -29,7 +34,7 @@ def run(unit: Unit) -> None:
         if not seen:
             continue
         _require_size(unit, seen)
-        reading = settle_session(seen)
+        reading = settle_session(seen, limits)
         rows += rows_of(session or "", reading)
         whose = f"{unit.name}, session {session}" if session else unit.name
         for finding in findings_about(reading):

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
+from bsip_cli.config import load_config
 from bsip_cli.recordings.assemble import assemble, findings_about
 from bsip_cli.recordings.frame_change import FrameChange
+from bsip_cli.recordings.gate_limits import USUAL
 from bsip_cli.recordings.handedness import handedness
 from bsip_cli.recordings.plate_reading import PlateReading
 from bsip_cli.recordings.settle import settle_session
@@ -190,6 +192,11 @@ def test_left_and_right_of_one_part_are_said():
     assert session.frame == FrameChange()
     (said,) = [f for f in assemble(trial, session).findings if f.check == "labels"]
     assert said.subject == "pelvis" and said.level == "warning"
+
+
+def test_the_limits_are_those_of_the_options():
+    options = load_config([]).ingest
+    assert asdict(USUAL) == {name: getattr(options, name) for name in asdict(USUAL)}
 
 
 def test_distance_from_the_feet():

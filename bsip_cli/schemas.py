@@ -184,7 +184,7 @@ SCHEMAS = {
                 _text("session", "of the recordings; empty without sessions"),
                 _text("moved", "what is in other axes: all, markers, forces or nothing (empty)"),
                 Column("axis", "int", "", "of the world that was mirrored: 0 for X, 1 for Y"),
-                Column("turned_deg", "float", "deg", "by which it was turned instead"),
+                *_floats("turned_deg turned_sd_deg", "deg", "by which it was turned instead"),
                 Column("corners_only", "bool", "", "of C3D: channels were not mirrored with them"),
                 _text("plate", "its name; empty if no plate was loaded"),
                 Column("moment_scale", "float", "1", "what the moments are multiplied with"),

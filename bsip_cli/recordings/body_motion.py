@@ -30,6 +30,7 @@ _EDGE_S = 4.0 * SMOOTH_S  # how far the bell reaches: nearer to an end, it avera
 _MOST_OF_IT = 0.5  # of the body's mass
 _OFTEN = 0.9  # of the frames
 _FEWEST_FRAMES = 10
+_ROUNDS = 5  # of weights that follow the residuals
 _FALLS = 0.2  # of gravity: less is flight
 _CLOSEST = 0.97  # correlation: the highest of moments in sound recordings, see above
 _KINDS = {"force": [0, 1], "level": [3, 4], "vertical": [5]}  # columns of a wrench
@@ -117,46 +118,22 @@ class Balance:
 
     @classmethod
     def of(cls, body: Body, wrench: np.ndarray, limits: GateLimits) -> Balance:
-        """Of total wrenches (n, 6) about the world's origin, smoothed as the body is.
-
-        The person is the same in all trials: contacts are complete where the force is the weight
-        that the motion needs, and the weight is what they nearly reach at most.
-        """
-        needed = GRAVITY_M_S2 + body.rate[:, 2]
-        known = np.isfinite(needed) & np.isfinite(wrench).all(axis=1) & (wrench[:, 2] > 0)
-        known &= needed > _FALLS * GRAVITY_M_S2
-        if not known.any():
+        """Of total wrenches (n, 6) about the world's origin, smoothed as the body is."""
+        if (some := _Complete.of(body, wrench, limits)) is None:
             return cls()
-        mass = wrench[known, 2] / needed[known]
-        whole = np.percentile(mass, 90)
-        known[known] = np.abs(mass / whole - 1.0) < limits.complete_percent / 100
-        member = body.trial[known] == np.arange(body.trial.max() + 1)[:, None]
-        seconds = member @ body.lasts_s[known]
-        member = member[seconds >= _INDEPENDENT_S].astype(float)
-        if not len(member):
-            return cls()
-        force, motion = wrench[known] / whole, body.rate[known]
-        force[:, 3:] -= _cross(body.place_m[known], force[:, :3])
+        force, motion = some.wrench.copy(), some.rate
+        force[:, 3:] -= _cross(some.place_m, force[:, :3])
         lean2 = ((force[:, 3:5] - motion[:, 3:5]) ** 2).sum(axis=1)
-        count = member.sum(axis=1)
-        noise = limits.marker_noise_m**2 * (member @ body.noise[known]).sum(axis=0)
-
-        def about_means(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-            means = (member @ a) * (member @ b) / count[:, None]
-            return np.asarray((member @ (a * b) - means).sum(axis=0))
-
-        together = about_means(force, motion)
-        force2, motion2 = about_means(force, force) + noise, about_means(motion, motion) + noise
+        together = some.about_means(force, motion)
+        force2 = some.about_means(force, force) + some.noise
+        motion2 = some.about_means(motion, motion) + some.noise
         return cls(
-            tuple(np.sqrt(member @ lean2 / count) / GRAVITY_M_S2),
+            tuple(np.sqrt(some.member @ lean2 / some.member.sum(axis=1)) / GRAVITY_M_S2),
             {
                 kind: float(together[k].sum() / np.sqrt(force2[k].sum() * motion2[k].sum()))
                 for kind, k in _KINDS.items()
             },
-            min(
-                limits.independent_numbers,
-                seconds[seconds >= _INDEPENDENT_S].sum() / _INDEPENDENT_S,
-            ),
+            min(limits.independent_numbers, some.numbers),
         )
 
     def log_likelihood(self, limits: GateLimits) -> float:
@@ -171,6 +148,81 @@ class Balance:
             return 0.0
         close = np.clip(list(self.correlations.values()), -_CLOSEST, _CLOSEST)
         return float(-0.5 * self.numbers * np.sum(np.sign(close) * np.log(1.0 - close**2)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Complete:
+    """The samples in which the plates have every contact; all of them over the person's mass.
+
+    wrench, rate, place_m : of the plates and of the body (n, 6), (n, 3). member : of which trial
+    (trials, n), 0 or 1. noise : of all samples together, (6,). numbers : independent ones.
+    """
+
+    wrench: np.ndarray
+    rate: np.ndarray
+    place_m: np.ndarray
+    member: np.ndarray
+    noise: np.ndarray
+    numbers: float
+
+    @classmethod
+    def of(cls, body: Body, wrench: np.ndarray, limits: GateLimits) -> _Complete | None:
+        """The person is the same in all trials: contacts are complete where the force is the weight
+        that the motion needs, and the weight is what they nearly reach at most."""
+        needed = GRAVITY_M_S2 + body.rate[:, 2]
+        known = np.isfinite(needed) & np.isfinite(wrench).all(axis=1) & (wrench[:, 2] > 0)
+        known &= needed > _FALLS * GRAVITY_M_S2
+        if not known.any():
+            return None
+        mass = wrench[known, 2] / needed[known]
+        whole = np.percentile(mass, 90)
+        known[known] = np.abs(mass / whole - 1.0) < limits.complete_percent / 100
+        member = (body.trial[known] == np.arange(body.trial.max() + 1)[:, None]).astype(float)
+        seconds = member @ body.lasts_s[known]
+        member = member[seconds >= _INDEPENDENT_S]
+        if not len(member):
+            return None
+        return cls(
+            wrench[known] / whole,
+            body.rate[known],
+            body.place_m[known],
+            member,
+            limits.marker_noise_m**2 * (member @ body.noise[known]).sum(axis=0),
+            float(seconds[seconds >= _INDEPENDENT_S].sum() / _INDEPENDENT_S),
+        )
+
+    def about_means(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Sums of products (n, k) about the means of each trial, (k,)."""
+        means = (self.member @ a) * (self.member @ b) / self.member.sum(axis=1)[:, None]
+        return np.asarray((self.member @ (a * b) - means).sum(axis=0))
+
+
+def turn_of_forces(
+    body: Body, wrench: np.ndarray, limits: GateLimits
+) -> tuple[float, float] | None:
+    """The turn of the wrenches about the vertical through the origin that suits the body best, and
+    its standard deviation [rad]; None if nothing is known.
+
+    Least squares of horizontal force and of horizontal moment about the origin, each over its own
+    residual. Where the centre of mass is thought to be is off by as much all through a trial, so
+    that a trial is one independent number.
+    """
+    if (some := _Complete.of(body, wrench, limits)) is None:
+        return None
+    force = some.rate[:, :3] + [0.0, 0.0, GRAVITY_M_S2]
+    moment = some.rate[:, 3:] + _cross(some.place_m, force)
+    pairs = [
+        (one[:, 0] + 1j * one[:, 1], other[:, 0] + 1j * other[:, 1])
+        for one, other in ((some.wrench[:, :3], force), (some.wrench[:, 3:], moment))
+    ]
+    weights, turn, total = [1.0, 1.0], 1.0 + 0j, 0j
+    for _ in range(_ROUNDS):
+        total = sum(
+            weight * (np.conj(a) * b).mean() for weight, (a, b) in zip(weights, pairs, strict=True)
+        )
+        turn = total / abs(total)
+        weights = [2.0 / np.mean(np.abs(turn * a - b) ** 2) for a, b in pairs]
+    return float(np.angle(turn)), float(1.0 / np.sqrt(abs(total) * len(some.member)))
 
 
 def _acceleration_of_noise(rate_hz: float) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.plate_reading import MIRRORED, TURNED
 
+_ODD = -2.3  # of ten frames that are turned one is so by no multiple of 90 degrees
 _IN_PART = -2.3  # markers or forces alone are mirrored more rarely than both: one in ten
 
 Moved = Literal["", "all", "markers", "forces"]
@@ -18,7 +19,8 @@ Moved = Literal["", "all", "markers", "forces"]
 @dataclass(frozen=True)
 class FrameChange:
     """What of a session is written in other axes than it should be, and how these are changed: a
-    horizontal ``axis`` reversed or, where ``turned_deg`` is not 0, a turn about the vertical.
+    horizontal ``axis`` reversed or, where ``turned_deg`` is not 0, a turn about the vertical, of
+    which the standard deviation is ``turned_sd_deg``.
 
     corners_only : of a C3D the channels were not mirrored with the plates' corners.
     """
@@ -26,6 +28,7 @@ class FrameChange:
     moved: Moved = ""
     axis: int = 0
     turned_deg: float = 0.0
+    turned_sd_deg: float = 0.0
     corners_only: bool = False
 
     @property
@@ -58,7 +61,8 @@ class FrameChange:
 
     def log_prior(self) -> float:
         if self.moved == "forces":
-            return TURNED if self.turned_deg else MIRRORED
+            turned = TURNED + _ODD * (self.turned_sd_deg > 0)
+            return turned if self.turned_deg else MIRRORED
         return _IN_PART if self.moved == "markers" else 0.0
 
     def words(self) -> str:
@@ -67,7 +71,10 @@ class FrameChange:
             return ""
         what = {"all": "markers and forces", "markers": "the markers", "forces": "the forces"}
         if self.turned_deg:
-            return f"turned {what[self.moved]} by {self.turned_deg:.3g} degrees about the vertical"
+            sd = f" +- {self.turned_sd_deg:.2g}" if self.turned_sd_deg else ""
+            return (
+                f"turned {what[self.moved]} by {self.turned_deg:.4g}{sd} degrees about the vertical"
+            )
         return f"reversed the {'XY'[self.axis]} axis of {what[self.moved]}"
 
 

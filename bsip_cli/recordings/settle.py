@@ -17,7 +17,7 @@ from itertools import combinations
 import numpy as np
 from scipy.special import logsumexp
 
-from bsip_cli.recordings.body_motion import Balance, Body
+from bsip_cli.recordings.body_motion import Balance, Body, turn_of_forces
 from bsip_cli.recordings.frame_change import FORCES_MOVED, MIRRORS, FrameChange
 from bsip_cli.recordings.gate_limits import USUAL, GateLimits
 from bsip_cli.recordings.handedness import Handedness
@@ -40,6 +40,7 @@ _ALIKE_M = 0.01  # readings whose centres of pressure differ by less are one,
 _ALIKE_SHARE = 0.03  # if their forces differ by less than this part of the load,
 _ALIKE_TORQUE_M = 0.003  # and their vertical moments by less than this times the load
 _RIM_M = 0.02
+_CLEARLY = 3.0  # standard deviations
 _MOSTLY_OUTSIDE = 0.8  # share of the load
 
 # Logarithms: how often something else is wrong; how each trial and plate looks then (a person: -1).
@@ -85,6 +86,8 @@ def settle_session(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -
     if not trials:
         return SessionReading(changes[0])
     hypotheses = [Hypothesis.as_stated(change, trials, limits) for change in changes]
+    if (turn := hypotheses[0].odd_turn()) is not None:
+        hypotheses.append(Hypothesis.as_stated(turn, trials, limits))
     chosen = _corrected(hypotheses)
     verdicts = {name: _verdict(hypotheses[0].fits[name], chosen, name) for name in chosen.of.fits}
     repeated = {name: Verdict(repeats=others) for name, others in repeats.items()}
@@ -112,13 +115,28 @@ class Hypothesis:
         body = Body.of_all([trial.body for trial in trials])
         return cls(change, trials, body, fits, limits)
 
+    def odd_turn(self) -> FrameChange | None:
+        """Of the forces against markers that are not mirrored, if it is surely no multiple of 90
+        degrees."""
+        found = turn_of_forces(self.body, self._total(), self.limits)
+        if self.frame.moved or found is None:
+            return None
+        angle, sd = np.rad2deg(found)
+        if abs((angle + 45.0) % 90.0 - 45.0) < _CLEARLY * sd:
+            return None
+        return FrameChange("forces", turned_deg=round(angle, 2), turned_sd_deg=round(sd, 2))
+
     @cached_property
     def balance(self) -> Balance:
+        return Balance.of(self.body, self._total(), self.limits)
+
+    def _total(self) -> np.ndarray:
+        """All plates' wrench at the samples of all trials, (n, 6)."""
         total = [np.zeros((len(trial.body.trial), 6)) for trial in self.trials]
         for fit in self.fits.values():
             for k, wrench in fit.smooth_wrenches().items():
                 total[k] += wrench
-        return Balance.of(self.body, np.concatenate(total), self.limits)
+        return np.concatenate(total)
 
     @cached_property
     def log_posterior(self) -> float:
@@ -287,7 +305,7 @@ def _surest(tried: Sequence[Hypothesis]) -> _Choice:
     like_now = {0, *(k for k in likely if now.is_alike(tried[k]))}
     if np.exp(logsumexp(logs[list(like_now)])) >= (corrected if now.frame.moved else believed):
         return _Choice(now)
-    some = [tried[k] for k in likely if logs[k] > np.log(1 - corrected)]
+    some = [now, *(tried[k] for k in likely if logs[k] > np.log(1 - corrected))]
     words = {name: dict.fromkeys(one.words(name, now) for one in some) for name in now.fits}
     rivals = {name: tuple(all_) for name, all_ in words.items() if set(all_) != {_AS_IT_IS}}
     in_torque = all(now.is_alike(one, torque=False) for one in some)

@@ -80,6 +80,11 @@ def reading_of(unit: Unit, trial: Trial) -> SessionReading:
     if not rows:
         return SessionReading()
     first = rows[0]
-    corners_only = bool(first["corners_only"])
-    frame = FrameChange(first["moved"], int(first["axis"]), first["turned_deg"], corners_only)
+    frame = FrameChange(
+        first["moved"],
+        int(first["axis"]),
+        first["turned_deg"],
+        first["turned_sd_deg"],
+        bool(first["corners_only"]),
+    )
     return SessionReading(frame, {row["plate"]: _verdict(row) for row in rows if row["plate"]})

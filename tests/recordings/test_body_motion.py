@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.recordings.body_motion import Balance, Body
+from bsip_cli.recordings.body_motion import Balance, Body, turn_of_forces
 from bsip_cli.recordings.gate_limits import USUAL
 
 RATE_HZ, N, MASS_KG = 100.0, 300, 70.0
@@ -84,3 +84,13 @@ def test_noise_is_that_of_markers_seen_to_a_millimetre():
     body = Body.of(noisy, RATE_HZ, np.arange(4000))
     expected = 1e-6 * body.noise[0]
     np.testing.assert_allclose(np.nanvar(body.rate, axis=0), expected, rtol=0.25)
+
+
+@pytest.mark.parametrize("turn_deg", [-125.0, 0.0, 31.0])
+def test_the_turn_of_forces_is_found(body, turn_deg):
+    c, s = np.cos(np.deg2rad(turn_deg)), np.sin(np.deg2rad(turn_deg))
+    back = np.kron(np.eye(2), [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    noise = np.random.default_rng(1).normal(0.0, 5.0, (N, 6))
+    angle, sd = turn_of_forces(body, _wrench(body) @ back.T + noise, USUAL)
+    assert np.rad2deg(sd) < 5.0
+    assert np.rad2deg(angle) == pytest.approx(turn_deg, abs=3 * np.rad2deg(sd))

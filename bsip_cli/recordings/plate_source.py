@@ -152,7 +152,7 @@ class C3dPlate:
     def alternatives(self) -> Iterable[PlateReading]:
         """Type 3 has no moments of its own, type 1 no point that they are about."""
         kind = self.description.kind
-        scales = (1.0,) if kind == 3 else (1.0, 1e-3, 1e3, -1.0)
+        scales = (1.0,) if kind == 3 else (1.0, 1e-3, 1e3, -1.0, -1e-3, -1e3)
         abouts: tuple[Reference, ...] = ("stated",)
         if kind in (2, 4) and self.description.origin_m[:2].any():
             abouts += ("reversed", "centred")
@@ -289,7 +289,7 @@ class ForceOnPoint:
         abouts: tuple[Reference, ...] = ("stated",)
         if self.points is not None and self.points_move:
             abouts += ("origin", "fixed")
-        for point, moment, about in product(points, (1.0, 1e-3, -1.0), abouts):
+        for point, moment, about in product(points, (1.0, 1e-3, -1.0, -1e-3), abouts):
             yield PlateReading(moment_scale=moment, point_scale=point, about=about)
         for channel in CHANNELS[:3]:
             yield PlateReading(reversed_channel=channel)

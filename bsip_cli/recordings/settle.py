@@ -37,7 +37,7 @@ from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence, outline
 _SURELY_NOBODY = 0.999  # probability from which on no reading is believed
 _LEAST_LIKELY = -12.0  # logarithm: less adds nothing
 _ALIKE_M = 0.01  # readings whose centres of pressure differ by less are one,
-_ALIKE_SHARE = 0.03  # if their forces differ by less than this part of the load,
+_ALIKE_SHARE = 0.01  # if their forces differ by less than this part of the load,
 _ALIKE_TORQUE_M = 0.003  # and their vertical moments by less than this times the load
 _RIM_M = 0.02
 _CLEARLY = 3.0  # standard deviations

@@ -110,8 +110,9 @@ def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
         findings.append(Finding("plate_moment", name, found, expected, action, "warning"))
     if words := reading.words():
         assert verdict.before is not None and verdict.after is not None
-        action = f"{words}: {_words(verdict.after)}"
-        findings.append(_about(name, _words(verdict.before), action, "corrected"))
+        before, after = _words(verdict.before), _words(verdict.after)
+        action = f"{words}: {after}" if after else f"{words}, as of the other plates"
+        findings.append(_about(name, before or "never loaded", action, "corrected"))
     if reading.half_size_m is not None:
         sides = " x ".join(f"{2 * half:.2f}" for half in reading.half_size_m)
         found = "its load lies beside its outline and under a foot"
@@ -181,9 +182,11 @@ def _about(name: str, found: str, action: str, level: str) -> Finding:
 
 
 def _words(evidence: Evidence) -> str:
-    """Where a reading puts the force."""
+    """Where a reading puts the force; empty if there is none."""
     if np.isfinite(evidence.distance_m):
         place = f"{evidence.distance_m:.2f} m beside the feet on the ground"
-    else:
+    elif np.isfinite(evidence.outside_m):
         place = f"{evidence.outside_m:.2f} m outside the plate"
+    else:
+        return ""
     return f"centre of pressure {place}, moving by {1e3 * evidence.sway_m:.3g} mm"

@@ -137,8 +137,11 @@ class Balance:
         )
 
     def log_likelihood(self, limits: GateLimits) -> float:
-        """How likely a person is so balanced and driven, logarithm."""
-        gaps = np.array(self.gaps_m) / limits.balance_scale_m()
+        """How likely a person is so balanced and driven, logarithm.
+
+        Gaps in the plane are as Student's t with two degrees of freedom, whose median is its scale.
+        """
+        gaps = np.array(self.gaps_m) / limits.balance_median_m
         return float(-2.0 * np.log1p(gaps**2).sum()) + self.drive_log_likelihood()
 
     def drive_log_likelihood(self) -> float:

@@ -51,13 +51,13 @@ class PlateTrial:
 class PlateFit:
     """A reading, with its sign and its fixed point, and how well it makes forces under feet.
 
-    For each trial that has the plate: from the parts to the wrench, ``matrices`` (n, 6, k), and
+    For each of n trials that have the plate: from the parts to the wrench, ``matrices`` (6, k), and
     what it shows, ``found`` (n, 7), with its logarithmic likelihood, of all trials together.
     """
 
     reading: PlateReading
     trials: Sequence[PlateTrial]
-    matrices: np.ndarray
+    matrices: Sequence[np.ndarray]
     found: np.ndarray
     log_likelihood: float
 
@@ -101,7 +101,7 @@ def plate_fits(
         PlateFit(
             replace(reading, sign=int(sign)),
             seen,
-            sign * np.array([every[k] for every in matrices]),
+            [sign * every[k] for every in matrices],
             np.array([rows[k] for rows in found]),
             float(likely[k]),
         )

@@ -199,6 +199,7 @@ SCHEMAS = {
                 *_floats("half_size_x_m half_size_y_m", "m", "half the widened outline", "plate"),
                 _text("refusal", "why the plate was left out"),
                 _text("rivals", "repairs that would each do, apart by |; not told apart"),
+                _text("doubted", "what of it is believed as the file says, though they would do"),
                 _text("repeats", "the plates whose copy or sum it is"),
                 *(
                     column

@@ -103,11 +103,14 @@ def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
             )
         return [_about(name, verdict.refusal, action, "excluded")]
     reading, findings = verdict.reading, []
-    if verdict.rivals:
-        found = f"its vertical moment: {' or '.join(verdict.rivals)}: these trials cannot tell"
-        action = "took it as it stands; a movement that turns the body would tell"
-        expected = "one that turns the body as the markers do"
-        findings.append(Finding("plate_moment", name, found, expected, action, "warning"))
+    if verdict.doubted:
+        is_moment = verdict.doubted == "vertical moment"
+        found = f"its {verdict.doubted}: {' or '.join(verdict.rivals)}: these trials cannot tell"
+        expected = "one that moves the body as the markers do"
+        action = "took it as it stands; a movement that "
+        action += f"{'turns the body' if is_moment else 'pushes the body more'} would tell"
+        check = "plate_moment" if is_moment else "plate_force"
+        findings.append(Finding(check, name, found, expected, action, "warning"))
     if words := reading.words():
         assert verdict.before is not None and verdict.after is not None
         before, after = _words(verdict.before), _words(verdict.after)

@@ -207,8 +207,8 @@ def turn_of_forces(
     its standard deviation [rad]; None if nothing is known.
 
     Least squares of horizontal force and of horizontal moment about the origin, each over its own
-    residual. Where the centre of mass is thought to be is off by as much all through a trial, so
-    that a trial is one independent number.
+    residual, the moment's that of usual gaps of the balance at least. Where the centre of mass is
+    thought to be is off by as much all through a trial: a trial is one independent number.
     """
     if (some := _Complete.of(body, wrench, limits)) is None:
         return None
@@ -218,13 +218,17 @@ def turn_of_forces(
         (one[:, 0] + 1j * one[:, 1], other[:, 0] + 1j * other[:, 1])
         for one, other in ((some.wrench[:, :3], force), (some.wrench[:, 3:], moment))
     ]
+    gap = limits.balance_median_m * GRAVITY_M_S2
     weights, turn, total = [1.0, 1.0], 1.0 + 0j, 0j
     for _ in range(_ROUNDS):
         total = sum(
             weight * (np.conj(a) * b).mean() for weight, (a, b) in zip(weights, pairs, strict=True)
         )
         turn = total / abs(total)
-        weights = [2.0 / np.mean(np.abs(turn * a - b) ** 2) for a, b in pairs]
+        residuals = [float(np.mean(np.abs(turn * a - b) ** 2)) for a, b in pairs]
+        weights = [
+            2.0 / max(one, least) for one, least in zip(residuals, (0.0, gap**2), strict=True)
+        ]
     return float(np.angle(turn)), float(1.0 / np.sqrt(abs(total) * len(some.member)))
 
 

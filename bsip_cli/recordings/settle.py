@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
+from typing import Literal
 
 import numpy as np
 from scipy.special import logsumexp
@@ -46,6 +47,9 @@ _MOSTLY_OUTSIDE = 0.8  # share of the load
 # Logarithms: how often something else is wrong; how each trial and plate looks then (a person: -1).
 _UNKNOWN, _UNKNOWN_EACH = -6.2, -1.5
 
+Doubted = Literal["", "vertical moment", "force and centre of pressure"]
+
+_ALL: Doubted = "force and centre of pressure"
 _AS_IT_IS = "taken as they stand"
 _UNTOLD = "its numbers are no force under a foot as they stand, and several corrections make one"
 _AGAINST = "its force is not one that carries and drives the body that the markers show"
@@ -57,8 +61,9 @@ class Verdict:
 
     ``before`` and ``after``: what its numbers make as the file says, and as they are understood,
     where that differs. ``rivals``: repairs that would each explain a plate, and that cannot be
-    told apart: it is left out, or, if only the vertical moment differs, doubted. ``repeats`` names
-    the plates whose copy or sum it is.
+    told apart: it is left out, or what is ``doubted`` is said: its vertical moment where only that
+    differs, its force where it is likeliest as the file says. ``repeats`` names the plates whose
+    copy or sum it is.
     """
 
     reading: PlateReading = field(default_factory=PlateReading)
@@ -66,6 +71,7 @@ class Verdict:
     after: Evidence | None = None
     refusal: str = ""
     rivals: tuple[str, ...] = ()
+    doubted: Doubted = ""
     repeats: tuple[str, ...] = ()
 
 
@@ -253,12 +259,12 @@ def _are_alike(one: PlateFit, other: PlateFit, with_torque: bool) -> bool:
 @dataclass(frozen=True, eq=False)
 class _Choice:
     """The hypothesis that is believed; and, where the trials cannot tell it from others, the
-    repairs of each plate that would do, in words, which may differ in the vertical moment only;
-    or none makes a person."""
+    repairs of each plate that would do, in words, and what of it is in doubt, if it is believed
+    all the same; or none makes a person."""
 
     of: Hypothesis
     rivals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    only_torque: bool = False
+    doubted: Doubted = ""
     is_no_person: bool = False
 
 
@@ -295,21 +301,20 @@ def _surest(tried: Sequence[Hypothesis]) -> _Choice:
         return _Choice(now, is_no_person=True)
     logs -= logsumexp([*logs, unknown])
     likely = [k for k in range(len(tried)) if logs[k] > _LEAST_LIKELY]
-    same = [k for k in likely if best.is_alike(tried[k])]
-    if 0 in same:
+    like_now = {0, *(k for k in likely if now.is_alike(tried[k]))}
+    if np.exp(logsumexp(logs[list(like_now)])) >= (corrected if now.frame.moved else believed):
         return _Choice(now)
+    same = [k for k in likely if best.is_alike(tried[k])]
     # A further fault that the trials do not show is no more likely here than in a sound file.
     unlikely = [k for k in likely if logs[k] < np.log(1 - corrected) and tried[k].goes_beyond(best)]
     if np.exp(logsumexp(logs[sorted({*same, *unlikely})])) >= corrected:
         return _Choice(best)
-    like_now = {0, *(k for k in likely if now.is_alike(tried[k]))}
-    if np.exp(logsumexp(logs[list(like_now)])) >= (corrected if now.frame.moved else believed):
-        return _Choice(now)
     some = [now, *(tried[k] for k in likely if logs[k] > np.log(1 - corrected))]
     words = {name: dict.fromkeys(one.words(name, now) for one in some) for name in now.fits}
     rivals = {name: tuple(all_) for name, all_ in words.items() if set(all_) != {_AS_IT_IS}}
-    in_torque = all(now.is_alike(one, torque=False) for one in some)
-    return _Choice(now, rivals, in_torque)
+    if all(now.is_alike(one, torque=False) for one in some):
+        return _Choice(now, rivals, "vertical moment")
+    return _Choice(now, rivals, _ALL if best is now and not now.frame.moved else "")
 
 
 # --- what is said of it -----------------------------------------------------------------------
@@ -319,11 +324,13 @@ def _verdict(stated: PlateFit, chosen: _Choice, name: str) -> Verdict:
     fit, rivals = chosen.of.fits[name], chosen.rivals.get(name, ())
     before, after = stated.evidence(), fit.evidence()
     fault = _fault(after)
-    if not fault and not chosen.only_torque:
+    if not fault and not chosen.doubted:
         fault = _UNTOLD if rivals else _AGAINST if chosen.is_no_person else ""
     if fault:
         return Verdict(fit.reading, before, after, refusal=fault, rivals=rivals)
-    return Verdict(_with_outline(fit), before, after, rivals=rivals)
+    is_loaded = np.isfinite([after.distance_m, after.outside_m]).any()
+    doubted: Doubted = chosen.doubted if rivals and is_loaded else ""
+    return Verdict(_with_outline(fit), before, after, rivals=rivals, doubted=doubted)
 
 
 def _fault(found: Evidence) -> str:

@@ -37,6 +37,7 @@ def _row(verdict: Verdict) -> dict:
         "half_size_y_m": half_y,
         "refusal": verdict.refusal,
         "rivals": "|".join(verdict.rivals),
+        "doubted": verdict.doubted,
         "repeats": " ".join(verdict.repeats),
     }
     unknown = Evidence(*[nothing] * len(_EVIDENCE))
@@ -69,6 +70,7 @@ def _verdict(row: dict) -> Verdict:
         after,
         refusal=row["refusal"],
         rivals=tuple(filter(None, row["rivals"].split("|"))),
+        doubted=row["doubted"],
         repeats=tuple(row["repeats"].split()),
     )
 

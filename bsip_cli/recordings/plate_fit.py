@@ -25,13 +25,15 @@ _PULLS = 3.0  # a force is reversed if it pulls so many times what it pushes
 @dataclass(frozen=True, eq=False)
 class PlateTrial:
     """A plate in one trial: ``source`` at the samples in which it is loaded, with its parts (n, k)
-    there and, averaged, at all samples of the trial, ``smooth`` (m, k)."""
+    there and, averaged, at all samples of the trial, ``smooth`` (m, k); ``apart`` (n,) where one
+    other plate is loaded too: two feet, two plates."""
 
     trial: int
     source: PlateSource
     parts: np.ndarray
     smooth: np.ndarray
     feet: Feet
+    apart: np.ndarray
     corners_m: np.ndarray | None
 
     @classmethod
@@ -44,7 +46,10 @@ class PlateTrial:
         loaded = np.flatnonzero(samples.loaded[name])
         source, corners = source.at(loaded), source.plate(AS_STATED).corners_m
         feet = samples.feet.at(loaded).on(corners)
-        return cls(trial, source, source.parts(), np.nan_to_num(smooth.parts()), feet, corners)
+        others = [samples.loaded[other][loaded] for other in samples.sources if other != name]
+        apart = np.sum(others, axis=0, initial=0) == 1 if others else np.zeros(len(loaded), bool)
+        smooth_parts = np.nan_to_num(smooth.parts())
+        return cls(trial, source, source.parts(), smooth_parts, feet, apart, corners)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +123,7 @@ def _evidence(one: PlateTrial, readings: Sequence[PlateReading], wrench: np.ndar
         both = one.parts @ np.array(levels).transpose(1, 0, 3, 2)  # (2, r, n, 2)
         level_Nm = tuple(np.linalg.norm(both, axis=-1))
     lever = None if levers[0] is None else np.array(levers)
-    return evidence(wrench, floors, one.feet, one.corners_m, lever, level_Nm)
+    return evidence(wrench, floors, one.feet, one.apart, one.corners_m, lever, level_Nm)
 
 
 def _centred(reading: PlateReading, seen: Sequence[PlateTrial]) -> PlateReading:

@@ -10,6 +10,7 @@ import numpy as np
 from bsip_cli.recordings.body_motion import SMOOTH_S, Body
 from bsip_cli.recordings.frame_change import FrameChange
 from bsip_cli.recordings.handedness import Handedness, handedness
+from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.person_size import by_segment, height_m
 from bsip_cli.recordings.plate_source import PlateSource, lift_N
@@ -47,6 +48,9 @@ class TrialSamples:
         samples = np.unique(np.concatenate(few)) if few else np.zeros(0, int)
         frames = np.round(samples * recording.marker_rate_hz / rate_hz).astype(int)
         samples, frames = samples[frames < recording.n_frames], frames[frames < recording.n_frames]
+        known = meanings(recording.labels)
+        sides = [known[n].segment[-1] if n in known else "" for n in recording.labels]
+        sides = [side if side in "lr" else "" for side in sides]
         floor = sources[0].floor_m() if sources else 0.0
         return cls(
             hands=handedness(recording.labels, markers),
@@ -54,7 +58,7 @@ class TrialSamples:
             sources={s.name: s.at(samples) for s in sources},
             smooth={s.name: s.smoothed(SMOOTH_S * rate_hz).at(samples) for s in sources},
             loaded={s.name: heavy[s.name][samples] for s in sources},
-            feet=Feet.of(markers, frames, floor if abs(floor) < 1.0 else 0.0),
+            feet=Feet.of(markers, sides, frames, floor if abs(floor) < 1.0 else 0.0),
             body=Body.of(segments if sources else {}, recording.marker_rate_hz, frames),
         )
 

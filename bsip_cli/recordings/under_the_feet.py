@@ -9,7 +9,8 @@ the vertical moment over the force is 3 mm, in golf swings 60.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -35,19 +36,25 @@ _DIRECTIONS = np.array([np.cos(_ANGLES), np.sin(_ANGLES)])  # (2, k)
 
 @dataclass(frozen=True, eq=False)
 class Feet:
-    """Horizontal places of foot markers on the ground, (n, k, 2); NaN: in the air, unseen."""
+    """Horizontal places of foot markers on the ground, (n, k, 2); NaN: in the air, unseen.
+
+    sides : whose they are, "l", "r" or empty, k of them.
+    """
 
     points_m: np.ndarray
+    sides: tuple[str, ...]
 
     @classmethod
-    def of(cls, markers_m: np.ndarray, frames: np.ndarray, floor_m: float) -> Feet:
+    def of(
+        cls, markers_m: np.ndarray, sides: Sequence[str], frames: np.ndarray, floor_m: float
+    ) -> Feet:
         """From a trial's markers (n_frames, n_markers, 3), world frame, at some frames (n,)."""
         height = markers_m[..., 2] - floor_m
         lowest = _lowest(height)
         feet = np.flatnonzero(lowest < _LOW_M)
         points = markers_m[np.ix_(frames, feet)][..., :2].copy()
         points[height[np.ix_(frames, feet)] - lowest[feet] > _LIFT_M] = np.nan
-        return cls(points)
+        return cls(points, tuple(sides[k] for k in feet.tolist()))
 
     def on(self, corners_m: np.ndarray | None) -> Feet:
         """Those on a plate of these corners (4, 3), where any are, else all."""
@@ -56,21 +63,29 @@ class Feet:
         beyond = _beyond(self.points_m, corners_m)
         inside = (beyond <= _RIM_M).all(axis=-1)
         some = np.any(inside, axis=1, keepdims=True)
-        return Feet(np.where((inside | ~some)[..., None], self.points_m, np.nan))
+        points = np.where((inside | ~some)[..., None], self.points_m, np.nan)
+        return replace(self, points_m=points)
 
     def at(self, samples: np.ndarray) -> Feet:
-        return Feet(self.points_m[samples])
+        return replace(self, points_m=self.points_m[samples])
 
     def moved(self, change: np.ndarray) -> Feet:
         """In other axes of the world (3, 3)."""
-        return Feet(self.points_m @ change[:2, :2].T)
+        return replace(self, points_m=self.points_m @ change[:2, :2].T)
 
-    def distance_m(self, places_m: np.ndarray) -> np.ndarray:
-        """Of places (..., n, 2) from the convex area of the markers, 0 inside, NaN without any.
+    def distance_m(self, places_m: np.ndarray, apart: np.ndarray) -> np.ndarray:
+        """Of places (..., n, 2) from the convex area of the markers, 0 inside, NaN without any;
+        from that of the nearer foot where each stands ``apart`` (n,), on a plate of its own."""
+        both = self._distance_m(places_m, [True] * len(self.sides))
+        if not {"l", "r"} <= set(self.sides):
+            return both
+        each = [self._distance_m(places_m, [one != other for one in self.sides]) for other in "lr"]
+        nearer = np.fmin(*each)
+        return np.where(apart & np.isfinite(nearer), nearer, both)
 
-        The largest, over all directions, by which a place lies further out than every marker.
-        """
-        reach = self.points_m @ _DIRECTIONS  # (n, k, directions)
+    def _distance_m(self, places_m: np.ndarray, columns: Sequence[bool]) -> np.ndarray:
+        """The largest, over all directions, by which a place lies further out than every marker."""
+        reach = self.points_m[:, np.array(columns, bool)] @ _DIRECTIONS  # (n, k, directions)
         furthest = np.max(np.where(np.isfinite(reach), reach, -np.inf), axis=1, initial=-np.inf)
         beyond = np.max(places_m @ _DIRECTIONS - furthest, axis=-1)
         return np.where(np.isfinite(beyond), np.maximum(beyond, 0.0), np.nan)
@@ -102,6 +117,7 @@ def evidence(
     wrench: np.ndarray,
     floor_m: np.ndarray,
     feet: Feet,
+    apart: np.ndarray,
     corners_m: np.ndarray | None,
     lever_m: np.ndarray | None,
     level_Nm: tuple[np.ndarray, np.ndarray] | None,
@@ -109,6 +125,7 @@ def evidence(
     """What each of r readings makes of n loaded samples, (r, 7): columns as in `Evidence`.
 
     wrench : (r, n, 6), about the world's origin. floor_m : (r,). feet : on the plate's place.
+    apart : (n,), where each foot stands on a plate of its own.
     lever_m : (r, n), from the sensor to where its moments have the force; None without a sensor.
     level_Nm : horizontal moment (r, n) at the points that the file calls centres of pressure, as
     read and as written; None without such points.
@@ -122,7 +139,7 @@ def evidence(
     force, moment, load, cop = (x[:, known] for x in (force, moment, load, cop))
     torque = moment[..., 2] - cop[..., 0] * force[..., 1] + cop[..., 1] * force[..., 0]
     table = np.full((len(FIELDS), len(wrench)), np.nan)
-    table[0] = _mean(feet.at(known).distance_m(cop))
+    table[0] = _mean(feet.at(known).distance_m(cop, apart[known]))
     if corners_m is not None:
         table[1] = _mean(np.linalg.norm(_beyond(cop, corners_m), axis=-1))
     table[2] = _spread(cop)

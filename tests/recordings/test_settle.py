@@ -202,15 +202,27 @@ def test_the_limits_are_those_of_the_options():
 def test_distance_from_the_feet():
     square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]] * 3)
     places = np.array([[0.5, 0.4], [1.5, 0.5], [-3.0, -4.0]])
-    np.testing.assert_allclose(Feet(square).distance_m(places), [0.0, 0.5, 5.0], rtol=1e-3)
+    together = np.zeros(3, bool)
+    found = Feet(square, ("", "", "", "")).distance_m(places, together)
+    np.testing.assert_allclose(found, [0.0, 0.5, 5.0], rtol=1e-3)
     two = square[:, :2].copy()
     two[2] = np.nan
-    np.testing.assert_allclose(Feet(two).distance_m(places), [0.4, 0.5**0.5, np.nan], rtol=1e-3)
+    found = Feet(two, ("", "")).distance_m(places, together)
+    np.testing.assert_allclose(found, [0.4, 0.5**0.5, np.nan], rtol=1e-3)
+
+
+def test_feet_on_plates_of_their_own_are_two_areas():
+    """Left and right side of a square: its middle is half a metre from either."""
+    square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]] * 2)
+    feet = Feet(square, ("l", "r", "r", "l"))
+    middle = np.full((2, 2), 0.5)
+    found = feet.distance_m(middle, np.array([False, True]))
+    np.testing.assert_allclose(found, [0.0, 0.5], rtol=1e-3)
 
 
 def test_feet_on_the_plate_count_before_all_others():
     points = np.array([[[0.6, 0.2], [0.6, 0.8]], [[5.0, 5.0], [6.0, 6.0]]])
-    kept = Feet(points).on(corners(0)).points_m
+    kept = Feet(points, ("r", "l")).on(corners(0)).points_m
     assert np.isfinite(kept[0, 0]).all() and np.isnan(kept[0, 1]).all()
     np.testing.assert_array_equal(kept[1], points[1])
 

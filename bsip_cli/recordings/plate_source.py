@@ -77,9 +77,9 @@ class PlateSource(Protocol):
         """What is to be said of this reading beyond its words."""
 
 
-def lift_N(source: PlateSource, reading: PlateReading = AS_STATED) -> np.ndarray:
-    """Vertical force, world frame, (n,)."""
-    return np.asarray(source.parts() @ source.matrix(reading)[2])
+def lift_N(source: PlateSource) -> np.ndarray:
+    """Vertical force as the file says, world frame, (n,)."""
+    return np.asarray(source.parts() @ source.matrix(AS_STATED)[2])
 
 
 @dataclass(frozen=True, eq=False)

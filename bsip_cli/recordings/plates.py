@@ -60,9 +60,6 @@ class LocalWrench:
         """
         return replace(self, moment_Nm=self.moment_Nm + np.cross(self.force_N, origin_m))
 
-    def scaled(self, moment_factor: float) -> LocalWrench:
-        return replace(self, moment_Nm=self.moment_Nm * moment_factor)
-
     def cop(self) -> np.ndarray:
         """Centre of pressure on the surface, plate frame, (n, 2); NaN without load."""
         return cop_at_height(self.force_N, self.moment_Nm, 0.0)

@@ -108,7 +108,8 @@ def of_c3d(
         axes = true.rotation_lab_plate()
         moment = free_moment(force) + np.cross(point - CENTRES_M[k], force)
         local = LocalWrench(sign * force @ axes, sign * moment @ axes)
-        at_sensor = local.at_surface(-np.array(origin_m)).scaled(moment_scale)
+        at_sensor = local.at_surface(-np.array(origin_m))
+        at_sensor = LocalWrench(at_sensor.force_N, at_sensor.moment_Nm * moment_scale)
         stated = PlateDescription(
             true.name,
             2,

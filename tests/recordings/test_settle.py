@@ -13,6 +13,7 @@ from bsip_cli.recordings.frame_change import FrameChange
 from bsip_cli.recordings.gate_limits import USUAL
 from bsip_cli.recordings.handedness import handedness
 from bsip_cli.recordings.plate_reading import PlateReading
+from bsip_cli.recordings.plate_source import ForceOnPoint
 from bsip_cli.recordings.settle import settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import Feet
@@ -167,6 +168,20 @@ def test_forces_in_turned_axes_are_turned_back(turns):
         _wrench(assemble(opened(of_table()), session_of())),
         atol=1e-9,
     )
+
+
+@pytest.mark.parametrize("make", [of_c3d, of_table])
+@pytest.mark.parametrize("moved", ["", "all", "forces"])
+def test_a_reading_is_a_matrix(make, moved):
+    """Every reading's wrench is linear in the source's parts, also in other axes."""
+    for source in FrameChange(moved, 1).of(opened(make())).sources:
+        for reading in source.alternatives():
+            if reading.about == "fixed":
+                reading = ForceOnPoint.with_centre([source], reading)
+            read = replace(reading, sign=-1)
+            expected = source.plate(read).wrench()
+            found = source.parts() @ source.matrix(read).T
+            np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("corners_only", [False, True])

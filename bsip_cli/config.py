@@ -69,6 +69,12 @@ class Ingest(Section):
     mass_tolerance_percent: float = Field(gt=0)
     mass_gross_percent: float = Field(gt=0)
     mass_half_width_percent: float = Field(gt=0)
+    believed_percent: float = Field(gt=50, lt=100)
+    corrected_percent: float = Field(gt=50, lt=100)
+    balance_median_m: float = Field(gt=0)
+    complete_percent: float = Field(gt=0, lt=100)
+    marker_noise_m: float = Field(gt=0)
+    independent_numbers: float = Field(ge=1)
     zero_unloaded_plates: bool
     plates: tuple[int, ...]
     prefixes: dict[str, str]

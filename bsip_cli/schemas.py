@@ -198,13 +198,13 @@ SCHEMAS = {
         Schema(
             "readings",
             "participant",
-            2,
+            3,
             "how the numbers of a session's recordings are understood, one row per plate",
             (
                 _text("session", "of the recordings; empty without sessions"),
                 _text("moved", "what is in other axes: all, markers, forces or nothing (empty)"),
                 Column("axis", "int", "", "of the world that was mirrored: 0 for X, 1 for Y"),
-                Column("quarter_turns", "int", "90 degrees", "by which it was turned instead"),
+                *_floats("turned_deg turned_sd_deg", "deg", "by which it was turned instead"),
                 Column("corners_only", "bool", "", "of C3D: channels were not mirrored with them"),
                 _text("plate", "its name; empty if no plate was loaded"),
                 Column("moment_scale", "float", "1", "what the moments are multiplied with"),
@@ -219,6 +219,7 @@ SCHEMAS = {
                 *_floats("half_size_x_m half_size_y_m", "m", "half the widened outline", "plate"),
                 _text("refusal", "why the plate was left out"),
                 _text("rivals", "repairs that would each do, apart by |; not told apart"),
+                _text("doubted", "what of it is believed as the file says, though they would do"),
                 _text("repeats", "the plates whose copy or sum it is"),
                 *(
                     column

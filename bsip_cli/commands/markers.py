@@ -17,6 +17,7 @@ from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.config import load_config
 from bsip_cli.errors import UsageError, printable
 from bsip_cli.recordings.labels import LabelMatch, match_labels
+from bsip_cli.recordings.lateral_medial import with_pairs_named
 from bsip_cli.recordings.marker_guess import Guess, SetFit, fits, told_from
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
@@ -54,8 +55,10 @@ def markers_command(request: Request) -> int:
 
 def _compared(request: Request, recording: Recording, chosen: MarkerSet) -> bool:
     """Print what a marker set finds in a recording; whether a skeleton can be built from it."""
+    labels, paired = with_pairs_named(recording.labels, recording.markers_m, chosen, request.prefix)
+    _say([finding.sentence() for finding in paired])
     match = match_labels(
-        recording.labels,
+        labels,
         chosen.wanted(),
         optional=chosen.optional(),
         seen=np.isfinite(recording.markers_m[..., 0]).any(axis=0),

@@ -14,9 +14,14 @@ _STUCK_S = 0.5
 _LOAD_CHANGE = 0.2  # of the largest load
 _LOST_S = 0.1
 _ABRUPT_N = 100.0  # load beside samples that are all zero: they are lost
-_SPIKE_SHARE = 1.0  # of the channel's range: up and down again within one sample
-_SPIKE_NOISE = 20.0  # times the median step
-_ONE_LEVEL = 0.2  # of the spike: the samples beside it are alike
+# A spike beside the cubic through its neighbours: of the channel's size (less moves a frame by less
+# than other errors of plates), times what samples usually are beside it, times the smallest step.
+_SPIKE_SHARE, _SPIKE_NOISE, _SPIKE_STEPS = 0.05, 10.0, 5.0
+_SPIKE_CLEAR = (
+    6.0  # times what is left around: of its own size, a sixth falls on the second samples
+)
+_TOUCHED = 20.0  # N or N m: what counts on a plate that bears nobody
+_AROUND = 12  # samples on either side
 _ABSURD_N = 15_000.0
 _MANY = 0.02  # of the samples
 
@@ -82,28 +87,49 @@ def spike_samples(channels: np.ndarray, load: np.ndarray) -> np.ndarray:
 
     If there are many they are no exceptions, and the plate as a whole is judged elsewhere.
     """
-    spikes = np.abs(np.nan_to_num(load)) > _ABSURD_N
+    size = np.abs(np.nan_to_num(load))
+    spikes = size > _ABSURD_N
+    bears = np.percentile(size, 99) > _ABRUPT_N if len(size) else False
     for channel in channels.T:
-        spikes |= _spikes(channel)
+        spikes |= _spikes(channel, 0.0 if bears else _TOUCHED)
     return spikes if spikes.mean() <= _MANY else np.zeros(len(spikes), bool)
 
 
-def _spikes(signal: np.ndarray) -> np.ndarray:
-    """Single samples that leave and come back by all of the signal's range, (n,) bool."""
-    spikes = np.zeros(len(signal), bool)
-    known = signal[np.isfinite(signal)]
-    if len(known) < 5:
+def _spikes(signal: np.ndarray, least: float) -> np.ndarray:
+    """Single samples that leave a smooth course by more than ``least`` and come back, (n,) bool.
+
+    What is left of a sample beside the cubic through its neighbours is then large against noise,
+    steps of the converter and the channel's size, and once it is taken away, the surroundings are
+    smooth: a foot that touches down leaves more than one such sample.
+    """
+    spikes, known = np.zeros(len(signal), bool), np.isfinite(signal)
+    if known.sum() < 5:
         return spikes
-    low, high = np.percentile(known, [1, 99])
+    samples = np.arange(len(signal))
+    whole = np.interp(samples, samples[known], signal[known])
+    steps = np.abs(np.diff(whole))
+    if not steps.any():
+        return spikes
+    beside = _beside_cubic(whole)
     least = max(
-        _SPIKE_SHARE * (high - low), _SPIKE_NOISE * float(np.median(np.abs(np.diff(known)))), 1e-3
+        least,
+        _SPIKE_SHARE * float(np.abs(np.percentile(whole, [1, 99])).max()),
+        _SPIKE_NOISE * float(np.median(np.abs(beside))),
+        _SPIKE_STEPS * float(steps[steps > 0].min()),
     )
-    padded = np.concatenate([signal[1:2], signal, signal[-2:-1]])
-    with np.errstate(invalid="ignore"):
-        left, right = padded[1:-1] - padded[:-2], padded[1:-1] - padded[2:]
-        jump = np.where(left * right > 0, np.minimum(np.abs(left), np.abs(right)), 0.0)
-        spikes |= (jump > least) & (np.abs(left - right) < _ONE_LEVEL * jump)
+    for k in np.flatnonzero((np.abs(beside) > least) & known).tolist():
+        if 2 <= k < len(signal) - 2:
+            first = max(k - _AROUND, 0)
+            around = whole[first : k + _AROUND + 1].copy()
+            around[k - first] -= beside[k]
+            spikes[k] = np.abs(beside[k]) > _SPIKE_CLEAR * np.abs(_beside_cubic(around)).max()
     return spikes
+
+
+def _beside_cubic(signal: np.ndarray) -> np.ndarray:
+    """Samples (n,) less the cubic through the two before and the two after."""
+    p = np.pad(signal, 2, mode="reflect")
+    return np.asarray(signal - (4.0 * (p[1:-3] + p[3:-1]) - p[:-4] - p[4:]) / 6.0)
 
 
 def runs(mask: np.ndarray) -> np.ndarray:

@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from bsip_cli.recordings.frame_change import FrameChange
 from bsip_cli.recordings.handedness import handedness
 from bsip_cli.recordings.model import Finding, Plate, Recording
+from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.plates import LOADED_N
-from bsip_cli.recordings.settle import Opened, Scene, SessionReading, Verdict
+from bsip_cli.recordings.settle import SessionReading, Verdict
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
 from bsip_cli.recordings.weight_shift import sign_doubts
 
@@ -27,7 +29,7 @@ _WITHOUT_PLACE = (
 
 def assemble(opened: Opened, session: SessionReading) -> Recording:
     """The recording with its plates, understood as all trials of the session say."""
-    opened = session.scene.of(opened)
+    opened = session.frame.of(opened)
     recording = opened.recording
     findings = [*findings_about(session), *_about_sides(recording)]
     if recording.forces_note:
@@ -66,20 +68,20 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
 def findings_about(session: SessionReading) -> list[Finding]:
     """What was decided for all trials of a session alike."""
     plates = (_about_plate(name, verdict) for name, verdict in session.plates.items())
-    return [*_about_scene(session.scene), *(finding for found in plates for finding in found)]
+    return [*_about_frame(session.frame), *(finding for found in plates for finding in found)]
 
 
-def _about_scene(scene: Scene) -> list[Finding]:
-    if not scene.moved:
+def _about_frame(frame: FrameChange) -> list[Finding]:
+    if not frame.moved:
         return []
-    if scene.moved == "forces":
+    if frame.moved == "forces":
         check, expected = "frame", "markers and forces in one frame"
         found = "the forces lie under the feet and go with the motion in another frame only"
-        action = f"{scene.words()}, in all trials"
+        action = f"{frame.words()}, in all trials"
     else:
         check, expected = "mirrored", "a right-handed frame"
         found = "left and right are exchanged all over the body: a left-handed laboratory frame"
-        action = f"{scene.words()}, in all trials; if instead left and right labels are exchanged, "
+        action = f"{frame.words()}, in all trials; if instead left and right labels are exchanged, "
         action += "rename them"
     return [Finding(check, "", found, expected, action, "corrected")]
 
@@ -101,15 +103,19 @@ def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
             )
         return [_about(name, verdict.refusal, action, "excluded")]
     reading, findings = verdict.reading, []
-    if verdict.rivals:
-        found = f"its vertical moment: {' or '.join(verdict.rivals)}: these trials cannot tell"
-        action = "took it as it stands; a movement that turns the body would tell"
-        expected = "one that turns the body as the markers do"
-        findings.append(Finding("plate_moment", name, found, expected, action, "warning"))
+    if verdict.doubted:
+        is_moment = verdict.doubted == "vertical moment"
+        found = f"its {verdict.doubted}: {' or '.join(verdict.rivals)}: these trials cannot tell"
+        expected = "one that moves the body as the markers do"
+        action = "took it as it stands; a movement that "
+        action += f"{'turns the body' if is_moment else 'pushes the body more'} would tell"
+        check = "plate_moment" if is_moment else "plate_force"
+        findings.append(Finding(check, name, found, expected, action, "warning"))
     if words := reading.words():
         assert verdict.before is not None and verdict.after is not None
-        action = f"{words}: {_words(verdict.after)}"
-        findings.append(_about(name, _words(verdict.before), action, "corrected"))
+        before, after = _words(verdict.before), _words(verdict.after)
+        action = f"{words}: {after}" if after else f"{words}, as of the other plates"
+        findings.append(_about(name, before or "never loaded", action, "corrected"))
     if reading.half_size_m is not None:
         sides = " x ".join(f"{2 * half:.2f}" for half in reading.half_size_m)
         found = "its load lies beside its outline and under a foot"
@@ -179,9 +185,11 @@ def _about(name: str, found: str, action: str, level: str) -> Finding:
 
 
 def _words(evidence: Evidence) -> str:
-    """Where a reading puts the force."""
+    """Where a reading puts the force; empty if there is none."""
     if np.isfinite(evidence.distance_m):
         place = f"{evidence.distance_m:.2f} m beside the feet on the ground"
-    else:
+    elif np.isfinite(evidence.outside_m):
         place = f"{evidence.outside_m:.2f} m outside the plate"
+    else:
+        return ""
     return f"centre of pressure {place}, moving by {1e3 * evidence.sway_m:.3g} mm"

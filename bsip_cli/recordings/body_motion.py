@@ -2,14 +2,14 @@
 
 The sum of all plates' wrenches is the rate of the body's momentum, linear and angular, which the
 markers tell. Horizontal forces go with the acceleration of the centre of mass, moments about it
-with the rate of the angular momentum. In complete stretches of 50 sound public recordings the
+with the rate of the angular momentum. In complete intervals of 50 sound public recordings the
 forces correlate by 0.5 to 0.99 in movement (median 0.9), moments about level axes by 0.4 to 0.97,
 about the vertical by 0 to 0.9, and none clearly below zero over a second or more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,24 +17,23 @@ from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.names import without_side
+from bsip_cli.recordings.gate_limits import GateLimits
 from bsip_cli.recordings.momentum_mass import NEIGHBOUR, shares_of_seen
 
 SMOOTH_S = 0.04
-"""Standard deviation of the bell that forces and markers alike are averaged with: 3 Hz."""
+"""Standard deviation of the bell that forces and markers alike are averaged with: half of the
+amplitude is left at 4.7 Hz; horizontal forces of plates and of markers hardly agree above 3."""
 
+# After so long a sample is independent: half the inverse of the bell's noise bandwidth.
+_INDEPENDENT_S = 2.0 * np.sqrt(np.pi) * SMOOTH_S
+_EDGE_S = 4.0 * SMOOTH_S  # how far the bell reaches: nearer to an end, it averages nothing
 _MOST_OF_IT = 0.5  # of the body's mass
 _OFTEN = 0.9  # of the frames
 _FEWEST_FRAMES = 10
-_EDGE_S = 0.1
-_COMPLETE = 0.15  # of the weight that the motion needs: all contacts are on the plates
-_SHORTEST_S = 0.2
+_ROUNDS = 5  # of weights that follow the residuals
 _FALLS = 0.2  # of gravity: less is flight
-_BALANCE_M = 0.03  # of the centre of mass from the centre of pressure: median 15 mm, golf 56
-_BANDWIDTH_HZ = 3.0
-_MOST_NUMBERS = 12.0  # that count as independent, however long a session is
-_CLOSEST = 0.97  # correlation
-# Below these, movement is noise of markers and plates [m/s2; m2/s2].
-_FLOORS = {"force": 0.03, "level": 0.03, "vertical": 0.015}
+_CLOSEST = 0.97  # correlation: the highest of moments in sound recordings, see above
+_KINDS = {"force": [0, 1], "level": [3, 4], "vertical": [5]}  # columns of a wrench
 # Of the way from a segment's markers, which mark its lower joint or the top of the trunk, to those
 # of the segment that it hangs on: about there is its centre of mass.
 _TO_NEIGHBOUR = dict.fromkeys(("thigh", "shank", "upper_arm", "forearm"), 0.5) | {
@@ -44,16 +43,18 @@ _TO_NEIGHBOUR = dict.fromkeys(("thigh", "shank", "upper_arm", "forearm"), 0.5) |
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The centre of mass, as the segments' markers tell it, at n samples; NaN: not known.
+    """The momentum that the segments' markers tell, at n samples; NaN: not known.
 
-    place_m : (n, 3). acceleration_m_s2 : (n, 3). spin_m2_s2 : rate of the angular momentum about
-    it, over the mass, (n, 3). lasts_s : what each sample stands for, (n,).
+    place_m : of the centre of mass, (n, 3). rate : of the momentum over the mass, linear [m/s2] and
+    angular about the centre of mass [m2/s2], (n, 6). noise : its variance over that of a marker's
+    place, (n, 6). lasts_s : what each sample stands for, (n,). trial : its number, (n,).
     """
 
     place_m: np.ndarray
-    acceleration_m_s2: np.ndarray
-    spin_m2_s2: np.ndarray
+    rate: np.ndarray
+    noise: np.ndarray
     lasts_s: np.ndarray
+    trial: np.ndarray
 
     @classmethod
     def of(cls, markers_m: Mapping[str, np.ndarray], rate_hz: float, frames: np.ndarray) -> Body:
@@ -64,104 +65,182 @@ class Body:
         mass = sum(weights.values())
         n_frames = max((len(path) for path in paths.values()), default=0)
         if mass < _MOST_OF_IT or n_frames < _FEWEST_FRAMES:
-            nothing = np.full((len(frames), 3), np.nan)
-            return cls(nothing, nothing, nothing, np.zeros(len(frames)))
+            nothing = np.full((len(frames), 6), np.nan)
+            return cls(nothing[:, :3], nothing, nothing, nothing[:, 0], np.zeros(len(frames), int))
         paths = _about_centres({name: _smooth(paths[name], rate_hz) for name in weights})
-        place = sum(share / mass * paths[n].mean(axis=1) for n, share in weights.items())
-        place = np.asarray(place)
+        place = np.asarray(sum(w / mass * paths[n].mean(axis=1) for n, w in weights.items()))
         velocity = np.gradient(place, axis=0) * rate_hz
-        spin = np.zeros_like(place)
-        for name, share in weights.items():
+        spin, noise = np.zeros_like(place), np.zeros(6)
+        for name, weight in weights.items():
             away = paths[name] - place[:, None]
             turning = np.cross(away, np.gradient(away, axis=0) * rate_hz)
-            spin += share / mass * turning.mean(axis=1)
-        acceleration = np.gradient(velocity, axis=0) * rate_hz
+            spin += weight / mass * turning.mean(axis=1)
+            lever2 = (away**2).sum(axis=-1, keepdims=True) - away**2
+            share2 = (weight / mass) ** 2 / away.shape[1]
+            noise += share2 * np.append(np.ones(3), lever2.mean(axis=(0, 1)))
+        rate = np.gradient(np.hstack([velocity, spin]), axis=0) * rate_hz
         edge = np.ones(n_frames, bool)
         edge[round(_EDGE_S * rate_hz) : n_frames - round(_EDGE_S * rate_hz)] = False
-        acceleration[edge] = np.nan
-        rates = np.gradient(spin, axis=0) * rate_hz
+        rate[edge] = np.nan
         lasts = np.diff(frames, append=frames[-1:] + 1) / rate_hz
-        lasts = np.minimum(lasts, 0.5 / _BANDWIDTH_HZ)
-        return cls(place[frames], acceleration[frames], rates[frames], lasts)
+        noise *= _acceleration_of_noise(rate_hz)
+        lasts = np.minimum(lasts, _INDEPENDENT_S)
+        each = np.tile(noise, (len(frames), 1))
+        return cls(place[frames], rate[frames], each, lasts, np.zeros(len(frames), int))
+
+    @classmethod
+    def of_all(cls, trials: Sequence[Body]) -> Body:
+        """The same person in several trials."""
+        columns = zip(*((b.place_m, b.rate, b.noise, b.lasts_s) for b in trials), strict=True)
+        number = np.repeat(np.arange(len(trials)), [len(b.trial) for b in trials])
+        place, rate, noise, lasts = map(np.concatenate, columns)
+        return cls(place, rate, noise, lasts, number)
 
     def moved(self, change: np.ndarray) -> Body:
         """In other axes (3, 3), mirrored ones too."""
-        return replace(
-            self,
-            place_m=self.place_m @ change.T,
-            acceleration_m_s2=self.acceleration_m_s2 @ change.T,
-            spin_m2_s2=np.linalg.det(change) * self.spin_m2_s2 @ change.T,
-        )
-
-    def match(self, wrench: np.ndarray) -> Match:
-        """With a total wrench (n, 6) about the world's origin, smoothed alike."""
-        needed = GRAVITY_M_S2 + self.acceleration_m_s2[:, 2]
-        known = np.isfinite(needed) & np.isfinite(wrench).all(axis=1) & (wrench[:, 2] > 0)
-        known &= needed > _FALLS * GRAVITY_M_S2
-        if not known.any():
-            return Match()
-        mass = wrench[known, 2] / needed[known]
-        whole = float(np.percentile(mass, 90))
-        known[known] = np.abs(mass / whole - 1.0) < _COMPLETE
-        seconds = float(self.lasts_s[known].sum())
-        if seconds < _SHORTEST_S:
-            return Match()
-        force, place = wrench[known, :3] / whole, self.place_m[known]
-        moment = wrench[known, 3:] / whole - np.cross(place, force)
-        acceleration, spin = self.acceleration_m_s2[known], self.spin_m2_s2[known]
-        lean = moment[:, :2] - spin[:, :2]
-        return Match(
-            gap_m=float(np.sqrt(np.mean((lean**2).sum(axis=1)))) / GRAVITY_M_S2,
-            seconds=seconds,
-            sums={
-                "force": _sums(force[:, :2], acceleration[:, :2], _FLOORS["force"]),
-                "level": _sums(moment[:, :2], spin[:, :2], _FLOORS["level"]),
-                "vertical": _sums(moment[:, 2:], spin[:, 2:], _FLOORS["vertical"]),
-            },
-        )
+        linear, angular = np.split(self.rate @ np.kron(np.eye(2), change).T, 2, axis=1)
+        angular = np.linalg.det(change) * angular
+        return replace(self, place_m=self.place_m @ change.T, rate=np.hstack([linear, angular]))
 
 
 @dataclass(frozen=True)
-class Match:
-    """How a trial's wrench goes with its body; gap_m NaN: nothing is known.
+class Balance:
+    """How the total wrenches of all trials of a session go with their bodies.
 
-    gap_m : of the centre of mass from over the centre of pressure, movement taken off, RMS.
-    seconds : in which the plates measure everything. sums : of products of force with motion, of
-    the force's and of the motion's squares, by kind.
+    gaps_m : of each trial, of the centre of mass from over the centre of pressure, movement taken
+    off, RMS; without trials in which nothing is known. correlations : of force with motion, by
+    kind; numbers : how many independent ones they are of.
     """
 
-    gap_m: float = float("nan")
-    seconds: float = 0.0
-    sums: Mapping[str, tuple[float, float, float]] | None = None
-
-
-@dataclass(frozen=True)
-class Harmony:
-    """Of all trials together: correlation of forces with motion, by kind, and how sure [1]."""
-
-    correlations: Mapping[str, float]
-    numbers: float
+    gaps_m: tuple[float, ...] = ()
+    correlations: Mapping[str, float] | None = None
+    numbers: float = 0.0
 
     @classmethod
-    def of(cls, matches: Iterable[Match]) -> Harmony:
-        some = [(match.seconds, match.sums) for match in matches if match.sums is not None]
-        seconds = sum(each for each, _ in some)
-        total = {kind: np.sum([sums[kind] for _, sums in some], axis=0) for kind in _FLOORS if some}
+    def of(cls, body: Body, wrench: np.ndarray, limits: GateLimits) -> Balance:
+        """Of total wrenches (n, 6) about the world's origin, smoothed as the body is."""
+        if (some := _Complete.of(body, wrench, limits)) is None:
+            return cls()
+        force, motion = some.wrench.copy(), some.rate
+        force[:, 3:] -= _cross(some.place_m, force[:, :3])
+        lean2 = ((force[:, 3:5] - motion[:, 3:5]) ** 2).sum(axis=1)
+        together = some.about_means(force, motion)
+        force2 = some.about_means(force, force) + some.noise
+        motion2 = some.about_means(motion, motion) + some.noise
         return cls(
-            {kind: float(ab / np.sqrt(aa * bb)) for kind, (ab, aa, bb) in total.items()},
-            min(_MOST_NUMBERS, 2.0 * _BANDWIDTH_HZ * seconds),
+            tuple(np.sqrt(some.member @ lean2 / some.member.sum(axis=1)) / GRAVITY_M_S2),
+            {
+                kind: float(together[k].sum() / np.sqrt(force2[k].sum() * motion2[k].sum()))
+                for kind, k in _KINDS.items()
+            },
+            min(limits.independent_numbers, some.numbers),
         )
 
-    def log_likelihood(self) -> float:
+    def log_likelihood(self, limits: GateLimits) -> float:
+        """How likely a person is so balanced and driven, logarithm.
+
+        Gaps in the plane are as Student's t with two degrees of freedom, whose median is its scale.
+        """
+        gaps = np.array(self.gaps_m) / limits.balance_median_m
+        return float(-2.0 * np.log1p(gaps**2).sum()) + self.drive_log_likelihood()
+
+    def drive_log_likelihood(self) -> float:
         """Of a rising line through numbers that scatter like these, logarithm; against a falling
         one as much."""
+        if self.correlations is None:
+            return 0.0
         close = np.clip(list(self.correlations.values()), -_CLOSEST, _CLOSEST)
         return float(-0.5 * self.numbers * np.sum(np.sign(close) * np.log(1.0 - close**2)))
 
 
-def balance_log_likelihood(match: Match) -> float:
-    """How likely a person stands so far from over the centre of pressure, logarithm."""
-    return 0.0 if np.isnan(match.gap_m) else float(-2.0 * np.log1p((match.gap_m / _BALANCE_M) ** 2))
+@dataclass(frozen=True, eq=False)
+class _Complete:
+    """The samples in which the plates have every contact; all of them over the person's mass.
+
+    wrench, rate, place_m : of the plates and of the body (n, 6), (n, 3). member : of which trial
+    (trials, n), 0 or 1. noise : of all samples together, (6,). numbers : independent ones.
+    """
+
+    wrench: np.ndarray
+    rate: np.ndarray
+    place_m: np.ndarray
+    member: np.ndarray
+    noise: np.ndarray
+    numbers: float
+
+    @classmethod
+    def of(cls, body: Body, wrench: np.ndarray, limits: GateLimits) -> _Complete | None:
+        """The person is the same in all trials: contacts are complete where the force is the weight
+        that the motion needs, and the weight is what they nearly reach at most."""
+        needed = GRAVITY_M_S2 + body.rate[:, 2]
+        known = np.isfinite(needed) & np.isfinite(wrench).all(axis=1) & (wrench[:, 2] > 0)
+        known &= needed > _FALLS * GRAVITY_M_S2
+        if not known.any():
+            return None
+        mass = wrench[known, 2] / needed[known]
+        whole = np.percentile(mass, 90)
+        known[known] = np.abs(mass / whole - 1.0) < limits.complete_percent / 100
+        member = (body.trial[known] == np.arange(body.trial.max() + 1)[:, None]).astype(float)
+        seconds = member @ body.lasts_s[known]
+        member = member[seconds >= _INDEPENDENT_S]
+        if not len(member):
+            return None
+        return cls(
+            wrench[known] / whole,
+            body.rate[known],
+            body.place_m[known],
+            member,
+            limits.marker_noise_m**2 * (member @ body.noise[known]).sum(axis=0),
+            float(seconds[seconds >= _INDEPENDENT_S].sum() / _INDEPENDENT_S),
+        )
+
+    def about_means(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Sums of products (n, k) about the means of each trial, (k,)."""
+        means = (self.member @ a) * (self.member @ b) / self.member.sum(axis=1)[:, None]
+        return np.asarray((self.member @ (a * b) - means).sum(axis=0))
+
+
+def turn_of_forces(
+    body: Body, wrench: np.ndarray, limits: GateLimits
+) -> tuple[float, float] | None:
+    """The turn of the wrenches about the vertical through the origin that suits the body best, and
+    its standard deviation [rad]; None if nothing is known.
+
+    Least squares of horizontal force and of horizontal moment about the origin, each over its own
+    residual, the moment's that of usual gaps of the balance at least. Where the centre of mass is
+    thought to be is off by as much all through a trial: a trial is one independent number.
+    """
+    if (some := _Complete.of(body, wrench, limits)) is None:
+        return None
+    force = some.rate[:, :3] + [0.0, 0.0, GRAVITY_M_S2]
+    moment = some.rate[:, 3:] + _cross(some.place_m, force)
+    pairs = [
+        (one[:, 0] + 1j * one[:, 1], other[:, 0] + 1j * other[:, 1])
+        for one, other in ((some.wrench[:, :3], force), (some.wrench[:, 3:], moment))
+    ]
+    gap = limits.balance_median_m * GRAVITY_M_S2
+    weights, turn, total = [1.0, 1.0], 1.0 + 0j, 0j
+    for _ in range(_ROUNDS):
+        total = sum(
+            weight * (np.conj(a) * b).mean() for weight, (a, b) in zip(weights, pairs, strict=True)
+        )
+        turn = total / abs(total)
+        residuals = [float(np.mean(np.abs(turn * a - b) ** 2)) for a, b in pairs]
+        weights = [
+            2.0 / max(one, least) for one, least in zip(residuals, (0.0, gap**2), strict=True)
+        ]
+    return float(np.angle(turn)), float(1.0 / np.sqrt(abs(total) * len(some.member)))
+
+
+def _acceleration_of_noise(rate_hz: float) -> float:
+    """Variance of the second derivative of smoothed white noise of variance 1 [1/s4]: the integral
+    of w^4 exp(-w^2 s^2) over its spectrum."""
+    return float(3.0 / (8.0 * np.sqrt(np.pi) * rate_hz * SMOOTH_S**5))
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Of (n, 3) each: ten times as fast as numpy's on small arrays."""
+    return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
 
 
 def _paths(markers_m: np.ndarray) -> np.ndarray:
@@ -190,10 +269,3 @@ def _about_centres(paths: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def _smooth(paths: np.ndarray, rate_hz: float) -> np.ndarray:
     return np.asarray(gaussian_filter1d(paths, SMOOTH_S * rate_hz, axis=0, mode="nearest"))
-
-
-def _sums(force: np.ndarray, motion: np.ndarray, floor: float) -> tuple[float, float, float]:
-    """About their means, with the noise of both beside what they are."""
-    a, b = force - force.mean(axis=0), motion - motion.mean(axis=0)
-    noise = a.size * floor**2
-    return float((a * b).sum()), float((a**2).sum() + noise), float((b**2).sum() + noise)

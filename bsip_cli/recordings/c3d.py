@@ -15,9 +15,9 @@ from bsip_cli.recordings.c3d_person import stated_person
 from bsip_cli.recordings.c3d_plates import PlateChannels, plate_surfaces, read_plates
 from bsip_cli.recordings.c3d_points import Points, read_points
 from bsip_cli.recordings.model import Finding, Recording
+from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.plate_source import C3dPlate
 from bsip_cli.recordings.plates import local_wrench
-from bsip_cli.recordings.settle import Opened
 from bsip_cli.recordings.zero import without_baseline
 
 

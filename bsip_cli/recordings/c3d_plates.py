@@ -26,7 +26,7 @@ class PlateChannels:
 _MOST_PLATES = 64
 _PLATE_UNITS = ("mm", "cm", "in", "m")
 _USUAL_SIDES_M = (0.35, 1.25)  # of plates as they are sold: so that one unit alone can fit
-_INCH_M = 0.0254
+_USUAL_LENGTHS_M = (1.0, 1e-3)  # m, mm
 _VOLTS = {"V", "v", "Volts", "volts", "mV"}
 
 
@@ -187,7 +187,7 @@ def _in_si(
 ) -> np.ndarray:
     """Channels in N, N m and m; a unit that is no mechanical one (V) means N and N x length."""
     if kind == 4 and (matrix := _cal_matrix(content.group("FORCE_PLATFORM"), index)) is not None:
-        return raw @ matrix.T * np.repeat([1.0, length_unit_m], 3)
+        return raw @ matrix.T * np.repeat([1.0, _usual_moment_Nm(length_unit_m)], 3)
     units = _units(content.group("ANALOG"), rows)
     return raw * np.array([_size(unit, kind, i, length_unit_m) for i, unit in enumerate(units)])
 
@@ -222,8 +222,13 @@ def _size(unit: str, kind: int, position: int, length_unit_m: float) -> float:
         return force_in_N(unit) or 1.0
     if kind == 1 and position < 5:
         return length_in_m(unit) or length_unit_m
-    # Nobody measures moments in N times inches: N mm, or, as the feet tell, N m.
-    return moment_in_Nm(unit) or (1e-3 if length_unit_m == _INCH_M else length_unit_m)
+    return moment_in_Nm(unit) or _usual_moment_Nm(length_unit_m)
+
+
+def _usual_moment_Nm(length_unit_m: float) -> float:
+    """Size of the unit of moments where none is stated: nobody measures in N times cm or inches,
+    but in N mm, or, as the feet tell, N m."""
+    return length_unit_m if length_unit_m in _USUAL_LENGTHS_M else 1e-3
 
 
 def _units(group: Group, rows: np.ndarray) -> list[str]:

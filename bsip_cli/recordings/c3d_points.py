@@ -99,7 +99,7 @@ def _dropped(labels: Sequence[str], outputs: set[int], n_kept: int) -> Finding:
 
 
 def _labels(group: Group, n_points: int) -> tuple[list[str], list[Finding]]:
-    """POINT:LABELS with its continuations; duplicates resolved by POINT:DESCRIPTIONS."""
+    """POINT:LABELS with its continuations; duplicates by POINT:DESCRIPTIONS if these tell."""
     labels = _continued(group, "LABELS", n_points)
     counts = Counter(labels)
     twice = [i for i, label in enumerate(labels) if counts[label] > 1 and not is_unlabelled(label)]
@@ -110,16 +110,18 @@ def _labels(group: Group, n_points: int) -> tuple[list[str], list[Finding]]:
     resolved = len({renamed[i] for i in twice}) == len(twice) and all(
         renamed[i] and renamed[i] not in counts.keys() - {labels[i]} for i in twice
     )
+    if not resolved:  # what nobody asks for need not be told apart
+        return labels, []
     names = ", ".join(sorted({labels[i] for i in twice}))
     finding = Finding(
         check="labels",
         subject=names,
         found=f"{len(twice)} points share {len({labels[i] for i in twice})} labels",
         expected="one point per label",
-        action="named them by POINT:DESCRIPTIONS" if resolved else "cannot tell them apart",
-        level="corrected" if resolved else "warning",
+        action="named them by POINT:DESCRIPTIONS",
+        level="corrected",
     )
-    return (renamed if resolved else labels), [finding]
+    return renamed, [finding]
 
 
 def _continued(group: Group, name: str, n: int) -> list[str]:

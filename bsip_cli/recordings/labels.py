@@ -240,6 +240,11 @@ def _cut(name: str) -> str:
     return name.casefold()[:_CUT]
 
 
+def spelling_of(bare: Collection[str]) -> Callable[[str], str]:
+    """What two labels must share to be one marker's."""
+    return _cut if _are_cut(bare) else _folded
+
+
 def _are_cut(bare: Collection[str]) -> bool:
     """Most have the length that old formats cut to; descriptions may have restored the others."""
     return bool(bare) and 2 * sum(len(label) == _CUT for label in bare) > len(bare)
@@ -249,7 +254,7 @@ def _spelt(
     names: Sequence[str], wanted: Mapping[str, Sequence[str]], bare: Sequence[str]
 ) -> list[str]:
     """Those of the names that bare labels may mean, case aside, and cut where labels are."""
-    spelling = _cut if _are_cut(bare) else _folded
+    spelling = spelling_of(bare)
     spelt = {spelling(b) for b in bare}
     return [n for n in names if any(spelling(s) in spelt for s in (n, *wanted[n]))]
 

@@ -13,7 +13,13 @@ from scipy.ndimage import gaussian_filter1d
 from bsip_cli.recordings.cop_polynomial import correct_cop
 from bsip_cli.recordings.model import Finding, Plate
 from bsip_cli.recordings.plate_reading import AS_STATED, CHANNELS, PlateReading, Reference
-from bsip_cli.recordings.plates import LocalWrench, PlateDescription, surface_offset_m, to_world
+from bsip_cli.recordings.plates import (
+    LocalWrench,
+    PlateDescription,
+    crossing,
+    surface_offset_m,
+    to_world,
+)
 
 _THICK_M = 0.3  # no plate's sensors lie so deep under its surface
 _Z = np.array([1.0, 1.0, -1.0])
@@ -31,8 +37,11 @@ class PlateSource(Protocol):
     def usable(self) -> np.ndarray:
         """Samples that can be believed, (n,) bool."""
 
-    def lift_N(self, reading: PlateReading = AS_STATED) -> np.ndarray:
-        """Vertical force, world frame, before the sign of a reading, (n,)."""
+    def parts(self) -> np.ndarray:
+        """What every reading combines linearly, (n, k)."""
+
+    def matrix(self, reading: PlateReading) -> np.ndarray:
+        """From the parts to the wrench about the world's origin, world frame, (6, k)."""
 
     def at(self, samples: np.ndarray) -> PlateSource:
         """These samples alone."""
@@ -43,8 +52,9 @@ class PlateSource(Protocol):
     def plate(self, reading: PlateReading) -> Plate:
         """In the world frame."""
 
-    def left_at_point(self, reading: PlateReading) -> LeftMoment | None:
-        """What is left at the points that the file calls centres of pressure, if it names some."""
+    def level_matrices(self, reading: PlateReading) -> tuple[np.ndarray, np.ndarray] | None:
+        """From the parts to the horizontal moment at the points that the file calls centres of
+        pressure, as read and as written, (2, k) each; None where it names no such points."""
 
     def lever_m(self, reading: PlateReading) -> np.ndarray | None:
         """How far from the sensor, or from the origin of its points, the force is, (n,); None where
@@ -53,7 +63,7 @@ class PlateSource(Protocol):
     def in_place_of(self, other: PlateSource) -> PlateSource:
         """This force where the other one is."""
 
-    def floor_m(self, reading: PlateReading) -> float:
+    def floor_m(self, reading: PlateReading = AS_STATED) -> float:
         """Height of the surface, world frame."""
 
     def moved(self, change: np.ndarray, corners_only: bool = False) -> PlateSource:
@@ -67,12 +77,9 @@ class PlateSource(Protocol):
         """What is to be said of this reading beyond its words."""
 
 
-@dataclass(frozen=True, eq=False)
-class LeftMoment:
-    """Horizontal moment at a named centre of pressure (n,): as read and as written, in N m."""
-
-    read: np.ndarray
-    written: np.ndarray
+def lift_N(source: PlateSource) -> np.ndarray:
+    """Vertical force as the file says, world frame, (n,)."""
+    return np.asarray(source.parts() @ source.matrix(AS_STATED)[2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +96,19 @@ class C3dPlate:
     def name(self) -> str:
         return self.description.name
 
-    def lift_N(self, reading: PlateReading = AS_STATED) -> np.ndarray:
-        axes = self.rotation_world_lab @ self.read_description(reading).rotation_lab_plate()
-        return np.asarray(self.wrench.force_N * reading.force_signs() @ axes[2])
+    def parts(self) -> np.ndarray:
+        return np.hstack([self.wrench.force_N, self.wrench.moment_Nm])
+
+    def matrix(self, reading: PlateReading) -> np.ndarray:
+        """Without the maker's correction of the centre of pressure, which is no linear one."""
+        description = self.read_description(reading)
+        axes = self.rotation_world_lab @ description.rotation_lab_plate()
+        force = reading.sign * axes * reading.force_signs()
+        to_surface = axes @ crossing(self._surface_m(reading)) @ axes.T
+        at_centre = crossing(self.rotation_world_lab @ description.centre_m()) - to_surface
+        scale = reading.sign * reading.moment_scale
+        moment = np.hstack([at_centre @ force, scale * axes * reading.moment_signs()])
+        return np.vstack([np.hstack([force, np.zeros((3, 3))]), moment])
 
     def at(self, samples: np.ndarray) -> C3dPlate:
         part = LocalWrench(self.wrench.force_N[samples], self.wrench.moment_Nm[samples])
@@ -110,17 +127,17 @@ class C3dPlate:
         corners = description.corners_m @ self.rotation_world_lab.T
         return Plate(self.name, reading.sign * force, reading.sign * moment, corners, self.usable)
 
-    def left_at_point(self, reading: PlateReading) -> None:
+    def level_matrices(self, reading: PlateReading) -> None:
         return None
 
     def lever_m(self, reading: PlateReading) -> np.ndarray:
-        return np.asarray(np.hypot(*self._wrench(reading).cop().T))
+        return np.hypot(*self.wrench.cop().T) * abs(reading.moment_scale)
 
     def in_place_of(self, other: PlateSource) -> C3dPlate:
         assert isinstance(other, C3dPlate)
         return replace(self, description=replace(other.description, name=self.name))
 
-    def floor_m(self, reading: PlateReading) -> float:
+    def floor_m(self, reading: PlateReading = AS_STATED) -> float:
         return float((self.description.corners_m @ self.rotation_world_lab.T)[:, 2].mean())
 
     def moved(self, change: np.ndarray, corners_only: bool = False) -> C3dPlate:
@@ -135,7 +152,7 @@ class C3dPlate:
     def alternatives(self) -> Iterable[PlateReading]:
         """Type 3 has no moments of its own, type 1 no point that they are about."""
         kind = self.description.kind
-        scales = (1.0,) if kind == 3 else (1.0, 1e-3, 1e3, -1.0)
+        scales = (1.0,) if kind == 3 else (1.0, 1e-3, 1e3, -1.0, -1e-3, -1e3)
         abouts: tuple[Reference, ...] = ("stated",)
         if kind in (2, 4) and self.description.origin_m[:2].any():
             abouts += ("reversed", "centred")
@@ -159,25 +176,21 @@ class C3dPlate:
         local *= [*(np.array(reading.half_size_m) / read.half_size_m()), 1.0]
         return replace(read, corners_m=read.centre_m() + local @ read.rotation_lab_plate().T)
 
-    def local_cop_m(self, reading: PlateReading) -> np.ndarray:
-        """Centre of pressure on the surface, plate frame, (n, 2)."""
-        return self._at_surface(reading).cop()
-
-    def _at_surface(self, reading: PlateReading) -> LocalWrench:
+    def _surface_m(self, reading: PlateReading) -> np.ndarray:
+        """From the sensor's origin to the surface, plate frame, (3,)."""
         offset = surface_offset_m(self.description)
         if reading.about != "stated":
             offset = offset * (np.array([-1, -1, 1]) if reading.about == "reversed" else [0, 0, 1])
             offset[2] *= abs(offset[2]) < _THICK_M
-        if self.z_up:
-            offset = offset * _Z
-        return self._wrench(reading).at_surface(offset)
+        return offset * _Z if self.z_up else offset
 
-    def _wrench(self, reading: PlateReading) -> LocalWrench:
-        """At the sensor's origin, before the sign of a reading."""
-        return LocalWrench(
+    def _at_surface(self, reading: PlateReading) -> LocalWrench:
+        """Before the sign of a reading."""
+        wrench = LocalWrench(
             self.wrench.force_N * reading.force_signs(),
             self.wrench.moment_Nm * reading.moment_signs() * reading.moment_scale,
         )
+        return wrench.at_surface(self._surface_m(reading))
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,24 +203,36 @@ class ForceOnPoint:
     name: str
     force_N: np.ndarray
     points: np.ndarray | None
-    moment: np.ndarray | None
+    moment: np.ndarray
     point_height: float  # median under load, in the points' unit
     points_move: bool
     usable: np.ndarray  # (n,) bool
     rotation_world_lab: np.ndarray  # (3, 3)
 
-    def lift_N(self, reading: PlateReading = AS_STATED) -> np.ndarray:
-        return np.asarray(self._force_N(reading) @ self.rotation_world_lab[2])
+    def parts(self) -> np.ndarray:
+        """Force, moment, and the products of point and force that make up their cross product."""
+        f = self.force_N
+        p = np.zeros_like(f) if self.points is None else self.points
+        products = p[:, [1, 2, 2, 0, 0, 1]] * f[:, [2, 1, 0, 2, 1, 0]]
+        return np.hstack([f, self.moment, products])
+
+    def matrix(self, reading: PlateReading) -> np.ndarray:
+        moment = self._scaled_moment(reading)
+        if self.points is not None:
+            left = self._left(reading)
+            if reading.about != "stated":
+                up = self.rotation_world_lab[2]
+                left = np.outer(up, up) @ left
+            moment = self._at_origin(reading) + left
+        turn = reading.sign * self.rotation_world_lab
+        return np.vstack([turn @ self._force(reading), turn @ moment])
 
     def at(self, samples: np.ndarray) -> ForceOnPoint:
-        def some(values: np.ndarray | None) -> np.ndarray | None:
-            return None if values is None else values[samples]
-
         return replace(
             self,
             force_N=self.force_N[samples],
-            points=some(self.points),
-            moment=some(self.moment),
+            points=None if self.points is None else self.points[samples],
+            moment=self.moment[samples],
             usable=self.usable[samples],
         )
 
@@ -222,22 +247,19 @@ class ForceOnPoint:
             self,
             force_N=_smooth(self.force_N, self.usable, sigma),
             points=points,
-            moment=None if self.moment is None else _smooth(self.moment, self.usable, sigma),
+            moment=_smooth(self.moment, self.usable, sigma),
         )
 
     def plate(self, reading: PlateReading) -> Plate:
-        turn = self.rotation_world_lab
-        force, moment = self._force_N(reading) @ turn.T, self._moment_Nm(reading) @ turn.T
-        return Plate(self.name, reading.sign * force, reading.sign * moment, None, self.usable)
+        force, moment = np.split(self.parts() @ self.matrix(reading).T, 2, axis=1)
+        return Plate(self.name, force, moment, None, self.usable)
 
-    def left_at_point(self, reading: PlateReading) -> LeftMoment | None:
-        """None where the points are no centres of pressure, or nothing is left to be seen."""
-        if self.moment is None or self.points is None or not self.points_move:
+    def level_matrices(self, reading: PlateReading) -> tuple[np.ndarray, np.ndarray] | None:
+        """None where the points are no centres of pressure."""
+        if self.points is None or not self.points_move:
             return None
-        turn = self.rotation_world_lab
-        left = self._left(reading) @ turn.T
-        written = self.moment @ turn.T * reading.moment_scale
-        return LeftMoment(np.hypot(*left.T[:2]), np.hypot(*written.T[:2]))
+        level = self.rotation_world_lab[:2]
+        return level @ self._left(reading), level @ self._scaled_moment(reading)
 
     def lever_m(self, reading: PlateReading) -> np.ndarray | None:
         """From the laboratory's origin, where points in too small a unit come to lie."""
@@ -249,27 +271,25 @@ class ForceOnPoint:
         assert isinstance(other, ForceOnPoint)
         return other.with_force(self)
 
-    def floor_m(self, reading: PlateReading) -> float:
+    def floor_m(self, reading: PlateReading = AS_STATED) -> float:
         return self.point_height * reading.point_scale
 
     def moved(self, change: np.ndarray, corners_only: bool = False) -> ForceOnPoint:
         """A moment turns the other way round in a mirror."""
         change = _in_lab(change, self.rotation_world_lab)
-        moment = None if self.moment is None else self.moment @ change.T * np.linalg.det(change)
         return replace(
             self,
             force_N=self.force_N @ change.T,
             points=None if self.points is None else self.points @ change.T,
-            moment=moment,
+            moment=self.moment @ change.T * np.linalg.det(change),
         )
 
     def alternatives(self) -> Iterable[PlateReading]:
         points = (1.0, 1e-3, 1e-2) if self.points is not None else (1.0,)
-        moments = (1.0, 1e-3, -1.0) if self.moment is not None else (1.0,)
         abouts: tuple[Reference, ...] = ("stated",)
-        if self.moment is not None and self.points is not None and self.points_move:
+        if self.points is not None and self.points_move:
             abouts += ("origin", "fixed")
-        for point, moment, about in product(points, moments, abouts):
+        for point, moment, about in product(points, (1.0, 1e-3, -1.0, -1e-3), abouts):
             yield PlateReading(moment_scale=moment, point_scale=point, about=about)
         for channel in CHANNELS[:3]:
             yield PlateReading(reversed_channel=channel)
@@ -283,10 +303,10 @@ class ForceOnPoint:
         turn = trials[0].rotation_world_lab
         forces, lefts = [], []
         for one in trials:
+            parts = one.parts()[one.usable]
             left = one._scaled_moment(reading) - one._at_origin(reading)
-            known = one.usable & np.isfinite(left).all(axis=1)
-            forces.append(one._force_N(reading)[known] @ turn.T)
-            lefts.append(left[known] @ turn.T)
+            forces.append(parts @ (turn @ one._force(reading)).T)
+            lefts.append(parts @ (turn @ left).T)
         force, left = np.concatenate(forces), np.concatenate(lefts)
         zero = np.zeros(len(force))
         # The horizontal part of centre x force, linear in the centre.
@@ -307,40 +327,33 @@ class ForceOnPoint:
         """These points with another force and its moment."""
         return replace(self, name=other.name, force_N=other.force_N, moment=other.moment)
 
-    def _moment_Nm(self, reading: PlateReading) -> np.ndarray:
-        """About the lab's origin, lab frame, (n, 3)."""
-        if self.points is None:
-            return self._scaled_moment(reading)
-        at_point = self._at_origin(reading)
-        if self.moment is None:
-            return at_point
-        left = self._left(reading)
-        if reading.about != "stated":
-            up = self.rotation_world_lab[2]
-            left = np.outer(left @ up, up)
-        return at_point + left
+    # From the parts, lab frame, (3, 12) each.
+
+    def _force(self, reading: PlateReading) -> np.ndarray:
+        return np.hstack([np.diag(reading.force_signs()), np.zeros((3, 9))])
+
+    def _scaled_moment(self, reading: PlateReading) -> np.ndarray:
+        return np.hstack([_NONE, reading.moment_scale * np.eye(3), _NONE, _NONE])
+
+    def _at_origin(self, reading: PlateReading) -> np.ndarray:
+        """Moment of the force at its point about the lab's origin."""
+        signs = reading.force_signs()[[2, 1, 0, 2, 1, 0]]
+        return np.hstack([_NONE, _NONE, reading.point_scale * _CROSS_PRODUCT * signs])
 
     def _left(self, reading: PlateReading) -> np.ndarray:
-        """Moment at the point, lab frame, (n, 3)."""
+        """Moment at the point."""
         left = self._scaled_moment(reading)
         if reading.about == "stated":
             return left
         left = left - self._at_origin(reading)
         if reading.centre_m is not None:
-            left = left + np.cross(np.array(reading.centre_m), self._force_N(reading))
+            left = left + crossing(np.array(reading.centre_m)) @ self._force(reading)
         return left
 
-    def _at_origin(self, reading: PlateReading) -> np.ndarray:
-        """Moment of the force at its point about the lab's origin, (n, 3)."""
-        assert self.points is not None
-        return np.asarray(np.cross(self.points * reading.point_scale, self._force_N(reading)))
 
-    def _force_N(self, reading: PlateReading) -> np.ndarray:
-        return self.force_N * reading.force_signs()
-
-    def _scaled_moment(self, reading: PlateReading) -> np.ndarray:
-        assert self.moment is not None
-        return self.moment * reading.moment_scale
+_NONE = np.zeros((3, 3))
+# y Fz, z Fy, z Fx, x Fz, x Fy, y Fx make up a point's moment.
+_CROSS_PRODUCT = np.array([[1, -1, 0, 0, 0, 0], [0, 0, 1, -1, 0, 0], [0, 0, 0, 0, 1, -1]])
 
 
 def _in_lab(change: np.ndarray, rotation_world_lab: np.ndarray) -> np.ndarray:

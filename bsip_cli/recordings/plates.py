@@ -41,8 +41,8 @@ class PlateDescription:
         """Columns are the plate's axes in the lab frame, (3, 3)."""
         c = self.corners_m
         x, y = c[0] - c[1], c[0] - c[3]
-        z = np.cross(x, y)
-        axes = np.array([x, np.cross(z, x), z]).T
+        z = crossing(x) @ y
+        axes = np.array([x, crossing(z) @ x, z]).T
         return axes / np.linalg.norm(axes, axis=0)
 
 
@@ -60,20 +60,26 @@ class LocalWrench:
         """
         return replace(self, moment_Nm=self.moment_Nm + np.cross(self.force_N, origin_m))
 
-    def scaled(self, moment_factor: float) -> LocalWrench:
-        return replace(self, moment_Nm=self.moment_Nm * moment_factor)
-
     def cop(self) -> np.ndarray:
         """Centre of pressure on the surface, plate frame, (n, 2); NaN without load."""
         return cop_at_height(self.force_N, self.moment_Nm, 0.0)
 
 
-def cop_at_height(force_N: np.ndarray, moment_Nm: np.ndarray, height_m: float) -> np.ndarray:
-    """Where the wrench about the origin pierces the plane z = height without Mx, My, (n, 2)."""
-    fz = np.where(np.abs(force_N[:, 2]) > _LEAST_FORCE_N, force_N[:, 2], np.nan)
-    x = (-moment_Nm[:, 1] + height_m * force_N[:, 0]) / fz
-    y = (moment_Nm[:, 0] + height_m * force_N[:, 1]) / fz
-    return np.column_stack([x, y])
+def crossing(vector: np.ndarray) -> np.ndarray:
+    """The matrix (3, 3) whose product with another vector is the cross product."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def cop_at_height(
+    force_N: np.ndarray, moment_Nm: np.ndarray, height_m: float | np.ndarray
+) -> np.ndarray:
+    """Where wrenches (..., 3) about the origin pierce the plane z = height without Mx, My,
+    (..., 2)."""
+    fz = np.where(np.abs(force_N[..., 2]) > _LEAST_FORCE_N, force_N[..., 2], np.nan)
+    x = (-moment_Nm[..., 1] + height_m * force_N[..., 0]) / fz
+    y = (moment_Nm[..., 0] + height_m * force_N[..., 1]) / fz
+    return np.stack([x, y], axis=-1)
 
 
 def local_wrench(kind: int, channels: np.ndarray, plate: PlateDescription) -> LocalWrench:
@@ -127,14 +133,6 @@ _BY_TYPE: dict[int, Callable[[np.ndarray, PlateDescription], LocalWrench]] = {
     3: _type_3,
     4: _six_components,
 }
-
-
-def inside_share(cop_m: np.ndarray, half_size_m: np.ndarray, tolerance_m: float = 0.005) -> float:
-    """Share of the centres of pressure (n, 2) inside the plate's rectangle; NaN if none."""
-    known = cop_m[np.isfinite(cop_m).all(axis=1)]
-    if not len(known):
-        return float("nan")
-    return float((np.abs(known) <= half_size_m + tolerance_m).all(axis=1).mean())
 
 
 def to_world(

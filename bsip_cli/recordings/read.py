@@ -8,7 +8,9 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.files.regular import check_regular
 from bsip_cli.recordings.assemble import assemble
 from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.settle import Opened, SessionReading, Survey, settle_session
+from bsip_cli.recordings.opened import Opened
+from bsip_cli.recordings.settle import SessionReading, settle_session
+from bsip_cli.recordings.trial_samples import TrialSamples
 
 
 def read_recording(path: Path, session: SessionReading | None = None) -> Recording:
@@ -17,7 +19,7 @@ def read_recording(path: Path, session: SessionReading | None = None) -> Recordi
     ``session`` says how its numbers are to be understood; without it this trial alone decides.
     """
     opened = open_recording(path)
-    return assemble(opened, session or settle_session([Survey.of(opened)]))
+    return assemble(opened, session or settle_session([TrialSamples.of(opened)]))
 
 
 def open_recording(path: Path) -> Opened:

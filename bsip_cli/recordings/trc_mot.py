@@ -15,10 +15,10 @@ from bsip_cli.recordings.analog import spike_samples
 from bsip_cli.recordings.force_times import UNEVEN, MarkerTimes, settle_force_times
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
+from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.plate_reading import PlateReading
 from bsip_cli.recordings.plate_source import ForceOnPoint, points_that_move
 from bsip_cli.recordings.plates import LOADED_N
-from bsip_cli.recordings.settle import Opened
 from bsip_cli.recordings.timebase import (
     FRAMES,
     MOST_HZ,

@@ -10,11 +10,10 @@ the vertical moment over the force is 3 mm, in golf swings 60.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from bsip_cli.recordings.plate_source import LeftMoment
 from bsip_cli.recordings.plates import cop_at_height
 
 BESIDE_M = 0.12
@@ -30,100 +29,71 @@ _FURTHEST_M = 1e4
 _LOW_M = 0.17  # ankles and below
 _LIFT_M = 0.035  # over a marker's own lowest height: the foot is in the air
 _RIM_M = 0.05
+# A distance is short by 1 - cos(2.5 degrees), a thousandth, between two of these.
+_ANGLES = np.deg2rad(np.arange(0.0, 360.0, 5.0))
+_DIRECTIONS = np.array([np.cos(_ANGLES), np.sin(_ANGLES)])  # (2, k)
 
 
 @dataclass(frozen=True, eq=False)
 class Feet:
-    """Horizontal places of foot markers on the ground, (n, k, 2); NaN: in the air, unseen."""
+    """Horizontal places of foot markers on the ground, (n, k, 2); NaN: in the air, unseen.
+
+    sides : whose they are, "l", "r" or empty, k of them.
+    """
 
     points_m: np.ndarray
+    sides: tuple[str, ...]
 
     @classmethod
-    def of(cls, markers_m: np.ndarray, frames: np.ndarray, floor_m: float) -> Feet:
+    def of(
+        cls, markers_m: np.ndarray, sides: Sequence[str], frames: np.ndarray, floor_m: float
+    ) -> Feet:
         """From a trial's markers (n_frames, n_markers, 3), world frame, at some frames (n,)."""
         height = markers_m[..., 2] - floor_m
         lowest = _lowest(height)
         feet = np.flatnonzero(lowest < _LOW_M)
         points = markers_m[np.ix_(frames, feet)][..., :2].copy()
         points[height[np.ix_(frames, feet)] - lowest[feet] > _LIFT_M] = np.nan
-        return cls(points)
+        return cls(points, tuple(sides[k] for k in feet.tolist()))
 
     def on(self, corners_m: np.ndarray | None) -> Feet:
         """Those on a plate of these corners (4, 3), where any are, else all."""
         if corners_m is None:
             return self
-        centre = corners_m.mean(axis=0)[:2]
-        inside: np.ndarray = np.ones(self.points_m.shape[:2], bool)
-        for side in (corners_m[0] - corners_m[1], corners_m[0] - corners_m[3]):
-            length = np.linalg.norm(side[:2])
-            along = (self.points_m - centre) @ side[:2] / length
-            inside &= np.abs(along) <= length / 2 + _RIM_M
-        kept = np.where(inside[..., None], self.points_m, np.nan)
+        beyond = _beyond(self.points_m, corners_m)
+        inside = (beyond <= _RIM_M).all(axis=-1)
         some = np.any(inside, axis=1, keepdims=True)
-        return Feet(np.where(some[..., None], kept, self.points_m))
+        points = np.where((inside | ~some)[..., None], self.points_m, np.nan)
+        return replace(self, points_m=points)
+
+    def at(self, samples: np.ndarray) -> Feet:
+        return replace(self, points_m=self.points_m[samples])
 
     def moved(self, change: np.ndarray) -> Feet:
         """In other axes of the world (3, 3)."""
-        return Feet(self.points_m @ change[:2, :2].T)
+        return replace(self, points_m=self.points_m @ change[:2, :2].T)
 
-    def area(self) -> Area:
-        """The smallest convex area that holds the markers, at each of the n samples."""
-        hulls = [_hull(points[np.isfinite(points).all(axis=1)]) for points in self.points_m]
-        most = max((len(hull) for hull in hulls), default=0)
-        corners = np.full((len(hulls), most + 1, 2), np.nan)
-        for row, hull in zip(corners, hulls, strict=True):
-            row[: len(hull)] = hull
-            row[len(hull) :] = hull[:1] if len(hull) else np.nan  # closed
-        return Area(corners)
+    def distance_m(self, places_m: np.ndarray, apart: np.ndarray) -> np.ndarray:
+        """Of places (..., n, 2) from the convex area of the markers, 0 inside, NaN without any;
+        from that of the nearer foot where each stands ``apart`` (n,), on a plate of its own."""
+        both = self._distance_m(places_m, [True] * len(self.sides))
+        if not {"l", "r"} <= set(self.sides):
+            return both
+        each = [self._distance_m(places_m, [one != other for one in self.sides]) for other in "lr"]
+        nearer = np.fmin(*each)
+        return np.where(apart & np.isfinite(nearer), nearer, both)
 
-
-@dataclass(frozen=True, eq=False)
-class Area:
-    """Convex areas, (n, h + 1, 2): corners counter-clockwise, the first one again; NaN: none."""
-
-    corners_m: np.ndarray
-
-    def at(self, samples: np.ndarray) -> Area:
-        return Area(self.corners_m[samples])
-
-    def distance_m(self, places_m: np.ndarray) -> np.ndarray:
-        """Of places (n, 2), 0 inside, NaN where there is no area, (n,)."""
-        start, end = self.corners_m[:, :-1], self.corners_m[:, 1:]
-        if not start.shape[1]:
-            return np.full(len(places_m), np.nan)
-        along, offset = end - start, places_m[:, None] - start
-        length2 = (along**2).sum(axis=-1)
-        share = (offset * along).sum(axis=-1) / np.where(length2 > 0, length2, 1.0)
-        gap = np.linalg.norm(offset - np.clip(share, 0, 1)[..., None] * along, axis=-1).min(axis=1)
-        left = along[..., 0] * offset[..., 1] - along[..., 1] * offset[..., 0]
-        is_area = (length2 > 0).sum(axis=1) >= 3
-        return np.where(is_area & (left >= 0).all(axis=1), 0.0, gap)
-
-
-def _hull(points: np.ndarray) -> np.ndarray:
-    """Corners of the convex hull of points (k, 2), counter-clockwise (Andrew's monotone chain)."""
-    ordered = sorted({(x, y) for x, y in points.tolist()})
-    if len(ordered) < 3:
-        return np.array(ordered).reshape(-1, 2)
-    chains: list[list[tuple[float, float]]] = []
-    for some in (ordered, ordered[::-1]):
-        chain: list[tuple[float, float]] = []
-        for point in some:
-            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0:
-                chain.pop()
-            chain.append(point)
-        chains.append(chain[:-1])
-    return np.array(chains[0] + chains[1])
-
-
-def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    """Positive where a, b, c turn left."""
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    def _distance_m(self, places_m: np.ndarray, columns: Sequence[bool]) -> np.ndarray:
+        """The largest, over all directions, by which a place lies further out than every marker."""
+        reach = self.points_m[:, np.array(columns, bool)] @ _DIRECTIONS  # (n, k, directions)
+        furthest = np.max(np.where(np.isfinite(reach), reach, -np.inf), axis=1, initial=-np.inf)
+        beyond = np.max(places_m @ _DIRECTIONS - furthest, axis=-1)
+        return np.where(np.isfinite(beyond), np.maximum(beyond, 0.0), np.nan)
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a reading makes of a plate's numbers in one trial [m]; NaN where it cannot be known.
+    """What a reading makes of a plate's numbers [m]; NaN where it cannot be known.
 
     distance_m : of the centre of pressure from the feet, mean; outside_m : from the outline, mean;
     sway_m : its standard deviation; lever_m : its distance from the sensor as the moments have it;
@@ -139,82 +109,97 @@ class Evidence:
     level_m: float
     level_share: float
 
-    def log_likelihood(self) -> float:
-        """Up to a constant: how likely a person's foot makes such numbers, natural logarithm."""
-        terms = [
-            -2.0 * np.log1p((size / scale) ** 2)
-            for size, scale in (
-                (self.distance_m, _DISTANCE_M),
-                (self.torque_m, _TORQUE_M),
-                (self.level_m, _LEVEL_M),
-            )
-        ]
-        outside = -2.0 * np.log1p((self.outside_m / _DISTANCE_M) ** 2)
-        terms.append(np.clip(outside, _OUTLINE, 0.0))
-        terms.append(self.lever_log_likelihood())
-        terms.append(-_INDEPENDENT * np.log(np.maximum(self.level_share, _LEAST_SHARE)))
-        return float(np.nansum(terms))
 
-    def lever_log_likelihood(self) -> float:
-        """The part of how the moments go with a lever about the sensor: it tells readings from one
-        another, and no person from nobody, since a file may give moments about its own origin."""
-        return float(2.0 * np.log(np.clip(self.lever_m / _LEVER_M, _LEAST, 1.0)))
-
-    @classmethod
-    def mean(cls, found: Sequence[Evidence]) -> Evidence:
-        """Over several trials, of what is known in them."""
-        rows = np.array([[getattr(one, f.name) for f in fields(cls)] for one in found])
-        known = np.isfinite(rows)
-        count = np.where(known.any(axis=0), known.sum(axis=0), np.nan)
-        return cls(*(np.where(known, rows, 0.0).sum(axis=0) / count).tolist())
+FIELDS = tuple(field.name for field in fields(Evidence))
 
 
 def evidence(
-    force_N: np.ndarray,
-    moment_Nm: np.ndarray,
-    left: LeftMoment | None,
-    lever_m: np.ndarray | None,
-    feet: Area,
+    wrench: np.ndarray,
+    floor_m: np.ndarray,
+    feet: Feet,
+    apart: np.ndarray,
     corners_m: np.ndarray | None,
-    floor_m: float,
-) -> Evidence:
-    """Of loaded samples: force (n, 3), moment about the world origin (n, 3), the feet on
-    its place.
+    lever_m: np.ndarray | None,
+    level_Nm: tuple[np.ndarray, np.ndarray] | None,
+) -> np.ndarray:
+    """What each of r readings makes of n loaded samples, (r, 7): columns as in `Evidence`.
 
-    ``left``: what is left at the points that the file calls centres of pressure; ``lever_m`` (n,):
-    from the sensor to where its moments have the force, None where there is no sensor.
+    wrench : (r, n, 6), about the world's origin. floor_m : (r,). feet : on the plate's place.
+    apart : (n,), where each foot stands on a plate of its own.
+    lever_m : (r, n), from the sensor to where its moments have the force; None without a sensor.
+    level_Nm : horizontal moment (r, n) at the points that the file calls centres of pressure, as
+    read and as written; None without such points.
     """
-    cop = np.clip(cop_at_height(force_N, moment_Nm, floor_m), -_FURTHEST_M, _FURTHEST_M)
-    known = np.isfinite(cop).all(axis=1)
+    force, moment = wrench[..., :3], wrench[..., 3:]
+    load = np.abs(force[..., 2])
+    cop = np.clip(cop_at_height(force, moment, floor_m[:, None]), -_FURTHEST_M, _FURTHEST_M)
+    known = np.isfinite(cop).all(axis=(0, 2))
     if not known.any():
-        return Evidence(*[np.nan] * len(fields(Evidence)))
-    load = np.abs(force_N[:, 2])
-    torque = moment_Nm[:, 2] - cop[:, 0] * force_N[:, 1] + cop[:, 1] * force_N[:, 0]
-    gap = feet.distance_m(cop)
-    return Evidence(
-        distance_m=float(np.nanmean(gap)) if np.isfinite(gap).any() else np.nan,
-        outside_m=np.nan if corners_m is None else float(np.nanmean(_outside(cop, corners_m))),
-        sway_m=_spread(cop[known]),
-        lever_m=np.nan if lever_m is None else float(np.sqrt(np.nanmean(lever_m**2))),
-        torque_m=float(np.nanmedian(np.abs(torque) / load)),
-        level_m=np.nan if left is None else float(np.nanmedian(left.read / load)),
-        level_share=np.nan if left is None else _share(left, load),
-    )
+        return np.full((len(wrench), len(FIELDS)), np.nan)
+    force, moment, load, cop = (x[:, known] for x in (force, moment, load, cop))
+    torque = moment[..., 2] - cop[..., 0] * force[..., 1] + cop[..., 1] * force[..., 0]
+    table = np.full((len(FIELDS), len(wrench)), np.nan)
+    table[0] = _mean(feet.at(known).distance_m(cop, apart[known]))
+    if corners_m is not None:
+        table[1] = _mean(np.linalg.norm(_beyond(cop, corners_m), axis=-1))
+    table[2] = _spread(cop)
+    if lever_m is not None:
+        table[3] = np.sqrt(_mean(lever_m[:, known] ** 2))
+    table[4] = np.median(np.abs(torque) / load, axis=1)
+    if level_Nm is not None:
+        read, written = (x[:, known] for x in level_Nm)
+        table[5], table[6] = np.median(read / load, axis=1), _left_share(read, written, load)
+    return table.T
 
 
-def _spread(places_m: np.ndarray) -> float:
-    """Standard deviation of places (n, 2) about their median, 0 where nothing is known."""
-    known = places_m[np.isfinite(places_m).all(axis=1)]
-    if not len(known):
-        return 0.0
-    return float(np.sqrt(np.mean(np.sum((known - np.median(known, axis=0)) ** 2, axis=1))))
+def log_likelihood(found: np.ndarray) -> np.ndarray:
+    """Up to a constant: how likely a person's foot makes such numbers (..., 7), logarithm."""
+    distance, outside, _, _, torque, level, share = np.moveaxis(found, -1, 0)
+    terms = [
+        _falling(distance, _DISTANCE_M),
+        np.clip(_falling(outside, _DISTANCE_M), _OUTLINE, 0.0),
+        lever_log_likelihood(found),
+        _falling(torque, _TORQUE_M),
+        _falling(level, _LEVEL_M),
+        -_INDEPENDENT * np.log(np.maximum(share, _LEAST_SHARE)),
+    ]
+    return np.nansum(terms, axis=0)
 
 
-def _share(left: LeftMoment, load_N: np.ndarray) -> float:
+def lever_log_likelihood(found: np.ndarray) -> np.ndarray:
+    """The part of how the moments go with a lever about the sensor: it tells readings from one
+    another, and no person from nobody, since a file may give moments about its own origin."""
+    return np.nan_to_num(2.0 * np.log(np.clip(found[..., 3] / _LEVER_M, _LEAST, 1.0)))
+
+
+def mean_evidence(found: np.ndarray) -> Evidence:
+    """Over several trials (n, 7), of what is known in them."""
+    return Evidence(*_mean(found.T).tolist())
+
+
+def _falling(size: np.ndarray, scale: float) -> np.ndarray:
+    return -2.0 * np.log1p((size / scale) ** 2)
+
+
+def _mean(values: np.ndarray) -> np.ndarray:
+    """Over the last axis, of what is known; NaN if nothing is."""
+    known = np.isfinite(values)
+    count = known.sum(axis=-1)
+    total = np.where(known, values, 0.0).sum(axis=-1)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _spread(places_m: np.ndarray) -> np.ndarray:
+    """Standard deviation of places (r, n, 2) about their median, (r,)."""
+    away = places_m - np.median(places_m, axis=1, keepdims=True)
+    return np.sqrt((away**2).sum(axis=-1).mean(axis=-1))
+
+
+def _left_share(read: np.ndarray, written: np.ndarray, load_N: np.ndarray) -> np.ndarray:
     """Root mean square of what is left over that of what is written, to a hair of the force."""
-    hair = _HAIR_M * load_N.mean()
-    read, written = (np.sqrt(np.nanmean(x**2)) for x in (left.read, left.written))
-    return float((read + hair) / (written + hair))
+    hair = _HAIR_M * load_N.mean(axis=-1)
+    left, whole = (np.sqrt((x**2).mean(axis=-1)) for x in (read, written))
+    return (left + hair) / (whole + hair)
 
 
 def _lowest(height_m: np.ndarray) -> np.ndarray:
@@ -224,12 +209,15 @@ def _lowest(height_m: np.ndarray) -> np.ndarray:
     return np.array([np.percentile(z[k], 2) if k.any() else np.inf for z, k in columns])
 
 
-def _outside(cop_m: np.ndarray, corners_m: np.ndarray) -> np.ndarray:
-    """Distance of centres of pressure (n, 2) from the outline, 0 inside, (n,)."""
-    centre = corners_m.mean(axis=0)[:2]
-    beyond = np.zeros(len(cop_m))
-    for side in (corners_m[0] - corners_m[1], corners_m[0] - corners_m[3]):
-        length = np.linalg.norm(side[:2])
-        along = np.abs((cop_m - centre) @ side[:2] / length)
-        beyond = np.hypot(beyond, np.maximum(along - length / 2, 0.0))
-    return beyond
+def outline(places_m: np.ndarray, corners_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How far places (..., 2) are from a plate's middle along its sides, (..., 2), and half of
+    these sides, (2,)."""
+    sides = np.array([corners_m[0] - corners_m[1], corners_m[0] - corners_m[3]])[:, :2]
+    length = np.linalg.norm(sides, axis=1)
+    return np.abs((places_m - corners_m.mean(axis=0)[:2]) @ (sides.T / length)), length / 2
+
+
+def _beyond(places_m: np.ndarray, corners_m: np.ndarray) -> np.ndarray:
+    """How far places (..., 2) lie outside an outline, along its sides, (..., 2)."""
+    along, half = outline(places_m, corners_m)
+    return np.maximum(along - half, 0.0)

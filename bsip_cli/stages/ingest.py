@@ -24,6 +24,7 @@ from bsip_cli.recordings.force_balance import agreeing_mass
 from bsip_cli.recordings.free_plates import nobody_near
 from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps
 from bsip_cli.recordings.labels import match_labels
+from bsip_cli.recordings.lateral_medial import with_pairs_named
 from bsip_cli.recordings.marker_guess import guess_marker_set
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.momentum_mass import Stretch, stretches_of, upright_frames
@@ -46,6 +47,10 @@ def run(unit: Unit) -> None:
     session = reading_of(unit, unit.trial)
     recording = assemble(opened, session)
     marker_set, told = _marker_set(unit, recording)
+    labels, paired = with_pairs_named(
+        recording.labels, recording.markers_m, marker_set, _prefix(unit)
+    )
+    recording = replace(recording, labels=labels)
     match = match_labels(
         recording.labels,
         marker_set.wanted(),
@@ -56,7 +61,7 @@ def run(unit: Unit) -> None:
     names = [marker.label for marker in marker_set.markers if marker.label in match.index]
     _require(unit, names, recording)
     recording, repeats = without_repeats(recording)
-    findings = [*recording.findings, *told, *match.findings, *repeats]
+    findings = [*recording.findings, *told, *paired, *match.findings, *repeats]
     if unit.config.ingest.zero_unloaded_plates:
         recording, zeroed = _without_zero(recording)
         findings += zeroed

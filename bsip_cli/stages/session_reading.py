@@ -6,8 +6,9 @@ from dataclasses import asdict, fields
 
 import pandas as pd
 
+from bsip_cli.recordings.frame_change import FrameChange
 from bsip_cli.recordings.plate_reading import PlateReading
-from bsip_cli.recordings.settle import Scene, SessionReading, Verdict
+from bsip_cli.recordings.settle import SessionReading, Verdict
 from bsip_cli.recordings.under_the_feet import Evidence
 from bsip_cli.running.unit import Unit
 from bsip_cli.study.study import Trial
@@ -17,9 +18,9 @@ _EVIDENCE = tuple(field.name for field in fields(Evidence))
 
 def rows_of(session: str, reading: SessionReading) -> list[dict]:
     """One row per plate; one without a name where none was loaded."""
-    scene = {"session": session, **asdict(reading.scene)}
+    frame = {"session": session, **asdict(reading.frame)}
     plates = reading.plates or {"": Verdict()}
-    return [scene | {"plate": name} | _row(verdict) for name, verdict in plates.items()]
+    return [frame | {"plate": name} | _row(verdict) for name, verdict in plates.items()]
 
 
 def _row(verdict: Verdict) -> dict:
@@ -36,6 +37,7 @@ def _row(verdict: Verdict) -> dict:
         "half_size_y_m": half_y,
         "refusal": verdict.refusal,
         "rivals": "|".join(verdict.rivals),
+        "doubted": verdict.doubted,
         "repeats": " ".join(verdict.repeats),
     }
     unknown = Evidence(*[nothing] * len(_EVIDENCE))
@@ -68,6 +70,7 @@ def _verdict(row: dict) -> Verdict:
         after,
         refusal=row["refusal"],
         rivals=tuple(filter(None, row["rivals"].split("|"))),
+        doubted=row["doubted"],
         repeats=tuple(row["repeats"].split()),
     )
 
@@ -79,6 +82,11 @@ def reading_of(unit: Unit, trial: Trial) -> SessionReading:
     if not rows:
         return SessionReading()
     first = rows[0]
-    turns, corners_only = int(first["quarter_turns"]), bool(first["corners_only"])
-    scene = Scene(first["moved"], int(first["axis"]), turns, corners_only)
-    return SessionReading(scene, {row["plate"]: _verdict(row) for row in rows if row["plate"]})
+    frame = FrameChange(
+        first["moved"],
+        int(first["axis"]),
+        first["turned_deg"],
+        first["turned_sd_deg"],
+        bool(first["corners_only"]),
+    )
+    return SessionReading(frame, {row["plate"]: _verdict(row) for row in rows if row["plate"]})

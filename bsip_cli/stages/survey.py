@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import pandas as pd
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.assemble import findings_about
+from bsip_cli.recordings.gate_limits import GateLimits
 from bsip_cli.recordings.person_size import no_person
 from bsip_cli.recordings.read import open_recording
-from bsip_cli.recordings.settle import Survey, settle_session
+from bsip_cli.recordings.settle import settle_session
+from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
 from bsip_cli.stages.session_reading import rows_of
@@ -19,6 +23,8 @@ def run(unit: Unit) -> None:
     """Look at every recording of the participant; write readings, decided for each session."""
     assert unit.participant is not None
     rows: list[dict] = []
+    options = unit.config.ingest
+    limits = GateLimits(**{one.name: getattr(options, one.name) for one in fields(GateLimits)})
     for session in dict.fromkeys(trial.session for trial in unit.participant.trials):
         seen = [
             survey
@@ -28,7 +34,7 @@ def run(unit: Unit) -> None:
         if not seen:
             continue
         _require_size(unit, seen)
-        reading = settle_session(seen)
+        reading = settle_session(seen, limits)
         rows += rows_of(session or "", reading)
         whose = f"{unit.name}, session {session}" if session else unit.name
         for finding in findings_about(reading):
@@ -36,7 +42,7 @@ def run(unit: Unit) -> None:
     unit.write("readings", pd.DataFrame(rows, columns=column_names("readings")))
 
 
-def _require_size(unit: Unit, seen: list[Survey]) -> None:
+def _require_size(unit: Unit, seen: list[TrialSamples]) -> None:
     """The markers are those of somebody as tall as stated, or as people are."""
     assert unit.participant is not None
     heights = [one.height_m for one in seen if one.height_m is not None]
@@ -45,10 +51,10 @@ def _require_size(unit: Unit, seen: list[Survey]) -> None:
         raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
 
 
-def _survey(unit: Unit, trial: Trial) -> Survey | None:
+def _survey(unit: Unit, trial: Trial) -> TrialSamples | None:
     """None where the recording cannot be read: its own turn will say why."""
     try:
         opened = open_recording(trial.path)
     except BadDataError:
         return None
-    return Survey.of(opened.with_plates(unit.config.ingest.plates))
+    return TrialSamples.of(opened.with_plates(unit.config.ingest.plates))

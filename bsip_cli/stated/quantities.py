@@ -19,8 +19,8 @@ class Quantity:
     """A mass or a height: its column, the limits [SI] of what people have, and units [SI].
 
     ``names`` are what people call it, in small letters and without blanks.
-    ``guessed`` are units that are looked for where none is stated, ``slips`` those of the same
-    system that are looked for where the stated one cannot be.
+    ``guessed`` are units that are looked for where none is stated, ``slips`` those that are looked
+    for where the stated one cannot be.
     """
 
     column: str
@@ -59,7 +59,7 @@ HEIGHT = Quantity(
     2.6,
     {"m": 1.0, "cm": 0.01, "mm": 1e-3, "in": 0.0254, "ft": 0.3048},
     ("m", "cm", "mm", "in"),  # 5.4 may be feet or 5 ft 4 in
-    ("m", "cm", "mm"),
+    ("m", "cm", "mm", "in"),
     "height stature bodyheight grösse größe groesse körpergrösse körpergröße koerpergroesse "
     "taille talla altura estatura altezza statura",
 )

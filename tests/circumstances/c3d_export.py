@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -35,6 +36,20 @@ def write_c3d(path: Path, session: Session, trial: Trial, export: Export, seed: 
     _add_plates(content, session, trial, export)
     content.add_parameter("SUBJECTS", "NAMES", [""])
     content.write(str(path))
+    if export.residuals == "negative":
+        _mark_all_invalid(path, len(session.labels), len(trial.time_s))
+
+
+def _mark_all_invalid(path: Path, n_points: int, n_frames: int) -> None:
+    """Residual -1 in every point, coordinates kept, as files have it; ezc3d writes NaN there."""
+    data = bytearray(path.read_bytes())
+    start = (struct.unpack_from("<H", data, 16)[0] - 1) * 512
+    samples = struct.unpack_from("<H", data, 4)[0]  # analog values of a frame
+    size = 4 * (4 * n_points + samples)
+    for frame in range(n_frames):
+        for point in range(n_points):
+            struct.pack_into("<f", data, start + frame * size + 16 * point + 12, -1.0)
+    path.write_bytes(data)
 
 
 def _add_points(

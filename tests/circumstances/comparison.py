@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import convolve1d
 from scipy.optimize import linear_sum_assignment
 
 from tests.circumstances.sound import Trial
@@ -149,7 +149,7 @@ def _forces(
     use: np.ndarray,
     weight_N: float,
 ) -> dict[str, str]:
-    true = _truth_wrenches(truth)[frames][use]
+    true = truth_wrenches(truth)[frames][use]
     plates = np.stack([lab.wrench(w)[use] for w in taken.plates.values()], axis=1)
     wrong = _one_wrench(lab.wrench(taken.wrench)[use], true.sum(axis=1), weight_N, "all plates")
     plates = np.nan_to_num(plates)
@@ -173,11 +173,16 @@ def _plate_by_plate(
     return wrong
 
 
-def _truth_wrenches(truth: Trial) -> np.ndarray:
-    """(frames, plates, 6), averaged over a frame's time."""
+def truth_wrenches(truth: Trial) -> np.ndarray:
+    """(frames, plates, 6), averaged over a frame's time, half of it before and half after."""
     wrench = np.concatenate([truth.force_N, truth.moment_Nm], axis=2)
-    per_frame = round(len(truth.analog_s) / len(truth.time_s))
-    return uniform_filter1d(wrench, size=max(per_frame, 1), axis=0)[::per_frame]
+    per_frame = max(round(len(truth.analog_s) / len(truth.time_s)), 1)
+    # An even number of samples has no middle one: the two at the ends count half.
+    weights = np.ones(per_frame + 1)
+    weights[[0, -1]] = 0.5
+    if per_frame % 2:
+        weights = np.ones(per_frame)
+    return convolve1d(wrench, weights / weights.sum(), axis=0, mode="nearest")[::per_frame]
 
 
 def _one_wrench(found: np.ndarray, true: np.ndarray, weight_N: float, name: str) -> dict[str, str]:

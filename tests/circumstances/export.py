@@ -57,7 +57,7 @@ class Export:
     label: Callable[[str], str] = str
     missing: str = "nan"  # zero, held, or a number
     hidden_share: float = 0.0
-    residuals: str = "normal"  # negative, zero
+    residuals: str = "normal"  # negative: of all points
     unnamed: int = 0
     # MOT
     mot_columns: str = "ground_force_{n}_v{a} ground_force_{n}_p{a} ground_torque_{n}_{a}"

@@ -32,8 +32,7 @@ def stored_points(points_m: np.ndarray, export: Export, seed: int) -> tuple[np.n
     else:
         points[lost] = float(export.missing)
     normal = np.where(lost & (export.missing == "nan"), -1.0, 0.0)
-    residuals = {"normal": normal, "zero": 0 * normal, "negative": 0 * normal - 1.0}
-    return points, residuals[export.residuals]
+    return points, normal
 
 
 def _held(points: np.ndarray, lost: np.ndarray) -> np.ndarray:

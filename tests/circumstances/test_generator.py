@@ -7,6 +7,7 @@ import ezc3d
 import numpy as np
 import pytest
 
+from bsip_cli.recordings.c3d_content import read_content
 from tests.circumstances.generator import draw, sound_export, write
 from tests.circumstances.judge import (
     CRASHED,
@@ -112,3 +113,15 @@ def test_a_sound_c3d_says_what_the_truth_is(tmp_path):
     np.testing.assert_allclose(points, trial.markers_m, atol=1e-6)
     total = sum(plate["force"].T for plate in content["data"]["platform"])
     np.testing.assert_allclose(total, trial.force_N.sum(axis=1), atol=0.01)
+
+
+def test_invalid_points_keep_their_coordinates(tmp_path):
+    circumstance = next(
+        c for n in range(50) if len((c := draw(SEED, n, "residuals_negative")).things) == 1
+    )
+    write([circumstance], tmp_path / "study")
+    trial = circumstance.truth.trials[0]
+    file = tmp_path / "study" / circumstance.participant
+    content = read_content(file / f"{circumstance.participant}_{trial.name}.c3d")
+    assert not content.is_valid.any()
+    np.testing.assert_allclose(content.positions / 1000, trial.markers_m, atol=1e-6)

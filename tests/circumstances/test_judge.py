@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.circumstances.comparison import compare
+from tests.circumstances.comparison import compare, truth_wrenches
 from tests.circumstances.generator import draw
 from tests.circumstances.judge import (
     DISTURBED,
@@ -192,3 +192,12 @@ def test_a_mass_in_pounds_needs_a_word():
     assert outcome_of(pounds, lambda t: t) == WRONG
     said = word("warning", "plate_mass: 76 kg on the plates, the stated 168 kg look like pounds")
     assert outcome_of(pounds, lambda t: t, said) != WRONG
+
+
+@pytest.mark.parametrize("per_frame", [1, 2, 5, 8])
+def test_the_truth_at_a_frame_is_not_late(circumstance, per_frame):
+    """A force that rises evenly is at each frame what it is at its time."""
+    trial = circumstance.truth.trials[0].sampled(100.0, per_frame)
+    rising = np.broadcast_to(trial.analog_s[:, None, None], trial.force_N.shape)
+    found = truth_wrenches(replace(trial, force_N=rising))[1:-1, 0, 0]
+    np.testing.assert_allclose(found, trial.time_s[1:-1], atol=1e-9)

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.plate_source import C3dPlate, ForceOnPoint, PlateSource, points_that_move
 from bsip_cli.recordings.plates import LocalWrench, PlateDescription
-from bsip_cli.recordings.settle import Opened
 
 N, RATE_HZ = 400, 100.0
 LABELS = ["RASI", "LASI", "RPSI", "LPSI", "RHEE", "RTOE", "RANK", "LHEE", "LTOE", "LANK"]
@@ -108,7 +108,8 @@ def of_c3d(
         axes = true.rotation_lab_plate()
         moment = free_moment(force) + np.cross(point - CENTRES_M[k], force)
         local = LocalWrench(sign * force @ axes, sign * moment @ axes)
-        at_sensor = local.at_surface(-np.array(origin_m)).scaled(moment_scale)
+        at_sensor = local.at_surface(-np.array(origin_m))
+        at_sensor = LocalWrench(at_sensor.force_N, at_sensor.moment_Nm * moment_scale)
         stated = PlateDescription(
             true.name,
             2,

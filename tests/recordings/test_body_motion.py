@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.recordings.body_motion import Body, Harmony
+from bsip_cli.recordings.body_motion import Balance, Body, turn_of_forces
+from bsip_cli.recordings.gate_limits import USUAL
 
 RATE_HZ, N, MASS_KG = 100.0, 300, 70.0
 FRAMES = np.arange(N)
@@ -23,8 +24,8 @@ def _markers() -> dict[str, np.ndarray]:
 
 def _wrench(body: Body) -> np.ndarray:
     """What Newton and Euler ask for, about the world's origin."""
-    force = MASS_KG * (body.acceleration_m_s2 + np.array([0.0, 0.0, GRAVITY_M_S2]))
-    moment = MASS_KG * body.spin_m2_s2 + np.cross(body.place_m, force)
+    force = MASS_KG * (body.rate[:, :3] + np.array([0.0, 0.0, GRAVITY_M_S2]))
+    moment = MASS_KG * body.rate[:, 3:] + np.cross(body.place_m, force)
     return np.nan_to_num(np.hstack([force, moment]))
 
 
@@ -33,12 +34,11 @@ def body():
     return Body.of(_markers(), RATE_HZ, FRAMES)
 
 
-def test_its_own_wrench_is_in_full_harmony(body):
-    match = body.match(_wrench(body))
-    assert match.gap_m < 1e-6 and match.seconds > 2.5
-    found = Harmony.of([match])
+def test_its_own_wrench_balances_and_drives_it(body):
+    found = Balance.of(body, _wrench(body), USUAL)
+    assert max(found.gaps_m) < 1e-6
     assert all(found.correlations[kind] > 0.95 for kind in ("force", "vertical"))
-    assert found.log_likelihood() > 10.0
+    assert found.drive_log_likelihood() > 10.0
 
 
 @pytest.mark.parametrize(("columns", "kind"), [([0, 1], "force"), ([5], "vertical")])
@@ -47,19 +47,50 @@ def test_a_reversed_part_goes_against_the_motion(body, columns, kind):
     about_centre[:, 3:] -= np.cross(body.place_m, about_centre[:, :3])
     about_centre[:, columns] *= -1.0
     about_centre[:, 3:] += np.cross(body.place_m, about_centre[:, :3])
-    assert Harmony.of([body.match(about_centre)]).correlations[kind] < -0.95
+    assert Balance.of(body, about_centre, USUAL).correlations[kind] < -0.95
 
 
 def test_other_axes_change_nothing(body):
     mirror = np.diag([1.0, -1.0, 1.0])
     wrench = _wrench(body)
     seen = np.hstack([wrench[:, :3] @ mirror, -wrench[:, 3:] @ mirror])
-    one, other = body.match(wrench), body.moved(mirror).match(seen)
-    assert one.seconds == other.seconds
-    np.testing.assert_allclose(one.sums["vertical"], other.sums["vertical"])
+    one = Balance.of(body, wrench, USUAL)
+    other = Balance.of(body.moved(mirror), seen, USUAL)
+    assert one.numbers == other.numbers
+    assert one.correlations == pytest.approx(other.correlations)
 
 
 def test_a_body_of_which_little_is_seen_says_nothing():
-    match = Body.of({"foot_l": _markers()["lower_torso"]}, RATE_HZ, FRAMES).match(np.ones((N, 6)))
-    assert match.sums is None and np.isnan(match.gap_m)
-    assert Harmony.of([match]).log_likelihood() == 0.0
+    little = Body.of({"foot_l": _markers()["lower_torso"]}, RATE_HZ, FRAMES)
+    found = Balance.of(little, np.ones((N, 6)), USUAL)
+    assert found.gaps_m == () and found.log_likelihood(USUAL) == 0.0
+
+
+def test_each_trial_counts_with_its_own_means(body):
+    """A force that is offset in one of two trials goes with the motion no less."""
+    offset = _wrench(body)
+    offset[:, 0] += 30.0
+    one = Balance.of(body, _wrench(body), USUAL)
+    both = Balance.of(Body.of_all([body, body]), np.vstack([_wrench(body), offset]), USUAL)
+    assert len(both.gaps_m) == 2
+    assert both.correlations["force"] == pytest.approx(one.correlations["force"], abs=1e-3)
+
+
+def test_noise_is_that_of_markers_seen_to_a_millimetre():
+    """White noise on markers at rest, against what is said of its momentum's rate."""
+    rng = np.random.default_rng(3)
+    still = np.repeat(_markers()["lower_torso"][:1], 4000, axis=0)
+    noisy = {"lower_torso": still + rng.normal(0.0, 1e-3, still.shape)}
+    body = Body.of(noisy, RATE_HZ, np.arange(4000))
+    expected = 1e-6 * body.noise[0]
+    np.testing.assert_allclose(np.nanvar(body.rate, axis=0), expected, rtol=0.25)
+
+
+@pytest.mark.parametrize("turn_deg", [-125.0, 0.0, 31.0])
+def test_the_turn_of_forces_is_found(body, turn_deg):
+    c, s = np.cos(np.deg2rad(turn_deg)), np.sin(np.deg2rad(turn_deg))
+    back = np.kron(np.eye(2), [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    noise = np.random.default_rng(1).normal(0.0, 5.0, (N, 6))
+    angle, sd = turn_of_forces(body, _wrench(body) @ back.T + noise, USUAL)
+    assert np.rad2deg(sd) < 5.0
+    assert np.rad2deg(angle) == pytest.approx(turn_deg, abs=3 * np.rad2deg(sd))

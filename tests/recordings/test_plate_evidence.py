@@ -13,6 +13,7 @@ from bsip_cli.recordings.plates import LocalWrench, PlateDescription
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.recordings.weight_shift import sign_doubts
 from bsip_cli.recordings.zero import plate_zero
+from tests.circumstances.sound import sound_session
 from tests.recordings.recording_writers import (
     CORNERS_M,
     PlateSpec,
@@ -160,6 +161,34 @@ def test_spikes_and_lost_samples_are_marked():
     channels[300:330] = 0.0
     lost = lost_samples(channels, channels[:, 2], RATE_HZ)
     assert np.flatnonzero(lost).tolist() == list(range(299, 331))
+
+
+@pytest.mark.parametrize("per_frame", [1, 4, 10])
+@pytest.mark.parametrize("weights", [0.1, 0.5])
+def test_a_spike_of_one_sample_is_found_in_any_movement(per_frame, weights):
+    rng = np.random.default_rng(7)
+    found = []
+    for laboratory in ("walkway", "side-by-side"):
+        session = sound_session(laboratory, 0)
+        for trial in session.trials:
+            force = trial.sampled(100.0, per_frame).force_N[:, 0]
+            force = force + rng.normal(0.0, 0.5, force.shape)
+            for _ in range(5):
+                k, channel = rng.integers(3, len(force) - 3), rng.integers(3)
+                hit = force.copy()
+                hit[k, channel] += weights * 9.81 * session.mass_kg * rng.choice([-1, 1])
+                found.append(np.flatnonzero(spike_samples(hit, hit[:, 2])).tolist() == [k])
+    # At the markers' rate a step may look like one.
+    assert np.mean(found) >= (0.75 if per_frame == 1 else 0.95)
+
+
+def test_a_foot_that_touches_down_is_no_spike():
+    """300 Hz; as a plate of a public recording has it, an impact of one sample's length."""
+    load = np.zeros(300)
+    load[100:] = 600.0 + 50.0 * np.sin(np.arange(200) / 10.0)
+    impact = np.zeros(300)
+    impact[99:106] = [7.7, 35.8, 12.0, -8.2, -25.1, -30.0, -15.0]
+    assert not spike_samples(np.column_stack([impact, load]), load).any()
 
 
 def test_flight_on_a_plate_set_to_zero_is_not_lost():

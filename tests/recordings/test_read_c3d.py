@@ -282,7 +282,7 @@ def test_duplicate_labels_are_resolved_by_descriptions(tmp_path):
     )
     assert read_recording(described).labels[:2] == ("heel", "toe")
     plain = write_c3d(tmp_path / "b.c3d", markers, labels)
-    assert _levels(read_recording(plain), "labels") == ["warning"]
+    assert read_recording(plain).labels[:2] == ("LFOO", "LFOO")  # the marker set may tell
 
 
 def test_plate_that_claims_missing_channels(tmp_path):

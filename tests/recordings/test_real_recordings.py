@@ -17,7 +17,8 @@ from bsip_cli.recordings.c3d_parameters import numbers, texts
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import open_recording, read_recording
 from bsip_cli.recordings.resample import wrench_at_marker_rate
-from bsip_cli.recordings.settle import Survey, settle_session
+from bsip_cli.recordings.settle import settle_session
+from bsip_cli.recordings.trial_samples import TrialSamples
 
 pytestmark = pytest.mark.real
 
@@ -186,7 +187,7 @@ def test_kistlers_polynomial_gives_the_centre_of_pressure_of_ezc3d(real_data, na
 )
 def test_centre_of_pressure_lies_under_the_feet(real_data, name):
     """Of every loaded plate, to a foot's breadth: two markers on a foot tell no more."""
-    session = settle_session([Survey.of(open_recording(real_data / name))])
+    session = settle_session([TrialSamples.of(open_recording(real_data / name))])
     distances = np.array([verdict.after.distance_m for verdict in session.plates.values()])
     loaded = distances[np.isfinite(distances)]
     assert len(loaded) and loaded.max() < 0.1

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
+from bsip_cli.config import load_config
 from bsip_cli.recordings.assemble import assemble, findings_about
+from bsip_cli.recordings.frame_change import FrameChange
+from bsip_cli.recordings.gate_limits import USUAL
 from bsip_cli.recordings.handedness import handedness
 from bsip_cli.recordings.plate_reading import PlateReading
-from bsip_cli.recordings.settle import Scene, Survey, settle_session
+from bsip_cli.recordings.plate_source import ForceOnPoint
+from bsip_cli.recordings.settle import settle_session
+from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import Feet
 from tests.recordings.standing_on_two_plates import (
     LABELS,
@@ -63,7 +68,7 @@ def test_the_forces_of_the_person_come_back(name):
     make, faults, words = FAULTS[name]
     _, force, point = motion()
     trial = opened(make(**faults))
-    session = settle_session([Survey.of(trial)])
+    session = settle_session([TrialSamples.of(trial)])
     found = findings_about(session)
     assert all(words in f.action and f.level == "corrected" for f in found)
     assert len(found) == (2 if words else 0)
@@ -77,7 +82,7 @@ def test_the_forces_of_the_person_come_back(name):
 def test_exchanged_plates():
     one, two = of_c3d()
     trial = opened([replace(one, wrench=two.wrench), replace(two, wrench=one.wrench)])
-    session = settle_session([Survey.of(trial)])
+    session = settle_session([TrialSamples.of(trial)])
     assert [v.reading.place_of for v in session.plates.values()] == ["2", "1"]
     sound = assemble(opened([one, two]), session_of())
     np.testing.assert_allclose(_total(assemble(trial, session)), _total(sound), atol=1e-9)
@@ -88,7 +93,7 @@ def _total(recording) -> np.ndarray:
 
 
 def session_of():
-    return settle_session([Survey.of(opened(of_c3d()))])
+    return settle_session([TrialSamples.of(opened(of_c3d()))])
 
 
 @pytest.mark.parametrize("make", [of_c3d, of_table])
@@ -96,7 +101,7 @@ def test_copies_and_sums_count_once(make):
     one, two = make()
     sum_ = replace(one, **_renamed(one, "3", _force(one) + _force(two)))
     copy = replace(two, **_renamed(two, "4", _force(two)))
-    session = settle_session([Survey.of(opened([one, two, sum_, copy]))])
+    session = settle_session([TrialSamples.of(opened([one, two, sum_, copy]))])
     assert {n: v.repeats for n, v in session.plates.items() if v.repeats} == {
         "3": ("1", "2"),
         "4": ("2",),
@@ -119,18 +124,18 @@ def test_forces_that_no_reading_brings_under_the_feet_are_refused():
     far = motion()[0] + np.array([3.0, -2.0, 0.0])
     for make in (of_c3d, of_table):
         trial = opened(make(), far)
-        session = settle_session([Survey.of(trial)])
+        session = settle_session([TrialSamples.of(trial)])
         assert [f.level for f in findings_about(session)] == ["excluded"] * 2
         assert assemble(trial, session).plates == ()
 
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_mirrored_laboratory_is_turned_back(axis):
-    mirrored = Scene("all", axis).of(opened(of_table()))
+    mirrored = FrameChange("all", axis).of(opened(of_table()))
     markers = mirrored.recording.markers_m
     mirrored = replace(mirrored, recording=replace(mirrored.recording, markers_m=markers))
-    session = settle_session([Survey.of(mirrored)])
-    assert session.scene.moved == "all"
+    session = settle_session([TrialSamples.of(mirrored)])
+    assert session.frame.moved == "all"
     there = assemble(mirrored, session)
     assert handedness(there.labels, there.markers_m).parts["pelvis"] > 0.9
     expected = _wrench(assemble(opened(of_table()), session_of()))
@@ -138,16 +143,16 @@ def test_a_mirrored_laboratory_is_turned_back(axis):
 
 
 def test_mirrored_markers_alone_leave_the_forces():
-    trial = Scene("markers", 1).of(opened(of_table()))
-    session = settle_session([Survey.of(trial)])
-    assert session.scene == Scene("markers", 1)
+    trial = FrameChange("markers", 1).of(opened(of_table()))
+    session = settle_session([TrialSamples.of(trial)])
+    assert session.frame == FrameChange("markers", 1)
     np.testing.assert_allclose(assemble(trial, session).markers_m, motion()[0])
 
 
 def test_mirrored_forces_alone_leave_the_markers():
-    trial = Scene("forces", 0).of(opened(of_table()))
-    session = settle_session([Survey.of(trial)])
-    assert session.scene == Scene("forces", 0)
+    trial = FrameChange("forces", 0).of(opened(of_table()))
+    session = settle_session([TrialSamples.of(trial)])
+    assert session.frame == FrameChange("forces", 0)
     np.testing.assert_allclose(
         _wrench(assemble(trial, session)), _wrench(assemble(opened(of_table()), session_of()))
     )
@@ -155,9 +160,9 @@ def test_mirrored_forces_alone_leave_the_markers():
 
 @pytest.mark.parametrize("turns", [1, 2, 3])
 def test_forces_in_turned_axes_are_turned_back(turns):
-    trial = Scene("forces", quarter_turns=turns).of(opened(of_table()))
-    session = settle_session([Survey.of(trial)])
-    assert session.scene == Scene("forces", quarter_turns=4 - turns)
+    trial = FrameChange("forces", turned_deg=90.0 * turns).of(opened(of_table()))
+    session = settle_session([TrialSamples.of(trial)])
+    assert session.frame == FrameChange("forces", turned_deg=360 - 90.0 * turns)
     np.testing.assert_allclose(
         _wrench(assemble(trial, session)),
         _wrench(assemble(opened(of_table()), session_of())),
@@ -165,11 +170,25 @@ def test_forces_in_turned_axes_are_turned_back(turns):
     )
 
 
+@pytest.mark.parametrize("make", [of_c3d, of_table])
+@pytest.mark.parametrize("moved", ["", "all", "forces"])
+def test_a_reading_is_a_matrix(make, moved):
+    """Every reading's wrench is linear in the source's parts, also in other axes."""
+    for source in FrameChange(moved, 1).of(opened(make())).sources:
+        for reading in source.alternatives():
+            if reading.about == "fixed":
+                reading = ForceOnPoint.with_centre([source], reading)
+            read = replace(reading, sign=-1)
+            expected = source.plate(read).wrench()
+            found = source.parts() @ source.matrix(read).T
+            np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("corners_only", [False, True])
 def test_a_mirrored_c3d_mirrors_its_channels_or_its_corners(corners_only):
     """Mirrored twice is nothing: also the sensor's depth."""
     sources = opened(of_c3d())
-    scene = Scene("all", 1, corners_only=corners_only)
+    scene = FrameChange("all", 1, corners_only=corners_only)
     twice = scene.of(scene.of(sources))
     sound = [source.plate(PlateReading()).wrench() for source in sources.sources]
     again = [source.plate(PlateReading()).wrench() for source in twice.sources]
@@ -184,24 +203,41 @@ def test_left_and_right_of_one_part_are_said():
     markers = motion()[0]
     order = [1, 0, 3, 2, *range(4, len(LABELS))]
     trial = opened(of_table(), markers[:, order])
-    session = settle_session([Survey.of(trial)])
-    assert session.scene == Scene()
+    session = settle_session([TrialSamples.of(trial)])
+    assert session.frame == FrameChange()
     (said,) = [f for f in assemble(trial, session).findings if f.check == "labels"]
     assert said.subject == "pelvis" and said.level == "warning"
+
+
+def test_the_limits_are_those_of_the_options():
+    options = load_config([]).ingest
+    assert asdict(USUAL) == {name: getattr(options, name) for name in asdict(USUAL)}
 
 
 def test_distance_from_the_feet():
     square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]] * 3)
     places = np.array([[0.5, 0.4], [1.5, 0.5], [-3.0, -4.0]])
-    np.testing.assert_allclose(Feet(square).area().distance_m(places), [0.0, 0.5, 5.0])
+    together = np.zeros(3, bool)
+    found = Feet(square, ("", "", "", "")).distance_m(places, together)
+    np.testing.assert_allclose(found, [0.0, 0.5, 5.0], rtol=1e-3)
     two = square[:, :2].copy()
     two[2] = np.nan
-    np.testing.assert_allclose(Feet(two).area().distance_m(places), [0.4, 0.5**0.5, np.nan])
+    found = Feet(two, ("", "")).distance_m(places, together)
+    np.testing.assert_allclose(found, [0.4, 0.5**0.5, np.nan], rtol=1e-3)
+
+
+def test_feet_on_plates_of_their_own_are_two_areas():
+    """Left and right side of a square: its middle is half a metre from either."""
+    square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]] * 2)
+    feet = Feet(square, ("l", "r", "r", "l"))
+    middle = np.full((2, 2), 0.5)
+    found = feet.distance_m(middle, np.array([False, True]))
+    np.testing.assert_allclose(found, [0.0, 0.5], rtol=1e-3)
 
 
 def test_feet_on_the_plate_count_before_all_others():
     points = np.array([[[0.6, 0.2], [0.6, 0.8]], [[5.0, 5.0], [6.0, 6.0]]])
-    kept = Feet(points).on(corners(0)).points_m
+    kept = Feet(points, ("r", "l")).on(corners(0)).points_m
     assert np.isfinite(kept[0, 0]).all() and np.isnan(kept[0, 1]).all()
     np.testing.assert_array_equal(kept[1], points[1])
 
@@ -209,7 +245,7 @@ def test_feet_on_the_plate_count_before_all_others():
 def test_a_trial_without_the_exchanged_plate_leaves_its_own_out():
     one, two = of_c3d()
     trial = opened([replace(one, wrench=two.wrench), replace(two, wrench=one.wrench)])
-    session = settle_session([Survey.of(trial)])
+    session = settle_session([TrialSamples.of(trial)])
     alone = assemble(opened([one]), session)
     assert alone.plates == ()
     assert [f.level for f in alone.findings if "lacks the plate" in f.found] == ["excluded"]

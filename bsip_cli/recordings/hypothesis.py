@@ -1,0 +1,177 @@
+"""A way to understand all recordings of a session, and how likely it is that a person makes it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+
+from bsip_cli.recordings.body_motion import Balance, Body, turn_of_forces
+from bsip_cli.recordings.frame_change import FrameChange
+from bsip_cli.recordings.gate_limits import GateLimits
+from bsip_cli.recordings.plate_fit import PlateFit, plate_fits
+from bsip_cli.recordings.plate_reading import (
+    AS_STATED,
+    EXCHANGED,
+    ONE_ALONE,
+    REVERSED,
+    PlateReading,
+)
+from bsip_cli.recordings.plates import cop_at_height
+from bsip_cli.recordings.trial_samples import TrialSamples
+
+AS_IT_IS = "taken as they stand"
+
+_ALIKE_M = 0.01  # readings whose centres of pressure differ by less are one,
+_ALIKE_SHARE = 0.01  # if their forces differ by less than this part of the load,
+_ALIKE_TORQUE_M = 0.003  # and their vertical moments by less than this times the load
+_CLEARLY = 3.0  # standard deviations
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """Axes, and a reading of each plate in them; ``trials`` and ``body`` are in these axes."""
+
+    frame: FrameChange
+    trials: Sequence[TrialSamples]
+    body: Body
+    fits: Mapping[str, PlateFit]
+    limits: GateLimits
+
+    @classmethod
+    def as_stated(
+        cls, change: FrameChange, trials: Sequence[TrialSamples], limits: GateLimits
+    ) -> Hypothesis:
+        """As the files say, in other axes."""
+        trials = [trial.in_frame(change) for trial in trials]
+        names = dict.fromkeys(name for trial in trials for name in trial.sources)
+        fits = {name: plate_fits(trials, name, [AS_STATED])[0] for name in names}
+        body = Body.of_all([trial.body for trial in trials])
+        return cls(change, trials, body, fits, limits)
+
+    def odd_turn(self) -> FrameChange | None:
+        """Of the forces against markers that are not mirrored, if it is surely no multiple of 90
+        degrees."""
+        found = turn_of_forces(self.body, self._total(), self.limits)
+        if self.frame.moved or found is None:
+            return None
+        angle, sd = np.rad2deg(found)
+        if abs((angle + 45.0) % 90.0 - 45.0) < _CLEARLY * sd:
+            return None
+        return FrameChange("forces", turned_deg=round(angle, 2), turned_sd_deg=round(sd, 2))
+
+    @cached_property
+    def balance(self) -> Balance:
+        return Balance.of(self.body, self._total(), self.limits)
+
+    def _total(self) -> np.ndarray:
+        """All plates' wrench at the samples of all trials, (n, 6)."""
+        total = [np.zeros((len(trial.body.trial), 6)) for trial in self.trials]
+        for fit in self.fits.values():
+            for k, wrench in fit.smooth_wrenches().items():
+                total[k] += wrench
+        return np.concatenate(total)
+
+    @cached_property
+    def log_posterior(self) -> float:
+        """But for a constant."""
+        on_feet = sum(fit.log_likelihood for fit in self.fits.values())
+        return self._log_prior() + on_feet + self.balance.log_likelihood(self.limits)
+
+    def _log_prior(self) -> float:
+        """How rare it is that so much is wrong at once, logarithm."""
+        readings = [fit.reading for fit in self.fits.values()]
+        repairs: dict[PlateReading, int] = {}
+        for reading in readings:
+            repair = replace(reading, centre_m=None, place_of="", sign=1)
+            repairs[repair] = repairs.get(repair, 0) + 1
+        alone = sum(n < len(readings) for repair, n in repairs.items() if repair != AS_STATED)
+        return (
+            self.frame.log_prior()
+            + sum(repair.log_prior() for repair in repairs)
+            + ONE_ALONE * alone
+            + EXCHANGED * sum(bool(reading.place_of) for reading in readings) / 2
+            + REVERSED * any(reading.sign < 0 for reading in readings)
+        )
+
+    def words(self, name: str, now: Hypothesis) -> str:
+        """What is done to a plate's numbers, as a clause; to the axes where they are others."""
+        axes = self.frame.words() if self.frame != now.frame else ""
+        return ", ".join(filter(None, (axes, self.fits[name].reading.words()))) or AS_IT_IS
+
+    def goes_beyond(self, other: Hypothesis) -> bool:
+        """Whether all repairs of another hypothesis are made, and more."""
+        if other.frame != self.frame and other.frame.moved:
+            return False
+        return all(
+            mine == theirs or theirs == default
+            for name, fit in other.fits.items()
+            for mine, theirs, default in zip(
+                astuple(self.fits[name].reading),
+                astuple(fit.reading),
+                astuple(AS_STATED),
+                strict=True,
+            )
+        )
+
+    def is_alike(self, other: Hypothesis, torque: bool = True) -> bool:
+        """Whether both leave the same forces (and vertical moments) at the same places under the
+        same body."""
+        return self.frame.of_markers() == other.frame.of_markers() and all(
+            _are_alike(fit, other.fits[name], torque) for name, fit in self.fits.items()
+        )
+
+    def with_one_more(self) -> Iterator[Hypothesis]:
+        """One more repair, of all plates or of one."""
+        possible: dict[PlateReading, dict[str, PlateFit]] = {}
+        for name, now in self.fits.items():
+            repairs = list(dict.fromkeys(r for t in now.trials for r in t.source.alternatives()))
+            asked = [_with(repair, now.reading) for repair in repairs]
+            fits = plate_fits(self.trials, name, asked) if asked else []
+            for repair, fit in zip(repairs, fits, strict=True):
+                possible.setdefault(repair, {})[name] = fit
+        for repair, some in possible.items():
+            if repair != AS_STATED:
+                yield self._with(some)
+                yield from (self._with({name: fit}) for name, fit in some.items() if len(some) > 1)
+        for pair in combinations(self.fits, 2):
+            if all(name in trial.sources for trial in self.trials for name in pair):
+                yield self._with({a: self._in_place_of(a, b) for a, b in (pair, pair[::-1])})
+
+    def _with(self, fits: Mapping[str, PlateFit]) -> Hypothesis:
+        return Hypothesis(self.frame, self.trials, self.body, {**self.fits, **fits}, self.limits)
+
+    def _in_place_of(self, name: str, other: str) -> PlateFit:
+        place = self.fits[other].reading.place_of or other
+        reading = replace(self.fits[name].reading, place_of=place * (place != name))
+        return plate_fits(self.trials, name, [reading])[0]
+
+
+def _with(repair: PlateReading, now: PlateReading) -> PlateReading:
+    """One more repair of a plate's numbers, which may be exchanged or have a channel reversed."""
+    if repair.reversed_channel:
+        return replace(now, reversed_channel=repair.reversed_channel)
+    return replace(repair, place_of=now.place_of, reversed_channel=now.reversed_channel)
+
+
+def _are_alike(one: PlateFit, other: PlateFit, with_torque: bool) -> bool:
+    others = other.wrenches()
+    for plate, wrench in zip(one.trials, one.wrenches().values(), strict=True):
+        if not len(wrench):
+            continue
+        both = np.array([wrench, others[plate.trial]])
+        floors = np.array([[plate.source.floor_m(fit.reading)] for fit in (one, other)])
+        cop = cop_at_height(both[..., :3], both[..., 3:], floors)
+        load = np.abs(wrench[:, 2]).mean()
+        apart = np.linalg.norm(both[0, :, :3] - both[1, :, :3], axis=1)
+        if np.nanmax(np.abs(cop[0] - cop[1]), initial=0.0) >= _ALIKE_M:
+            return False
+        if apart.mean() > _ALIKE_SHARE * load:
+            return False
+        torque = both[..., 5] - cop[..., 0] * both[..., 1] + cop[..., 1] * both[..., 0]
+        if with_torque and np.nanmedian(np.abs(torque[0] - torque[1])) > _ALIKE_TORQUE_M * load:
+            return False
+    return True

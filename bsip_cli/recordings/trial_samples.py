@@ -1,0 +1,84 @@
+"""What is kept of a trial until all of a session are seen: small, however long it is."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bsip_cli.recordings.body_motion import SMOOTH_S, Body
+from bsip_cli.recordings.frame_change import FrameChange
+from bsip_cli.recordings.handedness import Handedness, handedness
+from bsip_cli.recordings.label_words import meanings
+from bsip_cli.recordings.opened import Opened
+from bsip_cli.recordings.person_size import by_segment, height_m
+from bsip_cli.recordings.plate_source import PlateSource, lift_N
+from bsip_cli.recordings.plates import LOADED_N
+from bsip_cli.recordings.under_the_feet import Feet
+
+_FEW = 100  # samples that each plate of a trial is seen by
+
+
+@dataclass(frozen=True, eq=False)
+class TrialSamples:
+    """Some samples at which plates are loaded.
+
+    ``sources`` by their names, none if no plate is loaded, and ``smooth``, averaged over as long as
+    the ``body``; for each ``loaded`` (n,) bool; the ``feet``.
+    """
+
+    hands: Handedness
+    height_m: float | None
+    sources: dict[str, PlateSource]
+    smooth: dict[str, PlateSource]
+    loaded: dict[str, np.ndarray]
+    feet: Feet
+    body: Body
+
+    @classmethod
+    def of(cls, opened: Opened) -> TrialSamples:
+        recording = opened.recording
+        markers, rate_hz = recording.markers_m, recording.analog_rate_hz
+        segments = by_segment(recording.labels, markers)
+        heavy = {s.name: _heavy(np.where(s.usable, lift_N(s), 0.0)) for s in opened.sources}
+        sources = opened.sources if any(mask.any() for mask in heavy.values()) else ()
+        few = [np.flatnonzero(heavy[s.name]) for s in sources]
+        few = [some[:: max(1, len(some) // _FEW)] for some in few]
+        samples = np.unique(np.concatenate(few)) if few else np.zeros(0, int)
+        frames = np.round(samples * recording.marker_rate_hz / rate_hz).astype(int)
+        samples, frames = samples[frames < recording.n_frames], frames[frames < recording.n_frames]
+        known = meanings(recording.labels)
+        sides = [known[n].segment[-1] if n in known else "" for n in recording.labels]
+        sides = [side if side in "lr" else "" for side in sides]
+        floor = sources[0].floor_m() if sources else 0.0
+        return cls(
+            hands=handedness(recording.labels, markers),
+            height_m=height_m(segments),
+            sources={s.name: s.at(samples) for s in sources},
+            smooth={s.name: s.smoothed(SMOOTH_S * rate_hz).at(samples) for s in sources},
+            loaded={s.name: heavy[s.name][samples] for s in sources},
+            feet=Feet.of(markers, sides, frames, floor if abs(floor) < 1.0 else 0.0),
+            body=Body.of(segments if sources else {}, recording.marker_rate_hz, frames),
+        )
+
+    def without(self, plates: Collection[str]) -> TrialSamples:
+        return replace(self, sources={n: s for n, s in self.sources.items() if n not in plates})
+
+    def in_frame(self, change: FrameChange) -> TrialSamples:
+        """In other axes."""
+        changed, matrix = self, change.matrix()
+        if change.moves_markers:
+            changed = replace(changed, body=self.body.moved(matrix), feet=self.feet.moved(matrix))
+        if change.moves_forces:
+            sources, smooth = (
+                {name: source.moved(matrix, change.corners_only) for name, source in some.items()}
+                for some in (self.sources, self.smooth)
+            )
+            changed = replace(changed, sources=sources, smooth=smooth)
+        return changed
+
+
+def _heavy(lift_N: np.ndarray) -> np.ndarray:
+    size = np.abs(lift_N)
+    return size > max(LOADED_N, 0.5 * np.percentile(size, 99)) if len(size) else size > 0

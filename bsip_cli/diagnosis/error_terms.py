@@ -32,7 +32,7 @@ INERTIA, JOINTS, MARKERS = "inertial_parameters", "joint_centres", "marker_place
 SKIN, TRUNK, SMOOTHING = "soft_tissue", "trunk_and_shoulders", "smoothing"
 FAULT = "fault:"
 # Joints that stand for many: their shift is what a trunk or a shoulder girdle that bends does.
-_BENDING = ("waist", "neck", "shoulder")
+_BENDING = ("waist", "neck", "sternoclavicular", "shoulder")
 _HEAVIER = 0.01  # usual error of the whole mass, part of it: a scale's, clothes and shoes
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class GateLimits:
     """Options of `ingest`; their reasons are in configs/default.toml, whose values these are."""
 
-    believed_percent: float = 90.0
+    believed_percent: float = 85.0
     corrected_percent: float = 95.0
     balance_median_m: float = 0.024
     complete_percent: float = 15.0

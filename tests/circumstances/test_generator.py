@@ -25,12 +25,12 @@ SEED = 36
 # Shares of what was changed (of the sound: disturbed). Today's is what this revision keeps at the
 # seed of the long test; with a better reader it moves towards the target, never away from it.
 AT_MOST = {  # target of issue 36, today
-    WRONG: (0.0, 0.03),
-    WRONGLY_REPAIRED: (0.01, 0.03),
+    WRONG: (0.0, 0.0),
+    WRONGLY_REPAIRED: (0.01, 0.02),
     CRASHED: (0.0, 0.0),
     DISTURBED: (0.0, 0.0),
 }
-RIGHT_OR_REPAIRED = (0.85, 0.80)  # at least: target, today
+RIGHT_OR_REPAIRED = (0.85, 0.85)  # at least: target, today
 # Things of which bsip has a bug today; empty as soon as it is mended.
 KNOWN_TO_CRASH: set[str] = set()
 

@@ -191,7 +191,9 @@ def test_centre_of_pressure_lies_under_the_feet(real_data, name):
     distances = np.array([verdict.after.distance_m for verdict in session.plates.values()])
     loaded = distances[np.isfinite(distances)]
     assert len(loaded) and loaded.max() < 0.1
-    assert [f.check for f in findings_about(session)] == []  # sound: nothing is changed
+    # Sound: nothing is changed. The vertical moments of opencap are reversed, which squats show.
+    doubts = {"plate_moment"} if name.startswith("opencap") else set()
+    assert {f.check for f in findings_about(session)} == doubts
 
 
 def test_a_plate_that_no_reading_brings_under_the_feet_is_left_out(real_data):

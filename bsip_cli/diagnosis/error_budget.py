@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import permutations
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from bsip_cli.statistics.normal import Z95
 
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
 UNKNOWN, NOISE, TOTAL = "unknown", "noise", "total"
-_ONE_PLACE = 0.5  # of the smaller spread: the sum of two terms is surer than either
+_SURER = 0.5  # of the smaller spread, that the sum of two terms has which stand in for each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,8 +117,9 @@ class _Budget:
             for target in ("", *(t for t in targets if t and len(targets) > 1)):
                 parts = tuple(p for p in whole if not target or p.target == target)
                 lines = self._of(parts, residual, squares, count, weights)
-                like = alike.get(term, ())
-                yield from (replace(x, term=term, target=target, alike=like) for x in lines)
+                for one in lines:
+                    like = alike.get((term, one.component), ())
+                    yield replace(one, term=term, target=target, alike=like)
         yield from self._rest(residual, squares, count, weights)
         gains = self._gains(here, residual)
         for k, name in enumerate(COMPONENTS):
@@ -246,18 +248,17 @@ class _Budget:
 
     def _alike(
         self, weights: np.ndarray, here: Sequence[Part], terms: Sequence[str]
-    ) -> dict[str, tuple[str, ...]]:
-        """Terms of which the sum is surer than either in most components: they stand in for each
-        other."""
+    ) -> dict[tuple[str, str], tuple[str, ...]]:
+        """By term and component, the terms with which its sum is surer than either alone: they
+        stand in for each other."""
         of = {term: [p for p in here if p.term == term] for term in terms}
         spread = {term: self._spread(parts, weights) for term, parts in of.items()}
-        found: dict[str, tuple[str, ...]] = {}
-        for a in terms:
-            for b in terms:
-                both = self._spread([*of[a], *of[b]], weights)
-                surer = both < _ONE_PLACE * np.minimum(spread[a], spread[b])
-                if a != b and surer.mean() > 0.5:
-                    found[a] = (*found.get(a, ()), b)
+        found: dict[tuple[str, str], tuple[str, ...]] = {}
+        for a, b in permutations(terms, 2):
+            both = self._spread([*of[a], *of[b]], weights)
+            surer = both < _SURER * np.minimum(spread[a], spread[b])
+            for component in np.array(COMPONENTS)[surer].tolist():
+                found[a, component] = (*found.get((a, component), ()), b)
         return found
 
 

@@ -9,7 +9,14 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.effect_words import EFFECT_WORDS
-from bsip_cli.report.words import component_label, listing, number, segment_label, trial_label
+from bsip_cli.report.words import (
+    component_label,
+    listing,
+    number,
+    segment_label,
+    signed,
+    trial_label,
+)
 
 FIRST = ("fz", "cop_ap", "cop_ml")  # components that a reader asks for first
 REST = "all others"
@@ -112,10 +119,12 @@ def _sentence(budget: pd.DataFrame, component: str) -> str:
     total = _total(budget, "", component)
     worth = ""
     if np.isfinite(total["gain_percent"]):
-        low, high = (number(total[name], 0) for name in ("gain_low", "gain_high"))
+        change, low, high = (
+            signed(-total[name], 0) for name in ("gain_percent", "gain_high", "gain_low")
+        )
         worth = (
-            f" Put into the model by their sizes in other data, all of them make the error "
-            f"{number(total['gain_percent'], 0)} % smaller ({low} to {high} %)."
+            " Put into the model with their sizes in other data, all of them change the error by "
+            f"{change} % ({low} to {high} %)."
         )
     return (
         f"What makes RM's error of {number(size, 1)} {unit} in {component_label(component)}: "

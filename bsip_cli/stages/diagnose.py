@@ -32,7 +32,6 @@ from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.prior import Prior
-from bsip_cli.report.budget import budget_sentences
 from bsip_cli.report.verdict import verdict_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnosis_facts import detection_rows, facts_of
@@ -184,7 +183,7 @@ def _write(
     unit.write("overall-diagnosis", diagnosis, facts)
     unit.write("detection", limits)
     said = verdict_of(diagnosis, limits)
-    for sentence in (said.headline, *said.causes, *budget_sentences(budget), said.limits):
+    for sentence in (said.headline, *said.causes, said.limits):
         if sentence:
             unit.warn(f"{unit.name}: {sentence}")
 

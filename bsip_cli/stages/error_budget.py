@@ -23,6 +23,7 @@ from bsip_cli.diagnosis.evidence import Filter, filter_of, slow
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.held_out import FOLDS
 from bsip_cli.diagnosis.large_errors import Yardsticks, large_errors
+from bsip_cli.diagnosis.support import HANDS, LIGHTER
 from bsip_cli.dynamics.lowpass import lowpass_operator
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
@@ -54,14 +55,16 @@ def error_budget(
     prior: Prior,
     scenes: Sequence[tuple[Trial, Scene]],
     causes: Sequence[Mapping],
-    told: Sequence[str],
+    held: Sequence[str],
 ) -> tuple[pd.DataFrame, tuple[Finding, ...]]:
     """The ``overall-error-budget``, and what is too large for all that is named or usual.
 
-    causes : as in the facts of ``overall-diagnosis``; they are part of the model. told : stems of
-    trials of which something is told that is not in the model.
+    causes : as in the facts of ``overall-diagnosis``; they are part of the model. held : stems of
+    trials in which hands hold on to something: what that bears is a term, and no large error.
     """
-    trials = [one for t, s in scenes if (one := _prepared(unit, prior, t, s, causes)) is not None]
+    trials = [
+        one for t, s in scenes if (one := _prepared(unit, prior, t, s, causes, held)) is not None
+    ]
     if not trials:
         return empty_table(_KIND), ()
     whole = sum(one.moves for one in trials) > 1
@@ -74,7 +77,7 @@ def error_budget(
     for k in every:
         rows += _rows(budget_of(model, grounds, (k,), rng), errors[k].name, data)
     budget = pd.DataFrame(rows)
-    return budget, _large(unit, trials, told, partial(_along, budget))
+    return budget, _large(unit, trials, held, partial(_along, budget))
 
 
 def _along(budget: pd.DataFrame, trials: Sequence[str], component: str) -> str:
@@ -98,7 +101,7 @@ def _along(budget: pd.DataFrame, trials: Sequence[str], component: str) -> str:
 def _large(
     unit: Unit,
     trials: Sequence[Prepared],
-    told: Sequence[str],
+    held: Sequence[str],
     along: Callable[[Sequence[str], str], str],
 ) -> tuple[Finding, ...]:
     usual: ErrorModel = error_model([one.errors for one in trials], 1, adapt=False)
@@ -109,12 +112,17 @@ def _large(
         options.least_correlation,
         trials[0].weight_N,
     )
-    asked = [k for k, one in enumerate(trials) if one.errors.name not in told]
+    asked = [k for k, one in enumerate(trials) if one.errors.name not in held]
     return large_errors(usual, [one.ground for one in trials], asked, yardsticks, along)
 
 
 def _prepared(
-    unit: Unit, prior: Prior, trial: Trial, scene: Scene, causes: Sequence[Mapping]
+    unit: Unit,
+    prior: Prior,
+    trial: Trial,
+    scene: Scene,
+    causes: Sequence[Mapping],
+    held: Sequence[str],
 ) -> Prepared | None:
     """None where the plates carry the person for hardly a sample."""
     if not scene.valid.any():
@@ -142,6 +150,7 @@ def _prepared(
         (
             *(_term(x, filter_) for x in terms),
             *_named(fewer, filter_, [x for x in causes if trial.stem in x["trials"]]),
+            *(_of_hands(fewer, filter_) if trial.stem in held else ()),
         ),
         noise_of_instruments(fewer, filter_.reference_m, noise_m, scene.rate_hz, options.cutoff_hz),
     )
@@ -189,6 +198,17 @@ def _named(scene: Scene, filter_: Filter, causes: Sequence[Mapping]) -> Iterator
             columns,
             known,
         )
+
+
+def _of_hands(scene: Scene, filter_: Filter) -> Iterator[Term]:
+    """A constant force on each hand, of the size from which on it is told."""
+    force = LIGHTER * scene.mass_kg * GRAVITY_M_S2 * np.eye(3)
+    for hand in HANDS:
+        place = scene.point(hand, scene.centre_of(hand)).position_m
+        arm = np.cross(place[:, None], force).swapaxes(1, 2)
+        columns = np.concatenate([np.broadcast_to(force, arm.shape), arm], axis=1)
+        term = FAULT + EFFECTS["unmeasured_contact"].name
+        yield Term(term, hand, f"{term} {hand}", True, filter_(columns))
 
 
 def _rows(lines: Sequence[Line], trial: str, data: str) -> Iterator[dict]:

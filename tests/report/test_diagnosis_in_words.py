@@ -380,4 +380,4 @@ def test_the_budget_tells_terms_that_look_alike_together_and_adds_up():
     assert sum(one.share for one in found) == pytest.approx(100.0)
     (first, *_) = budget_sentences(table)
     assert first.startswith("What makes RM's error of 20.0 N in force, lab Z (up): the table's")
-    assert "40 % smaller (30 to 50 %)" in first
+    assert "change the error by −40 % (−50 to −30 %)" in first

@@ -16,15 +16,13 @@ from bsip_cli.diagnosis.candidates import candidates_of
 from bsip_cli.diagnosis.evidence import LEAST
 from bsip_cli.diagnosis.geometry import joint_errors
 from bsip_cli.diagnosis.nuisances import marker_rms_m
-from bsip_cli.diagnosis.skin import SKIN_HZ, nearby_angles
-from bsip_cli.diagnosis.slack import slack_share
+from bsip_cli.diagnosis.skin import SKIN_HZ, nearby_angles, skin_inertia
+from bsip_cli.diagnosis.slack import is_of_instruments, slack_share
 from bsip_cli.diagnosis.smoothing_bias import smoothing_bias
 from bsip_cli.diagnosis.wander import wander
 from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
 from bsip_cli.effects.catalogue import CATALOGUE
-from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.effect import Effect
-from bsip_cli.effects.gravity_tilt import GravityTilt
 from bsip_cli.effects.joint_centre import JointCentre
 from bsip_cli.effects.scene import Scene, standing_place_m
 
@@ -73,24 +71,28 @@ def error_terms(
     for k, joint in enumerate(JointCentre().targets(scene)):
         term = TRUNK if joint.startswith(_BENDING) else JOINTS
         yield Columns(term, joint, term, False, joints[..., 3 * k : 3 * k + 3])
-    for segment, places, skin in _of_markers(scene, landmark_sd_m, skin_factor):
+    swinging = skin_inertia(scene)
+    of_markers = _of_markers(scene, landmark_sd_m, skin_factor)
+    for k, (segment, places, skin) in enumerate(of_markers):
         name = skeleton.segments[segment]
         yield Columns(MARKERS, name, MARKERS, False, places)
         yield Columns(SKIN, name, f"{SKIN} {name}", True, skin)
-        yield Columns(SKIN, name, f"{SKIN} swings", False, _swinging(scene, segment))
+        yield Columns(SKIN, name, f"{SKIN} swings", False, swinging[..., k : k + 1])
     yield Columns(SKIN, "", f"{SKIN} of the whole body", False, _swinging_body(scene))
     yield Columns(SKIN, "", f"{SKIN} wanders", True, wander(scene))
     yield Columns(SMOOTHING, "", SMOOTHING, True, smoothing_bias(scene))
+    source = _as_simulated(scene)
     for effect in CATALOGUE:
-        if effect.of_the_plates or isinstance(effect, (Delay, GravityTilt)):
-            yield from _of_instruments(effect, scene)
+        if is_of_instruments(effect):
+            yield from _of_instruments(effect, scene, source)
 
 
-def _of_instruments(effect: Effect, scene: Scene) -> Iterator[Columns]:
-    """Each place of a fault, as far as every laboratory has it; a constant one is the session's."""
+def _of_instruments(effect: Effect, scene: Scene, source: Scene) -> Iterator[Columns]:
+    """Each place of a fault, as far as every laboratory has it; a constant one is the session's.
+    ``source``: the trial whose plates read what is simulated."""
     for one in candidates_of(effect, scene):
         if not one.scanned:
-            wrench = slack_share(one) * one.signature(_as_simulated(scene))
+            wrench = slack_share(one) * one.signature(source)
             scale = f"{FAULT}{effect.name} {one.target}"
             yield Columns(FAULT + effect.name, one.target, scale, not effect.of_the_lab, wrench)
 
@@ -130,14 +132,6 @@ def _following(parts: np.ndarray, courses: Sequence[np.ndarray]) -> np.ndarray:
     """(N, 6, 3 j) of parts (3, N, 6, 3) for courses s, s' and s'' (N, j) of each angle."""
     both = sum(p[..., None] * s[:, None, None, :] for p, s in zip(parts, courses, strict=True))
     return np.asarray(both).reshape(*parts.shape[1:3], -1)
-
-
-def _swinging(scene: Scene, segment: int) -> np.ndarray:
-    """(N, 6, 1) if the skin of a segment stays behind by -a / w^2, held at SKIN_HZ."""
-    (mine,) = np.nonzero(scene.person.marker_segments == segment)
-    behind = -scene.motion.acceleration_m_s2[:, segment] / (2 * np.pi * SKIN_HZ) ** 2
-    errors = np.broadcast_to(behind[:, None, :, None], (len(behind), len(mine), 3, 1))
-    return scene.response.of(scene.pose_response.of(errors, mine.tolist()))
 
 
 def _swinging_body(scene: Scene) -> np.ndarray:

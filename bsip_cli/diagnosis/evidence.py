@@ -175,7 +175,8 @@ def trial_evidence(
     fewer = slow(scene)
     stride = round(scene.rate_hz / fewer.rate_hz)
     filter_ = filter_of(fewer, cutoff_hz)
-    residual = _residual(scene, filter_, stride, cutoff_hz)
+    full = at_full_rate(filter_, scene, cutoff_hz)
+    residual = full.one(scene.measured - scene.predicted)
     level = noise_level[::stride][filter_.frames]
     least = LEAST * scene.mass_kg * GRAVITY_M_S2
     filtered = Filtered(
@@ -193,12 +194,11 @@ def _evidence(
     return TrialEvidence(name, scene, filtered, whitening, white, shared)
 
 
-def _residual(scene: Scene, filter_: Filter, stride: int, cutoff_hz: float) -> np.ndarray:
-    """(n, 6) measured less simulated wrench, low-passed at its full rate."""
+def at_full_rate(filter_: Filter, scene: Scene, cutoff_hz: float) -> Filter:
+    """The filter of a slower trial for courses of the whole one, with the same samples."""
     operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz)
-    wanted = np.searchsorted(frames, filter_.frames * stride)
-    full = replace(filter_, operator=operator[wanted])
-    return full.one(scene.measured - scene.predicted)
+    stride = round(scene.rate_hz / slow(scene).rate_hz)
+    return replace(filter_, operator=operator[np.searchsorted(frames, filter_.frames * stride)])
 
 
 def _whitening(filtered: Filtered, beside: np.ndarray, floor: float) -> Whitening:

@@ -27,7 +27,7 @@ BLUR_S = 0.015  # standard deviation of a Gaussian that the one passed and the o
 
 def slack(scene: Scene) -> np.ndarray:
     """(N, 6, k) change of the wrench for one standard deviation of each small imperfection."""
-    instruments = [effect for effect in CATALOGUE if _is_of_instruments(effect)]
+    instruments = [effect for effect in CATALOGUE if is_of_instruments(effect)]
     columns = [
         slack_share(c) * c.signature(_source(effect, scene))
         for effect in (*instruments, EFFECTS["over_smoothing"])
@@ -58,12 +58,13 @@ def _source(effect: Effect, scene: Scene) -> Scene:
     return replace(scene, wrench=scene.predicted) if isinstance(effect, Delay) else scene
 
 
-def _is_of_instruments(effect: Effect) -> bool:
+def is_of_instruments(effect: Effect) -> bool:
+    """Whether it is a fault of plates, clocks or the lab's vertical."""
     return effect.of_the_plates or isinstance(effect, (Delay, GravityTilt))
 
 
 def slack_share(candidate: Candidate) -> np.ndarray:
-    """(k,) or (1,) of the free parameters' typical sizes.
+    """(k,) or (1,) of the free parameters' typical sizes, that every lab and smoothing has.
 
     Horizontal forces are all motion, so what the motion's amplitude errs by is their gain.
     """

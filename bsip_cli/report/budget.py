@@ -44,8 +44,6 @@ class Piece:
 
     label: str
     share: float
-    low: float
-    high: float
 
 
 def pieces(budget: pd.DataFrame, trial: str, component: str) -> tuple[Piece, ...]:
@@ -58,7 +56,7 @@ def pieces(budget: pd.DataFrame, trial: str, component: str) -> tuple[Piece, ...
     large.sort(key=lambda one: -one.share)
     last = [one for one in found if one.label in _last()]
     others = 100.0 - sum(one.share for one in (*large, *last))
-    rest = [Piece(REST, others, np.nan, np.nan)] if abs(others) >= 0.5 else []
+    rest = [Piece(REST, others)] if abs(others) >= 0.5 else []
     return (*large, *rest, *last)
 
 
@@ -80,9 +78,7 @@ def _groups(rows: pd.DataFrame) -> Iterator[tuple[str, ...]]:
 
 def _together(rows: pd.DataFrame, terms: tuple[str, ...]) -> Piece:
     label = " or ".join(dict.fromkeys(term_words(term) for term in terms))
-    share, low, high = rows.loc[list(terms), ["share_percent", "share_low", "share_high"]].sum()
-    one = len(terms) == 1  # the sum of two intervals is not that of the sum
-    return Piece(label, float(share), float(low) if one else np.nan, float(high) if one else np.nan)
+    return Piece(label, float(rows.loc[list(terms), "share_percent"].sum()))
 
 
 def term_words(term: str) -> str:

@@ -12,19 +12,18 @@ import pandas as pd
 from bsip_cli.artifacts import empty_table
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.error_budget import Ground, Line, budget_of, ground_of
-from bsip_cli.diagnosis.error_model import ErrorModel, Term, TrialErrors, error_model
+from bsip_cli.diagnosis.error_model import Term, TrialErrors, error_model
 from bsip_cli.diagnosis.error_terms import (
     FAULT,
     Columns,
     error_terms,
     noise_of_instruments,
 )
-from bsip_cli.diagnosis.evidence import Filter, filter_of, slow
+from bsip_cli.diagnosis.evidence import Filter, at_full_rate, filter_of, slow
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.held_out import FOLDS
 from bsip_cli.diagnosis.large_errors import Yardsticks, large_errors
 from bsip_cli.diagnosis.support import HANDS, LIGHTER
-from bsip_cli.dynamics.lowpass import lowpass_operator
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.prior import Prior
@@ -104,7 +103,7 @@ def _large(
     held: Sequence[str],
     along: Callable[[Sequence[str], str], str],
 ) -> tuple[Finding, ...]:
-    usual: ErrorModel = error_model([one.errors for one in trials], 1, adapt=False)
+    usual = error_model([one.errors for one in trials], 1, adapt=False)
     options = unit.config.diagnosis
     yardsticks = Yardsticks(
         options.large_cop_error_m,
@@ -132,7 +131,9 @@ def _prepared(
     filter_ = _about_surface(filter_of(fewer, options.cutoff_hz), scene)
     if len(filter_.frames) < _LEAST_SAMPLES:
         return None
-    measured, residual = _filtered(scene, fewer, filter_, options.cutoff_hz)
+    full = at_full_rate(filter_, scene, options.cutoff_hz)
+    measured = full.one(scene.measured)
+    residual = full.one(scene.measured - scene.predicted)
     weight_N = scene.mass_kg * GRAVITY_M_S2
     terms = error_terms(fewer, prior.root, options.landmark_sd_m, options.skin_factor)
     ground = ground_of(
@@ -168,16 +169,6 @@ def _about_surface(filter_: Filter, scene: Scene) -> Filter:
     heights = [plate.corners_m[:, 2] for plate in scene.plates]
     height = float(np.mean(heights)) if heights else 0.0
     return replace(filter_, reference_m=np.append(filter_.reference_m[:2], height))
-
-
-def _filtered(
-    scene: Scene, fewer: Scene, filter_: Filter, cutoff_hz: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 6) measured, and measured less simulated, low-passed at the full rate."""
-    operator, frames = lowpass_operator(scene.valid, scene.rate_hz, cutoff_hz)
-    stride = round(scene.rate_hz / fewer.rate_hz)
-    full = replace(filter_, operator=operator[np.searchsorted(frames, filter_.frames * stride)])
-    return full.one(scene.measured), full.one(scene.measured - scene.predicted)
 
 
 def _named(scene: Scene, filter_: Filter, causes: Sequence[Mapping]) -> Iterator[Term]:

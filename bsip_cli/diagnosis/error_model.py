@@ -13,14 +13,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor
+from scipy.linalg.lapack import dpotri
 
 from bsip_cli.diagnosis.error_terms import FAULT
 from bsip_cli.diagnosis.evidence import FLOOR, Filter, innovations, recursion_of
 
 # How many observations a hyperprior counts for. With one, a fault has the wide tails of Cauchy: it
 # is hardly there or of any size. With four, ordinary errors are rarely three times the usual.
-_WEIGHT, _WEIGHT_OF_FAULTS = 4.0, 1.0
+WEIGHT, WEIGHT_OF_FAULTS = 4.0, 1.0
 _STEPS = 25  # of expectation and maximisation
 _ROUNDS = 3  # of what is left
 _NEGLIGIBLE = 0.5  # that a direction may add to the squared residual, whose noise is one
@@ -134,7 +135,7 @@ def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = Tru
     stretches : into so many each trial is cut, of which each is held out in turn.
     adapt : scales from the data; else everything is as large as usual.
     """
-    parts, used, columns, known, mixed = _laid_out(trials)
+    parts, used, columns, known, mixed = laid_out(trials)
     count = max(part.stop for part in parts)
     off = [sum((x for (_, t), x in known.items() if t == k), 0.0) for k in range(len(trials))]
     residual = [one.residual - x for one, x in zip(trials, off, strict=True)]
@@ -144,7 +145,7 @@ def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = Tru
         folds = tuple(f for t, one in enumerate(equations) for f in _folds(t, *one, stretches))
         mean, covariance, scales = _settled(folds, parts, count, adapt)
         told = zip(residual, columns, used, strict=True)
-        left, courses = zip(*(_left(*one, mean, covariance) for one in told), strict=True)
+        left, courses = zip(*(left_by(*one, mean, covariance) for one in told), strict=True)
     return ErrorModel(
         tuple(trials),
         parts,
@@ -170,7 +171,7 @@ Laid = tuple[
 ]
 
 
-def _laid_out(trials: Sequence[TrialErrors]) -> Laid:
+def laid_out(trials: Sequence[TrialErrors]) -> Laid:
     """Parts; per trial the coefficients that its columns are about, and these; known and mixed."""
     groups: dict[tuple[str, str, str, int], dict[int, Term]] = {}
     for t, one in enumerate(trials):
@@ -216,23 +217,37 @@ def _folds(
     stretches: int,
 ) -> Iterator[Fold]:
     """White equations of a trial; ``course`` (n, 6) is what may be left of it."""
-    spread = np.maximum(course.std(axis=0), one.noise)
-    share = one.noise / spread
-    memory = [
-        recursion_of(x, one.filter.rate_hz, max(FLOOR, float(s**2)))
-        for x, s in zip((course / spread).T, share, strict=True)
-    ]
-    recursion = np.stack(memory)
-    white = innovations((course / spread)[..., None], recursion, one.filter).reshape(-1, 6)
-    size = (spread * np.maximum(white.std(axis=0), share))[:, None]
-    rows = innovations(columns / size, recursion, one.filter)
-    right = innovations(residual[..., None] / size, recursion, one.filter)[:, 0]
+    size, recursion = white_noise_of(one, course)
+    rows = white_columns(columns, size, recursion, one.filter)
+    right = white_columns(residual[..., None], size, recursion, one.filter)[:, 0]
     for part in np.array_split(np.arange(len(course)), min(stretches, len(course))):
         at = (6 * part[:, None] + np.arange(6)).ravel()
         yield Fold(trial, part, used, rows[at].T @ rows[at], rows[at].T @ right[at])
 
 
-def _left(
+def white_noise_of(one: TrialErrors, course: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Size (6,) and recursion (6, p) of a course (n, 6) that may be left of a trial; it is never
+    quieter than the instruments."""
+    spread = np.maximum(course.std(axis=0), one.noise)
+    share = one.noise / spread
+    recursion = np.stack(
+        [
+            recursion_of(x, one.filter.rate_hz, max(FLOOR, float(s**2)))
+            for x, s in zip((course / spread).T, share, strict=True)
+        ]
+    )
+    white = innovations((course / spread)[..., None], recursion, one.filter).reshape(-1, 6)
+    return spread * np.maximum(white.std(axis=0), share), recursion
+
+
+def white_columns(
+    columns: np.ndarray, size: np.ndarray, recursion: np.ndarray, filter_: Filter
+) -> np.ndarray:
+    """(6 n, k) of filtered columns (n, 6, k), in which what is left is white."""
+    return innovations(columns / size[:, None], recursion, filter_)
+
+
+def left_by(
     residual: np.ndarray,
     columns: np.ndarray,
     used: np.ndarray,
@@ -264,13 +279,13 @@ def _settled(
         mine = place[mine[told[mine]]]
         at[part.scale] = np.concatenate([at.get(part.scale, mine[:0]), mine])
     root = np.ones(len(right))
-    mean, covariance = _posterior(gram, right, root)
+    mean, covariance = posterior(gram, right, root)
     for _ in range(_STEPS if adapt else 0):
         second = mean**2 + np.diag(covariance)
         for scale, mine in at.items():
-            weight = _WEIGHT_OF_FAULTS if scale.startswith(FAULT) else _WEIGHT
+            weight = WEIGHT_OF_FAULTS if scale.startswith(FAULT) else WEIGHT
             root[mine] = np.sqrt((weight + second[mine].sum()) / (weight + len(mine)))
-        mean, covariance = _posterior(gram, right, root)
+        mean, covariance = posterior(gram, right, root)
     scales = {s: float(root[x[0]]) if len(x) else 1.0 for s, x in at.items()}
     if told.all():
         return mean, covariance, scales
@@ -279,11 +294,12 @@ def _settled(
     return whole, covariance, scales
 
 
-def _posterior(
+def posterior(
     gram: np.ndarray, right: np.ndarray, root: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mean (K,) and covariance (K, K) of coefficients with standard deviations ``root`` (K,)."""
     inner = gram * np.outer(root, root) + np.eye(len(right))
-    inverse = cho_solve(cho_factor(inner, overwrite_a=True), np.eye(len(right)))
-    covariance = inverse * np.outer(root, root)
+    factor, _ = cho_factor(inner, lower=True, overwrite_a=True)
+    lower, _ = dpotri(factor, lower=1, overwrite_c=1)
+    covariance = (np.tril(lower) + np.tril(lower, -1).T) * np.outer(root, root)
     return covariance @ right, covariance

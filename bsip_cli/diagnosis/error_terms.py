@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.diagnosis.candidates import candidates_of
+from bsip_cli.diagnosis.hypothesis import candidates_of
 from bsip_cli.diagnosis.evidence import LEAST
 from bsip_cli.diagnosis.geometry import joint_errors
 from bsip_cli.diagnosis.nuisances import marker_rms_m

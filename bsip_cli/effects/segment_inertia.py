@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bsip_cli.body.inertia import PARAMETERS, UNITS, from_phi
+from bsip_cli.body.inertia import from_phi
 from bsip_cli.body.names import in_words
 from bsip_cli.dynamics.cop import centre_of_pressure
 from bsip_cli.effects.effect import Effect, Parameter
@@ -15,31 +15,35 @@ LEAST_FORCE_N = 50.0
 
 
 class SegmentInertia(Effect):
-    """Deviation of a segment's ten parameters from those simulated with, about the joint."""
+    """A segment heavier, with another centre of mass or tensor than simulated with."""
 
     name = "segment_inertia"
     of_the_lab = False
+    of_the_person = True
     remedy = "record a sequence that moves this segment fast, and identify with it"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
         return scene.bodies
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        body, length = _phi(scene, target), scene.length_of(target)
-        moment = CENTRE_SHARE * length * body[0] + MASS_SHARE * np.linalg.norm(body[1:4])
-        sizes = [MASS_SHARE * body[0], *[moment] * 3, *[INERTIA_SHARE * body[4:].max()] * 6]
-        return tuple(
-            Parameter(name, unit, -10 * size, 10 * size, float(size))
-            for name, unit, size in zip(PARAMETERS, UNITS, sizes, strict=True)
+        length = scene.length_of(target)
+        mass = MASS_SHARE * float(_phi(scene, target)[0])
+        shift = CENTRE_SHARE * length
+        return (
+            Parameter("mass_change", "kg", -5 * mass, 10 * mass, mass),
+            *(Parameter(f"shift_{axis}", "m", -length, length, shift) for axis in "xyz"),
+            Parameter("inertia_change", "1", -1.0, 3.0, INERTIA_SHARE),
         )
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         i = scene.person.skeleton.index(target)
-        return scene.once((self.name, i), lambda: scene.motion.wrenches(i)) @ values
+        return scene.once((self.name, i), lambda: scene.motion.wrenches(i)) @ (
+            _changes(scene, target) @ values
+        )
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """A body with these parameters exists, with its centre of mass inside the segment."""
-        phi = _phi(scene, target) + values
+        phi = _phi(scene, target) + _changes(scene, target) @ values
         if phi[0] <= 0:
             return False
         origin = scene.person.origin_in_joint_m[scene.person.skeleton.index(target)]
@@ -66,6 +70,29 @@ class SegmentInertia(Effect):
 def _phi(scene: Scene, target: str) -> np.ndarray:
     i = scene.person.skeleton.index(target)
     return scene.phi_of(i)
+
+
+def _changes(scene: Scene, target: str) -> np.ndarray:
+    """(10, 5) of the parameters about the joint by those of the effect: the whole segment heavier,
+    its mass moved, its tensor about the centre of mass larger, each to first order."""
+    phi = _phi(scene, target)
+    mass = float(phi[0])
+    central = phi.copy()
+    central[:4] = 0.0
+    central[4:] -= _steiner(phi[1:4] / mass, phi[1:4])
+    columns = [phi / mass]
+    for axis in np.eye(3):
+        moved = np.zeros(10)
+        moved[1:4] = mass * axis
+        moved[4:] = _steiner(axis, phi[1:4]) + _steiner(phi[1:4] / mass, mass * axis)
+        columns.append(moved)
+    return np.stack([*columns, central], axis=1)
+
+
+def _steiner(place: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """(6,) Ixx, Ixy, Iyy, Ixz, Iyz, Izz of a mass at a place [m] with first moment [kg m]."""
+    tensor = place @ moment * np.eye(3) - np.outer(place, moment)
+    return tensor[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
 
 
 def _share(measured: np.ndarray, before: np.ndarray, after: np.ndarray, valid: np.ndarray) -> float:

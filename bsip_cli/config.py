@@ -145,8 +145,6 @@ class Reconstruct(Section):
 class Diagnosis(Section):
     cutoff_hz: float = Field(gt=0)
     skin_factor: float = Field(ge=0)
-    skin_draws: Count
-    marker_sd_m: float = Field(gt=0)
     landmark_sd_m: float = Field(gt=0)
     large_cop_error_m: float = Field(gt=0)
     large_force_error_percent: float = Field(gt=0)

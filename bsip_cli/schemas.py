@@ -163,13 +163,16 @@ _DIAGNOSIS = (
     Column("estimate", "float", "as unit", "likeliest value"),
     _text("unit", "of estimate and interval"),
     *_floats("ci_low ci_high", "as unit", "95 % interval"),
-    Column("p_value", "float", "1", "chance brings as much among all candidates"),
+    Column("p_value", "float", "1", "1 less the probability, where no test gives another"),
     Column("gain_percent", "float", "%", "squared white residual that goes on held-out data"),
     *_floats("gain_ci_low gain_ci_high", "%", "95 % interval of the gain"),
     _text("verdict", "named, ambiguous or rejected"),
     _text("class_id", "causes that cannot be told apart here share it"),
     _text("sentence", "for people"),
     _text("trials", "recordings that show it"),
+    Column("probability", "float", "1", "that it is there, given what else is found"),
+    _text("scope", "laboratory, person or trial: how far it reaches"),
+    Column("rms_change", "float", "N or N m", "what it does to the component that it changes most"),
 )
 
 _ERROR_BUDGET = (

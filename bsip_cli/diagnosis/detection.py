@@ -1,4 +1,4 @@
-"""How small each cause might have been and still been seen in these very recordings."""
+"""How small each fault might have been and still been named in these very recordings."""
 
 from __future__ import annotations
 
@@ -6,26 +6,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import logit
 
-from bsip_cli.diagnosis.chance import group_of
-from bsip_cli.diagnosis.explanation import NEGLIGIBLE
-from bsip_cli.diagnosis.fair_sizes import known_to
-from bsip_cli.diagnosis.judging import ALPHA, WORTH
+from bsip_cli.diagnosis.fault_model import SIZES, Session
+from bsip_cli.diagnosis.fault_search import Found, Library, Place
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
-from bsip_cli.diagnosis.rounds import Selection
-from bsip_cli.diagnosis.signatures import Place
-from bsip_cli.statistics.normal import Z95
 
 _SURE = 1.645  # standard deviations: found in 95 of 100 recordings like these
-_TOLD = (
-    1e-5  # of what the likeliest combination of an effect's parameters is told: less is rounding
-)
-_ALONE = 1e-3  # part of a parameter, squared, that lies in what is not told
+_UNTOLD = 1e-3  # part of a parameter, squared, that lies in what the motion does not tell
+_TOLD = 1e-5  # of what the likeliest combination of parameters is told: less is rounding
 
 
 @dataclass(frozen=True)
 class Limit:
-    """Size of one parameter, the effect's others free, that would have been found; infinite where
+    """Size of one parameter, the effect's others free, that would have been named; infinite where
     no possible one would."""
 
     place: Place
@@ -34,43 +28,46 @@ class Limit:
     size: float
 
 
-def limits_of(selection: Selection) -> Iterator[Limit]:
+def limits_of(
+    session: Session, library: Library, found: Found, named_from: float
+) -> Iterator[Limit]:
     """Per effect, target and parameter, in the trials together or alone; what is of the body cannot
     be in one trial alone. Of moments, frequencies and windows the median counts: half of them show
-    the cause better."""
-    signatures = selection.signatures
-    fit = selection.fit
-    chances = [one.chance for one in selection.rounds if one.chance is not None]
-    last = chances[-1]
-    scores = zip(signatures.places, signatures.information(fit.tangent), strict=True)
-    found: dict[tuple, list[Limit]] = {}
-    for place, information in scores:
+    the fault better.
+
+    Evidence of a size x whose standard deviation is s is x^2 / (2 s^2), less what spreading over
+    two decades costs, and must outweigh the prior odds.
+    """
+    scores = found.scores
+    limits: dict[tuple, list[Limit]] = {}
+    kinds: dict[tuple, float] = {}
+    for place, prior in zip(library.places, library.log_prior, strict=True):
+        kinds[place.kind] = np.logaddexp(kinds.get(place.kind, -np.inf), prior)
+    for place, information in zip(library.places, scores.information, strict=True):
         effect = place.candidate.effect
-        elsewhere = signatures.trials_of(place.candidate) - set(place.trials)
-        if effect.name == UNEXPLAINED or (effect.of_the_body and elsewhere):
+        holding = [t for t, one in enumerate(library.parts) if place.candidate in one]
+        if effect.name == UNEXPLAINED or (effect.of_the_body and len(place.trials) < len(holding)):
             continue
-        scene = signatures.evidence.trials[place.trials[0]].scene
-        rows = sum(len(signatures.evidence.trials[t].residual) for t in place.trials)
-        beyond = selection.background.get(group_of(place.trials), 0.0)
-        beyond_scale = (Z95 + _SURE) * known_to(signatures.evidence, place)
-        least = max(last.limit(place.trials, ALPHA), beyond, WORTH * rows / 2)
-        for parameter, sd in zip(place.candidate.free(scene), _spreads(information), strict=True):
-            needed = max(sd * (np.sqrt(2 * least) + _SURE), NEGLIGIBLE)
-            named = max(beyond_scale, effect.least_named.get(parameter.name, 0.0))
-            size = max(needed * parameter.typical, named)
+        inflation = float(scores.inflation[list(place.trials)].mean())
+        spreads = np.sqrt(inflation) * _spreads(information)
+        needed = float(logit(named_from)) - kinds[place.kind]
+        scene = session.trials[place.trials[0]].scene
+        for parameter, sd in zip(place.candidate.free(scene), spreads, strict=True):
+            cost = np.log(np.hypot(1.0, SIZES[1] / sd)) if np.isfinite(sd) else 0.0
+            size = sd * (np.sqrt(2 * (needed + cost)) + _SURE) * parameter.typical
+            size = max(size, effect.least_named.get(parameter.name, 0.0))
             size = size if size < parameter.most else np.inf
-            limit = Limit(place, parameter.name, parameter.unit, size)
-            key = (effect.name, place.candidate.target, place.trials, parameter.name)
-            found.setdefault(key, []).append(limit)
-    for limits in found.values():
-        yield sorted(limits, key=lambda one: one.size)[len(limits) // 2]
+            key = (place.kind, parameter.name)
+            limits.setdefault(key, []).append(Limit(place, parameter.name, parameter.unit, size))
+    for mine in limits.values():
+        yield sorted(mine, key=lambda one: one.size)[len(mine) // 2]
 
 
 def _spreads(information: np.ndarray) -> np.ndarray:
-    """(k,) standard deviations of an effect's sizes, infinite where the motion does not tell them:
-    a hinge hides a shift along its axis."""
+    """(k,) standard deviations of an effect's sizes [typical], infinite where the motion does not
+    tell them: a hinge hides a shift along its axis."""
     squares, directions = np.linalg.eigh(information)
     told = squares > _TOLD * max(squares[-1], 1.0)
     spread = np.sqrt((directions[:, told] ** 2 / squares[told]).sum(axis=1))
-    hidden = (directions[:, ~told] ** 2).sum(axis=1) > _ALONE
+    hidden = (directions[:, ~told] ** 2).sum(axis=1) > _UNTOLD
     return np.where(hidden, np.inf, spread)

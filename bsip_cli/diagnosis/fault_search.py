@@ -238,9 +238,12 @@ class Found:
     scores: Scores
 
 
-def search(session: Session, library: Library, named_from: float) -> Found:
-    """named_from : probability from which on one name is said; else so many as hold it."""
-    fit = fitted(session, ())
+def search(
+    session: Session, library: Library, named_from: float, known: Sequence[Hypothesis] = ()
+) -> Found:
+    """named_from : probability from which on one name is said; else so many as hold it. known :
+    faults that are there for other reasons; they come first in the fit and have no verdict."""
+    fit = fitted(session, known)
     rejected: dict[tuple, Tried] = {}
     for _ in range(_MOST):
         tried = one_round(session, library, fit)
@@ -248,7 +251,7 @@ def search(session: Session, library: Library, named_from: float) -> Found:
         if not tried or tried[0].log_odds < 0:
             break
         fit = corrected(fitted(session, tried[0].fit.faults, start=tried[0].fit))
-    fit, verdicts = _judged(session, library, fit, named_from)
+    fit, verdicts = _judged(session, library, fit, named_from, len(known))
     said = {one.fault.key for verdict in verdicts for one, _ in verdict.members}
     others = tuple(one for one in rejected.values() if one.fault.key not in said)
     best = sorted(others, key=lambda one: -one.log_odds)
@@ -256,14 +259,14 @@ def search(session: Session, library: Library, named_from: float) -> Found:
 
 
 def _judged(
-    session: Session, library: Library, fit: Fitted, named_from: float
+    session: Session, library: Library, fit: Fitted, named_from: float, known: int
 ) -> tuple[Fitted, list[Verdict]]:
     """Each fault given the others; one that is likelier absent goes, the least likely first."""
     while True:
         inflation = scores_of(library, fit).inflation
         verdicts = [
             _verdict(session, library, fit, k, named_from, inflation)
-            for k in range(len(fit.faults))
+            for k in range(known, len(fit.faults))
         ]
         weakest = min(verdicts, key=lambda one: one.probability, default=None)
         if weakest is None or weakest.probability > 0.5:

@@ -1,27 +1,30 @@
-"""From what the selection kept to what is said: causes, classes of causes, or none."""
+"""From the faults' probabilities to what is said: one name, a group of names, or not so."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from string import ascii_uppercase
 from typing import Literal
 
 import numpy as np
+from scipy.special import expit
 
-from bsip_cli.diagnosis.explanation import Explanation
-from bsip_cli.diagnosis.intervals import drawn_explanations
-from bsip_cli.diagnosis.judging import NAMELESS_LEAST, NAMELESS_WORTH, TINY_WORTH, Tried
-from bsip_cli.diagnosis.pattern import UNEXPLAINED
-from bsip_cli.diagnosis.refitting import alike
-from bsip_cli.diagnosis.rounds import Round, Selection
-from bsip_cli.diagnosis.together import Evidence
+from bsip_cli.diagnosis.fault_model import Fitted
+from bsip_cli.diagnosis.fault_search import Found, Tried, Verdict
+from bsip_cli.diagnosis.held_out import HeldOut
+from bsip_cli.diagnosis.hypothesis import Hypothesis
+from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 
-Verdict = Literal["named", "ambiguous", "rejected"]
+Said = Literal["named", "ambiguous", "rejected"]
+DRAWS = 200
+SCALE_ERROR = 0.03  # of every size: the simulated motion is neither free of noise nor unsmoothed
 _MOMENTS = {"start", "end", "from_time", "release_time"}
-_LETTERS = ascii_uppercase.replace("W", "")  # W is the class of the stated mass
+_LETTERS = ascii_uppercase.replace("W", "")  # W is the group of the stated mass
+_UNKNOWN = (np.nan, np.nan, np.nan)
+_ARM_M = 0.3  # at which a moment counts as much as a force, to find the component that changes most
 
 
 @dataclass(frozen=True)
@@ -37,188 +40,137 @@ class Number:
 
 @dataclass(frozen=True)
 class Finding:
-    """A candidate and what is made of it.
+    """A hypothesis and what is made of it.
 
-    trials : their names. class_id : of causes that cannot be told apart; empty for a single one.
-    gain : percent of the squared white residual on data held out, and its interval.
+    trials : their names. class_id : of faults that cannot be distinguished here; empty for a single
+    one. p_value : 1 less ``probability``, where no test gives another. gain : percent of the squared
+    white residual on data held out, and its interval. scope : laboratory, person or trial.
+    rms_change : root mean square of what it does to the component that it changes most [N, N m].
     """
 
     effect: str
     target: str
     trials: tuple[str, ...]
-    verdict: Verdict
+    verdict: Said
     class_id: str
     p_value: float
     gain: tuple[float, float, float]
     numbers: tuple[Number, ...]
     sentence: str
+    probability: float = np.nan
+    scope: str = ""
+    rms_change: float = np.nan
 
 
-def findings_of(selection: Selection, rng: np.random.Generator) -> tuple[Finding, ...]:
-    """All candidates that were looked at in full: those kept first, with their rivals."""
-    evidence = selection.signatures.evidence
-    kept = list(_kept(selection))
-    said = {_key(cause.explanation) for _, cause, _ in kept}
-    findings = []
-    told: set[int] = set()
+def scope_of(effect: Effect) -> str:
+    """How far a fault reaches, if it is there."""
+    if effect.of_the_lab:
+        return "laboratory"
+    return "person" if effect.of_the_person else "trial"
+
+
+def findings_of(
+    found: Found, held: HeldOut, named_from: float, rng: np.random.Generator
+) -> tuple[Finding, ...]:
+    """What is there first, with the members of each group; then what is not so."""
     names = (a + b for a, b in product(("", *_LETTERS), _LETTERS))  # A, B, ... Z, AA, AB ...
-    for one, cause, number in kept:
-        numbers = _numbers(evidence, cause, _draws(evidence, cause, number, rng))
-        rivals = [
-            rival
-            for rival in cause.rivals
-            if not any(_same(rival.explanation, other.explanation) for _, other, _ in kept)
-        ]
-        said.update(_key(rival.explanation) for rival in rivals)
-        class_id = next(names) if rivals else ""
-        remedy = cause.explanation.effect.remedy
-        findings.append(_finding(evidence, cause, numbers, class_id, remedy))
-        told.update(cause.trials)
-        for rival in rivals:
-            its = _numbers(one.evidence, rival, _draws(one.evidence, rival, -1, rng))
-            findings.append(_finding(one.evidence, rival, its, class_id, remedy))
-    findings += _without_name(selection, told)
-    tried_in_all = (tried for one in selection.rounds for tried in one.tried)
-    for tried in sorted(tried_in_all, key=lambda t: t.given_up is None):
-        if _key(tried.explanation) not in said:
-            said.add(_key(tried.explanation))
-            findings.append(_rejected(evidence, tried))
-    return tuple(findings)
+    findings: list[Finding] = []
+    for verdict in found.verdicts:
+        findings += _findings(found, held, verdict, named_from, names, rng)
+    return (*findings, *(_rejected(one) for one in found.rejected))
 
 
-def _without_name(selection: Selection, told: set[int]) -> Iterator[Finding]:
-    """Trials of which nothing else is told, though a cause was found there and given up: what is
-    wrong has no name. Each trial once, with the cause that came nearest."""
-    given_up = [
-        (tried, tried.given_up.nearest)
-        for one in selection.rounds
-        for tried in one.tried
-        if tried.given_up and tried.given_up.nearest and not tried.is_too_little_unnamed
-    ]
-    for tried, why in sorted(given_up, key=lambda one: -one[0].score):
-        left = tuple(t for t in tried.trials if t not in told)
-        if left:
-            told = told | set(left)
-            yield _nearest(selection.signatures.evidence, tried, why, left)
-
-
-def _nearest(evidence: Evidence, tried: Tried, why: str, trials: tuple[int, ...]) -> Finding:
-    one = tried.explanation
-    sentence = one.sentence(evidence)
-    if one.effect.name != UNEXPLAINED:
-        sentence = f"something without a name; the nearest cause {why} ({sentence})"
-    numbers = (Number("explained", "1", tried.gain.percent / 100, np.nan, np.nan),)
-    without_name = _with(evidence, tried, "named", "", numbers, sentence)
-    names = tuple(evidence.trials[t].name for t in trials)
-    return replace(without_name, effect=UNEXPLAINED, target="", trials=names)
-
-
-def _kept(selection: Selection) -> Iterator[tuple[Round, Tried, int]]:
-    """Rounds and what they kept, with the numbers of the last fit and the place in it."""
-    kept = ((one, one.kept) for one in selection.rounds if one.kept is not None)
-    last = zip(kept, selection.fit.explanations, strict=True)
-    for number, ((one, cause), explanation) in enumerate(last):
-        yield one, replace(cause, explanation=explanation, fit=selection.fit), number
-
-
-def _key(one: Explanation) -> tuple:
-    return one.effect, one.target, one.place.trials
-
-
-def _same(one: Explanation, other: Explanation) -> bool:
-    """The same cause, looked at in fewer or more trials."""
-    return alike(one, other) and not set(one.place.trials).isdisjoint(other.place.trials)
-
-
-def _finding(
-    evidence: Evidence,
-    tried: Tried,
-    numbers: tuple[Number, ...],
-    class_id: str,
-    remedy: str,
-) -> Finding:
-    """A cause that is kept, or with a ``class_id`` one of several."""
-    sentence = _plainest(evidence, tried).sentence(evidence) + interval_words(numbers)
-    verdict: Verdict = "ambiguous" if class_id else "named"
-    if class_id:
-        sentence += f"; other causes look alike here: to tell them apart, {remedy}"
-    return _with(evidence, tried, verdict, class_id, numbers, sentence)
-
-
-def _plainest(evidence: Evidence, tried: Tried) -> Explanation:
-    return tried.explanation.alike(evidence)[0]
-
-
-def _why_not(tried: Tried) -> str:
-    """Why a candidate is not told."""
-    if not tried.is_rare:
-        percent = 100 * tried.p_value
-        often = f"{percent:.0f}" if percent >= 1 else f"{percent:.1g}"
-        return f"chance brings as much in {often} % of cases"
-    if tried.is_leftover:
-        return "it is no more than what a larger cause leaves behind"
-    if tried.given_up:
-        return tried.given_up.why
-    if not tried.is_good:
-        helps = (
-            "makes the error larger" if tried.gain.percent < 0 else "hardly helps, or not for sure"
-        )
-        return f"on data held out it {helps}"
-    if tried.is_slight and tried.is_tiny:
-        least = 100 * NAMELESS_LEAST
-        why = f"it has no name, changes the forces by less than {least:g} % of body weight"
-        enough = f"explains less than {100 * TINY_WORTH:.0f} %"
-        return f"{why}, and {enough if tried.is_first else 'another cause is there'}"
-    if tried.is_slight:
-        return f"it has no name and explains less than {100 * NAMELESS_WORTH:.0f} %, as skin may"
-    return "another cause explains it better"
-
-
-def _rejected(evidence: Evidence, tried: Tried) -> Finding:
-    sentence = f"not so: {tried.explanation.sentence(evidence)} ({_why_not(tried)})"
-    return _with(evidence, tried, "rejected", "", _bare(evidence, tried), sentence)
-
-
-def _with(
-    evidence: Evidence,
-    tried: Tried,
+def _findings(
+    found: Found,
+    held: HeldOut,
     verdict: Verdict,
-    class_id: str,
-    numbers: tuple[Number, ...],
-    sentence: str,
-) -> Finding:
-    one = tried.explanation
-    trials = tuple(evidence.trials[t].name for t in one.place.trials)
+    named_from: float,
+    names: Iterator[str],
+    rng: np.random.Generator,
+) -> Iterator[Finding]:
+    if verdict.probability < named_from:
+        yield _rejected(verdict.members[0][0])
+        return
+    is_alone = len(verdict.members) == 1
+    class_id = "" if is_alone else next(names)
+    mine = found.fit.faults[verdict.number]
+    for tried, probability in verdict.members:
+        is_mine = tried.fault.key == mine.key
+        fit, number = (found.fit, verdict.number) if is_mine else (tried.fit, len(tried.fit.faults) - 1)
+        numbers = _numbers(fit, number, found.scores.inflation, rng)
+        one = fit.faults[number]
+        sentence = one.alike(fit.session)[0].sentence(fit.session) + interval_words(numbers)
+        if not is_alone:
+            sentence += f"; other causes look alike here: to tell them apart, {mine.effect.remedy}"
+        yield Finding(
+            one.effect.name,
+            one.target,
+            _names(fit, one),
+            "named" if is_alone else "ambiguous",
+            class_id,
+            1 - (verdict.probability if is_alone else probability),
+            held.gain(number).interval() if is_mine else _UNKNOWN,
+            numbers,
+            sentence,
+            verdict.probability if is_alone else probability,
+            scope_of(one.effect),
+            _rms_change(fit, one),
+        )
+
+
+def _names(fit: Fitted, one: Hypothesis) -> tuple[str, ...]:
+    return tuple(fit.session.trials[t].name for t in one.trials)
+
+
+def _rejected(tried: Tried) -> Finding:
+    fit, one = tried.fit, tried.fault
+    probability = float(expit(tried.log_odds))
+    numbers = tuple(Number(n, u, x, np.nan, np.nan) for n, u, x in one.reported(fit.session))
+    sentence = (
+        f"not so: {one.sentence(fit.session)} (probability {probability:.2g} given what is found)"
+    )
+    told = one.effect.name, one.target, _names(fit, one), "rejected", "", 1 - probability
     return Finding(
-        one.effect.name,
-        one.target,
-        trials,
-        verdict,
-        class_id,
-        tried.p_value,
-        tried.gain.interval(),
+        *told,
+        _UNKNOWN,
         numbers,
         sentence,
+        probability,
+        scope_of(one.effect),
+        _rms_change(fit, one),
     )
 
 
-def _draws(
-    evidence: Evidence, tried: Tried, number: int, rng: np.random.Generator
-) -> list[Explanation]:
-    """The explanation with that number in its fit, as it might as well be."""
-    return drawn_explanations(evidence, tried.fit, number % len(tried.fit.explanations), rng)
+def _rms_change(fit: Fitted, one: Hypothesis) -> float:
+    """In the component that changes most, in its trial of the largest change."""
+    trials = (fit.session.trials[t] for t in one.trials)
+    changes = [x.errors.filter.one(one.effect.change(x.scene, one.target, one.values)) for x in trials]
+    rms = np.array([np.sqrt((x**2).mean(axis=0)) for x in changes])
+    return float(rms.flat[int(np.argmax(rms / np.repeat([1.0, _ARM_M], 3)))])
 
 
-def _numbers(evidence: Evidence, tried: Tried, draws: list[Explanation]) -> tuple[Number, ...]:
-    """What is reported of a cause, with intervals."""
-    reported = _plainest(evidence, tried).reported(evidence)
-    return numbers_of(reported, [draw.reported(evidence) for draw in draws])
+def _numbers(
+    fit: Fitted, number: int, inflation: np.ndarray, rng: np.random.Generator
+) -> tuple[Number, ...]:
+    """What is reported of a fault, with the intervals of draws from the posterior.
 
-
-def _bare(evidence: Evidence, tried: Tried) -> tuple[Number, ...]:
-    """What is reported of it, without intervals."""
-    reported = tried.explanation.reported(evidence)
-    return tuple(Number(name, unit, x, np.nan, np.nan) for name, unit, x in reported)
+    Its variance counts as many times as the trials' candidates explain more than chance; what no
+    recording betters comes on top.
+    """
+    session, one = fit.session, fit.faults[number]
+    mine = fit.coefficients(number)
+    covariance = fit.covariance[mine, mine] * inflation[list(one.trials)].mean()
+    free, typical = one.is_free(session), one.typical(session)
+    known_to = np.array([p.known_to for p in one.parameters(session)])
+    spread = np.hypot(known_to, SCALE_ERROR * one.values * free)
+    steps = rng.multivariate_normal(np.zeros(len(typical)), covariance, DRAWS, check_valid="ignore")
+    noise = spread * rng.standard_normal(steps.shape)
+    drawn = [
+        one.with_values(session, one.values + step * typical + more).alike(session)
+        for step, more in zip(steps, noise, strict=True)
+    ]
+    alike = [each[rng.integers(len(each))].reported(session) for each in drawn]
+    return numbers_of(one.alike(session)[0].reported(session), alike)
 
 
 Reported = tuple[tuple[str, str, float], ...]

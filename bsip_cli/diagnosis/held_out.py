@@ -1,4 +1,4 @@
-"""What an explanation is worth on stretches of time that did not help to find its size."""
+"""What a fault is worth on stretches of time that did not help to find its size."""
 
 from __future__ import annotations
 
@@ -6,25 +6,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.diagnosis.explanation import Fit
-from bsip_cli.diagnosis.together import Evidence
+from bsip_cli.diagnosis.error_model import posterior
+from bsip_cli.diagnosis.fault_model import Fitted, Session, columns_of, summed
 from bsip_cli.statistics.normal import Z95
 
 FOLDS = 5
+BLOCK_S = 1.0  # stretches of time that stand for independent ones
 
 
 @dataclass(frozen=True, eq=False)
 class Gain:
-    """Squared white residual that goes, per block (b,), 0 in trials that are not concerned.
+    """Squared white residual that goes, per block (b,) of the trials concerned.
 
-    concerned : (b,) blocks of the trials that the explanation is about.
-    before : their squared white residual without it.
+    before : their squared white residual without the fault.
 
     percent : of the squared residual, and its standard error over the blocks.
     """
 
     blocks: np.ndarray
-    concerned: np.ndarray
     before: float
 
     @property
@@ -33,15 +32,13 @@ class Gain:
 
     @property
     def error_percent(self) -> float:
-        return 100 * standard_error(self.blocks[self.concerned]) / self.before
+        count = len(self.blocks)
+        spread = np.sqrt(count) * self.blocks.std(ddof=1) if count > 1 else np.inf
+        return 100 * float(spread) / self.before
 
     def is_real(self) -> bool:
         """Larger than its standard error."""
         return self.percent > self.error_percent
-
-    def is_sure(self) -> bool:
-        """Its 95 % interval lies above zero."""
-        return self.interval()[1] > 0
 
     def interval(self) -> tuple[float, float, float]:
         """Percent, and its 95 % interval."""
@@ -49,52 +46,93 @@ class Gain:
         return self.percent, self.percent - half, self.percent + half
 
 
-def standard_error(blocks: np.ndarray) -> float:
-    """Of the sum of blocks (b,)."""
-    return float(np.sqrt(len(blocks)) * blocks.std(ddof=1)) if len(blocks) > 1 else np.inf
+def first_blocks(session: Session) -> list[int]:
+    """Number of each trial's first block, counted through all of them."""
+    counts = [int(_own_blocks(session, t).max()) + 1 for t in range(len(session.trials))]
+    return np.cumsum([0, *counts[:-1]]).tolist()
 
 
-def gain_of(
-    evidence: Evidence,
-    trials: tuple[int, ...],
-    before: np.ndarray,
-    after: np.ndarray,
-    tangent: np.ndarray,
-) -> Gain:
-    """Gain on the blocks of some trials.
+def start_s(session: Session, trial: int) -> float:
+    """When a trial's first block begins."""
+    one = session.trials[trial]
+    return float(one.scene.times_s[one.errors.filter.frames][0])
 
-    Every block is left out once, with a fifth of the others, and the sizes are estimated anew.
-    The percentage is of the residual in the trials that the explanation is about.
 
-    before, after : (R,) residual without the explanation, and with its likeliest sizes.
-    tangent : (R, k) of everything that is estimated anew.
-    """
-    blocks = evidence.blocks()
-    there = np.concatenate(
-        [np.full(len(one.residual), t in trials) for t, one in enumerate(evidence.trials)]
+def _own_blocks(session: Session, trial: int) -> np.ndarray:
+    """(n,) block of each sample of a trial."""
+    one = session.trials[trial]
+    times = one.scene.times_s[one.errors.filter.frames]
+    return ((times - start_s(session, trial)) / BLOCK_S).astype(int)
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """A fit without each fold in turn: coefficients (FOLDS, K); rows are the trials' blocks."""
+
+    fit: Fitted
+    blocks: tuple[np.ndarray, ...]
+    means: np.ndarray
+
+    def values(self, number: int) -> np.ndarray:
+        """(FOLDS, k) all parameters of a fault."""
+        return np.array([self.fit.values_at(number, mean) for mean in self.means])
+
+    def gain(self, number: int) -> Gain:
+        """Of a fault given the others: both with and without it, every block is judged by the
+        other folds."""
+        fit, one = self.fit, self.fit.faults[number]
+        kept = np.ones(len(fit.mean), dtype=bool)
+        kept[fit.coefficients(number)] = False
+        offsets = {
+            t: fit.whitened(t, columns_of(fit.session, one, t).offset[..., None])[:, 0]
+            for t in one.trials
+        }
+        without = _means(fit, self.blocks, kept, offsets)
+        saved: list[np.ndarray] = []
+        before = 0.0
+        for t in one.trials:
+            piece, fold = fit.pieces[t], self.blocks[t] % FOLDS
+            at = piece.used[None, :], fold[:, None]
+            full, fewer = (_predicted(piece.white, x[at[1], at[0]]) for x in (self.means, without))
+            squares = (piece.right + offsets[t] - fewer) ** 2
+            before += float(squares.sum())
+            gone = squares - (piece.right - full) ** 2
+            saved.append(np.bincount(self.blocks[t] - self.blocks[t].min(), gone))
+        return Gain(np.concatenate(saved), before)
+
+
+def held_out(fit: Fitted) -> HeldOut:
+    """Every fifth block of all trials is left out in turn."""
+    firsts = first_blocks(fit.session)
+    blocks = tuple(
+        np.repeat(first + _own_blocks(fit.session, t), 6) for t, first in enumerate(firsts)
     )
-    numbers = np.unique(blocks)
-    gains = np.zeros(len(numbers))
+    return HeldOut(fit, blocks, _means(fit, blocks, np.ones(len(fit.mean), dtype=bool), {}))
+
+
+def _means(
+    fit: Fitted, blocks: tuple[np.ndarray, ...], kept: np.ndarray, more: dict[int, np.ndarray]
+) -> np.ndarray:
+    """(FOLDS, K) coefficients without each fold, those that are not ``kept`` zero; ``more`` is added
+    to a trial's white residual."""
+    count = len(fit.mean)
+    gram, against = summed(fit.pieces, count)
+    for t, offset in more.items():
+        against[fit.pieces[t].used] += fit.pieces[t].white.T @ offset
+    means = np.zeros((FOLDS, count))
     for fold in range(FOLDS):
-        test = blocks % FOLDS == fold
-        train = ~test
-        step = np.linalg.lstsq(tangent[train], after[train], rcond=None)[0]
-        saved = before**2 - (after - tangent @ step) ** 2
-        for k in np.flatnonzero(numbers % FOLDS == fold):
-            gains[k] = saved[blocks == numbers[k]].sum()
-    concerned = np.isin(numbers, blocks[there])
-    return Gain(np.where(concerned, gains, 0.0), concerned, float((before[there] ** 2).sum()))
+        its, to = gram.copy(), against.copy()
+        for t, piece in enumerate(fit.pieces):
+            rows = blocks[t] % FOLDS == fold
+            white = piece.white[rows]
+            right = (piece.right + more.get(t, 0.0))[rows]
+            its[np.ix_(piece.used, piece.used)] -= white.T @ white
+            to[piece.used] -= white.T @ right
+        told = np.ix_(kept, kept)
+        means[fold, kept] = posterior(its[told], to[kept], fit.root[kept])[0]
+    return means
 
 
-def values_without(evidence: Evidence, fit: Fit) -> list[list[list[float]]]:
-    """Per explanation and fold, all its parameters, the free ones estimated without the fold's
-    blocks."""
-    fold = evidence.blocks() % FOLDS
-    kept: list[list[list[float]]] = [[] for _ in fit.explanations]
-    for number in range(FOLDS):
-        train = fold != number
-        step = np.linalg.lstsq(fit.tangent[train], fit.residual[train], rcond=None)[0]
-        for k, one in enumerate(fit.explanations):
-            moved = one.moved(evidence, step[fit.columns(k, evidence)])
-            kept[k].append(moved.values.tolist())
-    return kept
+def _predicted(white: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+    """(6 n,) of rows (6 n, K') with coefficients (6 n, K') of their own."""
+    return np.einsum("rk,rk->r", white, coefficients)

@@ -1,24 +1,30 @@
-"""What the markers prove by themselves: one that slips or sits wrong, a second bend of the trunk.
+"""What the markers show by themselves: one that slips or sits wrong, a second bend of the trunk.
 
-The pose is the best that the model can do; what a cause leaves of the markers is linear in its
-sizes like the wrench, and far sharper: the skin slides by millimetres. What is proven here is no
-question to the plates any more, and its course in the wrench is nobody else's.
+The pose is the best that the model can do; what a fault leaves of the markers is linear in its
+sizes like the wrench, and far sharper: the skin slides by millimetres. A marker that jumps and stays
+is proven by that. A bend of the trunk is not: soft tissue that moves with it leaves the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
 
-from bsip_cli.diagnosis.candidates import Candidate
-from bsip_cli.diagnosis.explanation import explanation_of
-from bsip_cli.diagnosis.findings import Finding, Number, interval_words, numbers_of
-from bsip_cli.diagnosis.held_out import Gain
-from bsip_cli.diagnosis.intervals import DRAWS, SCALE_ERROR
-from bsip_cli.diagnosis.together import BLOCK_S, Evidence, clipped
+from bsip_cli.body.names import in_words
+from bsip_cli.diagnosis.findings import (
+    DRAWS,
+    SCALE_ERROR,
+    Finding,
+    Number,
+    interval_words,
+    numbers_of,
+    scope_of,
+)
+from bsip_cli.diagnosis.held_out import BLOCK_S, Gain
+from bsip_cli.diagnosis.hypothesis import Candidate, Hypothesis
 from bsip_cli.dynamics.lowpass import stride_to
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect
@@ -26,16 +32,10 @@ from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH
 
 ENOUGH_HZ = 10.0  # for a course of many seconds
-# Of the markers' squared residuals, their means left out. Less than PROVEN is enough where no
-# joint's centre explains a third as much: skin that follows the trunk, by 5 % at most, looks as
-# much like a waist that lies elsewhere.
-PROVEN, CLEAR, CLEARLY = 0.25, 0.06, 3.0
+BENT = 0.25  # of the markers' squared residuals, their means left out: less is skin that follows
 OWN = 0.5  # of a marker's own squared residual: else its skin slides more than it slips
-RIVAL = 0.9  # of the best one's share: who explains as much cannot be told from it
-# In the simulator the bend is told 0.42 to 0.64 times as large as it is where all trials have it.
-_TAKEN_UP = 2.0
 _UNKNOWN = (np.nan, np.nan, np.nan)
-SLIP, BEND, CENTRE = "marker_shift", "missing_joint", "joint_centre"
+SLIP, BEND, SOFT_TISSUE = "marker_shift", "missing_joint", "soft_tissue"
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,10 @@ class Slip:
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """A cause in one trial, sized by the markers.
+    """A fault in one trial, sized by the markers.
 
     values : (K,) all parameters, in the effect's order. draws : (DRAWS, K) as they might as well
-    be. share : of the markers' squared residuals, of a slip of its own marker's. is_alone :
-    nothing else explains them as well. is_rival : of another cause, in the place of which it would
-    stand.
+    be. share : of the markers' squared residuals, of a slip of its own marker's.
     """
 
     effect: Effect
@@ -65,69 +63,43 @@ class Proof:
     draws: np.ndarray
     share: float
     p_value: float
-    is_alone: bool = True
-    is_rival: bool = False
 
-    def columns(self, scene: Scene) -> np.ndarray:
-        """(N, 6, k) what it may do to the wrench, sizes of unit variance: the plates do not judge
-        how far the mass follows the markers."""
-        free = self.effect.is_free(scene, self.target)
-        typical = np.array([p.typical for p in self.effect.parameters(scene, self.target)])
-        sizes = (typical + np.abs(self.values))[free]
-        return self.effect.tangent(scene, self.target, self.values) * sizes
+    def hypothesis(self, trial: int) -> Hypothesis:
+        """As the search for faults takes it."""
+        return Hypothesis(self.effect, self.target, (trial,), self.values)
 
-    def gain(self, evidence: Evidence) -> Gain:
-        """What it takes off the wrench's residual in its trial's evidence, which did not help to
-        find its sizes."""
-        scene = evidence.trials[0].scene
-        one = explanation_of(self.effect, self.target, self.values, scene, (0,))
-        before = clipped(evidence.residual)
-        saved = before**2 - clipped(evidence.residual - one.change(evidence)) ** 2
-        numbers, block = np.unique(evidence.blocks(), return_inverse=True)
-        blocks = np.bincount(block, saved)
-        return Gain(blocks, np.ones(len(numbers), dtype=bool), float((before**2).sum()))
-
-    def finding(
-        self, scene: Scene, trial: str, class_id: str, gain: Gain, is_taken_up: bool
-    ) -> Finding:
-        """As the diagnosis prints it; the class is that of causes that look alike.
-
-        is_taken_up : ``scale`` has fitted the body to part of it.
-        """
+    def finding(self, scene: Scene, trial: str, gain: Gain | None) -> Finding:
+        """As the diagnosis prints it. gain : of the forces."""
+        whose = "the marker's" if self.effect.name == SLIP else "all markers'"
+        is_shown = gain is not None and gain.is_real()
         reported = self.effect.reported(scene, self.target, self.values)
         drawn = [self.effect.reported(scene, self.target, one) for one in self.draws]
         numbers = numbers_of(reported, drawn)
-        if is_taken_up:
-            numbers = tuple(_wider(one) for one in numbers)
         told = self.effect.sentence(scene, self.target, self.values) + interval_words(numbers)
-        whose = "the marker's" if self.effect.name == SLIP else "all markers'"
         sentence = f"{told}; this is {100 * self.share:.0f} % of {whose} squared residual"
-        if is_taken_up:
-            sentence += ", and `scale` has fitted the waist to it: the bend may be twice as large"
-        if not gain.is_real():
+        if not is_shown:
             sentence += ", and the forces do not show it"
-        if not self.is_alone:
-            sentence += f"; other causes look alike here: to tell them apart, {self.effect.remedy}"
         return Finding(
             self.effect.name,
             self.target,
             (trial,),
-            "named" if self.is_alone else "ambiguous",
-            "" if self.is_alone else class_id,
+            "named",
+            "",
             self.p_value,
-            gain.interval() if gain.is_real() else _UNKNOWN,
+            gain.interval() if gain is not None and is_shown else _UNKNOWN,
             numbers,
             sentence,
+            1 - self.p_value,
+            scope_of(self.effect),
         )
 
 
-def proofs_of(scene: Scene, slips: Sequence[Slip], rng: np.random.Generator) -> tuple[Proof, ...]:
-    """What a trial's markers prove: the slips that were found in them, and a second bend."""
-    if scene.residual_m is None:
-        return ()
-    fewer = scene.every(stride_to(scene.rate_hz, ENOUGH_HZ))
-    assert fewer.residual_m is not None
+def slips_of(scene: Scene, slips: Sequence[Slip], rng: np.random.Generator) -> tuple[Proof, ...]:
+    """The slips that a trial's markers show, of those that were found in them."""
+    fewer = _slower(scene)
     left, found = fewer.residual_m, []
+    if left is None:
+        return ()
     for slip in slips:
         p_value = float(chi2.sf(slip.statistic**2, 3))
         one = _sized(fewer, left, EFFECTS[SLIP], slip.marker, (slip.start_s, 0.0), rng)
@@ -136,12 +108,41 @@ def proofs_of(scene: Scene, slips: Sequence[Slip], rng: np.random.Generator) -> 
             continue
         found.append(one)
         left = left - _left(one.effect, fewer, one.target, one.values)
-    return (*found, *_bends(fewer, left, rng))
+    return tuple(found)
 
 
-def _wider(one: Number) -> Number:
-    low, high = min(one.low, _TAKEN_UP * one.low), max(one.high, _TAKEN_UP * one.high)
-    return replace(one, low=low, high=high)
+def bend_of(
+    scene: Scene, slips: Sequence[Proof], trial: str, class_id: str, rng: np.random.Generator
+) -> tuple[Finding, ...]:
+    """A second bend of the trunk or soft tissue that moves with it, which markers do not tell apart,
+    where that is much of their residuals beside slips; nothing where it is little."""
+    fewer = _slower(scene)
+    left = fewer.residual_m
+    if left is None:
+        return ()
+    for one in slips:
+        left = left - _left(one.effect, fewer, one.target, one.values)
+    effect = EFFECTS[BEND]
+    sized = (_sized(fewer, left, effect, target, (), rng) for target in effect.targets(fewer))
+    possible = (one for one in sized if effect.possible(fewer, one.target, one.values))
+    bend = max(possible, key=lambda one: one.share, default=None)
+    if bend is None or bend.share < BENT:
+        return ()
+    alike = f"a second bend and soft tissue look alike here: to tell them apart, {effect.remedy}"
+    one = bend.finding(fewer, trial, None)
+    one = replace(one, verdict="ambiguous", class_id=class_id, sentence=f"{one.sentence}; {alike}")
+    markers = fewer.person.marker_segments == fewer.person.skeleton.index(bend.target)
+    size = float(np.sqrt(np.nanmean((left[:, markers] ** 2).sum(axis=2))))
+    number = Number("size", "m", size, np.nan, np.nan)
+    said = (
+        f"soft tissue on the {in_words(bend.target)} moves with the trunk's posture: its markers are "
+        f"{1000 * size:.0f} mm off; {alike}"
+    )
+    return one, replace(one, effect=SOFT_TISSUE, numbers=(number,), sentence=said, scope="person")
+
+
+def _slower(scene: Scene) -> Scene:
+    return scene.every(stride_to(scene.rate_hz, ENOUGH_HZ))
 
 
 def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:
@@ -152,34 +153,6 @@ def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:
     rows = _in_rows(scene, change[..., None], own, with_means=_is_throughout(scene, one.values[3]))
     columns, course, _ = rows
     return 1 - float(((course - columns[:, 0]) ** 2).sum() / (course @ course))
-
-
-def _bends(scene: Scene, residual_m: np.ndarray, rng: np.random.Generator) -> tuple[Proof, ...]:
-    """A second bend, with the joints' centres that explain as much; nothing if one explains more:
-    scaling may err by that."""
-    bend = next(_possible(scene, residual_m, EFFECTS[BEND], rng), None)
-    if bend is None or bend.share < CLEAR:
-        return ()
-    centres = list(_possible(scene, residual_m, EFFECTS[CENTRE], rng))
-    is_clear = all(CLEARLY * one.share < bend.share for one in centres)
-    if bend.share < PROVEN and not is_clear:
-        return ()
-    rivals = [one for one in centres if one.share > RIVAL * bend.share]
-    if any(RIVAL * one.share > bend.share for one in rivals):
-        return ()
-    rivals.sort(key=lambda one: -one.share)
-    others = (replace(one, is_alone=False, is_rival=True) for one in rivals)
-    return replace(bend, is_alone=not rivals), *others
-
-
-def _possible(
-    scene: Scene, residual_m: np.ndarray, effect: Effect, rng: np.random.Generator
-) -> Iterator[Proof]:
-    """An effect wherever it may be, where its sizes can be true."""
-    for target in effect.targets(scene):
-        one = _sized(scene, residual_m, effect, target, (), rng)
-        if effect.possible(scene, target, one.values):
-            yield one
 
 
 def _sized(

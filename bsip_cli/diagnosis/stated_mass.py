@@ -67,12 +67,12 @@ def stated_mass_findings(
     gain = f"the plates' vertical gain is off by {100 * share:+.1f} %"
     zero = f"the plates' zero is off by {weight:+.0f} N"
     causes = [
-        (PlateGain.name, "gain", "1", share, mass_sd, gain),
-        (PlateZero.name, "offset", "N", weight, weight_error, zero),
+        (PlateGain.name, "gain", "1", share, mass_sd, gain, "laboratory"),
+        (PlateZero.name, "offset", "N", weight, weight_error, zero, "laboratory"),
     ]
     if extra > 0:
         cause = f"{extra:.1f} kg are worn or carried that the stated mass leaves out"
-        causes.insert(0, (AddedMass.name, "mass", "kg", extra, error, cause))
+        causes.insert(0, (AddedMass.name, "mass", "kg", extra, error, cause, "person"))
     return tuple(
         Finding(
             effect,
@@ -84,6 +84,9 @@ def stated_mass_findings(
             _UNKNOWN,
             (Number(name, unit, x, x - Z95 * sd, x + Z95 * sd),),
             f"{told}: {why}, or the stated mass is wrong; to tell them apart, {REMEDY}",
+            (1 - p_value) / (len(causes) + 1),
+            scope,
+            abs(weight),
         )
-        for effect, name, unit, x, sd, why in causes
+        for effect, name, unit, x, sd, why, scope in causes
     )

@@ -18,8 +18,7 @@ from scipy.stats import chi2
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.names import in_words
 from bsip_cli.diagnosis.findings import Finding, Number
-from bsip_cli.diagnosis.held_out import FOLDS, Gain
-from bsip_cli.diagnosis.together import BLOCK_S
+from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, Gain
 from bsip_cli.effects.scene import Scene
 from bsip_cli.effects.unmeasured_contact import UnmeasuredContact
 from bsip_cli.statistics.effective_samples import effective_samples
@@ -68,6 +67,9 @@ class Support:
             (percent, low, high),
             self._numbers(),
             f"{self.words()}, and what else may be wrong in this trial is not asked",
+            1 - p_value,
+            "trial",
+            float(np.linalg.norm(self.force_N)),
         )
 
     def _numbers(self) -> tuple[Number, ...]:
@@ -166,4 +168,4 @@ def _gain(missing: np.ndarray, times_s: np.ndarray) -> Gain:
             mean = missing[~test].mean(axis=0)
             saved[test] = (missing[test] ** 2 - (missing[test] - mean) ** 2).sum(axis=1)
     blocks = np.bincount(np.unique(numbers, return_inverse=True)[1], weights=saved)
-    return Gain(blocks, np.ones(len(blocks), dtype=bool), float((missing**2).sum()))
+    return Gain(blocks, float((missing**2).sum()))

@@ -2,67 +2,73 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pandas as pd
 
 from bsip_cli.diagnosis.detection import limits_of
+from bsip_cli.diagnosis.fault_search import Found, Library, Verdict
 from bsip_cli.diagnosis.findings import Finding
-from bsip_cli.diagnosis.held_out import FOLDS, values_without
-from bsip_cli.diagnosis.intervals import bounds
-from bsip_cli.diagnosis.rounds import Selection
-from bsip_cli.diagnosis.together import BLOCK_S
+from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, HeldOut, first_blocks, start_s
 
 
-def facts_of(selection: Selection, findings: tuple[Finding, ...]) -> dict:
-    """The best score of each round and whether it was a cause, and the causes in full: their
-    values from all data and from each fold's training blocks, for ``extend``, and the bound of
-    Cramér and Rao on what is reported."""
-    evidence = selection.signatures.evidence
-    rounds = [
-        {"best": max((t.score for t in one.tried), default=0.0), "kept": one.kept is not None}
-        for one in selection.rounds
-    ]
-    verdicts = {
-        (one.effect, one.target, one.trials): one.verdict
-        for one in findings
-        if one.verdict != "rejected"
-    }
+def facts_of(found: Found, held: HeldOut, findings: tuple[Finding, ...]) -> dict:
+    """The faults in full: their values from all data and from each fold's training blocks, for
+    ``extend``, and the standard deviation of what is reported if the model of the error is exact."""
+    session = found.fit.session
+    said = {(f.effect, f.target, f.trials): f.verdict for f in findings if f.verdict != "rejected"}
     causes = []
-    unseen = values_without(evidence, selection.fit)
-    for number, (one, folds) in enumerate(zip(selection.fit.explanations, unseen, strict=True)):
-        trials = tuple(evidence.trials[t].name for t in one.place.trials)
-        if (one.effect.name, one.target, trials) not in verdicts:
-            continue  # something else in its trials is far louder
-        causes.append(
-            {
-                "effect": one.effect.name,
-                "target": one.target,
-                "trials": list(trials),
-                "verdict": verdicts[one.effect.name, one.target, trials],
-                "values": one.values.tolist(),
-                "folds": folds,
-                "bounds": bounds(evidence, selection.fit, number),
-            }
-        )
-    blocks = {
-        one.name: {
-            "first": evidence.first_block(t),
-            "start_s": float(one.rows_s()[0]),
-        }
-        for t, one in enumerate(evidence.trials)
-    }
+    for one in found.verdicts:
+        fault = found.fit.faults[one.number]
+        trials = tuple(session.trials[t].name for t in fault.trials)
+        if (*fault.key, trials) in said:
+            causes.append(
+                {
+                    "effect": fault.effect.name,
+                    "target": fault.target,
+                    "trials": list(trials),
+                    "verdict": said[*fault.key, trials],
+                    "values": fault.values.tolist(),
+                    "folds": held.values(one.number).tolist(),
+                    "bounds": _bounds(found, one),
+                }
+            )
+    starts = first_blocks(session)
     return {
-        "trials": [one.name for one in evidence.trials],
-        "rounds": rounds,
+        "trials": [one.name for one in session.trials],
         "causes": causes,
         "block_s": BLOCK_S,
         "folds": FOLDS,
-        "blocks": blocks,
+        "blocks": {
+            one.name: {"first": starts[t], "start_s": start_s(session, t)}
+            for t, one in enumerate(session.trials)
+        },
     }
 
 
-def detection_rows(selection: Selection) -> pd.DataFrame:
-    """The ``detection`` artifact: the smallest size of every cause that would have been found."""
-    trials = selection.signatures.evidence.trials
+_STEP = 1e-3  # of the typical size
+
+
+def _bounds(found: Found, verdict: Verdict) -> dict[str, float]:
+    """Standard deviation of all that a fault reports, by the slope of that."""
+    fit, one = found.fit, found.fit.faults[verdict.number]
+    session, typical = fit.session, one.typical(found.fit.session)
+    mine = fit.coefficients(verdict.number)
+    slopes = []
+    for step in _STEP * np.diag(typical):
+        ahead, behind = (
+            np.array([x for *_, x in one.with_values(session, v).reported(session)])
+            for v in (one.values + step, one.values - step)
+        )
+        slopes.append((ahead - behind) / (2 * _STEP))
+    slope = np.stack(slopes, axis=1)
+    spread = np.sqrt(np.einsum("ij,jk,ik->i", slope, fit.covariance[mine, mine], slope))
+    names = [name for name, *_ in one.reported(session)]
+    return dict(zip(names, spread.tolist(), strict=True))
+
+
+def detection_rows(found: Found, library: Library, named_from: float) -> pd.DataFrame:
+    """The ``detection`` artifact: the smallest size of every fault that would have been named."""
+    session = found.fit.session
     rows = [
         {
             "effect": limit.place.candidate.effect.name,
@@ -70,8 +76,8 @@ def detection_rows(selection: Selection) -> pd.DataFrame:
             "parameter": limit.parameter,
             "unit": limit.unit,
             "limit": limit.size,
-            "trials": ", ".join(trials[t].name for t in limit.place.trials),
+            "trials": ", ".join(session.trials[t].name for t in limit.place.trials),
         }
-        for limit in limits_of(selection)
+        for limit in limits_of(session, library, found, named_from)
     ]
     return pd.DataFrame(rows)

@@ -45,6 +45,9 @@ def nothing(p_value: float, trials: tuple[str, ...]) -> dict:
         "class_id": "",
         "sentence": "nothing wrong above the noise",
         "trials": ", ".join(trials),
+        "probability": 1 - p_value,
+        "scope": "",
+        "rms_change": np.nan,
     }
 
 
@@ -67,4 +70,7 @@ def _row(rank: int, one: Finding, number: Number) -> dict:
         "class_id": one.class_id,
         "sentence": one.sentence,
         "trials": ", ".join(one.trials),
+        "probability": one.probability,
+        "scope": one.scope,
+        "rms_change": one.rms_change,
     }

@@ -1,0 +1,225 @@
+"""A person's trials as the diagnosis takes them: what the plates say of the mass, errors, markers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from zlib import crc32
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.body.person import Person
+from bsip_cli.diagnosis.error_budget import Ground, ground_of
+from bsip_cli.diagnosis.error_model import Term, TrialErrors
+from bsip_cli.diagnosis.error_terms import FAULT, error_terms, noise_of_instruments
+from bsip_cli.diagnosis.evidence import Filter, at_full_rate, filter_of, slow
+from bsip_cli.diagnosis.fault_model import FaultTrial
+from bsip_cli.diagnosis.findings import Finding
+from bsip_cli.diagnosis.marker_proof import Proof, Slip, slips_of
+from bsip_cli.diagnosis.scale_mass import agreed_share, is_noticed, weight_share
+from bsip_cli.diagnosis.stated_mass import loaded_plate, stated_mass_findings
+from bsip_cli.diagnosis.support import HANDS, LIGHTER, Support
+from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.marker_shift import BEFORE_S
+from bsip_cli.effects.scene import Scene
+from bsip_cli.identification.prior import Prior
+from bsip_cli.running.unit import Unit
+from bsip_cli.schemas import bsip_names
+from bsip_cli.stages.identification_problem import prior_from
+from bsip_cli.stages.person_mass import PLATES
+from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.study.study import Trial
+
+STATIC = "static"
+# Of the spreads an offset is judged against: 17 mm for a marker that is trusted to 5.
+_FAR_OFF = 3.5
+_READ_TO_PERCENT = 0.3  # standard deviation of what the same plates read in another trial
+_LEAST_SAMPLES = 4  # of the filtered residual, for its course to be one
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """A trial as the model of the error takes it.
+
+    ground : how forces become components. held : what hands hold on to, if they do. slips : what
+    its markers prove.
+    """
+
+    trial: Trial
+    scene: Scene
+    errors: TrialErrors
+    ground: Ground
+    held: Support | None
+    slips: tuple[Proof, ...]
+
+    @property
+    def moves(self) -> bool:
+        return self.trial.role != STATIC
+
+    @cached_property
+    def for_faults(self) -> FaultTrial:
+        """As the search for faults takes it."""
+        return FaultTrial(self.errors, slow(self.scene))
+
+    def with_causes(self, causes: Sequence[Mapping]) -> TrialErrors:
+        """With terms of the causes that concern it, as in the facts of ``overall-diagnosis``."""
+        mine = [one for one in causes if self.trial.stem in one["trials"]]
+        named = tuple(_named(slow(self.scene), self.errors.filter, mine))
+        return replace(self.errors, terms=(*self.errors.terms, *named))
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """All trials with forces, of a body as heavy as is believed.
+
+    prior : of its parameters. share : part of the stated mass by which the plates read more, where
+    they are believed instead; findings : what is told of that.
+    """
+
+    scenes: tuple[tuple[Trial, Scene], ...]
+    prior: Prior
+    share: float
+    findings: tuple[Finding, ...]
+
+
+def weighed(unit: Unit, person: Person) -> Weighed:
+    """Quiet stance judges a stated mass, and trials that agree where nobody stands still."""
+    prior = prior_of(unit, person)
+    trials = unit.trials("kinematics", "wrench")
+    scenes = tuple((t, scene_of(unit, person, prior.phi, t)) for t in trials)
+    scenes = tuple((t, s) for t, s in scenes if s.valid.any())
+    if not scenes or not is_weighed(unit):
+        return Weighed(scenes, prior, 0.0, ())
+    sd = stated_sd(unit)
+    standing = [(t, s) for t, s in scenes if t.role == STATIC][:1]
+    if standing:
+        share, manner = weight_share(standing[0][1]), "in quiet standing"
+    else:
+        standing, manner = list(scenes), "in motion"
+        share = agreed_share([s for _, s in scenes], sd) or 0.0
+    if not is_noticed(share, sd):
+        return Weighed(scenes, prior, 0.0, ())
+    plate = loaded_plate([s for _, s in standing])
+    stems = tuple(t.stem for t, _ in standing)
+    mass_kg = scenes[0][1].mass_kg
+    findings = stated_mass_findings(share, mass_kg, sd, plate, stems, manner)
+    as_read = prior_of(unit, person, share)
+    heavier = tuple((t, replace(s, phi=s.phi + as_read.phi - prior.phi)) for t, s in scenes)
+    return Weighed(heavier, as_read, share, findings)
+
+
+def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:
+    """Of the parameters, none of which is taken for known; the plates' gain shows against a mass
+    that a scale has told.
+
+    share : by what part of the stated mass the plates read more, where they are believed instead.
+    """
+    sd_percent = 100 * stated_sd(unit) if share is None else _READ_TO_PERCENT
+    known = {"total_mass_sd_percent": sd_percent} if is_weighed(unit) else {}
+    table = unit.read("regression").copy()
+    table[[name for name in bsip_names() if not name.startswith("com")]] *= 1 + (share or 0.0)
+    none = np.zeros(len(person.skeleton.bodies), dtype=bool)
+    return prior_from(unit, table, person, none, **known)
+
+
+def stated_sd(unit: Unit) -> float:
+    """Standard deviation of a stated mass, part of it."""
+    return 0.01 * unit.config.diagnosis.stated_mass_sd_percent
+
+
+def is_weighed(unit: Unit) -> bool:
+    """Whether the person's mass is a stated one, in a table or in a recording."""
+    return unit.read("person").iloc[0]["mass_source"] != PLATES
+
+
+def diagnosed(unit: Unit, prior: Prior, trial: Trial, scene: Scene) -> Diagnosed | None:
+    """None where the plates carry the person for hardly a sample."""
+    options, facts = unit.config.diagnosis, unit.read("person").iloc[0]
+    fewer = slow(scene)
+    filter_ = _about_surface(filter_of(fewer, options.cutoff_hz), scene)
+    if len(filter_.frames) < _LEAST_SAMPLES:
+        return None
+    full = at_full_rate(filter_, scene, options.cutoff_hz)
+    measured, residual = full.one(scene.measured), full.one(scene.measured - scene.predicted)
+    contact = unit.facts("identification")["external_contacts"].get(trial.stem)
+    rng = np.random.default_rng(crc32(trial.stem.encode()))
+    slips = slips_of(fewer, _slips(unit, trial), rng) if trial.role != STATIC else ()
+    terms = [
+        Term(x.term, x.target, x.scale, x.own, filter_(x.wrench), mixing=x.mixing, targets=x.targets)
+        for x in error_terms(fewer, prior.root, options.landmark_sd_m, options.skin_factor)
+    ]
+    if contact is not None:
+        terms += _of_hands(fewer, filter_)
+    ground = ground_of(
+        measured,
+        residual,
+        facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float),
+        0.01 * unit.config.reconstruct.cop_min_force_percent_bw * scene.mass_kg * GRAVITY_M_S2,
+        np.floor(fewer.times_s[filter_.frames]).astype(int),
+    )
+    marker_noise_m = unit.facts("kinematics", trial)["marker_noise_m"]
+    noise = noise_of_instruments(
+        fewer, filter_.reference_m, marker_noise_m, scene.rate_hz, options.cutoff_hz
+    )
+    errors = TrialErrors(trial.stem, filter_, residual, tuple(terms), noise)
+    held = None if contact is None else Support(**contact)
+    return Diagnosed(trial, scene, errors, ground, held, slips)
+
+
+def _about_surface(filter_: Filter, scene: Scene) -> Filter:
+    """Moments about a point of the plates' surface."""
+    heights = [plate.corners_m[:, 2] for plate in scene.plates]
+    height = float(np.mean(heights)) if heights else 0.0
+    return replace(filter_, reference_m=np.append(filter_.reference_m[:2], height))
+
+
+def _named(scene: Scene, filter_: Filter, causes: Sequence[Mapping]) -> Iterator[Term]:
+    """Faults with the sizes that the diagnosis has found, and how they might differ."""
+    for one in causes:
+        effect, target = EFFECTS.get(one["effect"]), one["target"]
+        if effect is None:
+            continue  # a pattern without a cause: it belongs to the unknown
+        values = np.asarray(one["values"], dtype=float)
+        typical = [p.typical for p in effect.parameters(scene, target) if not p.scan]
+        columns = filter_(effect.tangent(scene, target, values) * np.array(typical))
+        known = filter_.one(effect.change(scene, target, values))
+        yield Term(
+            FAULT + effect.name,
+            target,
+            f"{FAULT}{effect.name} {target} named",
+            len(one["trials"]) == 1,
+            columns,
+            known,
+        )
+
+
+def _of_hands(scene: Scene, filter_: Filter) -> Iterator[Term]:
+    """A constant force on each hand, of the size from which on it is told."""
+    force = LIGHTER * scene.mass_kg * GRAVITY_M_S2 * np.eye(3)
+    for hand in HANDS:
+        place = scene.point(hand, scene.centre_of(hand)).position_m
+        arm = np.cross(place[:, None], force).swapaxes(1, 2)
+        columns = np.concatenate([np.broadcast_to(force, arm.shape), arm], axis=1)
+        term = FAULT + EFFECTS["unmeasured_contact"].name
+        yield Term(term, hand, f"{term} {hand}", True, filter_(columns))
+
+
+def _slips(unit: Unit, trial: Trial) -> list[Slip]:
+    """Markers off their places that the inverse kinematics has found, a slip's before those of
+    the whole trial."""
+    events = unit.read("marker-events", trial)
+    slips = events["kind"] == "slip"
+    throughout = (events["kind"] == "offset") & (events["statistic"] > _FAR_OFF)
+    return [*_off(events[slips]), *_off(events[throughout], BEFORE_S, _FAR_OFF)]
+
+
+def _off(events: pd.DataFrame, before_s: float = 0.0, least: float = 0.0) -> list[Slip]:
+    """``least``: how far off a marker must be, in the spreads that its statistic is in."""
+    columns = (events[name] for name in ("marker", "start_s", "statistic", "size_m"))
+    return [
+        Slip(str(m), float(t) - before_s, float(z), least * float(size) / float(z))
+        for m, t, z, size in zip(*columns, strict=True)
+    ]

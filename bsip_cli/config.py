@@ -149,6 +149,8 @@ class Diagnosis(Section):
     large_cop_error_m: float = Field(gt=0)
     large_force_error_percent: float = Field(gt=0)
     least_correlation: float = Field(gt=0, lt=1)
+    fault_prior_odds: float = Field(gt=0)
+    named_from: float = Field(gt=0.5, lt=1)
     stated_mass_sd_percent: float = Field(gt=0)
 
 

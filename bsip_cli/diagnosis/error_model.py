@@ -17,7 +17,8 @@ from scipy.linalg import cho_factor
 from scipy.linalg.lapack import dpotri
 
 from bsip_cli.diagnosis.error_terms import FAULT
-from bsip_cli.diagnosis.evidence import FLOOR, Filter, innovations, recursion_of
+from bsip_cli.diagnosis.filtering import Filter
+from bsip_cli.diagnosis.whitening import FLOOR, innovations, recursion_of, white_columns
 
 # How many observations a hyperprior counts for. With one, a fault has the wide tails of Cauchy: it
 # is hardly there or of any size. With four, ordinary errors are rarely three times the usual.
@@ -238,13 +239,6 @@ def white_noise_of(one: TrialErrors, course: np.ndarray) -> tuple[np.ndarray, np
     )
     white = innovations((course / spread)[..., None], recursion, one.filter).reshape(-1, 6)
     return spread * np.maximum(white.std(axis=0), share), recursion
-
-
-def white_columns(
-    columns: np.ndarray, size: np.ndarray, recursion: np.ndarray, filter_: Filter
-) -> np.ndarray:
-    """(6 n, k) of filtered columns (n, 6, k), in which what is left is white."""
-    return innovations(columns / size[:, None], recursion, filter_)
 
 
 def left_by(

@@ -12,17 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.diagnosis.hypothesis import candidates_of
-from bsip_cli.diagnosis.evidence import LEAST
-from bsip_cli.diagnosis.geometry import joint_errors
-from bsip_cli.diagnosis.nuisances import marker_rms_m
-from bsip_cli.diagnosis.skin import SKIN_HZ, nearby_angles, skin_inertia
-from bsip_cli.diagnosis.slack import is_of_instruments, slack_share
+from bsip_cli.diagnosis.hypothesis import Candidate, candidates_of
+from bsip_cli.diagnosis.skin import SKIN_HZ, marker_rms_m, nearby_angles, skin_inertia
 from bsip_cli.diagnosis.smoothing_bias import smoothing_bias
 from bsip_cli.diagnosis.wander import wander
 from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
 from bsip_cli.effects.catalogue import CATALOGUE
+from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.gravity_tilt import GravityTilt
 from bsip_cli.effects.joint_centre import JointCentre
 from bsip_cli.effects.scene import Scene, standing_place_m
 
@@ -31,6 +29,26 @@ SKIN, TRUNK, SMOOTHING = "soft_tissue", "trunk_and_shoulders", "smoothing"
 FAULT = "fault:"
 # Joints that stand for many: their shift is what a trunk or a shoulder girdle that bends does.
 _BENDING = ("waist", "neck", "sternoclavicular", "shoulder")
+# What scaling may err by. The spine bends in many places, which no single joint stands for.
+JOINT_SD_M = {
+    "waist": 0.04,
+    "neck": 0.03,
+    "sternoclavicular": 0.01,
+    "shoulder": 0.02,
+    "elbow": 0.008,
+    "wrist": 0.008,
+    "hip": 0.012,
+    "knee": 0.008,
+    "ankle": 0.008,
+}
+# What every laboratory has of a fault of its instruments, part of the size that is met.
+_SHARE = 0.02
+_HORIZONTAL = 0.7  # of the gain of horizontal forces: all motion, so this is its amplitude's error
+# Of a plate's place: bodies of another table's segments look some centimetres higher or lower, as
+# far as horizontal forces tell a height.
+_PLACE = (_SHARE, _SHARE, 1.0)
+# Noise that no lab goes below: parts of body weight, and arms of it (half a millimetre) [m].
+LEAST = np.array([0.0003, 0.0003, 0.0005, 0.0005, 0.0005, 0.0001])
 _HEAVIER = 0.01  # usual error of the whole mass, part of it: a scale's, clothes and shoes
 
 
@@ -92,9 +110,33 @@ def _of_instruments(effect: Effect, scene: Scene, source: Scene) -> Iterator[Col
     ``source``: the trial whose plates read what is simulated."""
     for one in candidates_of(effect, scene):
         if not one.scanned:
-            wrench = slack_share(one) * one.signature(source)
+            wrench = _usual_share(one) * one.signature(source)
             scale = f"{FAULT}{effect.name} {one.target}"
             yield Columns(FAULT + effect.name, one.target, scale, not effect.of_the_lab, wrench)
+
+
+def is_of_instruments(effect: Effect) -> bool:
+    """Whether it is a fault of plates, clocks or the lab's vertical."""
+    return effect.of_the_plates or isinstance(effect, (Delay, GravityTilt))
+
+
+def _usual_share(one: Candidate) -> np.ndarray:
+    """(k,) or (1,) of the free parameters' typical sizes, that every laboratory has."""
+    if one.effect.name == "plate_translation":
+        return np.array(_PLACE)
+    is_horizontal = one.effect.name == "plate_gain" and one.target.endswith((" fx", " fy"))
+    return np.array([_HORIZONTAL if is_horizontal else _SHARE])
+
+
+def joint_errors(scene: Scene) -> np.ndarray:
+    """(N, 6, 3 joints) change of the wrench for joint centres that are off by one sd."""
+    effect = JointCentre()
+    columns = [
+        JOINT_SD_M[target.removesuffix("_l").removesuffix("_r")]
+        * effect.tangent(scene, target, np.zeros(3))
+        for target in effect.targets(scene)
+    ]
+    return np.concatenate(columns, axis=2)
 
 
 def _as_simulated(scene: Scene) -> Scene:

@@ -90,9 +90,7 @@ def columns_of(session: Session, one: Hypothesis, trial: int) -> FaultColumns:
     free, typical = one.is_free(session), one.typical(session)
     change = filter_.one(one.effect.change(scene, one.target, one.values))
     slope = np.zeros((*change.shape, len(typical)))
-    slope[..., free] = filter_(
-        one.effect.tangent(scene, one.target, one.values) * typical[free]
-    )
+    slope[..., free] = filter_(one.effect.tangent(scene, one.target, one.values) * typical[free])
     for k in np.flatnonzero(~free):
         step = np.zeros(len(typical))
         step[k] = _DIFFERENCE * typical[k]
@@ -247,9 +245,7 @@ class _Fitting:
         mine = [(f, columns_of(self.session, one, trial)) for f, one in self._touching(trial)]
         at = [first + np.arange(x.slope.shape[2]) for first, x in mine]
         used = np.concatenate([self.session.used[trial], *at])
-        columns = np.concatenate(
-            [self.session.columns[trial], *(x.slope for _, x in mine)], axis=2
-        )
+        columns = np.concatenate([self.session.columns[trial], *(x.slope for _, x in mine)], axis=2)
         residual = self.session.trials[trial].errors.residual
         return used, columns, residual - sum((x.offset for _, x in mine), np.zeros(()))
 

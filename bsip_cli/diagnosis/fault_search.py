@@ -22,10 +22,9 @@ from scipy.stats import chi2
 
 from bsip_cli.diagnosis.fault_model import (
     SIZES,
-    Fitted,
     FaultTrial,
+    Fitted,
     Session,
-    columns_of,
     corrected,
     fitted,
 )
@@ -178,7 +177,7 @@ def scores_of(library: Library, fit: Fitted) -> Scores:
             if len(place.trials) == 1 and told[n].any():
                 ratio = float(squares[n] / _MEDIANS[int(told[n].sum())])
                 saved[place.trials[0]].setdefault(place.candidate.effect, []).append(ratio)
-    medians = [[np.median(x) for x in one.values()] or [1.0] for one in saved]
+    medians = [[float(np.median(x)) for x in one.values()] or [1.0] for one in saved]
     inflation = np.array([max(1.0, float(np.median(one))) for one in medians])
     return Scores(log_factor, tuple(sizes), tuple(known), inflation)
 

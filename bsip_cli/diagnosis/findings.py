@@ -42,8 +42,7 @@ class Number:
 class Finding:
     """A hypothesis and what is made of it.
 
-    trials : their names. class_id : of faults that cannot be distinguished here; empty for a single
-    one. p_value : 1 less ``probability``, where no test gives another. gain : percent of the squared
+    trials : their names. class_id : of faults that cannot be told apart here; empty for a single one. p_value : 1 less ``probability``, where no test gives another. gain : percent of the squared
     white residual on data held out, and its interval. scope : laboratory, person or trial.
     rms_change : root mean square of what it does to the component that it changes most [N, N m].
     """
@@ -96,7 +95,9 @@ def _findings(
     mine = found.fit.faults[verdict.number]
     for tried, probability in verdict.members:
         is_mine = tried.fault.key == mine.key
-        fit, number = (found.fit, verdict.number) if is_mine else (tried.fit, len(tried.fit.faults) - 1)
+        fit, number = (
+            (found.fit, verdict.number) if is_mine else (tried.fit, len(tried.fit.faults) - 1)
+        )
         numbers = _numbers(fit, number, found.scores.inflation, rng)
         one = fit.faults[number]
         sentence = one.alike(fit.session)[0].sentence(fit.session) + interval_words(numbers)
@@ -129,9 +130,13 @@ def _rejected(tried: Tried) -> Finding:
     sentence = (
         f"not so: {one.sentence(fit.session)} (probability {probability:.2g} given what is found)"
     )
-    told = one.effect.name, one.target, _names(fit, one), "rejected", "", 1 - probability
     return Finding(
-        *told,
+        one.effect.name,
+        one.target,
+        _names(fit, one),
+        "rejected",
+        "",
+        1 - probability,
         _UNKNOWN,
         numbers,
         sentence,
@@ -144,7 +149,9 @@ def _rejected(tried: Tried) -> Finding:
 def _rms_change(fit: Fitted, one: Hypothesis) -> float:
     """In the component that changes most, in its trial of the largest change."""
     trials = (fit.session.trials[t] for t in one.trials)
-    changes = [x.errors.filter.one(one.effect.change(x.scene, one.target, one.values)) for x in trials]
+    changes = [
+        x.errors.filter.one(one.effect.change(x.scene, one.target, one.values)) for x in trials
+    ]
     rms = np.array([np.sqrt((x**2).mean(axis=0)) for x in changes])
     return float(rms.flat[int(np.argmax(rms / np.repeat([1.0, _ARM_M], 3)))])
 

@@ -113,8 +113,8 @@ def held_out(fit: Fitted) -> HeldOut:
 def _means(
     fit: Fitted, blocks: tuple[np.ndarray, ...], kept: np.ndarray, more: dict[int, np.ndarray]
 ) -> np.ndarray:
-    """(FOLDS, K) coefficients without each fold, those that are not ``kept`` zero; ``more`` is added
-    to a trial's white residual."""
+    """(FOLDS, K) coefficients without each fold, those that are not ``kept`` zero; ``more`` is
+    added to a trial's white residual."""
     count = len(fit.mean)
     gram, against = summed(fit.pieces, count)
     for t, offset in more.items():

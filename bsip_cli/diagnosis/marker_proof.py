@@ -2,7 +2,7 @@
 
 The pose is the best that the model can do; what a fault leaves of the markers is linear in its
 sizes like the wrench, and far sharper: the skin slides by millimetres. A marker that jumps and stays
-is proven by that. A bend of the trunk is not: soft tissue that moves with it leaves the same.
+is proven by that. A bend of the trunk is not: soft tissue moving with it leaves the same.
 """
 
 from __future__ import annotations
@@ -114,8 +114,8 @@ def slips_of(scene: Scene, slips: Sequence[Slip], rng: np.random.Generator) -> t
 def bend_of(
     scene: Scene, slips: Sequence[Proof], trial: str, class_id: str, rng: np.random.Generator
 ) -> tuple[Finding, ...]:
-    """A second bend of the trunk or soft tissue that moves with it, which markers do not tell apart,
-    where that is much of their residuals beside slips; nothing where it is little."""
+    """A second bend of the trunk or soft tissue that moves with it, which markers do not tell
+    apart, where that is much of their residuals beside slips; nothing where it is little."""
     fewer = _slower(scene)
     left = fewer.residual_m
     if left is None:
@@ -129,16 +129,18 @@ def bend_of(
     if bend is None or bend.share < BENT:
         return ()
     alike = f"a second bend and soft tissue look alike here: to tell them apart, {effect.remedy}"
-    one = bend.finding(fewer, trial, None)
-    one = replace(one, verdict="ambiguous", class_id=class_id, sentence=f"{one.sentence}; {alike}")
+    told = bend.finding(fewer, trial, None)
+    told = replace(
+        told, verdict="ambiguous", class_id=class_id, sentence=f"{told.sentence}; {alike}"
+    )
     markers = fewer.person.marker_segments == fewer.person.skeleton.index(bend.target)
     size = float(np.sqrt(np.nanmean((left[:, markers] ** 2).sum(axis=2))))
     number = Number("size", "m", size, np.nan, np.nan)
     said = (
-        f"soft tissue on the {in_words(bend.target)} moves with the trunk's posture: its markers are "
-        f"{1000 * size:.0f} mm off; {alike}"
+        f"soft tissue on the {in_words(bend.target)} moves with the trunk's posture: its markers "
+        f"are {1000 * size:.0f} mm off; {alike}"
     )
-    return one, replace(one, effect=SOFT_TISSUE, numbers=(number,), sentence=said, scope="person")
+    return told, replace(told, effect=SOFT_TISSUE, numbers=(number,), sentence=said, scope="person")
 
 
 def _slower(scene: Scene) -> Scene:

@@ -1,15 +1,6 @@
-"""What skin that slides over the bones can do to the simulated wrench.
-
-Skin moves with the pose: a marker's error is taken as a random linear function of the angles of the
-joints beside its segment, as large as the residual that the marker itself shows. What all markers
-of a segment share leaves no residual, and is larger: skin moves over the bone as a whole rather
-than being deformed (Andersen 2012, J Biomech 45). Each draw of such functions bends the pose, and
-the pose bends the wrench. The draws span what no diagnosis may take for an effect.
-"""
+"""Skin that slides and swings over the bones, and what it does to the simulated wrench."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -18,26 +9,18 @@ from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.effects.scene import Scene
 
 SKIN_HZ = 8.0
-_FRAMES_AT_ONCE = 200_000  # of all draws together: bounds the memory
+_UNKNOWN_RMS_M = 0.004  # of a marker whose residuals are not known
 
 
-def skin_draws(
-    scene: Scene, marker_rms_m: np.ndarray, shared: float, count: int, rng: np.random.Generator
-) -> np.ndarray:
-    """(N, 6, count) changes of the wrench, one per draw of all markers' errors.
-
-    marker_rms_m (m,) : how far each marker slides against the others, root mean square.
-    shared : how many times as far all markers of a segment slide together.
-    """
-    nearby = nearby_angles(scene)
-    mixing = _mixing(scene.person.marker_segments, nearby, marker_rms_m, shared, count, rng)
-    at_once = max(1, _FRAMES_AT_ONCE // len(scene.q))
-    parts = []
-    for first in range(0, count, at_once):
-        some = [one[..., first : first + at_once] for one in mixing]
-        errors = _marker_errors(scene, nearby, some)
-        parts.append(scene.response.of(scene.pose_response.of(errors)))
-    return np.concatenate(parts, axis=2)
+def marker_rms_m(scene: Scene) -> np.ndarray:
+    """(m,) root mean square of each marker's residuals, per direction."""
+    if scene.residual_m is None:
+        return np.full(len(scene.person.markers), _UNKNOWN_RMS_M)
+    known = np.isfinite(scene.residual_m)
+    squares = np.where(known, scene.residual_m, 0.0) ** 2
+    count = known.sum(axis=(0, 2))
+    rms = np.sqrt(squares.sum(axis=(0, 2)) / np.maximum(count, 1))
+    return np.where(count > 0, rms, _UNKNOWN_RMS_M)
 
 
 def skin_inertia(scene: Scene) -> np.ndarray:
@@ -67,38 +50,6 @@ def nearby_angles(scene: Scene) -> list[np.ndarray]:
         scale = np.sqrt((nearby**2).sum(axis=1).mean())
         found.append(nearby / max(scale, 1e-9))
     return found
-
-
-def _mixing(
-    segments: np.ndarray,
-    nearby: Sequence[np.ndarray],
-    marker_rms_m: np.ndarray,
-    shared: float,
-    count: int,
-    rng: np.random.Generator,
-) -> list[np.ndarray]:
-    """(3, j, count) per marker: by how far each angle beside its segment moves it [m]."""
-    together = {}
-    for segment in np.unique(segments):
-        (mine,) = np.nonzero(segments == segment)
-        far = shared * np.sqrt((marker_rms_m[mine] ** 2).mean())
-        together[segment] = far * rng.normal(size=(3, nearby[mine[0]].shape[1], count))
-    return [
-        together[segment] + rms * rng.normal(size=(3, angles.shape[1], count))
-        for segment, angles, rms in zip(segments, nearby, marker_rms_m, strict=True)
-    ]
-
-
-def _marker_errors(
-    scene: Scene, nearby: Sequence[np.ndarray], mixing: Sequence[np.ndarray]
-) -> np.ndarray:
-    """(N, m, 3, k) [m] in the world, of k draws: mixing (3, j, k) of each marker."""
-    rotation, draws = scene.motion.rotation, mixing[0].shape[2]
-    errors = np.empty((len(scene.q), len(mixing), 3, draws))
-    for m, segment in enumerate(scene.person.marker_segments):
-        local = np.einsum("fj,xjc->fxc", nearby[m], mixing[m])
-        errors[:, m] = rotation[:, segment] @ local
-    return errors
 
 
 def beside(person: Person, segment: int) -> list[int]:

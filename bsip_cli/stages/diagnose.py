@@ -46,9 +46,7 @@ def run(unit: Unit) -> None:
         found, library, held = _searched(unit, free)
         named_from = unit.config.diagnosis.named_from
         more = findings_of(found, held, named_from, rng)
-        findings = tuple(
-            sorted((*findings, *more), key=lambda one: one.verdict == "rejected")
-        )
+        findings = tuple(sorted((*findings, *more), key=lambda one: one.verdict == "rejected"))
         facts |= facts_of(found, held, findings)
         limits = detection_rows(found, library, named_from)
         findings = (*_of_markers(free, found, held, findings, rng), *findings)
@@ -61,7 +59,9 @@ def run(unit: Unit) -> None:
             f"{unit.name}: no trial has motion with every contact on a plate; no movement can be "
             "diagnosed"
         )
-    names = dict.fromkeys([*(x.trial.stem for x in trials), *(t for f in findings for t in f.trials)])
+    names = dict.fromkeys(
+        [*(x.trial.stem for x in trials), *(t for f in findings for t in f.trials)]
+    )
     facts["trials"] = list(names)
     _write(unit, rows_of(findings, tuple(names)), limits, facts, budget)
 

@@ -1,4 +1,4 @@
-"""A person's trials as the diagnosis takes them: what the plates say of the mass, errors, markers."""
+"""A person's trials as the diagnosis takes them: mass by the plates, errors, markers."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from bsip_cli.body.person import Person
 from bsip_cli.diagnosis.error_budget import Ground, ground_of
 from bsip_cli.diagnosis.error_model import Term, TrialErrors
 from bsip_cli.diagnosis.error_terms import FAULT, error_terms, noise_of_instruments
-from bsip_cli.diagnosis.evidence import Filter, at_full_rate, filter_of, slow
 from bsip_cli.diagnosis.fault_model import FaultTrial
+from bsip_cli.diagnosis.filtering import Filter, at_full_rate, filter_of, slow
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.marker_proof import Proof, Slip, slips_of
 from bsip_cli.diagnosis.scale_mass import agreed_share, is_noticed, weight_share
@@ -148,7 +148,9 @@ def diagnosed(unit: Unit, prior: Prior, trial: Trial, scene: Scene) -> Diagnosed
     rng = np.random.default_rng(crc32(trial.stem.encode()))
     slips = slips_of(fewer, _slips(unit, trial), rng) if trial.role != STATIC else ()
     terms = [
-        Term(x.term, x.target, x.scale, x.own, filter_(x.wrench), mixing=x.mixing, targets=x.targets)
+        Term(
+            x.term, x.target, x.scale, x.own, filter_(x.wrench), mixing=x.mixing, targets=x.targets
+        )
         for x in error_terms(fewer, prior.root, options.landmark_sd_m, options.skin_factor)
     ]
     if contact is not None:

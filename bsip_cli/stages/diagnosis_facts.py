@@ -13,7 +13,7 @@ from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, HeldOut, first_blocks, s
 
 def facts_of(found: Found, held: HeldOut, findings: tuple[Finding, ...]) -> dict:
     """The faults in full: their values from all data and from each fold's training blocks, for
-    ``extend``, and the standard deviation of what is reported if the model of the error is exact."""
+    ``extend``, and the standard deviation of what is reported if the error's model is exact."""
     session = found.fit.session
     said = {(f.effect, f.target, f.trials): f.verdict for f in findings if f.verdict != "rejected"}
     causes = []

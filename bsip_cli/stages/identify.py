@@ -12,7 +12,7 @@ from bsip_cli.artifacts import empty_table
 from bsip_cli.body.names import in_words as segment_in_words
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
-from bsip_cli.diagnosis.evidence import slow
+from bsip_cli.diagnosis.filtering import slow
 from bsip_cli.diagnosis.support import Support, support_of
 from bsip_cli.dynamics.base_parameters import expressions
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model

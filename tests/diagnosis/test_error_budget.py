@@ -11,7 +11,7 @@ from bsip_cli.body.anthropometry import regress
 from bsip_cli.diagnosis.error_budget import COMPONENTS, Ground, budget_of, ground_of
 from bsip_cli.diagnosis.error_model import Term, TrialErrors, error_model
 from bsip_cli.diagnosis.error_terms import error_terms, noise_of_instruments
-from bsip_cli.diagnosis.evidence import filter_of, slow
+from bsip_cli.diagnosis.filtering import filter_of, slow
 from bsip_cli.diagnosis.large_errors import Yardsticks, large_errors
 from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.prior import Spread, prior_of

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bsip_cli.diagnosis.together import Evidence, together
 
 from bsip_cli.diagnosis.scale_mass import agreed_share, weight_round, weight_share
 from bsip_cli.diagnosis.stated_mass import (
@@ -13,7 +14,6 @@ from bsip_cli.diagnosis.stated_mass import (
     loaded_plate,
     stated_mass_findings,
 )
-from bsip_cli.diagnosis.together import Evidence, together
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
 from tests.diagnosis.noisy_trial import all_of, noisy, part_of_moving, with_effect

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.diagnosis.hypothesis import Candidate, candidates_of
+from bsip_cli.diagnosis.hypothesis import candidates_of
 from bsip_cli.diagnosis.skin import SKIN_HZ, marker_rms_m, nearby_angles, skin_inertia
 from bsip_cli.diagnosis.smoothing_bias import smoothing_bias
 from bsip_cli.diagnosis.wander import wander
@@ -43,10 +43,6 @@ JOINT_SD_M = {
 }
 # What every laboratory has of a fault of its instruments, part of the size that is met.
 _SHARE = 0.02
-_HORIZONTAL = 0.7  # of the gain of horizontal forces: all motion, so this is its amplitude's error
-# Of a plate's place: bodies of another table's segments look some centimetres higher or lower, as
-# far as horizontal forces tell a height.
-_PLACE = (_SHARE, _SHARE, 1.0)
 # Noise that no lab goes below: parts of body weight, and arms of it (half a millimetre) [m].
 LEAST = np.array([0.0003, 0.0003, 0.0005, 0.0005, 0.0005, 0.0001])
 _HEAVIER = 0.01  # usual error of the whole mass, part of it: a scale's, clothes and shoes
@@ -99,7 +95,7 @@ def error_terms(
     yield Columns(SKIN, "", f"{SKIN} of the whole body", False, _swinging_body(scene))
     yield Columns(SKIN, "", f"{SKIN} wanders", True, wander(scene))
     yield Columns(SMOOTHING, "", SMOOTHING, True, smoothing_bias(scene))
-    source = _as_simulated(scene)
+    source = as_simulated(scene)
     for effect in CATALOGUE:
         if is_of_instruments(effect):
             yield from _of_instruments(effect, scene, source)
@@ -110,7 +106,7 @@ def _of_instruments(effect: Effect, scene: Scene, source: Scene) -> Iterator[Col
     ``source``: the trial whose plates read what is simulated."""
     for one in candidates_of(effect, scene):
         if not one.scanned:
-            wrench = _usual_share(one) * one.signature(source)
+            wrench = _SHARE * one.signature(source)
             scale = f"{FAULT}{effect.name} {one.target}"
             yield Columns(FAULT + effect.name, one.target, scale, not effect.of_the_lab, wrench)
 
@@ -118,14 +114,6 @@ def _of_instruments(effect: Effect, scene: Scene, source: Scene) -> Iterator[Col
 def is_of_instruments(effect: Effect) -> bool:
     """Whether it is a fault of plates, clocks or the lab's vertical."""
     return effect.of_the_plates or isinstance(effect, (Delay, GravityTilt))
-
-
-def _usual_share(one: Candidate) -> np.ndarray:
-    """(k,) or (1,) of the free parameters' typical sizes, that every laboratory has."""
-    if one.effect.name == "plate_translation":
-        return np.array(_PLACE)
-    is_horizontal = one.effect.name == "plate_gain" and one.target.endswith((" fx", " fy"))
-    return np.array([_HORIZONTAL if is_horizontal else _SHARE])
 
 
 def joint_errors(scene: Scene) -> np.ndarray:
@@ -139,16 +127,20 @@ def joint_errors(scene: Scene) -> np.ndarray:
     return np.concatenate(columns, axis=2)
 
 
-def _as_simulated(scene: Scene) -> Scene:
-    """The plates read what is simulated: of what they measured, a gain or a delay would explain the
-    residual by itself. Each plate bears its part of the vertical force."""
+def as_simulated(scene: Scene) -> Scene:
+    """The plates read what is simulated: of what they measured, a gain or a delay would explain a
+    part of any residual by itself. Each plate bears its part of the vertical force."""
+    return scene.once("as simulated", lambda: _reading_what_is_simulated(scene))
+
+
+def _reading_what_is_simulated(scene: Scene) -> Scene:
     off, total = scene.measured - scene.predicted, scene.measured[:, 2:3]
     loaded = total > 0
     plates = []
     for one in scene.plates:
         part = np.where(loaded, one.wrench[:, 2:3], 0.0) / np.where(loaded, total, 1.0)
         plates.append(replace(one, wrench=one.wrench - part * off))
-    return replace(scene, wrench=scene.predicted, plates=tuple(plates))
+    return scene.reading(tuple(plates), scene.predicted)
 
 
 def _of_markers(

@@ -21,7 +21,7 @@ from bsip_cli.diagnosis.error_model import (
     white_columns,
     white_noise_of,
 )
-from bsip_cli.diagnosis.error_terms import FAULT
+from bsip_cli.diagnosis.error_terms import FAULT, as_simulated
 from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.scene import Scene
 
@@ -36,10 +36,16 @@ _EXACT = 0.02  # of the typical size
 
 @dataclass(frozen=True, eq=False)
 class FaultTrial:
-    """A trial's errors, and its motion at a slow rate, which faults see."""
+    """A trial's errors, and its motion and plates at a slow rate, which faults see."""
 
     errors: TrialErrors
     scene: Scene
+
+    @cached_property
+    def simulated(self) -> Scene:
+        """What faults change. Of what the plates measured, which holds the residual, every gain or
+        delay would explain a part of it."""
+        return as_simulated(self.scene)
 
     @property
     def name(self) -> str:
@@ -86,7 +92,7 @@ class FaultColumns:
 
 def columns_of(session: Session, one: Hypothesis, trial: int) -> FaultColumns:
     """About the values of a fault; parameters with a scan count as deviations from theirs."""
-    scene, filter_ = session.trials[trial].scene, session.trials[trial].errors.filter
+    scene, filter_ = session.trials[trial].simulated, session.trials[trial].errors.filter
     free, typical = one.is_free(session), one.typical(session)
     change = filter_.one(one.effect.change(scene, one.target, one.values))
     slope = np.zeros((*change.shape, len(typical)))

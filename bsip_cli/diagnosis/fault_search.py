@@ -20,6 +20,7 @@ from scipy.optimize import minimize
 from scipy.special import expit, logsumexp
 from scipy.stats import chi2
 
+from bsip_cli.diagnosis.evenness import Uneven, can_be_uneven, unevenness
 from bsip_cli.diagnosis.fault_model import (
     SIZES,
     FaultTrial,
@@ -60,12 +61,13 @@ class Library:
     """All places of all effects.
 
     columns : signatures (n, 6, C) of each trial; ``parts``: which of them are a candidate's.
-    log_prior : (P,) of the odds that one more fault is just there.
+    prior_odds : of one more fault against none; ``log_prior`` (P,) of those that it is just there.
     """
 
     columns: tuple[np.ndarray, ...]
     parts: tuple[dict[Candidate, slice], ...]
     places: tuple[Place, ...]
+    prior_odds: float
     log_prior: np.ndarray
 
     @cached_property
@@ -85,7 +87,7 @@ def library_of(
     prior_odds : of one more fault in a person's recordings against none."""
     columns, parts = zip(*(_signatures(one, effects) for one in session.trials), strict=True)
     places = tuple(_places(parts, alone))
-    return Library(columns, parts, places, _log_prior(places, prior_odds))
+    return Library(columns, parts, places, prior_odds, _log_prior(places, prior_odds))
 
 
 def _signatures(
@@ -98,7 +100,8 @@ def _signatures(
     parts = {}
     for first in range(0, len(candidates), _BATCH):
         batch = candidates[first : first + _BATCH]
-        filtered = filter_(np.concatenate([c.signature(scene) for c in batch], axis=2))
+        signatures = [c.signature(trial.simulated) for c in batch]
+        filtered = filter_(np.concatenate(signatures, axis=2))
         mine = ends[first : first + len(batch) + 1]
         columns[..., mine[0] : mine[-1]] = filtered
         for candidate, (start, stop) in zip(batch, pairwise(mine), strict=True):
@@ -210,6 +213,15 @@ class Tried:
         odds = self.log_prior + float((each / inflation).sum()) + float(rest)
         return replace(self, log_odds=odds)
 
+    def evenly_or_not(self, inflation: np.ndarray, prior_odds: float) -> Iterator[Tried]:
+        """Itself, and what acts like it but not evenly; prior_odds : of the second to the first."""
+        yield self
+        if can_be_uneven(self.fault.effect):
+            number = self.fit.faults.index(self.fault)
+            log = unevenness(self.fit, number, inflation) + np.log(prior_odds)
+            fault = replace(self.fault, effect=Uneven(self.fault.effect))
+            yield replace(self, fault=fault, log_odds=self.log_odds + log)
+
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
@@ -288,7 +300,11 @@ def _verdict(
     mine = {one.key: Tried(one, again, _prior_of(library, one))}
     for other in _in_full(session, library, without, set(one.trials)):
         mine.setdefault(other.fault.key, other)
-    weighed = [x.weighed(without, inflation) for x in mine.values()]
+    weighed = [
+        each
+        for x in mine.values()
+        for each in x.weighed(without, inflation).evenly_or_not(inflation, library.prior_odds)
+    ]
     weighed.sort(key=lambda x: -x.log_odds)
     logs = np.array([x.log_odds for x in weighed])
     there = float(expit(logsumexp(logs)))
@@ -393,8 +409,8 @@ def _marginal(fit: Fitted, one: Hypothesis) -> _Marginal:
         right = piece.right
         if t in one.trials:
             trial, sizes = session.trials[t], one.typical(session)[free]
-            change = one.effect.change(trial.scene, one.target, one.values)[..., None]
-            slope = one.effect.tangent(trial.scene, one.target, one.values) * sizes
+            change = one.effect.change(trial.simulated, one.target, one.values)[..., None]
+            slope = one.effect.tangent(trial.simulated, one.target, one.values) * sizes
             white = fit.whitened(t, trial.errors.filter(np.concatenate([change, slope], axis=2)))
             right, mine = right - white[:, 0], white[:, 1:]
             pull += mine.T @ right

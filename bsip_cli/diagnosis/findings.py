@@ -150,7 +150,7 @@ def _rms_change(fit: Fitted, one: Hypothesis) -> float:
     """In the component that changes most, in its trial of the largest change."""
     trials = (fit.session.trials[t] for t in one.trials)
     changes = [
-        x.errors.filter.one(one.effect.change(x.scene, one.target, one.values)) for x in trials
+        x.errors.filter.one(one.effect.change(x.simulated, one.target, one.values)) for x in trials
     ]
     rms = np.array([np.sqrt((x**2).mean(axis=0)) for x in changes])
     return float(rms.flat[int(np.argmax(rms / np.repeat([1.0, _ARM_M], 3)))])

@@ -48,7 +48,7 @@ class Gain:
 
 def first_blocks(session: Session) -> list[int]:
     """Number of each trial's first block, counted through all of them."""
-    counts = [int(_own_blocks(session, t).max()) + 1 for t in range(len(session.trials))]
+    counts = [int(own_blocks(session, t).max()) + 1 for t in range(len(session.trials))]
     return np.cumsum([0, *counts[:-1]]).tolist()
 
 
@@ -58,7 +58,7 @@ def start_s(session: Session, trial: int) -> float:
     return float(one.scene.times_s[one.errors.filter.frames][0])
 
 
-def _own_blocks(session: Session, trial: int) -> np.ndarray:
+def own_blocks(session: Session, trial: int) -> np.ndarray:
     """(n,) block of each sample of a trial."""
     one = session.trials[trial]
     times = one.scene.times_s[one.errors.filter.frames]
@@ -81,7 +81,7 @@ class HeldOut:
         """Of a fault given the others: both with and without it, every block is judged by the
         other folds."""
         fit, one = self.fit, self.fit.faults[number]
-        kept = np.ones(len(fit.mean), dtype=bool)
+        kept = _linear(fit)
         kept[fit.coefficients(number)] = False
         offsets = {
             t: fit.whitened(t, columns_of(fit.session, one, t).offset[..., None])[:, 0]
@@ -105,9 +105,18 @@ def held_out(fit: Fitted) -> HeldOut:
     """Every fifth block of all trials is left out in turn."""
     firsts = first_blocks(fit.session)
     blocks = tuple(
-        np.repeat(first + _own_blocks(fit.session, t), 6) for t, first in enumerate(firsts)
+        np.repeat(first + own_blocks(fit.session, t), 6) for t, first in enumerate(firsts)
     )
-    return HeldOut(fit, blocks, _means(fit, blocks, np.ones(len(fit.mean), dtype=bool), {}))
+    return HeldOut(fit, blocks, _means(fit, blocks, _linear(fit), {}))
+
+
+def _linear(fit: Fitted) -> np.ndarray:
+    """(K,) False for moments, frequencies and windows: without the second that tells them nothing
+    does, so they stay as all seconds have them."""
+    kept = np.ones(len(fit.mean), dtype=bool)
+    for number, one in enumerate(fit.faults):
+        kept[fit.coefficients(number)] = one.is_free(fit.session)
+    return kept
 
 
 def _means(

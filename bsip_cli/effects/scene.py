@@ -58,6 +58,12 @@ class Plate:
         return np.stack([first, np.cross(normal, first), normal])
 
 
+_OF_THE_MOTION = {
+    *("rate_hz", "model", "predicted", "motion", "response", "trust", "pose_response"),
+    *("markers_m", "model_markers_m", "centre_of_mass_m"),
+}
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """One trial: what was measured of the motion and the ground, and a body to simulate.
@@ -113,6 +119,13 @@ class Scene:
             residual_m=residual,
             wrench=None if self.wrench is None else without_fast(self.wrench, stride)[part],
         )
+
+    def reading(self, plates: tuple[Plate, ...], wrench: np.ndarray) -> Scene:
+        """The same motion over other readings: nothing of the motion is computed again."""
+        other = replace(self, plates=plates, wrench=wrench)
+        known = {name: x for name, x in vars(self).items() if name in _OF_THE_MOTION}
+        vars(other).update(known)
+        return other
 
     @cached_property
     def model(self) -> pin.Model:

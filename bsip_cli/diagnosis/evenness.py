@@ -54,6 +54,11 @@ class Uneven(Pattern):
         return f"something without a name acts as if {told}, but not evenly"
 
 
+def plain(effect: Effect) -> Effect:
+    """What an uneven effect acts like; another one itself."""
+    return effect.effect if isinstance(effect, Uneven) else effect
+
+
 def can_be_uneven(effect: Effect) -> bool:
     """A rail is touched now more, now less; what lasts is as it is."""
     return effect.lasts and effect.name != UNEXPLAINED

@@ -308,9 +308,14 @@ def _verdict(
     weighed.sort(key=lambda x: -x.log_odds)
     logs = np.array([x.log_odds for x in weighed])
     there = float(expit(logsumexp(logs)))
-    shares = np.exp(logs - logsumexp(logs))
-    count = int(np.searchsorted(np.cumsum(shares), named_from)) + 1
-    members = tuple(zip(weighed[:count], (shares[:count] * there).tolist(), strict=True))
+    shares: dict[Tried, float] = {}
+    unnamed = [x for x in weighed if x.fault.effect.name == UNEXPLAINED]
+    for each, share in zip(weighed, np.exp(logs - logsumexp(logs)).tolist(), strict=True):
+        name = unnamed[0] if each in unnamed else each  # without a name they are all one
+        shares[name] = shares.get(name, 0.0) + share
+    ranked = sorted(shares.items(), key=lambda one: -one[1])
+    count = int(np.searchsorted(np.cumsum([x for _, x in ranked]), named_from)) + 1
+    members = tuple((each, share * there) for each, share in ranked[:count])
     return Verdict(number, members, there, without)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from string import ascii_uppercase
 from typing import Literal
@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import expit
 
+from bsip_cli.diagnosis.evenness import plain
 from bsip_cli.diagnosis.fault_model import Fitted
 from bsip_cli.diagnosis.fault_search import Found, Tried, Verdict
 from bsip_cli.diagnosis.held_out import HeldOut
@@ -42,7 +43,8 @@ class Number:
 class Finding:
     """A hypothesis and what is made of it.
 
-    trials : their names. class_id : of faults that cannot be told apart here; empty for a single one. p_value : 1 less ``probability``, where no test gives another. gain : percent of the squared
+    trials : their names. class_id : of faults that cannot be told apart here; empty for one alone.
+    p_value : 1 less ``probability``, where no test gives another. gain : percent of the squared
     white residual on data held out, and its interval. scope : laboratory, person or trial.
     rms_change : root mean square of what it does to the component that it changes most [N, N m].
     """
@@ -94,12 +96,12 @@ def _findings(
     class_id = "" if is_alone else next(names)
     mine = found.fit.faults[verdict.number]
     for tried, probability in verdict.members:
-        is_mine = tried.fault.key == mine.key
-        fit, number = (
-            (found.fit, verdict.number) if is_mine else (tried.fit, len(tried.fit.faults) - 1)
-        )
+        plainly = replace(tried.fault, effect=plain(tried.fault.effect))
+        is_mine = (*plainly.key, plainly.trials) == (*mine.key, mine.trials)
+        fit = found.fit if is_mine else tried.fit
+        number = verdict.number if is_mine else len(fit.faults) - 1
         numbers = _numbers(fit, number, found.scores.inflation, rng)
-        one = fit.faults[number]
+        one = replace(fit.faults[number], effect=tried.fault.effect)
         sentence = one.alike(fit.session)[0].sentence(fit.session) + interval_words(numbers)
         if not is_alone:
             sentence += f"; other causes look alike here: to tell them apart, {mine.effect.remedy}"

@@ -1,8 +1,8 @@
 """What the markers show by themselves: one that slips or sits wrong, a second bend of the trunk.
 
 The pose is the best that the model can do; what a fault leaves of the markers is linear in its
-sizes like the wrench, and far sharper: the skin slides by millimetres. A marker that jumps and stays
-is proven by that. A bend of the trunk is not: soft tissue moving with it leaves the same.
+sizes like the wrench, and far sharper: the skin slides by millimetres. A marker that jumps and
+stays is proven by that. A bend of the trunk is not: soft tissue moving with it leaves the same.
 """
 
 from __future__ import annotations
@@ -128,6 +128,9 @@ def bend_of(
     bend = max(possible, key=lambda one: one.share, default=None)
     if bend is None or bend.share < BENT:
         return ()
+    waist = _sized(fewer, left, EFFECTS["joint_centre"], "waist", (), rng)
+    if waist.share >= bend.share:
+        return ()  # by so much scaling errs
     alike = f"a second bend and soft tissue look alike here: to tell them apart, {effect.remedy}"
     told = bend.finding(fewer, trial, None)
     told = replace(

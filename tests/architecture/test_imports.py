@@ -132,7 +132,7 @@ def test_stages_do_not_know_each_other():
         "stages.gain_rows",
         "stages.identification_problem",
         "stages.known_loads",
-        "stages.moving_trials",
+        "stages.diagnosed_trials",
         "stages.person_mass",
         "stages.person_values",
         "stages.reconstructed",

@@ -74,7 +74,7 @@ def test_options_of_another_type(tmp_path, line):
     assert WRONG[line] in sentence and f"ingest.{line.split()[0]}" in sentence
 
 
-@pytest.mark.parametrize("line", ["[scale]\nframes", "[ik]\niterations", "[diagnosis]\nskin_draws"])
+@pytest.mark.parametrize("line", ["[scale]\nframes", "[ik]\niterations"])
 def test_counts_without_end(tmp_path, line):
     path = tmp_path / "study.toml"
     path.write_text(f"{line} = 1000000000000\n")

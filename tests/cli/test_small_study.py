@@ -19,7 +19,6 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from bsip_cli.stages.moving_trials import prior_of
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
@@ -35,6 +34,7 @@ from bsip_cli.schemas import SCHEMAS, bsip_names
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages import diagnose
+from bsip_cli.stages.diagnosed_trials import prior_of
 from bsip_cli.stages.frames import person_from
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study.study import load_study

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bsip_cli.diagnosis.together import Evidence, together
 
-from bsip_cli.diagnosis.scale_mass import agreed_share, weight_round, weight_share
+from bsip_cli.diagnosis.scale_mass import agreed_share, weight_share
 from bsip_cli.diagnosis.stated_mass import (
     CLASS,
     loaded_plate,
@@ -16,7 +15,7 @@ from bsip_cli.diagnosis.stated_mass import (
 )
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene
-from tests.diagnosis.noisy_trial import all_of, noisy, part_of_moving, with_effect
+from tests.diagnosis.noisy_trial import noisy, part_of_moving, with_effect
 from tests.effects.moving_scene import MASS_KG, standing_still
 
 MASS_SD = 0.008
@@ -59,13 +58,6 @@ def test_only_one_plate_carries_the_person_or_none_does_alone():
     assert loaded_plate([on_one, scene]) is None
 
 
-def weighed(*scenes: Scene) -> Evidence:
-    """Of a person whose mass is stated."""
-    trials = all_of(*scenes).trials
-    known = (replace(t, filtered=replace(t.filtered, mass_sd=MASS_SD)) for t in trials)
-    return together(tuple(known))
-
-
 def on_one_plate(gain: float, first_s: float) -> Scene:
     """A moving trial on the first of two plates, whose vertical channel is off."""
     scene = part_of_moving(first_s, 4.0)
@@ -78,31 +70,14 @@ def on_one_plate(gain: float, first_s: float) -> Scene:
     return noisy(with_effect(alone, EFFECTS["plate_gain"], "1 fz", gain), round(first_s))
 
 
-def test_moving_trials_on_one_plate_give_its_gain_to_begin_with():
-    evidence = weighed(on_one_plate(0.05, 0), on_one_plate(0.05, 4))
-    share = agreed_share(evidence)
-    assert share == pytest.approx(0.05 / 1.05, abs=0.003)
-    begun = weight_round(evidence, share, "1")
-    gain, offset = begun.tried
-    assert begun.kept is gain
-    assert gain.explanation.effect is EFFECTS["plate_gain"]  # else the search finds it again
-    assert gain.explanation.place.trials == (0, 1)
-    assert gain.explanation.values[0] == pytest.approx(share, rel=0.02)
-    assert gain.p_value < 1e-6
-    assert offset.explanation.values[0] == pytest.approx(share * MASS_KG * 9.81, rel=0.3)
-
-
-def test_no_plate_s_gain_is_off_by_a_quarter():
-    evidence = weighed(on_one_plate(0.25, 0), on_one_plate(0.25, 4))
-    share = agreed_share(evidence)
-    assert share == pytest.approx(0.2, abs=0.01)
-    assert weight_round(evidence, share, "1") is None
+def test_moving_trials_that_agree_tell_what_the_plates_read():
+    scenes = [on_one_plate(0.05, 0), on_one_plate(0.05, 4)]
+    assert agreed_share(scenes, MASS_SD) == pytest.approx(0.05 / 1.05, abs=0.003)
 
 
 @pytest.mark.parametrize("gains", [(0.05, -0.05), (0.01, 0.01)])
 def test_moving_trials_that_disagree_or_are_near_say_nothing(gains):
-    evidence = weighed(on_one_plate(gains[0], 0), on_one_plate(gains[1], 4))
-    assert agreed_share(evidence) is None
+    assert agreed_share([on_one_plate(gains[0], 0), on_one_plate(gains[1], 4)], MASS_SD) is None
 
 
 def test_a_scale_that_errs_more_says_less():
@@ -112,7 +87,6 @@ def test_a_scale_that_errs_more_says_less():
     good = stated_mass_findings(share, scene.mass_kg, MASS_SD, *said)
     assert stated_mass_findings(share, scene.mass_kg, 2 * MASS_SD, *said) == ()
     assert good[0].numbers[0].high < share * MASS_KG + 2 * MASS_SD * MASS_KG
-    evidence = weighed(on_one_plate(0.03, 0), on_one_plate(0.03, 4))
-    loose = (replace(t, filtered=replace(t.filtered, mass_sd=2 * MASS_SD)) for t in evidence.trials)
-    assert agreed_share(evidence) == pytest.approx(0.03 / 1.03, abs=0.003)
-    assert agreed_share(together(tuple(loose))) is None
+    scenes = [on_one_plate(0.03, 0), on_one_plate(0.03, 4)]
+    assert agreed_share(scenes, MASS_SD) == pytest.approx(0.03 / 1.03, abs=0.003)
+    assert agreed_share(scenes, 2 * MASS_SD) is None

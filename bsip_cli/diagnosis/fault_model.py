@@ -43,9 +43,10 @@ class FaultTrial:
 
     @cached_property
     def simulated(self) -> Scene:
-        """What faults change. Of what the plates measured, which holds the residual, every gain or
-        delay would explain a part of it."""
-        return as_simulated(self.scene)
+        """What faults change: plates that read what is simulated. Of what they measured, which
+        holds the residual, every gain would explain a part of it. What comes late is as measured:
+        the simulated course lacks what is fast."""
+        return self.scene.reading(as_simulated(self.scene).plates, self.scene.measured)
 
     @property
     def name(self) -> str:

@@ -66,6 +66,13 @@ def run(unit: Unit) -> None:
     _write(unit, rows_of(findings, tuple(names)), limits, facts, budget)
 
 
+def _still_open(of_mass: Sequence[Finding], more: Sequence[Finding]) -> tuple[Finding, ...]:
+    """The class of the stated mass, unless the movements tell which of its causes it is."""
+    told = {(one.effect, one.target) for one in more if one.verdict == "named"}
+    is_told = any((one.effect, one.target) in told for one in of_mass)
+    return () if is_told else tuple(of_mass)
+
+
 def _searched(unit: Unit, trials: Sequence[Diagnosed]) -> tuple[Found, Library, HeldOut]:
     """Faults that the forces show, beside what the markers prove."""
     options = unit.config.diagnosis

@@ -106,7 +106,7 @@ def _person(folder: Path) -> tuple[Searched, str] | None:
     gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
     facts = read_header(_path(folder, "overall-diagnosis"))["provenance"]["facts"]
     budget = _table(folder, "overall-error-budget")
-    found = verdict_of(diagnosis, detection, gains, changes, facts.get("too_short_s"), budget)
+    found = verdict_of(diagnosis, detection, gains, changes, budget)
     right = put_right_sentence(_marker_events(folder))
     text = verdict_text(folder.name, found, right, get_terminal_size().columns)
     return searched(folder.name, diagnosis, facts), text

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor
-from scipy.linalg.lapack import dpotri
+from scipy.linalg.lapack import dpotri, dtrtri
 
 from bsip_cli.diagnosis.error_terms import FAULT
 from bsip_cli.diagnosis.filtering import Filter
@@ -273,19 +273,29 @@ def _settled(
         mine = place[mine[told[mine]]]
         at[part.scale] = np.concatenate([at.get(part.scale, mine[:0]), mine])
     root = np.ones(len(right))
-    mean, covariance = posterior(gram, right, root)
     for _ in range(_STEPS if adapt else 0):
-        second = mean**2 + np.diag(covariance)
+        mean, variance = moments(gram, right, root)
+        second = mean**2 + variance
         for scale, mine in at.items():
             weight = WEIGHT_OF_FAULTS if scale.startswith(FAULT) else WEIGHT
             root[mine] = np.sqrt((weight + second[mine].sum()) / (weight + len(mine)))
-        mean, covariance = posterior(gram, right, root)
+    mean, covariance = posterior(gram, right, root)
     scales = {s: float(root[x[0]]) if len(x) else 1.0 for s, x in at.items()}
     if told.all():
         return mean, covariance, scales
     whole = np.zeros(count)
     whole[told] = mean
     return whole, covariance, scales
+
+
+def moments(gram: np.ndarray, right: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (K,) and variance (K,) of coefficients with standard deviations ``root`` (K,)."""
+    inner = gram * np.outer(root, root) + np.eye(len(right))
+    factor, _ = cho_factor(inner, lower=True, overwrite_a=True)
+    inverse, _ = dtrtri(factor, lower=1, overwrite_c=1)
+    inverse = np.tril(inverse)
+    mean = root * (inverse.T @ (inverse @ (root * right)))
+    return mean, root**2 * (inverse**2).sum(axis=0)
 
 
 def posterior(

@@ -17,6 +17,7 @@ from bsip_cli.diagnosis.error_model import (
     TrialErrors,
     laid_out,
     left_by,
+    moments,
     posterior,
     white_columns,
     white_noise_of,
@@ -28,6 +29,7 @@ from bsip_cli.effects.scene import Scene
 SIZES = (0.1, 10.0)  # of a fault, in what laboratories meet: two decades about it
 _STEPS, _FEW_STEPS = 8, 2  # of expectation and maximisation
 _ROUNDS = 12  # of what is left, at most
+_STEADY = 0.01  # change of every scale
 _SETTLED = 0.3  # change of the logarithm of the evidence
 _DIFFERENCE = 0.05  # of the typical size: a moment in time moves by a part of a frame at least
 _CORRECTIONS = 3  # of the values about which the columns are
@@ -293,14 +295,17 @@ class _Fitting:
     def _solved(self, pieces: Sequence[Piece], whole: bool) -> Fitted:
         """Coefficients and scales of the largest evidence beside given noise."""
         gram, against = summed(pieces, self.count)
-        mean, covariance = posterior(gram, against, self.root)
         for _ in range(_STEPS if whole else _FEW_STEPS):
-            second = mean**2 + np.diag(covariance)
+            before = self.root.copy()
+            mean, variance = moments(gram, against, self.root)
+            second = mean**2 + variance
             for mine in self.session.adapts if whole else ():
                 self.root[mine] = np.sqrt((WEIGHT + second[mine].sum()) / (WEIGHT + len(mine)))
             for mine in self.free:
                 self.root[mine] = np.clip(np.sqrt(second[mine].mean()), *SIZES)
-            mean, covariance = posterior(gram, against, self.root)
+            if np.abs(self.root / before - 1).max() < _STEADY:
+                break
+        mean, covariance = posterior(gram, against, self.root)
         inner = gram * np.outer(self.root, self.root) + np.eye(self.count)
         log = 0.5 * float(against @ mean) - 0.5 * float(np.linalg.slogdet(inner)[1])
         log -= sum(0.5 * float(one.right @ one.right) + one.log_volume for one in pieces)

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.optimize import minimize
@@ -78,6 +79,22 @@ class Library:
             part = self.parts[place.trials[0]][place.candidate]
             found.setdefault(part.stop - part.start, []).append(k)
         return found
+
+    def products(
+        self, fit: Fitted, trial: int
+    ) -> tuple[np.ndarray, np.ndarray, dict[Candidate, np.ndarray]]:
+        """Of the white signatures of a trial with its residual (C,), with the columns of all terms
+        (K', C), and each candidate's with itself (k, k); once for the same noise and faults."""
+        piece = fit.pieces[trial]
+        if piece not in self._products:
+            white = fit.whitened(trial, self.columns[trial])
+            grams = {c: white[:, s].T @ white[:, s] for c, s in self.parts[trial].items()}
+            self._products[piece] = white.T @ piece.right, piece.white.T @ white, grams
+        return self._products[piece]
+
+    @cached_property
+    def _products(self) -> WeakKeyDictionary:
+        return WeakKeyDictionary()
 
 
 def library_of(
@@ -190,10 +207,10 @@ def _products(
 ) -> tuple[np.ndarray, np.ndarray, dict[Candidate, np.ndarray]]:
     """Of the white signatures of a trial: with what is left (C,), with the coefficients' spread
     (K, C), and each candidate's with itself (k, k)."""
-    white, piece = fit.whitened(trial, library.columns[trial]), fit.pieces[trial]
-    inside = fit.root_of_covariance[piece.used].T @ (piece.white.T @ white)
-    grams = {c: white[:, s].T @ white[:, s] for c, s in library.parts[trial].items()}
-    return white.T @ fit.left(trial), inside, grams
+    piece = fit.pieces[trial]
+    with_right, with_columns, grams = library.products(fit, trial)
+    inside = fit.root_of_covariance[piece.used].T @ with_columns
+    return with_right - fit.mean[piece.used] @ with_columns, inside, grams
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,7 +35,8 @@ class UnmeasuredContact(Effect):
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         start, end = float(scene.times_s[0]), float(scene.times_s[-1])
         fitting = [w for w in WINDOWS_S if w <= 0.8 * (end - start)]
-        lengths = tuple(w for w in fitting if (end - start) / w <= MOST_WINDOWS) or (fitting[-1],)
+        longest = fitting[-1] if fitting else end - start  # a short trial is one window
+        lengths = tuple(w for w in fitting if (end - start) / w <= MOST_WINDOWS) or (longest,)
         middles = tuple(float(t) for t in np.arange(start, end, min(lengths) / 2))
         return (
             *(
@@ -43,7 +44,7 @@ class UnmeasuredContact(Effect):
                 for axis in "xyz"
             ),
             Parameter("middle", "s", start, end, 0.25, middles, known_to=EDGE_S / np.sqrt(2)),
-            Parameter("length", "s", 0.2, end - start, 0.5, lengths, known_to=EDGE_S * np.sqrt(2)),
+            Parameter("length", "s", min(0.2, end - start), end - start, 0.5, lengths, known_to=EDGE_S * np.sqrt(2)),
         )
 
     def scans(self, scene: Scene, target: str) -> Iterator[tuple[float, ...]]:

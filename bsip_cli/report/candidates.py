@@ -22,9 +22,9 @@ from bsip_cli.report.words import listing, number, trial_label
 NOTHING = "none"
 UNNAMED = "unexplained"
 _INTERVAL = re.compile(r" \([^()]*: 95 % interval .*$")  # what follows it the report says itself
-_ADVICE = re.compile(r"; (other causes look alike here: )?to tell them apart, .*$")
+_ADVICE = re.compile(r"; ([^;]* look alike here: )?to tell them apart, .*$")
 _REMARK = re.compile(r"; this is [^;]*")  # what markers prove by themselves
-_REASON = re.compile(r" \(([^()]*)\)$")  # why a candidate was rejected
+_REASON = re.compile(r" \([^()]*\)$")  # how improbable a rejected candidate is
 _MINUS = re.compile(r"(?<![\w.)])-(?=\d)")
 _SIGNED = re.compile(r"[+−]\d")
 _NO_SIZES = ("start", "end", "from_time", "release_time", "frequency", "damping_ratio")
@@ -59,13 +59,19 @@ class Number:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A cause that was looked at, with its numbers; ``trials`` are stems of recordings."""
+    """A cause that was looked at, with its numbers; ``trials`` are stems of recordings.
+
+    probability : that it is there, NaN where the diagnosis gives none. scope : laboratory, person
+    or trial. rms_change : what it does to the component that it changes most [N or N m].
+    """
 
     effect: str
     target: str
     verdict: str
     class_id: str
-    p_value: float
+    probability: float
+    scope: str
+    rms_change: float
     gain: tuple[float, float, float]
     sentence: str
     trials: tuple[str, ...]
@@ -75,7 +81,7 @@ class Candidate:
     def label(self) -> str:
         """``force plate turned or tilted: plate 1``."""
         where = place_label(self.effect, self.target)
-        if self.effect == UNNAMED and self.numbers:
+        if self.effect == UNNAMED and self.numbers and self.target:
             where = unnamed_label(self.numbers[0].name, where)
         return effect_title(self.effect) + (f": {where}" if where else "")
 
@@ -121,11 +127,6 @@ class Candidate:
         """``hops (run 1) and squat (run 1)``."""
         return listing([trial_label(stem) for stem in self.trials])
 
-    def why_not(self) -> str:
-        """Why it was rejected; empty if it was not."""
-        found = re.search(_REASON, self.sentence) if self.verdict == "rejected" else None
-        return found[1] if found else ""
-
 
 def candidates_of(diagnosis: pd.DataFrame) -> tuple[Candidate, ...]:
     """The candidates of a ``diagnosis`` table in their order; the row ``none`` is none."""
@@ -146,7 +147,9 @@ def _candidate(rows: pd.DataFrame) -> Candidate:
         first["target"],
         first["verdict"],
         first["class_id"],
-        float(first["p_value"]),
+        float(first["probability"]),
+        first["scope"],
+        float(first["rms_change"]),
         (gain, low, min(high, 100.0)),  # more than everything cannot go
         first["sentence"],
         tuple(str(first["trials"]).split(", ")),
@@ -155,7 +158,7 @@ def _candidate(rows: pd.DataFrame) -> Candidate:
 
 
 def causes_of(candidates: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], ...]:
-    """What was found: a single candidate each, or all candidates of a class."""
+    """What was found: a single candidate each, or all candidates of a group."""
     groups: dict[str, list[Candidate]] = {}
     for k, one in enumerate(candidates):
         if one.verdict != "rejected":

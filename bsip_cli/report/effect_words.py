@@ -22,6 +22,10 @@ _MOTION = (
     "The motion is not the true one, and the simulated forces with it: put the markers right, and "
     "run again."
 )
+_SKIN = (
+    "The pose of the trunk, and the simulated forces with it, is only as good as markers on soft "
+    "tissue can be: put markers over bone, and run again."
+)
 _PERSON = (
     "The recordings need not be wrong: the model lacks something that this person has, and "
     "squeezes it into the inertial parameters of some segment."
@@ -67,6 +71,7 @@ EFFECT_WORDS = {
     "unmeasured_contact": EffectWords("contact beside the plates", _CONTACT),
     "joint_centre": EffectWords("joint centre in the wrong place", _PERSON),
     "missing_joint": EffectWords("trunk bends where the model is stiff", _PERSON),
+    "soft_tissue": EffectWords("soft tissue that moves with the trunk's posture", _SKIN),
     "marker_shift": EffectWords("marker not in its place", _MOTION),
     "marker_swap": EffectWords("two markers exchanged", _MOTION),
     "over_smoothing": EffectWords("markers smoothed too much", _MOTION),
@@ -92,7 +97,7 @@ _CHANNELS = {
     "my": "moment y",
     "mz": "moment about the vertical",
 }
-_ONE_PLACE = ("breathing", "missing_joint")  # where they sit is no news
+_ONE_PLACE = ("breathing", "missing_joint", "soft_tissue")  # where they sit is no news
 
 
 def place_label(effect: str, target: str) -> str:
@@ -149,6 +154,7 @@ MAIN_NUMBERS = {
     "gravity_tilt": ("angle",),
     "unmeasured_contact": ("force",),
     "marker_shift": ("shift",),
+    "soft_tissue": ("size",),
     "unexplained": ("amplitude", "stiffness", "curvature", "error", "nonlinearity", "lacking"),
 }
 _PARTS = {  # of a size with several parts: which one the interval is of

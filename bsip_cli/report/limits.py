@@ -18,7 +18,7 @@ _EXAMPLES = (  # effects whose limits are told in the sentence
     ("added_mass", "hand_l", "a mass on the left hand"),
     ("added_mass", "upper_torso", "a mass on the upper torso"),
 )
-OF_THE_WEIGHT = "W"  # class of what quiet standing tells
+OF_THE_WEIGHT = "W"  # group of what quiet standing tells
 _BY = ("plate_translation", "plate_gain")  # shifted *by* less than, but a delay *under*
 
 
@@ -91,7 +91,7 @@ def _under(limit: Limit) -> str:
 
 
 def looked_at(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[str, ...]:
-    """Stems of the moving recordings that were diagnosed, those of which something was told before
-    the search too."""
+    """Stems of the recordings that were diagnosed, those of which something was told before the
+    search too."""
     told = diagnosis.loc[diagnosis["class_id"] != OF_THE_WEIGHT, "trials"]
     return tuple(sorted({s for t in (*detection["trials"], *told) for s in str(t).split(", ")}))

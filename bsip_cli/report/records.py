@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -61,8 +61,7 @@ class TrialRecord:
 class ParticipantRecord:
     """One participant; ``facts`` is the single row of the ``person`` artifact, ``loads`` the known
     loads as (trial label, words). ``diagnosis``, ``detection``, ``budget``, ``gains`` and ``changes`` (of a model
-    extended by what was found), and ``choice`` are None where their stages have not run; ``too_short_s``: trials that
-    had no part in the diagnosis, with the seconds of them that can be used."""
+    extended by what was found), and ``choice`` are None where their stages have not run."""
 
     id: str
     facts: pd.Series
@@ -77,7 +76,6 @@ class ParticipantRecord:
     refusals: tuple[Refusal, ...]
     origins: tuple[Origin, ...]
     loads: tuple[tuple[str, str], ...] = ()
-    too_short_s: Mapping[str, float] = field(default_factory=dict)
     diagnosis: pd.DataFrame | None = None
     detection: pd.DataFrame | None = None
     budget: pd.DataFrame | None = None

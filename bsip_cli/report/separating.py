@@ -44,6 +44,7 @@ _APART: dict[frozenset[str], str] = {
             [("sync_offset", "clock_drift")],
             "hop three times at the beginning and at the end of a long recording",
         ),
+        ([("missing_joint", "soft_tissue")], EFFECTS["missing_joint"].remedy),
         (
             [("breathing", "unexplained")],
             "stand still for thirty seconds, the breath held in the last ten",

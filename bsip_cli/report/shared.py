@@ -23,32 +23,30 @@ _MOST_TOLD = 8  # causes
 _DIFFER = 0.05  # p-value from which on sizes may be the same
 
 Cause = tuple[Candidate, ...]
-"""A single candidate, or all of a class of rivals."""
+"""A single candidate, or all of a group of which one is there."""
 
 
 @dataclass(frozen=True)
 class Searched:
     """What was found of one participant.
 
-    trials, too_short : stems of moving trials that were searched, or too short for that.
+    trials : stems of those that were searched.
     was_searched : whether anything can be said at all.
     """
 
     id: str
     causes: tuple[Cause, ...]
     trials: tuple[str, ...]
-    too_short: tuple[str, ...]
     was_searched: bool
 
 
 def searched(participant: str, diagnosis: pd.DataFrame, facts: Mapping[str, Any]) -> Searched:
-    """From a person's artifact ``diagnosis``, which is empty where no trial was long enough, and
+    """From a person's artifact ``diagnosis``, which is empty where no trial could be searched, and
     its facts."""
     return Searched(
         participant,
         causes_of(candidates_of(diagnosis)),
         tuple(facts.get("trials", ())),
-        tuple(facts.get("too_short_s", {})),
         not diagnosis.empty,
     )
 

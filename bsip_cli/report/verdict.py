@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,13 +24,13 @@ from bsip_cli.report.words import (
     trial_label,
 )
 
-LEAST_TOLD = 1e-3  # p-values below are not told in digits
+_UNTOLD = 1e-3  # probabilities this near to 0 or 1 are not told in digits
 _MOST_GAINS = 3
 _MOST_CHANGES = 2
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
-_NO_TRIAL = "No trial was long enough on the plates to look for errors: nobody can say."
-_TOO_SHORT = (
-    "Not looked at, because less than 2 s of them have every contact on a plate and the pose known"
+_NO_TRIAL = "Inconclusive: no recording has motion with every contact on a plate."
+_OF_THE_LAB = (
+    "It is a matter of the laboratory: whoever else was recorded there has it too, if it is there."
 )
 _NOTHING = "Nothing is wrong above the noise."
 
@@ -42,7 +42,7 @@ class Verdict:
     Attributes
     ----------
     headline : whether anything is wrong. found : whether anything was.
-    causes : a text per cause or class of rivals.
+    causes : a text per cause or group of causes that cannot be distinguished here.
     results : what the causes do to forces and parameters, and where they were looked for.
     advice : what follows for the reader.
     limits : what might have gone unseen; empty where that is not known.
@@ -66,13 +66,11 @@ def verdict_of(
     detection: pd.DataFrame,
     gains: pd.DataFrame | None = None,
     changes: pd.DataFrame | None = None,
-    too_short_s: Mapping[str, float] | None = None,
     budget: pd.DataFrame | None = None,
 ) -> Verdict:
     """From the artifacts ``diagnosis`` and ``detection``, and of ``extend`` where it has run
     ``gain`` and ``bsip-change``, with one method each. ``budget``: ``overall-error-budget``, where
-    it is known. ``too_short_s``: stems of trials that had no
-    part in it, with the seconds of them that can be used."""
+    it is known."""
     causes = causes_of(candidates_of(diagnosis))
     everywhere = looked_at(detection, diagnosis)
     return Verdict(
@@ -83,7 +81,6 @@ def verdict_of(
             *(budget_sentences(budget) if budget is not None else ()),
             *(_results(causes, gains, changes) if causes else ()),
             *_seen_in(everywhere),
-            *_not_seen_in(too_short_s or {}),
         ),
         (*filter(None, [_named_twice(causes)]), *consequences(causes)),
         limits_sentence(limits_of(detection, diagnosis)),
@@ -105,7 +102,9 @@ def headline(diagnosis: pd.DataFrame) -> str:
     parts = [f"{count(named, 'cause')} named"] if named else []
     if classes:
         how_many = str(classes) if named else count(classes, "cause")
-        parts.append(f"{how_many} narrowed down to rivals that look alike in these recordings")
+        parts.append(
+            f"{how_many} narrowed down to several that these recordings cannot distinguish"
+        )
     if unnamed:
         parts.append(f"{unnamed if parts else count(unnamed, 'cause')} without a name")
     return f"Something is wrong: {listing(parts)}."
@@ -113,31 +112,39 @@ def headline(diagnosis: pd.DataFrame) -> str:
 
 def _seen_in(everywhere: Sequence[str]) -> tuple[str, ...]:
     names = [trial_label(stem) for stem in everywhere]
-    return (f"Movements looked at: {listing(names)}.",) if names else ()
-
-
-def _not_seen_in(too_short_s: Mapping[str, float]) -> tuple[str, ...]:
-    names = [f"{trial_label(stem)} ({seconds:.2f} s)" for stem, seconds in too_short_s.items()]
-    return (f"{_TOO_SHORT}: {listing(names)}.",) if names else ()
+    return (f"Recordings looked at: {listing(names)}.",) if names else ()
 
 
 # --- a cause ----------------------------------------------------------------------------------
 
 
 def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
-    """A cause, or a class of rivals: what, how large, where and how sure."""
+    """A cause, or a group of which one is there: what, how large, where and how probable."""
     first = cause[0]
-    where, sure = where_seen(first.trials, everywhere), how_sure(first)
+    places, sure = [f", {where_seen(one.trials, everywhere)}" for one in cause], how_sure(cause)
     if len(cause) == 1:
-        return f"{capital(first.told())}, {where}. {sure}"
-    rivals = "; ".join(f"({chr(ord('a') + k)}) {one.told()}" for k, one in enumerate(cause))
+        return f"{capital(first.told())}{places[0]}. {sure}".rstrip()
+    common, own = (places[0], [""] * len(cause)) if len(set(places)) == 1 else ("", places)
+    members = "; ".join(
+        f"({_letter(k)}) {one.told()}{place}{_probability(one)}"
+        for k, (one, place) in enumerate(zip(cause, own, strict=True))
+    )
     apart = separating_recording([(one.effect, one.target) for one in cause])
     if first.class_id == OF_THE_WEIGHT:
         apart = f"weigh the person as recorded; {apart}"
     return (
-        f"One of these, which these recordings cannot tell apart, {where}: {rivals}. {sure} To tell "
-        f"them apart: {apart}."
+        f"One of these, which these recordings cannot tell apart{common}: {members}. "
+        f"{sure}{' ' if sure else ''}To tell them apart: {apart}."
     )
+
+
+def _letter(number: int) -> str:
+    return chr(ord("a") + number)
+
+
+def _probability(one: Candidate) -> str:
+    words = probability_words(one.probability)
+    return f", probability {words}" if words else ""
 
 
 def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
@@ -150,30 +157,50 @@ def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
     return f"{'only ' if set(trials) < set(everywhere) else ''}in {listing(names)}"
 
 
-def how_sure(one: Candidate) -> str:
-    """Against chance, and on data that were not used to size it."""
+def how_sure(cause: Sequence[Candidate]) -> str:
+    """How probable it is, and what it explains of data that were not used to size it."""
+    said = [_probable(cause), *(_explained(one, k, cause) for k, one in enumerate(cause))]
+    text = "; ".join(filter(None, said))
+    return f"{capital(text)}." if text else ""
+
+
+def _probable(cause: Sequence[Candidate]) -> str:
+    words = probability_words(probability_of(cause))
+    if not words:
+        return ""
+    if len(cause) == 1:
+        return f"probability {words}"
+    rest = ", else the stated mass is wrong" if cause[0].class_id == OF_THE_WEIGHT else ""
+    return f"together {words}{rest}"
+
+
+def _explained(one: Candidate, position: int, cause: Sequence[Candidate]) -> str:
+    """Empty where that was not tested."""
     gain, low, high = one.gain
-    chance = f"chance {chance_words(one.p_value)}"
     if not np.isfinite(gain):
-        return f"How sure: {chance}."
+        return ""
     digits = 0 if gain >= 10 else 1
     share, least, most = (number(x, digits) for x in (gain, low, high))
+    which = f"({_letter(position)}) " if len(cause) > 1 else ""
+    perhaps = "" if low > 0 else ", perhaps nothing"
     return (
-        f"{_level(one.p_value, low)} ({chance}): explains {share} % ({least} to {most} %) of the "
-        "squared difference in seconds it was not fitted to."
+        f"{which}explains {share} % ({least} to {most} %{perhaps}) of the squared difference in "
+        "seconds it was not fitted to"
     )
 
 
-def _level(p_value: float, least_gain: float) -> str:
-    """In few seconds no gain is sure, though chance be out of the question."""
-    if p_value >= LEAST_TOLD:
-        return "Likely" if least_gain > 0 else "Weak"
-    return "Sure" if least_gain > 0 else "Real, but with an uncertain gain"
+def probability_of(cause: Sequence[Candidate]) -> float:
+    """That one of them is there; NaN where the diagnosis gives none."""
+    return float(sum(one.probability for one in cause))
 
 
-def chance_words(p_value: float) -> str:
-    """How often chance would bring as much."""
-    return f"{number(100 * p_value, 1)} %" if p_value >= LEAST_TOLD else "under 0.1 %"
+def probability_words(probability: float) -> str:
+    """``99.5 %`` or ``over 99.9 %``; empty where there is none."""
+    if np.isnan(probability):
+        return ""
+    if probability > 1 - _UNTOLD:
+        return "over 99.9 %"
+    return f"{number(100 * probability, 1)} %" if probability >= _UNTOLD else "under 0.1 %"
 
 
 # --- what it does -----------------------------------------------------------------------------
@@ -274,7 +301,8 @@ def _consequences_of(cause: Sequence[Candidate]) -> tuple[str, ...]:
     if cause[0].class_id == OF_THE_WEIGHT:
         return (WEIGHT,)
     known = (EFFECT_WORDS[one.effect] for one in cause if one.effect in EFFECT_WORDS)
-    return tuple(dict.fromkeys(words.consequence for words in known))
+    lab = (_OF_THE_LAB,) if all(one.scope == "laboratory" for one in cause) else ()
+    return (*dict.fromkeys(words.consequence for words in known), *lab)
 
 
 def _named_twice(causes: Sequence[Sequence[Candidate]]) -> str:

@@ -112,7 +112,6 @@ def record_of(unit: Unit) -> ParticipantRecord:
         refusals=refusals_of(unit, unit.participant),
         origins=_origins(unit, usable),
         loads=_loads(unit),
-        too_short_s=_too_short(unit),
         gains=_extended(unit, "overall-gain"),
         changes=_extended(unit, "bsip-change"),
         **{name: unit.read(kind) for name, kind in _FOUND.items() if unit.has(kind)},
@@ -126,12 +125,6 @@ def _extended(unit: Unit, kind: str) -> pd.DataFrame | None:
     if not there or not is_made_from(unit.path("bsip-change"), unit.path("overall-diagnosis")):
         return None
     return with_all_causes(unit.read(kind))
-
-
-def _too_short(unit: Unit) -> dict[str, float]:
-    """Trials that had no part in the diagnosis, with the seconds of contacts on plates only."""
-    facts = unit.facts("overall-diagnosis") if unit.has("overall-diagnosis") else {}
-    return facts.get("too_short_s", {})
 
 
 def _loads(unit: Unit) -> tuple[tuple[str, str], ...]:

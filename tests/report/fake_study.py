@@ -504,7 +504,7 @@ def posturography() -> pd.DataFrame:
 
 
 def diagnosis(trials: list[str]) -> pd.DataFrame:
-    """A turned plate (named), two rivals in the last trial, and a rejected wobbling mass."""
+    """A turned plate (named), a group of two in the last trial, and a rejected wobbling mass."""
     everywhere, last = ", ".join(trials), trials[-1]
     turned = "plate 1 is turned by +2.0 degrees (yaw: 95 % interval 1.75 to 2.26°)"
     alike = "; other causes look alike here: to tell them apart, pray"
@@ -523,7 +523,7 @@ def diagnosis(trials: list[str]) -> pd.DataFrame:
             ),
             _cause(
                 4, "wobbling_mass", "thigh_l", "mass", 0.3, "kg", "rejected", "",
-                f"not so: 0.3 kg swing on {EVIL} (chance brings as much in 40 % of cases)", last,
+                f"not so: 0.3 kg swing on {EVIL} (probability 0.04 given what is found)", last,
             ),
         ]
     )  # fmt: skip
@@ -533,6 +533,7 @@ def _cause(
     rank, effect, target, parameter, estimate, unit, verdict, class_id, sentence, trials
 ) -> dict:
     rejected = verdict == "rejected"
+    probability = {1: 0.995, 2: 0.58, 3: 0.38, 4: 0.04}[rank]
     return {
         "rank": rank,
         "effect": effect,
@@ -542,14 +543,19 @@ def _cause(
         "unit": unit,
         "ci_low": np.nan if rejected else 0.9 * estimate - 0.001,
         "ci_high": np.nan if rejected else 1.1 * estimate + 0.001,
-        "p_value": 0.4 if rejected else 0.005,
-        "gain_percent": -700.0 if rejected else 8.0 / rank,
-        "gain_ci_low": -2000.0 if rejected else 4.0 / rank,
-        "gain_ci_high": 600.0 if rejected else 12.0 / rank,
+        "p_value": 1 - probability,
+        "gain_percent": np.nan if rank > 2 else 8.0 / rank,
+        "gain_ci_low": np.nan if rank > 2 else 4.0 / rank,
+        "gain_ci_high": np.nan if rank > 2 else 12.0 / rank,
         "verdict": verdict,
         "class_id": class_id,
         "sentence": sentence,
         "trials": trials,
+        "probability": probability,
+        "scope": {"plate": "laboratory", "added": "person", "wobbling": "person"}[
+            effect.split("_")[0]
+        ],
+        "rms_change": 12.0 / rank,
     }
 
 

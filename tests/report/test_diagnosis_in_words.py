@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bsip_cli.diagnosis.marker_proof import SOFT_TISSUE
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.report.blocks import Paragraph
 from bsip_cli.report.budget import budget_sentences, pieces
@@ -19,8 +20,15 @@ from bsip_cli.report.participant.residual import residuals_of
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.separating import separating_recording
 from bsip_cli.report.usual_sizes import USUAL
-from bsip_cli.report.verdict import change_sentence, gain_sentence, headline, verdict_of
-from bsip_cli.report.words import EXTENDED
+from bsip_cli.report.verdict import (
+    cause_text,
+    change_sentence,
+    gain_sentence,
+    headline,
+    probability_words,
+    verdict_of,
+)
+from bsip_cli.report.words import EXTENDED, MISSING
 from tests.report.fake_study import changes, detection, diagnosis, error_budget, gains
 
 TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]
@@ -32,7 +40,7 @@ def found() -> pd.DataFrame:
 
 
 def test_every_effect_has_words():
-    assert set(EFFECT_WORDS) == {*EFFECTS, UNNAMED}
+    assert set(EFFECT_WORDS) == {*EFFECTS, UNNAMED, SOFT_TISSUE}
 
 
 def text_of(*tables) -> str:
@@ -42,17 +50,18 @@ def text_of(*tables) -> str:
 def test_the_verdict_says_what_how_large_how_sure_and_where(found):
     text = text_of(found, detection(TRIALS))
     assert text.startswith(
-        "Something is wrong: 1 cause named and 1 narrowed down to rivals that look alike in these "
-        "recordings."
+        "Something is wrong: 1 cause named and 1 narrowed down to several that these recordings "
+        "cannot distinguish."
     )
     assert (
         "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
-        "both recordings. Likely (chance 0.5 %): explains 8.0 % (4.0 to 12.0 %)" in text
+        "both recordings. Probability 99.5 %; explains 8.0 % (4.0 to 12.0 %) of the squared" in text
     )
     assert text.count(EFFECT_WORDS["plate_rotation"].consequence) == 1  # plate_zero's is the same
     assert f"Causes 1 and 2: {EFFECT_WORDS['plate_rotation'].consequence}" in text
-    rivals = found.replace({"effect": {"added_mass": "plate_gain"}})
-    assert "Causes 1 and 2: The measured forces" in text_of(rivals, detection(TRIALS))
+    group = found.replace({"effect": {"added_mass": "plate_gain"}})
+    assert "Causes 1 and 2: The measured forces" in text_of(group, detection(TRIALS))
+    assert "Cause 1: It is a matter of the laboratory" in text  # the group may be the person's
 
 
 def test_what_only_the_markers_prove_says_so(found):
@@ -71,41 +80,58 @@ def test_what_only_the_markers_prove_says_so(found):
 def test_a_trial_of_which_something_was_told_before_is_looked_at_too(found):
     leaning = found[found["rank"] == 1].assign(trials="sub-01_task-stairs", rank=9)
     text = text_of(pd.concat([found, leaning]), detection(TRIALS))
-    assert "Movements looked at: basketball (run 1), sequence (run 1) and stairs." in text
+    assert "Recordings looked at: basketball (run 1), sequence (run 1) and stairs." in text
     assert "only in sequence (run 1) and basketball (run 1)" in text
     standing = leaning.assign(class_id="W")
     assert "stairs" not in text_of(pd.concat([found, standing]), detection(TRIALS))[-400:]
 
 
-def test_a_gain_that_may_be_none_is_weak(found):
+def test_how_sure_is_a_probability_and_what_it_explains(found):
     text = text_of(found.assign(gain_ci_low=-1.0), detection(TRIALS))
-    assert "Weak (chance 0.5 %): explains 8.0 % (−1.0 to 12.0 %)" in text
-    sure = text_of(found.assign(p_value=1e-9, gain_ci_high=140.0), detection(TRIALS))
-    assert "Sure (chance under 0.1 %): explains 8.0 % (4.0 to 100.0 %)" in sure
-    short = text_of(found.assign(p_value=1e-40, gain_ci_low=-1.0), detection(TRIALS))
-    assert "Real, but with an uncertain gain (chance under 0.1 %): explains" in short
+    assert "Probability 99.5 %; explains 8.0 % (−1.0 to 12.0 %, perhaps nothing) of" in text
+    sure = text_of(found.assign(probability=1 - 1e-9, gain_ci_high=140.0), detection(TRIALS))
+    assert "Probability over 99.9 %; explains 8.0 % (4.0 to 100.0 %) of" in sure
+    told = found[found["rank"] == 1].assign(probability=np.nan, gain_percent=np.nan)
+    assert cause_text(causes_of(candidates_of(told))[0], TRIALS).endswith("in both recordings.")
 
 
-def test_rivals_come_with_what_tells_them_apart(found):
+def test_probabilities_have_digits_where_these_say_something():
+    words = [probability_words(p) for p in (0.0004, 0.04, 0.9504, 0.9996, np.nan)]
+    assert words == ["under 0.1 %", "4.0 %", "95.0 %", "over 99.9 %", ""]
+
+
+def test_a_group_comes_with_what_tells_its_members_apart(found):
     text = text_of(found, detection(TRIALS))
     assert (
         "One of these, which these recordings cannot tell apart, only in basketball (run 1): (a) "
-        "channel fz has an offset of +9.8 N (95 % interval 8.8 to 10.8 N); (b) 1.00 kg more move "
-        "with the left hand (95 % interval 0.90 to 1.10 kg)." in text
+        "channel fz has an offset of +9.8 N (95 % interval 8.8 to 10.8 N), probability 58.0 %; (b) "
+        "1.00 kg more move with the left hand (95 % interval 0.90 to 1.10 kg), probability 38.0 %. "
+        "Together 96.0 %; (a) explains 4.0 % (2.0 to 6.0 %) of the squared difference" in text
     )
     assert "To tell them apart: step off the plate for five seconds: an offset stays" in text
-    assert "pray" not in text  # the sentence's own advice names one of the rivals' only
+    assert "pray" not in text  # the sentence's own advice is that of one member only
+
+
+def test_members_of_a_group_may_be_of_different_recordings(found):
+    both = found["effect"] == "added_mass"
+    text = text_of(
+        found.assign(trials=found["trials"].mask(both, ", ".join(TRIALS))), detection(TRIALS)
+    )
+    assert "cannot tell apart: (a) channel fz has an offset" in text
+    assert "8.8 to 10.8 N), only in basketball (run 1), probability 58.0 %; (b)" in text
+    assert "0.90 to 1.10 kg), in both recordings, probability 38.0 %." in text
 
 
 def test_what_quiet_standing_tells_gives_its_advice_once(found):
     """The static recording is none of those that were searched."""
     told = "the plates read 60.0 kg, 2.6 kg less than stated: a gain; to tell them apart, weigh it"
     rows = found[found["class_id"] != ""].assign(
-        class_id="W", trials="sub-01_task-static", sentence=told
+        class_id="W", trials="sub-01_task-static", sentence=told, probability=1 / 3
     )
     text = text_of(rows, detection(TRIALS))
     assert "cannot tell apart, in static: (a) the plates read 60.0 kg" in text
     assert "weigh it" not in text and text.count("tell them apart") == 1
+    assert "Together 66.7 %, else the stated mass is wrong; (a) explains" in text
     assert "Either the stated mass is wrong or what the plates measure" in text
     assert "The measured forces are not the true ones" not in text
 
@@ -122,7 +148,7 @@ def test_a_marker_has_the_interval_of_its_distance(found):
     assert "26 mm from its place throughout (95 % interval 20 to 30 mm)" in said
 
 
-def test_what_tells_rivals_apart_depends_on_all_of_them():
+def test_what_tells_a_group_apart_depends_on_all_of_it():
     hands = [("added_mass", "hand_l"), ("added_mass", "hand_r")]
     assert separating_recording(hands).endswith("one at a time: left hand and right hand")
     assert "hop three times" in separating_recording(
@@ -142,7 +168,7 @@ def test_nothing_wrong(found):
     said = verdict_of(pd.concat([first, none]), detection(TRIALS))
     assert not said.found
     assert said.headline == "Nothing is wrong above the noise."
-    assert said.paragraphs()[1] == "Movements looked at: basketball (run 1) and sequence (run 1)."
+    assert said.paragraphs()[1] == "Recordings looked at: basketball (run 1) and sequence (run 1)."
     assert said.paragraphs()[2].endswith("might have gone unseen in these recordings.")
 
 
@@ -165,12 +191,14 @@ def test_a_cause_named_twice_is_a_warning(found):
     assert warning not in text_of(apart, detection(TRIALS))  # in two recordings, once each
 
 
-def test_candidates_keep_their_order_and_their_reason(found):
+def test_candidates_keep_their_order_and_their_numbers(found):
     candidates = candidates_of(found)
     assert [one.verdict for one in candidates] == ["named", "ambiguous", "ambiguous", "rejected"]
     assert len(candidates[0].numbers) == 2
-    assert candidates[3].why_not() == "chance brings as much in 40 % of cases"
-    assert "chance" not in candidates[3].what()
+    assert [one.probability for one in candidates] == [0.995, 0.58, 0.38, 0.04]
+    assert [one.scope for one in candidates[1:3]] == ["laboratory", "person"]
+    assert candidates[3].what().startswith("0.3 kg swing on")
+    assert "probability" not in candidates[3].what()  # it has a column of its own
     assert [len(cause) for cause in causes_of(candidates)] == [1, 2]
 
 
@@ -202,6 +230,53 @@ def test_a_marker_of_any_name_is_drawn_as_it_is(found):
     foreign = found.assign(effect="marker_shift", target="$\\frac{$")
     picture = ranking(candidates_of(foreign))[0]
     assert b"<svg" in picture.svg
+
+
+def test_the_table_says_how_probable_and_what_it_changes(found):
+    *_, grid = ranking(candidates_of(found))
+    cells = [[cell.text for cell in row] for row in grid.cells()]
+    assert cells[0][4:] == ["laboratory", "99.5 %", "12.0", "8.0 (4.0 to 12.0)"]
+    assert cells[2][1] == "one of group B"
+    assert cells[3][1] == "not so"
+    assert cells[3][4:] == ["person", "4.0 %", "3.0", "not tested"]
+
+
+def test_soft_tissue_or_a_bend_of_the_trunk(found):
+    """As ``marker_proof`` says it: no forces tell, and the markers do not tell which."""
+    remedy = EFFECTS["missing_joint"].remedy
+    advice = f"; a second bend and soft tissue look alike here: to tell them apart, {remedy}"
+    bend = "the trunk bends twice (flexion: 95 % interval 0.3 to 0.4); this is 40 % of all"
+    group = found[found["class_id"] == "B"].assign(
+        effect=["missing_joint", SOFT_TISSUE],
+        target="upper_torso",
+        parameter=["flexion", "size"],
+        unit=["1", "m"],
+        estimate=[0.35, 0.012],
+        ci_low=[0.3, np.nan],
+        ci_high=[0.4, np.nan],
+        class_id="M1",
+        gain_percent=np.nan,
+        rms_change=np.nan,
+        sentence=[bend + advice, "soft tissue moves: its markers are 12 mm off" + advice],
+    )
+    text = text_of(group, detection(TRIALS))
+    assert "(b) soft tissue moves: its markers are 12 mm off, probability 38.0 %." in text
+    assert text.count("a second bend and soft tissue") == 0 and text.count(remedy) == 1
+    assert EFFECT_WORDS[SOFT_TISSUE].consequence in text
+    *_, grid = ranking(candidates_of(group))
+    assert grid.cells()[1][0].text == f"2. (M1) {EFFECT_WORDS[SOFT_TISSUE].title}"
+    assert grid.cells()[1][6].text == MISSING
+
+
+def test_what_acts_like_a_cause_but_not_evenly_has_no_name(found):
+    uneven = found[found["rank"] == 1].assign(
+        effect=UNNAMED, sentence="something without a name acts as if plate 1 is turned, but not "
+        "evenly (yaw: 95 % interval 1.75 to 2.26°)",
+    )  # fmt: skip
+    text = text_of(uneven, detection(TRIALS))
+    assert "Something without a name acts as if plate 1 is turned, but not evenly (95 %" in text
+    assert EFFECT_WORDS[UNNAMED].consequence in text
+    assert ranking(candidates_of(uneven))
 
 
 def test_figure_and_table_number_causes_alike(found, monkeypatch):
@@ -253,7 +328,7 @@ def test_units_that_people_read():
 
 def test_limits_stand_beside_sizes_that_labs_meet(found):
     nothing = found[found["verdict"] == "rejected"]
-    *_, limits, masses, grid = limits_section.blocks(detection(TRIALS), nothing)
+    *_, limits, masses, grid = limits_section.blocks(detection(TRIALS), nothing, "95")
     assert (limits.name, masses.name) == ("diagnosis_limits", "diagnosis_masses")
     rows = {row[0].text: [cell.text for cell in row[1:]] for row in grid.cells()}
     assert rows["forces and markers out of step"] == ["2.5 ms", "22 ms", "–", "5 to 20 ms"]
@@ -264,19 +339,23 @@ def test_limits_stand_beside_sizes_that_labs_meet(found):
 def test_what_no_recording_shows_is_not_put_in_figures(found):
     far = detection(TRIALS).assign(effect="joint_centre", parameter="shift_x", unit="m")
     far["limit"] = np.where(far["target"] == "hand_l", 1e5, 0.02)
-    *_, grid = limits_section.blocks(far, found)
+    *_, grid = limits_section.blocks(far, found, "95")
     assert grid.cells()[0][1].text == "from 20 mm, or not at all"
 
 
 def test_what_no_recording_shows_at_all_is_said(found):
     blind = detection(TRIALS)
     blind.loc[blind["effect"] == "plate_gain", "limit"] = np.inf
-    said = [one.text for one in limits_section.blocks(blind, found) if isinstance(one, Paragraph)]
+    said = [
+        one.text for one in limits_section.blocks(blind, found, "95") if isinstance(one, Paragraph)
+    ]
     assert f"at any size that can be true: {EFFECT_WORDS['plate_gain'].title}." in " ".join(said)
     named = pd.concat([found, found[found["rank"] == 1].assign(effect="plate_gain", rank=9)])
-    said = [one.text for one in limits_section.blocks(blind, named) if isinstance(one, Paragraph)]
+    said = [
+        one.text for one in limits_section.blocks(blind, named, "95") if isinstance(one, Paragraph)
+    ]
     assert "at any size" not in " ".join(said)
-    usual = limits_section.blocks(detection(TRIALS), found)
+    usual = limits_section.blocks(detection(TRIALS), found, "95")
     assert "at any size" not in " ".join(one.text for one in usual if isinstance(one, Paragraph))
 
 
@@ -297,7 +376,7 @@ def test_gains_lead_with_what_improves():
 
 
 def test_the_verdict_tells_gains_where_they_are(found):
-    looked = "Movements looked at: basketball (run 1) and sequence (run 1)."
+    looked = "Recordings looked at: basketball (run 1) and sequence (run 1)."
     told = verdict_of(found, detection(TRIALS), gains()).results
     assert told == (gain_sentence(gains()), looked)
     advice, where = verdict_of(found, detection(TRIALS)).results

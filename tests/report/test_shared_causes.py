@@ -18,10 +18,10 @@ from bsip_cli.report.shared import named_people, searched, shared_causes
 from tests.report.fake_study import diagnosis
 
 TRIAL = "sub-01_task-sequence_run-1"
-FOUND = diagnosis([TRIAL])  # a turned plate, a class of two, one rejected
+FOUND = diagnosis([TRIAL])  # a turned plate, a group of two, one rejected
 TURNED = FOUND[FOUND["verdict"] != "ambiguous"]
 NOTHING = FOUND[FOUND["verdict"] == "rejected"]
-FACTS = {"trials": [TRIAL], "too_short_s": {"sub-01_task-throwing": 1.8}}
+FACTS = {"trials": [TRIAL]}
 
 
 def turned_by(radians: float, half: float = 0.01) -> pd.DataFrame:
@@ -77,7 +77,7 @@ def test_twice_in_one_person_is_not_shared_but_counts_among_the_sizes():
 
 
 def test_only_those_count_of_whom_such_a_recording_was_searched():
-    elsewhere = {"trials": ["sub-02_task-squat"], "too_short_s": {"sub-02_task-sequence": 1.8}}
+    elsewhere = {"trials": ["sub-02_task-squat"]}
     people = [searched(name, TURNED, FACTS) for name in ("ann", "eve")]
     (said,) = shared_causes([*people, searched("bob", NOTHING, elsewhere)])
     assert "in 2 of 2 participants" in said
@@ -87,7 +87,7 @@ def test_only_those_count_of_whom_such_a_recording_was_searched():
     assert "in 2 of 3 participants" in said
 
 
-def test_a_rival_counts_and_is_told_as_one():
+def test_a_member_of_a_group_counts_and_is_told_as_one():
     offset = FOUND["effect"] == "plate_zero"
     named = FOUND[offset].assign(verdict="named", class_id="")
     first, *others = shared(ann=FOUND, bob=FOUND, eve=named, tom=FOUND)
@@ -97,7 +97,7 @@ def test_a_rival_counts_and_is_told_as_one():
     assert others[-1].endswith("; one of several that look alike in all of them.")
 
 
-def test_what_is_named_once_is_no_rival_of_the_same_person():
+def test_what_is_named_once_is_in_no_group_of_the_same_person():
     named = FOUND[FOUND["effect"] == "plate_zero"].assign(verdict="named", class_id="", rank=9)
     first, *_ = shared(ann=pd.concat([FOUND, named]), eve=named)
     assert "look alike" not in first
@@ -133,18 +133,16 @@ def text_of(record: CohortRecord) -> str:
 def test_the_section_lists_causes_and_names_those_without():
     record = cohort(ann=FOUND, bob=NOTHING, eve=None, tom=TURNED.iloc[:0])
     text = text_of(record)
-    assert (
-        "Nothing wrong above the noise was found in bob (searched: sequence (run 1); too short to "
-        "be searched: throwing)." in text
-    )
+    assert "Nothing wrong above the noise was found in bob (searched: sequence (run 1))." in text
     assert "Not searched for errors: eve." in text
-    assert "No recording was long enough on the plates to look for errors: tom." in text
+    assert "No recording has motion with every contact on a plate: tom." in text
     (grid,) = (b for b in diagnoses.section(record).blocks if isinstance(b, Grid))
-    first, rivals = grid.cells()
+    first, group = grid.cells()
     assert (first[0].text, first[0].link) == ("ann", "../ann/report.html")
     assert first[1].text.startswith("Plate 1 is turned by +2.0 degrees")
-    assert first[3].text == "0.5 %"
-    assert rivals[1].text.startswith("One of these: ")
+    assert first[3].text == "99.5 %"
+    assert group[1].text.startswith("One of these: ")
+    assert group[3].text == "96.0 %"
 
 
 def test_what_is_shared_stands_in_the_section():
@@ -159,16 +157,16 @@ def test_what_is_shared_stands_in_the_section():
         ({"ann": TURNED, "bob": NOTHING}, "Something is wrong in 1 of 2 participants: ann."),
         ({"bob": NOTHING}, "Nothing wrong above the noise was found in 1 participant."),
         ({"bob": None}, "Nobody's recordings were searched for errors"),
-        ({"bob": TURNED.iloc[:0]}, "No recording was long enough"),
+        ({"bob": TURNED.iloc[:0]}, "No recording has motion"),
     ],
 )
 def test_the_verdict_of_all(tables, said):
     assert diagnoses.verdict(cohort(**tables)).text.startswith(said)
 
 
-def test_chance_is_mentioned_where_something_was_found():
-    assert "may be chance" in text_of(cohort(ann=TURNED))
-    assert "may be chance" not in text_of(cohort(bob=NOTHING, eve=NOTHING))
+def test_what_a_probability_means_is_said_where_something_was_found():
+    assert "one in twenty is expected not to be there" in text_of(cohort(ann=TURNED))
+    assert "one in twenty" not in text_of(cohort(bob=NOTHING, eve=NOTHING))
 
 
 def test_a_person_without_report_has_no_link():

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Paragraph, Section
 from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.shared import SHARED, Cause, Searched, named_people, shared_causes
-from bsip_cli.report.verdict import chance_words
-from bsip_cli.report.words import capital, count, labelled, listing
+from bsip_cli.report.verdict import probability_of, probability_words
+from bsip_cli.report.words import MISSING, capital, count, labelled, listing
 
 _NOT_RUN = "Nobody's recordings were searched for errors: run `bsip diagnose`."
-_TOO_SHORT = "No recording was long enough on the plates to look for errors"
-_BY_CHANCE = (
-    "The search is set so that at most about one in twenty people with nothing wrong has an alarm: a "
-    "single weak finding among many people may be chance."
+_NO_TRIAL = "No recording has motion with every contact on a plate"
+_SOME_ARE_WRONG = (
+    "The probabilities hold as far as the model of ordinary errors does. Of findings with 95 %, one "
+    "in twenty is expected not to be there: among many people some are not."
 )
 
 
@@ -23,7 +25,7 @@ def verdict(record: CohortRecord) -> Paragraph:
     people = _people(record)
     asked = [p for p in people if p.was_searched]
     if not asked:
-        return Paragraph(f"{_TOO_SHORT}." if people else _NOT_RUN, "note")
+        return Paragraph(f"{_NO_TRIAL}." if people else _NOT_RUN, "note")
     wrong = [p.id for p in asked if p.causes]
     how_many = count(len(asked), "participant")
     if not wrong:
@@ -43,17 +45,17 @@ def section(record: CohortRecord) -> Section:
     reports = {m.id for m in record.members if m.has_report}
     rows = tuple(_row(one.id, cause, reports) for one in people for cause in one.causes)
     if rows:
-        head = ("participant", "found", "recordings", "chance", "removes [%]")
+        head = ("participant", "found", "recordings", "probability", "removes [%]")
         caption = (
-            "What was found; rivals look alike in these recordings. Chance: how often it would bring "
-            "as much. Removes: of the squared difference between measured and simulated forces, in "
+            "What was found, or a group of which one is there. Probability: of the cause, or of the "
+            "group. Removes: of the squared difference between measured and simulated forces, in "
             "units of its noise, in seconds left out when its size was fitted, with 95 % interval"
         )
         blocks.append(Grid(head, rows, caption, words=3))
     if shared := shared_causes(people):
         blocks += [Paragraph(SHARED), Bullets(shared, "warning")]
     if rows:
-        blocks.append(Paragraph(_BY_CHANCE, "note"))
+        blocks.append(Paragraph(_SOME_ARE_WRONG, "note"))
     return Section("diagnoses", "What is wrong in the recordings", tuple(blocks))
 
 
@@ -68,9 +70,9 @@ def _unsearched(record: CohortRecord) -> list[Block]:
     said: list[Block] = []
     if missing and people:
         said.append(Paragraph(f"Not searched for errors: {named_people(missing)}.", "note"))
-    short = [p.id for p in people if not p.was_searched]
-    if short:
-        said.append(Paragraph(f"{_TOO_SHORT}: {named_people(short)}.", "note"))
+    without = [p.id for p in people if not p.was_searched]
+    if without:
+        said.append(Paragraph(f"{_NO_TRIAL}: {named_people(without)}.", "note"))
     return said
 
 
@@ -87,21 +89,16 @@ def _nothing_found(people: Sequence[Searched]) -> list[str]:
 
 
 def _movements(one: Searched) -> str:
-    short = f"; too short to be searched: {_trials(one.too_short)}" if one.too_short else ""
-    return f" (searched: {_trials(one.trials)}{short})" if one.trials else ""
-
-
-def _trials(stems: Sequence[str]) -> str:
-    return labelled(listing(list(stems)))
+    return f" (searched: {labelled(listing(list(one.trials)))})" if one.trials else ""
 
 
 def _row(person: str, cause: Cause, reports: set[str]) -> tuple[str | Cell, ...]:
-    first = cause[0]
-    told = [capital(rival.told()) for rival in cause]
+    tested = next((one for one in cause if np.isfinite(one.gain[0])), cause[0])
+    told = [capital(one.told()) for one in cause]
     return (
         Cell(person, link=f"../{person}/report.html" if person in reports else ""),
         told[0] if len(told) == 1 else f"One of these: {'; '.join(told)}",
-        first.where(),
-        chance_words(first.p_value),
-        first.removes(),
+        labelled(listing(list(dict.fromkeys(t for one in cause for t in one.trials)))),
+        probability_words(probability_of(cause)) or MISSING,
+        tested.removes(),
     )

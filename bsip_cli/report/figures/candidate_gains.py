@@ -1,4 +1,4 @@
-"""What each candidate cause explains of data that it was not fitted to."""
+"""What each cause that was found explains of data that it was not fitted to."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from bsip_cli.report.figures.canvas import (
     INK,
     ORANGE,
     PURPLE,
-    SOFT,
     house_style,
     literal,
     new_figure,
@@ -23,11 +22,10 @@ from bsip_cli.report.figures.canvas import (
 
 _LEAST, _ROOM = 5.0, 1.15
 _LABEL_WIDTH = 40  # letters in a line
-_STYLES = {  # verdict: colour, marker, filled, what the legend says
-    "named": (BLUE, "o", True, "named"),
-    "unnamed": (PURPLE, "^", True, "without a name"),
-    "ambiguous": (ORANGE, "D", True, "one of several rivals"),
-    "rejected": (SOFT, "s", False, "rejected"),
+_STYLES = {  # verdict: colour, marker, what the legend says
+    "named": (BLUE, "o", "named"),
+    "unnamed": (PURPLE, "^", "without a name"),
+    "ambiguous": (ORANGE, "D", "one of several"),
 }
 
 
@@ -44,7 +42,7 @@ class CandidateGains:
 
 @house_style()
 def candidate_gains(data: CandidateGains) -> Figure:
-    """A row per candidate; what runs out of the axis ends in an arrow at its edge."""
+    """A row per cause; what runs out of the axis ends in an arrow at its edge."""
     rows = len(data.labels)
     labels = [fill(literal(label), _LABEL_WIDTH) for label in data.labels]
     lines = max((label.count("\n") + 1 for label in labels), default=1)
@@ -72,17 +70,15 @@ def candidate_gains(data: CandidateGains) -> Figure:
 
 
 def _edges(data: CandidateGains) -> tuple[float, float]:
-    """Of the axis: all gains fit, and the intervals of what was kept; of the others' intervals to
-    the left no more than to the right."""
-    kept = np.array([verdict != "rejected" for verdict in data.verdicts])
-    highs = np.concatenate([data.gain, np.where(kept, data.high, np.nan)])
-    high = _ROOM * max(_LEAST, float(np.nanmax(highs, initial=_LEAST)))
+    """Of the axis: all gains fit, and of the intervals to the left no more than to the right."""
+    highs = np.concatenate([data.gain, data.high])
+    high = _ROOM * float(np.nanmax(highs, initial=_LEAST))
     low = _ROOM * float(np.nanmin(data.low, initial=-_LEAST))
     return min(max(low, -high), _ROOM * float(np.nanmin(data.gain, initial=0.0))), high
 
 
 def _draw(axes: Axes, data: CandidateGains, row: int, left: float, right: float) -> None:
-    colour, marker, filled, label = _STYLES[data.verdicts[row]]
+    colour, marker, label = _STYLES[data.verdicts[row]]
     low, high = np.clip([data.low[row], data.high[row]], left, right)
     axes.plot([low, high], [row, row], color=colour, lw=1.4)
     if data.low[row] < left:
@@ -97,6 +93,5 @@ def _draw(axes: Axes, data: CandidateGains, row: int, left: float, right: float)
             ls="none",
             ms=5.5,
             color=colour,
-            mfc=colour if filled else "white",
             label=label,
         )

@@ -26,8 +26,9 @@ _TOLD_BY_PART = ("plate_translation", "plate_rotation", "plate_gain", "missing_j
 _FAR = 20.0  # times the largest usual size: not seen at all
 
 
-def blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
-    """From the artifacts ``detection`` and ``diagnosis``."""
+def blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame, named_from: str) -> list[Block]:
+    """From the artifacts ``detection`` and ``diagnosis``; named_from [%]: probability from which on
+    one name is said."""
     together = limits_of(detection, diagnosis)
     alone = limits_of(detection, diagnosis, alone=True)
     if not together:
@@ -36,10 +37,10 @@ def blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
     said: list[Block] = [Paragraph(sentence)] if sentence else []
     said.append(
         Paragraph(
-            "Each limit is the size that would be found in 95 of 100 recordings like these, while "
-            "the inertial parameters and the cause's other numbers stay free; none is below a "
-            "quarter of the cause's typical size, since nothing smaller is named. Of moments, "
-            "windows and frequencies the median counts: a cause at half of them must be larger. "
+            "Each limit is the size that would be named in 95 of 100 recordings like these: the "
+            f"evidence for it outweighs the prior odds up to a probability of {named_from} %, while "
+            "the ordinary errors and the cause's other numbers stay free. Of moments, windows and "
+            "frequencies the median counts: a cause at half of them must be larger. "
             "Smaller errors may be there. Causes that were found have no limit, and none is given "
             "for exchanged labels and smoothed markers.",
             "note",
@@ -53,7 +54,7 @@ def blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
     rows = tuple(row for effect in USUAL for row in _rows(effect, together, alone))
     head = ("cause", "in all recordings", "in one alone", "shows best at", "usual in labs")
     caption = (
-        "Least size that would be found, from the best place, direction and recording to the worst"
+        "Least size that would be named, from the best place, direction and recording to the worst"
     )
     return [*said, Grid(head, rows, caption, words=5)]
 
@@ -108,10 +109,10 @@ def _usual_figure(limits: Sequence[Limit]) -> list[Block]:
         )
     )
     caption = (
-        "How small each cause might have been and still been found in these recordings. Dot: at the "
+        "How small each cause might have been and still been named in these recordings. Dot: at the "
         "place, in the direction and recording that show it best; bar: up to the worst; to the "
         "right the same in figures. Grey: sizes that laboratories meet. Left of the black line every usual size "
-        "would have been found, right of the grey none."
+        "would have been named, right of the grey none."
     )
     return [Picture(figure, caption, "Bars: limits over usual sizes.", "diagnosis_limits")]
 

@@ -33,18 +33,18 @@ from bsip_cli.report.figures.error_bars import Bar, error_bars
 from bsip_cli.report.participant import detection, residual
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import (
-    LEAST_TOLD,
     change_sentence,
+    probability_words,
     put_right_sentence,
     verdict_of,
     worth_telling,
 )
 from bsip_cli.report.words import (
+    MISSING,
     capital,
     component_label,
     labelled,
     number,
-    percent,
     segment_label,
     signed,
 )
@@ -60,7 +60,7 @@ def verdict(record: ParticipantRecord) -> list[Block]:
     if record.diagnosis is None or record.detection is None:
         return [Paragraph(NOT_RUN, "note")]
     tables = (record.diagnosis, record.detection, record.gains, record.changes)
-    said = verdict_of(*tables, record.too_short_s, record.budget)
+    said = verdict_of(*tables, record.budget)
     tone: Tone = "warning" if said.found or record.diagnosis.empty else "good"
     blocks: list[Block] = [Paragraph(said.headline, tone)]
     if said.causes:
@@ -100,20 +100,26 @@ def put_right(record: ParticipantRecord) -> tuple[str, ...]:
 
 
 def section(record: ParticipantRecord) -> Section:
+    odds = f"{record.option('diagnosis', 'fault_prior_odds', 0.1):g}"
+    named_from = f"{100 * record.option('diagnosis', 'named_from', 0.95):g}"
     blocks: list[Block] = [
         Paragraph(
-            "The simulated ground forces are compared with the measured ones, and every known cause "
-            "of a difference is tried: errors of the plates, the clocks, the markers and the model. "
-            "A cause is named only if chance would rarely bring as much (in 5 % of studies with "
-            "nothing wrong, counting all causes together) and if it helps in seconds that it was "
-            "not fitted to. Causes that look alike in these recordings are named together."
+            "One statistical model explains the difference between measured and simulated ground "
+            "forces: by noise, by ordinary errors of ordinary size (segment parameters, joint "
+            "centres, markers, smoothing), and by causes from a catalogue of faults of plates, "
+            "clocks, markers and model. Causes join it one after the other, the most probable "
+            f"first, while one more is more probable than none. Before the data its odds are {odds} "
+            "to 1, spread evenly over the catalogue; the recordings decide the rest. Where "
+            "nearly every cause seems to explain something of a recording, that recording counts "
+            f"for less. A single name is said from a probability of {named_from} % on, else "
+            "the smallest group of names that holds as much; what is less probable is not so."
         )
     ]
     if record.diagnosis is None or record.detection is None:
         blocks.append(Paragraph(NOT_RUN, "note"))
     else:
         blocks += [
-            Heading("The causes that came nearest"),
+            Heading("The causes found, and those that came nearest"),
             *ranking(candidates_of(record.diagnosis)),
         ]
         if record.gains is not None and len(record.gains):
@@ -122,7 +128,7 @@ def section(record: ParticipantRecord) -> Section:
             blocks += [Heading("What the body's parameters become"), *change_blocks(record)]
         blocks += [
             Heading("What might have gone unseen"),
-            *detection.blocks(record.detection, record.diagnosis),
+            *detection.blocks(record.detection, record.diagnosis, named_from),
         ]
     blocks += [*residual.blocks(record), *_segments(record)]
     return Section("diagnosis", "What the simulation gets wrong", tuple(blocks))
@@ -154,7 +160,7 @@ def _segments(record: ParticipantRecord) -> list[Block]:
 def ranking(candidates: Sequence[Candidate]) -> list[Block]:
     """The candidates as a figure and in words."""
     if not candidates:
-        return [Paragraph("No cause came near to explaining anything.")]
+        return [Paragraph("No cause of the catalogue came near.")]
     numbered = list(enumerate(candidates, start=1))
     known = [(k, one) for k, one in numbered if np.isfinite(one.gain[0])][:_MOST_IN_FIGURE]
     blocks: list[Block] = []
@@ -170,22 +176,31 @@ def ranking(candidates: Sequence[Candidate]) -> list[Block]:
             )
         )
         caption = (
-            "The causes that were fitted in full, in the order of the diagnosis; all others, from "
-            "clocks to joints, were tried and explain less. How much of the "
-            "squared difference between measured and simulated forces (in units of its noise) each "
-            "removes in seconds that it was not fitted to, with 95 % interval. An interval that "
-            "reaches below zero may be no gain at all; an arrow: it runs on. Each was tried beside "
-            "the causes named before it, and the one was kept that stands out most from chance; that "
-            "need not be the one that removes most. Letters in brackets: rivals of one class."
+            "How much of the squared difference between measured and simulated forces (in units of "
+            "its noise) each cause that was found removes, given all others, in seconds that it was "
+            "not fitted to, with 95 % interval. An interval that reaches below zero may be no gain "
+            "at all; an arrow: it runs on. Letters in brackets: a group of which one is there; only "
+            "the member that is in the model has a gain."
         )
         blocks.append(Picture(figure, caption, "Dots: gain of each cause.", "diagnosis_causes"))
     rows = tuple(_row(k, one) for k, one in numbered)
-    head = ("cause", "verdict", "in words", "recordings", "chance [%]", "removes [%]")
-    caption = (
-        "Causes that came nearest. Chance: how often it would bring as much; removes: of the squared "
-        "difference in unseen seconds, with 95 % interval"
+    head = (
+        "cause",
+        "verdict",
+        "in words",
+        "recordings",
+        "scope",
+        "probability",
+        "changes [N or N m]",
+        "removes [%]",
     )
-    return [*blocks, Grid(head, rows, caption, words=4)]
+    caption = (
+        "Causes that were found or came nearest. Scope: everybody recorded in the laboratory, this "
+        "person always, or single trials. Probability: that it is there, given all else that was "
+        "found. Changes: root mean square of what it does to the force or moment that it changes "
+        "most. Removes: of the squared difference in unseen seconds, with 95 % interval"
+    )
+    return [*blocks, Grid(head, rows, caption, words=5)]
 
 
 def _numbered(k: int, one: Candidate) -> str:
@@ -194,15 +209,19 @@ def _numbered(k: int, one: Candidate) -> str:
 
 def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
     marks: dict[str, Mark] = {"named": "group", "ambiguous": "warning"}
-    answers = {"ambiguous": f"rival in class {one.class_id}", "unnamed": "found, without a name"}
-    verdict = answers.get(one.answer, one.answer)
-    reason = one.why_not()
+    answers = {
+        "ambiguous": f"one of group {one.class_id}",
+        "unnamed": "found, without a name",
+        "rejected": "not so",
+    }
     return (
         _numbered(k, one),
-        Cell(verdict, marks.get(one.verdict, "")),
-        capital(f"{one.what()}; rejected: {reason}" if reason else one.told()),
+        Cell(answers.get(one.answer, one.answer), marks.get(one.verdict, "")),
+        capital(one.told()),
         one.where(),
-        percent(one.p_value, 1) if one.p_value >= LEAST_TOLD else "< 0.1",
+        one.scope or MISSING,
+        probability_words(one.probability) or MISSING,
+        number(one.rms_change, 1),
         one.removes(),
     )
 

@@ -258,11 +258,11 @@ class Verdict:
 @dataclass(frozen=True, eq=False)
 class Found:
     """Faults of a person's recordings: the fit with all of them, a verdict for each, and what was
-    tried in full and is not there."""
+    tried in full and is not there, with the logarithm of its odds."""
 
     fit: Fitted
     verdicts: tuple[Verdict, ...]
-    rejected: tuple[Tried, ...]
+    rejected: tuple[tuple[Hypothesis, float], ...]
     scores: Scores
 
 
@@ -272,17 +272,17 @@ def search(
     """named_from : probability from which on one name is said; else so many as hold it. known :
     faults that are there for other reasons; they come first in the fit and have no verdict."""
     fit = fitted(session, known)
-    rejected: dict[tuple, Tried] = {}
+    rejected: dict[tuple, tuple[Hypothesis, float]] = {}  # without their fits, which are large
     for _ in range(_MOST):
         tried = one_round(session, library, fit)
-        rejected |= {(*one.fault.key, one.fault.trials): one for one in tried}
+        rejected |= {(*x.fault.key, x.fault.trials): (x.fault, x.log_odds) for x in tried}
         if not tried or tried[0].log_odds < 0:
             break
         fit = corrected(fitted(session, tried[0].fit.faults, start=tried[0].fit))
     fit, verdicts = _judged(session, library, fit, named_from, len(known))
     said = {one.fault.key for verdict in verdicts for one, _ in verdict.members}
-    others = tuple(one for one in rejected.values() if one.fault.key not in said)
-    best = sorted(others, key=lambda one: -one.log_odds)
+    others = (one for one in rejected.values() if one[0].key not in said)
+    best = sorted(others, key=lambda one: -one[1])
     return Found(fit, tuple(verdicts), tuple(best), scores_of(library, fit))
 
 

@@ -13,7 +13,7 @@ from scipy.special import expit
 
 from bsip_cli.diagnosis.evenness import plain
 from bsip_cli.diagnosis.fault_model import Fitted
-from bsip_cli.diagnosis.fault_search import Found, Tried, Verdict
+from bsip_cli.diagnosis.fault_search import Found, Verdict
 from bsip_cli.diagnosis.held_out import HeldOut
 from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.effect import Effect
@@ -78,7 +78,7 @@ def findings_of(
     findings: list[Finding] = []
     for verdict in found.verdicts:
         findings += _findings(found, held, verdict, named_from, names, rng)
-    return (*findings, *(_rejected(one) for one in found.rejected))
+    return (*findings, *(_rejected(found.fit, *one) for one in found.rejected))
 
 
 def _findings(
@@ -90,7 +90,8 @@ def _findings(
     rng: np.random.Generator,
 ) -> Iterator[Finding]:
     if verdict.probability < named_from:
-        yield _rejected(verdict.members[0][0])
+        first = verdict.members[0][0]
+        yield _rejected(found.fit, first.fault, first.log_odds)
         return
     is_alone = len(verdict.members) == 1
     class_id = "" if is_alone else next(names)
@@ -125,9 +126,8 @@ def _names(fit: Fitted, one: Hypothesis) -> tuple[str, ...]:
     return tuple(fit.session.trials[t].name for t in one.trials)
 
 
-def _rejected(tried: Tried) -> Finding:
-    fit, one = tried.fit, tried.fault
-    probability = float(expit(tried.log_odds))
+def _rejected(fit: Fitted, one: Hypothesis, log_odds: float) -> Finding:
+    probability = float(expit(log_odds))
     numbers = tuple(Number(n, u, x, np.nan, np.nan) for n, u, x in one.reported(fit.session))
     sentence = (
         f"not so: {one.sentence(fit.session)} (probability {probability:.2g} given what is found)"

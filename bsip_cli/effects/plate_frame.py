@@ -50,13 +50,6 @@ def plates_that(name: str, does: str, do: str) -> str:
     return f"{plates_called(name)} {do if name == ALL else does}"
 
 
-def lab_channel(scene: Scene, target: str) -> str:
-    """``fy``: component of the lab's wrench that is nearest to a channel like ``1 fx``."""
-    name, channel = target.rsplit(" ", 1)
-    axis = plates_of(scene, name)[0].axes()["xyz".index(channel[1])]
-    return channel[0] + "xyz"[int(np.abs(axis).argmax())]
-
-
 def in_plate(plate: Plate, wrench: np.ndarray) -> np.ndarray:
     """(N, 6) force and moment on the body about the plate's sensor, plate axes."""
     axes, about = plate.axes(), sensor_m(plate)

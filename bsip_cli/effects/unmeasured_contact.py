@@ -44,7 +44,15 @@ class UnmeasuredContact(Effect):
                 for axis in "xyz"
             ),
             Parameter("middle", "s", start, end, 0.25, middles, known_to=EDGE_S / np.sqrt(2)),
-            Parameter("length", "s", min(0.2, end - start), end - start, 0.5, lengths, known_to=EDGE_S * np.sqrt(2)),
+            Parameter(
+                "length",
+                "s",
+                min(0.2, end - start),
+                end - start,
+                0.5,
+                lengths,
+                known_to=EDGE_S * np.sqrt(2),
+            ),
         )
 
     def scans(self, scene: Scene, target: str) -> Iterator[tuple[float, ...]]:

@@ -46,7 +46,8 @@ def run(unit: Unit) -> None:
         found, library, held = _searched(unit, free)
         named_from = unit.config.diagnosis.named_from
         more = findings_of(found, held, named_from, rng)
-        findings = tuple(sorted((*findings, *more), key=lambda one: one.verdict == "rejected"))
+        findings = (*_still_open(findings, more), *more)
+        findings = tuple(sorted(findings, key=lambda one: one.verdict == "rejected"))
         facts |= facts_of(found, held, findings)
         limits = detection_rows(found, library, named_from)
         findings = (*_of_markers(free, found, held, findings, rng), *findings)

@@ -41,6 +41,9 @@ class Uneven(Pattern):
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         return self.effect.change(scene, target, values)
 
+    def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        return self.effect.tangent(scene, target, values)
+
     def reported(
         self, scene: Scene, target: str, values: np.ndarray
     ) -> tuple[tuple[str, str, float], ...]:

@@ -21,7 +21,7 @@ from scipy.optimize import minimize
 from scipy.special import expit, logsumexp
 from scipy.stats import chi2
 
-from bsip_cli.diagnosis.evenness import Uneven, can_be_uneven, unevenness
+from bsip_cli.diagnosis.evenness import Uneven, can_be_uneven, plain, unevenness
 from bsip_cli.diagnosis.fault_model import (
     SIZES,
     FaultTrial,
@@ -279,11 +279,25 @@ def search(
         if not tried or tried[0].log_odds < 0:
             break
         fit = corrected(fitted(session, tried[0].fit.faults, start=tried[0].fit))
+        fit = _unnamed_if_uneven(library, fit)
     fit, verdicts = _judged(session, library, fit, named_from, len(known))
     said = {one.fault.key for verdict in verdicts for one, _ in verdict.members}
     others = (one for one in rejected.values() if one[0].key not in said)
     best = sorted(others, key=lambda one: -one[1])
     return Found(fit, tuple(verdicts), tuple(best), scores_of(library, fit))
+
+
+def _unnamed_if_uneven(library: Library, fit: Fitted) -> Fitted:
+    """The last fault without its name, if it is likelier of another size in every second: nothing
+    more is asked of its trials then."""
+    *others, last = fit.faults
+    if not can_be_uneven(last.effect):
+        return fit
+    inflation = scores_of(library, fit).inflation
+    log = unevenness(fit, len(others), inflation) + np.log(library.prior_odds)
+    if log < 0:
+        return fit
+    return replace(fit, faults=(*others, replace(last, effect=Uneven(last.effect))))
 
 
 def _judged(
@@ -310,7 +324,7 @@ def _verdict(
     named_from: float,
     inflation: np.ndarray,
 ) -> Verdict:
-    one = fit.faults[number]
+    one = replace(fit.faults[number], effect=plain(fit.faults[number].effect))
     others = [other for k, other in enumerate(fit.faults) if k != number]
     without = fitted(session, others, start=fit)
     again = fitted(session, (*others, one), start=without, whole=False)

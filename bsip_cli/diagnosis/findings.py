@@ -96,6 +96,7 @@ def _findings(
     is_alone = len(verdict.members) == 1
     class_id = "" if is_alone else next(names)
     mine = found.fit.faults[verdict.number]
+    mine = replace(mine, effect=plain(mine.effect))
     for tried, probability in verdict.members:
         plainly = replace(tried.fault, effect=plain(tried.fault.effect))
         is_mine = (*plainly.key, plainly.trials) == (*mine.key, mine.trials)

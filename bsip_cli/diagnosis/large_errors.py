@@ -122,4 +122,16 @@ def _finding(
         f"{along(trials, worst.component)}{interval_words((number,))}"
     )
     none = (np.nan, np.nan, np.nan)
-    return Finding(UNEXPLAINED, "", trials, "named", "", worst.chance, none, (number,), sentence)
+    return Finding(
+        UNEXPLAINED,
+        "",
+        trials,
+        "named",
+        "",
+        worst.chance,
+        none,
+        (number,),
+        sentence,
+        1 - worst.chance,
+        "trial",
+    )

@@ -111,6 +111,53 @@ def slips_of(scene: Scene, slips: Sequence[Slip], rng: np.random.Generator) -> t
     return tuple(found)
 
 
+def alone_and_shaken(
+    scene: Scene, slips: Sequence[Proof]
+) -> tuple[tuple[Proof, ...], tuple[Proof, ...]]:
+    """Slips, and what several markers do within the same second: no tape gives way at six places
+    at once, so that is soft tissue after a knock."""
+    moments = [one.values[3] for one in slips]
+    shaken = tuple(
+        one
+        for one, moment in zip(slips, moments, strict=True)
+        if not _is_throughout(scene, moment)
+        and sum(abs(moment - other) < BLOCK_S for other in moments) > 1
+    )
+    return tuple(one for one in slips if one not in shaken), shaken
+
+
+def shaken_finding(scene: Scene, shaken: Sequence[Proof], trial: str) -> Finding:
+    """Of markers that move on their segments together."""
+    sizes = [1000 * float(np.linalg.norm(one.values[:3])) for one in shaken]
+    moments = [float(one.values[3]) for one in shaken]
+    segments = [int(scene.person.marker_segments[_number(scene, one.target)]) for one in shaken]
+    target = scene.person.skeleton.segments[max(segments, key=segments.count)]
+    names = ", ".join(one.target for one in shaken)
+    said = (
+        f"soft tissue moves {len(shaken)} markers ({names}) by {min(sizes):.0f} to "
+        f"{max(sizes):.0f} mm from {min(moments):.2f} s on"
+    )
+    p_value = max(one.p_value for one in shaken)
+    number = Number("size", "m", max(sizes) / 1000, np.nan, np.nan)
+    return Finding(
+        SOFT_TISSUE,
+        target,
+        (trial,),
+        "named",
+        "",
+        p_value,
+        _UNKNOWN,
+        (number,),
+        said,
+        1 - p_value,
+        "trial",
+    )
+
+
+def _number(scene: Scene, marker: str) -> int:
+    return scene.person.markers.index(marker)
+
+
 def bend_of(
     scene: Scene, slips: Sequence[Proof], trial: str, class_id: str, rng: np.random.Generator
 ) -> tuple[Finding, ...]:
@@ -134,7 +181,11 @@ def bend_of(
     alike = f"a second bend and soft tissue look alike here: to tell them apart, {effect.remedy}"
     told = bend.finding(fewer, trial, None)
     told = replace(
-        told, verdict="ambiguous", class_id=class_id, sentence=f"{told.sentence}; {alike}"
+        told,
+        verdict="ambiguous",
+        class_id=class_id,
+        sentence=f"{told.sentence}; {alike}",
+        probability=told.probability / 2,  # nothing speaks for the one rather than the other
     )
     markers = fewer.person.marker_segments == fewer.person.skeleton.index(bend.target)
     size = float(np.sqrt(np.nanmean((left[:, markers] ** 2).sum(axis=2))))
@@ -152,7 +203,7 @@ def _slower(scene: Scene) -> Scene:
 
 def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:
     """Part of the squared residual of the marker that is off."""
-    m = scene.person.markers.index(one.target)
+    m = _number(scene, one.target)
     own = residual_m[:, m : m + 1]
     change = _left(one.effect, scene, one.target, one.values)[:, m : m + 1]
     rows = _in_rows(scene, change[..., None], own, with_means=_is_throughout(scene, one.values[3]))
@@ -221,7 +272,9 @@ def _is_throughout(scene: Scene, from_s: float) -> bool:
 def _misplaced(told: np.ndarray, residual_m: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """(DRAWS, k) what markers that sit elsewhere than the model has them, as far as these usually
     do, add to the right-hand side of shapes (N, m, 3, k)."""
-    usual = np.nanmedian(np.linalg.norm(np.nanmean(residual_m, axis=0), axis=1)) / MEDIAN_LENGTH
+    seen = np.isfinite(residual_m).all(axis=2).any(axis=0)
+    places = np.nanmean(residual_m[:, seen], axis=0)
+    usual = np.median(np.linalg.norm(places, axis=1)) / MEDIAN_LENGTH
     known = np.isfinite(residual_m)[..., None] & np.isfinite(told)
     total = np.where(known, told, 0.0).sum(axis=0).reshape(-1, told.shape[-1])
     return usual * rng.standard_normal((DRAWS, len(total))) @ total

@@ -15,7 +15,7 @@ from bsip_cli.diagnosis.fault_model import session_of
 from bsip_cli.diagnosis.fault_search import Found, Library, library_of, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import FOLDS, HeldOut, held_out
-from bsip_cli.diagnosis.marker_proof import BEND, bend_of
+from bsip_cli.diagnosis.marker_proof import BEND, bend_of, shaken_finding
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.effects.catalogue import CATALOGUE
@@ -100,8 +100,10 @@ def _of_markers(
         for slip in one.slips:
             yield slip.finding(scene, stem, held.gain(number))
             number += 1
+        if one.shaken:
+            yield shaken_finding(scene, one.shaken, stem)
         if one.moves and stem not in bent:
-            yield from bend_of(scene, one.slips, stem, f"M{k}", rng)
+            yield from bend_of(scene, (*one.slips, *one.shaken), stem, f"M{k}", rng)
 
 
 def _proven(trials: Sequence[Diagnosed], found: Found, held: HeldOut) -> Iterator[dict]:

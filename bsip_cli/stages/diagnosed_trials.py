@@ -18,7 +18,7 @@ from bsip_cli.diagnosis.error_terms import FAULT, error_terms, noise_of_instrume
 from bsip_cli.diagnosis.fault_model import FaultTrial
 from bsip_cli.diagnosis.filtering import Filter, at_full_rate, filter_of, slow
 from bsip_cli.diagnosis.findings import Finding
-from bsip_cli.diagnosis.marker_proof import Proof, Slip, slips_of
+from bsip_cli.diagnosis.marker_proof import Proof, Slip, alone_and_shaken, slips_of
 from bsip_cli.diagnosis.scale_mass import agreed_share, is_noticed, weight_share
 from bsip_cli.diagnosis.stated_mass import loaded_plate, stated_mass_findings
 from bsip_cli.diagnosis.support import HANDS, LIGHTER, Support
@@ -45,7 +45,7 @@ class Diagnosed:
     """A trial as the model of the error takes it.
 
     ground : how forces become components. held : what hands hold on to, if they do. slips : what
-    its markers prove.
+    its markers prove; ``shaken``: that several do at once.
     """
 
     trial: Trial
@@ -54,6 +54,7 @@ class Diagnosed:
     ground: Ground
     held: Support | None
     slips: tuple[Proof, ...]
+    shaken: tuple[Proof, ...]
 
     @property
     def moves(self) -> bool:
@@ -146,7 +147,8 @@ def diagnosed(unit: Unit, prior: Prior, trial: Trial, scene: Scene) -> Diagnosed
     measured, residual = full.one(scene.measured), full.one(scene.measured - scene.predicted)
     contact = unit.facts("identification")["external_contacts"].get(trial.stem)
     rng = np.random.default_rng(crc32(trial.stem.encode()))
-    slips = slips_of(fewer, _slips(unit, trial), rng) if trial.role != STATIC else ()
+    found = slips_of(fewer, _slips(unit, trial), rng) if trial.role != STATIC else ()
+    markers = alone_and_shaken(fewer, found)
     terms = [
         Term(
             x.term, x.target, x.scale, x.own, filter_(x.wrench), mixing=x.mixing, targets=x.targets
@@ -168,7 +170,7 @@ def diagnosed(unit: Unit, prior: Prior, trial: Trial, scene: Scene) -> Diagnosed
     )
     errors = TrialErrors(trial.stem, filter_, residual, tuple(terms), noise)
     held = None if contact is None else Support(**contact)
-    return Diagnosed(trial, scene, errors, ground, held, slips)
+    return Diagnosed(trial, scene, errors, ground, held, *markers)
 
 
 def _about_surface(filter_: Filter, scene: Scene) -> Filter:

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.diagnosis.detection import limits_of
+from bsip_cli.diagnosis.evenness import plain
 from bsip_cli.diagnosis.fault_search import Found, Library, Verdict
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, HeldOut, first_blocks, start_s
@@ -20,13 +21,14 @@ def facts_of(found: Found, held: HeldOut, findings: tuple[Finding, ...]) -> dict
     for one in found.verdicts:
         fault = found.fit.faults[one.number]
         trials = tuple(session.trials[t].name for t in fault.trials)
-        if (*fault.key, trials) in said:
+        key = plain(fault.effect).name, fault.target, trials
+        if key in said:
             causes.append(
                 {
-                    "effect": fault.effect.name,
+                    "effect": key[0],
                     "target": fault.target,
                     "trials": list(trials),
-                    "verdict": said[*fault.key, trials],
+                    "verdict": said[key],
                     "values": fault.values.tolist(),
                     "folds": held.values(one.number).tolist(),
                     "bounds": _bounds(found, one),

@@ -7,10 +7,19 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from bsip_cli.body.anthropometry import regress
+from bsip_cli.diagnosis.error_model import Term, TrialErrors
+from bsip_cli.diagnosis.error_terms import error_terms, noise_of_instruments
+from bsip_cli.diagnosis.fault_model import FaultTrial, Session, session_of
+from bsip_cli.diagnosis.filtering import filter_of, slow
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Scene
-from tests.effects.moving_scene import moving, scene_of
+from bsip_cli.identification.prior import Spread, prior_of
+from tests.body.standing_person import standing
+from tests.effects.moving_scene import MASS_KG, moving, scene_of
 
+CUTOFF_HZ, MARKER_NOISE_M = 5.0, 2e-4
+PEOPLE = Spread(12.0, 3.0, 0.005, 30.0, 0.93, 0.8)
 NOISE = np.array([2.0, 2.0, 4.0, 1.0, 1.0, 0.5])  # [N, N m] of the whole wrench, per frame
 
 
@@ -46,3 +55,30 @@ def late(scene: Scene, delay_s: float) -> Scene:
 def with_effect(scene: Scene, effect: Effect, target: str, *values: float) -> Scene:
     """The scene in which an effect, one that does not hang on what is measured, is true."""
     return shown(scene, effect.change(scene, target, np.array(values)))
+
+
+def prior_root() -> np.ndarray:
+    """Of the inertial parameters' covariance."""
+    person = standing().person
+    return prior_of(regress(person, "M", MASS_KG).inertias, person, PEOPLE).root
+
+
+def errors_of(scene: Scene, name: str = "a") -> TrialErrors:
+    """The trial's residual and all terms that may explain it."""
+    fewer = slow(scene)
+    low = filter_of(fewer, CUTOFF_HZ)
+    residual = low.one(fewer.measured - fewer.predicted)
+    terms = tuple(
+        Term(
+            one.term, one.target, one.scale, one.own, low(one.wrench), None, one.mixing, one.targets
+        )
+        for one in error_terms(fewer, prior_root(), 0.005, 2.0)
+    )
+    noise = noise_of_instruments(fewer, low.reference_m, MARKER_NOISE_M, scene.rate_hz, CUTOFF_HZ)
+    return TrialErrors(name, low, residual, terms, noise)
+
+
+def session(*scenes: Scene) -> Session:
+    """Trials a, b, ... of one person."""
+    named = zip("abcdef", scenes, strict=False)
+    return session_of([FaultTrial(errors_of(scene, name), slow(scene)) for name, scene in named])

@@ -7,52 +7,38 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.body.anthropometry import regress
 from bsip_cli.diagnosis.error_budget import COMPONENTS, Ground, budget_of, ground_of
-from bsip_cli.diagnosis.error_model import Term, TrialErrors, error_model
-from bsip_cli.diagnosis.error_terms import error_terms, noise_of_instruments
+from bsip_cli.diagnosis.error_model import TrialErrors, error_model
 from bsip_cli.diagnosis.filtering import filter_of, slow
 from bsip_cli.diagnosis.large_errors import Yardsticks, large_errors
 from bsip_cli.effects.scene import Scene
-from bsip_cli.identification.prior import Spread, prior_of
-from tests.body.standing_person import standing
-from tests.diagnosis.noisy_trial import NOISE, late, noisy, part_of_moving, shown
+from tests.diagnosis.noisy_trial import (
+    CUTOFF_HZ,
+    NOISE,
+    errors_of,
+    late,
+    noisy,
+    part_of_moving,
+    shown,
+)
 from tests.effects.moving_scene import MASS_KG
 
-CUTOFF_HZ, MARKER_NOISE_M = 5.0, 2e-4
 WEIGHT_N = MASS_KG * 9.81
 YARDSTICKS = Yardsticks(0.03, 0.05, 0.5, WEIGHT_N)
-PEOPLE = Spread(12.0, 3.0, 0.005, 30.0, 0.93, 0.8)
 
 
-def prior_root() -> np.ndarray:
-    person = standing().person
-    return prior_of(regress(person, "M", MASS_KG).inertias, person, PEOPLE).root
-
-
-def errors_of(scene: Scene, name: str = "a") -> tuple[TrialErrors, Ground]:
-    """The trial, all of whose frames are usable at a low rate already."""
-    fewer = slow(scene)
-    low = filter_of(fewer, CUTOFF_HZ)
-    residual = low.one(fewer.measured - fewer.predicted)
-    terms = tuple(
-        Term(
-            one.term, one.target, one.scale, one.own, low(one.wrench), None, one.mixing, one.targets
-        )
-        for one in error_terms(fewer, prior_root(), 0.005, 2.0)
-    )
-    noise = noise_of_instruments(fewer, low.reference_m, MARKER_NOISE_M, scene.rate_hz, CUTOFF_HZ)
-    seconds = fewer.times_s[low.frames].astype(int)
-    ground = ground_of(
-        low.one(fewer.measured), residual, np.array([1.0, 0.0]), 0.2 * WEIGHT_N, seconds
-    )
-    return TrialErrors(name, low, residual, terms, noise), ground
+def with_ground(scene: Scene, name: str = "a") -> tuple[TrialErrors, Ground]:
+    errors, fewer = errors_of(scene, name), slow(scene)
+    measured = errors.filter.one(fewer.measured)
+    seconds = fewer.times_s[errors.filter.frames].astype(int)
+    forwards = np.array([1.0, 0.0])
+    return errors, ground_of(measured, errors.residual, forwards, 0.2 * WEIGHT_N, seconds)
 
 
 def budget(*scenes: Scene) -> dict[tuple[str, str], tuple[float, float]]:
     """Share and gain by term and component, of all trials together."""
     trials, grounds = zip(
-        *(errors_of(s, n) for s, n in zip(scenes, "abc", strict=False)), strict=True
+        *(with_ground(s, n) for s, n in zip(scenes, "abc", strict=False)), strict=True
     )
     model = error_model(trials, 1 if len(trials) > 1 else 5)
     lines = budget_of(model, grounds, range(len(trials)), np.random.default_rng(1))
@@ -60,7 +46,7 @@ def budget(*scenes: Scene) -> dict[tuple[str, str], tuple[float, float]]:
 
 
 def large(scene: Scene) -> tuple:
-    trial, ground = errors_of(scene)
+    trial, ground = with_ground(scene)
     usual = error_model([trial], 1, adapt=False)
     return large_errors(usual, [ground], [0], YARDSTICKS, lambda trials, component: "nothing")
 
@@ -115,7 +101,7 @@ def test_a_heavier_segment_is_a_matter_of_the_parameters():
 
 
 def test_the_segments_add_up_to_the_parameters_and_the_heavier_one_is_the_largest():
-    trial, ground = errors_of(with_heavier(movement(), "upper_torso", 0.15))
+    trial, ground = with_ground(with_heavier(movement(), "upper_torso", 0.15))
     model = error_model([trial], 5)
     lines = budget_of(model, [ground], [0], np.random.default_rng(1))
     for component in COMPONENTS:

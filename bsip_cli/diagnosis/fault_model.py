@@ -201,14 +201,19 @@ class Fitted:
 
 
 def fitted(
-    session: Session, faults: Sequence[Hypothesis], start: Fitted | None = None, whole: bool = True
+    session: Session,
+    faults: Sequence[Hypothesis],
+    start: Fitted | None = None,
+    whole: bool = True,
+    same_noise: bool = False,
 ) -> Fitted:
     """Coefficients, scales and noise beside faults with the values that these have by now.
 
     start : a fit beside other faults to begin with. whole : until noise and scales are settled;
-    else the noise of trials alone whose faults are others, once.
+    else the noise of trials alone whose faults are others, once. same_noise : that of ``start``.
     """
-    return _Fitting(session, tuple(faults), start).run(whole)
+    rounds = _ROUNDS if whole else 1
+    return _Fitting(session, tuple(faults), start).run(whole, 0 if same_noise else rounds)
 
 
 def corrected(fit: Fitted) -> Fitted:
@@ -258,11 +263,11 @@ class _Fitting:
         residual = self.session.trials[trial].errors.residual
         return used, columns, residual - sum((x.offset for _, x in mine), np.zeros(()))
 
-    def run(self, whole: bool) -> Fitted:
+    def run(self, whole: bool, rounds: int) -> Fitted:
         trials = range(len(self.session.trials))
         pieces = [self._first(t) for t in trials]
         found = self._solved(pieces, whole)
-        for _ in range(_ROUNDS if whole else 1):
+        for _ in range(rounds):
             before = found
             pieces = [
                 self._again(t, found) if whole or self.changed[t] else pieces[t] for t in trials

@@ -38,6 +38,8 @@ _BEFORE = np.geomspace(*SIZES, 5)  # sizes before the data, evenly in the logari
 _BATCH = 60  # candidates whose signatures are filtered at a time
 _TRIED = 8  # candidates of a round that are fitted in full
 _OF_A_KIND = 2  # of them, of the same effect
+_POLISHED = 3  # of those that have moments, frequencies or windows
+_STARTS = 2  # values of a scan from which a finer search begins
 _SEARCH = 40  # evaluations for a moment, a frequency or a window
 _STEPS = 8  # of Gauss and Newton
 _MOST = 8  # faults of a person
@@ -245,12 +247,13 @@ class Verdict:
     """What is there in the end: a fault given all others, or one of several.
 
     number : in the fit. members : what it may be, with probabilities, the likeliest first; they
-    hold at least the probability that was asked for. probability : that any of them is there.
-    without : the fit without it.
+    hold at least the probability that was asked for. others : what it hardly is, with
+    probabilities. probability : that any of all these is there. without : the fit without it.
     """
 
     number: int
     members: tuple[tuple[Tried, float], ...]
+    others: tuple[tuple[Hypothesis, float], ...]
     probability: float
     without: Fitted
 
@@ -258,7 +261,7 @@ class Verdict:
 @dataclass(frozen=True, eq=False)
 class Found:
     """Faults of a person's recordings: the fit with all of them, a verdict for each, and what was
-    tried in full and is not there, with the logarithm of its odds."""
+    tried in full and is not there, with its probability given what is."""
 
     fit: Fitted
     verdicts: tuple[Verdict, ...]
@@ -272,19 +275,21 @@ def search(
     """named_from : probability from which on one name is said; else so many as hold it. known :
     faults that are there for other reasons; they come first in the fit and have no verdict."""
     fit = fitted(session, known)
-    rejected: dict[tuple, tuple[Hypothesis, float]] = {}  # without their fits, which are large
     for _ in range(_MOST):
         tried = one_round(session, library, fit)
-        rejected |= {(*x.fault.key, x.fault.trials): (x.fault, x.log_odds) for x in tried}
         if not tried or tried[0].log_odds < 0:
             break
         fit = corrected(fitted(session, tried[0].fit.faults, start=tried[0].fit))
         fit = _unnamed_if_uneven(library, fit)
     fit, verdicts = _judged(session, library, fit, named_from, len(known))
     said = {one.fault.key for verdict in verdicts for one, _ in verdict.members}
-    others = (one for one in rejected.values() if one[0].key not in said)
-    best = sorted(others, key=lambda one: -one[1])
-    return Found(fit, tuple(verdicts), tuple(best), scores_of(library, fit))
+    hardly = [one for verdict in verdicts for one in verdict.others]
+    hardly += [(one.fault, float(expit(one.log_odds))) for one in tried]
+    best: dict[tuple, tuple[Hypothesis, float]] = {}
+    for one, probability in sorted(hardly, key=lambda pair: -pair[1]):
+        if one.key not in said:
+            best.setdefault((*one.key, one.trials), (one, probability))
+    return Found(fit, tuple(verdicts), tuple(best.values()), scores_of(library, fit))
 
 
 def _unnamed_if_uneven(library: Library, fit: Fitted) -> Fitted:
@@ -347,7 +352,8 @@ def _verdict(
     ranked = sorted(shares.items(), key=lambda one: -one[1])
     count = int(np.searchsorted(np.cumsum([x for _, x in ranked]), named_from)) + 1
     members = tuple((each, share * there) for each, share in ranked[:count])
-    return Verdict(number, members, there, without)
+    rest = tuple((each.fault, share * there) for each, share in ranked[count:])
+    return Verdict(number, members, rest, there, without)
 
 
 def _prior_of(library: Library, one: Hypothesis) -> float:
@@ -381,14 +387,29 @@ def _in_full(
         for f, p in zip(scores.log_factor, library.places, strict=True)
     ]
     log = np.array(divided) + library.log_prior
-    tried = []
+    tried: list[tuple[Tried, list[Hypothesis]]] = []
     for mine in _chosen(library, fit, log, trials):
-        best = mine[int(np.argmax(log[mine]))]
-        one = _sized(fit, _refined(fit, _start(session, library.places[best], scores.sizes[best])))
-        if one.is_possible(session):
-            now = fitted(session, (*fit.faults, one), start=fit, whole=False)
-            tried.append(Tried(one, now, float(logsumexp(library.log_prior[mine]))))
-    return tried
+        likely = _apart(fit, library, mine, log)
+        starts = [_start(session, library.places[k], scores.sizes[k]) for k in likely]
+        if (now := _beside(fit, fit, starts[0])) is not None:
+            prior = float(logsumexp(library.log_prior[mine]))
+            tried.append((Tried(now.faults[-1], now, prior), starts[1:]))
+    tried.sort(key=lambda one: -one[0].log_prior - one[0].fit.log_evidence)
+    for k, (one, starts) in enumerate(tried[:_POLISHED]):
+        if starts:
+            tried[k] = _polished(fit, one, starts), []
+    return [one for one, _ in tried]
+
+
+def _polished(fit: Fitted, one: Tried, starts: Sequence[Hypothesis]) -> Tried:
+    """With the best of other moments, frequencies or windows, and these sought once more beside the
+    noise that it leaves: before it was found, it was taken for noise."""
+    fits = [one.fit, *(_beside(fit, fit, start) for start in starts)]
+    now = max((x for x in fits if x is not None), key=lambda x: x.log_evidence)
+    quiet = fitted(fit.session, fit.faults, start=now, whole=False, same_noise=True)
+    again = _beside(fit, quiet, now.faults[-1])
+    now = max(now, again or now, key=lambda x: x.log_evidence)
+    return replace(one, fault=now.faults[-1], fit=now)
 
 
 def _chosen(
@@ -416,6 +437,32 @@ def _chosen(
             yield mine
         if taken.total() >= _TRIED:
             return
+
+
+def _beside(fit: Fitted, noise: Fitted, one: Hypothesis) -> Fitted | None:
+    """The model with one more fault, sized beside the noise of a fit with the same others; None if
+    it is not possible."""
+    one = _sized(noise, _refined(noise, one))
+    if not one.is_possible(fit.session):
+        return None
+    return fitted(fit.session, (*fit.faults, one), start=noise, whole=False)
+
+
+def _apart(fit: Fitted, library: Library, mine: list[int], log: np.ndarray) -> list[int]:
+    """The likeliest values of a scan that are further apart than a finer search looks."""
+    chosen: list[int] = []
+    for k in sorted(mine, key=lambda k: -log[k]):
+        place = library.places[k]
+        scene = fit.session.trials[place.trials[0]].scene
+        at = np.array(place.candidate.scanned)
+        null = place.candidate.values(scene, np.zeros(len(place.candidate.free(scene))))
+        near = place.candidate.effect.spacing(scene, place.candidate.target, null)
+        others = [np.array(library.places[c].candidate.scanned) for c in chosen]
+        if all((np.abs(at - other) > near).any() for other in others):
+            chosen.append(k)
+        if len(chosen) == (_STARTS if len(at) else 1):
+            break
+    return chosen
 
 
 def _start(session: Session, place: Place, sizes: np.ndarray) -> Hypothesis:

@@ -9,7 +9,6 @@ from string import ascii_uppercase
 from typing import Literal
 
 import numpy as np
-from scipy.special import expit
 
 from bsip_cli.diagnosis.evenness import plain
 from bsip_cli.diagnosis.fault_model import Fitted
@@ -90,8 +89,8 @@ def _findings(
     rng: np.random.Generator,
 ) -> Iterator[Finding]:
     if verdict.probability < named_from:
-        first = verdict.members[0][0]
-        yield _rejected(found.fit, first.fault, first.log_odds)
+        first, probability = verdict.members[0]
+        yield _rejected(found.fit, first.fault, probability)
         return
     is_alone = len(verdict.members) == 1
     class_id = "" if is_alone else next(names)
@@ -127,8 +126,7 @@ def _names(fit: Fitted, one: Hypothesis) -> tuple[str, ...]:
     return tuple(fit.session.trials[t].name for t in one.trials)
 
 
-def _rejected(fit: Fitted, one: Hypothesis, log_odds: float) -> Finding:
-    probability = float(expit(log_odds))
+def _rejected(fit: Fitted, one: Hypothesis, probability: float) -> Finding:
     numbers = tuple(Number(n, u, x, np.nan, np.nan) for n, u, x in one.reported(fit.session))
     sentence = (
         f"not so: {one.sentence(fit.session)} (probability {probability:.2g} given what is found)"

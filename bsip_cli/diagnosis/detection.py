@@ -9,7 +9,8 @@ import numpy as np
 from scipy.special import logit
 
 from bsip_cli.diagnosis.fault_model import SIZES, Session
-from bsip_cli.diagnosis.fault_search import Found, Library, Place
+from bsip_cli.diagnosis.fault_scores import Library, Place
+from bsip_cli.diagnosis.fault_search import Found
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 
 _SURE = 1.645  # standard deviations: found in 95 of 100 recordings like these

@@ -12,207 +12,28 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import pairwise
-from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.optimize import minimize
 from scipy.special import expit, logsumexp
-from scipy.stats import chi2
 
 from bsip_cli.diagnosis.evenness import Uneven, can_be_uneven, plain, unevenness
 from bsip_cli.diagnosis.fault_model import (
-    SIZES,
-    FaultTrial,
     Fitted,
     Session,
     corrected,
     fitted,
 )
-from bsip_cli.diagnosis.hypothesis import Candidate, Hypothesis, candidates_of
+from bsip_cli.diagnosis.fault_scores import Library, Place, Scores, scores_of
+from bsip_cli.diagnosis.fault_sizes import refined, sized
+from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.effects.effect import Effect
 
-_BEFORE = np.geomspace(*SIZES, 5)  # sizes before the data, evenly in the logarithm [typical]
-_BATCH = 60  # candidates whose signatures are filtered at a time
 _TRIED = 8  # candidates of a round that are fitted in full
 _OF_A_KIND = 2  # of them, of the same effect
 _POLISHED = 3  # of those that have moments, frequencies or windows
 _STARTS = 2  # values of a scan from which a finer search begins
-_SEARCH = 40  # evaluations for a moment, a frequency or a window
-_STEPS = 8  # of Gauss and Newton
 _MOST = 8  # faults of a person
-_MEDIANS = [np.nan, *chi2.median(np.arange(1, 20))]
-
-
-@dataclass(frozen=True)
-class Place:
-    """A candidate in some of the trials, by their numbers."""
-
-    candidate: Candidate
-    trials: tuple[int, ...]
-
-    @property
-    def kind(self) -> tuple[Effect, str, tuple[int, ...]]:
-        """What, where and in which trials, whatever the values of a scan."""
-        return self.candidate.effect, self.candidate.target, self.trials
-
-
-@dataclass(frozen=True, eq=False)
-class Library:
-    """All places of all effects.
-
-    columns : signatures (n, 6, C) of each trial; ``parts``: which of them are a candidate's.
-    prior_odds : of one more fault against none; ``log_prior`` (P,) of those that it is just there.
-    """
-
-    columns: tuple[np.ndarray, ...]
-    parts: tuple[dict[Candidate, slice], ...]
-    places: tuple[Place, ...]
-    prior_odds: float
-    log_prior: np.ndarray
-
-    @cached_property
-    def widths(self) -> dict[int, list[int]]:
-        """Numbers of the places with as many free parameters."""
-        found: dict[int, list[int]] = {}
-        for k, place in enumerate(self.places):
-            part = self.parts[place.trials[0]][place.candidate]
-            found.setdefault(part.stop - part.start, []).append(k)
-        return found
-
-    def products(
-        self, fit: Fitted, trial: int
-    ) -> tuple[np.ndarray, np.ndarray, dict[Candidate, np.ndarray]]:
-        """Of the white signatures of a trial with its residual (C,), with the columns of all terms
-        (K', C), and each candidate's with itself (k, k); once for the same noise and faults."""
-        piece = fit.pieces[trial]
-        if piece not in self._products:
-            white = fit.whitened(trial, self.columns[trial])
-            grams = {c: white[:, s].T @ white[:, s] for c, s in self.parts[trial].items()}
-            self._products[piece] = white.T @ piece.right, piece.white.T @ white, grams
-        return self._products[piece]
-
-    @cached_property
-    def _products(self) -> WeakKeyDictionary:
-        return WeakKeyDictionary()
-
-
-def library_of(
-    session: Session, effects: Sequence[Effect], alone: Sequence[int], prior_odds: float
-) -> Library:
-    """alone : trials in which a fault may be by itself; in the others only what lasts is asked.
-    prior_odds : of one more fault in a person's recordings against none."""
-    columns, parts = zip(*(_signatures(one, effects) for one in session.trials), strict=True)
-    places = tuple(_places(parts, alone))
-    return Library(columns, parts, places, prior_odds, _log_prior(places, prior_odds))
-
-
-def _signatures(
-    trial: FaultTrial, effects: Sequence[Effect]
-) -> tuple[np.ndarray, dict[Candidate, slice]]:
-    scene, filter_ = trial.scene, trial.errors.filter
-    candidates = [c for effect in effects for c in candidates_of(effect, scene)]
-    ends = np.cumsum([0, *(len(c.free(scene)) for c in candidates)]).tolist()
-    columns = np.zeros((*trial.errors.residual.shape, ends[-1]), np.float32)
-    parts = {}
-    for first in range(0, len(candidates), _BATCH):
-        batch = candidates[first : first + _BATCH]
-        signatures = [c.signature(trial.simulated) for c in batch]
-        filtered = filter_(np.concatenate(signatures, axis=2))
-        mine = ends[first : first + len(batch) + 1]
-        columns[..., mine[0] : mine[-1]] = filtered
-        for candidate, (start, stop) in zip(batch, pairwise(mine), strict=True):
-            touched = filtered[..., start - mine[0] : stop - mine[0]].any(axis=(0, 1))
-            if touched.all():  # else it touches no valid frame
-                parts[candidate] = slice(start, stop)
-    return columns, parts
-
-
-def _places(parts: Sequence[dict[Candidate, slice]], alone: Sequence[int]) -> Iterator[Place]:
-    for t in alone:
-        for candidate in parts[t]:
-            yield Place(candidate, (t,))
-    for candidate in dict.fromkeys(c for one in parts for c in one):
-        holding = tuple(t for t, one in enumerate(parts) if candidate in one)
-        if candidate.effect.lasts and len(holding) > 1:
-            yield Place(candidate, holding)
-
-
-def _log_prior(places: Sequence[Place], prior_odds: float) -> np.ndarray:
-    """Even over the names of effects, over the effects of a name, and over the places of each."""
-    counts = Counter(one.candidate.effect for one in places)
-    names = Counter(effect.name for effect in counts)
-    shares = [
-        len(names) * names[one.candidate.effect.name] * counts[one.candidate.effect]
-        for one in places
-    ]
-    return np.log(prior_odds) - np.log(shares)
-
-
-@dataclass(frozen=True, eq=False)
-class Scores:
-    """Of all places: logarithm of the Bayes factor (P,), likeliest sizes and information of each
-    [typical]; (T,) how many times more of a trial candidates explain than chance lets them."""
-
-    log_factor: np.ndarray
-    sizes: tuple[np.ndarray, ...]
-    information: tuple[np.ndarray, ...]
-    inflation: np.ndarray
-
-
-def scores_of(library: Library, fit: Fitted) -> Scores:
-    """Given what the model holds by now, its scales and its noise: one linear step."""
-    pulls, inside, grams = zip(
-        *(_products(library, fit, t) for t in range(len(fit.pieces))), strict=True
-    )
-    count = len(library.places)
-    log_factor = np.empty(count)
-    sizes, known = [np.zeros(0)] * count, [np.zeros(0)] * count
-    saved: list[dict[Effect, list[float]]] = [{} for _ in fit.pieces]
-    for width, mine in library.widths.items():
-        pull, taken = np.zeros((len(mine), width)), np.zeros((len(mine), len(fit.mean), width))
-        whole = np.zeros((len(mine), width, width))
-        for n, k in enumerate(mine):
-            place = library.places[k]
-            for t in place.trials:
-                part = library.parts[t][place.candidate]
-                pull[n] += pulls[t][part]
-                taken[n] += inside[t][:, part]
-                whole[n] += grams[t][place.candidate]
-        information = whole - taken.swapaxes(1, 2) @ taken
-        values, vectors = np.linalg.eigh(information)
-        least = 1e-9 * np.trace(whole, axis1=1, axis2=2) + 1e-300  # less is rounding
-        values = np.maximum(values, least[:, None])
-        along = np.einsum("nki,nk->ni", vectors, pull)
-        added = values[:, None] + 1 / _BEFORE[:, None] ** 2
-        gains = 0.5 * (along[:, None] ** 2 / added).sum(axis=2)
-        gains -= 0.5 * np.log(added * _BEFORE[:, None] ** 2).sum(axis=2)
-        log_factor[mine] = logsumexp(gains, axis=1) - np.log(len(_BEFORE))
-        best = added[np.arange(len(mine)), np.argmax(gains, axis=1)]
-        likeliest = np.einsum("nki,ni->nk", vectors, along / best)
-        told = values > 1.0  # of which the recording tells a typical size
-        squares = (along**2 / values * told).sum(axis=1)
-        for n, k in enumerate(mine):
-            sizes[k], known[k], place = likeliest[n], information[n], library.places[k]
-            if len(place.trials) == 1 and told[n].any():
-                ratio = float(squares[n] / _MEDIANS[int(told[n].sum())])
-                saved[place.trials[0]].setdefault(place.candidate.effect, []).append(ratio)
-    medians = [[float(np.median(x)) for x in one.values()] or [1.0] for one in saved]
-    inflation = np.array([max(1.0, float(np.median(one))) for one in medians])
-    return Scores(log_factor, tuple(sizes), tuple(known), inflation)
-
-
-def _products(
-    library: Library, fit: Fitted, trial: int
-) -> tuple[np.ndarray, np.ndarray, dict[Candidate, np.ndarray]]:
-    """Of the white signatures of a trial: with what is left (C,), with the coefficients' spread
-    (K, C), and each candidate's with itself (k, k)."""
-    piece = fit.pieces[trial]
-    with_right, with_columns, grams = library.products(fit, trial)
-    inside = fit.root_of_covariance[piece.used].T @ with_columns
-    return with_right - fit.mean[piece.used] @ with_columns, inside, grams
 
 
 @dataclass(frozen=True, eq=False)
@@ -442,7 +263,7 @@ def _chosen(
 def _beside(fit: Fitted, noise: Fitted, one: Hypothesis) -> Fitted | None:
     """The model with one more fault, sized beside the noise of a fit with the same others; None if
     it is not possible."""
-    one = _sized(noise, _refined(noise, one))
+    one = sized(noise, refined(noise, one))
     if not one.is_possible(fit.session):
         return None
     return fitted(fit.session, (*fit.faults, one), start=noise, whole=False)
@@ -471,93 +292,3 @@ def _start(session: Session, place: Place, sizes: np.ndarray) -> Hypothesis:
     return Hypothesis(place.candidate.effect, place.candidate.target, place.trials, null).moved(
         session, sizes
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Marginal:
-    """Given the ordinary terms, of a fault at its values: squares of what is left, and pull (k,)
-    and information (k, k) of its free parameters [typical]."""
-
-    squares: float
-    pull: np.ndarray
-    information: np.ndarray
-
-
-def _marginal(fit: Fitted, one: Hypothesis) -> _Marginal:
-    session = fit.session
-    free = one.is_free(session)
-    against, shared = np.zeros(len(fit.mean)), np.zeros((len(fit.mean), int(free.sum())))
-    squares, pull, gram = 0.0, np.zeros(shared.shape[1]), np.zeros([shared.shape[1]] * 2)
-    for t, piece in enumerate(fit.pieces):
-        right = piece.right
-        if t in one.trials:
-            trial, sizes = session.trials[t], one.typical(session)[free]
-            change = one.effect.change(trial.simulated, one.target, one.values)[..., None]
-            slope = one.effect.tangent(trial.simulated, one.target, one.values) * sizes
-            white = fit.whitened(t, trial.errors.filter(np.concatenate([change, slope], axis=2)))
-            right, mine = right - white[:, 0], white[:, 1:]
-            pull += mine.T @ right
-            gram += mine.T @ mine
-            shared[piece.used] += piece.white.T @ mine
-        squares += float(right @ right)
-        against[piece.used] += piece.white.T @ right
-    mean = fit.covariance @ against
-    return _Marginal(
-        squares - float(against @ mean),
-        pull - shared.T @ mean,
-        gram - shared.T @ (fit.covariance @ shared),
-    )
-
-
-def _sized(fit: Fitted, one: Hypothesis) -> Hypothesis:
-    """Free parameters by Gauss and Newton, within their bounds; a step that does not help is
-    halved."""
-    session = fit.session
-    free, now = one.is_free(session), _marginal(fit, one)
-    typical = one.typical(session)[free]
-    for _ in range(_STEPS):
-        sizes = one.values[free] / typical
-        weight = 1 / np.clip((sizes**2).mean(), SIZES[0] ** 2, SIZES[1] ** 2)
-        ridge = now.information + weight * np.eye(len(sizes))
-        step = np.linalg.solve(ridge, now.pull - weight * sizes)
-        tried = ((x, _marginal(fit, x)) for x in (one.moved(session, h * step) for h in _HALVES))
-        better = next(((x, m) for x, m in tried if m.squares < now.squares), None)
-        if better is None:
-            return one
-        before = now.squares
-        one, now = better
-        if before - now.squares < 0.1:  # of a squared residual whose noise is one
-            return one
-    return one
-
-
-_HALVES = (1.0, 0.5, 0.25, 0.125)
-
-
-def _refined(fit: Fitted, one: Hypothesis) -> Hypothesis:
-    """Scanned parameters moved to where the fault explains most."""
-    session = fit.session
-    scanned = ~one.is_free(session)
-    if not scanned.any():
-        return one
-    scale = one.effect.spacing(one.scene(session), one.target, one.values)
-
-    def at(x: np.ndarray) -> Hypothesis:
-        values = np.where(scanned, one.values, 0.0)
-        values[scanned] += x * scale
-        return one.with_values(session, values)
-
-    def sized(x: np.ndarray) -> tuple[np.ndarray, _Marginal]:
-        told = _marginal(fit, at(x))
-        ridge = told.information + np.eye(len(told.pull)) / SIZES[1] ** 2
-        return np.linalg.solve(ridge, told.pull), told
-
-    def left(x: np.ndarray) -> float:
-        size, told = sized(x)
-        return -float(told.pull @ size)
-
-    start = np.zeros(int(scanned.sum()))
-    simplex = {"initial_simplex": np.vstack([start, np.eye(len(start))])}
-    options = {**simplex, "maxfev": _SEARCH, "xatol": 0.02, "fatol": 0.1}
-    found = minimize(left, start, method="Nelder-Mead", options=options)
-    return at(found.x).moved(session, sized(found.x)[0])

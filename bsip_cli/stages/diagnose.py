@@ -12,7 +12,8 @@ import pandas as pd
 from bsip_cli.artifacts import empty_table
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.fault_model import session_of
-from bsip_cli.diagnosis.fault_search import Found, Library, library_of, search
+from bsip_cli.diagnosis.fault_scores import Library, library_of
+from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import FOLDS, HeldOut, held_out
 from bsip_cli.diagnosis.marker_proof import BEND, bend_of, shaken_finding

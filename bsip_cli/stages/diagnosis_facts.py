@@ -7,7 +7,8 @@ import pandas as pd
 
 from bsip_cli.diagnosis.detection import limits_of
 from bsip_cli.diagnosis.evenness import plain
-from bsip_cli.diagnosis.fault_search import Found, Library, Verdict
+from bsip_cli.diagnosis.fault_scores import Library
+from bsip_cli.diagnosis.fault_search import Found, Verdict
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, HeldOut, first_blocks, start_s
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from bsip_cli.diagnosis.detection import limits_of
-from bsip_cli.diagnosis.fault_search import Found, library_of, search
+from bsip_cli.diagnosis.fault_scores import library_of
+from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import held_out
 from bsip_cli.diagnosis.patterns import PATTERNS

@@ -177,6 +177,12 @@ class Fitted:
         )
 
     @cached_property
+    def sums(self) -> tuple[np.ndarray, float]:
+        """(K,) products of all columns with the white residuals, and the squares of these."""
+        against = summed(self.pieces, len(self.mean))[1]
+        return against, sum(float(one.right @ one.right) for one in self.pieces)
+
+    @cached_property
     def root_of_covariance(self) -> np.ndarray:
         """(K, K) lower triangle L, covariance L L'."""
         tiny = 1e-12 * np.trace(self.covariance) / len(self.covariance)

@@ -28,21 +28,23 @@ class _Marginal:
 def _marginal(fit: Fitted, one: Hypothesis) -> _Marginal:
     session = fit.session
     free = one.is_free(session)
-    against, shared = np.zeros(len(fit.mean)), np.zeros((len(fit.mean), int(free.sum())))
-    squares, pull, gram = 0.0, np.zeros(shared.shape[1]), np.zeros([shared.shape[1]] * 2)
-    for t, piece in enumerate(fit.pieces):
-        right = piece.right
-        if t in one.trials:
-            trial, sizes = session.trials[t], one.typical(session)[free]
-            change = one.effect.change(trial.simulated, one.target, one.values)[..., None]
-            slope = one.effect.tangent(trial.simulated, one.target, one.values) * sizes
-            white = fit.whitened(t, trial.errors.filter(np.concatenate([change, slope], axis=2)))
-            right, mine = right - white[:, 0], white[:, 1:]
-            pull += mine.T @ right
-            gram += mine.T @ mine
-            shared[piece.used] += piece.white.T @ mine
-        squares += float(right @ right)
-        against[piece.used] += piece.white.T @ right
+    against, squares = fit.sums[0].copy(), fit.sums[1]
+    count = int(free.sum())
+    shared = np.zeros((len(fit.mean), count))
+    pull, gram = np.zeros(count), np.zeros((count, count))
+    for t in one.trials:
+        piece, trial = fit.pieces[t], session.trials[t]
+        change = one.effect.change(trial.simulated, one.target, one.values)[..., None]
+        slope = one.effect.tangent(trial.simulated, one.target, one.values)
+        slope = slope * one.typical(session)[free]
+        white = fit.whitened(t, trial.errors.filter(np.concatenate([change, slope], axis=2)))
+        products = piece.white.T @ white
+        left, mine = piece.right - white[:, 0], white[:, 1:]
+        pull += mine.T @ left
+        gram += mine.T @ mine
+        shared[piece.used] += products[:, 1:]
+        against[piece.used] -= products[:, 0]
+        squares += float(left @ left - piece.right @ piece.right)
     mean = fit.covariance @ against
     return _Marginal(
         squares - float(against @ mean),

@@ -46,8 +46,7 @@ def limits_of(
         kinds[place.kind] = np.logaddexp(kinds.get(place.kind, -np.inf), prior)
     for place, information in zip(library.places, scores.information, strict=True):
         effect = place.candidate.effect
-        holding = [t for t, one in enumerate(library.parts) if place.candidate in one]
-        if effect.name == UNEXPLAINED or (effect.of_the_body and len(place.trials) < len(holding)):
+        if effect.name == UNEXPLAINED:
             continue
         inflation = float(scores.inflation[list(place.trials)].mean())
         spreads = np.sqrt(inflation) * _spreads(information)

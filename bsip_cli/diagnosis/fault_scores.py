@@ -107,9 +107,11 @@ def _signatures(
 
 
 def _places(parts: Sequence[dict[Candidate, slice]], alone: Sequence[int]) -> Iterator[Place]:
+    held = Counter(c for one in parts for c in one)
     for t in alone:
         for candidate in parts[t]:
-            yield Place(candidate, (t,))
+            if held[candidate] == 1 or not candidate.effect.of_the_body:
+                yield Place(candidate, (t,))
     for candidate in dict.fromkeys(c for one in parts for c in one):
         holding = tuple(t for t, one in enumerate(parts) if candidate in one)
         if candidate.effect.lasts and len(holding) > 1:

@@ -20,6 +20,7 @@ class SegmentInertia(Effect):
     name = "segment_inertia"
     of_the_lab = False
     of_the_person = True
+    of_the_body = True
     remedy = "record a sequence that moves this segment fast, and identify with it"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -53,6 +53,12 @@ class Tried:
         odds = self.log_prior + float((each / inflation).sum()) + float(rest)
         return replace(self, log_odds=odds)
 
+    def without_prior_odds(self, prior_odds: float) -> Tried:
+        """If it has no name, as likely before the data as not; else itself."""
+        if self.fault.effect.name != UNEXPLAINED:
+            return self
+        return replace(self, log_odds=self.log_odds - np.log(prior_odds))
+
     def evenly_or_not(self, inflation: np.ndarray, prior_odds: float) -> Iterator[Tried]:
         """Itself, and what acts like it but not evenly; prior_odds : of the second to the first."""
         yield self
@@ -157,11 +163,12 @@ def _verdict(
     mine = {one.key: Tried(one, again, _prior_of(library, one))}
     for other in _in_full(session, library, without, set(one.trials)):
         mine.setdefault(other.fault.key, other)
-    weighed = [
-        each
-        for x in mine.values()
-        for each in x.weighed(without, inflation).evenly_or_not(inflation, library.prior_odds)
-    ]
+    mine = {key: x.weighed(without, inflation) for key, x in mine.items()}
+    odds = library.prior_odds
+    if any(x.effect.name == UNEXPLAINED and set(x.trials).isdisjoint(one.trials) for x in others):
+        odds = 1.0  # what has no name in one trial is in another as likely as not
+        mine = {key: x.without_prior_odds(library.prior_odds) for key, x in mine.items()}
+    weighed = [each for x in mine.values() for each in x.evenly_or_not(inflation, odds)]
     weighed.sort(key=lambda x: -x.log_odds)
     logs = np.array([x.log_odds for x in weighed])
     there = float(expit(logsumexp(logs)))

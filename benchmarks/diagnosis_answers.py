@@ -105,7 +105,7 @@ def answer_of(folder: Path, cpu_s: float, said: list[str]) -> Answer:
     rows = pd.read_parquet(file)
     refused = ""
     if "no movement can be diagnosed" in " ".join(said) and set(rows["effect"]) <= {NOTHING}:
-        refused = "no trial has 2 s of motion with every contact on a plate"
+        refused = "no trial has motion with every contact on a plate"
     return Answer(
         refused=refused,
         cpu_s=cpu_s,

@@ -224,7 +224,8 @@ _ODD = """
   of the measured on the simulated forces and the measured ones' derivative. The diagnosis
   tells clocks that do not agree, but not evenly. A mean horizontal force of 5.2 N beside a weight
   of 925 N is a plate or a lab that tilts by 0.3 degrees. From 45.6 s on RWRA and RWRB bear each
-  other's labels: `ik` puts them right. Markers smoothed beforehand smear that exchange, and it is told as two that slip.
+  other's labels: `ik` puts them right. Markers smoothed beforehand smear that exchange, and it is
+  told as two that slip.
 - `figaroh_human`: the moment about the vertical is off by 11.9 N m throughout, the largest cause
   there; what in the lab makes it is not known.
 - `return11_static`: the plates read 3.6 kg more than stated, and its file has markers on a bar (BL,

@@ -109,14 +109,22 @@ def search(
         fit = corrected(fitted(session, tried[0].fit.faults, start=tried[0].fit))
         fit = _unnamed_if_uneven(library, fit)
     fit, verdicts = _judged(session, library, fit, named_from, len(known))
-    said = {one.fault.key for verdict in verdicts for one, _ in verdict.members}
-    hardly = [one for verdict in verdicts for one in verdict.others]
-    hardly += [(one.fault, float(expit(one.log_odds))) for one in tried]
+    sure = [one for one in verdicts if one.probability >= named_from]
+    said = {_where(x.fault) for one in sure for x, _ in one.members}
+    hardly = [(one.fault, float(expit(one.log_odds))) for one in tried]
+    for verdict in verdicts:
+        unsure = [] if verdict in sure else [(x.fault, p) for x, p in verdict.members]
+        hardly += [*unsure, *verdict.others]
     best: dict[tuple, tuple[Hypothesis, float]] = {}
     for one, probability in sorted(hardly, key=lambda pair: -pair[1]):
-        if one.key not in said:
-            best.setdefault((*one.key, one.trials), (one, probability))
+        if _where(one) not in said:
+            best.setdefault(_where(one), (one, probability))
     return Found(fit, tuple(verdicts), tuple(best.values()), scores_of(library, fit))
+
+
+def _where(one: Hypothesis) -> tuple[str, str, tuple[int, ...]]:
+    """What, at which place and in which trials."""
+    return (*one.key, one.trials)
 
 
 def _unnamed_if_uneven(library: Library, fit: Fitted) -> Fitted:
@@ -219,13 +227,15 @@ def _in_full(
     for mine in _chosen(library, fit, log, trials):
         likely = _apart(fit, library, mine, log)
         starts = [_start(session, library.places[k], scores.sizes[k]) for k in likely]
-        if (now := _beside(fit, fit, starts[0])) is not None:
-            prior = float(logsumexp(library.log_prior[mine]))
-            tried.append((Tried(now.faults[-1], now, prior), starts[1:]))
+        while starts:
+            if (now := _beside(fit, fit, starts.pop(0))) is not None:
+                prior = float(logsumexp(library.log_prior[mine]))
+                tried.append((Tried(now.faults[-1], now, prior), starts))
+                break
     tried.sort(key=lambda one: -one[0].log_prior - one[0].fit.log_evidence)
-    for k, (one, starts) in enumerate(tried[:_POLISHED]):
-        if starts:
-            tried[k] = _polished(fit, one, starts), []
+    scanned = [k for k, (one, _) in enumerate(tried) if not one.fault.is_free(session).all()]
+    for k in scanned[:_POLISHED]:
+        tried[k] = _polished(fit, *tried[k]), []
     return [one for one, _ in tried]
 
 
@@ -279,14 +289,13 @@ def _beside(fit: Fitted, noise: Fitted, one: Hypothesis) -> Fitted | None:
 def _apart(fit: Fitted, library: Library, mine: list[int], log: np.ndarray) -> list[int]:
     """The likeliest values of a scan that are further apart than a finer search looks."""
     chosen: list[int] = []
+    reached: list[tuple[np.ndarray, np.ndarray]] = []  # by a search from each of them
     for k in sorted(mine, key=lambda k: -log[k]):
-        place = library.places[k]
-        scene = fit.session.trials[place.trials[0]].scene
-        at = np.array(place.candidate.scanned)
-        null = place.candidate.values(scene, np.zeros(len(place.candidate.free(scene))))
-        near = place.candidate.effect.spacing(scene, place.candidate.target, null)
-        others = [np.array(library.places[c].candidate.scanned) for c in chosen]
-        if all((np.abs(at - other) > near).any() for other in others):
+        candidate, at = library.places[k].candidate, np.array(library.places[k].candidate.scanned)
+        if all((np.abs(at - other) > reach).any() for other, reach in reached):
+            scene = fit.session.trials[library.places[k].trials[0]].scene
+            null = candidate.values(scene, np.zeros(len(candidate.free(scene))))
+            reached.append((at, candidate.effect.spacing(scene, candidate.target, null)))
             chosen.append(k)
         if len(chosen) == (_STARTS if len(at) else 1):
             break

@@ -89,9 +89,7 @@ def _findings(
     rng: np.random.Generator,
 ) -> Iterator[Finding]:
     if verdict.probability < named_from:
-        first, probability = verdict.members[0]
-        yield _rejected(found.fit, first.fault, probability)
-        return
+        return  # it stands with those that are not said
     is_alone = len(verdict.members) == 1
     class_id = "" if is_alone else next(names)
     mine = found.fit.faults[verdict.number]
@@ -129,7 +127,8 @@ def _names(fit: Fitted, one: Hypothesis) -> tuple[str, ...]:
 def _rejected(fit: Fitted, one: Hypothesis, probability: float) -> Finding:
     numbers = tuple(Number(n, u, x, np.nan, np.nan) for n, u, x in one.reported(fit.session))
     sentence = (
-        f"not so: {one.sentence(fit.session)} (probability {probability:.2g} given what is found)"
+        f"{'not so' if probability < 0.5 else 'not sure'}: {one.sentence(fit.session)} "
+        f"(probability {probability:.2g} given what is found)"
     )
     return Finding(
         one.effect.name,

@@ -93,7 +93,8 @@ class Candidate:
 
     def what(self) -> str:
         """Its sentence without interval, advice and reason."""
-        text = re.sub(_ADVICE, "", re.sub(_INTERVAL, "", self.sentence)).removeprefix("not so: ")
+        text = re.sub(_ADVICE, "", re.sub(_INTERVAL, "", self.sentence))
+        text = text.removeprefix("not so: ").removeprefix("not sure: ")
         text = re.sub(_REASON, "", text) if self.verdict == "rejected" else text
         return re.sub(_MINUS, "−", text)
 

@@ -49,7 +49,7 @@ def blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame, named_from: str) ->
     said += [
         *_never_seen(detection, diagnosis),
         *_usual_figure(together),
-        *_mass_figure(together, alone),
+        *_mass_figure(alone),
     ]
     rows = tuple(row for effect in USUAL for row in _rows(effect, together, alone))
     head = ("cause", "in all recordings", "in one alone", "shows best at", "usual in labs")
@@ -117,19 +117,16 @@ def _usual_figure(limits: Sequence[Limit]) -> list[Block]:
     return [Picture(figure, caption, "Bars: limits over usual sizes.", "diagnosis_limits")]
 
 
-def _mass_figure(together: Sequence[Limit], alone: Sequence[Limit]) -> list[Block]:
-    always, once = (
-        _least_masses(limits) for limits in ([x for x in together if x.trials > 1], alone)
-    )
-    shown = [segment for segment in SEGMENTS if segment in {*always, *once}]
+def _mass_figure(alone: Sequence[Limit]) -> list[Block]:
+    masses = _least_masses(alone)
+    shown = [segment for segment in SEGMENTS if segment in masses]
     if not shown:
         return []
-    masses = (np.array([one.get(s, np.nan) for s in shown]) for one in (always, once))
-    figure = mass_limits(MassLimits(tuple(segment_label(s) for s in shown), *masses))
+    least = np.array([masses[segment] for segment in shown])
+    figure = mass_limits(MassLimits(tuple(segment_label(s) for s in shown), least))
     caption = (
-        "How heavy something unknown on a segment must be, wherever on it, to be told from the "
-        "segment's own uncertain parameters: worn in all recordings (these parameters then take up "
-        "most of it), or in the single recording that shows it best."
+        "How heavy something unknown on a segment must be, wherever on it, in the recording that "
+        "shows it best. What is worn in all recordings is not told from the person's own parameters."
     )
     return [Picture(figure, caption, "Dots: least mass.", "diagnosis_masses")]
 

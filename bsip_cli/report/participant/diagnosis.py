@@ -112,7 +112,7 @@ def section(record: ParticipantRecord) -> Section:
             "to 1, spread evenly over the catalogue; the recordings decide the rest. Where "
             "nearly every cause seems to explain something of a recording, that recording counts "
             f"for less. A single name is said from a probability of {named_from} % on, else "
-            "the smallest group of names that holds as much; what is less probable is not so."
+            "the smallest group of names that holds as much; what is less probable is not told."
         )
     ]
     if record.diagnosis is None or record.detection is None:
@@ -212,7 +212,7 @@ def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
     answers = {
         "ambiguous": f"one of group {one.class_id}",
         "unnamed": "found, without a name",
-        "rejected": "not so",
+        "rejected": "not sure" if one.probability >= 0.5 else "not so",
     }
     return (
         _numbered(k, one),

@@ -10,6 +10,8 @@ from bsip_cli.recordings.model import Finding
 
 _RAILS = (2047, 2048, 32767, 32768)  # counts of 12- and 16-bit converters
 _FLAT_S = 0.02  # a true peak is not flat for longer
+_LONGER, _FEW_LEVELS = 5.0, 20  # see _cut_off: twice 2.4
+_FAR = 0.6  # of the largest value; the level of an unloaded plate is no limit
 _STUCK_S = 0.5
 _LOAD_CHANGE = 0.2  # of the largest load
 _LOST_S = 0.1
@@ -52,13 +54,16 @@ def check_samples(
     clipped = np.zeros(len(channels), bool)
     stuck = np.zeros(len(channels), bool)
     silent = []
+    is_fine = sum(len(np.unique(channel)) >= _FEW_LEVELS for channel in channels.T) > 1
     for i in range(channels.shape[1]):
-        clipped |= _at_rail(counts[:, i]) | _flat_top(channels[:, i], rate_hz)
+        clipped |= _at_rail(counts[:, i]) | _cut_off(channels[:, i], rate_hz)
         stuck_here = _stuck(channels[:, i], load, rate_hz)
         if stuck_here.any() and not np.nan_to_num(channels[:, i]).any():
             silent.append(i)
         else:
             stuck |= stuck_here
+            # Beside channels that move by fine steps, one that stands still hangs at its limit.
+            stuck |= is_fine and channels[0, i] != 0 and np.ptp(channels[:, i]) == 0
     lost = lost_samples(channels, load, rate_hz)
     spikes = spike_samples(channels, load)
     return SampleCheck(
@@ -153,17 +158,22 @@ def _at_rail(counts: np.ndarray) -> np.ndarray:
     return long_runs(is_count & np.isin(np.abs(whole), _RAILS), 2)
 
 
-def _flat_top(signal: np.ndarray, rate_hz: float) -> np.ndarray:
-    """Long runs of exactly the extreme value, far from where the signal usually is."""
-    known = signal[np.isfinite(signal)]
+def _cut_off(signal: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Long runs of exactly the largest or smallest value, as an amplifier at its limit leaves them.
+
+    A smooth course stays at the level of its peak 2.4 times as long as at the next level (both go
+    by square roots); at a limit it stays far longer. Where there are few levels, as of a coarse
+    converter in quiet stance, nothing can be told.
+    """
     flat = np.zeros(len(signal), bool)
-    if not len(known):
+    levels, counts = np.unique(signal[np.isfinite(signal)], return_counts=True)
+    if len(levels) < _FEW_LEVELS:
         return flat
-    largest = np.abs(known).max()
-    for extreme in (known.min(), known.max()):
-        far = abs(extreme - np.median(known)) > 0.1 * largest
-        if abs(extreme) >= 0.6 * largest and far:
-            flat |= long_runs(signal == extreme, max(4, round(_FLAT_S * rate_hz)))
+    far = np.abs(levels) >= _FAR * np.abs(levels).max()
+    for k in (0, len(levels) - 1):
+        others = counts[far & (np.arange(len(levels)) != k)]
+        if far[k] and counts[k] > _LONGER * others.max(initial=1):
+            flat |= long_runs(signal == levels[k], max(4, round(_FLAT_S * rate_hz)))
     return flat
 
 

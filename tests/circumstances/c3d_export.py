@@ -33,7 +33,7 @@ def write_c3d(path: Path, session: Session, trial: Trial, export: Export, seed: 
     """One trial; `trial` is at the export's rates, in the lab's frame."""
     content = ezc3d.c3d()
     _add_points(content, session, trial, export, seed)
-    _add_plates(content, session, trial, export)
+    _add_plates(content, session, trial, export, seed)
     content.add_parameter("SUBJECTS", "NAMES", [""])
     content.write(str(path))
     if export.residuals == "negative":
@@ -70,8 +70,10 @@ def _add_points(
     content["data"]["meta_points"]["camera_masks"] = np.zeros((7, markers, frames), dtype=bool)
 
 
-def _add_plates(content: ezc3d.c3d, session: Session, trial: Trial, export: Export) -> None:
-    plates = _stated_plates(session, trial, export)
+def _add_plates(
+    content: ezc3d.c3d, session: Session, trial: Trial, export: Export, seed: int
+) -> None:
+    plates = _stated_plates(session, trial, export, np.random.default_rng([seed, 78]))
     channels = np.hstack([plate.channels for plate in plates])
     count = len(plates[0].units)
     analog = content["parameters"]["ANALOG"]
@@ -98,7 +100,9 @@ def _add_plates(content: ezc3d.c3d, session: Session, trial: Trial, export: Expo
         group[name]["type"] = 2 if array.dtype.kind == "i" else 4
 
 
-def _stated_plates(session: Session, trial: Trial, export: Export) -> list[_Stated]:
+def _stated_plates(
+    session: Session, trial: Trial, export: Export, rng: np.random.Generator
+) -> list[_Stated]:
     seen = trial.seen_from(export.axes, np.zeros(3)).seen_from(export.force_axes, np.zeros(3))
     force, moment = seen.force_N, seen.moment_Nm
     plates = [_seen_plate(plate, export) for plate in session.plates]
@@ -113,7 +117,28 @@ def _stated_plates(session: Session, trial: Trial, export: Export) -> list[_Stat
     ]
     order = [*order, *range(len(order), len(plates))]
     stated = [_describe(plate, own[order[k]], export, k) for k, plate in enumerate(plates)]
+    hit = stated[export.damaged_plate]
+    if export.damage:
+        rate = export.marker_hz * export.analog_per_marker
+        hit = replace(hit, channels=export.damage(hit.channels, rate, rng))
+    if export.limit_share:
+        source = order[export.damaged_plate]
+        cut = _limited(hit.channels, source, trial, session, export.limit_share)
+        hit = replace(hit, channels=cut)
+    stated[export.damaged_plate] = hit
     return [*stated, stated[0]] if export.doubled else stated
+
+
+def _limited(
+    channels: np.ndarray, plate: int, trial: Trial, session: Session, share: float
+) -> np.ndarray:
+    """Cut at an amplifier's limit; of a plate of type 3, one of its four vertical sensors."""
+    channels, vertical = channels.copy(), 2 if channels.shape[1] == 6 else 4
+    loads = {t.name: np.abs(t.force_N[:, plate, 2]).max() for t in session.trials}
+    per_newton = np.abs(channels[:, vertical]).max() / loads[trial.name]
+    most = share * max(loads.values()) * per_newton
+    channels[:, vertical] = channels[:, vertical].clip(-most, most)
+    return channels
 
 
 def _seen_plate(plate: Plate, export: Export) -> Plate:

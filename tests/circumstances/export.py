@@ -46,6 +46,10 @@ class Export:
     summed: bool = False
     plate_type: int = 2
     origin: str = "sensor"  # reversed, place, zero
+    # of one plate's channels (n, 6 or 8) as written, at a rate [Hz]
+    damage: Callable[[np.ndarray, float, np.random.Generator], np.ndarray] | None = None
+    damaged_plate: int = 0
+    limit_share: float | None = None  # of its vertical channel, of the largest in the session
     # time
     marker_hz: float = 100.0
     analog_per_marker: int = 10

@@ -88,7 +88,10 @@ def _session(rng: np.random.Generator) -> Session:
     session = session.with_movement(pick(rng, LABORATORIES[laboratory][1]))
     turns = tuple(int(k) for k in rng.integers(0, 4, len(session.plates)))
     session = session.with_turned_plates(turns)
-    session = session.moved(np.pi / 2 * int(rng.integers(4)), np.zeros(3))
+    # Half of the labs draw their axes along the walls, the others anyhow.
+    along_walls = np.pi / 2 * int(rng.integers(4))
+    anyhow = float(rng.uniform(0.0, 2.0 * np.pi))
+    session = session.moved(along_walls if rng.random() < 0.5 else anyhow, np.zeros(3))
     shift = np.array([*rng.uniform(-2.0, 2.0, 2), 0.0])
     if rng.random() < AT_ORIGIN_SHARE:
         feet = session.trials[0].markers_m.mean(axis=(0, 1)) * [1.0, 1.0, 0.0]

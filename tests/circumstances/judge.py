@@ -19,18 +19,27 @@ OUTCOMES = (
     RIGHT, REPAIRED, REFUSED, SAID, MISNAMED, WRONGLY_REPAIRED, WRONG, DISTURBED, CRASHED,
 )  # fmt: skip
 
-_PLATES = r"\bframe\b|plates? .*(turned|cop(y|ies)\b|\bsum\b|twice|same|virtual|exchange|combined)"
-# Words that name a matter. Wide on purpose: the wording is not what is examined.
+_PLATES = (
+    r"frame.*(plate|force)|(plate|force)s?\b.*\bframe\b|another frame|"
+    r"plates? .*(turned|cop(y|ies)\b|\bsum\b|twice|same|virtual|exchange|combined|that of plate)"
+)
+_MOMENT = rf"centre of pressure|moments? (of|in|about|are|with)\b|torque|ORIGIN|corners?|{_PLATES}"
+# Words that name a matter, as narrow as leaves the wording free: a sentence on something else has
+# none of them.
 NAMES = {
-    "rate": r"\bHz\b|\brates?\b|\btimes?\b|time.?stamp|clock|\bms\b|\bframes? (number|rate)",
-    "labels": r"label|marker.?set|no marker|markers? .*(missing|not|twice|double)|unknown marker",
-    "scale": r"\bunits?\b|statur|\btall\b|\bheight\b|inch|\bcm\b|lengths?\b|\bscale",
+    "rate": r"\d ?Hz\b|\brates?\b|time.?stamps?|\btimes\b|clock|\bin ms\b|frame numbers?",
+    "labels": r"labels?\b|marker.?set|no marker|markers? .*(missing|twice|double)|unknown marker",
+    "scale": r"POINT:UNITS|units? of (the )?(points|lengths?|markers)|unit.points|lengths? in|"
+    r"statur|\btall\b|\bheight\b|inch",
     "handedness": r"mirror|handed|wrong side",
-    "vertical": r"vertical|\bup\b|upright",
-    "markers": r"missing|\bgaps?\b|invalid|residual|\bheld\b|slip|jump|repeat|frozen",
-    "force": rf"\bforces?\b(?! plate)|\bsigns?\b|\bunits?\b|mirror|never loaded|{_PLATES}",
-    "cop": rf"pressure|moments?\b|torque|origin|corner|points? of|no points?|mirror|{_PLATES}",
-    "moment": rf"pressure|moments?\b|torque|origin|corner|\bsigns?\b|mirror|{_PLATES}",
+    "vertical": r"\bvertical (is|axis)|lab's vertical|up.axis|upright",
+    "markers": r"(marker|point|traject)\w*\b.*(missing|invalid|held|slip|jump|repeat|frozen|gap)|"
+    r"(missing|invalid|held|repeated|frozen|gaps?)\b.*(marker|point|traject)|residual",
+    "force": r"\bsigns?\b|vertical force|forces?\b.*(unit|axes|reverse|do not follow)|mirror|"
+    rf"never loaded|do not carry|{_PLATES}",
+    "samples": r"\bsamples?\b",
+    "cop": rf"{_MOMENT}|points? of (pressure|force)|for the point|no points?|mirror",
+    "moment": rf"{_MOMENT}|\bsigns?\b|mirror|none for the moment",
     "mass": r"stated.*\b(kg|mass)|\bmass\b.*(stated|participants)|pound|\blbs?\b",
     "table": r"\bcolumns?\b|force (table|file)|no (ground )?force",
     "person": r"participants|\bsex\b",
@@ -46,6 +55,7 @@ OF_KIND = {
     "signs": ("force", "moment"),
     "plates": ("force", "cop"),
     "plate type": ("moment",),
+    "samples": ("samples",),
     "time": ("rate",),
     "labels": ("labels",),
     "missing": ("markers",),
@@ -89,7 +99,8 @@ def judge(circumstance: Circumstance, taken: Taken) -> Judgement:
         for quantity, found in comparison.wrong.items()
     }
     trials = {trial.name for trial in circumstance.truth.trials}
-    is_whole = set(comparisons) == trials and all(c.is_whole for c in comparisons.values())
+    short = {n for n in trials if n not in comparisons or not comparisons[n].is_whole}
+    is_whole = not short
     # What must be named: what is wrong in the artifacts, and what these cannot show.
     asked = [*wrong, *(("", t.name) for t in circumstance.things if t.name)]
     telling = [w for w in news if not _CONTACT.search(w.text)]
@@ -100,11 +111,11 @@ def judge(circumstance: Circumstance, taken: Taken) -> Judgement:
     elif circumstance.is_sound:
         outcome = _of_sound(wrong, is_whole, telling)
     elif wrong:
-        is_told = is_whole or _is_told(circumstance, telling)
+        is_told = is_whole or _is_told(circumstance, short, telling)
         outcome = _of_wrong(wrong, telling, all_named, is_told)
     elif not is_whole:
         # Who is refused before anything is read is refused for one matter, not for all.
-        is_told = _is_told(circumstance, telling) and (all_named or not comparisons)
+        is_told = _is_told(circumstance, short, telling) and (all_named or not comparisons)
         outcome = REFUSED if is_told else MISNAMED
     elif not all_named:
         outcome = WRONG
@@ -153,9 +164,23 @@ def _of_wrong(wrong: Wrong, telling: list[Word], all_named: bool, is_told: bool)
     return SAID if is_told else MISNAMED
 
 
-def _is_told(circumstance: Circumstance, telling: list[Word]) -> bool:
-    """A word names the matter for which forces, a trial or the person may have been refused."""
-    return any(_naming("", q, telling) for kind in circumstance.kinds for q in OF_KIND[kind])
+def _is_told(circumstance: Circumstance, short: set[str], telling: list[Word]) -> bool:
+    """Of each trial of which something is not passed on, a word names it and the matter.
+
+    What is said of the person, or of the table of all persons, is said of each trial.
+    """
+    matters = {quantity for kind in circumstance.kinds for quantity in OF_KIND[kind]}
+
+    def names(word: Word, trial: str) -> bool:
+        whose = word.trial or ("" if _names_file(word, circumstance.participant) else "nobody")
+        return whose in ("", trial) and any(_naming("", q, [word]) for q in matters)
+
+    return all(any(names(word, trial) for word in telling) for trial in short)
+
+
+def _names_file(word: Word, participant: str) -> bool:
+    """A row of a participant's table has its file's name; a printed line must say it."""
+    return word.level != "printed" or participant in word.text or "participants.tsv" in word.text
 
 
 def _naming(trial: str, quantity: str, words: list[Word]) -> str:

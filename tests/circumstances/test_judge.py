@@ -156,7 +156,7 @@ def mostly_lost(taken):
     return replace(taken, valid=np.arange(len(taken.time_s)) < 0.5 * len(taken.time_s))
 
 
-UNIT = "ANALOG:UNITS says N mm, moments fit N m"
+UNIT = "ANALOG:UNITS says N mm; read the moments in N m"
 
 
 @pytest.mark.parametrize(

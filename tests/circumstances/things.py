@@ -15,6 +15,7 @@ import numpy as np
 from tests.circumstances.export import Y_UP, Export
 
 Change = Callable[[Export, np.random.Generator, int], str]
+Damage = Callable[[np.ndarray, float, np.random.Generator], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -240,7 +241,7 @@ def one_component(export: Export, rng: np.random.Generator, plates: int) -> str:
 
 
 def one_plate_signs(export: Export, rng: np.random.Generator, plates: int) -> str:
-    plate = int(rng.integers(min(plates, 2)))
+    plate = _one_of(rng, plates)
     export.plate_signs = {plate: -np.ones(6)}
     return f"all six channels of plate {plate + 1} with the other sign"
 
@@ -255,7 +256,7 @@ def plates_exchanged(export: Export, rng: np.random.Generator, plates: int) -> s
 
 def corners_turned(export: Export, rng: np.random.Generator, plates: int) -> str:
     turn = int(rng.integers(1, 4))
-    which = range(plates) if rng.random() < 0.6 else [int(rng.integers(min(plates, 2)))]
+    which = range(plates) if rng.random() < 0.6 else [_one_of(rng, plates)]
     export.corner_roll = dict.fromkeys(which, turn)
     named = ", ".join(str(k + 1) for k in which)
     return f"corners of plate {named} turned by {90 * turn} degrees"
@@ -284,6 +285,53 @@ def plate_type(export: Export, rng: np.random.Generator, plates: int) -> str:
 def calibration_in_Nm(export: Export, rng: np.random.Generator, plates: int) -> str:
     export.plate_type, export.moment_unit = 4, "Nm"
     return "plates of type 4, CAL_MATRIX in N m, channels in V"
+
+
+# Samples of one plate, in every trial
+
+
+def spikes(export: Export, rng: np.random.Generator, plates: int) -> str:
+    count, times = int(rng.integers(1, 9)), float(np.exp(rng.uniform(np.log(0.2), np.log(4.0))))
+
+    def hit(channels: np.ndarray, rate_hz: float, rng: np.random.Generator) -> np.ndarray:
+        channels = channels.copy()
+        for sample in rng.integers(0, len(channels), count):
+            channel = int(rng.integers(channels.shape[1]))
+            height = times * np.abs(channels[:, channel]).max()
+            channels[sample, channel] += rng.choice([-height, height])
+        return channels
+
+    return _damaged(export, rng, plates, hit, f"{count} spikes {times:.1f} times the largest load")
+
+
+def cut_off(export: Export, rng: np.random.Generator, plates: int) -> str:
+    export.limit_share, export.damaged_plate = float(rng.uniform(0.6, 0.95)), _one_of(rng, plates)
+    return (
+        f"plate {export.damaged_plate + 1}: vertical channel cut at {export.limit_share:.0%} of "
+        "its largest in all trials"
+    )
+
+
+def lost_samples(export: Export, rng: np.random.Generator, plates: int) -> str:
+    count, length_s = int(rng.integers(1, 5)), float(rng.uniform(0.003, 0.06))
+
+    def hit(channels: np.ndarray, rate_hz: float, rng: np.random.Generator) -> np.ndarray:
+        channels, length = channels.copy(), max(round(length_s * rate_hz), 1)
+        for first in rng.integers(0, len(channels) - length, count):
+            channels[first : first + length] = 0.0
+        return channels
+
+    return _damaged(export, rng, plates, hit, f"all zero {count} times for {length_s:.3f} s")
+
+
+def _damaged(export: Export, rng: np.random.Generator, plates: int, hit: Damage, words: str) -> str:
+    export.damage, export.damaged_plate = hit, _one_of(rng, plates)
+    return f"plate {export.damaged_plate + 1}: {words}"
+
+
+def _one_of(rng: np.random.Generator, plates: int) -> int:
+    """One of the two plates that are surely stepped on."""
+    return int(rng.integers(min(plates, 2)))
 
 
 # Time
@@ -465,6 +513,9 @@ THINGS = (
     Thing("plates", "plates", plate_sum),
     Thing("plate type", "type", plate_type, C3D),
     Thing("plate type", "moment", calibration_in_Nm, C3D),
+    Thing("samples", "samples", spikes, C3D),
+    Thing("samples", "samples", cut_off, C3D),
+    Thing("samples", "samples", lost_samples, C3D),
     Thing("time", "time", rates),
     Thing("time", "time", few_decimals, TEXT),
     Thing("time", "time", milliseconds, TEXT),

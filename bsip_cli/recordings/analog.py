@@ -16,15 +16,15 @@ _STUCK_S = 0.5
 _LOAD_CHANGE = 0.2  # of the largest load
 _LOST_S = 0.1
 _ABRUPT_N = 100.0  # load beside samples that are all zero: they are lost
-# A spike beside the cubic through its neighbours: of the channel's size (less moves a frame by less
-# than other errors of plates), times what samples usually are beside it, times the smallest step.
-_SPIKE_SHARE, _SPIKE_NOISE, _SPIKE_STEPS = 0.05, 10.0, 5.0
-_SPIKE_CLEAR = (
-    6.0  # times what is left around: of its own size, a sixth falls on the second samples
-)
+# A spike beside the cubic through its neighbours must be larger than
+# - 5 % of the channel's size: among ten samples of a frame, less moves it by under half a per cent;
+# - 10 times the median of what samples are beside it: 6.7 standard deviations of normal noise;
+# - twice what flips of the converter by one step can be beside it, 1 + (4 + 4 + 1 + 1) / 6 steps;
+# - 6 times what is left around it: of its own size, a sixth falls on the second samples.
+_SPIKE_SHARE, _SPIKE_NOISE, _SPIKE_STEPS, _SPIKE_CLEAR = 0.05, 10.0, 16 / 3, 6.0
 _TOUCHED = 20.0  # N or N m: what counts on a plate that bears nobody
 _AROUND = 12  # samples on either side
-_ABSURD_N = 15_000.0
+_ABSURD_N = 15_000.0  # triple jumpers land with 15 times their weight (Perttunen 2000): 12 kN
 _MANY = 0.02  # of the samples
 
 
@@ -46,7 +46,8 @@ class SampleCheck:
 def check_samples(
     channels: np.ndarray, counts: np.ndarray, load: np.ndarray, rate_hz: float
 ) -> SampleCheck:
-    """Judge one plate's channels (n, k); ``counts`` (n, k) are the converter's integers.
+    """Judge one plate's channels (n, k); ``counts`` (n, k): the converter's, less
+    its offset.
 
     ``load`` (n,) is the plate's vertical force, used to see a channel that does not answer.
     """
@@ -54,16 +55,17 @@ def check_samples(
     clipped = np.zeros(len(channels), bool)
     stuck = np.zeros(len(channels), bool)
     silent = []
-    is_fine = sum(len(np.unique(channel)) >= _FEW_LEVELS for channel in channels.T) > 1
-    for i in range(channels.shape[1]):
-        clipped |= _at_rail(counts[:, i]) | _cut_off(channels[:, i], rate_hz)
-        stuck_here = _stuck(channels[:, i], load, rate_hz)
-        if stuck_here.any() and not np.nan_to_num(channels[:, i]).any():
+    is_fine = sum(len(np.unique(channel)) >= _FEW_LEVELS for channel in counts.T) > 1
+    # As the converter gave them: a calibration matrix mixes a channel at its limit with others.
+    for i, channel in enumerate(counts.T):
+        clipped |= _at_rail(channel) | _cut_off(channel, rate_hz)
+        stuck_here = _stuck(channel, load, rate_hz)
+        if stuck_here.any() and not np.nan_to_num(channel).any():
             silent.append(i)
         else:
             stuck |= stuck_here
             # Beside channels that move by fine steps, one that stands still hangs at its limit.
-            stuck |= is_fine and channels[0, i] != 0 and np.ptp(channels[:, i]) == 0
+            stuck |= is_fine and channel[0] != 0 and np.ptp(channel) == 0
     lost = lost_samples(channels, load, rate_hz)
     spikes = spike_samples(channels, load)
     return SampleCheck(

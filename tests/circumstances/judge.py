@@ -66,6 +66,8 @@ OF_KIND = {
 _CONTACT = re.compile(r"(^|: )contacts\b", re.I)
 # A mirror put right, gaps and held markers speak of labels and markers and do nothing to labels.
 _CORRECT_LABELS = ("labels", "marker_set")
+# What a force table lacks is told as lacking, whatever else was put right.
+_IS_LEFT_OUT = re.compile(r"no columns for|took the free torque as zero")
 _USUAL = re.compile(r"^(up_axis|marker_set|marker_gaps)|: (up axis|marker gaps)", re.I)
 
 
@@ -157,7 +159,10 @@ def _of_sound(wrong: Wrong, is_whole: bool, telling: list[Word]) -> str:
 def _of_wrong(wrong: Wrong, telling: list[Word], all_named: bool, is_told: bool) -> str:
     corrected = [w for w in telling if w.level == "corrected"]
     of_labels = [w for w in corrected if w.check in _CORRECT_LABELS]
-    if any(_naming(*w, of_labels if w[1] == "labels" else corrected) for w in wrong):
+    left = {
+        w for w in wrong if not _naming(*w, [x for x in telling if _IS_LEFT_OUT.search(x.text)])
+    }
+    if any(_naming(*w, of_labels if w[1] == "labels" else corrected) for w in left):
         return WRONGLY_REPAIRED
     if not all_named:
         return WRONG

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.diagnosis.detection import limits_of
+from bsip_cli.diagnosis.evenness import plain, unevenness
 from bsip_cli.diagnosis.fault_scores import library_of
 from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
@@ -85,38 +86,65 @@ def test_a_fault_gains_on_seconds_that_did_not_size_it():
         assert 0 < spread.max() < 0.2 * size.max()
 
 
-def gained(scene: Scene) -> Scene:
-    """Plate 1 reads its vertical force 6 % too large."""
-    first, second = scene.plates
-    wrench = first.wrench.copy()
-    wrench[:, 2] *= 1.06
-    return replace(scene, plates=(replace(first, wrench=wrench), second))
+@pytest.mark.parametrize("size", [0.03, 0.06])
+def test_the_plate_that_reads_too_much_is_named(size):
+    wrong = with_effect(movement(4), EFFECTS["plate_gain"], "1 fz", size)
+    (one,) = told(found_in(wrong, asked=CATALOGUE))
+    assert (one.effect, one.target) == ("plate_gain", "1 fz")
 
 
 def test_what_looks_alike_is_a_group_that_holds_the_truth():
-    """Beside a body of unknown mass, gain of one plate, of both, an offset and a tilt compete."""
-    findings = told(found_in(gained(movement(4)), asked=CATALOGUE))
-    assert "plate_gain" in {one.effect for one in findings}
-    for class_id in {one.class_id for one in findings} - {""}:
-        mine = [one for one in findings if one.class_id == class_id]
-        assert len(mine) > 1 and {one.verdict for one in mine} == {"ambiguous"}
-        assert sum(one.probability for one in mine) >= NAMED_FROM
-        assert all("to tell them apart" in one.sentence for one in mine)
+    """Four hundred grams on a forearm: so might six hundred be on the upper arm."""
+    loaded = with_effect(movement(4), EFFECTS["added_mass"], "forearm_r", 0.4, 0.0, 0.0, 0.0)
+    findings = told(found_in(loaded, movement(14, 8.0), asked=CATALOGUE))
+    assert len(findings) > 1 and {one.class_id for one in findings} == {"A"}
+    assert {one.verdict for one in findings} == {"ambiguous"}
+    assert (findings[0].effect, findings[0].target) == ("added_mass", "forearm_r")
+    assert sum(one.probability for one in findings) >= NAMED_FROM
+    assert all("to tell them apart" in one.sentence for one in findings)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_a_fault_of_some_seconds_is_not_what_is_so_throughout(seed):
-    """Late by 30 ms from the middle on: no delay, and no clock that drifts."""
+def half_late(seed: int) -> Scene:
+    """Late by 30 ms from the middle on."""
     scene = movement(seed)
     plates = tuple(
         replace(one, wrench=np.where(scene.times_s[:, None] > 4.0, late_one.wrench, one.wrench))
         for one, late_one in zip(scene.plates, late(scene, 0.03).plates, strict=True)
     )
+    return replace(scene, plates=plates)
+
+
+def unevenness_of_a_delay(*scenes: Scene) -> float:
+    """Of the delay that a search has found which asks for nothing else."""
+    trials = session(*scenes)
+    found = search(
+        trials, library_of(trials, [EFFECTS["sync_offset"]], range(len(scenes)), ODDS), NAMED_FROM
+    )
+    (number,) = (
+        k for k, one in enumerate(found.fit.faults) if plain(one.effect).name == "sync_offset"
+    )
+    return unevenness(found.fit, number, np.ones(len(scenes)))
+
+
+def test_a_delay_of_the_second_half_is_uneven_and_one_throughout_is_not():
+    assert unevenness_of_a_delay(late(movement(2), 0.015)) < 0
+    assert unevenness_of_a_delay(half_late(2)) > 10
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_fault_of_some_seconds_is_not_what_is_so_throughout(seed):
+    """No delay, and no clock that drifts."""
     asked = [EFFECTS[name] for name in ("clock_drift", *OF_THE_LAB)]
-    half_late = replace(scene, plates=plates)
-    findings = told(found_in(half_late, movement(seed + 10, 8.0), asked=asked))
+    findings = told(found_in(half_late(seed), movement(seed + 10, 8.0), asked=asked))
     assert findings and {one.effect for one in findings} == {"unexplained"}
     assert "not evenly" in findings[0].sentence
+
+
+def test_what_was_asked_and_is_not_there_is_rejected_with_a_small_probability():
+    found = found_in(movement(1), movement(11, 8.0))
+    findings = findings_of(found, held_out(found.fit), NAMED_FROM, np.random.default_rng(0))
+    assert {one.effect for one in findings} & set(OF_THE_LAB)
+    assert all(one.verdict == "rejected" and one.probability < 0.5 for one in findings)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

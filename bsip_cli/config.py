@@ -115,10 +115,8 @@ class Regress(Section):
 
 
 class Prior(Section):
-    mass_sd_percent: float = Field(gt=0)
     com_sd_percent: float = Field(gt=0)
     midline_sd_m: float = Field(gt=0)
-    inertia_sd_percent: float = Field(gt=0)
     left_right_correlation: float = Field(ge=0, lt=1)
     total_mass_sd_percent: float = Field(gt=0)
 

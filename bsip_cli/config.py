@@ -111,7 +111,7 @@ class Smoothing(Section):
 
 
 class Regress(Section):
-    table: Literal["dumas2007"]
+    table: Literal["dumas2007", "dumas2015"]
 
 
 class Prior(Section):

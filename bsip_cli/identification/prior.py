@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from bsip_cli.body.inertia import Inertia, readable_jacobian
+from bsip_cli.body.inertia import Inertia, readable_jacobian, rod_length_m
 from bsip_cli.body.person import Person
 
 # How the readable parameters of a left segment go with the right one's: Z points to the right on
@@ -175,17 +175,8 @@ def _readable_sd(inertia: Inertia, mass: float, com: np.ndarray, part: float) ->
     return np.array(
         [
             mass * inertia.mass_kg,
-            *(com * _rod_length_m(inertia)),
+            *(com * rod_length_m(inertia)),
             *(part * moments),
             *(0.5 * part * products),
         ]
     )
-
-
-def _rod_length_m(inertia: Inertia) -> float:
-    """Length of the rod whose mass lies as far from its centre, in the mean, as the segment's.
-
-    Near to the length of a limb; the tables' lengths of pelvis and hand are a third and a half of
-    what these segments measure.
-    """
-    return float(np.sqrt(6 * np.trace(inertia.tensor_kgm2) / inertia.mass_kg))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.body.anthropometry import regress
-from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.body.inertia import Inertia, rod_length_m
+from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.body.strays import strays_of
 from bsip_cli.errors import BadDataError
 from bsip_cli.identification.prior import prior_of
@@ -32,9 +33,22 @@ def run(unit: Unit) -> None:
     if strays.outside:
         unit.warn(f"{unit.name}: {strays.outside}")
     com = np.where(np.isnan(strays.com), unit.config.prior.com_sd_percent, strays.com)
+    com[:, 1] = np.hypot(com[:, 1], _joints_err(unit, skeleton, result.inertias))
     spreads = np.column_stack([strays.mass, com, strays.moments])
     prior = prior_of(result.inertias, person, spread_from(unit, spreads))
     values = np.array([inertia.readable() for inertia in prior.inertias])
     table = bsip_table(RM, skeleton.body_names, values, prior.readable_sd, np.zeros_like(values))
     table[list(spread_names())] = spreads
     unit.write("regression", table.assign(note=list(result.notes)))
+
+
+def _joints_err(unit: Unit, skeleton: Skeleton, inertias: tuple[Inertia, ...]) -> np.ndarray:
+    """(n,) by how much [% of the rod's length] a centre of mass lies elsewhere along a segment
+    because its joints do.
+
+    Both ends of a length that is known to s err by s / sqrt(2), and the centre near the middle
+    follows each by half: s / 2.
+    """
+    rows = unit.read("skeleton").set_index("segment").loc[list(skeleton.body_names)]
+    length_sd_m = np.nan_to_num(rows["length_sd_m"].to_numpy())  # not refined: not known
+    return 100 * 0.5 * length_sd_m / np.array([rod_length_m(one) for one in inertias])

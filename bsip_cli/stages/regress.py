@@ -33,7 +33,7 @@ def run(unit: Unit) -> None:
     if strays.outside:
         unit.warn(f"{unit.name}: {strays.outside}")
     com = np.where(np.isnan(strays.com), unit.config.prior.com_sd_percent, strays.com)
-    com[:, 1] = np.hypot(com[:, 1], _joints_err(unit, skeleton, result.inertias))
+    com = np.hypot(com, _lengths_err(unit, skeleton, result.inertias))
     spreads = np.column_stack([strays.mass, com, strays.moments])
     prior = prior_of(result.inertias, person, spread_from(unit, spreads))
     values = np.array([inertia.readable() for inertia in prior.inertias])
@@ -42,13 +42,13 @@ def run(unit: Unit) -> None:
     unit.write("regression", table.assign(note=list(result.notes)))
 
 
-def _joints_err(unit: Unit, skeleton: Skeleton, inertias: tuple[Inertia, ...]) -> np.ndarray:
-    """(n,) by how much [% of the rod's length] a centre of mass lies elsewhere along a segment
-    because its joints do.
+def _lengths_err(unit: Unit, skeleton: Skeleton, inertias: tuple[Inertia, ...]) -> np.ndarray:
+    """(n, 3) by how much [% of the rod's length] centres of mass err because lengths do.
 
-    Both ends of a length that is known to s err by s / sqrt(2), and the centre near the middle
-    follows each by half: s / 2.
+    The table puts them at parts of the length, so they err by the same part of its error: after
+    refinement, or of the first guess where a length is not refined.
     """
     rows = unit.read("skeleton").set_index("segment").loc[list(skeleton.body_names)]
-    length_sd_m = np.nan_to_num(rows["length_sd_m"].to_numpy())  # not refined: not known
-    return 100 * 0.5 * length_sd_m / np.array([rod_length_m(one) for one in inertias])
+    part = (rows["length_sd_m"] / rows["length_m"]).fillna(unit.config.scale.length_sd)
+    centres = np.array([np.abs(one.com_m) / rod_length_m(one) for one in inertias])
+    return 100 * part.to_numpy()[:, None] * centres

@@ -111,14 +111,12 @@ class Smoothing(Section):
 
 
 class Regress(Section):
-    table: Literal["dumas2007"]
+    table: Literal["dumas2007", "dumas2015"]
 
 
 class Prior(Section):
-    mass_sd_percent: float = Field(gt=0)
     com_sd_percent: float = Field(gt=0)
     midline_sd_m: float = Field(gt=0)
-    inertia_sd_percent: float = Field(gt=0)
     left_right_correlation: float = Field(ge=0, lt=1)
     total_mass_sd_percent: float = Field(gt=0)
 

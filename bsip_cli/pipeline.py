@@ -91,7 +91,7 @@ STAGES = (
         "Inertial parameters from an anthropometric table (RM).",
         reads=("skeleton", "marker-positions", "person"),
         writes=("regression",),
-        options=("skeleton", "regress", "prior"),
+        options=("skeleton", "scale", "regress", "prior"),
         module="bsip_cli.stages.regress",
     ),
     Stage(

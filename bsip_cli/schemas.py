@@ -86,6 +86,30 @@ def _bsip_columns() -> tuple[Column, ...]:
     return (*values, *spreads, *shares)
 
 
+def _spread_columns() -> tuple[Column, ...]:
+    rod = "of the length of a rod with the segment's mass and mean moment of inertia"
+    return (
+        Column("mass_spread_percent", "float", "%", "how far people's masses stray from the table"),
+        *_floats(
+            "com_x_spread_percent com_y_spread_percent com_z_spread_percent",
+            "%",
+            f"how far people's centres of mass stray from the table, {rod}; with what lengths err by",
+            "segment",
+        ),
+        Column(
+            "moments_spread_percent",
+            "float",
+            "%",
+            "how far people's moments of inertia stray from the table, the mass known",
+        ),
+    )
+
+
+def spread_names() -> tuple[str, ...]:
+    """The columns of mass, three coordinates and moments: how far people stray from the table."""
+    return tuple(column.name for column in _spread_columns())
+
+
 def _without_unit(name: str) -> str:
     return name.rsplit("_", 1)[0]
 
@@ -474,12 +498,13 @@ SCHEMAS = {
         Schema(
             "regression",
             "participant",
-            1,
+            2,
             "inertial parameters of the regression (RM)",
             (
                 _METHOD,
                 _SEGMENT,
                 *_bsip_columns(),
+                *_spread_columns(),
                 _text("note", "what had to be repaired or assumed"),
             ),
         ),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bsip_cli.body.inertia import Inertia, nearest_physical_tensor
+from bsip_cli.body.inertia import Inertia, from_phi, nearest_physical_tensor
 from bsip_cli.body.person import Person
 from bsip_cli.stated.sex_words import OTHER
 
@@ -28,6 +28,10 @@ class TableRow:
     gyration: np.ndarray
     mean_length_m: float
 
+    def tensor(self) -> np.ndarray:
+        """(3, 3) about the centre of mass [kg m2], of a body of 1 kg with the mean lengths."""
+        return self.mass_fraction * self.mean_length_m**2 * self.gyration
+
 
 @dataclass(frozen=True)
 class Regression:
@@ -39,13 +43,38 @@ class Regression:
 
 @cache
 def load_table(name: str) -> dict[tuple[str, str], TableRow]:
-    """Rows of a shipped table by sex (M, F, other) and segment, for the right side of the body."""
-    file = Path(__file__).parent / "tables" / f"{name}.csv"
-    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line[0] != "#"]
-    rows = {(row["sex"], row["segment"]): _row(row) for row in csv.DictReader(lines)}
+    """Rows of a shipped table by sex (M, F, other) and segment, for the right side of the body.
+
+    dumas2015 is dumas2007 with another torso: thorax and abdomen as one body, upright.
+    """
+    rows = _rows_of("dumas2007")
+    if name == "dumas2015":
+        parts = _rows_of(name)
+        rows |= {
+            (sex, "torso"): _torso(parts[sex, "thorax"], parts[sex, "abdomen"]) for sex in "MF"
+        }
     in_both = [segment for sex, segment in rows if sex == "M" and ("F", segment) in rows]
     means = {(OTHER, one): _mean(rows["M", one], rows["F", one]) for one in in_both}
     return rows | means
+
+
+def _rows_of(name: str) -> dict[tuple[str, str], TableRow]:
+    file = Path(__file__).parent / "tables" / f"{name}.csv"
+    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line[0] != "#"]
+    return {(row["sex"], row["segment"]): _row(row) for row in csv.DictReader(lines)}
+
+
+def _torso(thorax: TableRow, abdomen: TableRow) -> TableRow:
+    """Both parts as one body from CJC to LJC, the abdomen's axes parallel to the thorax's."""
+    length = thorax.mean_length_m + abdomen.mean_length_m
+    below = np.array([0.0, -thorax.mean_length_m, 0.0])  # TJC as seen from CJC
+    bodies = [
+        Inertia(row.mass_fraction, row.mean_length_m * row.com, row.tensor()).moved(-origin)
+        for row, origin in ((thorax, np.zeros(3)), (abdomen, below))
+    ]
+    whole = from_phi(np.sum([body.phi() for body in bodies], axis=0))
+    gyration = whole.tensor_kgm2 / (whole.mass_kg * length**2)
+    return TableRow(whole.mass_kg, whole.com_m / length, gyration, length)
 
 
 def _mean(one: TableRow, other: TableRow) -> TableRow:

@@ -87,6 +87,15 @@ def readable_jacobian(phi: np.ndarray) -> np.ndarray:
     return np.stack(columns, axis=1)
 
 
+def rod_length_m(inertia: Inertia) -> float:
+    """Length of the rod whose mass lies as far from its centre, in the mean, as the segment's.
+
+    Near to the length of a limb; the tables' lengths of pelvis and hand are a third and a half of
+    what these segments measure.
+    """
+    return float(np.sqrt(6 * np.trace(inertia.tensor_kgm2) / inertia.mass_kg))
+
+
 def second_moments(tensor: np.ndarray) -> np.ndarray:
     """(3, 3) second moments of mass ``integral r r^T dm`` of a tensor about the same point."""
     return 0.5 * np.trace(tensor) * np.eye(3) - tensor

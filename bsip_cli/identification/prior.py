@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from bsip_cli.body.inertia import Inertia, readable_jacobian
+from bsip_cli.body.inertia import Inertia, readable_jacobian, rod_length_m
 from bsip_cli.body.person import Person
 
 # How the readable parameters of a left segment go with the right one's: Z points to the right on
@@ -20,14 +20,23 @@ _EDITIONS_APART_M = {"upper_torso": 0.019}
 _FORWARDS, _TILT = 1, 7  # of the readable parameters: com x, ixy
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Spread:
-    """How people stray from the table, as in configs/default.toml, [prior]."""
+    """How people stray from the table: one number, or one per segment with mass.
 
-    mass_sd_percent: float
-    com_sd_percent: float
+    Attributes
+    ----------
+    mass_sd_percent, inertia_sd_percent : scalars or (n,): of the mass; of the moments of a segment
+        of known mass.
+    com_sd_percent : scalar or (n, 3), segment axes: of the length of the rod that has the
+        segment's mass and mean moment of inertia.
+    midline_sd_m, left_right_correlation, total_mass_sd_percent : as in configs/default.toml.
+    """
+
+    mass_sd_percent: float | np.ndarray
+    com_sd_percent: float | np.ndarray
     midline_sd_m: float
-    inertia_sd_percent: float
+    inertia_sd_percent: float | np.ndarray
     left_right_correlation: float
     total_mass_sd_percent: float
 
@@ -142,38 +151,32 @@ def _own_spread(
     """(10 n, 10 n) readable parameters of independent changes: a heavier segment has the heavier
     tensor too."""
     blocks = []
-    for inertia, name in zip(inertias, names, strict=True):
-        sd = _readable_sd(inertia, spread)
+    mass = np.broadcast_to(spread.mass_sd_percent, len(names)) / 100
+    com = np.broadcast_to(spread.com_sd_percent, (len(names), 3)) / 100
+    moments = np.broadcast_to(spread.inertia_sd_percent, len(names)) / 100
+    for i, (inertia, name) in enumerate(zip(inertias, names, strict=True)):
+        sd = _readable_sd(inertia, mass[i], com[i], moments[i])
         if not _has_side(name):
             sd[_SIDEWAYS] = min(sd[_SIDEWAYS], spread.midline_sd_m)
         if name in _EDITIONS_APART_M:
             sd[_FORWARDS] = np.hypot(sd[_FORWARDS], _EDITIONS_APART_M[name])
             sd[_TILT] = np.hypot(sd[_TILT], inertia.readable()[_TILT])
         block = np.diag(sd)
-        block[4:, 0] = spread.mass_sd_percent / 100 * inertia.readable()[4:]
+        block[4:, 0] = mass[i] * inertia.readable()[4:]
         blocks.append(block)
     return block_diag(*blocks)
 
 
-def _readable_sd(inertia: Inertia, spread: Spread) -> np.ndarray:
-    """(10,) in the order of :meth:`Inertia.readable`."""
+def _readable_sd(inertia: Inertia, mass: float, com: np.ndarray, part: float) -> np.ndarray:
+    """(10,) in the order of :meth:`Inertia.readable`, from parts of the mass, of the rod's length
+    (3,) and of the moments."""
     moments = np.diag(inertia.tensor_kgm2)
     products = np.sqrt([moments[0] * moments[1], moments[0] * moments[2], moments[1] * moments[2]])
-    part = spread.inertia_sd_percent / 100
     return np.array(
         [
-            spread.mass_sd_percent / 100 * inertia.mass_kg,
-            *[spread.com_sd_percent / 100 * _rod_length_m(inertia)] * 3,
+            mass * inertia.mass_kg,
+            *(com * rod_length_m(inertia)),
             *(part * moments),
             *(0.5 * part * products),
         ]
     )
-
-
-def _rod_length_m(inertia: Inertia) -> float:
-    """Length of the rod whose mass lies as far from its centre, in the mean, as the segment's.
-
-    Near to the length of a limb; the tables' lengths of pelvis and hand are a third and a half of
-    what these segments measure.
-    """
-    return float(np.sqrt(6 * np.trace(inertia.tensor_kgm2) / inertia.mass_kg))

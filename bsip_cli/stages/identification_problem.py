@@ -20,7 +20,7 @@ from bsip_cli.identification.instruments import Instruments
 from bsip_cli.identification.noise import even_noise, noise_of
 from bsip_cli.identification.prior import Prior, Spread, likeliest, prior_of
 from bsip_cli.running.unit import Unit
-from bsip_cli.schemas import bsip_names
+from bsip_cli.schemas import bsip_names, spread_names
 from bsip_cli.stages.frames import WRENCH, acceleration_noise, coordinates_from
 from bsip_cli.stages.known_loads import load_phi
 from bsip_cli.study.study import Trial
@@ -42,9 +42,17 @@ def prior_from(
     fixed : as of :func:`prior_of`. other : standard deviations that stand for the configured ones.
     """
     bodies = list(person.skeleton.body_names)
-    rows = regression.set_index("segment").loc[bodies, list(bsip_names())].to_numpy()
-    spread = Spread(**{**unit.config.prior.model_dump(), **other})
+    table = regression.set_index("segment").loc[bodies]
+    rows = table[list(bsip_names())].to_numpy()
+    spread = spread_from(unit, table[list(spread_names())].to_numpy(), **other)
     return prior_of(tuple(from_readable(row) for row in rows), person, spread, fixed)
+
+
+def spread_from(unit: Unit, spreads: np.ndarray, **other: float) -> Spread:
+    """As configured, with the person's own ``spreads`` (n, 5): the columns of ``regression``."""
+    options = {**unit.config.prior.model_dump(), **other}
+    options["com_sd_percent"] = spreads[:, 1:4]
+    return Spread(mass_sd_percent=spreads[:, 0], inertia_sd_percent=spreads[:, 4], **options)
 
 
 def usable_frames(unit: Unit, trial: Trial) -> np.ndarray:

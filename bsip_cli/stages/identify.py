@@ -25,6 +25,7 @@ from bsip_cli.identification.movement_gain import advice
 from bsip_cli.identification.rarity import RARE, Rarity, rarity_of
 from bsip_cli.identification.uncertainty import readable
 from bsip_cli.running.unit import Unit
+from bsip_cli.schemas import spread_names
 from bsip_cli.stages.frames import WRENCH, bsip_table, person_from
 from bsip_cli.stages.identification_problem import (
     duration_s,
@@ -60,7 +61,7 @@ def run(unit: Unit) -> None:
     estimators = _estimators(unit)
     estimates = {method: estimate_by(name, problem) for method, name in estimators.items()}
     results = {method: readable(estimate, prior) for method, estimate in estimates.items()}
-    tables = [regression.drop(columns="note")]
+    tables = [regression.drop(columns=["note", *spread_names()])]
     for method, result in results.items():
         unit.warn(f"{unit.name}: {method} ({estimators[method]}): {estimates[method].note}")
         tables.append(
@@ -98,7 +99,7 @@ def _write_table_only(
         f"{unit.name}: {duration_s(recordings):.2f} s of motion with every contact on a plate, "
         f"needed are {_SHORTEST_S:g} s: nothing is identified, the table (RM) stands alone"
     )
-    unit.write("bsip", regression.drop(columns="note"))
+    unit.write("bsip", regression.drop(columns=["note", *spread_names()]))
     for kind in ("base-parameters", "excitation", "used-blocks"):
         unit.write(kind, empty_table(kind))
     facts = {"external_contacts": _as_records(contacts)}

@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.body.anthropometry import regress
-from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.body.inertia import Inertia, rod_length_m
+from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.body.strays import strays_of
 from bsip_cli.errors import BadDataError
-from bsip_cli.identification.prior import Spread, prior_of
+from bsip_cli.identification.prior import prior_of
 from bsip_cli.running.unit import Unit
+from bsip_cli.schemas import spread_names
 from bsip_cli.stages.frames import bsip_table, person_from
+from bsip_cli.stages.identification_problem import spread_from
 from bsip_cli.statistics.methods import RM
 
 
@@ -24,7 +28,27 @@ def run(unit: Unit) -> None:
     for segment, note in zip(skeleton.body_names, result.notes, strict=True):
         if note:
             unit.warn(f"{unit.name}: {segment}: {note}")
-    prior = prior_of(result.inertias, person, Spread(**unit.config.prior.model_dump()))
+    rows = [skeleton.table_rows[i] for i in skeleton.bodies]
+    strays = strays_of(facts["sex"], facts["mass_kg"], facts["height_m"], rows)
+    if strays.outside:
+        unit.warn(f"{unit.name}: {strays.outside}")
+    com = np.where(np.isnan(strays.com), unit.config.prior.com_sd_percent, strays.com)
+    com = np.hypot(com, _lengths_err(unit, skeleton, result.inertias))
+    spreads = np.column_stack([strays.mass, com, strays.moments])
+    prior = prior_of(result.inertias, person, spread_from(unit, spreads))
     values = np.array([inertia.readable() for inertia in prior.inertias])
     table = bsip_table(RM, skeleton.body_names, values, prior.readable_sd, np.zeros_like(values))
+    table[list(spread_names())] = spreads
     unit.write("regression", table.assign(note=list(result.notes)))
+
+
+def _lengths_err(unit: Unit, skeleton: Skeleton, inertias: tuple[Inertia, ...]) -> np.ndarray:
+    """(n, 3) by how much [% of the rod's length] centres of mass err because lengths do.
+
+    The table puts them at parts of the length, so they err by the same part of its error: after
+    refinement, or of the first guess where a length is not refined.
+    """
+    rows = unit.read("skeleton").set_index("segment").loc[list(skeleton.body_names)]
+    part = (rows["length_sd_m"] / rows["length_m"]).fillna(unit.config.scale.length_sd)
+    centres = np.array([np.abs(one.com_m) / rod_length_m(one) for one in inertias])
+    return 100 * part.to_numpy()[:, None] * centres

@@ -5,6 +5,8 @@ import pytest
 
 from bsip_cli.body.anthropometry import load_table, mean_length_m, regress, stature_m
 from bsip_cli.body.names import SEGMENTS
+from bsip_cli.simulate.inertia import Inertia, combined
+from bsip_cli.simulate.people import mean_segments
 from tests.body.standing_person import standing
 
 
@@ -131,3 +133,40 @@ def test_other_sexes_lie_halfway():
     assert mean_length_m("other", "thigh", None) == pytest.approx(
         (mean_length_m("M", "thigh", None) + mean_length_m("F", "thigh", None)) / 2
     )
+
+
+@pytest.mark.parametrize(("sex", "leaning_2007_deg"), [("M", 40), ("F", 42)])
+def test_the_torso_of_2015_stands_upright_and_further_ahead(sex, leaning_2007_deg):
+    old, new = (load_table(name)[sex, "torso"] for name in ("dumas2007", "dumas2015"))
+    leaning = []
+    for row in (old, new):
+        along = np.linalg.eigh(row.gyration)[1][:, 0]  # of the smallest moment
+        leaning.append(np.rad2deg(np.arccos(abs(along[1]))))
+    assert leaning[0] == pytest.approx(leaning_2007_deg, abs=1)
+    assert leaning[1] < 6
+    assert new.mass_fraction == pytest.approx(old.mass_fraction)
+    assert new.mean_length_m == pytest.approx(old.mean_length_m)
+    ahead = new.com[0] * new.mean_length_m - old.com[0] * old.mean_length_m
+    assert 0.015 < ahead < 0.020
+
+
+@pytest.mark.parametrize("sex", ["M", "F"])
+def test_the_torso_of_2015_is_the_sum_of_its_parts(sex):
+    mean = mean_segments(sex)  # the simulator's own copy of the numbers, united by its own code
+    parts, origins = [], [np.zeros(3), np.array([0.0, -mean["thorax"].length_m, 0.0])]
+    for name in ("thorax", "abdomen"):
+        row, share = mean[name], mean[name].mass_percent / 100
+        parts.append(Inertia(share, row.length_m * row.com, share * row.length_m**2 * row.tensor))
+    whole = combined(list(zip(parts, origins, strict=True)))
+    row = load_table("dumas2015")[sex, "torso"]
+    assert row.mass_fraction == pytest.approx(whole.mass_kg)
+    np.testing.assert_allclose(row.com * row.mean_length_m, whole.com_m, atol=1e-12)
+    np.testing.assert_allclose(
+        row.mass_fraction * row.mean_length_m**2 * row.gyration, whole.tensor_kgm2, rtol=1e-9
+    )
+
+
+def test_the_table_of_2015_differs_in_the_torso_alone():
+    old, new = load_table("dumas2007"), load_table("dumas2015")
+    differ = {key for key in old if not np.array_equal(old[key].gyration, new[key].gyration)}
+    assert differ == {("M", "torso"), ("F", "torso"), ("other", "torso")}

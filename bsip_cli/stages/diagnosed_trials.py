@@ -112,6 +112,12 @@ def weighed(unit: Unit, person: Person) -> Weighed:
     return Weighed(heavier, as_read, share, findings)
 
 
+def prior_of_shares(unit: Unit, person: Person) -> Prior:
+    """How the stated mass is shared out, whatever it is."""
+    none = np.zeros(len(person.skeleton.bodies), dtype=bool)
+    return prior_from(unit, unit.read("regression"), person, none, total_mass_sd_percent=0.0)
+
+
 def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:
     """Of the parameters, none of which is taken for known; the plates' gain shows against a mass
     that a scale has told.

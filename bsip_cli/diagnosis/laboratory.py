@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bsip_cli.diagnosis.error_model import WEIGHT, WEIGHT_OF_FAULTS
+from bsip_cli.diagnosis.error_model import WEIGHT_OF_FAULTS
 from bsip_cli.diagnosis.error_terms import SHARE
 from bsip_cli.diagnosis.fault_model import SIZES
 from bsip_cli.diagnosis.shared_faults import STATED_MASS, Coordinate, Information
@@ -47,18 +47,11 @@ class Persons:
         """(M, C) True where a person tells something of a coordinate."""
         return np.diagonal(self.precision, axis1=1, axis2=2) > 0
 
-    def without(self, number: int) -> Persons:
-        """All others."""
-        arrays = (self.precision, self.pull, self.usual)
-        precision, pull, usual = (np.delete(x, number, axis=0) for x in arrays)
+    def only(self, numbers: Sequence[int]) -> Persons:
+        """Some of them."""
+        mine = list(numbers)
+        precision, pull, usual = self.precision[mine], self.pull[mine], self.usual[mine]
         return replace(self, precision=precision, pull=pull, usual=usual)
-
-    @property
-    def weights(self) -> np.ndarray:
-        """(G,) how many observations count as much as what is usual of a group's deviations."""
-        is_mass = np.array([one.effect == STATED_MASS.name for one in self.coordinates])
-        ordinary = np.array([is_mass[self.groups == g].any() for g in range(self.groups.max() + 1)])
-        return np.where(ordinary, WEIGHT, WEIGHT_OF_FAULTS)
 
 
 def persons_of(
@@ -190,11 +183,17 @@ def anything(persons: Persons) -> np.ndarray:
     return np.diag(np.where(is_mass, persons.ordinary, SIZES[1]))
 
 
-def scales_of(persons: Persons) -> np.ndarray:
-    """(G,) of the deviations, of the largest evidence beside any faults of the laboratory."""
-    scale = np.ones(persons.groups.max() + 1)
+def scales_of(*parts: Persons) -> np.ndarray:
+    """(G,) of the deviations, of the largest evidence beside any faults of the laboratory; of
+    other sizes in each part of its persons."""
+    groups = parts[0].groups
+    counts, scale = np.zeros(groups.max() + 1), np.ones(groups.max() + 1)
+    np.add.at(counts, groups, sum(one.told.sum(axis=0) for one in parts))
     for _ in range(_STEPS):
-        before, scale = scale, _maximised(persons, squares_of(persons, scale))
+        before, sums = scale, np.zeros(len(scale))
+        for one in parts:
+            np.add.at(sums, groups, (squares_of(one, scale) * one.told).sum(axis=0))
+        scale = np.sqrt((WEIGHT_OF_FAULTS + sums) / (WEIGHT_OF_FAULTS + counts))
         if np.abs(scale / before - 1).max() < _STEADY:
             break
     return scale
@@ -211,15 +210,6 @@ def squares_of(persons: Persons, scale: np.ndarray) -> np.ndarray:
     return square / persons.usual**2
 
 
-def _maximised(persons: Persons, squares: np.ndarray) -> np.ndarray:
-    """(G,) scales from expected squares (M, C)."""
-    told = persons.told
-    sums, counts = np.zeros((2, persons.groups.max() + 1))
-    np.add.at(sums, persons.groups, (squares * told).sum(axis=0))
-    np.add.at(counts, persons.groups, told.sum(axis=0))
-    return np.sqrt((persons.weights + sums) / (persons.weights + counts))
-
-
-def log_prior_of_scales(persons: Persons, scale: np.ndarray) -> float:
+def log_prior_of_scales(scale: np.ndarray) -> float:
     """Logarithm of their density before the data, less a constant."""
-    return -0.5 * float((persons.weights * (2 * np.log(scale) + 1 / scale**2 - 1)).sum())
+    return -0.5 * WEIGHT_OF_FAULTS * float((2 * np.log(scale) + 1 / scale**2 - 1).sum())

@@ -59,12 +59,11 @@ def deviations_of(
     causes = (*lab.causes, *_stated_mass(lab))
     log_prior = log_prior_of(causes, prior_odds) - np.log(count + max(0, len(order) - 2))
     found: list[Deviation] = []
-    alone = [((k,), *_by_the_others(lab, k)) for k in _likeliest(lab, causes)]
-    since = [
-        (tuple(order[k:]), lab.sums, sums_of(persons, lab.scale, order[k:]))
-        for k in range(1, len(order) - 1)
-    ]
-    for sessions, total, own in (*alone, *since):
+    alone = [(k,) for k in range(count)] if count > 1 else []
+    since = [tuple(order[k:]) for k in range(1, len(order) - 1)]
+    likeliest = (*_likeliest(lab, causes, alone), *_likeliest(lab, causes, since))
+    judged = [(sessions, *_by_the_others(lab, sessions)) for sessions in likeliest]
+    for sessions, total, own in judged:
         posterior = lab.posterior(sums=total)
         offsets = [posterior.offset(own, one.directions) for one in causes]
         logs = _log_odds(offsets) + log_prior
@@ -88,25 +87,26 @@ def _stated_mass(lab: Laboratory) -> Iterator[Cause]:
     yield Cause(STATED_MASS.name, "", (STATED_MASS.parameter,), directions)
 
 
-def _likeliest(lab: Laboratory, causes: Sequence[Cause]) -> list[int]:
-    """The sessions that deviate most, with the scales of all: only of these the scales of the
-    others are fitted, which among many are the same."""
-    if len(lab.persons.pull) < 2:
-        return []
-    posterior = lab.posterior()
-    odds = []
-    for k in range(len(lab.persons.pull)):
-        own = sums_of(lab.persons, lab.scale, [k])
+def _likeliest(
+    lab: Laboratory, causes: Sequence[Cause], asked: Sequence[tuple[int, ...]]
+) -> list[tuple[int, ...]]:
+    """The sets of sessions that deviate most, with the scales of all: only of these the scales
+    beside their deviation are fitted, which among many sessions are the same."""
+    posterior, odds = lab.posterior(), []
+    for sessions in asked:
+        own = sums_of(lab.persons, lab.scale, sessions)
         odds.append(_log_odds([posterior.offset(own, one.directions) for one in causes]).max())
-    return sorted(np.argsort(odds)[-_JUDGED:].tolist())
+    return [asked[k] for k in sorted(np.argsort(odds)[-_JUDGED:].tolist())]
 
 
-def _by_the_others(lab: Laboratory, number: int) -> tuple[Sums, Sums]:
-    """What all tell and what one session tells, its deviations as large as those of the others."""
-    others = lab.persons.without(number)
-    scale = scales_of(others)
-    mine = sums_of(lab.persons, scale, [number])
-    return sums_of(others, scale).with_(mine), mine
+def _by_the_others(lab: Laboratory, sessions: tuple[int, ...]) -> tuple[Sums, Sums]:
+    """What all tell and what some sessions tell, with the scales of deviations from the others'
+    laboratory and from their own."""
+    others = lab.persons.only([k for k in range(len(lab.persons.pull)) if k not in sessions])
+    mine = lab.persons.only(sessions)
+    scale = scales_of(others, mine) if len(sessions) > 1 else scales_of(others)
+    own = sums_of(mine, scale)
+    return sums_of(others, scale).with_(own), own
 
 
 def _log_odds(offsets: Sequence[Offset]) -> np.ndarray:

@@ -260,7 +260,7 @@ def _drawn(lab: Laboratory, k: int, rng: np.random.Generator) -> np.ndarray:
         scale = np.where(touched, times * lab.scale, lab.scale)
         sums = sums_of(persons, scale)
         log = posterior_of(sums, anything(persons)).log_evidence
-        logs.append(log + log_prior_of_scales(persons, scale))
+        logs.append(log + log_prior_of_scales(scale))
         offsets.append(lab.posterior(k, sums).offset(sums, cause.directions))
     shares = np.exp(np.array(logs) - logsumexp(logs))
     counts = rng.multinomial(_DRAWS, shares / shares.sum())

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import norm
 
 from bsip_cli.diagnosis.error_model import WEIGHT_OF_FAULTS
 from bsip_cli.diagnosis.error_terms import SHARE
@@ -134,19 +135,30 @@ class Offset:
     precision: np.ndarray
     pull: np.ndarray
 
-    def log_factors(self, sizes: np.ndarray) -> np.ndarray:
+    def log_factors(self, sizes: np.ndarray, most: np.ndarray) -> np.ndarray:
         """(S,) logarithm of the Bayes factor that they are there, with these standard deviations
-        before the data."""
+        before the data, and none of them is larger than ``most`` (k,)."""
         values, vectors = np.linalg.eigh(self.precision)
         values, along = np.maximum(values, 0.0), vectors.T @ self.pull
         added = values + 1 / sizes[:, None] ** 2
         gains = along**2 / added - np.log(added * sizes[:, None] ** 2)
-        return np.asarray(0.5 * gains.sum(axis=1))
+        mean = (along / added) @ vectors.T
+        spread = np.sqrt((1 / added) @ (vectors**2).T)
+        after = _log_within(mean, spread, most).sum(axis=1)
+        before = _log_within(np.zeros_like(mean), sizes[:, None], most).sum(axis=1)
+        return np.asarray(0.5 * gains.sum(axis=1) + after - before)
 
     def of_size(self, size: float) -> tuple[np.ndarray, np.ndarray]:
         """Mean (k,) and covariance (k, k) if they are there."""
         covariance = np.linalg.inv(self.precision + np.eye(len(self.pull)) / size**2)
         return covariance @ self.pull, covariance
+
+
+def _log_within(mean: np.ndarray, spread: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """Logarithm of the probability of numbers within +-most, the sign being that of the mean."""
+    far = np.abs(mean)
+    inside, below = norm.logcdf((most - far) / spread), norm.logcdf((-most - far) / spread)
+    return np.asarray(inside + np.log1p(-np.exp(below - inside)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,7 +66,7 @@ def deviations_of(
     for sessions, total, own in judged:
         posterior = lab.posterior(sums=total)
         offsets = [posterior.offset(own, one.directions) for one in causes]
-        logs = _log_odds(offsets) + log_prior
+        logs = _log_odds(offsets, causes) + log_prior
         there = float(np.exp(logsumexp(logs) - np.logaddexp(0.0, logsumexp(logs))))
         if there < named_from:
             continue
@@ -95,7 +95,8 @@ def _likeliest(
     posterior, odds = lab.posterior(), []
     for sessions in asked:
         own = sums_of(lab.persons, lab.scale, sessions)
-        odds.append(_log_odds([posterior.offset(own, one.directions) for one in causes]).max())
+        offsets = [posterior.offset(own, one.directions) for one in causes]
+        odds.append(_log_odds(offsets, causes).max())
     return [asked[k] for k in sorted(np.argsort(odds)[-_JUDGED:].tolist())]
 
 
@@ -109,8 +110,9 @@ def _by_the_others(lab: Laboratory, sessions: tuple[int, ...]) -> tuple[Sums, Su
     return sums_of(others, scale).with_(own), own
 
 
-def _log_odds(offsets: Sequence[Offset]) -> np.ndarray:
-    logs = np.array([logsumexp(one.log_factors(BEFORE)) for one in offsets])
+def _log_odds(offsets: Sequence[Offset], causes: Sequence[Cause]) -> np.ndarray:
+    pairs = zip(offsets, causes, strict=True)
+    logs = np.array([logsumexp(one.log_factors(BEFORE, cause.most)) for one, cause in pairs])
     return logs - np.log(len(BEFORE))
 
 

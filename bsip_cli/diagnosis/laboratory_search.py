@@ -47,6 +47,11 @@ class Cause:
     parameters: tuple[Parameter, ...]
     directions: np.ndarray
 
+    @property
+    def most(self) -> np.ndarray:
+        """(k,) no number is larger [typical]."""
+        return np.array([one.most / one.typical for one in self.parameters])
+
 
 @dataclass(frozen=True, eq=False)
 class Size:
@@ -171,7 +176,7 @@ def _log_odds(lab: Laboratory, but: int | None = None) -> dict[int, tuple[float,
     found = {}
     for k, cause in enumerate(lab.causes):
         if k == but or k not in lab.found:
-            logs = posterior.offset(lab.sums, cause.directions).log_factors(BEFORE)
+            logs = posterior.offset(lab.sums, cause.directions).log_factors(BEFORE, cause.most)
             log = float(logsumexp(logs)) - np.log(len(BEFORE)) + lab.log_prior[k]
             found[k] = (log, float(BEFORE[int(np.argmax(logs))]))
     return found

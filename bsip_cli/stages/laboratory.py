@@ -64,16 +64,16 @@ def run(unit: Unit) -> None:
             f"the recordings are of {len(laboratories)} laboratories, by the places of their "
             f"plates: persons {counts}; each is judged by itself"
         )
-    for row in rows:
-        if row["verdict"] in ("named", "ambiguous"):
-            unit.warn(f"laboratory {row['laboratory']}: {row['sentence']}")
+    said = [row for row in rows if row["verdict"] in ("named", "ambiguous")]
+    for sentence in dict.fromkeys(f"laboratory {x['laboratory']}: {x['sentence']}" for x in said):
+        unit.warn(sentence)
     if not rows:
         sentence = "no recording has motion with every contact on a plate"
         unit.warn(f"laboratory: nothing can be said: {sentence}")
         rows = [_row(("inconclusive", "", ""), verdict="inconclusive", sentence=sentence)]
     table = pd.DataFrame(rows, columns=column_names("laboratory"))
     facts = {str(k): [s.name for s in one] for k, one in enumerate(laboratories, start=1)}
-    unit.write("laboratory", table.drop_duplicates(), {"sessions": facts})
+    unit.write("laboratory", table, {"sessions": facts})
 
 
 # --- reading ------------------------------------------------------------------------------------

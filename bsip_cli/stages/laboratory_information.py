@@ -23,6 +23,8 @@ from bsip_cli.stages.frames import person_from
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study.study import Trial
 
+_LEAST_SAMPLES = 3  # of the residual, by which an autoregression is defined: 0.3 s on the plates
+
 
 def run(unit: Unit) -> None:
     """Read motion, wrench, person and RM of all trials; write the information of each session."""
@@ -38,7 +40,7 @@ def run(unit: Unit) -> None:
             seen.setdefault(trial.session or "", []).append((trial, scene))
     rows, sessions = [], {}
     for session, mine in seen.items():
-        found = [diagnosed(unit, prior, *one) for one in mine]
+        found = [diagnosed(unit, prior, *one, _LEAST_SAMPLES) for one in mine]
         told = [one for one in found if one is not None and one.held is None]
         if any(one.moves for one in told):
             trials = [SharedTrial(one.errors, slow(one.scene)) for one in told]

@@ -297,7 +297,7 @@ STAGES = (
         "cohort",
         "An HTML report per participant and one for the cohort.",
         reads=("values", "comparisons", "person", "identification", "tables-files"),
-        reads_if_there=("overall-diagnosis", "report-files"),
+        reads_if_there=("overall-diagnosis", "laboratory", "report-files"),
         writes=("group-report-files",),
         options=("stats",),
         module="bsip_cli.stages.group_report",

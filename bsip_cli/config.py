@@ -152,6 +152,11 @@ class Diagnosis(Section):
     stated_mass_sd_percent: float = Field(gt=0)
 
 
+class Laboratory(Section):
+    between_persons: float = Field(gt=0)
+    recorded_on: dict[str, str]
+
+
 class Stats(Section):
     alpha: float = Field(gt=0, lt=1)
     equivalence_percent: float = Field(gt=0)
@@ -173,6 +178,7 @@ class Config(Section):
     identify: Identify
     reconstruct: Reconstruct
     diagnosis: Diagnosis
+    laboratory: Laboratory
     stats: Stats
 
     def only(self, names: Iterable[str]) -> Config:

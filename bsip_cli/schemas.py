@@ -219,6 +219,13 @@ _ERROR_BUDGET = (
     _text("alike", "terms from which these recordings hardly tell it"),
 )
 
+_FAULT = (
+    _text("effect", "name in the catalogue, stated_mass or inconclusive"),
+    _text("target", "plate or its channel; empty: clock, vertical, stated mass"),
+    _text("parameter", "name of the number"),
+    _text("unit", "of the number"),
+)
+
 SCHEMAS = {
     schema.kind: schema
     for schema in (
@@ -807,6 +814,49 @@ SCHEMAS = {
                 _text("stage", "stage that refused"),
                 _text("kind", "bad data or numerical failure"),
                 _text("sentence", "what was found, what was expected, what to do"),
+            ),
+        ),
+        Schema(
+            "laboratory-information",
+            "participant",
+            1,
+            "what a person's sessions tell of the faults of plates, clock and vertical",
+            (
+                _text("session", "label of the session; empty if there are none"),
+                *_FAULT,
+                Column("typical", "float", "as unit", "size that laboratories meet"),
+                Column("most", "float", "as unit", "no fault is larger"),
+                Column("known_to", "float", "as unit", "spread that no recording betters"),
+                Column("trials", "int", "1", "recordings that tell of it"),
+                Column("pull", "float", "1", "precision times likeliest sizes [typical]"),
+                Column("precision_*", "float", "1", "with the number of this row [per typical^2]"),
+            ),
+        ),
+        Schema(
+            "laboratory",
+            "cohort",
+            1,
+            "the faults of each laboratory by all persons together, and who deviates from it",
+            (
+                *_FAULT[:3],
+                Column("estimate", "float", "as unit", "size if the fault is there"),
+                _FAULT[3],
+                *_floats("ci_low ci_high", "as unit", "95 % interval"),
+                Column("probability", "float", "1", "that it is there, given what else is found"),
+                _text(
+                    "verdict",
+                    "named; ambiguous: one of its class_id; rejected; inconclusive: no possible "
+                    "size would have been named",
+                ),
+                Column("limit", "float", "as unit", "size that is named in 95 of 100 laboratories"),
+                Column("persons", "int", "1", "whose recordings tell of it"),
+                Column("trials", "int", "1", "recordings that tell of it"),
+                _text("since", "first session of a change; empty: in all of the laboratory's"),
+                _text("sentence", "for people"),
+                _text("laboratory", "1, 2 ... by the place of the plates, that of most persons 1"),
+                _text("class_id", "causes that cannot be told apart share it"),
+                _text("scope", "laboratory, session or person"),
+                _text("who", "session that deviates; empty: all, or all since one"),
             ),
         ),
         Schema(

@@ -11,6 +11,7 @@ import pandas as pd
 
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
 from bsip_cli.errors import BadDataError, UsageError, printable
+from bsip_cli.report.cohort.laboratory import named_sentences, unnamed_sentences
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.shared import SHARED, Searched, searched, shared_causes
 from bsip_cli.report.tables.build import show as tables_of
@@ -59,6 +60,7 @@ def shown(out: Path) -> Iterator[str]:
         except BadDataError as error:
             unread.append(folder.name)
             yield f"\n{error}"
+    yield from _laboratory(out)
     yield from _no_more_true(out, get_terminal_size().columns)
     yield from _shared_text(shared_causes(everybody), get_terminal_size().columns)
     for report in (out / "group" / "report.html", *sorted(out.glob("sub-*/report.html"))):
@@ -83,6 +85,15 @@ def _mass_notes(out: Path) -> Iterator[str]:
         note = "" if person is None else str(person["mass_note"].iloc[0])
         if note:
             yield _wrapped(f"{folder.name}: {note}", _width(get_terminal_size().columns))
+
+
+def _laboratory(out: Path) -> Iterator[str]:
+    """What is wrong with the plates and the clock that all share."""
+    path = out / "group" / "group_laboratory.parquet"
+    if path.exists():
+        table = read_artifact(path, "laboratory")
+        for sentence in (*named_sentences(table), *unnamed_sentences(table)):
+            yield _wrapped(sentence, _width(get_terminal_size().columns))
 
 
 def _choices(out: Path) -> Iterator[str]:

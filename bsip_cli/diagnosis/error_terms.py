@@ -42,7 +42,7 @@ JOINT_SD_M = {
     "ankle": 0.008,
 }
 # What every laboratory has of a fault of its instruments, part of the size that is met.
-_SHARE = 0.02
+SHARE = 0.02
 # Noise that no lab goes below: parts of body weight, and arms of it (half a millimetre) [m].
 LEAST = np.array([0.0003, 0.0003, 0.0005, 0.0005, 0.0005, 0.0001])
 _HEAVIER = 0.01  # usual error of the whole mass, part of it: a scale's, clothes and shoes
@@ -106,7 +106,7 @@ def _of_instruments(effect: Effect, scene: Scene, source: Scene) -> Iterator[Col
     ``source``: the trial whose plates read what is simulated."""
     for one in candidates_of(effect, scene):
         if not one.scanned:
-            wrench = _SHARE * one.signature(source)
+            wrench = SHARE * one.signature(source)
             scale = f"{FAULT}{effect.name} {one.target}"
             yield Columns(FAULT + effect.name, one.target, scale, not effect.of_the_lab, wrench)
 

@@ -112,6 +112,12 @@ def weighed(unit: Unit, person: Person) -> Weighed:
     return Weighed(heavier, as_read, share, findings)
 
 
+def prior_of_shares(unit: Unit, person: Person) -> Prior:
+    """How the stated mass is shared out, whatever it is."""
+    none = np.zeros(len(person.skeleton.bodies), dtype=bool)
+    return prior_from(unit, unit.read("regression"), person, none, total_mass_sd_percent=0.0)
+
+
 def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:
     """Of the parameters, none of which is taken for known; the plates' gain shows against a mass
     that a scale has told.
@@ -136,12 +142,14 @@ def is_weighed(unit: Unit) -> bool:
     return unit.read("person").iloc[0]["mass_source"] != PLATES
 
 
-def diagnosed(unit: Unit, prior: Prior, trial: Trial, scene: Scene) -> Diagnosed | None:
-    """None where the plates carry the person for hardly a sample."""
+def diagnosed(
+    unit: Unit, prior: Prior, trial: Trial, scene: Scene, least: int = _LEAST_SAMPLES
+) -> Diagnosed | None:
+    """None where the plates carry the person for fewer than ``least`` samples of the residual."""
     options, facts = unit.config.diagnosis, unit.read("person").iloc[0]
     fewer = slow(scene)
     filter_ = _about_surface(filter_of(fewer, options.cutoff_hz), scene)
-    if len(filter_.frames) < _LEAST_SAMPLES:
+    if len(filter_.frames) < least:
         return None
     full = at_full_rate(filter_, scene, options.cutoff_hz)
     measured, residual = full.one(scene.measured), full.one(scene.measured - scene.predicted)

@@ -1,8 +1,8 @@
 """Report (cohort): one HTML page with the papers' tables and the gain per participant.
 
 Reads values, comparisons, person, identification, tables-files, and where it is there
-overall-diagnosis; links to the participants' reports where report-files are there. Writes
-group-report-files.
+overall-diagnosis and laboratory; links to the participants' reports where report-files are there.
+Writes group-report-files.
 """
 
 from __future__ import annotations
@@ -66,6 +66,7 @@ def record_of(unit: Unit) -> CohortRecord:
         missing=tuple(_missing_sentence(gone) for gone in facts["missing"]),
         made=HowMade.of(_origins(unit)),
         steps=steps(),
+        laboratory=unit.read("laboratory") if unit.has("laboratory") else None,
     )
 
 
@@ -123,7 +124,8 @@ def _origins(unit: Unit) -> Iterator[Origin]:
     diagnosis found has its section."""
     for kind in unit.stage.inputs:
         if SCHEMAS[kind].level == "cohort":
-            yield origin_of(unit.path(kind), "")
+            if unit.has(kind):
+                yield origin_of(unit.path(kind), "")
         else:
             paths = {p.id: unit.path(kind, participant=p) for p in unit.study.participants}
             for name, path in paths.items():

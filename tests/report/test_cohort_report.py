@@ -5,14 +5,17 @@ from dataclasses import replace
 from html import unescape
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from bsip_cli.artifacts import empty_table
+from bsip_cli.report.blocks import Grid
 from bsip_cli.report.cohort.document import cohort_document
 from bsip_cli.report.cohort.ratios import Ratios
 from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.origins import HowMade
 from bsip_cli.report.words import MISSING
+from bsip_cli.schemas import column_names
 from bsip_cli.stages.group_report import record_of
 from tests.report.fake_study import Artifacts
 
@@ -91,3 +94,53 @@ def test_second_run_gives_the_same_bytes(reports):
     for _, row in before.iterrows():
         content = (reports.out / row["file"]).read_bytes()
         assert hashlib.sha256(content).hexdigest() == row["sha256"]
+
+
+def laboratory(verdict: str, probability: float) -> pd.DataFrame:
+    """A delay in a laboratory of seven persons."""
+    row = dict.fromkeys(column_names("laboratory"), "") | {
+        "effect": "sync_offset",
+        "parameter": "delay",
+        "estimate": 0.011,
+        "unit": "s",
+        "ci_low": 0.009,
+        "ci_high": 0.013,
+        "probability": probability,
+        "verdict": verdict,
+        "limit": 0.006,
+        "persons": 7,
+        "trials": 20,
+        "sentence": "the forces were recorded 11 ms after the markers",
+        "laboratory": "1",
+        "scope": "laboratory",
+    }
+    return pd.DataFrame([row])
+
+
+def of_laboratory(reports, table: pd.DataFrame | None) -> tuple[str, list[list[str]]]:
+    record = replace(record_of(reports.unit("report")), laboratory=table)
+    document = cohort_document(record)
+    (section,) = [one for one in document.sections if one.anchor == "laboratory"]
+    texts = [getattr(block, "text", "") for block in section.blocks]
+    texts += [item for block in section.blocks for item in getattr(block, "items", ())]
+    grids = [block for block in section.blocks if isinstance(block, Grid)]
+    rows = [[cell.text for cell in row] for grid in grids for row in grid.cells()]
+    return " ".join(texts), rows
+
+
+def test_a_fault_of_the_laboratory_is_told_with_its_numbers(reports):
+    text, rows = of_laboratory(reports, laboratory("named", 0.9999))
+    assert "Laboratory 1: the forces were recorded 11 ms after the markers." in text
+    assert rows[0][3:] == ["11 ms", "9.0 ms to 13 ms", "6.0 ms", "over 99.9 %", "7"]
+
+
+def test_a_sound_laboratory_is_told_with_what_would_have_been_seen(reports):
+    text, _ = of_laboratory(reports, laboratory("rejected", 0.01))
+    assert "no fault of plates, clock or vertical was named" in text
+    assert "would have shown a delay of 6.0 ms" in text
+
+
+def test_a_cohort_whose_laboratory_was_not_asked(reports):
+    text, rows = of_laboratory(reports, None)
+    assert "run `bsip laboratory`" in text
+    assert not rows

@@ -258,3 +258,20 @@ def test_a_trial_that_cannot_take_it_is_copied_as_it_is_and_said(tmp_path, trc, 
     assert "where the plates lie" in capsys.readouterr().err
     for file in study.iterdir():
         assert (tmp_path / "out" / "sub-01" / file.name).read_bytes() == file.read_bytes()
+
+
+def test_an_origin_from_the_centre_to_the_sensor(recorded, tmp_path):
+    """As some laboratories write it: with the opposite sign, sideways too."""
+    c3d = ezc3d.c3d(str(recorded))
+    origin = c3d["parameters"]["FORCE_PLATFORM"]["ORIGIN"]
+    value = np.asarray(origin["value"], dtype=float)
+    sideways = np.array([3.0, -2.0, 0.0])[:, None]
+    origin["value"] = sideways - np.sign(value[2]) * value * np.array([0, 0, -1.0])[:, None]
+    assert (origin["value"][2] > 0).all()
+    source, copy = tmp_path / recorded.name, tmp_path / "copy.c3d"
+    c3d.write(str(source))
+    inject_recording(source, copy, [effect_of("plate_gain", 0.05, "fz,plate=1")])
+    before, after = (read_recording(file).plates[0].force_N for file in (source, copy))
+    loaded = before[:, 2] > 100
+    assert after[loaded, 2] / before[loaded, 2] == pytest.approx(1.05, abs=1e-4)
+    assert np.allclose(after[:, :2], before[:, :2], atol=1e-3)

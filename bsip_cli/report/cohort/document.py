@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from bsip_cli.report.blocks import Document
-from bsip_cli.report.cohort import diagnoses, gain, limits, people, published_tables, summary
+from bsip_cli.report.cohort import (
+    diagnoses,
+    gain,
+    laboratory,
+    limits,
+    people,
+    published_tables,
+    summary,
+)
 from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.words import WHAT_METHODS_ARE
 
@@ -11,6 +19,7 @@ SECTIONS = (
     summary.section,
     people.section,
     diagnoses.section,
+    laboratory.section,
     gain.section,
     published_tables.section,
     limits.section,

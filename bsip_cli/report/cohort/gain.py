@@ -1,4 +1,4 @@
-"""Section 4: the gain of identification, participant by participant."""
+"""Section 5: the gain of identification, participant by participant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Section 6: what to mind, warnings, options and versions."""
+"""Section 7: what to mind, warnings, options and versions."""
 
 from __future__ import annotations
 

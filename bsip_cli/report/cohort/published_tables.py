@@ -1,4 +1,4 @@
-"""Section 5: the papers' six tables with their legends."""
+"""Section 6: the papers' six tables with their legends."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class Member:
 class CohortRecord:
     """Attributes: ``ratios`` of the errors of the methods; ``task_errors`` of an error's name in
     table 4; ``missing`` sentences on who is in no table; ``table_files`` relative to OUT;
-    ``steps`` the stages in order."""
+    ``steps`` the stages in order; ``laboratory`` the table of that kind, if there."""
 
     members: tuple[Member, ...]
     ratios: Ratios
@@ -43,3 +43,4 @@ class CohortRecord:
     missing: tuple[str, ...]
     made: HowMade
     steps: tuple[Step, ...]
+    laboratory: pd.DataFrame | None = None

@@ -120,9 +120,11 @@ def _of_eight(a: float, b: float) -> np.ndarray:
 
 
 def _sensors(kind: int, origin_m: np.ndarray) -> list[np.ndarray]:
-    """Where the surface's centre may lie from the sensor, plate axes."""
+    """Where the surface's centre may lie from the sensor, plate axes: as is written, with the
+    other height, or, as the format means it where the height is positive, from the centre to the
+    sensor."""
     place = np.array([0.0, 0.0, origin_m[2]]) if kind == 3 else origin_m
-    return [place * [1.0, 1.0, sign] for sign in (1.0, -1.0)]
+    return [place, place * [1.0, 1.0, -1.0], -place]
 
 
 def _agrees(wired: WiredPlate, analogs: np.ndarray, extracted: Any, unit: float) -> bool:

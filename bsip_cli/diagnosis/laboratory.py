@@ -1,0 +1,227 @@
+"""The shared faults of all who were recorded in one laboratory, as one small Gaussian model.
+
+Each person's recordings tell something of the shared faults (``shared_faults``): of theta + d, with
+theta the laboratory's sizes and d the person's own deviation, since nobody's body and skin are just
+as the model has them. How large deviations are follows from the data, by kind of number (a random
+effect, its variance by expectation and maximisation: Dempster 1977, J R Stat Soc B 39; Laird and
+Ware 1982, Biometrics 38). With J and h a person's precision and pull and T^2 the variance of d, the
+person adds J - J V J and h - J V h to what is known of theta, V = (J + T^-2)^-1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import norm
+
+from bsip_cli.diagnosis.error_model import WEIGHT_OF_FAULTS
+from bsip_cli.diagnosis.error_terms import SHARE
+from bsip_cli.diagnosis.fault_model import SIZES
+from bsip_cli.diagnosis.shared_faults import STATED_MASS, Coordinate, Information
+from bsip_cli.effects.effect import Parameter
+
+_STEPS = 100  # of expectation and maximisation, at most
+_STEADY = 0.01  # change of every scale
+
+
+@dataclass(frozen=True, eq=False)
+class Persons:
+    """What M persons tell of C coordinates [typical sizes].
+
+    precision (M, C, C), pull (M, C) : of each alone; 0 where nothing is told.
+    usual (M, C) : standard deviation of the deviations before the data. groups (C,) : whose
+    deviations have one scale. ordinary (C,) : what every laboratory has of a fault.
+    """
+
+    coordinates: tuple[Coordinate, ...]
+    parameters: tuple[Parameter, ...]
+    precision: np.ndarray
+    pull: np.ndarray
+    usual: np.ndarray
+    groups: np.ndarray
+    ordinary: np.ndarray
+
+    @property
+    def told(self) -> np.ndarray:
+        """(M, C) True where a person tells something of a coordinate."""
+        return np.diagonal(self.precision, axis1=1, axis2=2) > 0
+
+    def only(self, numbers: Sequence[int]) -> Persons:
+        """Some of them."""
+        mine = list(numbers)
+        precision, pull, usual = self.precision[mine], self.pull[mine], self.usual[mine]
+        return replace(self, precision=precision, pull=pull, usual=usual)
+
+
+def persons_of(
+    informations: Sequence[Information], mass_sd: Sequence[float], deviation: float
+) -> Persons:
+    """Lay out what was kept of each.
+
+    mass_sd : (M,) standard deviation of each stated mass, part of it. deviation : usual standard
+    deviation from person to person [typical].
+    """
+    known = {
+        x: p for one in informations for x, p in zip(one.coordinates, one.parameters, strict=True)
+    }
+    coordinates = tuple(sorted(known))
+    count = len(coordinates)
+    precision, pull = np.zeros((len(informations), count, count)), np.zeros((len(mass_sd), count))
+    for k, one in enumerate(informations):
+        at = [coordinates.index(x) for x in one.coordinates]
+        precision[k][np.ix_(at, at)], pull[k, at] = one.precision, one.pull
+    is_mass = np.array([one.effect == STATED_MASS.name for one in coordinates])
+    masses = np.array(mass_sd) / STATED_MASS.parameter.typical
+    kinds = [(one.effect, *one.target.split(" ")[1:], one.parameter) for one in coordinates]
+    numbers = {kind: k for k, kind in enumerate(dict.fromkeys(kinds))}
+    return Persons(
+        coordinates,
+        tuple(known[one] for one in coordinates),
+        precision,
+        pull,
+        np.where(is_mass, masses[:, None], deviation),
+        np.array([numbers[kind] for kind in kinds]),
+        np.where(is_mass, np.median(masses), SHARE),  # one scale weighs all: it may err too
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Precision (C, C) and pull (C,) of the laboratory's sizes by all persons, whose deviations are
+    integrated out; ``log_factor``: of the evidence, that the deviations are of this size."""
+
+    precision: np.ndarray
+    pull: np.ndarray
+    log_factor: float
+
+    def with_(self, others: Sums) -> Sums:
+        """And what some others tell."""
+        return Sums(
+            self.precision + others.precision,
+            self.pull + others.pull,
+            self.log_factor + others.log_factor,
+        )
+
+
+def sums_of(persons: Persons, scale: np.ndarray, who: Iterable[int] | None = None) -> Sums:
+    """Of all persons or some; scale (G,) times what is usual: of their deviations."""
+    mine = slice(None) if who is None else list(who)
+    precision, pull = persons.precision[mine], persons.pull[mine]
+    spread = persons.usual[mine] * scale[persons.groups]
+    variance, volume = _deviations(precision, spread)
+    across = precision @ variance
+    along = np.einsum("mij,mj->mi", variance, pull)
+    return Sums(
+        (precision - across @ precision).sum(axis=0),
+        (pull - np.einsum("mij,mj->mi", precision, along)).sum(axis=0),
+        0.5 * float((pull * along).sum()) - 0.5 * float(volume.sum()),
+    )
+
+
+def _deviations(precision: np.ndarray, spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(M, C, C) covariance of each person's deviations (M, C) given the laboratory's sizes, and
+    (M,) logarithm of how much less volume than before the data."""
+    inner = spread[:, :, None] * precision * spread[:, None] + np.eye(spread.shape[1])
+    variance = spread[:, :, None] * np.linalg.inv(inner) * spread[:, None]
+    return variance, np.linalg.slogdet(inner)[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Offset:
+    """What is told of k more numbers [typical]: precision (k, k) and pull (k,)."""
+
+    precision: np.ndarray
+    pull: np.ndarray
+
+    def log_factors(self, sizes: np.ndarray, most: np.ndarray) -> np.ndarray:
+        """(S,) logarithm of the Bayes factor that they are there, with these standard deviations
+        before the data, and none of them is larger than ``most`` (k,)."""
+        values, vectors = np.linalg.eigh(self.precision)
+        values, along = np.maximum(values, 0.0), vectors.T @ self.pull
+        added = values + 1 / sizes[:, None] ** 2
+        gains = along**2 / added - np.log(added * sizes[:, None] ** 2)
+        mean = (along / added) @ vectors.T
+        spread = np.sqrt((1 / added) @ (vectors**2).T)
+        after = _log_within(mean, spread, most).sum(axis=1)
+        before = _log_within(np.zeros_like(mean), sizes[:, None], most).sum(axis=1)
+        return np.asarray(0.5 * gains.sum(axis=1) + after - before)
+
+    def of_size(self, size: float) -> tuple[np.ndarray, np.ndarray]:
+        """Mean (k,) and covariance (k, k) if they are there."""
+        covariance = np.linalg.inv(self.precision + np.eye(len(self.pull)) / size**2)
+        return covariance @ self.pull, covariance
+
+
+def _log_within(mean: np.ndarray, spread: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """Logarithm of the probability of numbers within +-most, the sign being that of the mean."""
+    far = np.abs(mean)
+    inside, below = norm.logcdf((most - far) / spread), norm.logcdf((-most - far) / spread)
+    return np.asarray(inside + np.log1p(-np.exp(below - inside)))
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Of sizes: mean (C,), covariance (C, C), and the logarithm of the evidence."""
+
+    mean: np.ndarray
+    covariance: np.ndarray
+    log_evidence: float
+
+    def offset(self, sums: Sums, directions: np.ndarray) -> Offset:
+        """What is told of sizes along ``directions`` (C, k) that some persons have on top of this.
+
+        sums : of these persons, who are among those that this rests on.
+        """
+        along = sums.precision @ directions
+        precision = directions.T @ along - along.T @ self.covariance @ along
+        return Offset(precision, directions.T @ sums.pull - along.T @ self.mean)
+
+
+def posterior_of(sums: Sums, root: np.ndarray) -> Posterior:
+    """With covariance ``root`` (C, K) root' before the data."""
+    inner = root.T @ sums.precision @ root + np.eye(root.shape[1])
+    against = root.T @ sums.pull
+    inverse = np.linalg.inv(inner)
+    along = inverse @ against
+    log = 0.5 * float(against @ along) - 0.5 * float(np.linalg.slogdet(inner)[1]) + sums.log_factor
+    return Posterior(root @ along, root @ inverse @ root.T, log)
+
+
+def anything(persons: Persons) -> np.ndarray:
+    """(C, C) root of the covariance if every fault may be there, and large."""
+    is_mass = [one.effect == STATED_MASS.name for one in persons.coordinates]
+    return np.diag(np.where(is_mass, persons.ordinary, SIZES[1]))
+
+
+def scales_of(*parts: Persons) -> np.ndarray:
+    """(G,) of the deviations, of the largest evidence beside any faults of the laboratory; of
+    other sizes in each part of its persons."""
+    groups = parts[0].groups
+    counts, scale = np.zeros(groups.max() + 1), np.ones(groups.max() + 1)
+    np.add.at(counts, groups, sum(one.told.sum(axis=0) for one in parts))
+    for _ in range(_STEPS):
+        before, sums = scale, np.zeros(len(scale))
+        for one in parts:
+            np.add.at(sums, groups, (squares_of(one, scale) * one.told).sum(axis=0))
+        scale = np.sqrt((WEIGHT_OF_FAULTS + sums) / (WEIGHT_OF_FAULTS + counts))
+        if np.abs(scale / before - 1).max() < _STEADY:
+            break
+    return scale
+
+
+def squares_of(persons: Persons, scale: np.ndarray) -> np.ndarray:
+    """(M, C) expected squares of the deviations, times what is usual."""
+    found = posterior_of(sums_of(persons, scale), anything(persons))
+    variance, _ = _deviations(persons.precision, persons.usual * scale[persons.groups])
+    taken = variance @ persons.precision
+    mean = np.einsum("mij,mj->mi", variance, persons.pull) - taken @ found.mean
+    square = mean**2 + np.diagonal(variance, axis1=1, axis2=2)
+    square += np.einsum("mij,jk,mik->mi", taken, found.covariance, taken, optimize=True)
+    return square / persons.usual**2
+
+
+def log_prior_of_scales(scale: np.ndarray) -> float:
+    """Logarithm of their density before the data, less a constant."""
+    return -0.5 * WEIGHT_OF_FAULTS * float((2 * np.log(scale) + 1 / scale**2 - 1).sum())

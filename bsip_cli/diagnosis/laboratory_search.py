@@ -1,0 +1,300 @@
+"""Which faults a laboratory has: one after the other, while one more is likelier than none."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from string import ascii_uppercase
+
+import numpy as np
+from scipy.special import expit, logit, logsumexp
+
+from bsip_cli.diagnosis.detection import named_size
+from bsip_cli.diagnosis.fault_model import SIZES
+from bsip_cli.diagnosis.findings import SCALE_ERROR
+from bsip_cli.diagnosis.laboratory import (
+    Offset,
+    Persons,
+    Posterior,
+    Sums,
+    anything,
+    log_prior_of_scales,
+    posterior_of,
+    scales_of,
+    sums_of,
+)
+from bsip_cli.diagnosis.shared_faults import OF_A_LABORATORY, Coordinate
+from bsip_cli.effects.effect import Parameter
+from bsip_cli.effects.plate_frame import ALL
+from bsip_cli.effects.plate_rotation import PlateRotation
+from bsip_cli.effects.plate_translation import PlateTranslation
+from bsip_cli.effects.plate_zero import PlateZero
+
+BEFORE = np.geomspace(*SIZES, 5)  # sizes before the data, evenly in the logarithm [typical]
+_TIMES = np.geomspace(0.3, 3.0, 5)  # deviations so many times as large as is likeliest
+_MOST = 8  # faults of a laboratory
+_DRAWS = 4000
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """A fault at a place: its k numbers are directions (C, k) among the C coordinates."""
+
+    effect: str
+    target: str
+    parameters: tuple[Parameter, ...]
+    directions: np.ndarray
+
+    @property
+    def most(self) -> np.ndarray:
+        """(k,) no number is larger [typical]."""
+        return np.array([one.most / one.typical for one in self.parameters])
+
+
+@dataclass(frozen=True, eq=False)
+class Size:
+    """A number of a cause if it is there, with its 95 % interval, and the size that would have been
+    named; infinite where no possible one would."""
+
+    parameter: Parameter
+    value: float
+    low: float
+    high: float
+    limit: float
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What is made of a cause, given the others that are there.
+
+    said : named; ambiguous: it is one of those of its ``class_id``, which cannot be told apart;
+    rejected; or inconclusive: even ten times what laboratories meet would not have been named.
+    probability : that it is there, and not another one in its place.
+    """
+
+    cause: Cause
+    said: str
+    class_id: str
+    probability: float
+    sizes: tuple[Size, ...]
+
+
+def causes_of(persons: Persons, centres_m: Mapping[str, np.ndarray]) -> tuple[Cause, ...]:
+    """Every fault at every plate and, where there are several, at all of them.
+
+    centres_m : (3,) of each plate's surface; all plates are turned about the middle of them.
+    """
+    found = []
+    for effect in OF_A_LABORATORY:
+        mine = [one.target for one in persons.coordinates if one.effect == effect.name]
+        alike: dict[str, list[str]] = {}
+        for target in dict.fromkeys(mine):
+            found.append(_cause(persons, effect.name, target, [target], centres_m))
+            plate, *channel = target.split(" ")
+            if plate and not isinstance(effect, PlateZero):
+                alike.setdefault(" ".join([ALL, *channel]), []).append(target)
+        for name, parts in alike.items():
+            if len(parts) > 1:
+                found.append(_cause(persons, effect.name, name, parts, centres_m))
+    return tuple(found)
+
+
+def _cause(
+    persons: Persons,
+    effect: str,
+    target: str,
+    parts: Sequence[str],
+    centres_m: Mapping[str, np.ndarray],
+) -> Cause:
+    known = dict(zip(persons.coordinates, persons.parameters, strict=True))
+    at = {one: k for k, one in enumerate(persons.coordinates)}
+    mine = [p for one, p in known.items() if (one.effect, one.target) == (effect, parts[0])]
+    directions = np.zeros((len(at), len(mine)))
+    for part, (k, parameter) in product(parts, enumerate(mine)):
+        directions[at[Coordinate(effect, part, parameter.name)], k] = 1.0
+    if effect == PlateRotation.name and len(parts) > 1:
+        middle = np.mean([centres_m[part] for part in parts], axis=0)
+        turns = {f"{word}": axis for word, axis in zip(_TURNS, np.eye(3), strict=True)}
+        for part, (k, parameter) in product(parts, enumerate(mine)):
+            shift_m = np.cross(turns[parameter.name], centres_m[part] - middle)
+            for axis, metres in zip("xyz", parameter.typical * shift_m, strict=True):
+                moved = Coordinate(PlateTranslation.name, part, axis)
+                directions[at[moved], k] = metres / known[moved].typical
+    return Cause(effect, target, tuple(mine), directions)
+
+
+_TURNS = ("tilt_x", "tilt_y", "yaw")
+
+
+def log_prior_of(causes: Sequence[Cause], prior_odds: float) -> np.ndarray:
+    """(K,) logarithm of the odds before the data: even over names, and over the places of each."""
+    places = Counter(one.effect for one in causes)
+    return np.log(prior_odds) - np.log([len(places) * places[one.effect] for one in causes])
+
+
+@dataclass(frozen=True, eq=False)
+class Laboratory:
+    """The faults that are there, of sizes before the data [typical], by all persons together.
+
+    scale (G,) : of the persons' deviations. log_prior (K,) : of ``causes``.
+    """
+
+    persons: Persons
+    causes: tuple[Cause, ...]
+    log_prior: np.ndarray
+    scale: np.ndarray
+    sums: Sums
+    found: Mapping[int, float]
+
+    def posterior(self, but: int | None = None, sums: Sums | None = None) -> Posterior:
+        """Of the coordinates, of all that is there but one fault."""
+        there = [s * self.causes[k].directions for k, s in self.found.items() if k != but]
+        root = np.column_stack([np.diag(self.persons.ordinary), *there])
+        return posterior_of(self.sums if sums is None else sums, root)
+
+
+def laboratory_of(persons: Persons, causes: tuple[Cause, ...], prior_odds: float) -> Laboratory:
+    """Fit the deviations beside any fault, and then look for what is there."""
+    scale = scales_of(persons)
+    log_prior = log_prior_of(causes, prior_odds)
+    lab = Laboratory(persons, causes, log_prior, scale, sums_of(persons, scale), {})
+    while len(lab.found) < _MOST:
+        odds = _log_odds(lab)
+        best = max(odds, key=lambda k: odds[k][0], default=None)
+        if best is None or odds[best][0] < 0:
+            break
+        lab = replace(lab, found={**lab.found, best: odds[best][1]})
+    return _without_the_unlikely(lab)
+
+
+def _log_odds(lab: Laboratory, but: int | None = None) -> dict[int, tuple[float, float]]:
+    """Of each cause that is not there: logarithm of the odds that it is too, and its likeliest size
+    before the data. ``but`` : a fault that counts as not there."""
+    posterior = lab.posterior(but)
+    found = {}
+    for k, cause in enumerate(lab.causes):
+        if k == but or k not in lab.found:
+            logs = posterior.offset(lab.sums, cause.directions).log_factors(BEFORE, cause.most)
+            log = float(logsumexp(logs)) - np.log(len(BEFORE)) + lab.log_prior[k]
+            found[k] = (log, float(BEFORE[int(np.argmax(logs))]))
+    return found
+
+
+def _without_the_unlikely(lab: Laboratory) -> Laboratory:
+    """Each fault given the others; one that is likelier absent goes, the least likely first."""
+    while lab.found:
+        odds = {k: _log_odds(lab, but=k)[k] for k in lab.found}
+        lab = replace(lab, found={k: size for k, (_, size) in odds.items()})
+        worst = min(odds, key=lambda k: odds[k][0])
+        if odds[worst][0] > 0:
+            break
+        lab = replace(lab, found={k: s for k, s in lab.found.items() if k != worst})
+    return lab
+
+
+def verdicts_of(
+    lab: Laboratory, named_from: float, rng: np.random.Generator
+) -> tuple[Verdict, ...]:
+    """Of every cause, what is there first."""
+    said: dict[int, tuple[str, str, float]] = {}
+    letters = iter(ascii_uppercase)
+    for k in lab.found:
+        shares = _shares(lab, k)
+        if shares[k] >= named_from:
+            said[k] = ("named", "", shares[k])
+        elif sum(shares.values()) >= named_from:
+            letter = next(letters)
+            for member in smallest(shares, named_from):
+                said.setdefault(member, ("ambiguous", letter, shares[member]))
+        else:
+            said[k] = ("rejected", "", shares[k])
+    rest = _log_odds(lab)
+    for k in range(len(lab.causes)):
+        said.setdefault(k, ("rejected", "", float(expit(rest[k][0])) if k in rest else 0.0))
+    order = sorted(said, key=lambda k: (_RANKS.index(said[k][0]), said[k][1], -said[k][2]))
+    return tuple(_verdict(lab, k, *said[k], named_from, rng) for k in order)
+
+
+_RANKS = ("named", "ambiguous", "rejected")
+
+
+def _shares(lab: Laboratory, number: int) -> dict[int, float]:
+    """Probabilities that a fault, or another one in its place, is there given the others."""
+    logs = {k: log for k, (log, _) in _log_odds(lab, but=number).items()}
+    total = logsumexp([0.0, *logs.values()])
+    return {k: float(np.exp(log - total)) for k, log in logs.items()}
+
+
+def smallest(shares: Mapping[int, float], least: float) -> Iterator[int]:
+    """The fewest that hold as much probability."""
+    held = 0.0
+    for k, share in sorted(shares.items(), key=lambda one: -one[1]):
+        yield k
+        held += share
+        if held >= least:
+            return
+
+
+def _verdict(
+    lab: Laboratory,
+    k: int,
+    said: str,
+    class_id: str,
+    probability: float,
+    named_from: float,
+    rng: np.random.Generator,
+) -> Verdict:
+    cause = lab.causes[k]
+    needed = needed_of(lab.log_prior[k], named_from)
+    sizes = sizes_of(_drawn(lab, k, rng), cause.parameters, needed, rng)
+    if said == "rejected" and all(np.isinf(one.limit) for one in sizes):
+        said = "inconclusive"
+    return Verdict(cause, said, class_id, probability, sizes)
+
+
+def _drawn(lab: Laboratory, k: int, rng: np.random.Generator) -> np.ndarray:
+    """(D, k) sizes [typical] of a cause from the posterior if it is there, over how large the
+    persons' deviations may be: few persons do not tell it."""
+    cause, persons = lab.causes[k], lab.persons
+    touched = np.zeros(len(lab.scale), dtype=bool)
+    touched[persons.groups[cause.directions.any(axis=1)]] = True
+    offsets, logs = [], []
+    for times in _TIMES:
+        scale = np.where(touched, times * lab.scale, lab.scale)
+        sums = sums_of(persons, scale)
+        log = posterior_of(sums, anything(persons)).log_evidence
+        logs.append(log + log_prior_of_scales(scale))
+        offsets.append(lab.posterior(k, sums).offset(sums, cause.directions))
+    shares = np.exp(np.array(logs) - logsumexp(logs))
+    counts = rng.multinomial(_DRAWS, shares / shares.sum())
+    return np.concatenate(
+        [_drawn_from(one, n, rng) for one, n in zip(offsets, counts, strict=True)]
+    )
+
+
+def _drawn_from(one: Offset, count: int, rng: np.random.Generator) -> np.ndarray:
+    mean, covariance = one.of_size(SIZES[1])
+    return rng.multivariate_normal(mean, covariance, count, check_valid="ignore")
+
+
+def needed_of(log_prior: float, named_from: float) -> float:
+    """Logarithm of the Bayes factor that names a cause."""
+    return float(logit(named_from) - log_prior)
+
+
+def sizes_of(
+    drawn: np.ndarray, parameters: Sequence[Parameter], needed: float, rng: np.random.Generator
+) -> tuple[Size, ...]:
+    """From draws (D, k) [typical]; needed : logarithm of the Bayes factor that names it."""
+    found = []
+    for x, parameter in zip(drawn.T, parameters, strict=True):
+        value = float(x.mean())
+        spread = np.hypot(parameter.known_to / parameter.typical, SCALE_ERROR * value)
+        low, high = np.percentile(x + spread * rng.standard_normal(len(x)), [2.5, 97.5])
+        limit = named_size(float(x.std()), needed)
+        limit = limit if limit * parameter.typical < parameter.most else np.inf
+        sizes = (float(one) * parameter.typical for one in (value, low, high, limit))
+        found.append(Size(parameter, *sizes))
+    return tuple(found)

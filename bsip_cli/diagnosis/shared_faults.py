@@ -1,0 +1,119 @@
+"""What one person's recordings tell of the faults that they share with others.
+
+The plates, the clock and the vertical belong to a laboratory, body and skin to a person. Of the
+person's equations only those of the shared faults are kept: of the white normal equations
+[G_oo G_os; G_so G_ss] x = [a_o; a_s] what is left when the own coefficients, of covariance R, are
+integrated out, G_ss - G_so (G_oo + R^-1)^-1 G_os and the like. These sum over persons.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.ndimage import binary_erosion
+
+from bsip_cli.diagnosis.error_terms import FAULT, INERTIA, as_simulated, is_of_instruments
+from bsip_cli.diagnosis.fault_model import FaultTrial, Fitted, fitted, session_of, summed
+from bsip_cli.diagnosis.hypothesis import Hypothesis
+from bsip_cli.effects.catalogue import CATALOGUE
+from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.plate_frame import ALL
+from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.stated_mass import StatedMass
+
+STATED_MASS = StatedMass()
+OF_A_LABORATORY: tuple[Effect, ...] = tuple(
+    effect for effect in CATALOGUE if effect.of_the_lab and is_of_instruments(effect)
+)
+_MARGIN_S = 0.02  # delays of this size, and the low-pass of 20 Hz before frames are left out
+_ASKED = (*OF_A_LABORATORY, STATED_MASS)
+
+
+@dataclass(frozen=True, order=True)
+class Coordinate:
+    """One number of a fault at a plate, or a channel of it; the clock has no target."""
+
+    effect: str
+    target: str
+    parameter: str
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """Of C coordinates [typical sizes]: precision (C, C) and pull (C,), so that the likeliest
+    sizes of this person alone solve precision @ sizes = pull. trials (C,) : how many tell of it."""
+
+    coordinates: tuple[Coordinate, ...]
+    parameters: tuple[Parameter, ...]
+    trials: np.ndarray
+    precision: np.ndarray
+    pull: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class SharedTrial(FaultTrial):
+    """A trial whose forces all are as simulated: near the ends of what is valid the measured course
+    bends as feet come and go beside the plates, and its slope would be taken for a delay."""
+
+    @cached_property
+    def simulated(self) -> Scene:
+        return as_simulated(self.scene)
+
+
+def inner(scene: Scene) -> Scene:
+    """The trial, its valid frames as far from the others as these reach by a delay and a filter."""
+    margin = max(1, round(_MARGIN_S * scene.rate_hz))
+    return replace(scene, valid=binary_erosion(scene.valid, iterations=margin, border_value=1))
+
+
+def information_of(trials: Sequence[SharedTrial]) -> Information:
+    """Scales and noise are the person's own; the equations are linear about no fault.
+
+    About what one person shows alone they would not be: a few steps on two plates fit any fault.
+    """
+    session = session_of([_without_the_shared(one) for one in trials])
+    return _marginal(fitted(session, _hypotheses(trials)))
+
+
+def _without_the_shared(trial: FaultTrial) -> FaultTrial:
+    """Without the ordinary terms that are asked of the laboratory."""
+    names = {FAULT + effect.name for effect in OF_A_LABORATORY}
+    terms = trial.errors.terms
+    kept = (x for x in terms if x.term not in names and x.scale != f"{INERTIA} in all")
+    return replace(trial, errors=replace(trial.errors, terms=tuple(kept)))
+
+
+def _hypotheses(trials: Sequence[FaultTrial]) -> list[Hypothesis]:
+    """Every shared fault at every plate; all plates alike are these together."""
+    found = []
+    for effect in _ASKED:
+        targets = [effect.targets(one.scene) for one in trials]
+        for target in dict.fromkeys(name for mine in targets for name in mine):
+            if target.split(" ")[0] == ALL:
+                continue
+            holding = tuple(t for t, mine in enumerate(targets) if target in mine)
+            count = len(effect.parameters(trials[holding[0]].scene, target))
+            found.append(Hypothesis(effect, target, holding, np.zeros(count)))
+    return found
+
+
+def _marginal(fit: Fitted) -> Information:
+    numbers = [
+        (Coordinate(one.effect.name, one.target, parameter.name), parameter, len(one.trials))
+        for one in fit.faults
+        for parameter in one.parameters(fit.session)
+    ]
+    coordinates, parameters, trials = zip(*numbers, strict=True)
+    gram, against = summed(fit.pieces, len(fit.mean))
+    own, shared = np.split(np.arange(len(fit.mean)), [fit.session.count])
+    root = fit.root[own]
+    inner = gram[np.ix_(own, own)] * np.outer(root, root) + np.eye(len(own))
+    across = root[:, None] * gram[np.ix_(own, shared)]
+    taken = np.linalg.solve(inner, np.column_stack([across, root * against[own]]))
+    precision = gram[np.ix_(shared, shared)] - across.T @ taken[:, :-1]
+    pull = against[shared] - across.T @ taken[:, -1]
+    precision = (precision + precision.T) / 2
+    return Information(coordinates, parameters, np.array(trials), precision, pull)

@@ -1,0 +1,107 @@
+"""Section 4: plates, clock and vertical by all persons together, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from math import isfinite
+from typing import Any
+
+import pandas as pd
+
+from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Paragraph, Section
+from bsip_cli.report.cohort.record import CohortRecord
+from bsip_cli.report.effect_words import effect_title, parameter_label, place_label, size_words
+from bsip_cli.report.verdict import probability_words
+from bsip_cli.report.words import MISSING, capital, listing
+
+SAID = ("named", "ambiguous")
+_NOT_RUN = "Nobody asked for the faults of the laboratory: run `bsip laboratory`."
+_HEAD = ("fault", "where", "number", "estimate", "95 % interval", "limit", "probability", "persons")
+_CAPTION = (
+    "Estimate and interval: if the fault is there. Limit: what would have been named in 95 of 100 "
+    "laboratories with these recordings. Probability: that it is there. Of all plates alike only "
+    "what is there is listed"
+)
+_WHAT_TO_DO = (
+    "Check what is named on the spot, as its sentence says, before any number is corrected. What is "
+    "wrong in the same way with the model of every person here can look like a plate elsewhere."
+)
+
+
+def section(record: CohortRecord) -> Section:
+    table = record.laboratory
+    if table is None:
+        return Section("laboratory", "The laboratory", (Paragraph(_NOT_RUN, "note"),))
+    blocks: list[Block] = []
+    if sentences := tuple(named_sentences(table)):
+        blocks += [Bullets(sentences, "warning"), Paragraph(_WHAT_TO_DO, "note")]
+    blocks += [Paragraph(text, "good") for text in unnamed_sentences(table)]
+    for number, rows in table[table["scope"] == "laboratory"].groupby("laboratory"):
+        cells = tuple(_row(row) for row in rows.to_dict("records") if _is_listed(row))
+        blocks.append(Grid(_HEAD, cells, f"Laboratory {number}. {_CAPTION}", words=3))
+    return Section("laboratory", "The laboratory", tuple(blocks))
+
+
+def named_sentences(table: pd.DataFrame) -> Iterator[str]:
+    """What is wrong with which laboratory, and who deviates from it."""
+    said = table[table["verdict"].isin(SAID)]
+    pairs = zip(said["laboratory"], said["sentence"], strict=True)
+    for laboratory, sentence in dict.fromkeys(pairs):
+        yield f"Laboratory {laboratory}: {sentence}."
+
+
+def unnamed_sentences(table: pd.DataFrame) -> Iterator[str]:
+    """Of a laboratory in which nothing is wrong, what would have been named."""
+    for sentence in table.loc[table["effect"] == "inconclusive", "sentence"]:
+        yield f"Nothing can be said of the laboratory: {sentence}."
+    for number, rows in table[table["scope"] == "laboratory"].groupby("laboratory"):
+        if not rows["verdict"].isin(SAID).any():
+            limits = listing([x for x in map(_limit_words, _best(rows)) if x])
+            yield (
+                f"Laboratory {number}: no fault of plates, clock or vertical was named; these "
+                f"recordings would have shown {limits}."
+            )
+
+
+_TOLD = {
+    ("sync_offset", "delay"): "a delay of",
+    ("plate_translation", "x"): "a plate shifted by",
+    ("plate_gain", "gain"): "a force's gain off by",
+}
+
+
+def _best(rows: pd.DataFrame) -> Iterator[Mapping[Any, Any]]:
+    """The smallest limit of each fault that is told in the sentence."""
+    for effect, parameter in _TOLD:
+        mine = rows[(rows["effect"] == effect) & (rows["parameter"] == parameter)]
+        if len(mine):
+            yield mine.sort_values("limit").iloc[0].to_dict()
+
+
+def _limit_words(row: Mapping[Any, Any]) -> str:
+    if not isfinite(row["limit"]):
+        return ""
+    size = size_words(row["parameter"], row["unit"], row["limit"])
+    return f"{_TOLD[row['effect'], row['parameter']]} {size}"
+
+
+def _is_listed(row: Mapping[Any, Any]) -> bool:
+    return row["verdict"] in SAID or not row["target"].startswith("all")
+
+
+def _row(row: Mapping[Any, Any]) -> tuple[str | Cell, ...]:
+    name, unit = row["parameter"], row["unit"]
+    low, high, estimate, limit = (
+        size_words(name, unit, row[x]) if isfinite(row[x]) else MISSING
+        for x in ("ci_low", "ci_high", "estimate", "limit")
+    )
+    return (
+        Cell(capital(effect_title(row["effect"])), "warning" if row["verdict"] in SAID else ""),
+        place_label(row["effect"], row["target"]),
+        parameter_label(row["effect"], name),
+        estimate,
+        f"{low} to {high}",
+        limit,
+        probability_words(row["probability"]),
+        str(row["persons"]),
+    )

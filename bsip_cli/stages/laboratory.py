@@ -1,0 +1,261 @@
+"""laboratory (cohort): the faults of plates, clock and vertical by all persons together.
+
+Reads laboratory-information of all who have it, one after the other. Writes laboratory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import cast
+from zlib import crc32
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.diagnosis.findings import Number, interval_words
+from bsip_cli.diagnosis.laboratory import persons_of
+from bsip_cli.diagnosis.laboratory_deviations import deviations_of
+from bsip_cli.diagnosis.laboratory_search import (
+    Cause,
+    Size,
+    causes_of,
+    laboratory_of,
+    verdicts_of,
+)
+from bsip_cli.diagnosis.shared_faults import STATED_MASS, Coordinate, Information
+from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.plate_frame import ALL
+from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
+from bsip_cli.effects.scene import Scene
+from bsip_cli.running.unit import Unit
+from bsip_cli.schemas import column_names
+
+_SAME_PLACE_M = (
+    0.02  # of every corner: what laboratories meet of a plate that is not where it is said
+)
+_UNWEIGHED = 0.1  # spread of a mass that nobody stated, part of it
+_NO_SCENE = cast(Scene, None)  # faults of a laboratory speak of no trial
+
+
+@dataclass(frozen=True, eq=False)
+class _Session:
+    """One session of a person; plates: corners (4, 3) in the world by name."""
+
+    name: str
+    person: str
+    told: Information
+    mass_sd: float
+    plates: Mapping[str, np.ndarray]
+
+
+def run(unit: Unit) -> None:
+    rows: list[dict] = []
+    laboratories = _laboratories(list(_sessions(unit)))
+    for number, sessions in enumerate(laboratories, start=1):
+        rows += _rows(unit, str(number), sessions)
+    if len(laboratories) > 1:
+        counts = ", ".join(
+            f"{len({s.person for s in one})} in laboratory {k}"
+            for k, one in enumerate(laboratories, start=1)
+        )
+        unit.warn(
+            f"the recordings are of {len(laboratories)} laboratories, by the places of their "
+            f"plates: persons {counts}; each is judged by itself"
+        )
+    said = [row for row in rows if row["verdict"] in ("named", "ambiguous")]
+    for sentence in dict.fromkeys(f"laboratory {x['laboratory']}: {x['sentence']}" for x in said):
+        unit.warn(sentence)
+    if not rows:
+        sentence = "no recording has motion with every contact on a plate"
+        unit.warn(f"laboratory: nothing can be said: {sentence}")
+        rows = [_row(("inconclusive", "", ""), verdict="inconclusive", sentence=sentence)]
+    table = pd.DataFrame(rows, columns=column_names("laboratory"))
+    facts = {str(k): [s.name for s in one] for k, one in enumerate(laboratories, start=1)}
+    unit.write("laboratory", table, {"sessions": facts})
+
+
+# --- reading ------------------------------------------------------------------------------------
+
+
+def _sessions(unit: Unit) -> Iterator[_Session]:
+    for participant in unit.study.participants:
+        if not unit.stands("laboratory-information", None, participant):
+            continue
+        table = unit.read("laboratory-information", participant=participant)
+        facts = unit.facts("laboratory-information", participant=participant)
+        for session in dict.fromkeys(table["session"]):
+            rows = table[table["session"] == session]
+            name = f"{participant.id}_ses-{session}" if session else participant.id
+            plates = facts["sessions"][session]["plates"]
+            yield _Session(
+                name,
+                participant.id,
+                _information(rows),
+                facts["mass_sd"] or _UNWEIGHED,
+                {plate: np.array(corners) for plate, corners in plates.items()},
+            )
+
+
+def _information(rows: pd.DataFrame) -> Information:
+    names = ("effect", "target", "parameter")
+    keys = rows[[*names]].itertuples(index=False)
+    numbers = rows[["parameter", "unit", "most", "typical", "known_to"]].itertuples(index=False)
+    return Information(
+        tuple(Coordinate(*one) for one in keys),
+        tuple(Parameter(n, u, -most, most, t, known_to=k) for n, u, most, t, k in numbers),
+        rows["trials"].to_numpy(),
+        rows[[f"precision_{k}" for k in range(len(rows))]].to_numpy(),
+        rows["pull"].to_numpy(),
+    )
+
+
+def _laboratories(sessions: Sequence[_Session]) -> list[list[_Session]]:
+    """Sessions whose plates have the same names and places, the most first."""
+    found: list[list[_Session]] = []
+    for one in sessions:
+        mine = next((lab for lab in found if _alike(lab[0].plates, one.plates)), None)
+        if mine is None:
+            found.append([one])
+        else:
+            mine.append(one)
+    return sorted(found, key=len, reverse=True)
+
+
+def _alike(a: Mapping[str, np.ndarray], b: Mapping[str, np.ndarray]) -> bool:
+    near = (np.linalg.norm(a[k] - b[k], axis=1).max() < _SAME_PLACE_M for k in a if k in b)
+    return a.keys() == b.keys() and all(near)
+
+
+# --- rows ---------------------------------------------------------------------------------------
+
+
+def _rows(unit: Unit, laboratory: str, sessions: Sequence[_Session]) -> Iterator[dict]:
+    options, mine = unit.config.diagnosis, unit.config.laboratory
+    told = [one.told for one in sessions]
+    persons = persons_of(told, [one.mass_sd for one in sessions], mine.between_persons)
+    centres = {name: x.mean(axis=0) for one in sessions for name, x in one.plates.items()}
+    lab = laboratory_of(persons, causes_of(persons, centres), options.fault_prior_odds)
+    rng = np.random.default_rng(crc32(unit.name.encode()))
+    for one in verdicts_of(lab, options.named_from, rng):
+        counts = _counts(sessions, one.cause)
+        said = (one.said, one.probability, counts)
+        for size in one.sizes:
+            yield _row(
+                (one.cause.effect, one.cause.target, size.parameter.name),
+                **_numbers(size),
+                probability=one.probability,
+                verdict=one.said,
+                persons=counts[0],
+                trials=counts[1],
+                sentence=_sentence(one.cause, one.sizes, *said),
+                laboratory=laboratory,
+                class_id=one.class_id,
+                scope="laboratory",
+            )
+    order = _order(sessions, mine.recorded_on)
+    odds, named_from = options.fault_prior_odds, options.named_from
+    for deviation in deviations_of(lab, odds, named_from, order, rng):
+        them = [sessions[k] for k in deviation.sessions]
+        is_mass = deviation.cause.effect == STATED_MASS.name
+        counts = _counts(them, deviation.cause)
+        who = them[0].name if len(them) == 1 else ""
+        where = f"in {who}" if who else f"from {them[0].name} on"
+        for size in deviation.sizes:
+            yield _row(
+                (deviation.cause.effect, deviation.cause.target, size.parameter.name),
+                **_numbers(size),
+                probability=deviation.probability,
+                verdict=deviation.said,
+                persons=counts[0],
+                trials=counts[1],
+                since="" if who else them[0].name,
+                sentence=f"{where}, unlike the others: {_words(deviation.cause, deviation.sizes)}",
+                laboratory=laboratory,
+                class_id=deviation.class_id,
+                scope="person" if is_mass else "session",
+                who=who,
+            )
+
+
+def _row(key: tuple[str, str, str], **cells: object) -> dict:
+    texts = ("unit", "verdict", "since", "sentence", "laboratory", "class_id", "scope", "who")
+    numbers = ("estimate", "ci_low", "ci_high", "probability", "limit")
+    empty = dict.fromkeys(texts, "") | dict.fromkeys(numbers, np.nan) | {"persons": 0, "trials": 0}
+    return dict(zip(("effect", "target", "parameter"), key, strict=True)) | empty | cells
+
+
+def _numbers(size: Size) -> dict:
+    return {
+        "estimate": size.value,
+        "unit": size.parameter.unit,
+        "ci_low": size.low,
+        "ci_high": size.high,
+        "limit": size.limit,
+    }
+
+
+def _counts(sessions: Sequence[_Session], cause: Cause) -> tuple[int, int]:
+    """Persons and trials that tell of a cause at its plate, or at any for all plates."""
+    plate, *channel = cause.target.split(" ")
+    persons, trials = set(), 0
+    for one in sessions:
+        numbers = [
+            int(count)
+            for c, count in zip(one.told.coordinates, one.told.trials, strict=True)
+            if c.effect == cause.effect
+            and c.target.split(" ")[1:] == channel
+            and plate in (ALL, c.target.split(" ")[0])
+        ]
+        if numbers:
+            persons.add(one.person)
+            trials += max(numbers)
+    return len(persons), trials
+
+
+def _order(sessions: Sequence[_Session], dates: Mapping[str, str]) -> list[int]:
+    """Numbers of those that have a date, the earliest first."""
+    dated = [(dates[s.name], k) for k, s in enumerate(sessions) if s.name in dates]
+    return [k for _, k in sorted(dated)]
+
+
+# --- words --------------------------------------------------------------------------------------
+
+
+def _effect(cause: Cause) -> Effect:
+    return STATED_MASS if cause.effect == STATED_MASS.name else EFFECTS[cause.effect]
+
+
+def _words(cause: Cause, sizes: Sequence[Size]) -> str:
+    values = np.array([one.value for one in sizes])
+    numbers = tuple(
+        Number(x.parameter.name, x.parameter.unit, x.value, x.low, x.high) for x in sizes
+    )
+    return _effect(cause).sentence(_NO_SCENE, cause.target, values) + interval_words(numbers)
+
+
+def _sentence(
+    cause: Cause, sizes: Sequence[Size], said: str, probability: float, counts: tuple[int, int]
+) -> str:
+    words, remedy = _words(cause, sizes), _effect(cause).remedy
+    told = f"by {counts[0]} persons and {counts[1]} recordings"
+    if said == "named":
+        return f"{words}, {told}; to make sure, {remedy}"
+    if said == "ambiguous":
+        return f"perhaps {words}, {told}; other causes look alike here: {remedy}"
+    if said == "inconclusive":
+        return f"cannot tell: {words}; no possible size would have been named {told}"
+    limit = _limit(sizes)
+    start = "not so" if probability < 0.5 else "not sure"
+    return f"{start}: {words}, probability {probability:.2g}; {limit} would have been named {told}"
+
+
+def _limit(sizes: Sequence[Size]) -> str:
+    """The smallest of what would have been named, as people read it."""
+    best = min(sizes, key=lambda one: one.limit / one.parameter.typical)
+    factor, unit = readable_unit(best.parameter.name, best.parameter.unit)
+    size = factor * best.limit
+    return (
+        f"{best.parameter.name.replace('_', ' ')} {with_unit(f'{size:.{digits_of(size)}f}', unit)}"
+    )

@@ -1,0 +1,84 @@
+"""laboratory (participant): what a person's sessions tell of plates, clock and vertical."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.diagnosis.filtering import slow
+from bsip_cli.diagnosis.shared_faults import Information, SharedTrial, information_of, inner
+from bsip_cli.effects.scene import Scene
+from bsip_cli.running.unit import Unit
+from bsip_cli.schemas import column_names
+from bsip_cli.stages.diagnosed_trials import (
+    STATIC,
+    diagnosed,
+    is_weighed,
+    prior_of_shares,
+    stated_sd,
+)
+from bsip_cli.stages.frames import person_from
+from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.study.study import Trial
+
+_LEAST_SAMPLES = 3  # of the residual, by which an autoregression is defined: 0.3 s on the plates
+
+
+def run(unit: Unit) -> None:
+    """Read motion, wrench, person and RM of all trials; write the information of each session."""
+    skeleton = load_skeleton(unit.config.skeleton)
+    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    prior = prior_of_shares(unit, person)
+    seen: dict[str, list[tuple[Trial, Scene]]] = {}
+    for trial in unit.trials("kinematics", "wrench"):
+        scene = scene_of(unit, person, prior.phi, trial)
+        if trial.role != STATIC:
+            scene = inner(scene)
+        if scene.valid.any():
+            seen.setdefault(trial.session or "", []).append((trial, scene))
+    rows, sessions = [], {}
+    for session, mine in seen.items():
+        found = [diagnosed(unit, prior, *one, _LEAST_SAMPLES) for one in mine]
+        told = [one for one in found if one is not None and one.held is None]
+        if any(one.moves for one in told):
+            trials = [SharedTrial(one.errors, slow(one.scene)) for one in told]
+            rows += _rows(session, information_of(trials))
+            sessions[session] = {
+                "plates": _corners([scene for _, scene in mine]),
+                "trials": [one.trial.stem for one in told],
+            }
+    if not sessions:
+        unit.warn(
+            f"{unit.name}: no trial has motion with every contact on a plate; it tells nothing of "
+            "the laboratory"
+        )
+    facts = {"sessions": sessions, "mass_sd": stated_sd(unit) if is_weighed(unit) else None}
+    families = [name for row in rows for name in row if name.startswith("precision_")]
+    columns = [*column_names("laboratory-information"), *dict.fromkeys(families)]
+    unit.write("laboratory-information", pd.DataFrame(rows, columns=columns), facts)
+
+
+def _rows(session: str, told: Information) -> list[dict]:
+    numbers = zip(told.coordinates, told.parameters, told.trials, strict=True)
+    return [
+        {
+            "session": session,
+            "effect": one.effect,
+            "target": one.target,
+            "parameter": one.parameter,
+            "unit": parameter.unit,
+            "typical": parameter.typical,
+            "most": parameter.most,
+            "known_to": parameter.known_to,
+            "trials": int(trials),
+            "pull": told.pull[k],
+            **{f"precision_{j}": x for j, x in enumerate(told.precision[k])},
+        }
+        for k, (one, parameter, trials) in enumerate(numbers)
+    ]
+
+
+def _corners(scenes: Sequence[Scene]) -> dict[str, list[list[float]]]:
+    return {plate.name: plate.corners_m.tolist() for scene in scenes for plate in scene.plates}

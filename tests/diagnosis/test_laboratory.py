@@ -1,0 +1,193 @@
+"""Persons as a sum: what they share is found, and what is one person's own is not blamed on it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bsip_cli.diagnosis.laboratory import persons_of, posterior_of, scales_of, sums_of
+from bsip_cli.diagnosis.laboratory_deviations import deviations_of
+from bsip_cli.diagnosis.laboratory_search import (
+    Laboratory,
+    causes_of,
+    laboratory_of,
+    verdicts_of,
+)
+from bsip_cli.diagnosis.shared_faults import OF_A_LABORATORY, STATED_MASS, Coordinate, Information
+from bsip_cli.effects.plate_rotation import PlateRotation
+from tests.effects.moving_scene import moving
+
+CENTRES_M = {"1": np.array([0.2, 0.3, 0.0]), "2": np.array([0.2, -0.3, 0.0])}
+ODDS, NAMED = 0.1, 0.95
+BETWEEN = 0.2  # deviations from person to person [typical]
+DELAY = Coordinate("sync_offset", "", "delay")
+VERTICAL = Coordinate("plate_gain", "1 fz", "gain")
+MASS = Coordinate(STATED_MASS.name, "", "share")
+
+
+def numbers() -> dict:
+    """Every number of the shared faults of two plates."""
+    scene, found = moving(), {}
+    for effect in (*OF_A_LABORATORY, STATED_MASS):
+        for target in effect.targets(scene):
+            if not target.startswith("all"):
+                for parameter in effect.parameters(scene, target):
+                    found[Coordinate(effect.name, target, parameter.name)] = parameter
+    return found
+
+
+def drawn(
+    rng: np.random.Generator, hidden: dict, count: int, between: float = BETWEEN
+) -> list[Information]:
+    """What persons tell who all have the hidden sizes [typical] and deviations of their own; each
+    tells some directions well and others hardly."""
+    known = numbers()
+    coordinates = tuple(known)
+    truth = np.array([hidden.get(one, 0.0) for one in coordinates])
+    found = []
+    for _ in range(count):
+        root = rng.standard_normal((len(truth), len(truth))) * rng.uniform(0.1, 2.0, len(truth))
+        precision = root @ root.T
+        own = truth + between * rng.standard_normal(len(truth))
+        own[coordinates.index(MASS)] = truth[coordinates.index(MASS)]
+        pull = precision @ own + root @ rng.standard_normal(len(truth))
+        trials = np.full(len(truth), 2)
+        found.append(Information(coordinates, tuple(known.values()), trials, precision, pull))
+    return found
+
+
+def fitted(told: list[Information]) -> Laboratory:
+    persons = persons_of(told, [0.008] * len(told), BETWEEN)
+    return laboratory_of(persons, causes_of(persons, CENTRES_M), ODDS)
+
+
+def verdict(lab: Laboratory, effect: str, target: str):
+    found = verdicts_of(lab, NAMED, np.random.default_rng(0))
+    return next(v for v in found if (v.cause.effect, v.cause.target) == (effect, target))
+
+
+def test_a_delay_that_all_share_is_named_with_its_size():
+    lab = fitted(drawn(np.random.default_rng(1), {DELAY: 1.0}, 8))
+    found = verdict(lab, "sync_offset", "")
+    (size,) = found.sizes
+    assert found.said == "named"
+    assert size.low < 0.010 < size.high
+    assert size.high - size.low < 0.006
+    assert size.limit < 0.010
+
+
+def test_intervals_hold_as_often_as_they_say():
+    inside = []
+    for seed in range(40):
+        lab = fitted(drawn(np.random.default_rng(seed), {DELAY: 1.0}, 6))
+        (size,) = verdict(lab, "sync_offset", "").sizes
+        inside.append(size.low < 0.010 < size.high)
+    assert 0.85 <= np.mean(inside) <= 1.0
+
+
+def test_nothing_is_named_where_nothing_is():
+    names = []
+    for seed in range(40):
+        lab = fitted(drawn(np.random.default_rng(100 + seed), {}, 5))
+        names += [lab.causes[k].effect for k in lab.found]
+        names += [
+            one.cause.effect
+            for one in deviations_of(lab, ODDS, NAMED, [], np.random.default_rng(0))
+        ]
+    assert len(names) <= 2
+
+
+def test_deviations_follow_from_the_persons():
+    few = scales_of(persons_of(drawn(np.random.default_rng(3), {}, 12, 0.05), [0.008] * 12, 0.2))
+    many = scales_of(persons_of(drawn(np.random.default_rng(3), {}, 12, 0.8), [0.008] * 12, 0.2))
+    assert np.median(many / few) > 2
+
+
+def test_persons_are_a_sum():
+    told = drawn(np.random.default_rng(4), {DELAY: 1.0}, 6)
+    persons = persons_of(told, [0.008] * 6, BETWEEN)
+    scale = np.ones(persons.groups.max() + 1)
+    whole = sums_of(persons, scale)
+    parts = sums_of(persons, scale, range(2)).with_(sums_of(persons, scale, range(2, 6)))
+    assert np.allclose(whole.precision, parts.precision)
+    assert np.allclose(whole.pull, parts.pull)
+    assert whole.log_factor == pytest.approx(parts.log_factor)
+
+
+def test_the_sums_are_those_of_all_deviations_at_once():
+    """With every person's deviation a coefficient of its own, the posterior is the same."""
+    told = drawn(np.random.default_rng(5), {DELAY: 1.0}, 3)
+    persons = persons_of(told, [0.008] * 3, BETWEEN)
+    root = np.diag(persons.ordinary + 1.0)
+    short = posterior_of(sums_of(persons, np.ones(persons.groups.max() + 1)), root)
+    count = len(persons.ordinary)
+    whole = np.zeros((4 * count, 4 * count))
+    against = np.zeros(4 * count)
+    whole[:count, :count] = np.diag(1 / np.diag(root) ** 2)
+    for k in range(3):
+        mine, own = slice((k + 1) * count, (k + 2) * count), persons.precision[k]
+        whole[:count, :count] += own
+        whole[:count, mine], whole[mine, :count] = own, own
+        whole[mine, mine] = own + np.diag(1 / persons.usual[k] ** 2)
+        against[:count] += persons.pull[k]
+        against[mine] = persons.pull[k]
+    inverse = np.linalg.inv(whole)
+    assert np.allclose(short.mean, (inverse @ against)[:count], atol=1e-8)
+    assert np.allclose(short.covariance, inverse[:count, :count], atol=1e-8)
+
+
+def test_a_stated_mass_that_is_wrong_is_the_persons_and_no_plates():
+    rng = np.random.default_rng(6)
+    told = drawn(rng, {}, 7) + drawn(rng, {MASS: 6.0}, 1)
+    lab = fitted(told)
+    assert not lab.found
+    (one,) = deviations_of(lab, ODDS, NAMED, [], rng)
+    assert (one.sessions, one.cause.effect, one.said) == ((7,), "stated_mass", "named")
+    (size,) = one.sizes
+    assert size.low < 0.06 < size.high
+
+
+def test_a_plate_that_reads_otherwise_in_one_session_is_found_there():
+    rng = np.random.default_rng(7)
+    told = drawn(rng, {}, 3) + drawn(rng, {VERTICAL: 3.0}, 1) + drawn(rng, {}, 4)
+    (one,) = deviations_of(fitted(told), ODDS, NAMED, [], rng)
+    assert (one.sessions, one.cause.effect, one.cause.target) == ((3,), "plate_gain", "1 fz")
+
+
+def test_a_change_that_lasts_is_dated():
+    rng = np.random.default_rng(8)
+    told = drawn(rng, {}, 6) + drawn(rng, {DELAY: 1.5}, 6)
+    found = deviations_of(fitted(told), ODDS, NAMED, list(range(12)), rng)
+    lasting = [one for one in found if len(one.sessions) > 1]
+    best = max(lasting, key=lambda one: one.probability)
+    assert best.cause.effect == "sync_offset"
+    assert best.sessions == tuple(range(6, 12))
+
+
+def test_all_plates_turned_are_each_turned_and_shifted():
+    """The directions of one turn about the middle of the plates are what the effect does."""
+    scene = moving()
+    known = numbers()
+    coordinates = tuple(known)
+    parameters = tuple(known.values())
+    empty = np.zeros((len(known), len(known)))
+    told = Information(coordinates, parameters, np.ones(len(known)), empty, empty[0])
+    centres = {plate.name: plate.centre_m() for plate in scene.plates}
+    persons = persons_of([told], [0.008], BETWEEN)
+    causes = causes_of(persons, centres)
+    cause = next(c for c in causes if (c.effect, c.target) == (PlateRotation.name, "all"))
+    effects = {effect.name: effect for effect in OF_A_LABORATORY}
+    for k, parameter in enumerate(cause.parameters):
+        turned = np.zeros(3)
+        turned[k] = 1.0
+        whole = PlateRotation().tangent(scene, "all", np.zeros(3)) @ turned * parameter.typical
+        parts = np.zeros_like(whole)
+        for one, p, size in zip(
+            persons.coordinates, persons.parameters, cause.directions[:, k], strict=True
+        ):
+            if size:
+                effect = effects[one.effect]
+                names = [x.name for x in effect.parameters(scene, one.target)]
+                tangent = effect.tangent(scene, one.target, np.zeros(len(names)))
+                parts += size * p.typical * tangent[..., names.index(one.parameter)]
+        assert np.allclose(whole, parts, atol=1e-4 * np.abs(whole).max())

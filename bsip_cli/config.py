@@ -140,6 +140,11 @@ class Reconstruct(Section):
     cop_min_force_percent_bw: float = Field(gt=0, lt=100)
 
 
+class Joints(Section):
+    cutoff_hz: float = Field(gt=0)
+    centre_sd_m: float = Field(gt=0)
+
+
 class Diagnosis(Section):
     cutoff_hz: float = Field(gt=0)
     skin_factor: float = Field(ge=0)
@@ -177,6 +182,7 @@ class Config(Section):
     prior: Prior
     identify: Identify
     reconstruct: Reconstruct
+    joints: Joints
     diagnosis: Diagnosis
     laboratory: Laboratory
     stats: Stats

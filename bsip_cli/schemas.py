@@ -169,6 +169,11 @@ _COMPARISON = (
     _text("reason", "why the test is not possible, or what to mind"),
 )
 
+_JOINT_AXIS = (
+    _text("joint", "joint of the skeleton"),
+    _text("axis", "where a positive moment about it turns the distal segment"),
+)
+
 _GAIN = (
     _text("component", "fx fy fz mx my mz cop_ap cop_ml grf_vertical"),
     _text("method", "the extended model that is compared with OM"),
@@ -516,6 +521,19 @@ SCHEMAS = {
             ),
         ),
         Schema(
+            "covariance",
+            "participant",
+            1,
+            "a root R of the parameters' covariance R R^T, per method; a row per parameter",
+            (
+                _METHOD,
+                _SEGMENT,
+                _text("parameter", "m, mcx .. Izz of the segment about its joint's centre"),
+                _text("unit", "of the row's standard deviation"),
+                Column("root_*", "float", "as unit", "independent contributions", "segment"),
+            ),
+        ),
+        Schema(
             "base-parameters",
             "participant",
             1,
@@ -747,6 +765,52 @@ SCHEMAS = {
             1,
             "ground wrench freed of the named errors of plates and clock; empty without any",
             (_TIME, *_WRENCH, _VALID),
+        ),
+        Schema(
+            "joint-moments",
+            "trial",
+            1,
+            "net force, moment and power at every joint, by the proximal on the distal segment",
+            (
+                _TIME,
+                _METHOD,
+                *_JOINT_AXIS,
+                *_floats("force_N force_sd_N", "N", "along the axis, standard deviation", "joint"),
+                *_floats("moment_Nm moment_sd_Nm", "N m", "about the axis, the same", "joint"),
+                *_floats(
+                    "power_W power_sd_W",
+                    "W",
+                    "moment times the rate of the angle about the axis; NaN where the first and "
+                    "third axis nearly fall together",
+                    "joint",
+                ),
+                Column("valid", "bool", "", "determined: else force and moment are NaN"),
+            ),
+        ),
+        Schema(
+            "joint-peaks",
+            "trial",
+            1,
+            "largest moment at every joint, and what method and named faults change",
+            (
+                _METHOD,
+                *_JOINT_AXIS,
+                Column("peak_Nm", "float", "N m", "the moment that is largest in size"),
+                Column("peak_sd_Nm", "float", "N m", "its standard deviation"),
+                Column("peak_Nm_kg", "float", "N m/kg", "the same over the person's mass"),
+                Column("peak_at_s", "float", "s", "when"),
+                Column("frames", "int", "1", "in which the moment is determined"),
+                _text("compared_with", "RM; of an extended model the one before; empty for RM"),
+                Column("change_Nm", "float", "N m", "largest difference from that"),
+                Column("change_rms_Nm", "float", "N m", "root mean square of the difference"),
+                Column(
+                    "change_percent",
+                    "float",
+                    "%",
+                    "largest difference over the joint's largest moment about any axis",
+                ),
+                _text("left_out", "why frames are not determined, and how many"),
+            ),
         ),
         Schema(
             "overall-gain",

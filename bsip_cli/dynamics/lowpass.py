@@ -57,3 +57,10 @@ def _outputs(valid: np.ndarray, stride: int) -> tuple[np.ndarray, np.ndarray, np
         parts.append(np.stack([np.full_like(frames, start), np.full_like(frames, stop), frames], 1))
     starts, stops, frames = np.concatenate(parts).T
     return starts, stops, frames
+
+
+def noise_left(rate_hz: float, cutoff_hz: float) -> float:
+    """Part of the variance of white noise that the low-pass leaves: the sum of its squared kernel,
+    1 / (2 sqrt(pi) sigma) with sigma in frames; all of it where that kernel is shorter than one."""
+    sigma = np.sqrt(np.log(2)) / (2 * np.pi * cutoff_hz) * rate_hz
+    return float(min(1.0, 1.0 / (2.0 * np.sqrt(np.pi) * sigma)))

@@ -9,8 +9,10 @@ import pinocchio as pin
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import SYMMETRIC
+from bsip_cli.dynamics.regressor import rotations_of
 
 UP = np.array([0.0, 0.0, 1.0])
+_FREE = 7  # entries in q of a joint that also shifts
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,17 +76,50 @@ class SegmentMotion:
 
 
 def segment_motion(model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> SegmentMotion:
-    """Forward kinematics of q (N, nq), v and a (N, nv)."""
-    data, n = model.createData(), model.njoints - 1
-    rotation, position = np.empty((len(q), n, 3, 3)), np.empty((len(q), n, 3))
-    velocity, spatial = np.empty((2, len(q), n, 6))  # in the axes of the segment
-    for k in range(len(q)):
-        pin.forwardKinematics(model, data, q[k], v[k], a[k])
-        for i in range(n):
-            place = data.oMi[i + 1]
-            rotation[k, i], position[k, i] = place.rotation, place.translation
-            velocity[k, i], spatial[k, i] = data.v[i + 1].vector, data.a[i + 1].vector
-    turning = velocity[..., 3:]
-    acceleration = spatial[..., :3] + np.cross(turning, velocity[..., :3])
-    inside = np.stack([acceleration, turning, spatial[..., 3:]])
-    return SegmentMotion(rotation, position, *np.einsum("fnij,vfnj->vfni", rotation, inside))
+    """Forward kinematics of q (N, nq), v and a (N, nv), all frames at once.
+
+    The tree's joints are free, spherical or hinges, as in ``pinocchio_model``; velocities and
+    accelerations are Pinocchio's, in the axes of the segment.
+    """
+    data, count, n = model.createData(), len(q), model.njoints - 1
+    pin.forwardKinematics(model, data, pin.neutral(model), np.zeros(model.nv))
+    rotation, position = np.zeros((n + 1, count, 3, 3)), np.zeros((n + 1, count, 3))
+    rotation[0] = np.eye(3)
+    acceleration, turning, turning_rate = np.zeros((3, n + 1, count, 3))
+    for j in range(1, n + 1):
+        joint, parent, place = model.joints[j], model.parents[j], model.jointPlacements[j]
+        own = slice(joint.idx_v, joint.idx_v + joint.nv)
+        free = np.asarray(data.joints[j].S).reshape(6, joint.nv)
+        lever = rotation[parent] @ place.translation
+        hinge = rotation[parent] @ place.rotation
+        rotation[j] = hinge @ _rotations(q[:, joint.idx_q : joint.idx_q + joint.nq], free[3:])
+        speed, rate = (np.split(x[:, own] @ free.T, 2, axis=1) for x in (v, a))
+        (linear, spin), (linear_rate, spin_rate) = (
+            [(rotation[j] @ part[..., None])[..., 0] for part in parts] for parts in (speed, rate)
+        )
+        w = turning[parent]
+        turning[j] = w + spin
+        turning_rate[j] = turning_rate[parent] + spin_rate + _cross(w, spin)
+        acceleration[j] = (
+            acceleration[parent] + _cross(turning_rate[parent], lever) + _cross(w, _cross(w, lever))
+        )
+        position[j] = position[parent] + lever
+        if joint.nq == _FREE:
+            position[j] += (hinge @ q[:, joint.idx_q : joint.idx_q + 3, None])[..., 0]
+            acceleration[j] += linear_rate + _cross(spin, linear)
+    parts = (rotation, position, acceleration, turning, turning_rate)
+    return SegmentMotion(*(np.ascontiguousarray(x[1:].swapaxes(0, 1)) for x in parts))
+
+
+def _rotations(q: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """(N, 3, 3) of a joint's entries in q: a place and a quaternion, a quaternion, or the angle
+    about ``axis`` (3, 1)."""
+    if q.shape[1] > 1:
+        return rotations_of(q[:, -4:])
+    half = 0.5 * q
+    return rotations_of(np.hstack([np.sin(half) * axis.T, np.cos(half)]))
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(N, 3) each: ten times as fast as numpy's on small arrays."""
+    return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]

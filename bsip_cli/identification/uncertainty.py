@@ -42,5 +42,11 @@ def readable(estimate: Estimate, prior: Prior) -> ReadableParameters:
     return ReadableParameters(values, sd, share)
 
 
+def root_of(covariance: np.ndarray) -> np.ndarray:
+    """(P, P) S with covariance S S^T; what rounding has made negative counts as zero."""
+    values, axes = np.linalg.eigh(covariance)
+    return np.asarray(axes * np.sqrt(np.maximum(values, 0.0)))
+
+
 def _sd(jacobian: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0.0))

@@ -231,11 +231,11 @@ def _inside_outlines(
     sole = foot.height_m < limits.sole_height_m
     inside = np.zeros(sole.shape, bool)
     for corners in outlines:
-        inside |= _inside(foot.position_m, corners[:, :2], limits.outline_tolerance_m)
+        inside |= inside_outline(foot.position_m, corners[:, :2], limits.outline_tolerance_m)
     return np.asarray((inside | ~sole).all(axis=1))
 
 
-def _inside(points_m: np.ndarray, corners_m: np.ndarray, tolerance_m: float) -> np.ndarray:
+def inside_outline(points_m: np.ndarray, corners_m: np.ndarray, tolerance_m: float) -> np.ndarray:
     """Points (..., 2) in the rectangle of corners (4, 2) widened by the tolerance."""
     x, y = corners_m[0] - corners_m[1], corners_m[0] - corners_m[3]
     offset = points_m - corners_m.mean(axis=0)  # NaN is nowhere inside

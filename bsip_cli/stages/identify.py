@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import empty_table
+from bsip_cli.body.inertia import PARAMETERS, UNITS
 from bsip_cli.body.names import in_words as segment_in_words
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
@@ -23,7 +24,7 @@ from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.identification.excitation import Excitation, excitation
 from bsip_cli.identification.movement_gain import advice
 from bsip_cli.identification.rarity import RARE, Rarity, rarity_of
-from bsip_cli.identification.uncertainty import readable
+from bsip_cli.identification.uncertainty import readable, root_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import spread_names
 from bsip_cli.stages.frames import WRENCH, bsip_table, person_from
@@ -37,7 +38,7 @@ from bsip_cli.stages.identification_problem import (
 )
 from bsip_cli.stages.known_loads import load_words, loads_record
 from bsip_cli.stages.trial_scene import motion_and_wrench_of
-from bsip_cli.statistics.methods import OM, RM_MASS
+from bsip_cli.statistics.methods import OM, RM, RM_MASS
 from bsip_cli.study.study import Trial
 
 _SHORTEST_S = 0.5
@@ -55,6 +56,7 @@ def run(unit: Unit) -> None:
     _tell_of_loads(unit, [trial for trial in trials if trial.stem in set(blocks["trial"])])
     if duration_s(recordings) < _SHORTEST_S:
         _write_table_only(unit, regression, recordings, contacts)
+        unit.write("covariance", _covariance_table(skeleton, {RM: prior.root}))
         return
     _tell_of_fixed(unit, person)
     problem, reference = problem_of(unit, person, prior, recordings)
@@ -77,6 +79,8 @@ def run(unit: Unit) -> None:
             "loads": {trial.stem: loads_record(unit, trial) for trial in trials},
         },
     )
+    roots = {method: root_of(estimate.covariance) for method, estimate in estimates.items()}
+    unit.write("covariance", _covariance_table(skeleton, {RM: prior.root} | roots))
     unit.write("base-parameters", _base_table(skeleton, problem))
     found = excitation(problem)
     unit.write("excitation", _excitation_table(person, problem, found, results[OM].share))
@@ -215,6 +219,22 @@ def _farthest_in_words(
         for i in found.farthest()
     ]
     return ", ".join(parts)
+
+
+def _covariance_table(skeleton: Skeleton, roots: dict[str, np.ndarray]) -> pd.DataFrame:
+    """Roots (P, P) of the covariance, by method."""
+    rows = [
+        (segment, name, unit)
+        for segment in skeleton.body_names
+        for name, unit in zip(PARAMETERS, UNITS, strict=True)
+    ]
+    tables = []
+    for method, root in roots.items():
+        table = pd.DataFrame(rows, columns=["segment", "parameter", "unit"])
+        table.insert(0, "method", method)
+        named = pd.DataFrame(root, columns=[f"root_{k}" for k in range(root.shape[1])])
+        tables.append(pd.concat([table, named], axis=1))
+    return pd.concat(tables, ignore_index=True)
 
 
 def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:

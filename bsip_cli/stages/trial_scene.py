@@ -66,13 +66,19 @@ def with_labels_put_right(
     return found
 
 
+def plate_names(wrench: pd.DataFrame) -> tuple[str, ...]:
+    """Of the plates whose readings a ``wrench`` table holds."""
+    columns = (str(c) for c in wrench)
+    return tuple(
+        c.removeprefix("plate").removesuffix("_fx_N") for c in columns if c.endswith("_fx_N")
+    )
+
+
 def _plates(corners: pd.DataFrame, wrench: pd.DataFrame) -> tuple[Plate, ...]:
     """Every plate that has a reading; where a file tells no place, about its mean load."""
-    names = [c.removesuffix("_fx_N") for c in map(str, wrench) if c.endswith("_fx_N")]
     found = []
-    for name in names:
-        number = name.removeprefix("plate")
-        reading = wrench[[f"{name}_{c}" for c in WRENCH]].to_numpy()
+    for number in plate_names(wrench):
+        reading = wrench[[f"plate{number}_{c}" for c in WRENCH]].to_numpy()
         rows = corners[corners["plate"].astype(str) == number].sort_values("corner")
         place = rows[["x_m", "y_m", "z_m"]].to_numpy() if len(rows) else _about_load(reading)
         if place is not None:

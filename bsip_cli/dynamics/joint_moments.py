@@ -1,0 +1,263 @@
+"""Net forces, moments and powers at the joints (Hansen 2017, equation 1): Newton and Euler from the
+free ends of the tree to the pelvis, with each foot's own ground wrench.
+
+The wrench at a joint is what the anatomical structures that cross it exert on the distal segment.
+It carries and drives all bodies beyond the joint, less what the ground does: for arms, head and
+trunk the way is from above, for legs from below, and what is missing at the pelvis is the residual
+of the whole body.
+
+**Axes** are those of the joint coordinate system (Grood and Suntay 1983; Wu 2002 and 2005 for hip,
+ankle and spine): the first is Z of the proximal segment (to the right), the third Y of the distal
+one (up along it), the second is perpendicular to both, Y x Z (ahead in the neutral pose). They are
+not those of the tree: a knee's or elbow's hinge leans by its tilts. Second and third axes of left
+joints point the other way, so that left and right numbers mean the same. A number is the projection
+on an axis, not a component along skew axes: so moments times the rates of the angles add up to the
+power. `AXES` says what a positive one does to the distal segment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from bsip_cli.body.names import without_side
+from bsip_cli.body.person import Person
+from bsip_cli.body.skeleton import Skeleton
+from bsip_cli.dynamics.pinocchio_model import bodies_of, pinocchio_model
+from bsip_cli.dynamics.regressor import skew
+from bsip_cli.dynamics.segment_motion import SegmentMotion, segment_motion
+
+_LIMB = ("flexion", "adduction", "internal_rotation")
+_SPINE = ("extension", "bending_right", "turning_left")
+AXES = {
+    "waist": _SPINE,
+    "neck": _SPINE,
+    "sternoclavicular": ("backward_rotation", "depression", "protraction"),
+    "shoulder": _LIMB,
+    "elbow": _LIMB,
+    "wrist": _LIMB,
+    "hip": _LIMB,
+    "knee": ("extension", "adduction", "internal_rotation"),
+    "ankle": ("dorsiflexion", "inversion", "internal_rotation"),
+}
+"""By kind of joint: where a positive moment about its three axes turns the distal segment."""
+
+PARALLEL = np.sin(np.deg2rad(10.0))
+"""First and third axis nearer to each other than 10 degrees leave the second without a direction
+(gimbal lock, the arm raised to the side). Chosen: rates of angles are there six times the truth's
+error."""
+
+
+def axes_of(joint: str) -> tuple[str, str, str]:
+    """Names of a joint's three axes."""
+    return AXES[without_side(joint)]
+
+
+@dataclass(frozen=True, eq=False)
+class JointLoads:
+    """Of J joints (all but the floating base), N frames and k bodies, (N, J, 3, k) in the axes of
+    the joint coordinate systems; NaN where an axis has no direction, or a foot's wrench is unknown.
+
+    force_N, moment_Nm : by the proximal on the distal segment. power_W : moment times the rate of
+    the angle about the same axis; the three add up to the joint's power.
+    The same with ``_sd``: standard deviations, first order.
+    """
+
+    joints: tuple[str, ...]
+    force_N: np.ndarray
+    moment_Nm: np.ndarray
+    rate_rad_s: np.ndarray  # (N, J, 3) of the angle about each axis
+    force_sd_N: np.ndarray
+    moment_sd_Nm: np.ndarray
+
+    @property
+    def power_W(self) -> np.ndarray:
+        return self.moment_Nm * self.rate_rad_s[..., None]
+
+    @property
+    def power_sd_W(self) -> np.ndarray:
+        """Of the moment alone: what the rates of the angles err by is not in it."""
+        return self.moment_sd_Nm * np.abs(self.rate_rad_s)[..., None]
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """What the ground does to one foot.
+
+    wrench : (N, 6) on the foot, world, about the origin; zero in the air, NaN if unknown.
+    noise : (N, 6) its standard deviation about ``noise_at_m`` (3,), where a plate's channels are
+        independent; zero in the air.
+    """
+
+    wrench: np.ndarray
+    noise: np.ndarray
+    noise_at_m: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """Standard errors that joint loads inherit.
+
+    covariances : k of (P, P), of the inertial parameters of each body; None: known.
+    centre_m : of a joint's centre in each direction; a moment changes by what the joint's force
+        does along that lever.
+    """
+
+    covariances: tuple[np.ndarray | None, ...]
+    centre_m: float
+
+
+def joint_loads(
+    person: Person,
+    q: np.ndarray,
+    v: np.ndarray,
+    a: np.ndarray,
+    phi: np.ndarray,
+    ground: Mapping[str, Ground],
+    spread: Spread,
+    block: int = 500,
+) -> JointLoads:
+    """Inverse dynamics of a motion with k bodies.
+
+    Parameters
+    ----------
+    q, v, a : (N, nq), (N, nv), (N, nv) in Pinocchio's conventions.
+    phi : (P, k) inertial parameters of the segments with mass about their joint centres.
+    ground : by segment, the ground's wrench; other segments touch nothing.
+    block : frames at once: temporary memory grows with it, not with N.
+    """
+    skeleton, model = person.skeleton, pinocchio_model(person)
+    joints, k = skeleton.joints[1:], phi.shape[1]
+    shape = (len(q), len(joints), 3)
+    value, variance = np.empty((2, 2, *shape, k))
+    rates = np.empty(shape)
+    parts = [_Part.of(skeleton, model, i, phi, ground, spread) for i in range(1, len(joints) + 1)]
+    for start in range(0, len(q), block):
+        now = slice(start, start + block)
+        motion = segment_motion(model, q[now], v[now], a[now])
+        rows = np.concatenate([motion.wrenches(i) for i in skeleton.bodies], axis=2)
+        for j, part in enumerate(parts):
+            axes, rates[now, j] = _axes(skeleton, motion, j + 1)
+            onto = _projection(axes, motion.position_m[:, j + 1])
+            found, squared = part.loads(onto, rows, now)
+            value[:, now, j] = np.moveaxis(found.reshape(-1, 2, 3, k), 1, 0)
+            variance[:, now, j] = np.moveaxis(squared.reshape(-1, 2, 3, k), 1, 0)
+            force2 = (part.force(rows, now) ** 2).sum(axis=1, keepdims=True)
+            across2 = np.maximum(force2 - value[0, now, j] ** 2, 0.0)
+            variance[1, now, j] += spread.centre_m**2 * across2
+    sd = np.sqrt(variance)
+    return JointLoads(joints, value[0], value[1], rates, sd[0], sd[1])
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """What lies beyond a joint: columns of its bodies, their parameters, the ground's wrenches."""
+
+    columns: np.ndarray
+    phi: np.ndarray
+    covariances: tuple[np.ndarray | None, ...]
+    ground: tuple[Ground, ...]
+
+    @classmethod
+    def of(cls, skeleton: Skeleton, model: pin.Model, i: int, phi, ground, spread) -> _Part:
+        beyond = segments_beyond(skeleton, i)
+        bodies = [b for b, joint in enumerate(bodies_of(model)) if joint - 1 in beyond]
+        columns = (10 * np.array(bodies)[:, None] + np.arange(10)).ravel()
+        covariances = tuple(
+            None if one is None else one[np.ix_(columns, columns)] for one in spread.covariances
+        )
+        touching = (ground[s] for n in beyond if (s := skeleton.segments[n]) in ground)
+        return cls(columns, phi[columns], covariances, tuple(touching))
+
+    def loads(
+        self, onto: np.ndarray, rows: np.ndarray, now: slice
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 6, k) forces, then moments, and their variances by parameters and plates."""
+        own = onto @ rows[:, :, self.columns]
+        found = own @ self.phi
+        squared = np.zeros_like(found)
+        flat = own.reshape(-1, own.shape[2])
+        for k, covariance in enumerate(self.covariances):
+            if covariance is not None:
+                of_each = np.einsum("ij,ij->i", flat @ covariance, flat)
+                squared[..., k] = of_each.reshape(-1, 6)
+        for one in self.ground:
+            found -= (onto @ one.wrench[now, :, None])[..., :1]
+            about = np.eye(6)
+            about[3:, :3] = skew(one.noise_at_m[None])[0]
+            squared += (onto @ about) ** 2 @ (one.noise[now, :, None] ** 2)
+        return found, squared
+
+    def force(self, rows: np.ndarray, now: slice) -> np.ndarray:
+        """(n, 3, k) force of the joint in the world."""
+        force = rows[:, :3, self.columns] @ self.phi
+        for one in self.ground:
+            force -= one.wrench[now, :3, None]
+        return force
+
+
+def segments_beyond(skeleton: Skeleton, i: int) -> list[int]:
+    """A segment and all that hang on it."""
+    found = [i]
+    for n in range(i + 1, len(skeleton.segments)):
+        if skeleton.parents[n] in found:
+            found.append(n)
+    return found
+
+
+def _axes(skeleton: Skeleton, motion: SegmentMotion, i: int) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3, 3) rows: unit axes in the world; (n, 3) rates of the angles about them [rad/s].
+
+    With c the cosine between first and third axis, w . e1 = rate1 + c rate3 and the reverse.
+    """
+    parent, side = skeleton.parents[i], skeleton.side(skeleton.segments[i])
+    sign = -1.0 if side == "l" else 1.0
+    first, third = motion.rotation[:, parent, :, 2], sign * motion.rotation[:, i, :, 1]
+    across = np.cross(third, first)  # the sign of a left joint's comes with its third
+    sine = np.linalg.norm(across, axis=1, keepdims=True)
+    skewed = sine < PARALLEL
+    with np.errstate(invalid="ignore", divide="ignore"):
+        second = np.where(skewed, np.nan, across / sine)
+        turning = motion.turning_rad_s[:, i] - motion.turning_rad_s[:, parent]
+        along = np.einsum("nc,nc->n", first, third)
+        one, two, three = (np.einsum("nc,nc->n", turning, e) for e in (first, second, third))
+        rates = np.stack([one - along * three, two * sine[:, 0] ** 2, three - along * one], axis=1)
+        rates = np.where(skewed, np.nan, rates / sine**2)
+    return np.stack([first, second, third], axis=1), rates
+
+
+def _projection(axes: np.ndarray, centre_m: np.ndarray) -> np.ndarray:
+    """(n, 6, 6): a world wrench about the origin as forces along the axes (n, 3, 3) and moments
+    about them through the joint's centre (n, 3): e . (m - p x f) = e . m + (p x e) . f."""
+    onto = np.zeros((len(axes), 6, 6))
+    onto[:, :3, :3] = onto[:, 3:, 3:] = axes
+    onto[:, 3:, :3] = np.cross(centre_m[:, None], axes)
+    return onto
+
+
+def of_accelerations(
+    person: Person, q: np.ndarray, phi: np.ndarray, covariance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviations (N, J, 3) of forces [N] and moments [N m] for errors of a with covariance
+    (N, nv, nv) in poses (N, nq) of a body phi (P,).
+
+    A body at rest is accelerated by one unit of each velocity in turn: what that changes.
+    """
+    count, nv = covariance.shape[:2]
+    known = Spread((None,), 0.0)
+
+    def at(a: np.ndarray) -> np.ndarray:
+        still = np.zeros((len(a), nv))
+        poses = np.repeat(q, len(a) // count, axis=0)
+        found = joint_loads(person, poses, still, a, phi[:, None], {}, known)
+        return np.stack([found.force_N[..., 0], found.moment_Nm[..., 0]])
+
+    rest = at(np.zeros((count, nv)))
+    each = at(np.tile(np.eye(nv), (count, 1))).reshape(2, count, nv, *rest.shape[2:])
+    response = each - rest[:, :, None]
+    variance = np.einsum("wnijx,nik,wnkjx->wnjx", response, covariance, response, optimize=True)
+    force, moment = np.sqrt(np.maximum(variance, 0.0))
+    return force, moment

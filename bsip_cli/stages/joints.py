@@ -1,0 +1,381 @@
+"""joints: net forces, moments and powers at the joints, per method, with standard deviations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from scipy.interpolate import interp1d
+
+from bsip_cli.body.names import in_words
+from bsip_cli.body.person import Person
+from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.diagnosis.cause import Cause, method_of
+from bsip_cli.diagnosis.corrected_wrench import corrected_wrench, is_of_the_forces
+from bsip_cli.dynamics.joint_moments import (
+    Ground,
+    JointLoads,
+    Spread,
+    axes_of,
+    joint_loads,
+    of_accelerations,
+)
+from bsip_cli.dynamics.lowpass import lowpass_operator, noise_left
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
+from bsip_cli.dynamics.segment_motion import SegmentMotion, segment_motion
+from bsip_cli.effects.plate_frame import ALL
+from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.unmeasured_contact import UnmeasuredContact
+from bsip_cli.motion.jacobian import coordinate_covariance
+from bsip_cli.recordings.own_plates import SIDES, FootForces, Reading, foot_forces, plate_noise
+from bsip_cli.report.words import listing
+from bsip_cli.running.unit import Unit
+from bsip_cli.stages.found_causes import body_beside, causes_of
+from bsip_cli.stages.frames import WRENCH, acceleration_noise, coordinates_from, person_from
+from bsip_cli.stages.joint_peaks import peaks_of
+from bsip_cli.stages.known_loads import load_phi, loads_record
+from bsip_cli.stages.reconstructed import parameters_of
+from bsip_cli.stages.trial_scene import plate_names, scene_of
+from bsip_cli.statistics.methods import OM, RM
+
+_POSES = 40  # in which the response to accelerations is computed; between them it is interpolated
+_WEAK_PRIOR = 200.0  # rad/m, as in smoothing: an angle that errs by more is held by the prior
+_HELD = "something that no plate measures may bear the person"
+Reasons = dict[str, np.ndarray]  # in words: (N, J) frames and joints that it leaves out
+_NO_POSE = "the markers do not determine the pose"
+
+
+def run(unit: Unit) -> None:
+    """Read motion, plates, contacts and parameters; write joint-moments and joint-peaks."""
+    skeleton = load_skeleton(unit.config.skeleton)
+    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    trial, bsip = _trial_of(unit, person), unit.read("bsip")
+    methods, phi = parameters_of(bsip, person)
+    spread = _spreads(unit, methods)
+    ground = trial.ground(trial.readings)
+    reasons = _reasons(unit, trial, ground.feet)
+    _tell(unit, trial, reasons)
+    noise = _of_accelerations(trial, phi[:, -1])
+    known = load_phi(unit, person)[:, None]
+    loads = joint_loads(person, trial.q, trial.v, trial.a, phi + known, ground.on_feet, spread)
+    tables = list(_tables(trial, methods, loads, trial.valid(reasons), noise))
+    for method, loads, ok in _extended(unit, trial, bsip, spread, methods):
+        tables += _tables(trial, [method], loads, ok, noise)
+    table = pd.concat(tables, ignore_index=True)
+    unit.write("joint-moments", table, facts={"loads": loads_record(unit)})
+    mass_kg = float(unit.read("person")["mass_kg"].iloc[0])
+    unit.write("joint-peaks", peaks_of(table, mass_kg, _words_of(trial, reasons)))
+
+
+# --- what was measured ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _Ground:
+    feet: FootForces
+    on_feet: dict[str, Ground]
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """Motion, and plates beside the feet, of one trial; frames N."""
+
+    person: Person
+    times_s: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    determined: np.ndarray
+    measured: np.ndarray
+    pelvis_noise: np.ndarray
+    readings: tuple[Reading, ...]
+    feet_m: dict[str, np.ndarray]
+    on_ground: dict[str, np.ndarray]
+    on_plate: dict[str, np.ndarray]
+    cutoff_hz: float
+    plates: tuple[str, ...]
+
+    @property
+    def rate_hz(self) -> float:
+        return 1.0 / float(np.median(np.diff(self.times_s)))
+
+    def valid(self, reasons: Reasons) -> np.ndarray:
+        """(N, J) joints that nothing leaves out."""
+        return ~np.logical_or.reduce(list(reasons.values()))
+
+    def ground(self, readings: Sequence[Reading]) -> _Ground:
+        """Each foot's wrench, and its noise after the low-pass."""
+        feet = foot_forces(readings, self.feet_m, self.on_ground, self.on_plate, self.rate_hz)
+        left = np.sqrt(noise_left(self.rate_hz, self.cutoff_hz))
+        on_feet = {}
+        for side in SIDES:
+            noise, at = np.zeros((len(self.q), 6)), np.zeros(3)
+            if feet.plate[side].any():
+                most = feet.plate[side].sum(axis=0).argmax()
+                at = _middle(readings[most])
+                noise[feet.plate[side].any(axis=1)] = left * plate_noise(readings[most], at)
+            on_feet[f"foot_{side}"] = Ground(feet.wrench[side], noise, at)
+        return _Ground(feet, on_feet)
+
+
+def _middle(plate: Reading) -> np.ndarray:
+    """(3,) of the plate; where no outline is known, of its load."""
+    if plate.corners_m is not None:
+        return np.asarray(plate.corners_m.mean(axis=0))
+    cop = plate.cop_m()
+    return np.append(np.nanmedian(cop[np.nan_to_num(plate.wrench[:, 2]) > 0], axis=0), 0.0)
+
+
+def _trial_of(unit: Unit, person: Person) -> _Trial:
+    kinematics, contacts, wrench = (unit.read(k) for k in ("kinematics", "contacts", "wrench"))
+    q, v, a = coordinates_from(kinematics, person.skeleton)
+    motion = segment_motion(pinocchio_model(person), q, v, a)
+    names = {"l": "left", "r": "right"}
+    return _Trial(
+        person,
+        kinematics["time_s"].to_numpy(),
+        q,
+        v,
+        a,
+        kinematics["determined"].to_numpy(),
+        wrench["valid"].to_numpy(),
+        acceleration_noise(kinematics, person.skeleton),
+        _readings(unit.read("plates"), wrench),
+        {side: _foot_points(person, motion, side) for side in SIDES},
+        {side: contacts[f"{names[side]}_on_ground"].to_numpy() for side in SIDES},
+        {side: contacts[f"{names[side]}_on_plate"].to_numpy() for side in SIDES},
+        unit.config.joints.cutoff_hz,
+        plate_names(wrench),
+    )
+
+
+def _readings(corners: pd.DataFrame, wrench: pd.DataFrame) -> tuple[Reading, ...]:
+    found = []
+    for name in plate_names(wrench):
+        rows = corners[corners["plate"].astype(str) == name].sort_values("corner")
+        place = rows[["x_m", "y_m", "z_m"]].to_numpy() if len(rows) else None
+        found.append(Reading(wrench[[f"plate{name}_{c}" for c in WRENCH]].to_numpy(), place))
+    return tuple(found)
+
+
+def _foot_points(person: Person, motion: SegmentMotion, side: str) -> np.ndarray:
+    """(N, k, 3) the foot's markers as the pose puts them, and the ankle's centre."""
+    i = person.skeleton.index(f"foot_{side}")
+    own = person.markers_in_joint_m()[person.marker_segments == i]
+    own = np.vstack([np.zeros(3), own])
+    if len(own) == 1:
+        own = np.vstack([own, [[person.lengths_m[i], 0.0, 0.0]]])
+    turned = np.einsum("nij,kj->nki", motion.rotation[:, i], own)
+    return motion.position_m[:, i, None] + turned
+
+
+# --- what is not determined -------------------------------------------------------------------
+
+
+def _reasons(unit: Unit, trial: _Trial, feet: FootForces) -> Reasons:
+    """Why a joint's loads are not determined; J joints, all but the floating base."""
+    person, count = trial.person, len(trial.q)
+    joints = len(person.skeleton.joints) - 1
+    found = {_NO_POSE: np.tile(~trial.determined[:, None], joints)}
+    unseen = person.without_data()[1:]
+    found["no markers show how the segment moves"] = np.tile(unseen, (count, 1))
+    beside = np.any([trial.on_ground[s] & ~trial.on_plate[s] for s in SIDES], axis=0)
+    if trial.readings:
+        found[_HELD] = np.tile((~trial.measured & ~beside)[:, None], joints)
+    for side in SIDES:
+        legs = [i - 1 for i in _way(person, f"foot_{side}")]
+        for words, frames in feet.unknown[side].items():
+            found.setdefault(words, np.zeros((count, joints), bool))[:, legs] |= frames[:, None]
+    words = "a hand or another segment bears part of the body"
+    found[words] = np.zeros((count, joints), bool)
+    for segment, frames in _contacts(unit, trial):
+        joints_on = np.isin(np.arange(joints) + 1, _way(person, segment))
+        found[words] |= frames[:, None] & joints_on
+    return found
+
+
+def _way(person: Person, segment: str) -> list[int]:
+    """Segments from one to the pelvis, which is not among them."""
+    skeleton, found = person.skeleton, []
+    i = skeleton.index(segment)
+    while i > 0:
+        found.append(i)
+        i = skeleton.parents[i]
+    return found
+
+
+def _contacts(unit: Unit, trial: _Trial) -> Iterator[tuple[str, np.ndarray]]:
+    """Segments that touch something no plate measures, and (N,) when, as identify and diagnose
+    found them."""
+    assert unit.trial is not None
+    contact = unit.facts("identification")["external_contacts"].get(unit.trial.stem)
+    for hand in contact["hands"] if contact else ():
+        yield hand, np.ones(len(trial.q), bool)
+    for cause in causes_of(unit):
+        if isinstance(cause.effect, UnmeasuredContact) and unit.trial.stem in cause.trials:
+            middle, length = cause.values[3:5]
+            yield cause.target, np.abs(trial.times_s - middle) <= length / 2
+
+
+def _tell(unit: Unit, trial: _Trial, reasons: Reasons) -> None:
+    """Say what is left out: joints of one reason and number of frames together."""
+    for words, out in reasons.items():
+        counts = out.sum(axis=0)
+        names = np.array(trial.person.skeleton.joints[1:])
+        for frames in sorted(set(counts.tolist()) - {0}, reverse=True):
+            joints = names[counts == frames]
+            which = (
+                "all joints" if len(joints) == len(names) else listing(list(map(in_words, joints)))
+            )
+            unit.warn(
+                f"{unit.name}: no moments of {which} in {frames} of {len(out)} frames: {words}"
+            )
+
+
+def _words_of(trial: _Trial, reasons: Reasons) -> dict[str, str]:
+    """By joint, what left frames out, in words; empty where nothing did."""
+    found = {}
+    for j, joint in enumerate(trial.person.skeleton.joints[1:]):
+        parts = [(int(out[:, j].sum()), words) for words, out in reasons.items()]
+        found[joint] = "; ".join(f"{words}: {n} frames" for n, words in parts if n)
+    return found
+
+
+# --- how sure ---------------------------------------------------------------------------------
+
+
+def _spreads(unit: Unit, methods: Sequence[str]) -> Spread:
+    """Covariances of the parameters by method, and the joint centres' error."""
+    rows = unit.read("covariance", method=methods)
+    names = [c for c in map(str, rows) if c.startswith("root_")]
+    roots = {m: part[names].to_numpy() for m, part in rows.groupby("method")}
+    covariances = tuple(roots[m] @ roots[m].T for m in methods)
+    return Spread(covariances, unit.config.joints.centre_sd_m)
+
+
+def _of_accelerations(trial: _Trial, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Standard deviations (N, J, 3) of forces and moments by the noise of the accelerations.
+
+    All coordinates are smoothed alike, so their noise at any time is that of the pose, as the
+    markers leave it, times one number, which the pelvis shows.
+    """
+    person = trial.person
+    frames = np.flatnonzero(trial.determined)
+    shape = (len(trial.q), len(person.skeleton.joints) - 1, 3)
+    if not len(frames):
+        return np.full(shape, np.nan), np.full(shape, np.nan)
+    some = np.unique(frames[np.linspace(0, len(frames) - 1, _POSES).astype(int)])
+    starts = np.array(person.skeleton.v_starts)
+    joint = np.searchsorted(starts, range(trial.v.shape[1]), side="right") - 1
+    known = ~person.without_data()[joint]
+    information = np.linalg.inv(coordinate_covariance(person, trial.q[some], _WEAK_PRIOR))
+    covariance = np.zeros_like(information)
+    inner = np.linalg.inv(information[:, known][:, :, known])
+    covariance[:, np.outer(known, known)] = inner.reshape(len(some), -1)
+    of_pelvis = np.trace(covariance[:, :3, :3], axis1=1, axis2=2) / 3
+    each = of_accelerations(person, trial.q[some], phi, covariance / of_pelvis[:, None, None])
+    near = np.clip(np.arange(shape[0]), some[0], some[-1])
+    course = np.stack(each)
+    if len(some) > 1:
+        course = interp1d(some, course, axis=1)(near)
+    force, moment = course * trial.pelvis_noise[:, None, None]
+    return force, moment
+
+
+# --- with the causes that the diagnosis named --------------------------------------------------
+
+
+def _extended(
+    unit: Unit, trial: _Trial, bsip: pd.DataFrame, spread: Spread, methods: Sequence[str]
+) -> Iterator[tuple[str, JointLoads, np.ndarray]]:
+    """Method, loads and valid frames (N, J) of the extended models of this trial.
+
+    Forces freed of the errors of plates and clock; parameters as ``extend`` found them. OM's
+    covariance stands for theirs: they come from the same data.
+    """
+    assert unit.trial is not None
+    causes, extended = causes_of(unit), unit.read("extended-bsip")
+    own = [k for k, cause in enumerate(causes) if unit.trial.stem in cause.trials]
+    if not own or extended.empty:
+        return
+    person = trial.person
+    names, phi = parameters_of(pd.concat([bsip, extended]), person)
+    scene = scene_of(unit, person, body_beside(unit, phi[:, names.index(RM)]))
+    known = load_phi(unit, person)
+    of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
+    for place, k in enumerate(own):
+        among = [causes[j] for j in own[: place + 1]]
+        readings = _corrected(trial, scene, among)
+        ground = trial.ground(readings)
+        body = phi[:, names.index(method_of(causes[: k + 1]))] + known
+        loads = joint_loads(person, trial.q, trial.v, trial.a, body[:, None], ground.on_feet, of_om)
+        yield method_of(among), loads, trial.valid(_reasons(unit, trial, ground.feet))
+
+
+def _corrected(trial: _Trial, scene: Scene, causes: Sequence[Cause]) -> tuple[Reading, ...]:
+    """The plates freed of the causes that concern them, each on its own."""
+    forces = [cause for cause in causes if is_of_the_forces(cause)]
+    found = []
+    for reading, name in zip(trial.readings, trial.plates, strict=True):
+        mine = [c for c in forces if c.target.split(" ")[0] in ("", ALL, name)]
+        plate = next((p for p in scene.plates if p.name == name), None)
+        if plate is None or not mine:
+            found.append(reading)
+            continue
+        alone = replace(scene, plates=(plate,), wrench=plate.wrench, valid=trial.measured)
+        wrench, _ = corrected_wrench(alone, np.nan_to_num(plate.wrench), mine)
+        wrench[~np.isfinite(plate.wrench).all(axis=1)] = np.nan
+        found.append(replace(reading, wrench=wrench))
+    return tuple(found)
+
+
+# --- tables -----------------------------------------------------------------------------------
+
+
+def _tables(
+    trial: _Trial,
+    methods: Sequence[str],
+    loads: JointLoads,
+    valid: np.ndarray,
+    noise: tuple[np.ndarray, np.ndarray],
+) -> Iterator[pd.DataFrame]:
+    """Rows of ``joint-moments`` per method: forces and moments low-passed in the valid frames."""
+    count = len(trial.times_s)
+    for k, method in enumerate(methods):
+        for j, joint in enumerate(loads.joints):
+            force, moment = (x[:, j, :, k] for x in (loads.force_N, loads.moment_Nm))
+            ok = valid[:, j, None] & np.isfinite(moment)
+            force, moment = _lowpassed(trial, force, ok), _lowpassed(trial, moment, ok)
+            rate = loads.rate_rad_s[:, j]
+            force_sd, moment_sd = (
+                np.where(ok, np.hypot(x[:, j, :, k], y[:, j]), np.nan)
+                for x, y in zip((loads.force_sd_N, loads.moment_sd_Nm), noise, strict=True)
+            )
+            for axis, name in enumerate(axes_of(joint)):
+                yield pd.DataFrame(
+                    {
+                        "time_s": trial.times_s,
+                        "method": np.full(count, method, dtype=object),
+                        "joint": np.full(count, joint, dtype=object),
+                        "axis": np.full(count, name, dtype=object),
+                        "force_N": force[:, axis],
+                        "force_sd_N": force_sd[:, axis],
+                        "moment_Nm": moment[:, axis],
+                        "moment_sd_Nm": moment_sd[:, axis],
+                        "power_W": moment[:, axis] * rate[:, axis],
+                        "power_sd_W": moment_sd[:, axis] * np.abs(rate[:, axis]),
+                        "valid": ok[:, axis],
+                    }
+                )
+
+
+def _lowpassed(trial: _Trial, course: np.ndarray, ok: np.ndarray) -> np.ndarray:
+    """(N, 3) of each axis inside its own valid frames; NaN outside."""
+    found = np.full(course.shape, np.nan)
+    for axes in (slice(0, 3, 2), slice(1, 2)):  # the second may lack a direction alone
+        good = np.asarray(ok[:, axes].all(axis=1))
+        operator, frames = lowpass_operator(good, trial.rate_hz, trial.cutoff_hz)
+        found[frames, axes] = operator @ np.where(good[:, None], course[:, axes], 0.0)
+    return found

@@ -31,7 +31,7 @@ NAMES = {
     "labels": r"labels?\b|marker.?set|no marker|markers? .*(missing|twice|double)|unknown marker",
     "scale": r"POINT:UNITS|units? of (the )?(points|lengths?|markers)|unit.points|lengths? in|"
     r"statur|\btall\b|\bheight\b|inch",
-    "handedness": r"mirror|handed|wrong side",
+    "handedness": r"mirror|handed|wrong side|reversed the . axis",
     "vertical": r"\bvertical (is|axis)|lab's vertical|up.axis|upright",
     "markers": r"(marker|point|traject)\w*\b.*(missing|invalid|held|slip|jump|repeat|frozen|gap)|"
     r"(missing|invalid|held|repeated|frozen|gaps?)\b.*(marker|point|traject)|residual",
@@ -104,7 +104,10 @@ def judge(circumstance: Circumstance, taken: Taken) -> Judgement:
     short = {n for n in trials if n not in comparisons or not comparisons[n].is_whole}
     is_whole = not short
     # What must be named: what is wrong in the artifacts, and what these cannot show.
-    asked = [*wrong, *(("", t.name) for t in circumstance.things if t.name)]
+    # A stated mass shows beside forces only.
+    has_forces = any(comparison.has_forces for comparison in comparisons.values())
+    hidden_matters = [t.name for t in circumstance.things if t.name]
+    asked = [*wrong, *(("", name) for name in hidden_matters if name != "mass" or has_forces)]
     telling = [w for w in news if not _CONTACT.search(w.text)]
     named = {which: word for which in asked if (word := _naming(*which, telling))}
     all_named = set(asked) == set(named)
@@ -113,6 +116,10 @@ def judge(circumstance: Circumstance, taken: Taken) -> Judgement:
     elif circumstance.is_sound:
         outcome = _of_sound(wrong, is_whole, telling)
     elif wrong:
+        # Numbers may be named by what is wrong with them, or by why: a clock that starts elsewhere.
+        warned = [w for w in telling if w.level == "warning"]
+        unnamed = {trial for trial, quantity in asked if (trial, quantity) not in named}
+        all_named = "" not in unnamed and _is_told(circumstance, unnamed, warned)
         is_told = is_whole or _is_told(circumstance, short, telling)
         outcome = _of_wrong(wrong, telling, all_named, is_told)
     elif not is_whole:

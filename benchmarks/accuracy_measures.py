@@ -40,7 +40,8 @@ def segment_errors(study: Path, out: Path) -> pd.DataFrame:
 
     Errors of mass [kg], centre of mass [mm] and, mean of three, principal moments of inertia [%];
     how far mass [kg] and centre of mass [mm] lie from RM's; whether a body can have it; and the
-    share of masses, coordinates and tensor entries whose 95 % interval holds the truth.
+    share of masses, coordinates and tensor entries whose 95 % interval holds the truth. Both sides
+    of a limb have the same name.
     """
     rows = []
     for folder in sorted(out.glob("sub-*")):
@@ -56,6 +57,7 @@ def segment_errors(study: Path, out: Path) -> pd.DataFrame:
                     "participant": folder.name,
                     "sex": sex,
                     "method": row["method"],
+                    "segment": row["segment"].removesuffix("_l").removesuffix("_r"),
                     **errors(found, true),
                     "mass from RM": abs(found[0] - rm[0]),
                     "centre from RM": 1000 * np.linalg.norm(found[1:4] - rm[1:4]),

@@ -25,9 +25,15 @@ BENT_RAD = np.deg2rad(10.0)
 PACE_HZ = 0.5
 
 
-def write_study(folder: Path, people: int, seed: int) -> None:
-    """The preset ``sample`` with other people, and two poor recordings of each."""
+def write_study(folder: Path, people: int, seed: int, quick: bool = False) -> None:
+    """The preset ``sample`` with other people, and two poor recordings of each.
+
+    quick : static trial and sequence alone.
+    """
     options = replace(preset("sample"), participants=people, seed=seed)
+    if quick:
+        simulate_study(folder, replace(options, tasks=("static", "sequence")))
+        return
     simulate_study(folder, options)
     for number in range(1, people + 1):
         person = participant_person(options, number)

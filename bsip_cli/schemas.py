@@ -93,7 +93,7 @@ def _spread_columns() -> tuple[Column, ...]:
         *_floats(
             "com_x_spread_percent com_y_spread_percent com_z_spread_percent",
             "%",
-            f"how far people's centres of mass stray from the table, {rod}; with what lengths err by",
+            f"how far people's centres of mass stray from the table, {rod}; lengths' errors too",
             "segment",
         ),
         Column(

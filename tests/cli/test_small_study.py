@@ -382,7 +382,8 @@ def make_other_version(path: Path) -> None:
     """As an earlier bsip might have left it: all but the version as it would be now."""
     table = pq.read_table(path)
     header = table.schema.metadata[b"bsip"]
-    old = header.replace(b'"schema_version": 1', b'"schema_version": 0')
+    now = f'"schema_version": {SCHEMAS["regression"].version}'.encode()
+    old = header.replace(now, b'"schema_version": 0')
     assert old != header
     pq.write_table(table.replace_schema_metadata({"bsip": old}), path)
 

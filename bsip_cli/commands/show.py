@@ -21,9 +21,8 @@ from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.trials import listed
 
 _JOINT_MOMENTS = (
-    "Net moments on the distal segment, negative against the named direction. RM+mass and OM with "
-    "their largest change against RM, extended models against the one before (share of the joint's "
-    "peak)."
+    "Net moments on the distal segment, negative against the named direction; then OM's largest "
+    "change against RM, or an extended model's against the one before (share of the joint's peak)."
 )
 _WIDEST = 100  # letters in a line
 
@@ -128,11 +127,12 @@ def _joints(folder: Path, width: int) -> Iterator[str]:
     lines = []
     for path in sorted(folder.glob(f"{folder.name}_*{ending}")):
         peaks = read_artifact(path, "joint-peaks")
-        for method, rows in peaks[peaks["frames"] > 0].groupby("method", sort=False):
-            largest = rows.loc[rows["peak_Nm"].abs().groupby(rows["joint"]).idxmax()]
-            words = ", ".join(_peak_in_words(row) for row in largest.to_dict("records"))
-            stem = path.name.removesuffix(ending)
-            lines.append(_wrapped(f"{stem}, {method}: {words}", width, "  - "))
+        method = peaks["method"].iloc[-1]  # with most in the model
+        rows = peaks[(peaks["frames"] > 0) & (peaks["method"] == method)]
+        largest = rows.loc[rows["peak_Nm"].abs().groupby(rows["joint"]).idxmax()]
+        words = ", ".join(_peak_in_words(row) for row in largest.to_dict("records"))
+        stem = path.name.removesuffix(ending)
+        lines.append(_wrapped(f"{stem}, {method}: {words or 'none'}", width, "  - "))
     if lines:
         title = f"\n## Largest joint moments: {printable(folder.name)}"
         yield "\n".join([title, _wrapped(_JOINT_MOMENTS, width), *lines])

@@ -10,7 +10,7 @@ from bsip_cli.recordings.own_plates import Reading, foot_forces, plate_noise
 COUNT, RATE_HZ = 200, 100.0
 LEFT, RIGHT = np.array([0.0, 0.1, 0.0]), np.array([0.0, -0.1, 0.0])
 OUTLINE = np.array([[0.3, 0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0], [0.3, -0.2, 0.0]])
-ASIDE = np.array([0.0, 0.2, 0.0])
+ASIDE, AHEAD = np.array([0.0, 0.2, 0.0]), np.array([1.0, 0.0, 0.0])
 YES = np.ones(COUNT, bool)
 
 
@@ -44,7 +44,7 @@ def test_each_foot_gets_the_wrench_of_its_own_plate():
 
 def test_a_foot_on_two_plates_gets_both():
     halves = [
-        Reading(load(LEFT + (x, 0, 0), 200.0), OUTLINE + (y, 0.2, 0))
+        Reading(load(LEFT + x * AHEAD, 200.0), OUTLINE + ASIDE + y * AHEAD)
         for x, y in ((-0.05, -0.3), (0.05, 0.3))
     ]
     found = told([*halves, Reading(load(RIGHT), OUTLINE - ASIDE)])

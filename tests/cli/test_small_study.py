@@ -311,7 +311,7 @@ def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
     times = run.times()
     chosen = ("--participant", "sub-01", "--config", own)
     answer = bsip("run", run.study, "--out", run.out, *chosen)
-    assert answer.summary.startswith("bsip run: 14 done, 10 up to date;")
+    assert answer.summary.startswith("bsip run: 17 done, 10 up to date;")
     rewritten = run.rewritten(times)
     assert stages_of(rewritten) == {
         "reconstruct (trial)",
@@ -320,6 +320,7 @@ def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
         "extend (participant)",
         "extend (trial)",
         "extend (participant, gain)",
+        "joints (trial)",
         "choose (participant)",
         "report (participant)",
     }

@@ -49,7 +49,7 @@ OPTIONS = StudyOptions(
 TRIALS = ("task-sequence_run-1", "task-squat_run-1", "task-static")
 GOLDEN = Path(__file__).with_name("files_of_a_run.txt")
 FITTED_ONLY = "diagnosis_causes"  # a figure of those people of whom a cause was fitted in full
-UNITS = 2 * (3 * 5 + 9) + 3  # 5 stages per trial, 9 per participant, 3 of the cohort
+UNITS = 2 * (3 * 6 + 9) + 3  # 6 stages per trial, 9 per participant, 3 of the cohort
 
 
 @dataclass(frozen=True)

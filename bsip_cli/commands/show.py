@@ -10,6 +10,7 @@ from textwrap import fill
 import pandas as pd
 
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
+from bsip_cli.body.names import in_words
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.report.cohort.laboratory import named_sentences, unnamed_sentences
 from bsip_cli.report.records import with_all_causes
@@ -20,6 +21,10 @@ from bsip_cli.running.freshness import outdated
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.trials import listed
 
+_JOINT_MOMENTS = (
+    "Net moments on the distal segment, negative against the named direction; then OM's largest "
+    "change against RM, or an extended model's against the one before (share of the joint's peak)."
+)
 _WIDEST = 100  # letters in a line
 
 
@@ -61,6 +66,10 @@ def shown(out: Path) -> Iterator[str]:
             unread.append(folder.name)
             yield f"\n{error}"
     yield from _laboratory(out)
+        try:
+            yield from _joints(folder, _width(get_terminal_size().columns))
+        except BadDataError as error:
+            yield str(error)
     yield from _no_more_true(out, get_terminal_size().columns)
     yield from _shared_text(shared_causes(everybody), get_terminal_size().columns)
     for report in (out / "group" / "report.html", *sorted(out.glob("sub-*/report.html"))):
@@ -121,6 +130,34 @@ def _person(folder: Path) -> tuple[Searched, str] | None:
     right = put_right_sentence(_marker_events(folder))
     text = verdict_text(folder.name, found, right, get_terminal_size().columns)
     return searched(folder.name, diagnosis, facts), text
+
+
+def _joints(folder: Path, width: int) -> Iterator[str]:
+    """The largest moment at each joint, a line per trial, and what OM and named faults change."""
+    ending = f"_{SCHEMAS['joint-peaks'].file_name}.parquet"
+    lines = []
+    for path in sorted(folder.glob(f"{folder.name}_*{ending}")):
+        peaks = read_artifact(path, "joint-peaks")
+        method = peaks["method"].iloc[-1]  # with most in the model
+        rows = peaks[(peaks["frames"] > 0) & (peaks["method"] == method)]
+        largest = rows.loc[rows["peak_Nm"].abs().groupby(rows["joint"]).idxmax()]
+        words = ", ".join(_peak_in_words(row) for row in largest.to_dict("records"))
+        stem = path.name.removesuffix(ending)
+        lines.append(_wrapped(f"{stem}, {method}: {words or 'none'}", width, "  - "))
+    if lines:
+        title = f"\n## Largest joint moments: {printable(folder.name)}"
+        yield "\n".join([title, _wrapped(_JOINT_MOMENTS, width), *lines])
+
+
+def _peak_in_words(row: dict) -> str:
+    """``left knee extension 72 N m (1.15 N m/kg), changed by 0.6 N m (1 %)``."""
+    axis = str(row["axis"]).replace("_", " ")
+    text = (
+        f"{in_words(row['joint'])} {axis} {row['peak_Nm']:.1f} N m ({row['peak_Nm_kg']:.2f} N m/kg)"
+    )
+    if row["compared_with"]:
+        text += f", {row['change_Nm']:+.1f} N m ({row['change_percent']:.0f} %)"
+    return text
 
 
 def _no_more_true(out: Path, columns: int) -> Iterator[str]:

@@ -103,11 +103,13 @@ class Spread:
 
     covariances : k of (P, P), of the inertial parameters of each body; None: known.
     centre_m : of a joint's centre in each direction; a moment changes by what the joint's force
-        does along that lever.
+        does along that lever. axes_rad : of the axes' direction about each axis of space: a turned
+        axis shows a part of the moment and the force across it.
     """
 
     covariances: tuple[np.ndarray | None, ...]
     centre_m: float
+    axes_rad: float = 0.0
 
 
 def joint_loads(
@@ -145,9 +147,13 @@ def joint_loads(
             found, squared = part.loads(onto, rows, now)
             value[:, now, j] = np.moveaxis(found.reshape(-1, 2, 3, k), 1, 0)
             variance[:, now, j] = np.moveaxis(squared.reshape(-1, 2, 3, k), 1, 0)
-            force2 = (part.force(rows, now) ** 2).sum(axis=1, keepdims=True)
-            across2 = np.maximum(force2 - value[0, now, j] ** 2, 0.0)
-            variance[1, now, j] += spread.centre_m**2 * across2
+            force, moment = part.whole(rows, now, motion.position_m[:, j + 1])
+            across = [
+                np.maximum((x**2).sum(axis=1, keepdims=True) - value[n, now, j] ** 2, 0.0)
+                for n, x in enumerate((force, moment))
+            ]
+            variance[1, now, j] += spread.centre_m**2 * across[0]
+            variance[:, now, j] += spread.axes_rad**2 * np.stack(across)
     sd = np.sqrt(variance)
     return JointLoads(joints, value[0], value[1], rates, sd[0], sd[1])
 
@@ -191,12 +197,15 @@ class _Part:
             squared += (onto @ about) ** 2 @ (one.noise[now, :, None] ** 2)
         return found, squared
 
-    def force(self, rows: np.ndarray, now: slice) -> np.ndarray:
-        """(n, 3, k) force of the joint in the world."""
-        force = rows[:, :3, self.columns] @ self.phi
+    def whole(
+        self, rows: np.ndarray, now: slice, centre_m: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 3, k) force of the joint and moment about its centre (n, 3), world."""
+        wrench = rows[:, :, self.columns] @ self.phi
         for one in self.ground:
-            force -= one.wrench[now, :3, None]
-        return force
+            wrench -= one.wrench[now, :, None]
+        force, moment = np.split(wrench, 2, axis=1)
+        return force, moment - skew(centre_m) @ force
 
 
 def segments_beyond(skeleton: Skeleton, i: int) -> list[int]:

@@ -252,7 +252,8 @@ def _spreads(unit: Unit, methods: Sequence[str]) -> Spread:
     names = [c for c in map(str, rows) if c.startswith("root_")]
     roots = {m: part[names].to_numpy() for m, part in rows.groupby("method")}
     covariances = tuple(roots[m] @ roots[m].T for m in methods)
-    return Spread(covariances, unit.config.joints.centre_sd_m)
+    options = unit.config.joints
+    return Spread(covariances, options.centre_sd_m, np.deg2rad(options.axes_sd_deg))
 
 
 def _of_accelerations(trial: _Trial, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -49,7 +49,7 @@ OPTIONS = StudyOptions(
 TRIALS = ("task-sequence_run-1", "task-squat_run-1", "task-static")
 GOLDEN = Path(__file__).with_name("files_of_a_run.txt")
 FITTED_ONLY = "diagnosis_causes"  # a figure of those people of whom a cause was fitted in full
-UNITS = 2 * (3 * 5 + 10) + 4  # 5 stages per trial, 10 per participant, 4 of the cohort
+UNITS = 2 * (3 * 6 + 10) + 4  # 6 stages per trial, 10 per participant, 4 of the cohort
 
 
 @dataclass(frozen=True)
@@ -311,7 +311,7 @@ def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
     times = run.times()
     chosen = ("--participant", "sub-01", "--config", own)
     answer = bsip("run", run.study, "--out", run.out, *chosen)
-    assert answer.summary.startswith("bsip run: 15 done, 10 up to date;")
+    assert answer.summary.startswith("bsip run: 18 done, 10 up to date;")
     rewritten = run.rewritten(times)
     assert stages_of(rewritten) == {
         "reconstruct (trial)",
@@ -321,6 +321,7 @@ def test_changed_option_reruns_its_stage_and_its_readers(run, bsip, tmp_path):
         "extend (participant)",
         "extend (trial)",
         "extend (participant, gain)",
+        "joints (trial)",
         "choose (participant)",
         "report (participant)",
     }

@@ -273,6 +273,24 @@ def test_a_centre_that_is_off_is_a_lever_of_the_joints_force():
     assert found.moment_sd_Nm[0, j, 0, 0] == pytest.approx(expected)
 
 
+def test_axes_that_are_turned_show_what_lies_across():
+    """Drawn turns of all axes together, of a moment known in the world."""
+    person = standing().person
+    still = np.zeros((1, len(person.skeleton.v_names)))
+    wrench = np.array([[30.0, 40.0, 700.0, 50.0, 60.0, 70.0]])
+    ground = {"foot_r": Ground(wrench, np.zeros((1, 6)), np.zeros(3))}
+    turned = Spread((None,), 0.0, 0.02)
+    q = standing().q[None]
+    found = joint_loads(person, q, still, still, np.zeros((150, 1)), ground, turned)
+    j = found.joints.index("hip_r")
+    R, p = joint_frames(person, q)
+    moment = -(wrench[0, 3:] - np.cross(p[0, j + 1], wrench[0, :3]))
+    first = R[0, 0] @ [0, 0, 1]
+    rng = np.random.default_rng(1)
+    shown = [moment @ (first + np.cross(rng.normal(0, 0.02, 3), first)) for _ in range(4000)]
+    assert found.moment_sd_Nm[0, j, 0, 0] == pytest.approx(np.std(shown), rel=0.05)
+
+
 def test_accelerations_spread_as_drawn_ones_do():
     body, q, v, a = few()
     person, phi, rng = body.person, phi_of(body), np.random.default_rng(8)

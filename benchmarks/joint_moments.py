@@ -1,0 +1,156 @@
+"""Joint moments of simulated people against their truth: error per method, coverage of intervals.
+
+    bsip simulate STUDY --participants 3 --plate-per-foot
+    bsip run STUDY --out OUT
+    python -m benchmarks.joint_moments STUDY OUT
+
+The truth is Newton and Euler of each simulated body at 1 kHz about its true joint, with the force
+that the simulator puts under each foot. Legs and arms only: the simulated trunk has two parts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.artifacts import read_artifact
+from bsip_cli.simulate.calculus import derivative
+from bsip_cli.simulate.loads import GRAVITY
+from bsip_cli.simulate.movements import DEFAULT_DURATION_S
+from bsip_cli.simulate.options import StudyOptions
+from bsip_cli.simulate.presets import preset
+from bsip_cli.simulate.study import MOVEMENT, generator, participant_person, wobbling
+from bsip_cli.simulate.trial import Trial, simulate_trial
+
+STEP_S = 1e-3
+LIMBS = {
+    "ankle": ("foot",),
+    "knee": ("shank", "foot"),
+    "hip": ("thigh", "shank", "foot"),
+    "elbow": ("forearm", "hand"),
+    "shoulder": ("upper_arm", "forearm", "hand"),
+}
+PROXIMAL = {"ankle": "shank", "knee": "thigh", "hip": "lower_torso", "elbow": "upper_arm"}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("study", type=Path)
+    parser.add_argument("out", type=Path)
+    given = parser.parse_args()
+    rows = []
+    for file in sorted((given.study / "truth").glob("*_truth.json")):
+        record = json.loads(file.read_text())
+        options = _options(record["options"])
+        name = record["participant_id"]
+        for task in options.tasks:
+            if task not in ("throwing", "basketball", "static"):  # a ball is in the hand
+                rows += _of_trial(given.out, options, name, task)
+    table = pd.DataFrame(rows)
+    print(_summary(table, ["joint", "method"]).to_string())
+    print(_summary(table, ["task"]).to_string())
+
+
+def _options(written: dict) -> StudyOptions:
+    """The sample's, with what a command line can change of it."""
+    base = preset("sample")
+    laboratory = replace(base.laboratory, plate_per_foot=written["laboratory"]["plate_per_foot"])
+    return replace(
+        base,
+        laboratory=laboratory,
+        durations_s=written["durations_s"],
+        **{key: written[key] for key in ("participants", "seed", "sexes", "run")},
+        tasks=tuple(written["tasks"]),
+    )
+
+
+def _summary(table: pd.DataFrame, by: list[str]) -> pd.DataFrame:
+    """Errors [N m], and frames within 95 % intervals [%], means over trials and axes."""
+    means = table.groupby(by)[["rms_Nm", "peak_Nm", "inside_percent", "inside_sd"]].mean()
+    return means.round(2)
+
+
+def _of_trial(out: Path, options: StudyOptions, name: str, task: str) -> list[dict]:
+    number = int(name.removeprefix("sub-"))
+    person = participant_person(options, number)
+    trial = simulate_trial(
+        person,
+        task,
+        generator(options, number, MOVEMENT, task),
+        options.durations_s.get(task, DEFAULT_DURATION_S[task]),
+        0.3,
+        wobbling(person),
+    )
+    stem = f"{name}_task-{task}_run-{options.run}"
+    file = out / name / f"{stem}_joint-moments.parquet"
+    found = read_artifact(file, "joint-moments")
+    rows = []
+    for kind in LIMBS:
+        for side in "lr":
+            true = _true_moments(person, trial, kind, side)
+            rows += _compared(found, f"{kind}_{side}", true, trial.time_s, task)
+    return rows
+
+
+def _compared(
+    found: pd.DataFrame, joint: str, true: np.ndarray, times_s: np.ndarray, task: str
+) -> list[dict]:
+    rows = []
+    mine = found[(found["joint"] == joint) & found["valid"]]
+    axes = list(dict.fromkeys(found.loc[found["joint"] == joint, "axis"]))
+    for (method, axis), part in mine.groupby(["method", "axis"]):
+        course = np.interp(part["time_s"], times_s, true[:, axes.index(axis)])
+        error = part["moment_Nm"].to_numpy() - course
+        ratio = np.abs(error) / part["moment_sd_Nm"].to_numpy()
+        rows.append(
+            {
+                "task": task,
+                "joint": joint[:-2],
+                "method": method,
+                "axis": axis,
+                "rms_Nm": np.sqrt((error**2).mean()),
+                "peak_Nm": np.abs(course).max(),
+                "inside_percent": 100 * (ratio < 1.96).mean(),
+                "inside_sd": np.sqrt((ratio**2).mean()),
+            }
+        )
+    return rows
+
+
+def _true_moments(person, trial: Trial, kind: str, side: str) -> np.ndarray:
+    """(T, 3) about the axes of the joint."""
+    force, moment = np.zeros((2, len(trial.time_s), 3))
+    for part in LIMBS[kind]:
+        body = f"{part}_{side}"
+        inertia, R = person.inertias[body], trial.poses.rotation[body]
+        com = trial.poses.point(body, inertia.com_m)
+        spin = derivative(R, STEP_S) @ R.swapaxes(1, 2)
+        w = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+        turned = R @ inertia.tensor_kgm2 @ R.swapaxes(1, 2)
+        linear = inertia.mass_kg * derivative(com, STEP_S)
+        angular = np.cross(com, linear) + (turned @ w[..., None])[..., 0]
+        weight = inertia.mass_kg * GRAVITY
+        force += derivative(linear, STEP_S) - weight
+        moment += derivative(angular, STEP_S) - np.cross(com, weight)
+    if "foot" in LIMBS[kind]:
+        force = force - trial.feet_force_n[side]
+        moment = moment - trial.feet_moment_nm[side]
+    own = f"{LIMBS[kind][0]}_{side}"
+    above = "thorax" if kind == "shoulder" else PROXIMAL[kind]
+    above = above if above in trial.poses.rotation else f"{above}_{side}"
+    moment = moment - np.cross(trial.poses.origin_m[own], force)
+    sign = -1.0 if side == "l" else 1.0
+    first = trial.poses.rotation[above][:, :, 2]
+    third = sign * trial.poses.rotation[own][:, :, 1]
+    second = np.cross(third, first)
+    second /= np.linalg.norm(second, axis=1, keepdims=True)
+    return np.stack([np.einsum("nc,nc->n", moment, e) for e in (first, second, third)], axis=1)
+
+
+if __name__ == "__main__":
+    main()

@@ -65,11 +65,11 @@ def shown(out: Path) -> Iterator[str]:
         except BadDataError as error:
             unread.append(folder.name)
             yield f"\n{error}"
-    yield from _laboratory(out)
         try:
             yield from _joints(folder, _width(get_terminal_size().columns))
         except BadDataError as error:
             yield str(error)
+    yield from _laboratory(out)
     yield from _no_more_true(out, get_terminal_size().columns)
     yield from _shared_text(shared_causes(everybody), get_terminal_size().columns)
     for report in (out / "group" / "report.html", *sorted(out.glob("sub-*/report.html"))):

@@ -193,7 +193,7 @@ def test_everybody_refused(bsip, empty_study, tmp_path):
     answer = bsip("run", empty_study, "--out", tmp_path / "out", "--jobs", 2)
     assert answer.code == 3
     assert "Traceback" not in answer.err
-    assert answer.summary.startswith("bsip run: 2 done, 2 refused, 27 without input;")
+    assert answer.summary.startswith("bsip run: 2 done, 2 refused, 32 without input;")
     done = {path.name for path in (tmp_path / "out").glob("*/*.parquet")}
     assert {name for name in done if "_refusal-" not in name} == {
         "sub-01_readings.parquet",

@@ -55,7 +55,6 @@ def check_samples(
     clipped = np.zeros(len(channels), bool)
     stuck = np.zeros(len(channels), bool)
     silent = []
-    is_fine = sum(len(np.unique(channel)) >= _FEW_LEVELS for channel in counts.T) > 1
     # As the converter gave them: a calibration matrix mixes a channel at its limit with others.
     for i, channel in enumerate(counts.T):
         clipped |= _at_rail(channel) | _cut_off(channel, rate_hz)
@@ -64,8 +63,6 @@ def check_samples(
             silent.append(i)
         else:
             stuck |= stuck_here
-            # Beside channels that move by fine steps, one that stands still hangs at its limit.
-            stuck |= is_fine and channel[0] != 0 and np.ptp(channel) == 0
     lost = lost_samples(channels, load, rate_hz)
     spikes = spike_samples(channels, load)
     return SampleCheck(

@@ -136,7 +136,8 @@ def _limited(
     channels, vertical = channels.copy(), 2 if channels.shape[1] == 6 else 4
     loads = {t.name: np.abs(t.force_N[:, plate, 2]).max() for t in session.trials}
     per_newton = np.abs(channels[:, vertical]).max() / loads[trial.name]
-    most = share * max(loads.values()) * per_newton
+    quiet = next(load for name, load in loads.items() if "static" in name)
+    most = (quiet + share * (max(loads.values()) - quiet)) * per_newton
     channels[:, vertical] = channels[:, vertical].clip(-most, most)
     return channels
 

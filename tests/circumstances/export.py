@@ -49,7 +49,7 @@ class Export:
     # of one plate's channels (n, 6 or 8) as written, at a rate [Hz]
     damage: Callable[[np.ndarray, float, np.random.Generator], np.ndarray] | None = None
     damaged_plate: int = 0
-    limit_share: float | None = None  # of its vertical channel, of the largest in the session
+    limit_share: float | None = None  # of its vertical channel: from quiet stance to the largest
     # time
     marker_hz: float = 100.0
     analog_per_marker: int = 10

@@ -305,10 +305,10 @@ def spikes(export: Export, rng: np.random.Generator, plates: int) -> str:
 
 
 def cut_off(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.limit_share, export.damaged_plate = float(rng.uniform(0.6, 0.95)), _one_of(rng, plates)
+    export.limit_share, export.damaged_plate = float(rng.uniform(0.1, 0.9)), _one_of(rng, plates)
     return (
         f"plate {export.damaged_plate + 1}: vertical channel cut at {export.limit_share:.0%} of "
-        "its largest in all trials"
+        "the way from quiet stance to its largest"
     )
 
 

@@ -458,8 +458,9 @@ def test_who_is_stale_is_left_out_of_the_group_and_named(run, bsip, command):
     before.assign(mass_kg=heavier).to_csv(table, sep="\t", index=False, na_rep="n/a")
     answer = bsip(command[0], run.study, "--out", run.out, *command[1:])
     assert answer.code == 3
+    first = {"stats": "stats", "run": "laboratory"}[command[0]]
     assert answer.err.splitlines()[0] == (
-        "stats: sub-02: left out of the group, since what `bsip ingest` made of sub-02 is not up "
+        f"{first}: sub-02: left out of the group, since what `bsip ingest` made of sub-02 is not up "
         "to date (other options (participant)); run `bsip run` first"
     )
     values = read_artifact(run.path("values", "group"), "values")
@@ -481,7 +482,8 @@ def test_all_are_left_out_of_the_group(run, bsip, tmp_path):
     assert [line for line in lines if line.endswith(because)] == lines[:2]
     assert [line.split(":")[1] for line in lines[:2]] == [" sub-01", " sub-02"]
     assert [line for line in lines if "nobody is left for" in line] == [
-        f"{stage}: group: nobody is left for {stage}" for stage in ("stats", "tables", "report")
+        f"{stage}: group: nobody is left for {stage}"
+        for stage in ("laboratory", "stats", "tables", "report")
     ]
     assert stages_of(run.rewritten(times)) == set()
 

@@ -66,14 +66,6 @@ def test_what_is_only_calm_is_not_clipped(calm):
     assert not clipped(calm).any()
 
 
-def test_one_channel_that_stands_still_beside_others_is_stuck():
-    raw = NOISE.copy()
-    raw[:, 2] = 400.0
-    assert check_samples(raw, raw, raw[:, 2], RATE_HZ).stuck.all()
-    still = np.full((4000, 6), 400.0)  # nothing moves: a calculated trial
-    assert not check_samples(still, still, still[:, 2], RATE_HZ).stuck.any()
-
-
 def repeated(monkeypatch, **forces):
     monkeypatch.setattr(copies, "lift_N", lambda source: source.force)
     usable = np.ones(len(TIME_S), bool)

@@ -460,8 +460,8 @@ def test_who_is_stale_is_left_out_of_the_group_and_named(run, bsip, command):
     assert answer.code == 3
     first = {"stats": "stats", "run": "laboratory"}[command[0]]
     assert answer.err.splitlines()[0] == (
-        f"{first}: sub-02: left out of the group, since what `bsip ingest` made of sub-02 is not up "
-        "to date (other options (participant)); run `bsip run` first"
+        f"{first}: sub-02: left out of the group, since what `bsip ingest` made of sub-02 is not "
+        "up to date (other options (participant)); run `bsip run` first"
     )
     values = read_artifact(run.path("values", "group"), "values")
     assert set(values["participant"]) == {"sub-01"}

@@ -19,12 +19,9 @@ from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.report.verdict import Verdict, put_right_sentence, verdict_of
 from bsip_cli.running.freshness import outdated
 from bsip_cli.schemas import SCHEMAS
+from bsip_cli.statistics.methods import OM
 from bsip_cli.study.trials import listed
 
-_JOINT_MOMENTS = (
-    "Net moments on the distal segment, negative against the named direction; then OM's largest "
-    "change against RM, or an extended model's against the one before (share of the joint's peak)."
-)
 _WIDEST = 100  # letters in a line
 
 
@@ -133,31 +130,34 @@ def _person(folder: Path) -> tuple[Searched, str] | None:
 
 
 def _joints(folder: Path, width: int) -> Iterator[str]:
-    """The largest moment at each joint, a line per trial, and what OM and named faults change."""
+    """What OM, and what was named, change most at a joint: a line each."""
     ending = f"_{SCHEMAS['joint-peaks'].file_name}.parquet"
+    files = sorted(folder.glob(f"{folder.name}_*{ending}"))
+    tables = [
+        read_artifact(path, "joint-peaks").assign(trial=path.name.removesuffix(ending))
+        for path in files
+    ]
+    peaks = pd.concat(tables) if tables else pd.DataFrame({"method": []})
     lines = []
-    for path in sorted(folder.glob(f"{folder.name}_*{ending}")):
-        peaks = read_artifact(path, "joint-peaks")
-        method = peaks["method"].iloc[-1]  # with most in the model
-        rows = peaks[(peaks["frames"] > 0) & (peaks["method"] == method)]
-        largest = rows.loc[rows["peak_Nm"].abs().groupby(rows["joint"]).idxmax()]
-        words = ", ".join(_peak_in_words(row) for row in largest.to_dict("records"))
-        stem = path.name.removesuffix(ending)
-        lines.append(_wrapped(f"{stem}, {method}: {words or 'none'}", width, "  - "))
+    for is_extended in (False, True):
+        rows = peaks[peaks["method"].str.startswith(f"{OM}+" if is_extended else OM)]
+        rows = rows[rows["method"].ne(OM) == is_extended].dropna(subset="change_Nm")
+        if len(rows):
+            most = rows.iloc[int(rows["change_Nm"].abs().argmax())]
+            lines.append(_wrapped(_change_in_words(most.to_dict()), width, "  - "))
     if lines:
-        title = f"\n## Largest joint moments: {printable(folder.name)}"
-        yield "\n".join([title, _wrapped(_JOINT_MOMENTS, width), *lines])
+        title = f"{printable(folder.name)}: largest changes of joint moments (*{ending} has all)"
+        yield "\n".join([f"\n{_wrapped(title, width)}", *lines])
 
 
-def _peak_in_words(row: dict) -> str:
-    """``left knee extension 72 N m (1.15 N m/kg), changed by 0.6 N m (1 %)``."""
+def _change_in_words(row: dict) -> str:
+    """``OM changes left knee extension by +0.6 N m of 72 N m (1.15 N m/kg), in walking``."""
     axis = str(row["axis"]).replace("_", " ")
-    text = (
-        f"{in_words(row['joint'])} {axis} {row['peak_Nm']:.1f} N m ({row['peak_Nm_kg']:.2f} N m/kg)"
+    return (
+        f"{row['method']} against {row['compared_with']}: {in_words(row['joint'])} {axis} "
+        f"{row['change_Nm']:+.1f} N m, with a peak of {row['peak_Nm']:.1f} N m "
+        f"({row['peak_Nm_kg']:.2f} N m/kg), in {row['trial']}"
     )
-    if row["compared_with"]:
-        text += f", {row['change_Nm']:+.1f} N m ({row['change_percent']:.0f} %)"
-    return text
 
 
 def _no_more_true(out: Path, columns: int) -> Iterator[str]:

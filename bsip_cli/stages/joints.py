@@ -27,6 +27,7 @@ from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.segment_motion import SegmentMotion, segment_motion
 from bsip_cli.effects.plate_frame import ALL
 from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.segment_inertia import SegmentInertia
 from bsip_cli.effects.unmeasured_contact import UnmeasuredContact
 from bsip_cli.motion.jacobian import coordinate_covariance
 from bsip_cli.recordings.own_plates import SIDES, FootForces, Reading, foot_forces, plate_noise
@@ -294,7 +295,8 @@ def _extended(
     """Method, loads and valid frames (N, J) of the extended models of this trial.
 
     Forces freed of the errors of plates and clock; parameters as ``extend`` found them. OM's
-    covariance stands for theirs: they come from the same data.
+    covariance stands for theirs: they come from the same data. Other causes, as a ball in a hand,
+    would act at the joints themselves: no model with one of them is computed.
     """
     assert unit.trial is not None
     causes, extended = causes_of(unit), unit.read("extended-bsip")
@@ -308,6 +310,12 @@ def _extended(
     of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
     for place, k in enumerate(own):
         among = [causes[j] for j in own[: place + 1]]
+        if not all(is_of_the_forces(c) or isinstance(c.effect, SegmentInertia) for c in among):
+            unit.warn(
+                f"{unit.name}: no joint moments of {method_of(among)}: what acts on a segment, or "
+                "moves a joint, is not carried to the joints yet"
+            )
+            return
         readings = _corrected(trial, scene, among)
         ground = trial.ground(readings)
         body = phi[:, names.index(method_of(causes[: k + 1]))] + known

@@ -517,7 +517,7 @@ def test_corrupt_recording_and_its_return(run, bsip, first_run):
     assert sentence.startswith(f"ingest: {recording}: ")
     assert "; expected " in sentence
     assert ". To mend it: " in sentence
-    assert " 1 refused, 4 without input;" in answer.summary
+    assert " 1 refused, 5 without input;" in answer.summary
     rewritten = run.rewritten(times)
     assert not any(
         "sub-02" in name or "squat" in name for name in rewritten if "refusal" not in name

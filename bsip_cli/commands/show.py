@@ -19,7 +19,7 @@ from bsip_cli.report.tables.build import show as tables_of
 from bsip_cli.report.verdict import Verdict, put_right_sentence, verdict_of
 from bsip_cli.running.freshness import outdated
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.statistics.methods import OM
+from bsip_cli.statistics.methods import OM, is_extended
 from bsip_cli.study.trials import listed
 
 _WIDEST = 100  # letters in a line
@@ -137,11 +137,11 @@ def _joints(folder: Path, width: int) -> Iterator[str]:
         read_artifact(path, "joint-peaks").assign(trial=path.name.removesuffix(ending))
         for path in files
     ]
-    peaks = pd.concat(tables) if tables else pd.DataFrame({"method": []})
-    lines = []
-    for is_extended in (False, True):
-        rows = peaks[peaks["method"].str.startswith(f"{OM}+" if is_extended else OM)]
-        rows = rows[rows["method"].ne(OM) == is_extended].dropna(subset="change_Nm")
+    if not tables:
+        return
+    peaks, lines = pd.concat(tables), []
+    for asked in (peaks["method"].eq(OM), peaks["method"].map(is_extended).astype(bool)):
+        rows = peaks[asked].dropna(subset="change_Nm")
         if len(rows):
             most = rows.iloc[int(rows["change_Nm"].abs().argmax())]
             lines.append(_wrapped(_change_in_words(most.to_dict()), width, "  - "))
@@ -151,7 +151,8 @@ def _joints(folder: Path, width: int) -> Iterator[str]:
 
 
 def _change_in_words(row: dict) -> str:
-    """``OM changes left knee extension by +0.6 N m of 72 N m (1.15 N m/kg), in walking``."""
+    """``OM against RM: left knee extension +0.6 N m, with a peak of 72.0 N m (1.15 N m/kg), in
+    sub-01_task-walking``."""
     axis = str(row["axis"]).replace("_", " ")
     return (
         f"{row['method']} against {row['compared_with']}: {in_words(row['joint'])} {axis} "

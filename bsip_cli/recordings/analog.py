@@ -46,8 +46,7 @@ class SampleCheck:
 def check_samples(
     channels: np.ndarray, counts: np.ndarray, load: np.ndarray, rate_hz: float
 ) -> SampleCheck:
-    """Judge one plate's channels (n, k); ``counts`` (n, k): the converter's, less
-    its offset.
+    """Judge one plate's channels (n, k); ``counts`` (n, k): the converter's, less its offset.
 
     ``load`` (n,) is the plate's vertical force, used to see a channel that does not answer.
     """

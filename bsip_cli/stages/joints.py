@@ -38,7 +38,7 @@ from bsip_cli.stages.frames import WRENCH, acceleration_noise, coordinates_from,
 from bsip_cli.stages.joint_peaks import peaks_of
 from bsip_cli.stages.known_loads import load_phi, loads_record
 from bsip_cli.stages.reconstructed import parameters_of
-from bsip_cli.stages.trial_scene import plate_names, scene_of
+from bsip_cli.stages.trial_scene import outline, plate_names, scene_of
 from bsip_cli.statistics.methods import OM, RM
 
 _POSES = 40  # in which the response to accelerations is computed; between them it is interpolated
@@ -62,8 +62,8 @@ def run(unit: Unit) -> None:
     known = load_phi(unit, person)[:, None]
     loads = joint_loads(person, trial.q, trial.v, trial.a, phi + known, ground.on_feet, spread)
     tables = list(_tables(trial, methods, loads, trial.valid(reasons), noise))
-    for method, loads, ok in _extended(unit, trial, bsip, spread, methods):
-        tables += _tables(trial, [method], loads, ok, noise)
+    for method, its_loads, ok in _extended(unit, trial, bsip, spread, methods):
+        tables += _tables(trial, [method], its_loads, ok, noise)
     table = pd.concat(tables, ignore_index=True)
     unit.write("joint-moments", table, facts={"loads": loads_record(unit)})
     mass_kg = float(unit.read("person")["mass_kg"].iloc[0])
@@ -155,9 +155,8 @@ def _trial_of(unit: Unit, person: Person) -> _Trial:
 def _readings(corners: pd.DataFrame, wrench: pd.DataFrame) -> tuple[Reading, ...]:
     found = []
     for name in plate_names(wrench):
-        rows = corners[corners["plate"].astype(str) == name].sort_values("corner")
-        place = rows[["x_m", "y_m", "z_m"]].to_numpy() if len(rows) else None
-        found.append(Reading(wrench[[f"plate{name}_{c}" for c in WRENCH]].to_numpy(), place))
+        reading = wrench[[f"plate{name}_{c}" for c in WRENCH]].to_numpy()
+        found.append(Reading(reading, outline(corners, name)))
     return tuple(found)
 
 

@@ -15,10 +15,11 @@ import pandas as pd
 
 from bsip_cli.diagnosis.findings import Number, interval_words
 from bsip_cli.diagnosis.laboratory import persons_of
-from bsip_cli.diagnosis.laboratory_deviations import deviations_of
+from bsip_cli.diagnosis.laboratory_deviations import Deviation, deviations_of
 from bsip_cli.diagnosis.laboratory_search import (
     Cause,
     Size,
+    Verdict,
     causes_of,
     laboratory_of,
     verdicts_of,
@@ -140,43 +141,40 @@ def _rows(unit: Unit, laboratory: str, sessions: Sequence[_Session]) -> Iterator
     rng = np.random.default_rng(crc32(unit.name.encode()))
     for one in verdicts_of(lab, options.named_from, rng):
         counts = _counts(sessions, one.cause)
-        said = (one.said, one.probability, counts)
-        for size in one.sizes:
-            yield _row(
-                (one.cause.effect, one.cause.target, size.parameter.name),
-                **_numbers(size),
-                probability=one.probability,
-                verdict=one.said,
-                persons=counts[0],
-                trials=counts[1],
-                sentence=_sentence(one.cause, one.sizes, *said),
-                laboratory=laboratory,
-                class_id=one.class_id,
-                scope="laboratory",
-            )
+        sentence = _sentence(one.cause, one.sizes, one.said, one.probability, counts)
+        cells = {"sentence": sentence, "laboratory": laboratory, "scope": "laboratory"}
+        yield from _rows_of(one, counts, cells)
     order = _order(sessions, mine.recorded_on)
     odds, named_from = options.fault_prior_odds, options.named_from
     for deviation in deviations_of(lab, odds, named_from, order, rng):
         them = [sessions[k] for k in deviation.sessions]
-        is_mass = deviation.cause.effect == STATED_MASS.name
-        counts = _counts(them, deviation.cause)
         who = them[0].name if len(them) == 1 else ""
         where = f"in {who}" if who else f"from {them[0].name} on"
-        for size in deviation.sizes:
-            yield _row(
-                (deviation.cause.effect, deviation.cause.target, size.parameter.name),
-                **_numbers(size),
-                probability=deviation.probability,
-                verdict=deviation.said,
-                persons=counts[0],
-                trials=counts[1],
-                since="" if who else them[0].name,
-                sentence=f"{where}, unlike the others: {_words(deviation.cause, deviation.sizes)}",
-                laboratory=laboratory,
-                class_id=deviation.class_id,
-                scope="person" if is_mass else "session",
-                who=who,
-            )
+        cells = {
+            "since": "" if who else them[0].name,
+            "sentence": f"{where}, unlike the others: {_words(deviation.cause, deviation.sizes)}",
+            "laboratory": laboratory,
+            "scope": "person" if deviation.cause.effect == STATED_MASS.name else "session",
+            "who": who,
+        }
+        yield from _rows_of(deviation, _counts(them, deviation.cause), cells)
+
+
+def _rows_of(
+    found: Verdict | Deviation, counts: tuple[int, int], cells: Mapping[str, str]
+) -> Iterator[dict]:
+    """One for each number of a cause; counts : persons and trials that tell of it."""
+    for size in found.sizes:
+        yield _row(
+            (found.cause.effect, found.cause.target, size.parameter.name),
+            **_numbers(size),
+            probability=found.probability,
+            verdict=found.said,
+            class_id=found.class_id,
+            persons=counts[0],
+            trials=counts[1],
+            **cells,
+        )
 
 
 def _row(key: tuple[str, str, str], **cells: object) -> dict:

@@ -74,13 +74,20 @@ def plate_names(wrench: pd.DataFrame) -> tuple[str, ...]:
     )
 
 
+def outline(corners: pd.DataFrame, name: str) -> np.ndarray | None:
+    """(4, 3) corners of a plate in a ``plates`` table, if it has any."""
+    rows = corners[corners["plate"].astype(str) == name].sort_values("corner")
+    return rows[["x_m", "y_m", "z_m"]].to_numpy() if len(rows) else None
+
+
 def _plates(corners: pd.DataFrame, wrench: pd.DataFrame) -> tuple[Plate, ...]:
     """Every plate that has a reading; where a file tells no place, about its mean load."""
     found = []
     for number in plate_names(wrench):
         reading = wrench[[f"plate{number}_{c}" for c in WRENCH]].to_numpy()
-        rows = corners[corners["plate"].astype(str) == number].sort_values("corner")
-        place = rows[["x_m", "y_m", "z_m"]].to_numpy() if len(rows) else _about_load(reading)
+        place = outline(corners, number)
+        if place is None:
+            place = _about_load(reading)
         if place is not None:
             found.append(Plate(number, place, reading))
     return tuple(found)

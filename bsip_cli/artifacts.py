@@ -285,4 +285,6 @@ def _header(schema: Schema, provenance: Mapping) -> dict[str, str]:
 def _plain(series: pd.Series) -> Any:
     if series.dtype.kind in "fib":
         return series.to_numpy()
+    if isinstance(series.dtype, pd.CategoricalDtype):
+        return pa.array(series).cast(pa.string())
     return np.asarray(series, dtype=object)

@@ -121,6 +121,7 @@ def joint_loads(
     ground: Mapping[str, Ground],
     spread: Spread,
     block: int = 500,
+    every: int = 1,
 ) -> JointLoads:
     """Inverse dynamics of a motion with k bodies.
 
@@ -130,6 +131,7 @@ def joint_loads(
     phi : (P, k) inertial parameters of the segments with mass about their joint centres.
     ground : by segment, the ground's wrench; other segments touch nothing.
     block : frames at once: temporary memory grows with it, not with N.
+    every : what the parameters' errors do is computed in every which frame, with lines between.
     """
     skeleton, model = person.skeleton, pinocchio_model(person)
     joints, k = skeleton.joints[1:], phi.shape[1]
@@ -144,7 +146,7 @@ def joint_loads(
         for j, part in enumerate(parts):
             axes, rates[now, j] = _axes(skeleton, motion, j + 1)
             onto = _projection(axes, motion.position_m[:, j + 1])
-            found, squared = part.loads(onto, rows, now)
+            found, squared = part.loads(onto, rows, now, every)
             value[:, now, j] = np.moveaxis(found.reshape(-1, 2, 3, k), 1, 0)
             variance[:, now, j] = np.moveaxis(squared.reshape(-1, 2, 3, k), 1, 0)
             force, moment = part.whole(rows, now, motion.position_m[:, j + 1])
@@ -179,17 +181,18 @@ class _Part:
         return cls(columns, phi[columns], covariances, tuple(touching))
 
     def loads(
-        self, onto: np.ndarray, rows: np.ndarray, now: slice
+        self, onto: np.ndarray, rows: np.ndarray, now: slice, every: int
     ) -> tuple[np.ndarray, np.ndarray]:
         """(n, 6, k) forces, then moments, and their variances by parameters and plates."""
         own = onto @ rows[:, :, self.columns]
         found = own @ self.phi
         squared = np.zeros_like(found)
-        flat = own.reshape(-1, own.shape[2])
+        some = np.unique(np.append(np.arange(0, len(own), every), len(own) - 1))
+        flat = own[some].reshape(-1, own.shape[2])
         for k, covariance in enumerate(self.covariances):
             if covariance is not None:
-                of_each = np.einsum("ij,ij->i", flat @ covariance, flat)
-                squared[..., k] = of_each.reshape(-1, 6)
+                of_each = np.einsum("ij,ij->i", flat @ covariance, flat).reshape(-1, 6)
+                squared[..., k] = _between(some, of_each, len(own))
         for one in self.ground:
             found -= (onto @ one.wrench[now, :, None])[..., :1]
             about = np.eye(6)
@@ -206,6 +209,13 @@ class _Part:
             wrench -= one.wrench[now, :, None]
         force, moment = np.split(wrench, 2, axis=1)
         return force, moment - skew(centre_m) @ force
+
+
+def _between(some: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    """(count, c) on lines between the values (s, c) at indices (s,)."""
+    if len(some) == count:
+        return values
+    return np.stack([np.interp(np.arange(count), some, x) for x in values.T], axis=1)
 
 
 def segments_beyond(skeleton: Skeleton, i: int) -> list[int]:

@@ -24,6 +24,7 @@ class AddedMass(Effect):
 
     name = "added_mass"
     of_the_lab = False
+    on_its_segment = True
     remedy = "weigh the person as recorded, and record once without the load"
     least_named = MappingProxyType({"mass": 0.2})  # less is what the segment may differ by
 

@@ -21,6 +21,7 @@ class Breathing(Effect):
 
     name = "breathing"
     of_the_lab = False
+    on_its_segment = True
     remedy = "hold the breath for ten seconds"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ class ReleasedObject(Effect):
 
     name = "released_object"
     of_the_lab = False
+    on_its_segment = True
     remedy = "stand still with the object and again without"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ class UnmeasuredContact(Effect):
 
     name = "unmeasured_contact"
     of_the_lab = False
+    on_its_segment = True
     remedy = "record without anything in reach"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -33,6 +33,7 @@ class WobblingMass(Effect):
 
     name = "wobbling_mass"
     of_the_lab = False
+    on_its_segment = True
     of_the_person = True
     remedy = "hop three times, or drop on the heels"
     least_named = MappingProxyType({"mass": 0.5})  # what swings to the sides only is none

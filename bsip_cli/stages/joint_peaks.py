@@ -13,9 +13,11 @@ from bsip_cli.statistics.methods import OM, RM, is_extended
 def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str]) -> pd.DataFrame:
     """One row per method, joint and axis; ``left_out`` in words, by joint."""
     keys = ["method", "joint", "axis"]
-    courses = {tuple(map(str, key)): part for key, part in moments.groupby(keys, sort=False)}
-    methods = list(dict.fromkeys(moments["method"]))
-    largest = moments["moment_Nm"].abs().groupby([moments["method"], moments["joint"]]).max()
+    groups = moments.groupby(keys, sort=False, observed=True)
+    courses = {tuple(map(str, key)): part for key, part in groups}
+    methods = list(dict.fromkeys(method for method, *_ in courses))
+    by_joint = [moments["method"], moments["joint"]]
+    largest = moments["moment_Nm"].abs().groupby(by_joint, observed=True).max()
     rows = []
     for (method, joint, axis), course in courses.items():
         other = _compared_with(method, methods)

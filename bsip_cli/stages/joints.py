@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from bsip_cli.dynamics.joint_moments import (
     joint_loads,
     of_accelerations,
 )
-from bsip_cli.dynamics.lowpass import lowpass_operator, noise_left
+from bsip_cli.dynamics.lowpass import lowpass_operator, noise_left, stride_to
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.segment_motion import SegmentMotion, segment_motion
 from bsip_cli.effects.plate_frame import ALL
@@ -60,10 +60,10 @@ def run(unit: Unit) -> None:
     _tell(unit, trial, reasons)
     noise = _of_accelerations(trial, phi[:, -1])
     known = load_phi(unit, person)[:, None]
-    loads = joint_loads(person, trial.q, trial.v, trial.a, phi + known, ground.on_feet, spread)
-    tables = list(_tables(trial, methods, loads, trial.valid(reasons), noise))
+    loads = trial.loads(phi + known, ground.on_feet, spread)
+    tables = [_table(trial, methods, loads, trial.valid(reasons), noise)]
     for method, its_loads, ok in _extended(unit, trial, bsip, spread, methods):
-        tables += _tables(trial, [method], its_loads, ok, noise)
+        tables.append(_table(trial, [method], its_loads, ok, noise))
     table = pd.concat(tables, ignore_index=True)
     unit.write("joint-moments", table, facts={"loads": loads_record(unit)})
     mass_kg = float(unit.read("person")["mass_kg"].iloc[0])
@@ -105,6 +105,12 @@ class _Trial:
     def valid(self, reasons: Reasons) -> np.ndarray:
         """(N, J) joints that nothing leaves out."""
         return ~np.logical_or.reduce(list(reasons.values()))
+
+    def loads(self, phi: np.ndarray, touched: Mapping[str, Ground], spread: Spread) -> JointLoads:
+        """Of bodies phi (P, k); their errors change no faster than what the low-pass leaves."""
+        every = stride_to(self.rate_hz, 2 * self.cutoff_hz)
+        motion = (self.q, self.v, self.a)
+        return joint_loads(self.person, *motion, phi, touched, spread, every=every)
 
     def ground(self, readings: Sequence[Reading]) -> _Ground:
         """Each foot's wrench, and its noise after the low-pass."""
@@ -220,7 +226,8 @@ def _contacts(unit: Unit, trial: _Trial) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _tell(unit: Unit, trial: _Trial, reasons: Reasons) -> None:
-    """Say what is left out: joints of one reason and number of frames together."""
+    """Say what is left out, in one sentence: joints of one reason and number of frames together."""
+    parts = []
     for words, out in reasons.items():
         counts = out.sum(axis=0)
         names = np.array(trial.person.skeleton.joints[1:])
@@ -229,9 +236,10 @@ def _tell(unit: Unit, trial: _Trial, reasons: Reasons) -> None:
             which = (
                 "all joints" if len(joints) == len(names) else listing(list(map(in_words, joints)))
             )
-            unit.warn(
-                f"{unit.name}: no moments of {which} in {frames} of {len(out)} frames: {words}"
-            )
+            parts.append(f"{which} in {frames} ({words})")
+    if parts:
+        count = len(trial.times_s)
+        unit.warn(f"{unit.name}: of {count} frames joint moments are left out: {'; '.join(parts)}")
 
 
 def _words_of(trial: _Trial, reasons: Reasons) -> dict[str, str]:
@@ -293,9 +301,10 @@ def _extended(
 ) -> Iterator[tuple[str, JointLoads, np.ndarray]]:
     """Method, loads and valid frames (N, J) of the extended models of this trial.
 
-    Forces freed of the errors of plates and clock; parameters as ``extend`` found them. OM's
-    covariance stands for theirs: they come from the same data. Other causes, as a ball in a hand,
-    would act at the joints themselves: no model with one of them is computed.
+    Forces freed of the errors of plates and clock; parameters as ``extend`` found them; what a
+    segment carries besides, as a ball in a hand, loads the joints on its way to the pelvis. OM's
+    covariance stands for theirs: they come from the same data. Causes that move joints or markers
+    would need another motion: no model with one of them is computed.
     """
     assert unit.trial is not None
     causes, extended = causes_of(unit), unit.read("extended-bsip")
@@ -309,17 +318,38 @@ def _extended(
     of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
     for place, k in enumerate(own):
         among = [causes[j] for j in own[: place + 1]]
-        if not all(is_of_the_forces(c) or isinstance(c.effect, SegmentInertia) for c in among):
+        if not all(_is_carried(cause) for cause in among):
             unit.warn(
-                f"{unit.name}: no joint moments of {method_of(among)}: what acts on a segment, or "
-                "moves a joint, is not carried to the joints yet"
+                f"{unit.name}: no joint moments of {method_of(among)}: a cause that moves joints, "
+                "markers or the vertical would need another motion"
             )
             return
-        readings = _corrected(trial, scene, among)
-        ground = trial.ground(readings)
+        ground = trial.ground(_corrected(trial, scene, among))
+        touched = _besides(scene, ground.on_feet, among)
         body = phi[:, names.index(method_of(causes[: k + 1]))] + known
-        loads = joint_loads(person, trial.q, trial.v, trial.a, body[:, None], ground.on_feet, of_om)
+        loads = trial.loads(body[:, None], touched, of_om)
         yield method_of(among), loads, trial.valid(_reasons(unit, trial, ground.feet))
+
+
+def _is_carried(cause: Cause) -> bool:
+    effect = cause.effect
+    return is_of_the_forces(cause) or effect.on_its_segment or isinstance(effect, SegmentInertia)
+
+
+def _besides(
+    scene: Scene, on_feet: Mapping[str, Ground], causes: Sequence[Cause]
+) -> dict[str, Ground]:
+    """What acts on each segment: the ground, less what the causes at a segment need."""
+    found = dict(on_feet)
+    nothing = Ground(
+        np.zeros((len(scene.times_s), 6)), np.zeros((len(scene.times_s), 6)), np.zeros(3)
+    )
+    for cause in causes:
+        if cause.effect.on_its_segment:
+            there = found.get(cause.target, nothing)
+            needs = cause.effect.change(scene, cause.target, cause.values)
+            found[cause.target] = replace(there, wrench=there.wrench - needs)
+    return found
 
 
 def _corrected(trial: _Trial, scene: Scene, causes: Sequence[Cause]) -> tuple[Reading, ...]:
@@ -342,48 +372,48 @@ def _corrected(trial: _Trial, scene: Scene, causes: Sequence[Cause]) -> tuple[Re
 # --- tables -----------------------------------------------------------------------------------
 
 
-def _tables(
+def _table(
     trial: _Trial,
     methods: Sequence[str],
     loads: JointLoads,
     valid: np.ndarray,
     noise: tuple[np.ndarray, np.ndarray],
-) -> Iterator[pd.DataFrame]:
-    """Rows of ``joint-moments`` per method: forces and moments low-passed in the valid frames."""
-    count = len(trial.times_s)
-    for k, method in enumerate(methods):
-        for j, joint in enumerate(loads.joints):
-            force, moment = (x[:, j, :, k] for x in (loads.force_N, loads.moment_Nm))
-            ok = valid[:, j, None] & np.isfinite(moment)
-            force, moment = _lowpassed(trial, force, ok), _lowpassed(trial, moment, ok)
-            rate = loads.rate_rad_s[:, j]
-            force_sd, moment_sd = (
-                np.where(ok, np.hypot(x[:, j, :, k], y[:, j]), np.nan)
-                for x, y in zip((loads.force_sd_N, loads.moment_sd_Nm), noise, strict=True)
-            )
-            for axis, name in enumerate(axes_of(joint)):
-                yield pd.DataFrame(
-                    {
-                        "time_s": trial.times_s,
-                        "method": np.full(count, method, dtype=object),
-                        "joint": np.full(count, joint, dtype=object),
-                        "axis": np.full(count, name, dtype=object),
-                        "force_N": force[:, axis],
-                        "force_sd_N": force_sd[:, axis],
-                        "moment_Nm": moment[:, axis],
-                        "moment_sd_Nm": moment_sd[:, axis],
-                        "power_W": moment[:, axis] * rate[:, axis],
-                        "power_sd_W": moment_sd[:, axis] * np.abs(rate[:, axis]),
-                        "valid": ok[:, axis],
-                    }
-                )
+) -> pd.DataFrame:
+    """Rows of ``joint-moments``: forces and moments low-passed in the valid frames."""
+    ok = valid[:, :, None, None] & np.isfinite(loads.moment_Nm)
+    force, moment = (_lowpassed(trial, x, ok) for x in (loads.force_N, loads.moment_Nm))
+    force_sd, moment_sd = (
+        np.where(ok, np.hypot(sd, of_motion[..., None]), np.nan)
+        for sd, of_motion in zip((loads.force_sd_N, loads.moment_sd_Nm), noise, strict=True)
+    )
+    rate = loads.rate_rad_s[..., None]
+    numbers = {
+        "force_N": force,
+        "force_sd_N": force_sd,
+        "moment_Nm": moment,
+        "moment_sd_Nm": moment_sd,
+        "power_W": moment * rate,
+        "power_sd_W": moment_sd * np.abs(rate),
+        "valid": ok,
+    }
+    keys = [(m, joint, axis) for m in methods for joint in loads.joints for axis in axes_of(joint)]
+    words = {
+        name: pd.Categorical(each, list(dict.fromkeys(each))).repeat(len(trial.times_s))
+        for name, each in zip(("method", "joint", "axis"), zip(*keys, strict=True), strict=True)
+    }
+    # from frames, joints, axes, methods to rows: all frames of an axis, all axes of a joint, ...
+    columns = {name: x.transpose(3, 1, 2, 0).ravel() for name, x in numbers.items()}
+    return pd.DataFrame({"time_s": np.tile(trial.times_s, len(keys))} | words | columns)
 
 
-def _lowpassed(trial: _Trial, course: np.ndarray, ok: np.ndarray) -> np.ndarray:
-    """(N, 3) of each axis inside its own valid frames; NaN outside."""
-    found = np.full(course.shape, np.nan)
-    for axes in (slice(0, 3, 2), slice(1, 2)):  # the second may lack a direction alone
-        good = np.asarray(ok[:, axes].all(axis=1))
-        operator, frames = lowpass_operator(good, trial.rate_hz, trial.cutoff_hz)
-        found[frames, axes] = operator @ np.where(good[:, None], course[:, axes], 0.0)
-    return found
+def _lowpassed(trial: _Trial, courses: np.ndarray, ok: np.ndarray) -> np.ndarray:
+    """Courses (N, ...), each inside its own valid frames; NaN outside."""
+    flat, good = courses.reshape(len(courses), -1), ok.reshape(len(ok), -1)
+    found = np.full(flat.shape, np.nan)
+    packed = np.packbits(good, axis=0)
+    _, first, alike = np.unique(packed, axis=1, return_index=True, return_inverse=True)
+    for number, column in enumerate(first):
+        pattern, mine = good[:, column], np.flatnonzero(alike.ravel() == number)
+        operator, frames = lowpass_operator(pattern, trial.rate_hz, trial.cutoff_hz)
+        found[np.ix_(frames, mine)] = operator @ np.where(pattern[:, None], flat[:, mine], 0.0)
+    return found.reshape(courses.shape)

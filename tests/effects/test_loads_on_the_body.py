@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import Inertia, from_phi
+from bsip_cli.dynamics.joint_moments import Ground, Spread, joint_loads
 from bsip_cli.effects.added_mass import AddedMass
 from bsip_cli.effects.breathing import OUTWARD, Breathing
 from bsip_cli.effects.released_object import ReleasedObject
@@ -263,3 +264,26 @@ def test_the_share_of_the_error_that_a_segment_makes():
     assert half == pytest.approx(0.75)
     assert SegmentInertia().possible(fast, "thigh_r", excess)
     assert not SegmentInertia().possible(fast, "thigh_r", 7 * excess)
+
+
+@pytest.mark.parametrize("target", ["hand_l", "thigh_r"])
+def test_a_mass_loads_the_joints_on_its_way_to_the_pelvis_as_another_body_does(target):
+    scene = moving()
+    i = scene.person.skeleton.index(target)
+    centre = scene.phi[10 * i + 1 : 10 * i + 4] / scene.phi[10 * i]
+    heavier = scene.phi.copy()
+    heavier[10 * i : 10 * i + 10] += Inertia(2.0, centre, np.zeros((3, 3))).phi()
+    assert AddedMass.on_its_segment
+    change = AddedMass().change(scene, target, np.array([2.0, 0.0, 0.0, 0.0]))
+    silent = np.zeros_like(change)
+    motion = (scene.person, scene.q, scene.v, scene.a)
+    known = Spread((None,), 0.0)
+    as_body = joint_loads(*motion, heavier[:, None], {}, known)
+    as_force = joint_loads(
+        *motion, scene.phi[:, None], {target: Ground(-change, silent, np.zeros(3))}, known
+    )
+    bare = joint_loads(*motion, scene.phi[:, None], {}, known)
+    np.testing.assert_allclose(as_force.moment_Nm, as_body.moment_Nm, atol=1e-8)
+    changed = np.abs(as_body.moment_Nm - bare.moment_Nm).max(axis=(0, 2, 3)) > 1e-6
+    way = {"hand_l": {"wrist_l", "elbow_l", "shoulder_l", "waist"}, "thigh_r": {"hip_r"}}
+    assert {j for j, yes in zip(bare.joints, changed, strict=True) if yes} == way[target]

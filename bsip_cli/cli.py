@@ -418,6 +418,16 @@ def published(what, paper):
 
 
 @cli.command()
+@click.argument("out", type=click.Path(path_type=Path))
+def methods(out) -> None:
+    """What was done with a study's data, with versions, options and references, in words to paste
+    into a paper."""
+    from bsip_cli.commands.methods import methods_text
+
+    click.echo(methods_text(out))
+
+
+@cli.command()
 @click.argument("artifact", required=False, type=click.Path(path_type=Path))
 def info(artifact) -> None:
     """What an artifact holds and what made it; without one, the versions of bsip and of the

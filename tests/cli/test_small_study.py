@@ -9,6 +9,7 @@ import hashlib
 import json
 import multiprocessing
 import os
+import re
 import shutil
 import time
 from dataclasses import dataclass
@@ -242,6 +243,33 @@ def test_show_prints_the_tables(first_run, bsip):
     assert answer.out.count("| ") > 20
     assert "Is anything wrong: sub-01" in answer.out
     assert [f"sub-0{k}: Use " in answer.out for k in (1, 2)] == [True, True]
+
+
+def test_methods_say_what_was_done(first_run, bsip, tmp_path):
+    answer = bsip("methods", first_run.out)
+    assert answer.code == 0
+    text = " ".join(answer.out.split())
+    assert "Recordings of 2 persons (1 female and 1 male;" in text
+    assert f"bsip {__version__}" in text
+    assert "(hansen2017, 50 Hz)" in text
+    assert 'Options other than the defaults: marker_set = "hansen2017".' in text
+    cited = {int(n) for n in re.findall(r"\[(\d+)\]", text)}
+    assert cited == set(range(1, len(re.findall(r"^\[\d+\] ", answer.out, re.MULTILINE)) + 1))
+    assert bsip("methods", tmp_path).code == 2
+
+
+def test_methods_name_options_that_differ(run, bsip, tmp_path):
+    other = tmp_path / "other.toml"
+    other.write_text("[reconstruct]\ncutoff_hz = 7.0\n")
+    assert (
+        bsip(
+            "reconstruct", run.study, "--out", run.out, "--participant", "sub-01", "--config", other
+        ).code
+        == 0
+    )
+    text = " ".join(bsip("methods", run.out).out.split())
+    assert "Options that differ among the results (the text gives the first): reconstruct." in text
+    assert "below 7.0 Hz" in text
 
 
 def test_info_tells_what_made_an_artifact(first_run, bsip):

@@ -36,6 +36,11 @@ def empty_table(kind: str) -> pd.DataFrame:
     return pd.DataFrame({column.name: [] for column in SCHEMAS[kind].columns}, dtype=object)
 
 
+def as_read(kind: str, frame: pd.DataFrame) -> pd.DataFrame:
+    """A table as it comes back from a file: the columns' types are those of its kind."""
+    return _to_arrow(SCHEMAS[kind], frame).to_pandas()
+
+
 def write_artifact(path: Path, kind: str, frame: pd.DataFrame, provenance: Mapping) -> None:
     """Write a table under its final name only when it is whole.
 

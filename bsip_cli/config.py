@@ -206,12 +206,21 @@ def load_config(files: Iterable[Path]) -> Config:
     UsageError
         A file is not TOML, or holds unknown options or values out of range: all named at once.
     """
+    there = [file for file in files if os.path.lexists(file)]
+    return config_of(*map(read_toml, there), file=", ".join(map(str, there)))
+
+
+def config_of(*given: Mapping, file: str = "the options") -> Config:
+    """Defaults, then each of these in turn.
+
+    Raises
+    ------
+    UsageError
+        Unknown options, or values out of range: all named at once, as those of ``file``.
+    """
     merged = read_toml(shipped("default.toml"))
-    sources = []
-    for file in files:
-        if os.path.lexists(file):
-            merged = _merge(merged, read_toml(file))
-            sources.append(str(file))
+    for options in given:
+        merged = _merge(merged, options)
     try:
         return Config.model_validate_json(json.dumps(merged, default=_date), strict=True)
     except ValidationError as error:
@@ -219,7 +228,7 @@ def load_config(files: Iterable[Path]) -> Config:
         more = f"; and {len(faults) - _MOST_FAULTS} more" if len(faults) > _MOST_FAULTS else ""
         raise UsageError(
             "; ".join(_fault(e, merged) for e in faults[:_MOST_FAULTS]) + more,
-            file=", ".join(sources),
+            file=file,
             remedy="configs/default.toml lists every option with its unit",
         ) from None
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -32,6 +33,7 @@ class Unit:
 
     ``config`` are the options that the stage names. ``left_out`` are participants whose results are
     not up to date, with the reason: a cohort stage tells of them and does not use them.
+    ``recordings`` are opened already, by their trials' stems; others are opened from their files.
     """
 
     stage: Stage
@@ -42,6 +44,7 @@ class Unit:
     trial: Trial | None = None
     messages: list[str] = field(default_factory=list)
     left_out: Mapping[str, str] = field(default_factory=dict)
+    recordings: Mapping[str, Any] = field(default_factory=dict)
     config_of_all: Config = field(init=False)
 
     def __post_init__(self) -> None:

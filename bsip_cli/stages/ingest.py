@@ -28,7 +28,6 @@ from bsip_cli.recordings.lateral_medial import with_pairs_named
 from bsip_cli.recordings.marker_guess import guess_marker_set
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.momentum_mass import Stretch, stretches_of, upright_frames
-from bsip_cli.recordings.read import open_recording
 from bsip_cli.recordings.repeated_frames import without_repeats
 from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
 from bsip_cli.recordings.stated_mass import mass_finding
@@ -37,15 +36,14 @@ from bsip_cli.recordings.zero import plate_zero, subtract_zero
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH
 from bsip_cli.stages.person_mass import VAGUE_PERCENT, StatedMass, compared, stated_mass
-from bsip_cli.stages.session_reading import reading_of
+from bsip_cli.stages.session_reading import opened, reading_of
 
 
 def run(unit: Unit) -> None:
     """Read one recording; write markers, wrench, plates, contacts and quality."""
     assert unit.trial is not None
-    opened = open_recording(unit.trial.path).with_plates(unit.config.ingest.plates)
     session = reading_of(unit, unit.trial)
-    recording = assemble(opened, session)
+    recording = assemble(opened(unit, unit.trial), session)
     marker_set, told = _marker_set(unit, recording)
     labels, paired = with_pairs_named(
         recording.labels, recording.markers_m, marker_set, _prefix(unit)

@@ -7,13 +7,21 @@ from dataclasses import asdict, fields
 import pandas as pd
 
 from bsip_cli.recordings.frame_change import FrameChange
+from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.plate_reading import PlateReading
+from bsip_cli.recordings.read import open_recording
 from bsip_cli.recordings.settle import SessionReading, Verdict
 from bsip_cli.recordings.under_the_feet import Evidence
 from bsip_cli.running.unit import Unit
 from bsip_cli.study.study import Trial
 
 _EVIDENCE = tuple(field.name for field in fields(Evidence))
+
+
+def opened(unit: Unit, trial: Trial) -> Opened:
+    """A trial's recording, of the plates that count."""
+    found: Opened = unit.recordings.get(trial.stem) or open_recording(trial.path)
+    return found.with_plates(unit.config.ingest.plates)
 
 
 def rows_of(session: str, reading: SessionReading) -> list[dict]:

@@ -10,12 +10,11 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.assemble import findings_about
 from bsip_cli.recordings.gate_limits import GateLimits
 from bsip_cli.recordings.person_size import no_person
-from bsip_cli.recordings.read import open_recording
 from bsip_cli.recordings.settle import settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
-from bsip_cli.stages.session_reading import rows_of
+from bsip_cli.stages.session_reading import opened, rows_of
 from bsip_cli.study.study import Trial
 
 
@@ -54,7 +53,6 @@ def _require_size(unit: Unit, seen: list[TrialSamples]) -> None:
 def _survey(unit: Unit, trial: Trial) -> TrialSamples | None:
     """None where the recording cannot be read: its own turn will say why."""
     try:
-        opened = open_recording(trial.path)
+        return TrialSamples.of(opened(unit, trial))
     except BadDataError:
         return None
-    return TrialSamples.of(opened.with_plates(unit.config.ingest.plates))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-from bsip_cli.errors import BadDataError, printable
+from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.files.folders import entries, is_folder
 from bsip_cli.files.force_files import ENDINGS, forces_beside, trial_stem
 from bsip_cli.files.regular import fault_of
@@ -63,6 +63,28 @@ class Fault:
     expected: str
     remedy: str
     alike: str = ""
+
+
+def trial_named(
+    participant: str, name: str, path: Path, roles: Mapping[str, tuple[str, ...]]
+) -> Trial:
+    """A trial by what its file's name says after task-: ``walking`` or ``walking_run-2``.
+
+    Raises
+    ------
+    UsageError
+        The name is none of a trial.
+    """
+    stem = f"{participant}_task-{name}"
+    match = _TRIAL.fullmatch(stem)
+    if match is None:
+        raise UsageError(
+            f"a trial '{name}'",
+            expected="a task, as walking or walking_run-2",
+            remedy="rename it: letters and numbers alone, with _run- and a number behind",
+        )
+    run = int(match["run"]) if match["run"] else None
+    return Trial(participant, match["task"], stem, path, _role(match["task"], roles), run)
 
 
 def refusals_of(faults: Iterable[Fault]) -> list[BadDataError]:

@@ -25,6 +25,8 @@ ALLOWED = {
     "__main__": "cli",
     "commands": "__init__ artifacts body config errors files pipeline recordings report running "
     "schemas stages statistics study",
+    "library": "__init__ artifacts body config errors pipeline recordings running schemas stages "
+    "study",
     "reference": "cli commands config pipeline schemas",
     "cli": "__init__ commands errors pipeline running simulate study",
     "body": "config errors files stated",
@@ -52,6 +54,7 @@ ONLY = {
     "simulate": {"body": {"body.names", "body.markersets"}},
     "cli": {"simulate": {"simulate.command"}},
     "commands": {"stages": {"stages.frames", "stages.known_loads", "stages.load_comparison"}},
+    "library": {"running": {"running.unit"}, "stages": {"stages.frames"}},
     "running": {"body": {"body.markersets", "body.skeleton"}},
     "stages": {"running": {"running.unit"}},
     "study": {"body": {"body.skeleton"}},

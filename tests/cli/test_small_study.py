@@ -21,7 +21,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from bsip_cli import __version__
+from bsip_cli import __version__, library
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, load_config
@@ -270,6 +270,38 @@ def test_methods_name_options_that_differ(run, bsip, tmp_path):
     text = " ".join(bsip("methods", run.out).out.split())
     assert "Options that differ among the results (the text gives the first): reconstruct." in text
     assert "below 7.0 Hz" in text
+
+
+def test_the_library_gives_the_same_tables(first_run):
+    trials = {
+        name: library.read(first_run.recording(f"sub-01_task-{name}"))
+        for name in ("sequence_run-1", "squat_run-1", "static")
+    }
+    study, _ = load_study(first_run.study, load_config([]).roles.model_dump())
+    known = study.participants[0]
+    person = library.Person(
+        trials,
+        sex=known.sex,
+        mass_kg=known.mass_kg,
+        height_m=known.height_m,
+        options={"marker_set": "hansen2017"},
+    )
+    person.diagnose()
+    person.extend()
+    person.joints()
+    compared = 0
+    for stage in STAGES:
+        if stage.level == "cohort" or stage.name in ("laboratory", "choose", "report"):
+            continue
+        for kind in stage.writes:
+            for name in trials if stage.level == "trial" else ("",):
+                owner = f"sub-01_task-{name}" if name else "sub-01"
+                path = first_run.path(SCHEMAS[kind].file_name, owner)
+                if path.exists():
+                    expected = read_artifact(path, kind)
+                    pd.testing.assert_frame_equal(person.table(kind, name), expected)
+                    compared += 1
+    assert compared > 50
 
 
 def test_info_tells_what_made_an_artifact(first_run, bsip):

@@ -1,0 +1,401 @@
+"""The stages on arrays and tables, without a study on disk: for notebooks and other programs.
+
+    import bsip_cli as bsip
+
+    trials = {name: bsip.read(f"{name}.c3d") for name in ("static", "sequence", "walking")}
+    person = bsip.Person(trials, sex="F", mass_kg=62.0)
+    person.identify()          # inertial parameters, RM and OM
+    person.diagnose()          # what the simulation gets wrong
+    person.joints()["walking"] # moments at the joints
+
+Tables are those of the artifacts: docs/artifacts.md lists their columns, units and frames.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli import __version__
+from bsip_cli.artifacts import as_read
+from bsip_cli.body.exports.formats import FORMATS
+from bsip_cli.body.exports.identified import IdentifiedPerson
+from bsip_cli.body.inertia import from_readable
+from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.config import Config, config_of
+from bsip_cli.errors import BadDataError, BsipError, UsageError
+from bsip_cli.pipeline import STAGES, Stage, producer
+from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.opened import Opened
+from bsip_cli.recordings.plate_source import C3dPlate
+from bsip_cli.recordings.plates import LocalWrench, PlateDescription
+from bsip_cli.recordings.read import open_recording
+from bsip_cli.running.unit import Unit
+from bsip_cli.schemas import bsip_names
+from bsip_cli.stages.frames import person_from
+from bsip_cli.study.participants import Participant
+from bsip_cli.study.study import Study
+from bsip_cli.study.trials import Trial, trial_named
+
+_NOWHERE = Path("memory")
+_ID = "sub-01"
+Key = tuple[str, str]  # kind of table; trial, or nothing where it is of the person
+
+
+@dataclass(frozen=True, eq=False)
+class Plate:
+    """What a force plate measured, on the body that stands on it.
+
+    Attributes
+    ----------
+    force_N, moment_Nm : (n, 3) in the world's axes (Z up), moments about the world's origin; a
+        person who stands gives a positive Z. NaN where a sample cannot be used.
+    corners_m : (4, 3) of the surface, in order round it, world.
+    """
+
+    force_N: np.ndarray
+    moment_Nm: np.ndarray
+    corners_m: np.ndarray
+
+
+def read(path: str | Path) -> Opened:
+    """A recording's file: a ``.c3d``, or a ``.trc`` with the file of ground forces beside it.
+
+    Raises
+    ------
+    BadDataError
+        The file is none of these, or is damaged; the sentence says what was found.
+    """
+    return open_recording(Path(path))
+
+
+def recording(
+    labels: Sequence[str],
+    markers_m: np.ndarray,
+    rate_hz: float,
+    plates: Sequence[Plate] = (),
+    analog_rate_hz: float | None = None,
+) -> Opened:
+    """A recording from arrays.
+
+    Parameters
+    ----------
+    labels : of m markers.
+    markers_m : (n, m, 3), world (Z up); NaN where a marker is not seen.
+    rate_hz : of the markers. analog_rate_hz : of the plates, a multiple of it; by default the same.
+
+    Raises
+    ------
+    UsageError
+        Shapes or rates do not fit together.
+    """
+    analog_rate_hz = analog_rate_hz or rate_hz
+    markers_m = np.asarray(markers_m, dtype=float)
+    if markers_m.ndim != 3 or markers_m.shape[1:] != (len(labels), 3):
+        raise UsageError(
+            f"markers of shape {markers_m.shape} for {len(labels)} labels",
+            expected=f"(frames, {len(labels)}, 3)",
+            remedy="put one position per frame and label",
+        )
+    ratio, count = analog_rate_hz / rate_hz, len(markers_m)
+    if ratio < 1 or abs(ratio - round(ratio)) > 1e-6:
+        raise UsageError(
+            f"plates at {analog_rate_hz:g} Hz, markers at {rate_hz:g} Hz",
+            expected="a whole multiple of the markers' rate",
+            remedy="resample the forces",
+        )
+    sources = [_source(str(k + 1), one, round(ratio) * count) for k, one in enumerate(plates)]
+    found = Recording(
+        path=_NOWHERE,
+        marker_rate_hz=float(rate_hz),
+        labels=tuple(labels),
+        markers_m=markers_m,
+        analog_rate_hz=float(analog_rate_hz),
+        plates=(),
+        findings=(),
+        rotation_world_lab=np.eye(3),
+        forces_note="" if plates else "there is no force plate",
+        time0_s=0.0,
+    )
+    return Opened(found, tuple(sources))
+
+
+def _source(name: str, plate: Plate, count: int) -> C3dPlate:
+    """As a C3D file has it: about the middle of the surface, in the plate's axes."""
+    force, moment, corners = (
+        np.asarray(x, dtype=float) for x in (plate.force_N, plate.moment_Nm, plate.corners_m)
+    )
+    shapes = force.shape, moment.shape, corners.shape
+    if shapes != ((count, 3), (count, 3), (4, 3)):
+        raise UsageError(
+            f"plate {name}: forces, moments and corners of shapes {shapes}",
+            expected=f"({count}, 3), ({count}, 3) and (4, 3)",
+            remedy="give all samples of the recording",
+        )
+    described = PlateDescription(name, 2, corners, np.zeros(3))
+    axes = described.rotation_lab_plate()
+    at_centre = moment - np.cross(described.centre_m(), force)
+    usable = np.isfinite(force).all(axis=1) & np.isfinite(moment).all(axis=1)
+    wrench = LocalWrench(np.nan_to_num(force) @ axes, np.nan_to_num(at_centre) @ axes)
+    return C3dPlate(described, wrench, usable, np.eye(3))
+
+
+class Person:
+    """A person, the recordings, and what the stages make of them.
+
+    Parameters
+    ----------
+    trials : recordings by name: a task, with ``_run-2`` where it was done again ("walking_run-2").
+        ``static`` calibrates, ``sequence`` identifies, as ``options["roles"]`` says.
+    sex : "M", "F" or "other" (the mean of both tables).
+    mass_kg, height_m : None where not known: then from the recordings, where they tell it.
+    options : as in study.toml, for example ``{"marker_set": "hansen2017"}``.
+
+    Attributes
+    ----------
+    messages : what the stages had to say, in order.
+    refused : by stage and trial (empty: the person), why it could not be done.
+
+    Raises
+    ------
+    UsageError
+        Unknown options, or a name that is none of a trial.
+    """
+
+    def __init__(
+        self,
+        trials: Mapping[str, Opened],
+        *,
+        sex: str = "other",
+        mass_kg: float | None = None,
+        height_m: float | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> None:
+        if sex not in ("M", "F", "other"):
+            raise UsageError(f"sex '{sex}'", expected="M, F or other", remedy="give one of them")
+        self.config: Config = config_of(options or {})
+        self.messages: list[str] = []
+        self.refused: dict[tuple[str, str], BsipError] = {}
+        self._done: set[str] = set()
+        self._kept: dict[Key, _Kept] = {}
+        roles = self.config.roles.model_dump()
+        named = {name: trial_named(_ID, name, _NOWHERE, roles) for name in trials}
+        self._recordings = {named[name].stem: opened for name, opened in trials.items()}
+        self._names = {trial.stem: name for name, trial in named.items()}
+        self._participant = Participant(
+            _ID, cast(Any, sex), mass_kg, height_m, tuple(named.values())
+        )
+        self._study = Study(_NOWHERE, (self._participant,))
+
+    # --- the stages ---------------------------------------------------------------------------
+
+    def scale(self) -> pd.DataFrame:
+        """The person's ``skeleton``: joints and lengths."""
+        return self._whole("scale", "skeleton")
+
+    def solve(self) -> dict[str, pd.DataFrame]:
+        """By trial, ``kinematics``: joint coordinates, velocities and accelerations."""
+        return self._by_trial("ik", "kinematics")
+
+    def identify(self) -> pd.DataFrame:
+        """``bsip``: mass, centre and inertia of each segment by method (RM, RM+mass, OM)."""
+        return self._whole("identify", "bsip")
+
+    def reconstruct(self) -> dict[str, pd.DataFrame]:
+        """By trial, ``reconstruction``: the ground wrench measured, and as each method has it."""
+        return self._by_trial("reconstruct", "reconstruction")
+
+    def diagnose(self) -> pd.DataFrame:
+        """``overall-diagnosis``: what the simulation gets wrong, candidate by candidate."""
+        return self._whole("diagnose", "overall-diagnosis")
+
+    def extend(self) -> dict[str, pd.DataFrame]:
+        """By trial, ``gain`` of the model with the named causes, on data held out."""
+        return self._by_trial("extend", "gain")
+
+    def joints(self) -> dict[str, pd.DataFrame]:
+        """By trial, ``joint-moments``: net forces, moments and powers with their errors."""
+        return self._by_trial("joints", "joint-moments")
+
+    def export(self, form: str, method: str = "OM") -> str:
+        """The identified person as a model, the text of a file.
+
+        form : urdf, mjcf, osim, biomod or csv.
+        """
+        self._run("identify")
+        if form not in FORMATS:
+            raise UsageError(f"format '{form}'", expected=", ".join(FORMATS), remedy="ask for one")
+        skeleton = load_skeleton(self.config.skeleton)
+        person = person_from(self.table("skeleton"), self.table("marker-positions"), skeleton)
+        rows = self.table("bsip").query("method == @method").set_index("segment")
+        if rows.empty:
+            known = ", ".join(self.table("bsip")["method"].unique())
+            raise UsageError(f"method '{method}'", expected=known, remedy="name one of them")
+        values = rows.loc[list(skeleton.body_names), list(bsip_names())].to_numpy()
+        inertias = tuple(from_readable(row) for row in values)
+        made_of = (f"bsip {__version__} in memory: method {method}",)
+        return FORMATS[form][1](IdentifiedPerson(person, inertias, _ID, method, made_of))
+
+    def table(self, kind: str, trial: str = "") -> pd.DataFrame:
+        """Any table that has been made, by its kind and trial, as docs/artifacts.md names it.
+
+        Raises
+        ------
+        KeyError
+            It has not been made.
+        """
+        stems = {name: stem for stem, name in self._names.items()}
+        return self._kept[kind, stems[trial] if trial else ""].frame.copy()
+
+    # --- running them -------------------------------------------------------------------------
+
+    def _whole(self, stage: str, kind: str) -> pd.DataFrame:
+        self._run(stage)
+        return self._kept[kind, ""].frame.copy()
+
+    def _by_trial(self, stage: str, kind: str) -> dict[str, pd.DataFrame]:
+        self._run(stage)
+        found = ((name, self._kept.get((kind, stem))) for stem, name in self._names.items())
+        return {name: kept.frame.copy() for name, kept in found if kept is not None}
+
+    def _run(self, last: str) -> None:
+        """What a stage needs, and itself, once; a trial that is refused does not stop the others.
+
+        Raises
+        ------
+        BsipError
+            The person cannot be done.
+        """
+        for stage in _needed(last):
+            if stage.label in self._done:
+                continue
+            trials = self._participant.trials if stage.level == "trial" else (None,)
+            for trial in trials:
+                self._do(self._unit(stage, trial))
+            self._done.add(stage.label)
+
+    def _do(self, unit: Unit) -> None:
+        if unit.missing():
+            if unit.trial is None:
+                raise self._why_not(unit)
+            return
+        try:
+            import_module(unit.stage.module).run(unit)
+        except BsipError as error:
+            self.refused[unit.stage.name, self._names[unit.trial.stem] if unit.trial else ""] = (
+                error
+            )
+            if unit.trial is None:
+                raise
+        finally:
+            self.messages += unit.messages
+
+    def _why_not(self, unit: Unit) -> BsipError:
+        first = next(iter(self.refused.values()), None)
+        return first or BadDataError(
+            f"{unit.stage.name} has no {', '.join(unit.missing())} to read",
+            file=unit.name,
+            remedy="give the recordings that it needs",
+        )
+
+    def _unit(self, stage: Stage, trial: Trial | None) -> Unit:
+        return _InMemory(
+            stage,
+            self._study,
+            _NOWHERE,
+            self.config,
+            self._participant,
+            trial,
+            recordings=self._recordings,
+            kept=self._kept,
+        )
+
+
+def _stages_of(name: str) -> list[Stage]:
+    return [stage for stage in STAGES if stage.name == name and stage.level != "cohort"]
+
+
+def _needed(last: str) -> list[Stage]:
+    """A stage and all that it reads from, in order."""
+    needed: set[str] = set()
+    open_ = _stages_of(last)
+    while open_:
+        stage = open_.pop()
+        if stage.label not in needed:
+            needed.add(stage.label)
+            open_ += [producer(kind) for kind in (*stage.reads, *stage.amends)]
+    return [stage for stage in STAGES if stage.label in needed]
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """A table, what its stage said of it, and how many rows were its stage's own."""
+
+    frame: pd.DataFrame
+    facts: dict
+    rows_made: int
+
+
+@dataclass
+class _InMemory(Unit):
+    """A unit whose tables stay in memory."""
+
+    kept: dict[Key, _Kept] = field(default_factory=dict)
+
+    def _key(self, kind: str, trial: Trial | None = None) -> Key:
+        of_trial = producer(kind).level == "trial"
+        owner = trial or self.trial
+        return kind, owner.stem if of_trial and owner else ""
+
+    def trials(self, *kinds: str) -> tuple[Trial, ...]:
+        assert self.participant is not None
+        every = self.participant.trials
+        return tuple(t for t in every if all(self._key(k, t) in self.kept for k in kinds))
+
+    def stands(self, kind: str, trial: Trial | None, participant: Participant) -> bool:
+        return self._key(kind, trial) in self.kept
+
+    def _has(self, kind: str) -> bool:
+        if producer(kind).level == "trial" and self.trial is None:
+            return bool(self.trials(kind))
+        return self._key(kind) in self.kept
+
+    def read(
+        self,
+        kind: str,
+        trial: Trial | None = None,
+        participant: Participant | None = None,
+        **wanted: Iterable[str],
+    ) -> pd.DataFrame:
+        frame = self.kept[self._key(kind, trial)].frame
+        for column, values in wanted.items():
+            frame = frame[frame[column].isin(list(values))]
+        return frame.reset_index(drop=True)
+
+    def facts(
+        self, kind: str, trial: Trial | None = None, participant: Participant | None = None
+    ) -> dict:
+        return self.kept[self._key(kind, trial)].facts
+
+    def write(self, kind: str, frame: pd.DataFrame, facts: dict | None = None) -> None:
+        plain = json.loads(json.dumps(facts or {}))  # as it would come back from a file
+        self.kept[self._key(kind)] = _Kept(as_read(kind, frame), plain, len(frame))
+
+    def write_in_parts(
+        self, kind: str, parts: Iterable[pd.DataFrame], facts: Callable[[], dict]
+    ) -> None:
+        frame = pd.concat(list(parts), ignore_index=True)
+        self.write(kind, frame, facts())
+
+    def amend(self, kind: str, rows: pd.DataFrame) -> None:
+        before = self.kept[self._key(kind)]
+        made = before.frame.iloc[: before.rows_made]
+        whole = pd.concat([made, rows], ignore_index=True) if len(rows) else made
+        self.kept[self._key(kind)] = replace(before, frame=as_read(kind, whole))

@@ -7,8 +7,8 @@ import io
 import os
 import shutil
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
 
@@ -16,20 +16,134 @@ import click
 from tqdm import tqdm
 
 from bsip_cli.commands.init_files import NO_RECORDING, Source, Unused, list_files, read_sources
-from bsip_cli.commands.init_markers import STARTER, StudyMarkers, study_markers
-from bsip_cli.commands.init_table import is_table, read_tables
 from bsip_cli.errors import BadDataError, UsageError, not_writable, printable
 from bsip_cli.files.folders import check_path, is_folder
 from bsip_cli.recordings.c3d_person import together
+from bsip_cli.recordings.marker_guess import told_from
 from bsip_cli.recordings.model import StatedPerson
-from bsip_cli.study.new_study import (
-    Named,
-    check_participant,
-    counted,
-    is_sequence,
-    name_all,
-)
+from bsip_cli.recordings.starter_set import starter_toml
+from bsip_cli.study.new_study import Named, check_participant, counted, is_sequence, name_all, plain
+from bsip_cli.study.participants import UNKNOWN, PeopleTable, Row, participant_of, read_people
 from bsip_cli.study.trials import listed
+
+# --- a table of people among the files that ``bsip init`` is given: what it says of them ----------
+
+
+_NAMES = ("participants", "subjects")
+_KINDS = (".tsv", ".csv")
+
+
+def is_table(path: Path) -> bool:
+    """Whether a file is called as a table of people."""
+    return path.stem.casefold() in _NAMES and path.suffix.lower() in _KINDS
+
+
+def read_tables(
+    files: Iterable[Path], people: Collection[str]
+) -> tuple[dict[str, tuple[Path, StatedPerson]], list[str]]:
+    """What tables say of the participants of the new study, by their names; and what is to be said.
+
+    A person is known by the letters and digits of the name. Of several tables the first counts.
+    """
+    said: dict[str, tuple[Path, StatedPerson]] = {}
+    notes: list[str] = []
+    wanted = {name.removeprefix("sub-").casefold(): name for name in people}
+    for file in files:
+        try:
+            table = read_people(file)
+        except BadDataError as refusal:
+            notes.append(str(refusal))
+            continue
+        notes += table.notes
+        for row in table.rows:
+            name = wanted.get(plain(row.id.removeprefix("sub-")).casefold())
+            if name is None or name in said:
+                continue
+            try:
+                stated, told = _stated(replace(row, id=name), table)
+            except BadDataError as refusal:
+                notes.append(str(refusal))
+                continue
+            said[name] = file, stated
+            notes += told
+    return said, notes
+
+
+def _stated(row: Row, table: PeopleTable) -> tuple[StatedPerson, tuple[str, ...]]:
+    person = participant_of(row, table)
+    is_stated = row.cells[table.columns["sex"].index].casefold() not in UNKNOWN
+    stated = StatedPerson(person.mass_kg, person.height_m, person.sex if is_stated else "")
+    return stated, person.notes
+
+
+# --- the marker set of a study that ``bsip init`` makes: a shipped one, or one of the labels ------
+
+
+STARTER = "markers.toml"
+
+
+@dataclass(frozen=True)
+class StudyMarkers:
+    """The marker set for study.toml, and the starter's TOML where no shipped one fits."""
+
+    name: str
+    starter: str
+    notes: tuple[str, ...]
+
+
+def study_markers(sources: Sequence[Source], named: Mapping[Path, Named]) -> StudyMarkers:
+    """The one shipped set that recordings fit; several are left to guess; a starter where none."""
+    guessed: dict[str, list[Source]] = defaultdict(list)
+    for source in sources:
+        guessed[_shipped(source)].append(source)
+    unknown = guessed.pop("", [])
+    if not guessed:
+        return _starter(unknown, named)
+    served = {named[source.path].participant for own in guessed.values() for source in own}
+    others = {named[source.path].participant for source in unknown} - served
+    name = next(iter(guessed)) if len(guessed) == 1 and not others else "auto"
+    notes = []
+    if unknown:
+        notes.append(
+            f"no shipped marker set fits {listed(source.path.name for source in unknown)}: ingest "
+            f"may refuse them; `bsip markers {quote(str(unknown[0].path))}` makes one, which "
+            "serves in a study of their own"
+        )
+    if len(guessed) > 1:
+        notes.append(f"several marker sets, guessed for each recording: {', '.join(guessed)}")
+    return StudyMarkers(name, "", tuple(notes))
+
+
+def _shipped(source: Source) -> str:
+    """The shipped set that a recording fits; empty without one, or with two people in the file."""
+    try:
+        guess = told_from(source.labels)
+    except BadDataError:
+        return ""  # ingest says it of the file
+    return guess.name if guess.is_shipped else ""
+
+
+def _starter(sources: Sequence[Source], named: Mapping[Path, Named]) -> StudyMarkers:
+    """A first set of all labels, those of static trials first."""
+    order = sorted(sources, key=lambda source: named[source.path].task != "static")
+    labels = dict.fromkeys(label for source in order for label in source.labels)
+    try:
+        guess = told_from(tuple(labels))
+    except BadDataError as several:
+        note = f"no shipped marker set fits, nor one for all recordings together: {several.found}"
+        return StudyMarkers("auto", "", (f"{note}; a study per laboratory may do",))
+    note = (
+        f"no shipped marker set fits: {STARTER} in the study is a first one, guessed from the "
+        "labels; check it before you trust a number"
+    )
+    source = printable(order[0].path.name)
+    return StudyMarkers(
+        STARTER, starter_toml(guess.marker_set, guess.unknown, source, STARTER), (note,)
+    )
+
+
+# --------------------------------------------------------------------------------------------------
+
 
 _COLUMNS = ("file", "source", "made", "participant_id", "task", "why")
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from bsip_cli.diagnosis.error_gain import ErrorGain, block_errors, error_gain, pooled
 from bsip_cli.diagnosis.error_model import ErrorModel, Part, Term
-from bsip_cli.statistics.normal import Z95
+from bsip_cli.statistics.samples import Z95
 
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
 UNKNOWN, NOISE, TOTAL = "unknown", "noise", "total"

@@ -8,7 +8,7 @@ import numpy as np
 
 from bsip_cli.diagnosis.error_model import posterior
 from bsip_cli.diagnosis.fault_model import Fitted, Session, columns_of, summed
-from bsip_cli.statistics.normal import Z95
+from bsip_cli.statistics.samples import Z95
 
 FOLDS = 5
 BLOCK_S = 1.0  # stretches of time that stand for independent ones

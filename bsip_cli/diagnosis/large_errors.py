@@ -17,7 +17,7 @@ from bsip_cli.diagnosis.error_model import ErrorModel
 from bsip_cli.diagnosis.findings import Finding, Number, interval_words
 from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.statistics.effective_samples import effective_samples
-from bsip_cli.statistics.normal import Z95
+from bsip_cli.statistics.samples import Z95
 
 _LOUD = 0.5  # of the yardstick, by which a component varies at least for its course to count
 _WORDS = {

@@ -18,7 +18,7 @@ from bsip_cli.effects.added_mass import AddedMass
 from bsip_cli.effects.plate_gain import PlateGain
 from bsip_cli.effects.plate_zero import PlateZero
 from bsip_cli.effects.scene import Scene
-from bsip_cli.statistics.normal import Z95
+from bsip_cli.statistics.samples import Z95
 
 CLASS = "W"  # of the weight; those found in the motion are A, B, C
 REMEDY = (

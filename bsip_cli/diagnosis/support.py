@@ -22,7 +22,7 @@ from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, Gain
 from bsip_cli.effects.scene import Scene
 from bsip_cli.effects.unmeasured_contact import UnmeasuredContact
 from bsip_cli.statistics.effective_samples import effective_samples
-from bsip_cli.statistics.normal import Z95
+from bsip_cli.statistics.samples import Z95
 
 HANDS, TRUNK = ("hand_l", "hand_r"), "upper_torso"
 STILL_M = 0.004  # root mean square distance of a hand that holds on from its mean place

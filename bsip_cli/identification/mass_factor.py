@@ -10,7 +10,7 @@ import numpy as np
 
 from bsip_cli.errors import NumericalError
 from bsip_cli.identification.estimator import Estimate, Problem
-from bsip_cli.statistics.normal import Z95
+from bsip_cli.statistics.samples import Z95
 
 _ROUNDS = 20  # of weights and number
 _QUIETEST = 0.1  # of what OM leaves: no component counts as without error

@@ -2,22 +2,179 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
 
 from bsip_cli.body.person import Person
+from bsip_cli.config import shipped
 from bsip_cli.dynamics.regressor import wrench_regressor
 from bsip_cli.identification.data_share import Beforehand, beforehand
 from bsip_cli.identification.estimator import Problem
-from bsip_cli.identification.movements import (
-    DURATION_S,
-    Movement,
-    load_movements,
-    motion_of,
-    possible,
-)
+
+# --- movements that a person can be asked for, and the motion of each in this body ----------------
+
+
+DURATION_S = 10.0
+RATE_HZ = 25.0  # the fastest movement has 2.2 Hz; differences at 25 Hz err by some 2 % there
+_EASE_S = 1.5
+_AXES = "xyz"
+_SIDES = {"l": "left", "r": "right"}
+
+
+@dataclass(frozen=True)
+class Swing:
+    """One joint's part: rotation about a segment axis (0 to 2), about a middle, at a growing pace.
+
+    ``hz`` is the pace at the beginning and at the end.
+    """
+
+    joint: str
+    axis: int
+    middle_rad: float
+    swing_rad: float
+    hz: tuple[float, float]
+    phase_rad: float
+
+    def angle_rad(self, times_s: np.ndarray) -> np.ndarray:
+        """(N,) angle over the time from the beginning, zero at both ends."""
+        slow, fast = self.hz
+        cycles = slow * times_s + 0.5 * (fast - slow) * times_s**2 / DURATION_S
+        wave = np.sin(2 * np.pi * cycles + self.phase_rad)
+        return _eased(times_s) * (self.middle_rad + self.swing_rad * wave)
+
+
+@dataclass(frozen=True)
+class Movement:
+    """A movement from standing: what people are told, the foot that stays, and the joints."""
+
+    name: str
+    text: str
+    stance: str
+    swings: tuple[Swing, ...]
+
+
+def _eased(times_s: np.ndarray) -> np.ndarray:
+    """(N,) from 0 to 1 and back, with two continuous derivatives."""
+    part = np.clip(np.minimum(times_s, DURATION_S - times_s) / _EASE_S, 0.0, 1.0)
+    return part**3 * (10 - 15 * part + 6 * part**2)
+
+
+# --- which movements there are ----------------------------------------------------------------
+
+
+def load_movements() -> tuple[Movement, ...]:
+    """The movements of ``configs/movements.toml``, those of one side once for each side."""
+    file = shipped("movements.toml")
+    rows = tomllib.loads(file.read_text(encoding="utf-8"))["movements"]
+    return tuple(
+        _movement(row, side) for row in rows for side in (_SIDES if "side" in row else ("",))
+    )
+
+
+def _movement(row: dict, side: str) -> Movement:
+    other = {"l": "r", "r": "l"}.get(side, "")
+    words = {"side": _SIDES.get(side, ""), "other": _SIDES.get(other, "")}
+    letters = {"side": side, "other": other}
+    return Movement(
+        row["name"].format(**letters),
+        row["text"].format(**words),
+        row["stance"].format(**letters),
+        tuple(_swing(part, part["joint"].format(**letters)) for part in row["joints"]),
+    )
+
+
+def _swing(part: dict, joint: str) -> Swing:
+    axis = _AXES.index(part["axis"])
+    mirror = -1.0 if joint.endswith("_l") and axis < 2 else 1.0
+    return Swing(
+        joint,
+        axis,
+        mirror * np.deg2rad(part["middle_deg"]),
+        mirror * np.deg2rad(part["swing_deg"]),
+        tuple(part["hz"]),
+        np.deg2rad(part.get("phase_deg", 0.0)),
+    )
+
+
+def possible(movement: Movement, person: Person) -> bool:
+    """Whether the skeleton has the joints and markers show them."""
+    skeleton = person.skeleton
+    joints = {swing.joint for swing in movement.swings}
+    if not joints <= set(skeleton.joints) or f"foot_{movement.stance}" not in skeleton.segments:
+        return False
+    return not any(person.held[skeleton.joints.index(joint)] for joint in joints)
+
+
+# --- as motion of this person -----------------------------------------------------------------
+
+
+def motion_of(
+    movement: Movement, person: Person, model: pin.Model
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """q (N, nq), v and a (N, nv) of the movement, the ground at height 0 below the stance foot.
+
+    The base moves so that the stance foot stays. Velocities and accelerations are differences on
+    the manifold.
+    """
+    step = 1.0 / RATE_HZ
+    times = np.arange(-step, DURATION_S + 1.5 * step, step)
+    q = _standing_on(movement, person, model, _joint_angles(movement, person, model, times))
+    steps = np.stack([pin.difference(model, a, b) for a, b in pairwise(q)])
+    v = (steps[1:] + steps[:-1]) / (2 * step)
+    a = (steps[1:] - steps[:-1]) / step**2
+    return q[1:-1], v, a
+
+
+def _joint_angles(
+    movement: Movement, person: Person, model: pin.Model, times: np.ndarray
+) -> np.ndarray:
+    """(N, nq) with the base upright at the origin."""
+    skeleton = person.skeleton
+    turns = np.zeros((len(times), model.nv))
+    for swing in movement.swings:
+        joint = skeleton.joints.index(swing.joint)
+        # A hinge has one coordinate, whatever axis it turns about.
+        axis = swing.axis if skeleton.joint_types[joint] == "spherical" else 0
+        turns[:, skeleton.v_starts[joint] + axis] += swing.angle_rad(times)
+    upright = _upright(model)
+    return np.stack([pin.integrate(model, upright, turn) for turn in turns])
+
+
+def _upright(model: pin.Model) -> np.ndarray:
+    """(nq,) neutral pose with the segments' Y up and X along the world's X."""
+    q = pin.neutral(model)
+    q[3:7] = [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]
+    return q
+
+
+def _standing_on(movement: Movement, person: Person, model: pin.Model, q: np.ndarray) -> np.ndarray:
+    """The same joint angles with the stance foot at its place, its lowest marker on the ground."""
+    data = model.createData()
+    foot = person.skeleton.index(f"foot_{movement.stance}")
+    home = _foot_on_ground(person, model, data, foot)
+    placed = q.copy()
+    for row in placed:
+        pin.forwardKinematics(model, data, row)
+        base = home * data.oMi[foot + 1].inverse() * data.oMi[1]
+        row[:7] = pin.SE3ToXYZQUAT(base)
+    return placed
+
+
+def _foot_on_ground(person: Person, model: pin.Model, data: pin.Data, foot: int) -> pin.SE3:
+    pin.forwardKinematics(model, data, _upright(model))
+    home = data.oMi[foot + 1].copy()
+    markers = person.markers_in_joint_m()[person.marker_segments == foot]
+    lowest = min((home.rotation @ m)[2] for m in markers) if len(markers) else 0.0
+    home.translation[2] = -lowest
+    return home
+
+
+# --------------------------------------------------------------------------------------------------
+
 
 _ADVISED = 3
 _STRIDE = 2  # frames; squares of 2.2 Hz need 9 Hz

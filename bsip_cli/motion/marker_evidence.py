@@ -6,13 +6,13 @@ recording; and the spread of the marker's own residual in its segment. What is f
 
 swap (marker_swaps.py)
     Both markers lie at least twice as near to the other's place in the model as to their own, or
-    the line between them reverses from one frame to the next; or (marker_limbs.py) both arms
+    the line between them reverses from one frame to the next; or both arms
     (legs) fit twice as well exchanged. Where all markers involved then lie nearer to the model
     (marker_exchange.py), the labels are put right and the poses fitted again before the rest is
     judged; else they stay as recorded.
-jump (marker_jumps.py)
+jump
     The residual leaves its running median for less than a quarter second and comes back.
-slip (marker_slips.py)
+slip
     The mean residual goes to another level and stays there, and the joint angles do not explain
     it.
 offset (marker_offsets.py)
@@ -28,15 +28,377 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 
-from bsip_cli.motion.marker_events import MarkerEvent
-from bsip_cli.motion.marker_exchange import Refit, exchanged
-from bsip_cli.motion.marker_fit import MarkerFit
-from bsip_cli.motion.marker_jumps import jumps
-from bsip_cli.motion.marker_limbs import swapped_limbs
+from bsip_cli.body.names import mirrored
+from bsip_cli.motion.level_change import LevelChange, find_level_change, two_levels
+from bsip_cli.motion.marker_events import BEYOND, MarkerEvent, event, pieces
+from bsip_cli.motion.marker_exchange import (
+    Exchange,
+    Labelling,
+    Refit,
+    as_recorded,
+    exchanged,
+    misfit_m,
+    put_right,
+    refitted,
+    with_exchanges,
+)
+from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit, best_source
 from bsip_cli.motion.marker_offsets import offsets
-from bsip_cli.motion.marker_slips import slips
 from bsip_cli.motion.marker_swaps import swaps
+
+# --- both arms or both legs that bear each other's labels throughout ------------------------------
+
+
+_FAR = 3.0  # misfit of the trial over the trusted distance
+_BETTER = 0.5  # misfit exchanged over that as labelled
+_ARM, _LEG = ("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot")
+_LIMBS = (_ARM, ("upper_torso", *_ARM), _LEG)  # the shoulders' labels may go with the arms'
+_LATERAL_M = 0.05  # a marker of the trunk this far beside its middle belongs to a side
+_MIRRORED_M = 0.1  # the places of a pair are mirrored to this
+_FRAMES = 24
+
+
+def swapped_limbs(fit: MarkerFit, refit: Refit) -> Labelling:
+    """Labels of the limbs put right, with the events.
+
+    All markers of one limb pull the other limb's model over, or turn the trunk round, so single
+    pairs need not show it. Where the markers fit badly, the poses are fitted again to some frames
+    with the limbs exchanged; if that at least halves the residual of all markers, they are.
+    """
+    whole = slice(0, len(fit.times_s))
+    frames = np.unique(np.linspace(0, whole.stop - 1, _FRAMES).astype(int))
+    before = misfit_m(fit.distance_m()[frames])
+    if not before > _FAR * fit.trusted_m.min():
+        return as_recorded(fit)
+    tried = []
+    for limb in _LIMBS:
+        pairs = _mirrored_pairs(fit, limb)
+        markers = with_exchanges(fit, [Exchange(a, b, whole, 1.0) for a, b in pairs])
+        again = refit(markers[frames], fit.times_s[frames])
+        tried.append((misfit_m(again.distance_m()), pairs))
+    after, pairs = min(tried, key=lambda one: one[0])
+    if not after < _BETTER * before:
+        return as_recorded(fit)
+    suspected = [Exchange(a, b, whole, before / after) for a, b in pairs]
+    return put_right(as_recorded(fit), refitted(fit, refit, suspected), refit, suspected)
+
+
+def _mirrored_pairs(fit: MarkerFit, limb: tuple[str, ...]) -> list[tuple[int, int]]:
+    """Markers of the right side of some segments and those that lie mirrored on the left one."""
+    side = np.array(
+        [
+            {"_r": 1, "_l": -1}.get(name[-2:], int(np.sign(z)) * (abs(z) > _LATERAL_M))
+            for name, z in zip(fit.segments, fit.place_m[:, 2], strict=True)
+        ]
+    )
+    seen = np.isfinite(fit.measured_m[..., 0])
+    near = sorted(
+        (float(np.linalg.norm(fit.place_m[a] * [1.0, 1.0, -1.0] - fit.place_m[b])), a, b)
+        for a, segment in enumerate(fit.segments)
+        for b, other in enumerate(fit.segments)
+        if segment.removesuffix("_r") in limb and other == mirrored(segment)
+        if side[a] == 1 and side[b] == -1 and (seen[:, a] & seen[:, b]).any()
+    )
+    pairs: list[tuple[int, int]] = []
+    for apart, a, b in near:
+        if apart < _MIRRORED_M and not {a, b} & {k for pair in pairs for k in pair}:
+            pairs.append((a, b))
+    return pairs
+
+
+# --- markers that leave their place for a moment: ghosts, flickers, badly filled gaps -------------
+
+
+_WINDOW_S = 0.5  # of the running median: a jump lasts at most half of it
+_JUMP = 8.0  # spreads
+_LEAST_FRAMES = 5
+_SAME = 0.7  # a jump that another one explains to 30 % is the pose's
+
+
+@dataclass(frozen=True)
+class _Jump:
+    m: int
+    frames: slice
+
+
+def jumps(
+    fit: MarkerFit, residual: np.ndarray, filled: np.ndarray | None
+) -> tuple[list[MarkerEvent], np.ndarray]:
+    """Events, and (N, m) frames in which a marker is astray.
+
+    A jump exceeds ``_JUMP`` spreads of the marker about its running median, of all markers in the
+    same frame (at an impact all shake), and of the noise; half of it comes or goes within two
+    frames, and the measured path shows it.
+    """
+    away = _away(residual, 2 * max(2, round(0.5 * _WINDOW_S / fit.step_s())) + 1)
+    distance = np.linalg.norm(away, axis=2)
+    astray = np.zeros(distance.shape, dtype=bool)
+    if not np.isfinite(distance).any():
+        return [], astray
+    own = _median(distance, 0)[None] / MEDIAN_LENGTH
+    frame = _median(distance, 1)[:, None] / MEDIAN_LENGTH
+    spread = np.maximum(np.maximum(own, frame), fit.noise_m())
+    with np.errstate(invalid="ignore"):
+        beyond = distance > np.maximum(_JUMP * spread, BEYOND * fit.trusted_m)
+    longest = round(0.5 * _WINDOW_S / fit.step_s())
+    found = []
+    for m in range(len(fit.labels)):
+        for piece in pieces(beyond[:, m], ~np.isfinite(distance[:, m]), 2):
+            if piece.stop - piece.start <= longest and _is_own(fit, m, piece, distance[:, m]):
+                found.append(_Jump(m, piece))
+                astray[piece, m] = True
+    events = []
+    for jump, size in _own(fit, away, spread, found):
+        m, piece = jump.m, jump.frames
+        gap = filled is not None and filled[piece, m].mean() > 0.5
+        note = ", where a gap was filled" if gap else ""
+        statistic = float(np.nanmax(distance[piece, m]) / spread[piece, m].max())
+        events.append(event(fit, "jump", m, piece, size, statistic, note=note))
+    return events, astray
+
+
+def _own(
+    fit: MarkerFit, away: np.ndarray, spread: np.ndarray, found: list[_Jump]
+) -> list[tuple[_Jump, float]]:
+    """The jumps without those that another one at the same time drags along, and their sizes."""
+    distance = np.linalg.norm(away, axis=2)
+    left = sorted(found, key=lambda one: -float(np.nanmax(distance[one.frames, one.m])))
+    own: list[tuple[_Jump, float]] = []
+    while left:
+        first = left[0]
+        together = [one for one in left if one is first or _overlap(one.frames, first.frames)]
+        peak = first.frames.start + int(np.nanargmax(distance[first.frames, first.m]))
+        sd = np.hypot(spread[peak], 0.1 * distance[peak, first.m])
+        candidates = [one.m for one in together if np.isfinite(distance[peak, one.m])]
+        m, vector = best_source(fit.response, away[peak], sd, candidates)
+        made = np.einsum("jak,k->ja", fit.response[:, :, m], vector)
+        missed = np.linalg.norm(away[peak] - made, axis=1)
+        source = next(one for one in together if one.m == m)
+        size = max(float(np.linalg.norm(vector)), float(np.nanmax(distance[source.frames, m])))
+        own.append((source, size))
+        dragged = [one for one in together if not missed[one.m] > _SAME * distance[peak, one.m]]
+        left = [one for one in left if one is not source and one not in dragged]
+    return own
+
+
+def _overlap(a: slice, b: slice) -> bool:
+    return a.start < b.stop + 1 and b.start < a.stop + 1
+
+
+def _away(residual: np.ndarray, width: int) -> np.ndarray:
+    """Residual less its running median over the visible frames, NaN where missing."""
+    away = np.full(residual.shape, np.nan)
+    for m in range(residual.shape[1]):
+        seen = np.flatnonzero(np.isfinite(residual[:, m, 0]))
+        if len(seen) >= _LEAST_FRAMES:
+            size = min(width, len(seen) | 1)
+            for axis in range(residual.shape[2]):  # one-dimensional, it costs a tenth
+                own = residual[seen, m, axis]
+                away[seen, m, axis] = own - median_filter(own, size=size, mode="nearest")
+    return away
+
+
+def _median(distance: np.ndarray, axis: int) -> np.ndarray:
+    seen = np.isfinite(distance).any(axis=axis)
+    out = np.zeros(len(seen))
+    kept = distance[:, seen] if axis == 0 else distance[seen]
+    out[seen] = np.nanmedian(kept, axis=axis)
+    return out
+
+
+def _is_own(fit: MarkerFit, m: int, piece: slice, distance: np.ndarray) -> bool:
+    """Half of the jump comes or goes within two frames, and the measured path shows it.
+
+    The path is compared with the straight line through the two frames before: a pose that another
+    marker bends leaves it smooth.
+    """
+    seen = np.flatnonzero(np.isfinite(fit.measured_m[:, m, 0]))
+    path, model = fit.measured_m[seen, m], fit.model_m[seen, m]
+    first, last = np.searchsorted(seen, [piece.start, piece.stop - 1])
+    half = 0.5 * float(np.nanmax(distance[piece]))
+    for edge, back in ((first, -1), (last, 1)):
+        before, earlier = edge + back, edge + 2 * back
+        if min(before, earlier) < 0 or max(before, earlier) >= len(seen):
+            continue
+        for k in {edge, min(max(edge - back, first), last)}:
+            step = (path[k] - model[k]) - (path[before] - model[before])
+            length = float(np.linalg.norm(step))
+            straight = path[before] + (path[before] - path[earlier]) * abs(k - before)
+            if length > half and (path[k] - straight) @ step > 0.5 * length**2:
+                return True
+    return False
+
+
+# --- markers that change their place on the segment and stay there --------------------------------
+
+
+_BLOCK_S = 0.1  # residuals are averaged over blocks
+_MOST_BLOCKS = 600  # longer ones in longer trials
+_STAYS_S = 0.5  # on each side of a slip
+_SLIP = 3.0  # spreads of what pose and step leave unexplained
+# A normal vector of three directions is this long once in 3e7 draws: 40 markers at 600 places give
+# one false alarm in a thousand trials, were the errors as the model says.
+_CHANCE = 6.0
+# Skin travels over the bone by some 15 mm in half a radian; a slip moves the pose too, by far less
+# for its size, and may not hide behind that.
+_SKIN_M_PER_RAD = 0.03
+_SAME_SHARE = 0.7  # a change that is explained to 30 % by a slip at the same time is no second one
+_LEAST_RESPONSE = 0.003  # what follows a slip by less says nothing of it
+_MOST = 12
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A change of level of marker ``m`` at a block."""
+
+    m: int
+    change: LevelChange
+    block: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Slip:
+    m: int
+    frame: int
+    vector: np.ndarray
+    z: float
+
+
+class _Search:
+    """The residuals that are left, in blocks, and the best change of level of each marker."""
+
+    def __init__(self, fit: MarkerFit, residual: np.ndarray) -> None:
+        self.fit, self.left = fit, residual.copy()
+        frames, most = round(_BLOCK_S / fit.step_s()), len(residual) // _MOST_BLOCKS
+        self.frames = max(1, frames, most)
+        self.least = max(3, round(_STAYS_S / (self.frames * fit.step_s())))
+        self.columns = {
+            name: block_means(_with_squares(x), self.frames) for name, x in fit.pose.items()
+        }
+        self.means = block_means(self.left, self.frames)
+        self.best: dict[int, _Found | None] = {}
+
+    def changes(self) -> list[_Found]:
+        """The changes that are slips, of all markers."""
+        for m in range(len(self.fit.labels)):
+            if m not in self.best:
+                self.best[m] = self._change(m, self.least)
+        return [f for f in self.best.values() if f and _is_slip(f.change, self.fit.trusted_m[f.m])]
+
+    def _change(self, m: int, least: int, block: int | None = None) -> _Found | None:
+        seen = np.flatnonzero(np.isfinite(self.means[:, m, 0]))
+        at = None if block is None else int(np.searchsorted(seen, block))
+        if len(seen) < 2 * least:
+            return None
+        columns = self.columns[self.fit.segments[m]][seen]
+        found = find_level_change(self.means[seen, m], columns, _SKIN_M_PER_RAD, least, at)
+        return _Found(m, found, int(seen[found.at])) if found else None
+
+    def source(self, first: _Found, changes: list[_Found]) -> tuple[_Slip, np.ndarray]:
+        """Whose slip makes the strongest change, and the change it makes of all (m, 3)."""
+        fit = self.fit
+        field, sd = np.full((len(fit.labels), 3), np.nan), np.full(len(fit.labels), np.nan)
+        near = {f.m: f for f in changes if abs(f.block - first.block) <= self.least}
+        reach = np.abs(fit.response[:, :, list(near)]).max(axis=(1, 2, 3))
+        for k in np.flatnonzero(reach > _LEAST_RESPONSE):
+            found = self._change(int(k), 1, first.block)
+            if found:
+                field[k], sd[k] = found.change.step, found.change.step_sd
+        near = {m: f for m, f in near.items() if np.isfinite(sd[m])} or {first.m: first}
+        field[first.m], sd[first.m] = first.change.step, first.change.step_sd
+        sd = np.hypot(sd, 0.1 * np.linalg.norm(first.change.step))
+        m, vector = best_source(fit.response, field, sd, list(near))
+        frame = self._frame(near[m])
+        made = np.einsum("jak,k->ja", fit.response[:, :, m], vector)
+        left = np.linalg.norm(field - made, axis=1)
+        same = left < _SAME_SHARE * np.linalg.norm(field, axis=1)
+        same[m] = True
+        return _Slip(m, frame, vector, near[m].change.z), np.where(same[:, None], field, made)
+
+    def take(self, slip: _Slip, made: np.ndarray) -> None:
+        """Take a slip out of the residuals."""
+        self.left[slip.frame :] -= made
+        self.means = block_means(self.left, self.frames)
+        moved = np.linalg.norm(made, axis=1) > 0.1 * self.fit.trusted_m
+        self.best = {k: f for k, f in self.best.items() if not moved[k]}
+
+    def _frame(self, found: _Found) -> int:
+        """First frame at the new level: the split near the block with the least squares."""
+        step, middle = found.change.step, found.block * self.frames
+        along = self.left[:, found.m] @ step / (step @ step)
+        near = np.arange(middle - 2 * self.frames, middle + 2 * self.frames + 1)
+        near = near[(near > 0) & (near < len(along))]
+        near = near[np.isfinite(along[near])]
+        if len(near) < 3:
+            return middle
+        return int(near[two_levels(along[near][:, None], 1, 1)])
+
+
+def slips(fit: MarkerFit, residual: np.ndarray) -> tuple[list[MarkerEvent], np.ndarray]:
+    """Events, and the residual as it would be without the slips: at the level of the start.
+
+    A change of level is searched for in what the joint angles about the segment (and their
+    squares) do not explain, since skin follows them; the strongest is traced to the marker that
+    explains the changes of all, and taken out; and so on.
+    """
+    search, found = _Search(fit, residual), []
+    for _ in range(_MOST):
+        changes = search.changes()
+        if not changes:
+            break
+        slip, made = search.source(max(changes, key=lambda one: one.change.z), changes)
+        search.take(slip, made)
+        if np.linalg.norm(slip.vector) > BEYOND * fit.trusted_m[slip.m]:
+            found.append(slip)
+    return _events(fit, found), search.left
+
+
+def _is_slip(change: LevelChange, trusted_m: float) -> bool:
+    size = float(np.linalg.norm(change.step))
+    return bool(
+        change.z > _CHANCE
+        and size > 0.5 * BEYOND * trusted_m  # the pose takes its part
+        and size > _SLIP * change.spread
+    )
+
+
+def _events(fit: MarkerFit, found: list[_Slip]) -> list[MarkerEvent]:
+    """Slips; one that a later one undoes is a long jump."""
+    events, waiting = [], sorted(found, key=lambda one: one.frame)
+    while waiting:
+        slip = waiting.pop(0)
+        size = float(np.linalg.norm(slip.vector))
+        back = [
+            other
+            for other in waiting
+            if other.m == slip.m and np.linalg.norm(slip.vector + other.vector) < 0.5 * size
+        ]
+        kind, stop = ("jump", back[0].frame) if back else ("slip", len(fit.times_s))
+        if back:
+            waiting.remove(back[0])
+        frames = slice(slip.frame, stop)
+        events.append(event(fit, kind, slip.m, frames, size, slip.z))  # type: ignore[arg-type]
+    return events
+
+
+def _with_squares(x: np.ndarray) -> np.ndarray:
+    centred = x - np.mean(x, axis=0)
+    return np.concatenate([x, centred**2], axis=1)
+
+
+def block_means(x: np.ndarray, frames: int) -> np.ndarray:
+    """Means of (N, ...) over blocks of frames, NaN where half of a block is missing."""
+    count = len(x) // frames
+    cut = x[: count * frames].reshape(count, frames, *x.shape[1:])
+    seen = np.isfinite(cut)
+    number = seen.sum(axis=1)
+    total = np.where(seen, cut, 0.0).sum(axis=1)
+    return np.where(2 * number >= frames, total / np.maximum(number, 1), np.nan)
+
+
+# --------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ import pandas as pd
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.report.candidates import Candidate, Number, candidates_of, causes_of
 from bsip_cli.report.words import capital, listing, number, task_of
-from bsip_cli.statistics.homogeneity import p_of_one_size
+from bsip_cli.statistics.samples import p_of_one_size
 
 SHARED = (
     "Shared causes may point to the laboratory, the protocol or the model rather than to a person "

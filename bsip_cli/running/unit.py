@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,20 +12,46 @@ from typing import Any
 
 import pandas as pd
 
-from bsip_cli.artifacts import (
-    read_artifact,
-    read_header,
-    write_artifact,
-    write_artifact_in_parts,
-)
+from bsip_cli.artifacts import read_artifact, read_header, write_artifact, write_artifact_in_parts
 from bsip_cli.config import Config, Load
 from bsip_cli.errors import printable
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.running.provenance import describe, hash_of_files
-from bsip_cli.running.status import Folder
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.study import Participant, Study, Trial
+
+# --- what lies in a folder of results, and what of it a refusal has made void ---------------------
+
+
+@dataclass(frozen=True)
+class Folder:
+    """The names in the folder of a participant, or of the group, at one moment."""
+
+    path: Path
+    names: frozenset[str]
+
+    @classmethod
+    def now(cls, path: Path) -> Folder:
+        """As it is; a folder that is not there is empty."""
+        try:
+            with os.scandir(path) as entries:
+                return cls(path, frozenset(entry.name for entry in entries))
+        except FileNotFoundError:
+            return cls(path, frozenset())
+
+    def holds(self, path: Path) -> bool:
+        return path.name in self.names
+
+    def refusals(self, owners: Collection[str], stages: Iterable[Stage]) -> list[Path]:
+        """The refusals of these owners (ids of participants, stems of trials) by these stages."""
+        if not any("_refusal-" in name for name in self.names):
+            return []
+        asked = (f"{owner}_refusal-{stage.name}.parquet" for owner in owners for stage in stages)
+        return [self.path / name for name in dict.fromkeys(asked) if name in self.names]
+
+
+# --------------------------------------------------------------------------------------------------
 
 
 @dataclass

@@ -9,7 +9,7 @@ from math import isnan, nan
 from typing import Literal
 
 from bsip_cli.statistics.cohort_values import Topic
-from bsip_cli.statistics.p_values import adjusted_p_values
+from bsip_cli.statistics.samples import adjusted_p_values
 
 
 @dataclass(frozen=True)

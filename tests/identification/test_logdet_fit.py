@@ -6,9 +6,8 @@ import pytest
 from scipy import sparse
 
 from bsip_cli.errors import NumericalError
-from bsip_cli.identification.logdet_fit import Objective, minimise
+from bsip_cli.identification.consistent import Objective, Weights, minimise, objective_of, terms_of
 from bsip_cli.identification.pseudo_inertia import BASIS, are_physical, pseudo_inertias
-from bsip_cli.identification.weights import Weights, objective_of, terms_of
 from tests.identification.synthetic_identification import problem_of, regressor, world
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bsip_cli.identification.movements import (
+from bsip_cli.identification.movement_gain import (
     DURATION_S,
     RATE_HZ,
     load_movements,

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bsip_cli.motion import marker_slips
+from bsip_cli.motion import marker_evidence
 from bsip_cli.motion.marker_events import MarkerEvent, summaries
 from bsip_cli.motion.marker_offsets import offsets
 from tests.marker_evidence.swinging_markers import MARKERS, PERSON, events_of, fitted, recording
@@ -67,7 +67,7 @@ def test_one_of_two_slips_at_the_same_time_that_comes_back(monkeypatch):
     """Other slips of that marker in that frame stay what they are."""
     there, back = np.array([0.03, 0.0, 0.0]), np.array([-0.03, 0.0, 0.0])
     times = ((START, there), (STOP, np.array([0.0, 0.03, 0.0])), (STOP, back))
-    slips = [marker_slips._Slip(0, frame, vector, 9.0) for frame, vector in times]
+    slips = [marker_evidence._Slip(0, frame, vector, 9.0) for frame, vector in times]
     strongest = SimpleNamespace(change=SimpleNamespace(z=9.0))
     search = SimpleNamespace(
         left=None,
@@ -75,9 +75,9 @@ def test_one_of_two_slips_at_the_same_time_that_comes_back(monkeypatch):
         source=lambda *_: (slips.pop(0), None),
         take=lambda *_: None,
     )
-    monkeypatch.setattr(marker_slips, "_Search", lambda *_: search)
+    monkeypatch.setattr(marker_evidence, "_Search", lambda *_: search)
     times_s, markers, _ = recording(2)
-    events, _ = marker_slips.slips(fitted(markers, times_s), np.zeros(0))
+    events, _ = marker_evidence.slips(fitted(markers, times_s), np.zeros(0))
     assert [(one.kind, round(one.start_s, 1)) for one in events] == [("jump", 3.2), ("slip", 3.5)]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.motion.skin import skin_corner_hz
+from bsip_cli.motion.smoothing import skin_corner_hz
 from tests.body.standing_person import markers_of, standing
 
 RATE_HZ, FRAMES, WHITE_M = 100.0, 2000, 3e-4

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bsip_cli.statistics.anova import one_way_anova, repeated_measures_anova
+from bsip_cli.statistics.cohort_groups import one_way_anova, repeated_measures_anova
 
 # Dobson 1983; R's `PlantGrowth`
 CONTROL = [4.17, 5.58, 5.18, 6.11, 4.50, 4.61, 5.17, 4.53, 5.33, 5.14]

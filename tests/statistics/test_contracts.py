@@ -7,14 +7,14 @@ from dataclasses import astuple
 import numpy as np
 import pytest
 
-from bsip_cli.statistics.anova import one_way_anova, repeated_measures_anova
+from bsip_cli.statistics.cohort_groups import one_way_anova, repeated_measures_anova
 from bsip_cli.statistics.correlation_tests import fisher_z_difference, williams_t
 from bsip_cli.statistics.fit_measures import fit_measures
-from bsip_cli.statistics.normality import lilliefors_test
 from bsip_cli.statistics.paired_tests import equivalence_tost, paired_t, wilcoxon
 from bsip_cli.statistics.posturography import posturography
+from bsip_cli.statistics.samples import lilliefors_test
 
-MODULES = "anova correlation_tests fit_measures normality p_values paired_tests posturography"
+MODULES = "cohort_groups correlation_tests fit_measures paired_tests posturography samples"
 VALUES = [0.0, 0.1, 1 / 3, 2.0, 3.5, -5.0, 1e-40, 1e8, 1e8 + 1e-7, 1e12, np.nan, np.inf]
 
 

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from bsip_cli.statistics.normality import lilliefors_test
-from bsip_cli.statistics.p_values import adjusted_p_values
+from bsip_cli.statistics.samples import adjusted_p_values, lilliefors_test
 
 
 def test_statistic_is_the_largest_gap_to_the_fitted_normal():

@@ -10,8 +10,7 @@ import pytest
 from scipy import stats
 
 from bsip_cli.errors import UsageError
-from bsip_cli.statistics.published.audit import audit
-from bsip_cli.statistics.published.group_audit import f_of_groups
+from bsip_cli.statistics.published.audit import audit, f_of_groups
 from bsip_cli.statistics.published.paper import Claim, PrintedTable, Row, load_paper, names
 from bsip_cli.statistics.published.printed import Cell, Interval, image, rounded_from
 from bsip_cli.statistics.published.readings import as_meant

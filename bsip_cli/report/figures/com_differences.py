@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from bsip_cli.report.figures.canvas import BLUE, ORANGE, SOFT, house_style, new_figure, tidy
-from bsip_cli.statistics.normal import Z95
+from bsip_cli.statistics.samples import Z95
 
 DECIDED = 0.5  # a share above it: more data than table
 LEAST_SPAN_MM = 2.0

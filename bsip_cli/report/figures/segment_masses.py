@@ -22,7 +22,7 @@ from bsip_cli.report.figures.canvas import (
     tidy,
 )
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
-from bsip_cli.statistics.normal import Z95
+from bsip_cli.statistics.samples import Z95
 
 _TICKS_KG = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
 

@@ -28,7 +28,7 @@ from bsip_cli.report.words import (
     trial_label,
 )
 from bsip_cli.statistics.methods import METHODS, OM, RIVALS, RM, RM_MASS, SAME_WITHIN
-from bsip_cli.statistics.normal import Z95
+from bsip_cli.statistics.samples import Z95
 
 _STRONGEST = 6
 _SEXES = {"M": "a man", "F": "a woman"}

@@ -23,8 +23,7 @@ from benchmarks.participant import run_stage
 from benchmarks.sections import replace_section
 from bsip_cli.artifacts import read_artifact
 from bsip_cli.body.names import without_side
-from bsip_cli.body.person import Person
-from bsip_cli.body.rigid_motion import rigid_motion
+from bsip_cli.body.person import Person, rigid_motion
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.simulate.options import StudyOptions
 from bsip_cli.simulate.study import simulate_study

@@ -1,7 +1,7 @@
 """Joint centres from bony landmarks in one standing pose (Reed 1999, as Dumas 2007 uses them).
 
 Positions are world coordinates [m]; ``landmarks`` maps the names of
-:data:`bsip_cli.body.landmarks.LANDMARKS` to (3,) positions. The pelvis fractions are those in
+:data:`bsip_cli.body.person.LANDMARKS` to (3,) positions. The pelvis fractions are those in
 the ISB pelvis frame (Dumas and Wojtusch 2018), since the pubis is not marked; the shoulder is the
 2007 edition's, whose angle is measured from the line C7 to suprasternale.
 """

@@ -8,6 +8,25 @@ import numpy as np
 
 from bsip_cli.body.skeleton import Skeleton
 
+# --- how a rigid body has moved between points that are known before and after --------------------
+
+
+def rigid_motion(reference: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations (N, 3, 3) and shifts (N, 3) that bring reference (k, 3) onto frames (N, k, 3).
+
+    Least squares (Kabsch 1976, A solution for the best rotation to relate two sets of vectors).
+    """
+    a, b = reference.mean(axis=0), frames.mean(axis=1)
+    covariance = np.einsum("ki,nkj->nij", reference - a, frames - b[:, None])
+    u, _, vt = np.linalg.svd(covariance)
+    vt[:, 2] *= np.linalg.det(u @ vt)[:, None]
+    turn = np.einsum("nji,nkj->nik", vt, u)
+    return turn, b - turn @ a
+
+
+# --------------------------------------------------------------------------------------------------
+
+
 # A marker trusted to 5 mm leaves the turn about an axis so near uncertain by a quarter radian.
 _LEVER_M = 0.02
 

@@ -5,10 +5,126 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import eigh
 
 from bsip_cli.body.inertia import from_phi, readable_jacobian
-from bsip_cli.identification.estimator import Estimate
+from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.identification.prior import Prior
+
+# --- how well the motion excited the inertial parameters ------------------------------------------
+
+
+_BETTER_THAN_TABLE = 0.5  # part of the prior variance: below it the data know more than the table
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation:
+    """What the motion shows, each parameter in its prior spread, each component in its noise.
+
+    singular_values : (rank,) of the base regressor; below 1 the table knows better than the data.
+    condition_number : their ratio.
+    segment_share : (n,) mean share of its ten parameters that the data could decide.
+    combinations : (n,) of a segment's ten parameters, how many independent combinations the data
+        know better than the table does. With none the segment was not excited.
+    """
+
+    singular_values: np.ndarray
+    condition_number: float
+    segment_share: np.ndarray
+    combinations: np.ndarray
+
+
+def excitation(problem: Problem) -> Excitation:
+    """Singular values, condition number and what the data could know of each segment."""
+    information, _ = problem.trusted_equations()
+    root = problem.prior.root
+    strength = np.linalg.eigvalsh(root.T @ information @ root)[::-1][: problem.basis.rank]
+    singular = np.sqrt(np.maximum(strength, 0.0))
+    smallest = singular[-1]
+    condition = float(singular[0] / smallest) if smallest > 0 else float("inf")
+    known = beforehand(problem)
+    table, left = (_segments(known.covariance(x)) for x in (0 * information, information))
+    share = 1.0 - np.einsum("nii->n", left) / 10
+    parts = [eigh(*pair, eigvals_only=True) for pair in zip(left, table, strict=True)]
+    combinations = (np.array(parts) < _BETTER_THAN_TABLE).sum(axis=1)
+    return Excitation(singular, condition, share, combinations)
+
+
+def _segments(covariance: np.ndarray) -> np.ndarray:
+    """(n, 10, 10) of each segment's own parameters."""
+    n = len(covariance) // 10
+    return covariance.reshape(n, 10, n, 10)[np.arange(n), :, np.arange(n)]
+
+
+# --- what a motion's information can tell of each segment, beside the table: its data share -------
+
+
+_GROUPS = (("mass", slice(0, 1)), ("centre of mass", slice(1, 4)), ("inertia", slice(4, 10)))
+_FROM_TABLE = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Beforehand:
+    """What is known before any wrench, about the table, in coordinates that scatter as N(0, 1).
+
+    seen : (P, P) change of the parameters.
+    readable : (P, P) change of mass, centre of mass and tensor of each segment that goes along, in
+        units of their standard deviations.
+    """
+
+    seen: np.ndarray
+    readable: np.ndarray
+
+    def covariance(self, information: np.ndarray) -> np.ndarray:
+        """(P, P) of the readable parameters, in units of their prior standard deviations.
+
+        ``information`` (P, P) is the weighted sum of Y^T Y of the wrench's regressor.
+        """
+        left = np.eye(len(self.seen)) - self._removed(information)
+        return self.readable @ left @ self.readable.T
+
+    def share(self, information: np.ndarray) -> np.ndarray:
+        """(n, 10) part of each parameter's prior variance that the information removes."""
+        removed = np.sum(self.readable @ self._removed(information) * self.readable, axis=1)
+        return removed.reshape(-1, 10)
+
+    def wrench_variance(self, information: np.ndarray, motion: np.ndarray) -> float:
+        """Sum of squares of the wrench that stays unknown in a motion of information ``motion``."""
+        weight = self.seen.T @ motion @ self.seen
+        return float(np.trace(weight) - np.sum(weight * self._removed(information)))
+
+    def _removed(self, information: np.ndarray) -> np.ndarray:
+        one = np.eye(len(self.seen))
+        return one - np.linalg.inv(self.seen.T @ information @ self.seen + one)
+
+
+def beforehand(problem: Problem) -> Beforehand:
+    """The table's spread of a problem, linearised about the table."""
+    return Beforehand(problem.prior.root, _readable(problem.prior))
+
+
+def _readable(prior: Prior) -> np.ndarray:
+    rows = np.empty_like(prior.root)
+    for i, sd in enumerate(prior.readable_sd):
+        block = slice(10 * i, 10 * i + 10)
+        rows[block] = readable_jacobian(prior.phi[block]) @ prior.root[block] / sd[:, None]
+    return rows
+
+
+def in_words(share: np.ndarray) -> str:
+    """One segment's data shares (10,) as people say them, the mean over each group's numbers."""
+    return ", ".join(_group_in_words(name, float(share[part].mean())) for name, part in _GROUPS)
+
+
+def _group_in_words(name: str, share: float) -> str:
+    if share < _FROM_TABLE:
+        return f"{name} from the table (prior {100 * (1 - share):.0f} %)"
+    if share < 0.5:
+        return f"{name}: prior {100 * (1 - share):.0f} %"
+    return f"{name}: data {100 * share:.0f} %"
+
+
+# --------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)

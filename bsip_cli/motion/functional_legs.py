@@ -10,7 +10,7 @@ import numpy as np
 from bsip_cli.body.joint_centres import hip_centres
 from bsip_cli.body.markersets import MarkerSet
 from bsip_cli.body.names import in_words
-from bsip_cli.body.rigid_motion import rigid_motion
+from bsip_cli.body.person import rigid_motion
 
 # --- a joint from the movement of the segments that it joins: SCoRE and SARA (Ehrig 2006, 2007) ---
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.body.person import Person
-from bsip_cli.body.rigid_motion import rigid_motion
+from bsip_cli.body.person import Person, rigid_motion
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion import kernel
 

@@ -32,7 +32,7 @@ from scipy.ndimage import median_filter
 
 from bsip_cli.body.names import mirrored
 from bsip_cli.motion.level_change import LevelChange, find_level_change, two_levels
-from bsip_cli.motion.marker_events import BEYOND, MarkerEvent, event, pieces
+from bsip_cli.motion.marker_events import BEYOND, MarkerEvent, event, offsets, pieces
 from bsip_cli.motion.marker_exchange import (
     Exchange,
     Labelling,
@@ -45,7 +45,6 @@ from bsip_cli.motion.marker_exchange import (
     with_exchanges,
 )
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit, best_source
-from bsip_cli.motion.marker_offsets import offsets
 from bsip_cli.motion.marker_swaps import swaps
 
 # --- both arms or both legs that bear each other's labels throughout ------------------------------

@@ -10,8 +10,8 @@ import numpy as np
 from bsip_cli.body.person import Person
 from bsip_cli.motion.calibration import Calibration
 from bsip_cli.motion.inverse_kinematics import solve_poses, solve_trial, tree_of
+from bsip_cli.motion.marker_events import offsets
 from bsip_cli.motion.marker_fit import marker_fit
-from bsip_cli.motion.marker_offsets import offsets
 from bsip_cli.motion.scaling import Refinement, ScalingOptions, refine, varied_frames
 
 _FRAMES_PER_TRIAL = 400

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from bsip_cli.body.rigid_motion import rigid_motion
+from bsip_cli.body.person import rigid_motion
 from bsip_cli.recordings.analog import runs
 
 _LEAST_OTHERS = 3

@@ -28,11 +28,10 @@ from bsip_cli.errors import (
 )
 from bsip_cli.files import fingerprints
 from bsip_cli.pipeline import STAGES, Stage, by_level, producer
-from bsip_cli.running.code_hash import code_hash
 from bsip_cli.running.endings import end_if_asked
 from bsip_cli.running.freshness import stale_upstream, was_changed, why_stale
 from bsip_cli.running.lock import held_alone
-from bsip_cli.running.provenance import library_versions
+from bsip_cli.running.provenance import code_hash, library_versions
 from bsip_cli.running.unit import Unit
 from bsip_cli.running.workers import Died, work_on
 from bsip_cli.study.study import Participant, Study, Trial

@@ -17,9 +17,8 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.person_values import Recording, centres, correlations, masses, values_of
 from bsip_cli.statistics.cohort import Criteria, tests_of
-from bsip_cli.statistics.cohort_comparison import Comparison, with_holm
 from bsip_cli.statistics.cohort_correlations import PAIR, PersonTestCounts, person_tests
-from bsip_cli.statistics.cohort_values import Topic, Value, line_of
+from bsip_cli.statistics.cohort_values import Comparison, Topic, Value, line_of, with_holm
 from bsip_cli.statistics.methods import OM, RM
 from bsip_cli.study.study import Participant, Trial
 

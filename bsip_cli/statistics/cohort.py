@@ -10,10 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from bsip_cli.statistics.cohort_comparison import Comparison
 from bsip_cli.statistics.cohort_correlations import PAIR
 from bsip_cli.statistics.cohort_groups import methods_beside_each_other
-from bsip_cli.statistics.cohort_values import DIFFERENCE, Topic, Value, per_participant, topics
+from bsip_cli.statistics.cohort_values import (
+    DIFFERENCE,
+    Comparison,
+    Topic,
+    Value,
+    per_participant,
+    topics,
+)
 from bsip_cli.statistics.methods import MEASURED, OM, RIVALS, RM
 from bsip_cli.statistics.paired_tests import (
     MINIMUM_FOR_WILCOXON,

@@ -11,8 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from bsip_cli.statistics.cohort_comparison import Comparison
-from bsip_cli.statistics.cohort_values import Topic, Value
+from bsip_cli.statistics.cohort_values import Comparison, Topic, Value
 from bsip_cli.statistics.correlation_tests import (
     DependentCorrelations,
     IndependentCorrelations,

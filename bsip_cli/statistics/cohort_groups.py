@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from bsip_cli.statistics.cohort_comparison import Comparison, joined
-from bsip_cli.statistics.cohort_values import Topic
+from bsip_cli.statistics.cohort_values import Comparison, Topic, joined
 from bsip_cli.statistics.paired_tests import paired_t
 from bsip_cli.statistics.samples import (
     ROUNDING,

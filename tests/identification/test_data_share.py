@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.identification.data_share import beforehand, in_words
-from bsip_cli.identification.excitation import excitation
 from bsip_cli.identification.hansen2017 import estimate
-from bsip_cli.identification.uncertainty import readable
+from bsip_cli.identification.uncertainty import beforehand, excitation, in_words, readable
 from tests.identification.synthetic_identification import problem_of, regressor, world
 
 

@@ -3,9 +3,8 @@ import pytest
 from scipy.optimize import minimize
 
 from bsip_cli.dynamics.regressor import predicted_wrench
-from bsip_cli.identification.excitation import excitation
 from bsip_cli.identification.hansen2017 import estimate
-from bsip_cli.identification.uncertainty import readable
+from bsip_cli.identification.uncertainty import excitation, readable
 from tests.identification.synthetic_identification import (
     MASS_KG,
     motion,

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.motion import marker_evidence
-from bsip_cli.motion.marker_events import MarkerEvent, summaries
-from bsip_cli.motion.marker_offsets import offsets
+from bsip_cli.motion.marker_events import MarkerEvent, offsets, summaries
 from tests.marker_evidence.swinging_markers import MARKERS, PERSON, events_of, fitted, recording
 
 START, STOP = 160, 175  # frames: 3.2 to 3.5 s

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.body.rigid_motion import rigid_motion
+from bsip_cli.body.person import rigid_motion
 from bsip_cli.motion.functional_legs import functional_joint
 
 CENTRE, AXIS = np.array([0.1, 0.2, 0.5]), np.array([0.1, 1.0, 0.2]) / np.sqrt(1.05)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from bsip_cli.statistics.published.paper import Claim, Paper, PrintedTable, Row
-from bsip_cli.statistics.published.printed import Cell
+from bsip_cli.statistics.published.paper import Cell, Claim, Paper, PrintedTable, Row
 
 N = 12
 

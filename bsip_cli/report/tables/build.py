@@ -24,7 +24,7 @@ from bsip_cli.report.tables.markdown import to_markdown
 from bsip_cli.report.tables.model import Table
 from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import Criteria
-from bsip_cli.statistics.cohort_comparison import Comparison
+from bsip_cli.statistics.cohort_values import Comparison
 
 BUILDERS: dict[str, Callable[[Results, Criteria], Table]] = {
     "table1": segment_mass.build,

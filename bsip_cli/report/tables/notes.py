@@ -8,8 +8,7 @@ from math import isnan
 
 from bsip_cli.report.tables.numbers import p_value
 from bsip_cli.report.tables.results import Results
-from bsip_cli.statistics.cohort_comparison import Comparison
-from bsip_cli.statistics.cohort_values import Topic
+from bsip_cli.statistics.cohort_values import Comparison, Topic
 
 NAMED_AT_MOST = 6
 """Missing participants and rows that are named one by one."""

@@ -9,8 +9,7 @@ from bsip_cli.report.tables.model import Cell, Column, Row, Table
 from bsip_cli.report.tables.numbers import mean_sd, number, p_value
 from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import Criteria
-from bsip_cli.statistics.cohort_comparison import Comparison
-from bsip_cli.statistics.cohort_values import Topic
+from bsip_cli.statistics.cohort_values import Comparison, Topic
 from bsip_cli.statistics.methods import MEASURED, OM, RM
 
 NAME = "table3_posturography"

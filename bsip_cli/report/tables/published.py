@@ -8,8 +8,7 @@ from math import nan
 from bsip_cli.report.tables.model import Cell, Column, Row, Table
 from bsip_cli.report.tables.numbers import count, mean_sd
 from bsip_cli.report.tables.results import Results
-from bsip_cli.statistics.cohort_comparison import Comparison
-from bsip_cli.statistics.cohort_values import Topic
+from bsip_cli.statistics.cohort_values import Comparison, Topic
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 from bsip_cli.statistics.published import paper as published
 from bsip_cli.statistics.published.audit import audit

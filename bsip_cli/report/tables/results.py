@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from bsip_cli.statistics.cohort_comparison import Comparison, joined
-from bsip_cli.statistics.cohort_values import Topic
+from bsip_cli.statistics.cohort_values import Comparison, Topic, joined
 from bsip_cli.statistics.methods import OM, RM
 
 

@@ -7,8 +7,7 @@ from bsip_cli.report.tables.model import Cell, Column, Row, Table
 from bsip_cli.report.tables.numbers import count, counts_of, mean_sd, number, p_value
 from bsip_cli.report.tables.results import Results
 from bsip_cli.statistics.cohort import Criteria
-from bsip_cli.statistics.cohort_comparison import Comparison, joined
-from bsip_cli.statistics.cohort_values import Topic
+from bsip_cli.statistics.cohort_values import Comparison, Topic, joined
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 
 NAME = "table5_six_components"

@@ -11,8 +11,17 @@ import numpy as np
 from scipy import stats
 from scipy.optimize import minimize_scalar
 
-from bsip_cli.statistics.published.paper import Claim, Paper, PrintedTable, Row
-from bsip_cli.statistics.published.printed import Interval, image
+from bsip_cli.statistics.published.paper import (
+    Claim,
+    Interval,
+    Paper,
+    PrintedTable,
+    Row,
+    Slip,
+    image,
+    range_words,
+    slip,
+)
 from bsip_cli.statistics.published.readings import (
     agrees,
     as_meant,
@@ -21,7 +30,6 @@ from bsip_cli.statistics.published.readings import (
     middle_of,
     pairs_that_differ_by,
 )
-from bsip_cli.statistics.published.slip import Slip, range_words, slip
 from bsip_cli.statistics.published.sway_audit import sway_slips
 
 # --- the ways in which papers compute Cohen's d of two methods in the same people -----------------

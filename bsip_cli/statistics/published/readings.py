@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-from bsip_cli.statistics.published.paper import PrintedTable, Row
-from bsip_cli.statistics.published.printed import Cell, Interval, image
+from bsip_cli.statistics.published.paper import Cell, Interval, PrintedTable, Row, image
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,17 @@ from math import inf, pi, sqrt
 
 from scipy import stats
 
-from bsip_cli.statistics.published.paper import Paper, PrintedTable, Row
-from bsip_cli.statistics.published.printed import Interval, image
+from bsip_cli.statistics.published.paper import (
+    Interval,
+    Paper,
+    PrintedTable,
+    Row,
+    Slip,
+    image,
+    range_words,
+    slip,
+)
 from bsip_cli.statistics.published.readings import as_meant
-from bsip_cli.statistics.published.slip import Slip, range_words, slip
 
 METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 STRAIGHT = 0.95  # correlation of the axes beyond which a path is a line

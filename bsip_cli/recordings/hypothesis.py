@@ -66,10 +66,12 @@ class Hypothesis:
             for fit in self.fits.values()
             for wrench in fit.wrenches().values()
         ]
-        far = max(float(np.sqrt(np.nanmean((cop**2).sum(axis=1)))) for cop in cops if len(cop))
-        unsure = _IN_19_OF_20 * np.deg2rad(sd) * far
+        far = max((np.sqrt(np.nanmean((c**2).sum(axis=1))) for c in cops if len(c)), default=0.0)
         return FrameChange(
-            "forces", 0, *(round(x, 3) for x in (float(angle), float(sd), float(unsure)))
+            "forces",
+            turned_deg=round(float(angle), 2),
+            turned_sd_deg=round(float(sd), 2),
+            unsure_m=round(float(_IN_19_OF_20 * np.deg2rad(sd) * far), 3),
         )
 
     @cached_property

@@ -237,13 +237,14 @@ SCHEMAS = {
         Schema(
             "readings",
             "participant",
-            3,
+            4,
             "how the numbers of a session's recordings are understood, one row per plate",
             (
                 _text("session", "of the recordings; empty without sessions"),
                 _text("moved", "what is in other axes: all, markers, forces or nothing (empty)"),
                 Column("axis", "int", "", "of the world that was mirrored: 0 for X, 1 for Y"),
                 *_floats("turned_deg turned_sd_deg", "deg", "by which it was turned instead"),
+                *_floats("unsure_m", "m", "of centres of pressure by it, in 19 of 20"),
                 Column("corners_only", "bool", "", "of C3D: channels were not mirrored with them"),
                 _text("plate", "its name; empty if no plate was loaded"),
                 Column("moment_scale", "float", "1", "what the moments are multiplied with"),
@@ -280,6 +281,7 @@ SCHEMAS = {
                             "1",
                             f"of the written horizontal moment, what is left {words}",
                         ),
+                        *_floats(f"{when}_astray", "1", f"from leaning to the body {words}"),
                     )
                 ),
             ),

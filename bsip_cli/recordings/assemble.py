@@ -9,6 +9,7 @@ import numpy as np
 
 from bsip_cli.recordings.frame_change import FrameChange
 from bsip_cli.recordings.handedness import handedness
+from bsip_cli.recordings.hypothesis import ALIKE_M
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.plates import LOADED_N
@@ -78,6 +79,10 @@ def _about_frame(frame: FrameChange) -> list[Finding]:
         check, expected = "frame", "markers and forces in one frame"
         found = "the forces lie under the feet and go with the motion in another frame only"
         action = f"{frame.words()}, in all trials"
+        if frame.unsure_m > ALIKE_M:
+            action += f": centres of pressure may be off by {1e3 * frame.unsure_m:.0f} mm; if you "
+            action += "know how the plates lie, correct their corners"
+            return [Finding(check, "", found, expected, action, "warning")]
     else:
         check, expected = "mirrored", "a right-handed frame"
         found = "left and right are exchanged all over the body: a left-handed laboratory frame"

@@ -25,7 +25,7 @@ SMOOTH_S = 0.04
 amplitude is left at 4.7 Hz; horizontal forces of plates and of markers hardly agree above 3."""
 
 # After so long a sample is independent: half the inverse of the bell's noise bandwidth.
-_INDEPENDENT_S = 2.0 * np.sqrt(np.pi) * SMOOTH_S
+INDEPENDENT_S = 2.0 * np.sqrt(np.pi) * SMOOTH_S
 _EDGE_S = 4.0 * SMOOTH_S  # how far the bell reaches: nearer to an end, it averages nothing
 _MOST_OF_IT = 0.5  # of the body's mass
 _OFTEN = 0.9  # of the frames
@@ -84,7 +84,7 @@ class Body:
         rate[edge] = np.nan
         lasts = np.diff(frames, append=frames[-1:] + 1) / rate_hz
         noise *= _acceleration_of_noise(rate_hz)
-        lasts = np.minimum(lasts, _INDEPENDENT_S)
+        lasts = np.minimum(lasts, INDEPENDENT_S)
         each = np.tile(noise, (len(frames), 1))
         return cls(place[frames], rate[frames], each, lasts, np.zeros(len(frames), int))
 
@@ -123,7 +123,11 @@ class Balance:
             return cls()
         force, motion = some.wrench.copy(), some.rate
         force[:, 3:] -= _cross(some.place_m, force[:, :3])
-        lean2 = ((force[:, 3:5] - motion[:, 3:5]) ** 2).sum(axis=1)
+        lean = force[:, 3:5] - motion[:, 3:5]
+        lean2 = (lean**2).sum(axis=1)
+        # The centre of mass is thought to be off by as much all through a trial: a gap, no motion.
+        lift = force[:, 2]
+        force[:, 3:5] -= (some.over(lean.T, lift) @ some.member * lift).T
         together = some.about_means(force, motion)
         force2 = some.about_means(force, force) + some.noise
         motion2 = some.about_means(motion, motion) + some.noise
@@ -133,7 +137,7 @@ class Balance:
                 kind: float(together[k].sum() / np.sqrt(force2[k].sum() * motion2[k].sum()))
                 for kind, k in _KINDS.items()
             },
-            min(limits.independent_numbers, some.numbers),
+            some.numbers,
         )
 
     def log_likelihood(self, limits: GateLimits) -> float:
@@ -150,7 +154,8 @@ class Balance:
         if self.correlations is None:
             return 0.0
         close = np.clip(list(self.correlations.values()), -_CLOSEST, _CLOSEST)
-        return float(-0.5 * self.numbers * np.sum(np.sign(close) * np.log(1.0 - close**2)))
+        axes = np.array([len(_KINDS[kind]) for kind in self.correlations])
+        return float(-0.5 * self.numbers * np.sum(axes * np.sign(close) * np.log(1.0 - close**2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +163,8 @@ class _Complete:
     """The samples in which the plates have every contact; all of them over the person's mass.
 
     wrench, rate, place_m : of the plates and of the body (n, 6), (n, 3). member : of which trial
-    (trials, n), 0 or 1. noise : of all samples together, (6,). numbers : independent ones.
+    (trials, n), 0 or 1. noise : of all samples together, (6,). numbers :
+    independent ones, as many as count.
     """
 
     wrench: np.ndarray
@@ -182,17 +188,24 @@ class _Complete:
         known[known] = np.abs(mass / whole - 1.0) < limits.complete_percent / 100
         member = (body.trial[known] == np.arange(body.trial.max() + 1)[:, None]).astype(float)
         seconds = member @ body.lasts_s[known]
-        member = member[seconds >= _INDEPENDENT_S]
+        member = member[seconds >= INDEPENDENT_S]
         if not len(member):
             return None
+        numbers = float(seconds[seconds >= INDEPENDENT_S].sum() / INDEPENDENT_S)
+        known[known] = of_trial = member.any(axis=0)
+        member = member[:, of_trial]
         return cls(
             wrench[known] / whole,
             body.rate[known],
             body.place_m[known],
             member,
             limits.marker_noise_m**2 * (member @ body.noise[known]).sum(axis=0),
-            float(seconds[seconds >= _INDEPENDENT_S].sum() / _INDEPENDENT_S),
+            min(limits.independent_numbers, numbers),
         )
+
+    def over(self, values: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Of values (..., n) what goes with another signal (n,) in each trial, (..., trials)."""
+        return np.asarray((values * other) @ self.member.T / (self.member @ other**2))
 
     def about_means(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Sums of products (n, k) about the means of each trial, (k,)."""
@@ -206,30 +219,39 @@ def turn_of_forces(
     """The turn of the wrenches about the vertical through the origin that suits the body best, and
     its standard deviation [rad]; None if nothing is known.
 
-    Least squares of horizontal force and of horizontal moment about the origin, each over its own
-    residual, the moment's that of usual gaps of the balance at least. Where the centre of mass is
-    thought to be is off by as much all through a trial: a trial is one independent number.
+    Least squares of horizontal forces, of level moments about the centre of mass but for what a
+    constant error of its place does, and of the places themselves, each over its own residual; of
+    places that of usual gaps at least, and a trial is one number.
     """
     if (some := _Complete.of(body, wrench, limits)) is None:
         return None
-    force = some.rate[:, :3] + [0.0, 0.0, GRAVITY_M_S2]
-    moment = some.rate[:, 3:] + _cross(some.place_m, force)
-    pairs = [
-        (one[:, 0] + 1j * one[:, 1], other[:, 0] + 1j * other[:, 1])
-        for one, other in ((some.wrench[:, :3], force), (some.wrench[:, 3:], moment))
+    level = np.array([1.0, 1j])
+    force, lift = some.wrench[:, :2] @ level, some.wrench[:, 2]
+    moment = some.wrench[:, 3:5] @ level - 1j * some.place_m[:, 2] * force
+    wanted = some.rate[:, 3:5] @ level - 1j * (some.place_m[:, :2] @ level) * lift
+    places = [some.over(one, lift) for one in (moment, wanted)]
+    ones = np.ones_like(lift)
+    motion = some.rate[:, :2] @ level
+    groups = [
+        (*(one - some.over(one, ones) @ some.member for one in (force, motion)), some.numbers),
+        (
+            moment - places[0] @ some.member * lift,
+            wanted - places[1] @ some.member * lift,
+            some.numbers,
+        ),
+        (*places, len(some.member)),
     ]
-    gap = limits.balance_median_m * GRAVITY_M_S2
-    weights, turn, total = [1.0, 1.0], 1.0 + 0j, 0j
+    least = (0.0, 0.0, limits.balance_median_m**2)
+    weights, turn, total = [1.0, 1.0, 1.0], 1.0 + 0j, 0j
     for _ in range(_ROUNDS):
         total = sum(
-            weight * (np.conj(a) * b).mean() for weight, (a, b) in zip(weights, pairs, strict=True)
+            weight * number * (np.conj(a) * b).mean()
+            for weight, (a, b, number) in zip(weights, groups, strict=True)
         )
         turn = total / abs(total)
-        residuals = [float(np.mean(np.abs(turn * a - b) ** 2)) for a, b in pairs]
-        weights = [
-            2.0 / max(one, least) for one, least in zip(residuals, (0.0, gap**2), strict=True)
-        ]
-    return float(np.angle(turn)), float(1.0 / np.sqrt(abs(total) * len(some.member)))
+        left = [float(np.mean(np.abs(turn * a - b) ** 2)) for a, b, _ in groups]
+        weights = [2.0 / max(one, floor) for one, floor in zip(left, least, strict=True)]
+    return float(np.angle(turn)), float(1.0 / np.sqrt(abs(total)))
 
 
 def _acceleration_of_noise(rate_hz: float) -> float:

@@ -25,10 +25,10 @@ from bsip_cli.recordings.trial_samples import TrialSamples
 
 AS_IT_IS = "taken as they stand"
 
-_ALIKE_M = 0.01  # readings whose centres of pressure differ by less are one,
+ALIKE_M = 0.01  # readings whose centres of pressure differ by less are one,
 _ALIKE_SHARE = 0.01  # if their forces differ by less than this part of the load,
 _ALIKE_TORQUE_M = 0.003  # and their vertical moments by less than this times the load
-_CLEARLY = 3.0  # standard deviations
+_CLEARLY, _IN_19_OF_20 = 3.0, 1.96  # standard deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,18 @@ class Hypothesis:
         angle, sd = np.rad2deg(found)
         if abs((angle + 45.0) % 90.0 - 45.0) < _CLEARLY * sd:
             return None
-        return FrameChange("forces", turned_deg=round(angle, 2), turned_sd_deg=round(sd, 2))
+        cops = [
+            cop_at_height(wrench[:, :3], wrench[:, 3:], fit.trials[0].source.floor_m(fit.reading))
+            for fit in self.fits.values()
+            for wrench in fit.wrenches().values()
+        ]
+        far = max((np.sqrt(np.nanmean((c**2).sum(axis=1))) for c in cops if len(c)), default=0.0)
+        return FrameChange(
+            "forces",
+            turned_deg=round(float(angle), 2),
+            turned_sd_deg=round(float(sd), 2),
+            unsure_m=round(float(_IN_19_OF_20 * np.deg2rad(sd) * far), 3),
+        )
 
     @cached_property
     def balance(self) -> Balance:
@@ -167,7 +178,7 @@ def _are_alike(one: PlateFit, other: PlateFit, with_torque: bool) -> bool:
         cop = cop_at_height(both[..., :3], both[..., 3:], floors)
         load = np.abs(wrench[:, 2]).mean()
         apart = np.linalg.norm(both[0, :, :3] - both[1, :, :3], axis=1)
-        if np.nanmax(np.abs(cop[0] - cop[1]), initial=0.0) >= _ALIKE_M:
+        if np.nanmax(np.abs(cop[0] - cop[1]), initial=0.0) >= ALIKE_M:
             return False
         if apart.mean() > _ALIKE_SHARE * load:
             return False

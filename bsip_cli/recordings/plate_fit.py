@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bsip_cli.recordings.body_motion import INDEPENDENT_S
 from bsip_cli.recordings.plate_reading import AS_STATED, PlateReading
 from bsip_cli.recordings.plate_source import ForceOnPoint, PlateSource
 from bsip_cli.recordings.trial_samples import TrialSamples
@@ -26,7 +27,8 @@ _PULLS = 3.0  # a force is reversed if it pulls so many times what it pushes
 class PlateTrial:
     """A plate in one trial: ``source`` at the samples in which it is loaded, with its parts (n, k)
     there and, averaged, at all samples of the trial, ``smooth`` (m, k); ``apart`` (n,) where one
-    other plate is loaded too: two feet, two plates."""
+    other plate is loaded too: two feet, two plates; ``body_m`` (n, 3) the centre of mass,
+    NaN where that is but for a moment."""
 
     trial: int
     source: PlateSource
@@ -35,6 +37,7 @@ class PlateTrial:
     feet: Feet
     apart: np.ndarray
     corners_m: np.ndarray | None
+    body_m: np.ndarray
 
     @classmethod
     def of(cls, trial: int, samples: TrialSamples, name: str, place: str) -> PlateTrial:
@@ -49,7 +52,10 @@ class PlateTrial:
         others = [samples.loaded[other][loaded] for other in samples.sources if other != name]
         apart = np.sum(others, axis=0, initial=0) == 1 if others else np.zeros(len(loaded), bool)
         smooth_parts = np.nan_to_num(smooth.parts())
-        return cls(trial, source, source.parts(), smooth_parts, feet, apart, corners)
+        body = samples.body.place_m[loaded].copy()
+        if samples.body.lasts_s[loaded][apart].sum() < INDEPENDENT_S:
+            body[:] = np.nan
+        return cls(trial, source, source.parts(), smooth_parts, feet, apart, corners, body)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +63,7 @@ class PlateFit:
     """A reading, with its sign and its fixed point, and how well it makes forces under feet.
 
     For each of n trials that have the plate: from the parts to the wrench, ``matrices`` (6, k), and
-    what it shows, ``found`` (n, 7), with its logarithmic likelihood, of all trials together.
+    what it shows, ``found`` (n, 8), with its logarithmic likelihood, of all trials together.
     """
 
     reading: PlateReading
@@ -123,7 +129,7 @@ def _evidence(one: PlateTrial, readings: Sequence[PlateReading], wrench: np.ndar
         both = one.parts @ np.array(levels).transpose(1, 0, 3, 2)  # (2, r, n, 2)
         level_Nm = tuple(np.linalg.norm(both, axis=-1))
     lever = None if levers[0] is None else np.array(levers)
-    return evidence(wrench, floors, one.feet, one.apart, one.corners_m, lever, level_Nm)
+    return evidence(wrench, floors, one.feet, one.apart, one.corners_m, lever, level_Nm, one.body_m)
 
 
 def _centred(reading: PlateReading, seen: Sequence[PlateTrial]) -> PlateReading:

@@ -31,7 +31,8 @@ _LEAST_LIKELY = -12.0  # logarithm: less adds nothing
 _RIM_M = 0.02
 _MOSTLY_OUTSIDE = 0.8  # share of the load
 
-# Logarithms: how often something else is wrong; how each trial and plate looks then (a person: -1).
+# Logarithms: how often something else is wrong; how each trial, plate and lean looks then (a
+# person: -1).
 _UNKNOWN, _UNKNOWN_EACH = -6.2, -1.5
 
 Doubted = Literal["", "vertical moment", "force and centre of pressure"]
@@ -127,7 +128,8 @@ def _surest(tried: Sequence[Hypothesis]) -> _Choice:
     now, limits = tried[0], tried[0].limits
     believed, corrected = limits.believed_percent / 100, limits.corrected_percent / 100
     logs = np.array([one.log_posterior for one in tried])
-    seen = sum(1 + len(trial.sources) for trial in now.trials)
+    leans = sum(np.isfinite(fit.found[:, -1]).sum() for fit in now.fits.values())
+    seen = leans + sum(1 + len(trial.sources) for trial in now.trials)
     best = tried[int(np.argmax(logs))]
     # A fault that no reading mends; that the file's moments have no lever is none.
     lever = sum(fit.lever_log_likelihood() for fit in now.fits.values())

@@ -5,6 +5,11 @@ of pressure against the feet on the ground, against the outline and the sensor, 
 The scales are those of 130 sound plates of 40 public recordings: the centre of pressure lies within
 the feet's markers in the median and 85 mm beside them at most (sets with two markers on a foot);
 the vertical moment over the force is 3 mm, in golf swings 60.
+
+A leg can turn little about its hip, so that the force under a foot leans from its centre of
+pressure towards the body: of the slope to the centre of mass it has 0.63 in the median over 66
+plates of 33 public trials in which each foot has a plate of its own, quiet stance, squats, gait and
+jumps alike; half are within 0.18 of it in size and direction, nine of ten within 0.4.
 """
 
 from __future__ import annotations
@@ -20,6 +25,8 @@ BESIDE_M = 0.12
 """Half a foot's length: a centre of pressure so far beside the feet is not under them."""
 
 _DISTANCE_M, _TORQUE_M, _LEVEL_M = 0.03, 0.05, 0.005  # where the likelihood begins to fall
+_LEAN, _ASTRAY = 0.63, 0.18  # of the slope to the body, and half of all are so far from it
+_PLACE_M = 0.024  # the markers tell where the body is, to this: see balance_median_m
 _LEVER_M = 0.05  # nobody stands nearer to the very middle of a plate but by chance
 _LEAST = 1e-9
 _OUTLINE = -4.6  # an outline is stated wrongly in one laboratory of a hundred
@@ -98,7 +105,8 @@ class Evidence:
     distance_m : of the centre of pressure from the feet, mean; outside_m : from the outline, mean;
     sway_m : its standard deviation; lever_m : its distance from the sensor as the moments have it;
     torque_m, level_m : vertical and horizontal moment at it over the force, median; level_share :
-    of the horizontal moment as written, what a reading leaves [1].
+    of the horizontal moment as written, what a reading leaves [1]; astray : how far the force under
+    one foot of two is from leaning towards the body, over the slope to its centre of mass [1].
     """
 
     distance_m: float
@@ -108,6 +116,7 @@ class Evidence:
     torque_m: float
     level_m: float
     level_share: float
+    astray: float
 
 
 FIELDS = tuple(field.name for field in fields(Evidence))
@@ -121,14 +130,15 @@ def evidence(
     corners_m: np.ndarray | None,
     lever_m: np.ndarray | None,
     level_Nm: tuple[np.ndarray, np.ndarray] | None,
+    body_m: np.ndarray,
 ) -> np.ndarray:
-    """What each of r readings makes of n loaded samples, (r, 7): columns as in `Evidence`.
+    """What each of r readings makes of n loaded samples, (r, 8): columns as in `Evidence`.
 
     wrench : (r, n, 6), about the world's origin. floor_m : (r,). feet : on the plate's place.
     apart : (n,), where each foot stands on a plate of its own.
     lever_m : (r, n), from the sensor to where its moments have the force; None without a sensor.
     level_Nm : horizontal moment (r, n) at the points that the file calls centres of pressure, as
-    read and as written; None without such points.
+    read and as written; None without such points. body_m : the centre of mass (n, 3).
     """
     force, moment = wrench[..., :3], wrench[..., 3:]
     load = np.abs(force[..., 2])
@@ -149,18 +159,20 @@ def evidence(
     if level_Nm is not None:
         read, written = (x[:, known] for x in level_Nm)
         table[5], table[6] = np.median(read / load, axis=1), _left_share(read, written, load)
+    table[7] = _astray(force, cop, floor_m, body_m[known], apart[known])
     return table.T
 
 
 def log_likelihood(found: np.ndarray) -> np.ndarray:
-    """Up to a constant: how likely a person's foot makes such numbers (..., 7), logarithm."""
-    distance, outside, _, _, torque, level, share = np.moveaxis(found, -1, 0)
+    """Up to a constant: how likely a person's foot makes such numbers (..., 8), logarithm."""
+    distance, outside, _, _, torque, level, share, astray = np.moveaxis(found, -1, 0)
     terms = [
         _falling(distance, _DISTANCE_M),
         np.clip(_falling(outside, _DISTANCE_M), _OUTLINE, 0.0),
         lever_log_likelihood(found),
         _falling(torque, _TORQUE_M),
         _falling(level, _LEVEL_M),
+        _falling(astray, _ASTRAY),
         -_INDEPENDENT * np.log(np.maximum(share, _LEAST_SHARE)),
     ]
     return np.nansum(terms, axis=0)
@@ -173,7 +185,7 @@ def lever_log_likelihood(found: np.ndarray) -> np.ndarray:
 
 
 def mean_evidence(found: np.ndarray) -> Evidence:
-    """Over several trials (n, 7), of what is known in them."""
+    """Over several trials (n, 8), of what is known in them."""
     return Evidence(*_mean(found.T).tolist())
 
 
@@ -200,6 +212,22 @@ def _left_share(read: np.ndarray, written: np.ndarray, load_N: np.ndarray) -> np
     hair = _HAIR_M * load_N.mean(axis=-1)
     left, whole = (np.sqrt((x**2).mean(axis=-1)) for x in (read, written))
     return (left + hair) / (whole + hair)
+
+
+def _astray(
+    force: np.ndarray, cop_m: np.ndarray, floor_m: np.ndarray, body_m: np.ndarray, apart: np.ndarray
+) -> np.ndarray:
+    """Least squares of what forces (r, n, 3) lean beyond their part of the slope to the body, in
+    size and direction, (r,): a short slope, which errors of the place may be, counts less."""
+    some = apart & np.isfinite(body_m).all(axis=1)
+    if not some.any():
+        return np.full(len(force), np.nan)
+    height = body_m[some, 2] - floor_m[:, None]
+    level = np.array([1.0, 1j])
+    slope = (body_m[some, :2] - cop_m[:, some]) @ level / height
+    lean = force[:, some, :2] @ level / force[:, some, 2]
+    beyond = ((lean - _LEAN * slope) * slope.conj()).sum(axis=1)
+    return np.abs(beyond) / (np.abs(slope) ** 2 + (_PLACE_M / height) ** 2).sum(axis=1)
 
 
 def _lowest(height_m: np.ndarray) -> np.ndarray:

@@ -95,6 +95,7 @@ def reading_of(unit: Unit, trial: Trial) -> SessionReading:
         int(first["axis"]),
         first["turned_deg"],
         first["turned_sd_deg"],
+        first["unsure_m"],
         bool(first["corners_only"]),
     )
     return SessionReading(frame, {row["plate"]: _verdict(row) for row in rows if row["plate"]})

@@ -19,7 +19,8 @@ class Export:
     axes : (3, 3) exported = axes @ lab, of points and forces alike; marker_axes, force_axes: of
         one of them only, after it.
     point_unit, corner_unit, moment_unit : in which the numbers are; stated_* : what the file says.
-    channel_signs : (6,) of forces and moments; plate_signs by plate: (6,), after it.
+    channel_signs : (6,) of forces and moments; plate_signs by plate: (6,), after it;
+        of the crossed_plate the cables of x and y are exchanged.
     plate_order : which plate's readings stand where; corner_roll, corner_wound, doubled,
         summed : see c3d_export. reference : of the moments: sensor (C3D), surface; in MOT point,
         plate_centre, lab_origin.
@@ -39,6 +40,7 @@ class Export:
     # signs and plates
     channel_signs: np.ndarray = field(default_factory=lambda: np.ones(6))
     plate_signs: dict[int, np.ndarray] = field(default_factory=dict)
+    crossed_plate: int | None = None
     plate_order: list[int] | None = None
     corner_roll: dict[int, int] = field(default_factory=dict)
     corner_wound: bool = False

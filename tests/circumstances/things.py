@@ -246,6 +246,23 @@ def one_plate_signs(export: Export, rng: np.random.Generator, plates: int) -> st
     return f"all six channels of plate {plate + 1} with the other sign"
 
 
+def one_plate_component(export: Export, rng: np.random.Generator, plates: int) -> str:
+    plate, component = _one_of(rng, plates), int(rng.integers(6))
+    export.plate_signs = {plate: np.array([-1.0 if k == component else 1.0 for k in range(6)])}
+    return f"component {CHANNELS[component]} of plate {plate + 1} with the other sign"
+
+
+def one_plate_horizontal(export: Export, rng: np.random.Generator, plates: int) -> str:
+    plate = _one_of(rng, plates)
+    export.plate_signs = {plate: np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0])}
+    return f"Fx and Fy of plate {plate + 1} with the other sign, moments not"
+
+
+def one_plate_axes(export: Export, rng: np.random.Generator, plates: int) -> str:
+    export.crossed_plate = _one_of(rng, plates)
+    return f"Fx and Fy, Mx and My of plate {export.crossed_plate + 1} exchanged"
+
+
 # Plates
 
 
@@ -506,6 +523,9 @@ THINGS = (
     Thing("signs", "signs", moment_signs),
     Thing("signs", "signs", one_component),
     Thing("signs", "signs", one_plate_signs),
+    Thing("signs", "signs", one_plate_component),
+    Thing("signs", "signs", one_plate_horizontal, C3D),
+    Thing("signs", "signs", one_plate_axes, C3D),
     Thing("plates", "plates", plates_exchanged),
     Thing("plates", "plates", corners_turned, C3D),
     Thing("plates", "plates", corners_wound, C3D),

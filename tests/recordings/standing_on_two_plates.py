@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.plate_source import C3dPlate, ForceOnPoint, PlateSource, points_that_move
@@ -30,17 +31,21 @@ def motion() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     shift = 0.3 * np.sin(2 * np.pi * 0.4 * time_s)
     share = np.array([0.5 + shift, 0.5 - shift])
     sway = 0.03 * np.sin(2 * np.pi * 0.3 * time_s + 1.0)
-    acceleration = np.gradient(np.gradient(shift)) * RATE_HZ**2
+    # An inverted pendulum: the body goes less far than the centre of pressure, and is driven by it.
+    aside = -0.26 * shift / (1.0 + (2 * np.pi * 0.4) ** 2 / GRAVITY_M_S2)
+    ahead = sway / (1.0 + (2 * np.pi * 0.3) ** 2 / GRAVITY_M_S2)
     force = np.zeros((2, N, 3))
     force[..., 2] = 600.0 * share
-    force[..., 1] = -0.26 * 60.0 * acceleration * share
-    force[..., 0] = 6.0 * np.cos(time_s) * share
+    force[..., 1] = -((2 * np.pi * 0.4) ** 2) * aside * 60.0 * share
+    force[..., 0] = -((2 * np.pi * 0.3) ** 2) * ahead * 60.0 * share
+    inward = 24.0 * 4.0 * share[0] * share[1]  # the legs are spread
+    force[..., 1] += np.array([inward, -inward])
     point = np.zeros((2, N, 3))
     point[..., 0] = 0.52 + sway
     point[..., 1] = np.array([[0.37], [0.63]]) + 0.005 * np.sin(5 * time_s)
     markers = np.repeat(_PLACES_M[None], N, axis=0)
-    markers[:, :4, 1] -= 0.26 * shift[:, None]  # as the centre of pressure
-    markers[:, :4, 0] += sway[:, None]
+    markers[:, :4, 1] += aside[:, None] / 0.9  # nine tenths of the mass
+    markers[:, :4, 0] += ahead[:, None] / 0.9
     return markers, force, point
 
 

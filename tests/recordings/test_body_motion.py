@@ -1,5 +1,7 @@
 """Forces that carry and drive a body go with its momentum."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -74,6 +76,14 @@ def test_each_trial_counts_with_its_own_means(body):
     both = Balance.of(Body.of_all([body, body]), np.vstack([_wrench(body), offset]), USUAL)
     assert len(both.gaps_m) == 2
     assert both.correlations["force"] == pytest.approx(one.correlations["force"], abs=1e-3)
+
+
+def test_a_centre_of_mass_that_is_thought_to_be_elsewhere_is_a_gap_and_no_motion(body):
+    wrench = _wrench(body)
+    aside = replace(body, place_m=body.place_m + np.array([0.03, -0.02, 0.0]))
+    one, other = (Balance.of(each, wrench, USUAL) for each in (body, aside))
+    assert max(other.gaps_m) == pytest.approx(np.hypot(0.03, 0.02), rel=0.05)
+    assert other.correlations["level"] == pytest.approx(one.correlations["level"], abs=0.02)
 
 
 def test_noise_is_that_of_markers_seen_to_a_millimetre():

@@ -14,7 +14,7 @@ from bsip_cli.recordings.gate_limits import USUAL
 from bsip_cli.recordings.handedness import handedness
 from bsip_cli.recordings.plate_reading import PlateReading
 from bsip_cli.recordings.plate_source import ForceOnPoint
-from bsip_cli.recordings.settle import settle_session
+from bsip_cli.recordings.settle import SessionReading, settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import Feet
 from tests.recordings.standing_on_two_plates import (
@@ -168,6 +168,33 @@ def test_forces_in_turned_axes_are_turned_back(turns):
         _wrench(assemble(opened(of_table()), session_of())),
         atol=1e-9,
     )
+
+
+def _slow_stance() -> list[ForceOnPoint]:
+    """Hardly a force but what spread legs push apart, equal and opposite at both feet."""
+    sources = of_table()
+    inward = (24.0, -24.0)
+    return [
+        replace(source, force_N=source.force_N * [1.0, 0.0, 1.0] + [0.0, side, 0.0])
+        for source, side in zip(sources, inward, strict=True)
+    ]
+
+
+def test_side_forces_that_point_away_from_the_body_are_not_believed():
+    """The sum shows nothing of it; alone the lean under each foot does."""
+    sound = opened(_slow_stance())
+    assert findings_about(settle_session([TrialSamples.of(sound)])) == []
+    away = [replace(s, force_N=s.force_N * [1.0, -1.0, 1.0]) for s in _slow_stance()]
+    found = findings_about(settle_session([TrialSamples.of(opened(away))] * 2))
+    assert [(f.level, "reversed Fy" in f.action) for f in found] == [("excluded", True)] * 2
+
+
+def test_what_an_odd_turn_leaves_unsure_is_a_warning():
+    """Far from the point that they are turned about, forces are off by much."""
+    sure = FrameChange("forces", 0, 31.0, 0.1, 0.004)
+    for frame, level in ((sure, "corrected"), (replace(sure, unsure_m=0.021), "warning")):
+        (found,) = findings_about(SessionReading(frame))
+        assert found.level == level and ("21 mm" in found.action) == (level == "warning")
 
 
 @pytest.mark.parametrize("make", [of_c3d, of_table])

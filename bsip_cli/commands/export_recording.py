@@ -156,8 +156,11 @@ class _Correction:
                 self._swaps |= {(first, second): (cause.values[1], cause.values[2])}
             else:
                 self.left.append(f"{words}: no fault of the plates, the clocks or the labels")
-        if words := self._session.frame.words():
-            self.left.append(f"{words}: bsip reads the file so")
+        kept = [
+            self._session.frame.words(),
+            *(f"plate {n}: {w}" for n, r in self._plates.items() if (w := _stated(r).words())),
+        ]
+        self.left += [f"{words}: bsip reads the file so" for words in kept if words]
 
     @property
     def said(self) -> list[str]:
@@ -166,7 +169,7 @@ class _Correction:
         last, cut = self._opened.recording.n_frames, self._kept
         return [
             *(
-                f"plate {name}: {reading.words()}"
+                f"plate {name}: {replace(reading, turn=0, mirrored=False, place_of='').words()}"
                 for name, reading in self._plates.items()
                 if _stated(reading) != reading
             ),
@@ -246,11 +249,9 @@ class _Correction:
     def _readings(self, before: Instruments) -> np.ndarray:
         corrected = corrected_plates(self._scene, self.causes)
         readings = before.readings.copy()
-        for k, source in enumerate(self._opened.sources):
-            if (reading := self._plates.get(source.name)) is None:
-                continue
-            now = self._wrench(source.name, _stated(reading))
-            wanted = corrected.get(source.name, self._wrench(source.name, reading))
+        for name, reading in self._plates.items():
+            now, k = self._wrench(name, _stated(reading)), int(name) - 1
+            wanted = corrected.get(name, self._wrench(name, reading))
             change = np.nan_to_num(wanted - now)
             if change.any():
                 readings[k] += _in_reading(readings[k], now, change, self.unit)

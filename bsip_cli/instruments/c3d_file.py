@@ -48,8 +48,20 @@ def rewrite_c3d(
     if said:
         lines = [part for line in said for part in wrap(line, _LINE)]
         c3d.add_parameter("BSIP", "CORRECTED", lines)
-    c3d.write(str(copy))
+    _write(c3d, copy, source)
     return after
+
+
+def _write(c3d: Any, copy: Path, source: Path) -> None:
+    """All of it, or nothing."""
+    partial = copy.with_name(f".{copy.stem}.part.c3d")  # ezc3d wants this ending
+    try:
+        c3d.write(str(partial))
+        partial.replace(copy)
+    except (RuntimeError, ValueError) as error:
+        raise BadDataError(f"ezc3d cannot write it again ({error})", file=source) from error
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def _labels(c3d: Any) -> list[str]:

@@ -5,6 +5,8 @@ The diagnosis is written by hand with the sizes that were hidden, so what is com
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -97,9 +99,15 @@ def plain(tmp_path_factory) -> Path:
 
 @pytest.fixture
 def hide(tmp_path, plain):
-    def hidden(*asked: Asked) -> Study:
+    def hidden(*asked: Asked, change: Callable[[Path], None] | None = None) -> Study:
         made = Results(tmp_path / "study", tmp_path / "out")
-        inject_study(plain, made.study, StudyOptions(effects=asked, effect_tasks=("squat",)))
+        if asked:
+            hiding = StudyOptions(effects=asked, effect_tasks=("squat",))
+            inject_study(plain, made.study, hiding)
+        else:
+            shutil.copytree(plain, made.study)
+        for path in made.study.rglob("*.c3d") if change else ():
+            change(path)
         assert run_session("ingest", made.study, made.out, (), None, jobs=1, force=False) == 0
         write_person(made, "sub-01")
         events = pd.DataFrame(columns=empty_table("marker-events").columns)
@@ -198,6 +206,28 @@ def all_else_is_equal(old, new) -> bool:
             a, b = a[:, others], b[:, others]
         assert np.array_equal(a, b, equal_nan=True), part
     return True
+
+
+def test_channels_that_ingest_corrects_are_corrected_in_the_file(hide, tmp_path, capsys):
+    """Moments in N mm that are said to be N m, in all trials."""
+
+    def misread(path: Path) -> None:
+        c3d = ezc3d.c3d(str(path))
+        units = c3d["parameters"]["ANALOG"]["UNITS"]["value"]
+        assert "Nmm" in units
+        c3d["parameters"]["ANALOG"]["UNITS"]["value"] = ["Nm" if u == "Nmm" else u for u in units]
+        c3d.write(str(path))
+
+    study = hide(change=misread)
+    study.diagnosed_as()
+    path = study.exported()
+    said = capsys.readouterr().err
+    for plate in "12":
+        assert f"{STEM}: corrected: plate {plate}: read the moments in N mm" in said
+    before, after = both(study, path)
+    assert np.abs(wrenches(after) - wrenches(before)).max() < 0.01
+    units = ezc3d.c3d(str(path))["parameters"]["ANALOG"]["UNITS"]["value"]
+    assert "Nm" in units and "Nmm" not in units
 
 
 def test_what_is_no_fault_of_the_recording_stays_and_is_said(hide, capsys):

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import binary_erosion
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import write_atomically
@@ -31,6 +32,8 @@ from bsip_cli.study.dataset import describe_dataset
 # Of a trial: names of files with their content, and what else the user should know.
 Texts = tuple[dict[str, str], str]
 _BODY = ("skeleton", "marker-positions")
+# Frames at the ends of a motion: OpenSim's spline (degree 5) makes other accelerations of them.
+_EDGE = 5
 
 
 @dataclass(frozen=True)
@@ -145,7 +148,7 @@ def _opensim(unit: Unit, asked: Tables) -> Texts:
     motion = coordinates(skeleton, trial.q[known])
     texts = {f"{name}_motion.mot": mot_text(name, trial.times_s[known], motion, said)}
     wrenches = {f"foot_{s}": w for s, w in trial.ground(trial.readings).feet.wrench.items()}
-    told = known & trial.measured & bool(trial.readings)
+    told = binary_erosion(known, iterations=_EDGE) & trial.measured & bool(trial.readings)
     for side in SIDES:
         told &= np.isfinite(wrenches[f"foot_{side}"]).all(axis=1)
     found = max(runs(told), key=lambda run: run[1] - run[0], default=(0, 0))
@@ -163,7 +166,8 @@ def _opensim(unit: Unit, asked: Tables) -> Texts:
     texts[f"{name}_loads.xml"] = loads_xml([*wrenches], f"{name}_loads.mot", said)
     setup = setup_xml(f"{name}_inverse-dynamics", files, times[0], times[-1], said)
     texts[f"{name}_inverse-dynamics.xml"] = setup
-    return texts, f"forces of each foot are known from {times[0]:.2f} to {times[-1]:.2f} s"
+    note = f"forces of each foot are known from {times[0]:.2f} to {times[-1]:.2f} s"
+    return texts, note + "; known loads are not in the model" * bool(unit.loads())
 
 
 _WRITERS: dict[str, Callable[[Unit, Tables], Texts]] = {
@@ -177,6 +181,6 @@ _READERS = {
     for name, reads, options in (
         ("joints", ("joint-moments",), ()),
         ("bids", ("markers", "kinematics", "wrench"), ("skeleton",)),
-        ("opensim", _OPENSIM, ("skeleton", "joints")),
+        ("opensim", _OPENSIM, ("skeleton", "loads", "joints")),
     )
 }

@@ -3,11 +3,16 @@ model and motion, and net moments at the joints by Newton and Euler for each bod
 
 from __future__ import annotations
 
+import contextlib
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+
+from bsip_cli.body.exports.osim import COORDINATES
+from bsip_cli.body.person import Person
+from bsip_cli.dynamics.joint_moments import JointLoads
 
 
 def read_mot(file: Path) -> dict[str, np.ndarray]:
@@ -141,3 +146,40 @@ def _rate(x: np.ndarray, step: float) -> np.ndarray:
     d = np.gradient(x, step, axis=0)
     d[2:-2] = (8 * (x[3:-1] - x[1:-3]) - (x[4:] - x[:-4])) / (12 * step)
     return d
+
+
+def by_coordinate(person: Person, R: np.ndarray, found: JointLoads) -> dict[str, np.ndarray]:
+    """bsip's moments (N,) of the first body as OpenSim has them: about the axis of each turn.
+
+    R : (N, n, 3, 3) orientation of all segments. A ball's axes are those of the joint coordinate
+    system, but left joints have the last two the other way; a hinge's axis leans.
+    """
+    skeleton, moments = person.skeleton, {}
+    for j, joint in enumerate(found.joints):
+        kind, i = skeleton.joint_types[j + 1], j + 1
+        side = np.array([1.0, -1.0, -1.0] if joint.endswith("_l") else [1.0, 1.0, 1.0])
+        about = found.moment_Nm[:, j, :, 0] * side
+        if kind == "revolute":
+            first, third = R[:, skeleton.parents[i]] @ [0, 0, 1], R[:, i] @ [0, 1, 0]
+            second = np.cross(third, first)
+            second /= np.linalg.norm(second, axis=1, keepdims=True)
+            moment = np.linalg.solve(np.stack([first, second, third], axis=1), about[..., None])
+            hinge = R[:, i] @ person.hinge_axes()[i]
+            about = np.einsum("nc,nc->n", moment[..., 0], hinge)[:, None]
+        moments |= {f"{joint}_{p}": a for p, a in zip(COORDINATES[kind], about.T, strict=True)}
+    return moments
+
+
+def of_the_tool(setup: Path) -> dict[str, np.ndarray]:
+    """What InverseDynamicsTool writes, by coordinate, and ``time``; it runs where its files are."""
+    import opensim
+
+    opensim.Logger.setLevelString("error")
+    with contextlib.chdir(setup.parent):
+        assert opensim.InverseDynamicsTool(setup.name).run()
+    table = opensim.TimeSeriesTable(str(setup.with_suffix(".sto")))
+    found = {"time": np.array(table.getIndependentColumn())}
+    for label in table.getColumnLabels():
+        name = label.removesuffix("_moment").removesuffix("_force")
+        found[name] = table.getDependentColumn(label).to_numpy()
+    return found

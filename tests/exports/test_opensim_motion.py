@@ -13,7 +13,7 @@ from bsip_cli.body.exports.osim import COORDINATES, osim_text
 from bsip_cli.dynamics.joint_moments import joint_loads
 from tests.body.standing_person import joint_frames, standing
 from tests.dynamics.test_joint_moments import KNOWN, STEP_S, feet, motion, phi_of
-from tests.exports.opensim_files import Model, read_mot
+from tests.exports.opensim_files import Model, by_coordinate, read_mot
 
 UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
@@ -44,24 +44,13 @@ def test_bodies_are_where_they_were(written):
 def test_moments_of_newton_and_euler_from_the_files(written):
     """At ball joints the numbers of the artifact themselves, but for the sides' signs."""
     folder, body, q, found = written
-    skeleton, feet_names = body.person.skeleton, ["foot_r", "foot_l"]
     model, inner = Model(folder / "m.osim"), slice(8, -8)
-    moments = model.moments(read_mot(folder / "m.mot"), read_mot(folder / "l.mot"), feet_names)
+    read = (read_mot(folder / name) for name in ("m.mot", "l.mot"))
+    moments = model.moments(*read, ["foot_r", "foot_l"])
     R, _ = joint_frames(body.person, q)
-    for j, joint in enumerate(found.joints):
-        kind, i = skeleton.joint_types[j + 1], j + 1
-        theirs = np.stack([moments[f"{joint}_{part}"] for part in COORDINATES[kind]], axis=1)
-        side = np.array([1.0, -1.0, -1.0] if joint.endswith("_l") else [1.0, 1.0, 1.0])
-        ours = found.moment_Nm[:, j, :, 0] * side
-        if kind == "revolute":
-            first, third = R[:, skeleton.parents[i]] @ [0, 0, 1], R[:, i] @ [0, 1, 0]
-            second = np.cross(third, first)
-            second /= np.linalg.norm(second, axis=1, keepdims=True)
-            moment = np.linalg.solve(np.stack([first, second, third], axis=1), ours[..., None])
-            hinge = R[:, i] @ body.person.hinge_axes()[i]
-            ours = np.einsum("nc,nc->n", moment[..., 0], hinge)[:, None]
-        limit = max(1e-3 * np.abs(ours[inner]).max(), 2e-3)
-        assert np.nanmax(np.abs(ours - theirs)[inner]) < limit, joint
+    for name, ours in by_coordinate(body.person, R, found).items():
+        limit = max(1e-3 * np.nanmax(np.abs(ours[inner])), 2e-3)
+        assert np.nanmax(np.abs(ours - moments[name])[inner]) < limit, name
 
 
 def test_angles_run_on_through_the_pose_where_two_axes_coincide():

@@ -153,7 +153,7 @@ class _Correction:
                 self.causes.append(cause)
             elif isinstance(cause.effect, MarkerSwap):
                 first, second = cause.target.split("+")
-                self._swaps |= {(first, second): (cause.values[1], cause.values[2])}
+                self._swaps.append((first, second, *cause.values[1:3].tolist()))
             else:
                 self.left.append(f"{words}: no fault of the plates, the clocks or the labels")
         kept = [
@@ -176,7 +176,7 @@ class _Correction:
             *(_words(cause, scene) for cause in self.causes if scene is not None),
             *(
                 f"labels {a} and {b} exchanged from {start:.3f} to {end:.3f} s"
-                for (a, b), (start, end) in self._swaps.items()
+                for a, b, start, end in self._swaps
             ),
             *(
                 f"{n} frames at the {end} left out: their forces were not recorded"
@@ -268,10 +268,10 @@ class _Correction:
         if self._session.frame.moves_markers:
             seen = seen @ self._session.frame.matrix().T
         points = before.points_m.copy()
-        for pair, (start, end) in self._swaps.items():
+        for *pair, start, end in self._swaps:
             columns = [_column(seen, places[:, labels.index(name)], name) for name in pair]
             frames = np.flatnonzero((times >= start) & (times <= end))[:, None]
-            points[frames, columns] = before.points_m[frames, columns[::-1]]
+            points[frames, columns] = points[frames, columns[::-1]]
         return points
 
 
@@ -292,12 +292,10 @@ def _named(unit: Unit) -> set[tuple[str, str, tuple[str, ...]]]:
     }
 
 
-def _exchanged(events: pd.DataFrame) -> dict[tuple[str, str], tuple[float, float]]:
-    """Pairs of labels that the inverse kinematics exchanged, and when."""
+def _exchanged(events: pd.DataFrame) -> list[tuple[str, str, float, float]]:
+    """Pairs of labels that the inverse kinematics exchanged, and from when to when."""
     done = events[events["put_right"].astype(bool)]
-    pairs = zip(done["marker"].astype(str), done["partner"].astype(str), strict=True)
-    times = zip(done["start_s"].to_numpy(float), done["end_s"].to_numpy(float), strict=True)
-    return dict(zip(pairs, times, strict=True))
+    return list(done[["marker", "partner", "start_s", "end_s"]].itertuples(index=False, name=None))
 
 
 def _stated(reading: PlateReading) -> PlateReading:

@@ -38,7 +38,7 @@ OPTIONS = StudyOptions(
     rates={"default": Rates(marker_hz=50, analog_hz=250)},
     laboratory=Laboratory(plate_per_foot=True),
 )
-SWAP = ("RKNEL", "RKNEM", 1.0, 2.0)
+PAIR, SWAPS = ("RKNEL", "RKNEM"), ((0.5, 0.9), (1.0, 2.0))
 
 # What is hidden, and the same as a diagnosis says it: the file's y and z are the plate's reversed.
 Fault = tuple[Asked, tuple[str, str, list[float]]]
@@ -110,17 +110,18 @@ def hide(tmp_path, plain):
             change(path)
         assert run_session("ingest", made.study, made.out, (), None, jobs=1, force=False) == 0
         write_person(made, "sub-01")
-        events = pd.DataFrame(columns=empty_table("marker-events").columns)
-        for one in asked:
-            if one.name == "marker_swap":
-                pair, start, end = SWAP[:2], SWAP[2], SWAP[3] - 0.01
-                row = dict.fromkeys(events.columns, 0.0) | {"kind": "swap", "sentence": ""}
-                row |= {"marker": pair[0], "partner": pair[1], "start_s": start, "end_s": end}
-                events = pd.DataFrame([row | {"put_right": True}])
+        swaps = [
+            dict.fromkeys(empty_table("marker-events").columns, 0.0)
+            | {"kind": "swap", "sentence": "", "marker": PAIR[0], "partner": PAIR[1]}
+            | {"start_s": start, "end_s": end - 0.01, "put_right": True}
+            for start, end in SWAPS
+            if any(one.name == "marker_swap" for one in asked)
+        ]
         for task in ("squat_run-1", "static"):
             path = made.out / "sub-01" / f"sub-01_task-{task}_marker-events.parquet"
-            table = events if task != "static" and len(events) else empty_table("marker-events")
-            write_artifact(path, "marker-events", table, NOTES)
+            table = pd.DataFrame(swaps) if swaps and task != "static" else None
+            events = empty_table("marker-events") if table is None else table
+            write_artifact(path, "marker-events", events, NOTES)
         return Study(plain, made)
 
     return hidden
@@ -173,15 +174,19 @@ def test_forces_are_back_at_their_time(hide, faults, capsys):
 
 
 def test_labels_are_exchanged_back_and_the_file_says_so(hide, capsys):
-    first, second, start, end = SWAP
-    study = hide(Asked("marker_swap", end - start, f"{first}+{second},start_s={start}"))
+    study = hide(
+        *(
+            Asked("marker_swap", end - start, f"{'+'.join(PAIR)},start_s={start}")
+            for start, end in SWAPS
+        )
+    )
     study.diagnosed_as()
     path = study.exported()
     said = capsys.readouterr().err
     before, after = both(study, path)
     assert np.allclose(before.markers_m, after.markers_m, atol=1e-7, equal_nan=True)
     assert np.array_equal(wrenches(before), wrenches(after))
-    words = f"labels {first} and {second} exchanged from 1.000 to 1.990 s"
+    words = f"labels {' and '.join(PAIR)} exchanged from 1.000 to 1.990 s"
     assert words in said
     old, new = (ezc3d.c3d(str(one)) for one in (study.made.study / "sub-01" / path.name, path))
     entry = " ".join(new["parameters"]["BSIP"]["CORRECTED"]["value"])
@@ -199,7 +204,7 @@ def all_else_is_equal(old, new) -> bool:
                 assert np.array_equal(np.asarray(entry["value"]), np.asarray(copy["value"])), name
                 assert entry["type"] == copy["type"], name
     labels = old["parameters"]["POINT"]["LABELS"]["value"]
-    others = [k for k, label in enumerate(labels) if label not in SWAP]
+    others = [k for k, label in enumerate(labels) if label not in PAIR]
     for part in ("points", "analogs"):
         a, b = old["data"][part], new["data"][part]
         if part == "points":

@@ -128,7 +128,7 @@ def corrected_in(said: str) -> frozenset[tuple[str, str]]:
         if mark and rest.startswith("labels "):
             pair = rest.split()
             found.add(("marker_swap", f"{pair[1]}+{pair[3]}"))
-        elif mark and rest.endswith("taken off"):
+        elif mark and "taken off" in rest:
             effect, _, target = rest.split(":")[0].partition(" ")
             found.add((effect, target))
     return frozenset(found)

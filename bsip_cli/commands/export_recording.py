@@ -17,6 +17,8 @@ from bsip_cli.artifacts import is_made_from
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.cause import Cause, delay_by
 from bsip_cli.diagnosis.corrected_wrench import corrected_plates, is_of_the_forces
+from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.marker_swap import MarkerSwap
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
@@ -141,21 +143,21 @@ class _Correction:
     def __init__(self, unit: Unit) -> None:
         self.unit, self.left = unit, list[str]()
         self._opened, self._session = _opened(unit)
-        self.causes, self._swaps = list[Cause](), _exchanged(unit.read("marker-events"))
-        named = _named(unit)
-        for cause in causes_of(unit):
-            if unit.name not in cause.trials:
-                continue
-            words = f"{cause.effect.name} {cause.target}".strip()
-            if (cause.effect.name, cause.target, cause.trials) not in named:
-                self.left.append(f"{words}: it cannot be distinguished from another cause here")
-            elif is_of_the_forces(cause):
-                self.causes.append(cause)
-            elif isinstance(cause.effect, MarkerSwap):
+        self._swaps = _exchanged(unit.read("marker-events"))
+        self.causes: dict[Cause, str] = {}  # and what else it may be
+        told = unit.read("overall-diagnosis")
+        for cause in (one for one in causes_of(unit) if unit.name in one.trials):
+            words, alike = f"{cause.effect.name} {cause.target}".strip(), _alike(cause, told)
+            others = " or ".join(f"{effect} {target}".strip() for effect, target in alike)
+            if isinstance(cause.effect, MarkerSwap):
                 first, second = cause.target.split("+")
                 self._swaps.append((first, second, *cause.values[1:3].tolist()))
-            else:
+            elif not is_of_the_forces(cause):
                 self.left.append(f"{words}: no fault of the plates, the clocks or the labels")
+            elif not all(_of_the_forces(effect) for effect, _ in alike):
+                self.left.append(f"{words}: it cannot be distinguished from {others} here")
+            else:
+                self.causes[cause] = others
         kept = [
             self._session.frame.words(),
             *(f"plate {n}: {w}" for n, r in self._plates.items() if (w := _stated(r).words())),
@@ -173,7 +175,7 @@ class _Correction:
                 for name, reading in self._plates.items()
                 if _stated(reading) != reading
             ),
-            *(_words(cause, scene) for cause in self.causes if scene is not None),
+            *(_words(*one, scene) for one in self.causes.items() if scene is not None),
             *(
                 f"labels {a} and {b} exchanged from {start:.3f} to {end:.3f} s"
                 for a, b, start, end in self._swaps
@@ -200,7 +202,7 @@ class _Correction:
             return slice(0, recording.n_frames)
         scene = self._scene
         begin = recording.time_s() + np.interp(
-            recording.time_s(), scene.times_s, delay_by(self.causes, scene)
+            recording.time_s(), scene.times_s, delay_by([*self.causes], scene)
         )
         end = begin + 1 / recording.marker_rate_hz - 1 / recording.analog_rate_hz
         there = (begin > scene.times_s[0] - 1e-9) & (end < scene.times_s[-1] + 1e-9)
@@ -247,7 +249,7 @@ class _Correction:
         return Scene(times, person, none, none, none, np.empty(0), plates, valid)
 
     def _readings(self, before: Instruments) -> np.ndarray:
-        corrected = corrected_plates(self._scene, self.causes)
+        corrected = corrected_plates(self._scene, [*self.causes])
         readings = before.readings.copy()
         for name, reading in self._plates.items():
             now, k = self._wrench(name, _stated(reading)), int(name) - 1
@@ -282,14 +284,19 @@ def _opened(unit: Unit) -> tuple[Opened, SessionReading]:
     return session.frame.of(found), session
 
 
-def _named(unit: Unit) -> set[tuple[str, str, tuple[str, ...]]]:
-    """Causes that are not one of several that look alike."""
-    found = unit.facts("overall-diagnosis").get("causes", [])
-    return {
-        (one["effect"], one["target"], tuple(one["trials"]))
-        for one in found
-        if one["verdict"] == "named"
-    }
+def _alike(cause: Cause, told: pd.DataFrame) -> list[tuple[str, str]]:
+    """Effects and targets that look like a cause in these recordings."""
+    trials = ", ".join(cause.trials)
+    is_it = (told["effect"] == cause.effect.name) & (told["target"] == cause.target)
+    groups = set(told.loc[is_it & (told["trials"] == trials), "class_id"]) - {""}
+    others = told[told["class_id"].isin(groups) & ~is_it]
+    return list(dict.fromkeys(zip(others["effect"], others["target"], strict=True)))
+
+
+def _of_the_forces(effect: str) -> bool:
+    return effect in EFFECTS and (
+        EFFECTS[effect].of_the_plates or isinstance(EFFECTS[effect], Delay)
+    )
 
 
 def _exchanged(events: pd.DataFrame) -> list[tuple[str, str, float, float]]:
@@ -310,10 +317,12 @@ def _stated(reading: PlateReading) -> PlateReading:
     )
 
 
-def _words(cause: Cause, scene: Scene) -> str:
+def _words(cause: Cause, others: str, scene: Scene) -> str:
     sizes = cause.effect.reported(scene, cause.target, cause.values)
     values = ", ".join(f"{name} {value:.4g} {unit}" for name, unit, value in sizes)
-    return f"{' '.join(filter(None, (cause.effect.name, cause.target)))}: {values} taken off"
+    alike = f" (as likely {others}, with the same sum of forces)" if others else ""
+    words = " ".join(filter(None, (cause.effect.name, cause.target)))
+    return f"{words}: {values} taken off{alike}"
 
 
 def _in_reading(

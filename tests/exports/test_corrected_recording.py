@@ -6,7 +6,7 @@ The diagnosis is written by hand with the sizes that were hidden, so what is com
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +26,7 @@ from bsip_cli.running.session import run_session
 from bsip_cli.simulate.injection.folder import inject_study
 from bsip_cli.simulate.options import Asked, Laboratory, Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
+from bsip_cli.stages.diagnosis_rows import nothing
 from tests.exports.test_export_command import NOTES, Results, write_person
 
 STEM = "sub-01_task-squat_run-1"
@@ -65,7 +66,15 @@ class Study:
     plain: Path
     made: Results
 
-    def diagnosed_as(self, *causes: tuple[str, str, list[float]], verdict: str = "named") -> None:
+    def diagnosed_as(self, *causes: tuple[str, str, list[float]], alike: Sequence = ()) -> None:
+        """``alike``: effect and target of what cannot be told from the causes."""
+        verdict = "ambiguous" if alike else "named"
+        group = [*((effect, target) for effect, target, _ in causes), *alike]
+        rows = [
+            nothing(0.01, (STEM,)) | {"effect": effect, "target": target, "class_id": "A"}
+            for effect, target in (group if alike else ())
+        ]
+        table = pd.DataFrame(rows) if rows else empty_table("overall-diagnosis")
         facts = [
             {
                 "effect": effect,
@@ -81,7 +90,7 @@ class Study:
         made_by = {"inputs": {path.name: file_hash(path) for path in wrenches}}
         notes = NOTES | {"made_by": made_by, "facts": {"causes": facts}}
         path = self.made.artifact("diagnosis")
-        write_artifact(path, "overall-diagnosis", empty_table("overall-diagnosis"), notes)
+        write_artifact(path, "overall-diagnosis", table, notes)
 
     def exported(self, code: int = 0) -> Path:
         to = self.made.study.with_name("corrected")
@@ -249,11 +258,21 @@ def test_what_is_no_fault_of_the_recording_stays_and_is_said(hide, capsys):
 
 def test_what_cannot_be_told_from_another_cause_stays(hide, capsys):
     study = hide(GAIN[0])
-    study.diagnosed_as(GAIN[1], verdict="ambiguous")
+    study.diagnosed_as(GAIN[1], alike=[("added_mass", "hand_r")])
     path = study.exported()
-    said = capsys.readouterr().err
     assert path.read_bytes() == (study.made.study / "sub-01" / path.name).read_bytes()
-    assert "plate_gain 1 fz: it cannot be distinguished from another cause here" in said
+    said = capsys.readouterr().err
+    assert "plate_gain 1 fz: it cannot be distinguished from added_mass hand_r here" in said
+
+
+def test_of_faults_of_the_plates_that_look_alike_one_is_taken_off(hide, capsys):
+    study = hide(ZERO[0])
+    study.diagnosed_as(ZERO[1], alike=[("plate_zero", "1 fz")])
+    before, after = both(study, study.exported())
+    assert np.abs(wrenches(after) - wrenches(before)).max() < 0.05
+    assert "taken off (as likely plate_zero 1 fz, with the same sum of forces)" in (
+        capsys.readouterr().err
+    )
 
 
 def test_a_recording_that_changed_since_is_refused(hide, capsys):

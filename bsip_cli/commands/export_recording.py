@@ -146,8 +146,10 @@ class _Correction:
         self._swaps = _exchanged(unit.read("marker-events"))
         self.causes: dict[Cause, str] = {}  # and what else it may be
         told = unit.read("overall-diagnosis")
+        known = set[tuple[str, str]]()
         for cause in (one for one in causes_of(unit) if unit.name in one.trials):
             words, alike = f"{cause.effect.name} {cause.target}".strip(), _alike(cause, told)
+            known |= {(cause.effect.name, cause.target), *alike}
             others = " or ".join(f"{effect} {target}".strip() for effect, target in alike)
             if isinstance(cause.effect, MarkerSwap):
                 first, second = cause.target.split("+")
@@ -158,6 +160,11 @@ class _Correction:
                 self.left.append(f"{words}: it cannot be distinguished from {others} here")
             else:
                 self.causes[cause] = others
+        self.left += [
+            f"{effect} {target}: of unknown size in this recording, or one of several causes"
+            for effect, target in _told_of(unit.name, told)
+            if (effect, target) not in known
+        ]
         kept = [
             self._session.frame.words(),
             *(f"plate {n}: {w}" for n, r in self._plates.items() if (w := _stated(r).words())),
@@ -291,6 +298,13 @@ def _alike(cause: Cause, told: pd.DataFrame) -> list[tuple[str, str]]:
     groups = set(told.loc[is_it & (told["trials"] == trials), "class_id"]) - {""}
     others = told[told["class_id"].isin(groups) & ~is_it]
     return list(dict.fromkeys(zip(others["effect"], others["target"], strict=True)))
+
+
+def _told_of(trial: str, told: pd.DataFrame) -> list[tuple[str, str]]:
+    """Effects and targets that the diagnosis names, alone or in a group, in a trial."""
+    here = np.array([trial in names.split(", ") for names in told["trials"]], dtype=bool)
+    rows = told[here & told["effect"].isin(list(EFFECTS)) & (told["verdict"] != "rejected")]
+    return list(dict.fromkeys(zip(rows["effect"], rows["target"], strict=True)))
 
 
 def _of_the_forces(effect: str) -> bool:

@@ -265,6 +265,13 @@ def test_what_cannot_be_told_from_another_cause_stays(hide, capsys):
     assert "plate_gain 1 fz: it cannot be distinguished from added_mass hand_r here" in said
 
 
+def test_what_the_diagnosis_did_not_size_is_said(hide, capsys):
+    study = hide(GAIN[0])
+    study.diagnosed_as(alike=[("plate_gain", "all fz")])
+    study.exported()
+    assert "not corrected: plate_gain all fz: of unknown size" in capsys.readouterr().err
+
+
 def test_of_faults_of_the_plates_that_look_alike_one_is_taken_off(hide, capsys):
     study = hide(ZERO[0])
     study.diagnosed_as(ZERO[1], alike=[("plate_zero", "1 fz")])

@@ -274,13 +274,31 @@ def inject(source, out, participants, seed, **effects):
     help="Replace inertia tensors that no body can have by the nearest possible ones, and say so; "
     "without it such a person gets the .csv only.",
 )
+@click.option(
+    "--what",
+    type=click.Choice(["model", "recording", "opensim", "bids", "joints"]),
+    default="model",
+    show_default=True,
+    help="model: the person, for other software. recording: a copy of the study with the named "
+    "faults of plates, clocks and labels corrected. opensim: model, motion, forces of the feet and "
+    "the set-up of InverseDynamicsTool. bids: markers, pose and forces as BIDS-Motion. joints: "
+    "joint moments as CSV.",
+)
+@click.option(
+    "--to",
+    type=click.Path(path_type=Path),
+    help="Folder for the files, instead of OUT/sub-XX/export; recording and bids need one.",
+)
 @_CONFIG
-def export(study, out, chosen, method, formats, model_file, model_bodies, repair, config_file):
-    """Write identified people as models for Pinocchio, MuJoCo, OpenSim, biorbd and Visual3D:
-    OUT/sub-XX/export/sub-XX_METHOD with .urdf, .xml (MuJoCo), .osim, .bioMod and .csv."""
+def export(
+    study, out, chosen, method, formats, model_file, model_bodies, repair, what, to, config_file
+):
+    """Write files to go on with: people as models for Pinocchio, MuJoCo, OpenSim, biorbd and
+    Visual3D (OUT/sub-XX/export/sub-XX_METHOD with .urdf, .xml, .osim, .bioMod and .csv), or with
+    --what corrected recordings, motion with forces, or joint moments."""
     from bsip_cli.commands.export import Request, export_session
 
-    request = Request(method, formats, model_file, model_bodies, repair)
+    request = Request(method, formats, model_file, model_bodies, repair, what, to)
     return export_session(study, out, chosen, config_file, request)
 
 

@@ -1,9 +1,9 @@
-"""The command ``bsip export``: participants as models that other software reads."""
+"""The command ``bsip export``: people, trials and recordings as files that other software reads."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -30,6 +30,8 @@ from bsip_cli.body.exports.osim_given import (
 )
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.commands.export_recording import export_recordings
+from bsip_cli.commands.export_trials import Tables, export_trials, folder_of
 from bsip_cli.errors import BadDataError, BsipError, UsageError
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.files.regular import check_regular
@@ -40,6 +42,7 @@ from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import person_from
+from bsip_cli.study.study import Participant
 
 # Not a stage of the pipeline, but it reads as one.
 _READER = Stage(
@@ -51,6 +54,7 @@ _READER = Stage(
     options=("skeleton",),
     reads_if_there=("choice",),
 )
+_OF_TRIALS = ("recording", "bids", "joints")
 _FILE_NAME = re.compile(r"[A-Za-z0-9_+-]+")
 
 
@@ -59,7 +63,8 @@ class Request:
     """What the user asks for; no ``formats`` are all of them, no ``method`` is the person's choice.
 
     ``model_file`` is an OpenSim model to be given the inertias, ``model_bodies`` names its map;
-    ``repair`` replaces tensors that no body can have by the nearest possible ones.
+    ``repair`` replaces tensors that no body can have by the nearest possible ones. ``what`` is
+    written into ``to``, or beside the results.
     """
 
     method: str | None = None
@@ -67,6 +72,8 @@ class Request:
     model_file: Path | None = None
     model_bodies: str | None = None
     repair: bool = False
+    what: str = "model"
+    to: Path | None = None
 
 
 # Of an identified person: the text of the file, and what else the user should know of it.
@@ -81,16 +88,43 @@ def export_session(
     request: Request,
 ) -> int:
     """Export a study's participants and return the exit code."""
+    _check(request)
     opened = open_study(root, out, chosen, config_file)
     skeleton = load_skeleton(opened.config.skeleton)
+    study, to = opened.study, request.to
+    if request.what == "recording":
+        assert to is not None
+        return export_recordings(opened, out, to)
+    if request.what in ("bids", "joints"):
+        return export_trials(opened, out, Tables(request.what, to), None)
+    if request.what == "opensim":
+        request = replace(request, formats=("osim",))
     writers = _writers(request, skeleton)
 
-    def running() -> Generator[Outcome, None, None]:
-        for participant in opened.study.participants:
-            unit = Unit(_READER, opened.study, out, opened.config, participant)
-            yield _export(unit, skeleton, request, writers)
+    def model(participant: Participant) -> tuple[str, Outcome]:
+        unit = Unit(_READER, study, out, opened.config, participant)
+        return _export(unit, skeleton, request, writers)
 
-    return follow("export", opened.refusals, running(), len(opened.study.participants), out)
+    if request.what == "opensim":
+        return export_trials(opened, out, Tables("opensim", to), model)
+    running = (model(participant)[1] for participant in study.participants)
+    return follow("export", opened.refusals, running, len(study.participants), to or out)
+
+
+def _check(request: Request) -> None:
+    """Options that belong together."""
+    of_models = request.formats or request.model_file or request.model_bodies
+    of_bodies = of_models or request.method or request.repair
+    if request.what in ("recording", "bids") and request.to is None:
+        raise UsageError(
+            f"--what {request.what} makes a folder of its own", remedy="name a new one with --to"
+        )
+    if (request.what == "opensim" and of_models) or (request.what in _OF_TRIALS and of_bodies):
+        raise UsageError(
+            f"--what {request.what} knows no --format, --model-file or --model-bodies"
+            + (", --method or --repair" if request.what in _OF_TRIALS else ""),
+            remedy="leave them out, or leave out --what",
+        )
 
 
 def _writers(request: Request, skeleton: Skeleton) -> dict[str, Writer]:
@@ -146,11 +180,15 @@ def _given_model(file: Path, name: str | None, skeleton: Skeleton) -> tuple[Give
 
 def _export(
     unit: Unit, skeleton: Skeleton, request: Request, writers: dict[str, Writer]
-) -> Outcome:
-    """All files of one participant; a format that cannot be written does not stop the others."""
+) -> tuple[str, Outcome]:
+    """All files of one participant; a format that cannot be written does not stop the others.
+
+    Returns the last file's name, too.
+    """
     waiting = lacking(unit)
     if waiting is not None:
-        return replace(waiting, exit_code=waiting.exit_code or BadDataError.exit_code)
+        return "", replace(waiting, exit_code=waiting.exit_code or BadDataError.exit_code)
+    folder = folder_of(unit, request.to)
     written: list[str] = []
     notes: list[str] = []
     errors: list[BsipError] = []
@@ -166,7 +204,7 @@ def _export(
                 body = body.repaired()
                 notes += body.made_of[len(known) :]
             for ending, writer in writers.items():
-                path = unit.out / unit.name / "export" / f"{body.name}{ending}"
+                path = folder / f"{body.name}{ending}"
                 try:
                     text, note = writer(body)
                 except BadDataError as error:
@@ -178,13 +216,15 @@ def _export(
                 notes += [note] if note else []
     except BsipError as error:
         errors.append(error)
-    return _outcome(unit, written, notes, errors)
+    return written[-1] if written else "", _outcome(unit, folder, written, notes, errors)
 
 
-def _outcome(unit: Unit, written: list[str], notes: list[str], errors: list[BsipError]) -> Outcome:
+def _outcome(
+    unit: Unit, folder: Path, written: list[str], notes: list[str], errors: list[BsipError]
+) -> Outcome:
     sentences = [f"{unit.name}: {note}" for note in notes]
     if written:
-        sentences.append(f"{unit.name}: {unit.out / unit.name / 'export'}: {', '.join(written)}")
+        sentences.append(f"{unit.name}: {folder}: {', '.join(written)}")
     sentences += dict.fromkeys(map(str, errors))
     code = max((error.exit_code for error in errors), default=0)
     return Outcome("export", unit.name, "refused" if errors else "done", tuple(sentences), code)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from bsip_cli.diagnosis.cause import Cause, change_by, delay_by
 from bsip_cli.effects.delayed import Delay
-from bsip_cli.effects.scene import Scene
+from bsip_cli.effects.plate_frame import ALL, loaded_plates, plate_of
+from bsip_cli.effects.plate_rotation import PlateRotation
+from bsip_cli.effects.scene import Plate, Scene
 
 _ROUNDS = 2  # a clock's rate is wrong by 0.3 % at most: each round leaves as much of the error
 
@@ -33,6 +36,31 @@ def corrected_wrench(
     if late_s.any():
         wrench, valid = _earlier(wrench, valid, scene.times_s, late_s)
     return wrench, valid
+
+
+def corrected_plates(scene: Scene, causes: Sequence[Cause]) -> dict[str, np.ndarray]:
+    """By plate, (N, 6) its wrench about the world's origin without the causes that concern it; NaN
+    where it has none."""
+    late_s, loaded = delay_by(causes, scene), loaded_plates(scene)
+    found = {}
+    for plate in scene.plates:
+        names = {plate.name, ALL} if plate.name in loaded else {plate.name}
+        wrench = np.nan_to_num(plate.wrench)
+        for cause in causes:
+            if cause.effect.of_the_plates and cause.target.split(" ")[0] in names:
+                wrench = wrench - change_by([cause], _alone(scene, plate, cause, loaded))
+        if late_s.any():
+            wrench, _ = _earlier(wrench, scene.valid, scene.times_s, late_s)
+        found[plate.name] = np.where(np.isfinite(plate.wrench).all(axis=1)[:, None], wrench, np.nan)
+    return found
+
+
+def _alone(scene: Scene, plate: Plate, cause: Cause, loaded: Sequence[str]) -> Scene:
+    """The scene with one plate; where all turn together, about the middle that they turn about."""
+    if isinstance(cause.effect, PlateRotation) and cause.target == ALL:
+        middle = np.mean([plate_of(scene, name).centre_m() for name in loaded], axis=0)
+        plate = replace(plate, corners_m=plate.corners_m + middle - plate.centre_m())
+    return replace(scene, plates=(plate,), wrench=plate.wrench)
 
 
 def _earlier(

@@ -9,8 +9,8 @@ from pathlib import Path
 import ezc3d
 import numpy as np
 
+from bsip_cli.instruments.readings import Instruments, SensingPlate
 from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.instruments import Instruments, SensingPlate
 from bsip_cli.simulate.markers import marker_paths
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
 from bsip_cli.simulate.people import Person

@@ -13,7 +13,7 @@ from bsip_cli.body.names import in_words
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.cause import Cause, method_of
-from bsip_cli.diagnosis.corrected_wrench import corrected_wrench, is_of_the_forces
+from bsip_cli.diagnosis.corrected_wrench import corrected_plates, is_of_the_forces
 from bsip_cli.dynamics.joint_moments import (
     Ground,
     JointLoads,
@@ -25,7 +25,6 @@ from bsip_cli.dynamics.joint_moments import (
 from bsip_cli.dynamics.lowpass import lowpass_operator, noise_left, stride_to
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.segment_motion import SegmentMotion, segment_motion
-from bsip_cli.effects.plate_frame import ALL
 from bsip_cli.effects.scene import Scene
 from bsip_cli.effects.segment_inertia import SegmentInertia
 from bsip_cli.effects.unmeasured_contact import UnmeasuredContact
@@ -52,7 +51,7 @@ def run(unit: Unit) -> None:
     """Read motion, plates, contacts and parameters; write joint-moments and joint-peaks."""
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
-    trial, bsip = _trial_of(unit, person), unit.read("bsip")
+    trial, bsip = trial_of(unit, person), unit.read("bsip")
     methods, phi = parameters_of(bsip, person)
     spread = _spreads(unit, methods)
     ground = trial.ground(trial.readings)
@@ -135,7 +134,8 @@ def _middle(plate: Reading) -> np.ndarray:
     return np.append(np.nanmedian(cop[np.nan_to_num(plate.wrench[:, 2]) > 0], axis=0), 0.0)
 
 
-def _trial_of(unit: Unit, person: Person) -> _Trial:
+def trial_of(unit: Unit, person: Person) -> _Trial:
+    """Motion, plates and feet of the unit's trial."""
     kinematics, contacts, wrench = (unit.read(k) for k in ("kinematics", "contacts", "wrench"))
     q, v, a = coordinates_from(kinematics, person.skeleton)
     motion = segment_motion(pinocchio_model(person), q, v, a)
@@ -353,20 +353,13 @@ def _besides(
 
 
 def _corrected(trial: _Trial, scene: Scene, causes: Sequence[Cause]) -> tuple[Reading, ...]:
-    """The plates freed of the causes that concern them, each on its own."""
+    """The plates freed of the causes that concern them."""
     forces = [cause for cause in causes if is_of_the_forces(cause)]
-    found = []
-    for reading, name in zip(trial.readings, trial.plates, strict=True):
-        mine = [c for c in forces if c.target.split(" ")[0] in ("", ALL, name)]
-        plate = next((p for p in scene.plates if p.name == name), None)
-        if plate is None or not mine:
-            found.append(reading)
-            continue
-        alone = replace(scene, plates=(plate,), wrench=plate.wrench, valid=trial.measured)
-        wrench, _ = corrected_wrench(alone, np.nan_to_num(plate.wrench), mine)
-        wrench[~np.isfinite(plate.wrench).all(axis=1)] = np.nan
-        found.append(replace(reading, wrench=wrench))
-    return tuple(found)
+    corrected = corrected_plates(replace(scene, valid=trial.measured), forces)
+    return tuple(
+        replace(reading, wrench=corrected.get(name, reading.wrench))
+        for reading, name in zip(trial.readings, trial.plates, strict=True)
+    )
 
 
 # --- tables -----------------------------------------------------------------------------------

@@ -32,7 +32,7 @@ def scene_of(unit: Unit, person: Person, phi: np.ndarray, trial: Trial | None = 
     scene = motion_and_wrench_of(unit, person, phi, trial)
     return replace(
         scene,
-        plates=_plates(unit.read("plates", trial), unit.read("wrench", trial)),
+        plates=plates_of(unit.read("plates", trial), unit.read("wrench", trial)),
         robust_limit_m=unit.config.ik.robust_limit_m,
         residual_m=marker_residuals(person, scene.q, markers),
     )
@@ -80,7 +80,7 @@ def outline(corners: pd.DataFrame, name: str) -> np.ndarray | None:
     return rows[["x_m", "y_m", "z_m"]].to_numpy() if len(rows) else None
 
 
-def _plates(corners: pd.DataFrame, wrench: pd.DataFrame) -> tuple[Plate, ...]:
+def plates_of(corners: pd.DataFrame, wrench: pd.DataFrame) -> tuple[Plate, ...]:
     """Every plate that has a reading; where a file tells no place, about its mean load."""
     found = []
     for number in plate_names(wrench):

@@ -23,10 +23,10 @@ ALLOWED = {
     "study": "__init__ artifacts body config errors files schemas stated",
     "running": "__init__ artifacts body config errors files pipeline schemas study",
     "__main__": "cli",
-    "commands": "__init__ artifacts body config errors files pipeline recordings report running "
-    "schemas stages statistics study",
     "library": "__init__ artifacts body config errors pipeline recordings running schemas stages "
     "study",
+    "commands": "__init__ artifacts body config diagnosis effects errors files instruments "
+    "pipeline recordings report running schemas stages statistics study",
     "reference": "cli commands config pipeline schemas",
     "cli": "__init__ commands errors pipeline running simulate study",
     "body": "config errors files stated",
@@ -39,7 +39,8 @@ ALLOWED = {
     "effects": "body dynamics errors motion",
     "diagnosis": "body dynamics effects errors identification motion statistics",
     "report": "body caches dynamics effects errors motion schemas statistics",
-    "simulate": "body config errors files",
+    "instruments": "errors files",
+    "simulate": "body config errors files instruments",
     "stages": "artifacts body diagnosis dynamics effects errors files identification motion "
     "pipeline recordings report running schemas statistics study",
 }
@@ -53,8 +54,18 @@ MAY_ALSO = {"recordings.c3d_guard": {"subprocess"}}
 ONLY = {
     "simulate": {"body": {"body.names", "body.markersets"}},
     "cli": {"simulate": {"simulate.command"}},
-    "commands": {"stages": {"stages.frames", "stages.known_loads", "stages.load_comparison"}},
     "library": {"running": {"running.unit"}, "stages": {"stages.frames"}},
+    "commands": {
+        "stages": {
+            "stages.found_causes",
+            "stages.frames",
+            "stages.joints",
+            "stages.known_loads",
+            "stages.load_comparison",
+            "stages.session_reading",
+            "stages.trial_scene",
+        }
+    },
     "running": {"body": {"body.markersets", "body.skeleton"}},
     "stages": {"running": {"running.unit"}},
     "study": {"body": {"body.skeleton"}},

@@ -304,6 +304,36 @@ def test_the_library_gives_the_same_tables(first_run):
     assert compared > 50
 
 
+@pytest.mark.parametrize("what", ["joints", "opensim", "bids"])
+def test_every_trial_is_exported(first_run, bsip, tmp_path, what):
+    to = tmp_path / "to"
+    answer = bsip("export", first_run.study, "--out", first_run.out, "--what", what, "--to", to)
+    assert answer.code == 0, answer.err
+    names = {path.relative_to(to).as_posix() for path in to.rglob("*") if path.is_file()}
+    if what == "bids":
+        assert {"dataset_description.json", "participants.tsv"} < names
+        stem = "sub-02/motion/sub-02_task-squat_tracksys-bsip_run-1"
+        assert {f"{stem}_{one}" for one in ("motion.tsv", "channels.tsv", "motion.json")} < names
+        return
+    stems = [f"sub-0{k}/sub-0{k}_{trial}" for k in (1, 2) for trial in TRIALS]
+    if what == "opensim":  # one plate under both feet, of which one is lifted in the sequence only
+        assert {f"{stem}_motion.mot" for stem in stems} < names
+        assert {path for path in names if "osim" in path} == set(_models(first_run))
+        assert answer.err.count("no loads: the plates do not tell what acts on each foot") == 4
+        return
+    assert names == {f"{stem}_joint-moments.csv" for stem in stems}
+    for stem in stems:
+        table = read_artifact(first_run.path("joint-moments", stem.split("/")[1]), "joint-moments")
+        found = pd.read_csv(to / f"{stem}_joint-moments.csv")
+        assert list(found) == list(table)
+        assert found["moment_Nm"].to_numpy() == pytest.approx(table["moment_Nm"], nan_ok=True)
+
+
+def _models(run: Run) -> list[str]:
+    uses = (read_artifact(run.path("choice", f"sub-0{k}"), "choice").iloc[0]["use"] for k in (1, 2))
+    return [f"sub-0{k}/sub-0{k}_{use}.osim" for k, use in enumerate(uses, start=1)]
+
+
 def test_info_tells_what_made_an_artifact(first_run, bsip):
     path = first_run.path("bsip")
     answer = bsip("info", path)

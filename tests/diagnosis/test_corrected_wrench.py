@@ -7,13 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
 from bsip_cli.diagnosis.cause import Cause, change_by
-from bsip_cli.diagnosis.corrected_wrench import corrected_wrench, is_of_the_forces
+from bsip_cli.diagnosis.corrected_wrench import (
+    corrected_plates,
+    corrected_wrench,
+    is_of_the_forces,
+)
 from bsip_cli.effects.added_mass import AddedMass
 from bsip_cli.effects.clock_drift import ClockDrift
 from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.plate_rotation import PlateRotation
 from bsip_cli.effects.plate_zero import PlateZero
 from bsip_cli.effects.scene import Scene
 from bsip_cli.effects.sync_offset import SyncOffset
@@ -82,3 +88,31 @@ def test_only_forces_are_put_right():
     carried = cause_of(AddedMass(), "hand_r", 1.0, 0.0, 0.0, 0.0)
     assert not is_of_the_forces(carried)
     assert all(is_of_the_forces(cause) for cause in (OFFSET, LATE, SLOW))
+
+
+def test_plates_that_turned_together_turn_about_the_middle_of_all():
+    scene = moving()
+    turned = cause_of(PlateRotation(), "all", 0.0, 0.02, 0.1)
+    found = corrected_plates(scene, [turned])
+    whole, _ = corrected_wrench(scene, scene.measured, [turned])
+    assert sum(found.values()) == pytest.approx(whole, abs=1e-9)
+    middle = np.mean([plate.centre_m() for plate in scene.plates], axis=0)
+    for plate in scene.plates:
+        turn = Rotation.from_rotvec([0.0, 0.02, 0.1])
+        force = turn.apply(plate.wrench[:, :3])
+        moment = turn.apply(plate.wrench[:, 3:] - np.cross(middle, plate.wrench[:, :3]))
+        assert found[plate.name][:, :3] == pytest.approx(force, abs=1e-9)
+        assert found[plate.name][:, 3:] == pytest.approx(moment + np.cross(middle, force), abs=1e-9)
+
+
+def test_a_plate_is_freed_of_its_own_faults_only():
+    scene = moving()
+    first, second = scene.plates
+    lost = first.wrench.copy()
+    lost[5] = np.nan
+    scene = replace(scene, plates=(replace(first, wrench=lost), second))
+    found = corrected_plates(scene, [OFFSET])
+    assert np.isnan(found["1"][5]).all()
+    change = np.delete(found["1"] - first.wrench, 5, axis=0)
+    assert change[:, 2] == pytest.approx(-30.0, abs=1e-9)
+    assert np.array_equal(found[second.name], second.wrench)

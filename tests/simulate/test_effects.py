@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from bsip_cli.errors import UsageError
+from bsip_cli.instruments.readings import Instruments, SensingPlate, interpolated
 from bsip_cli.simulate.asked import drawn, effects_of, pair_up, touches
 from bsip_cli.simulate.calculus import derivative
 from bsip_cli.simulate.effects import CATALOGUE, EFFECTS, OUTSIDE
 from bsip_cli.simulate.effects.breathing import ChestMotion
 from bsip_cli.simulate.effects.outside import play
 from bsip_cli.simulate.effects.wobbling_mass import Swinging
-from bsip_cli.simulate.instruments import Instruments, SensingPlate, interpolated
 from bsip_cli.simulate.loads import GRAVITY
 from bsip_cli.simulate.mixing import Mixer
 from bsip_cli.simulate.options import Asked, Laboratory, Rates, Richness, StudyOptions

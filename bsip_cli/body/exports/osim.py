@@ -15,12 +15,17 @@ from bsip_cli.body.exports.identified import (
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import Inertia
 
-_JOINTS = {"free": "FreeJoint", "spherical": "BallJoint", "revolute": "PinJoint"}
-_COORDINATES = {
-    "free": ("rx", "ry", "rz", "tx", "ty", "tz"),
-    "spherical": ("rx", "ry", "rz"),
+# A ball or free joint's speeds are no rates of its coordinates, and InverseDynamicsTool (OpenSim
+# 4.6) takes them for that: three turns in a row are a joint whose moments it computes.
+_JOINTS = {"free": "CustomJoint", "spherical": "CustomJoint", "revolute": "PinJoint"}
+COORDINATES = {
+    "free": ("rz", "rx", "ry", "tx", "ty", "tz"),
+    "spherical": ("rz", "rx", "ry"),
     "revolute": ("angle",),
 }
+"""Of each type of joint, in the order of the joint coordinate system: turns about Z of the parent
+(flexion), X after that turn, and Y of the segment."""
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _NOTES = (
     "SI units, Y up. Body frames: origin at the joint to the parent, axes of the segment (X",
     "anterior, Y up, Z right). No muscles, no geometry, no limits.",
@@ -28,7 +33,7 @@ _NOTES = (
 
 
 def osim_text(body: IdentifiedPerson) -> str:
-    """An OpenSim 4 model: bodies, free base, ball and pin joints, markers.
+    """An OpenSim 4 model: bodies, custom and pin joints, markers.
 
     Raises
     ------
@@ -77,7 +82,7 @@ def _add_joint(joints: ET.Element, body: IdentifiedPerson, i: int) -> None:
     ET.SubElement(joint, "socket_parent_frame").text = "in_parent"
     ET.SubElement(joint, "socket_child_frame").text = "in_child"
     coordinates = ET.SubElement(joint, "coordinates")
-    for part in _COORDINATES[kind]:
+    for part in COORDINATES[kind]:
         coordinate = ET.SubElement(coordinates, "Coordinate", name=f"{name}_{part}")
         if part == "ty":
             height = numbers([body.height_of_base_m()])
@@ -92,6 +97,24 @@ def _add_joint(joints: ET.Element, body: IdentifiedPerson, i: int) -> None:
         ET.SubElement(offset, "socket_parent").text = socket
         ET.SubElement(offset, "translation").text = numbers(place)
         ET.SubElement(offset, "orientation").text = numbers([tilt, 0.0, 0.0])
+    if kind != "revolute":
+        _add_transform(joint, name, kind)
+
+
+def _add_transform(joint: ET.Element, name: str, kind: str) -> None:
+    """Three turns, and in the free joint three ways: one coordinate each; else zero."""
+    transform = ET.SubElement(joint, "SpatialTransform")
+    parts = (*COORDINATES["spherical"], "tx", "ty", "tz")
+    for number, part in enumerate(parts):
+        what = "rotation" if number < 3 else "translation"
+        one = ET.SubElement(transform, "TransformAxis", name=f"{what}{number % 3 + 1}")
+        is_free = part in COORDINATES[kind]
+        if is_free:
+            ET.SubElement(one, "coordinates").text = f"{name}_{part}"
+        ET.SubElement(one, "axis").text = numbers(_AXES[part[1]])
+        function = ET.SubElement(one, "LinearFunction" if is_free else "Constant", name="function")
+        tag, value = ("coefficients", [1.0, 0.0]) if is_free else ("value", [0.0])
+        ET.SubElement(function, tag).text = numbers(value)
 
 
 def _add_markers(markers: ET.Element, body: IdentifiedPerson) -> None:

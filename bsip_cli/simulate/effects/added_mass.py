@@ -8,11 +8,11 @@ from typing import Any, Self
 import numpy as np
 
 from bsip_cli.body.names import SEGMENTS
+from bsip_cli.instruments.readings import Instruments
 from bsip_cli.simulate.effects.base import Effect, Target
 from bsip_cli.simulate.effects.carried import with_mass_at
 from bsip_cli.simulate.effects.places import SEGMENT_NAMES, body_of
 from bsip_cli.simulate.inertia import Inertia, combined
-from bsip_cli.simulate.instruments import Instruments
 from bsip_cli.simulate.people import Person
 
 RADIUS_M = 0.03  # a ball of this size

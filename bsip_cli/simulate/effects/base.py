@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from bsip_cli.errors import UsageError
-from bsip_cli.simulate.instruments import Instruments
+from bsip_cli.instruments.readings import Instruments
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
 

@@ -12,8 +12,8 @@ from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.instruments.readings import Instruments
 from bsip_cli.simulate.effects.segment_markers import markers_of
-from bsip_cli.simulate.instruments import Instruments
 
 CUTOFF_HZ = 10.0
 LOADED_N = 40.0

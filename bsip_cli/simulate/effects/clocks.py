@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from bsip_cli.instruments.readings import Instruments
 from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.instruments import Instruments
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from typing import Self
 
 import numpy as np
 
+from bsip_cli.instruments.readings import Instruments
 from bsip_cli.simulate.effects.base import Effect, Target
-from bsip_cli.simulate.instruments import Instruments
 from bsip_cli.simulate.rotations import from_rotation_vector
 
 

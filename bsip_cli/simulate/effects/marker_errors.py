@@ -8,9 +8,9 @@ from typing import Self
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from bsip_cli.instruments.readings import Instruments
 from bsip_cli.simulate.curves import step
 from bsip_cli.simulate.effects.base import Effect, Target, direction
-from bsip_cli.simulate.instruments import Instruments
 from bsip_cli.simulate.rotations import frame_of, rotate
 
 SLIP_S = 0.05

@@ -10,9 +10,9 @@ from typing import Self
 
 import numpy as np
 
+from bsip_cli.instruments.readings import Instruments, SensingPlate
 from bsip_cli.simulate.effects.base import Effect, Target
 from bsip_cli.simulate.effects.plate_channels import ChannelFault, on_plates
-from bsip_cli.simulate.instruments import Instruments, SensingPlate
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
 from bsip_cli.simulate.poses import Poses

@@ -13,8 +13,8 @@ from typing import Self
 import numpy as np
 
 from bsip_cli.errors import UsageError
+from bsip_cli.instruments.readings import COMPONENTS, Instruments, SensingPlate
 from bsip_cli.simulate.effects.base import Effect, Target
-from bsip_cli.simulate.instruments import COMPONENTS, Instruments, SensingPlate
 
 Change = Callable[[np.ndarray, SensingPlate, np.ndarray], np.ndarray]
 

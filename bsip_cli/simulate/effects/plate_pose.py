@@ -7,9 +7,9 @@ from typing import Self
 
 import numpy as np
 
+from bsip_cli.instruments.readings import Instruments, SensingPlate
 from bsip_cli.simulate.effects.base import Effect, Target
 from bsip_cli.simulate.effects.plate_channels import on_plates
-from bsip_cli.simulate.instruments import Instruments, SensingPlate
 from bsip_cli.simulate.rotations import from_rotation_vector
 
 AXES = ("x", "y", "z")

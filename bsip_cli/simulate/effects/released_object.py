@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from bsip_cli.body.names import SEGMENTS
+from bsip_cli.instruments.readings import Instruments
 from bsip_cli.simulate.curves import step
 from bsip_cli.simulate.effects.base import Effect, Target
 from bsip_cli.simulate.effects.carried import with_mass_at
@@ -17,7 +18,6 @@ from bsip_cli.simulate.effects.places import (
     recorded_length_s,
     recorded_times_s,
 )
-from bsip_cli.simulate.instruments import Instruments
 from bsip_cli.simulate.loads import Ball
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan

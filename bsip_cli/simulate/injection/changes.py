@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.instruments.readings import Instruments
 from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.instruments import Instruments
 
 
 def check_injectable(effects: Sequence[Effect]) -> None:

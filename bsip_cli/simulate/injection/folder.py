@@ -15,11 +15,11 @@ from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.files.folders import entries, is_folder
 from bsip_cli.files.force_files import ENDINGS
 from bsip_cli.files.regular import fault_of
+from bsip_cli.instruments.c3d_file import rewrite_c3d
+from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot
 from bsip_cli.simulate.asked import effects_of, touches
 from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.injection.c3d_file import inject_c3d
-from bsip_cli.simulate.injection.changes import check_injectable
-from bsip_cli.simulate.injection.trc_mot_files import inject_trc_mot
+from bsip_cli.simulate.injection.changes import changed_by, check_injectable
 from bsip_cli.simulate.options import StudyOptions
 
 RECORDING = re.compile(
@@ -45,12 +45,12 @@ def inject_recording(source: Path, copy: Path, effects: Sequence[Effect]) -> dic
     BadDataError : the recording cannot take an effect.
     """
     check_injectable(effects)
-    writers = {".c3d": inject_c3d, ".trc": inject_trc_mot}
+    writers = {".c3d": rewrite_c3d, ".trc": rewrite_trc_mot}
     kind = source.suffix.lower()
     if kind not in writers:
         raise UsageError("not a recording", file=source, expected="a .c3d, or a .trc with a .mot")
     copy.parent.mkdir(parents=True, exist_ok=True)
-    after = writers[kind](source, copy, effects)
+    after = writers[kind](source, copy, lambda before: changed_by(effects, before, source))
     return {"recorded_from_s": after.start_s, "effects": [effect.name for effect in effects]}
 
 

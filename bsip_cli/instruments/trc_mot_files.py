@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,9 +12,7 @@ import numpy as np
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.force_files import forces_beside
 from bsip_cli.files.regular import check_regular
-from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.injection.changes import changed_by
-from bsip_cli.simulate.instruments import Instruments, SensingPlate
+from bsip_cli.instruments.readings import Instruments, SensingPlate
 
 METRES = {"m": 1.0, "mm": 1e-3}
 LOADED_N = 20.0
@@ -38,10 +36,18 @@ class ForceSet:
     torque: list[int]
 
 
-def inject_trc_mot(trc: Path, copy: Path, effects: Sequence[Effect]) -> Instruments:
-    """Write copies of a TRC file and of the MOT file beside it with the effects hidden in them.
+def rewrite_trc_mot(
+    trc: Path,
+    copy: Path,
+    change: Callable[[Instruments], Instruments],
+    said: Sequence[str] = (),
+) -> Instruments:
+    """Write copies of a TRC file and of the MOT file beside it with other readings.
 
-    copy : the TRC file to be written; the MOT file goes beside it.
+    A file that does not change is copied as it is.
+
+    copy : the TRC file to be written; the MOT file goes beside it. said : what the header of the
+        MOT says of the change, a line each.
 
     Raises
     ------
@@ -54,11 +60,13 @@ def inject_trc_mot(trc: Path, copy: Path, effects: Sequence[Effect]) -> Instrume
     sets = _force_sets(forces, mot)
     scale = _scale_m(markers, trc)
     before = _instruments(markers, forces, sets, scale, trc)
-    after = changed_by(effects, before, trc)
-    _write(copy, _new_trc(markers, before, after, scale))
+    after = change(before)
+    moved = not np.array_equal(before.points_m, after.points_m, equal_nan=True)
+    loaded = not np.array_equal(before.readings, after.readings, equal_nan=True)
+    _write(copy, _new_trc(markers, before, after, scale) if moved else trc.read_bytes())
     _write(
         copy.with_name(copy.stem + mot.name[len(trc.stem) :]),
-        _new_mot(forces, sets, before, after),
+        _new_mot(forces, sets, before, after, said) if loaded else mot.read_bytes(),
     )
     return after
 
@@ -246,7 +254,13 @@ def _new_trc(table: Table, before: Instruments, after: Instruments, scale: float
     return "\n".join([*head, *rows]) + "\n"
 
 
-def _new_mot(table: Table, sets: list[ForceSet], before: Instruments, after: Instruments) -> str:
+def _new_mot(
+    table: Table,
+    sets: list[ForceSet],
+    before: Instruments,
+    after: Instruments,
+    said: Sequence[str],
+) -> str:
     first = _first(before, after) * before.per_frame
     values = table.values[first : first + after.readings.shape[1]].copy()
     for each, plate, reading in zip(sets, after.plates, after.readings, strict=True):
@@ -254,6 +268,7 @@ def _new_mot(table: Table, sets: list[ForceSet], before: Instruments, after: Ins
             values, each, plate, reading, after.up
         )
     head = [re.sub(r"(?i)^nRows=.*", f"nRows={len(values)}", line) for line in table.head]
+    head[-2:-2] = said  # before the line endheader and the names
     rows = ["\t".join(f"{x:.9g}" for x in row) for row in values]
     return "\n".join([*head, *rows]) + "\n"
 
@@ -262,7 +277,7 @@ def _cell(value: float) -> str:
     return "" if np.isnan(value) else f"{value:.9g}"
 
 
-def _write(file: Path, text: str) -> None:
+def _write(file: Path, content: str | bytes) -> None:
     partial = file.with_name(file.name + ".part")
-    partial.write_text(text, encoding="utf-8")
+    partial.write_bytes(content.encode() if isinstance(content, str) else content)
     partial.replace(file)

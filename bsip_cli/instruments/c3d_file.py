@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import ezc3d
 import numpy as np
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.injection.c3d_plates import METRES, WiredPlate, wired_plates
-from bsip_cli.simulate.injection.changes import changed_by
-from bsip_cli.simulate.instruments import Instruments
+from bsip_cli.instruments.c3d_plates import METRES, WiredPlate, wired_plates
+from bsip_cli.instruments.readings import Instruments
 
 MODEL_OUTPUTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS")
+_LINE = 120  # letters: a C3D file counts a text's in one byte, which some readers take as signed
 
 
-def inject_c3d(source: Path, copy: Path, effects: Sequence[Effect]) -> Instruments:
-    """Write a copy of a C3D file with the effects hidden in it; returns what it now holds.
+def rewrite_c3d(
+    source: Path,
+    copy: Path,
+    change: Callable[[Instruments], Instruments],
+    said: Sequence[str] = (),
+) -> Instruments:
+    """Write a copy of a C3D file with other readings; returns what it now holds.
+
+    said : what the parameter group BSIP of the copy says of the change, a line each.
 
     Raises
     ------
-    BadDataError : not a readable C3D file; plates that cannot be changed; nothing changed.
+    BadDataError : not a readable C3D file; plates that cannot be changed.
     """
     try:
         c3d = ezc3d.c3d(str(source), extract_forceplat_data=True)
@@ -32,14 +39,29 @@ def inject_c3d(source: Path, copy: Path, effects: Sequence[Effect]) -> Instrumen
     wired = wired_plates(c3d, source)
     columns = _marker_columns(c3d)
     before = _instruments(c3d, columns, wired, source)
-    after = changed_by(effects, before, source)
+    after = change(before)
     _cut(c3d, before, after)
     first = _first_frame(before, after)
-    frames = len(after.points_m)
-    _put_points(c3d, columns, after)
-    _put_forces(c3d, wired, before.frames(first, first + frames), after)
-    c3d.write(str(copy))
+    kept = before.frames(first, first + len(after.points_m))
+    _put_points(c3d, columns, kept, after)
+    _put_forces(c3d, wired, kept, after)
+    if said:
+        lines = [part for line in said for part in wrap(line, _LINE)]
+        c3d.add_parameter("BSIP", "CORRECTED", lines)
+    _write(c3d, copy, source)
     return after
+
+
+def _write(c3d: Any, copy: Path, source: Path) -> None:
+    """All of it, or nothing."""
+    partial = copy.with_name(f".{copy.stem}.part.c3d")  # ezc3d wants this ending
+    try:
+        c3d.write(str(partial))
+        partial.replace(copy)
+    except (RuntimeError, ValueError) as error:
+        raise BadDataError(f"ezc3d cannot write it again ({error})", file=source) from error
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def _labels(c3d: Any) -> list[str]:
@@ -116,15 +138,18 @@ def _cut(c3d: Any, before: Instruments, after: Instruments) -> None:
     header["last_frame"] = header["first_frame"] + frames - 1
 
 
-def _put_points(c3d: Any, columns: np.ndarray, after: Instruments) -> None:
-    """Markers that are seen; a lost one stays as it was written."""
-    scale = _scale_m(c3d, "")
-    points = c3d["data"]["points"].copy()
-    placed = after.points_m.transpose(2, 1, 0) / scale
+def _put_points(c3d: Any, columns: np.ndarray, before: Instruments, after: Instruments) -> None:
+    """Markers that changed; a lost one stays as it was written."""
+    gone = np.isnan(before.points_m) & np.isnan(after.points_m)
+    frames, markers = np.nonzero(~((before.points_m == after.points_m) | gone).all(axis=2))
+    placed = after.points_m[frames, markers].T / _scale_m(c3d, "")
     lost = np.isnan(placed).any(axis=0)
-    points[:3, columns] = np.where(lost, np.nan, placed)
+    was_lost = np.isnan(before.points_m[frames, markers]).any(axis=1)
+    points = c3d["data"]["points"].copy()
+    points[:3, columns[markers], frames] = np.where(lost, np.nan, placed)
     residuals = c3d["data"]["meta_points"]["residuals"].copy()
-    residuals[:, columns] = np.where(lost, -1.0, residuals[:, columns])
+    kept = residuals[0, columns[markers], frames]
+    residuals[0, columns[markers], frames] = np.select([lost, was_lost], [-1.0, 0.0], kept)
     c3d["data"]["points"] = points
     c3d["data"]["meta_points"]["residuals"] = residuals
 

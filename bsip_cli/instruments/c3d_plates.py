@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.simulate.instruments import SensingPlate
+from bsip_cli.instruments.readings import SensingPlate
 
 AGREEMENT = 1e-3  # with ezc3d's own extraction, of the largest value
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2}

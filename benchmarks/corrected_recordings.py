@@ -1,0 +1,187 @@
+"""Are recordings free of a fault after `bsip export --what recording`?
+
+    python -m benchmarks.corrected_recordings DATA --write docs/corrected_recordings.md
+
+A fault is hidden, the study is diagnosed, exported and diagnosed again. Cases are two simulated
+people and, where DATA has them, real recordings. --only TEXT runs the cases whose line holds it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from benchmarks.diagnosis_of_recordings import SUBJECTS
+from benchmarks.measure import ROOT, markdown, run_child
+from benchmarks.recordings import make_study
+
+_STAGES = """
+import sys
+from pathlib import Path
+from bsip_cli.running.session import run_session
+study, out = map(Path, sys.argv[1:])
+stages = ("ingest", "scale", "ik", "regress", "identify", "reconstruct", "diagnose")
+print(max(run_session(stage, study, out, (), None, jobs=1, force=False) for stage in stages))
+"""
+BAD_DATA = 3  # some trial was refused, the rest is done
+SEEDS = (5101, 5102)
+TASKS = ("static", "sequence", "squat", "hops")
+OPENCAP, FIGAROH = "opencap_subject4", "figaroh_human"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A fault as ``bsip inject`` wants it, in a simulated person (a seed) or a real recording."""
+
+    source: int | str
+    effect: str
+    size: float
+    target: str
+
+    def words(self) -> str:
+        where = f"simulated person {self.source}" if isinstance(self.source, int) else self.source
+        return f"{self.effect} {self.size:g} {self.target} in {where}"
+
+
+CASES = (
+    Case(SEEDS[0], "sync_offset", 0.012, "-"),
+    Case(SEEDS[0], "plate_translation", 0.025, "x,plate=1"),
+    Case(SEEDS[0], "plate_gain", 0.05, "fz,plate=2"),
+    Case(SEEDS[0], "plate_zero", 15.0, "fx,plate=1"),
+    Case(SEEDS[1], "plate_rotation", 0.06, "yaw,plate=1"),
+    Case(SEEDS[1], "plate_crosstalk", 0.04, "fz:fy,plate=2"),
+    Case(SEEDS[1], "clock_drift", 0.001, "-"),
+    Case(SEEDS[1], "marker_swap", 2.0, "RELB+RUA"),
+    Case(OPENCAP, "sync_offset", 0.010, "-"),
+    Case(OPENCAP, "plate_translation", 0.020, "x,plate=1"),
+    Case(FIGAROH, "plate_rotation", 0.05236, "yaw,plate=1"),
+)
+
+
+@dataclass(frozen=True)
+class Result:
+    """Effects and targets: named before, corrected, and not rejected afterwards."""
+
+    before: frozenset[tuple[str, str]]
+    corrected: frozenset[tuple[str, str]]
+    after: frozenset[tuple[str, str]]
+
+    def is_corrected(self, case: Case) -> bool:
+        return any(effect == case.effect for effect, _ in self.corrected)
+
+    def is_free(self) -> bool:
+        return not self.corrected & self.after
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("data", type=Path)
+    parser.add_argument("--write", type=Path, help="write the page here instead of printing it")
+    parser.add_argument("--only", default="", help="cases whose line holds this")
+    arguments = parser.parse_args()
+    results = {}
+    for case in CASES:
+        if arguments.only not in case.words():
+            continue
+        with tempfile.TemporaryDirectory() as scratch:
+            if (result := run_case(case, arguments.data, Path(scratch))) is not None:
+                results[case] = result
+                print(case.words(), result, sep=": ", file=sys.stderr, flush=True)
+    text = page(results)
+    if arguments.write:
+        arguments.write.write_text(text, encoding="utf-8")
+    else:
+        print(text)
+
+
+def run_case(case: Case, data: Path, scratch: Path) -> Result | None:
+    """None where a real recording is missing."""
+    study, hidden, fixed = (scratch / name for name in ("study", "hidden", "fixed"))
+    if isinstance(case.source, int):
+        simulated = ["--preset", "diagnosis", "--sequence-s", "20", "--plate-per-foot"]
+        simulated += [part for task in TASKS for part in ("--task", task)]
+        bsip("simulate", study, *simulated, "--seed", case.source)
+    else:
+        subject = next(one for one in SUBJECTS if one.source.name == case.source)
+        if not make_study(study, data, subject.source):
+            return None
+    fault = ("--effect", case.effect, "--size", repr(case.size), "--target", case.target)
+    bsip("inject", study, hidden, *fault)
+    before = diagnosed(hidden, scratch / "out")
+    said = bsip("export", hidden, "--out", scratch / "out", "--what", "recording", "--to", fixed)
+    after = diagnosed(fixed, scratch / "again")
+    return Result(before, corrected_in(said), after)
+
+
+def corrected_in(said: str) -> frozenset[tuple[str, str]]:
+    """Effects and targets of the lines ``NAME: corrected: EFFECT TARGET: sizes``."""
+    found = set()
+    for line in said.splitlines():
+        _, mark, rest = line.partition(": corrected: ")
+        if mark and rest.startswith("labels "):
+            pair = rest.split()
+            found.add(("marker_swap", f"{pair[1]}+{pair[3]}"))
+        elif mark and "taken off" in rest:
+            effect, _, target = rest.split(":")[0].partition(" ")
+            found.add((effect, target))
+    return frozenset(found)
+
+
+def diagnosed(study: Path, out: Path) -> frozenset[tuple[str, str]]:
+    """Run the stages; effects and targets that are named or in a class, labels exchanged by ik."""
+    done = run_child([sys.executable, "-c", _STAGES, str(study), str(out)], folder=ROOT)
+    if done.stdout.strip().splitlines()[-1] not in ("0", str(BAD_DATA)):
+        raise RuntimeError(done.stderr)
+    table = pd.read_parquet(out / "sub-01" / "sub-01_diagnosis.parquet")
+    found = table[table["verdict"] != "rejected"]
+    events = pd.concat(
+        pd.read_parquet(path) for path in sorted(out.glob("sub-01/*_marker-events.parquet"))
+    )
+    swaps = events[events["put_right"].astype(bool)]
+    pairs = {("marker_swap", f"{m}+{p}") for m, p in zip(swaps.marker, swaps.partner, strict=True)}
+    return frozenset({*zip(found["effect"], found["target"], strict=True), *pairs})
+
+
+def bsip(*arguments: object) -> str:
+    """Run a command; what it says."""
+    command = [sys.executable, "-m", "bsip_cli", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
+    if done.returncode not in (0, BAD_DATA):
+        raise RuntimeError(f"{' '.join(command)}\n{done.stderr}")
+    return done.stderr
+
+
+def page(results: dict[Case, Result]) -> str:
+    """How many cases are free, and a line for each."""
+    told = {case: one for case, one in results.items() if one.is_corrected(case)}
+    free = sum(one.is_free() for one in told.values())
+    header = ("hidden", "before", "corrected", "afterwards", "free")
+    rows = [
+        (
+            case.words(),
+            *(_words(part) for part in (one.before, one.corrected, one.after)),
+            "not corrected" if case not in told else "yes" if one.is_free() else "no",
+        )
+        for case, one in results.items()
+    ]
+    return (
+        "# Corrected recordings, diagnosed again\n\n"
+        f"{len(told)} of {len(results)} hidden faults were named and corrected; {free} of these "
+        f"{len(told)} recordings are free of what was corrected. "
+        "By `python -m benchmarks.corrected_recordings`.\n\n" + markdown(header, rows) + "\n"
+    )
+
+
+def _words(found: Sequence[tuple[str, str]] | frozenset[tuple[str, str]]) -> str:
+    return ", ".join(" ".join(filter(None, one)) for one in sorted(found))
+
+
+if __name__ == "__main__":
+    main()

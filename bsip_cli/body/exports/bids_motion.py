@@ -1,0 +1,134 @@
+"""BIDS-Motion: one tracking system per trial, columns as `_channels.tsv` lists them (BIDS 1.10)."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bsip_cli.body.exports.opensim_motion import coordinates
+from bsip_cli.body.skeleton import Skeleton
+
+TRACKSYS = "bsip"
+_FRAMES = {
+    "global": {
+        "SpatialAxes": "__S",
+        "RotationRule": "right-hand",
+        "Description": "Z up; X and Y of the laboratory",
+    },
+    "joint": {
+        "RotationRule": "right-hand",
+        "Description": "of the distal segment in the proximal one: z about Z (to the right) of the "
+        "proximal one, then x (anterior), then y along the distal one; hinges about their own axis",
+    },
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One column: its line in ``_channels.tsv``, and values (N,), NaN where missing."""
+
+    name: str
+    component: str
+    type: str
+    tracked_point: str
+    units: str
+    reference_frame: str
+    values: np.ndarray
+
+
+def channels(
+    markers: Sequence[str],
+    markers_m: np.ndarray,
+    skeleton: Skeleton,
+    q: np.ndarray,
+    determined: np.ndarray,
+    plates: Mapping[str, np.ndarray],
+) -> list[Channel]:
+    """Markers (N, m, 3), pose q (N, nq) in the frames that determine it, and ground wrenches (N, 6)
+    on the body about the world's origin, by plate; world frame, SI, angles in degrees."""
+    return [
+        *_markers(markers, markers_m),
+        *_pose(skeleton, q, determined),
+        *(one for name, wrench in plates.items() for one in _plate(name, wrench)),
+    ]
+
+
+def _markers(names: Sequence[str], places_m: np.ndarray) -> Iterator[Channel]:
+    for k, name in enumerate(names):
+        for c, axis in enumerate("xyz"):
+            values = places_m[:, k, c]
+            yield Channel(f"{name}_{axis}", axis, "POS", name, "m", "global", values)
+
+
+def _pose(skeleton: Skeleton, q: np.ndarray, determined: np.ndarray) -> Iterator[Channel]:
+    def seen(values: np.ndarray) -> np.ndarray:
+        found = np.full(len(q), np.nan)
+        found[determined] = values
+        return found
+
+    base, known = skeleton.segments[0], q[determined]
+    for c, axis in enumerate("xyz"):
+        yield Channel(f"{base}_t{axis}", axis, "POS", base, "m", "global", seen(known[:, c]))
+    for c, part in enumerate("xyzw", start=3):
+        name = f"{base}_quat_{part}"
+        yield Channel(name, f"quat_{part}", "ORNT", base, "n/a", "global", seen(known[:, c]))
+    for name, course in coordinates(skeleton, known).items():
+        joint, part = name.rsplit("_", 1)
+        if joint == skeleton.joints[0]:
+            continue
+        axis = part[1] if part in ("rx", "ry", "rz") else "n/a"
+        values = seen(np.rad2deg(course))
+        yield Channel(name, axis, "JNTANG", joint, "deg", "joint", values)
+
+
+def _plate(name: str, wrench: np.ndarray) -> Iterator[Channel]:
+    for c, (what, unit) in enumerate(
+        [(w, u) for w, u in (("f", "N"), ("m", "N m")) for _ in "xyz"]
+    ):
+        axis, point = "xyz"[c % 3], f"plate{name}"
+        yield Channel(f"{point}_{what}{axis}", axis, "MISC", point, unit, "global", wrench[:, c])
+
+
+def motion_tsv(columns: Sequence[Channel]) -> str:
+    """Values, a row per frame, without a header."""
+    rows = np.column_stack([one.values for one in columns])
+    lines = ("\t".join("n/a" if np.isnan(x) else f"{x:.9g}" for x in row) for row in rows)
+    return "\n".join([*lines, ""])
+
+
+def channels_tsv(columns: Sequence[Channel]) -> str:
+    """A row per column of the motion."""
+    names = ("name", "component", "type", "tracked_point", "units", "reference_frame")
+    rows = ("\t".join(getattr(one, name) for name in names) for one in columns)
+    return "\n".join(["\t".join(names), *rows, ""])
+
+
+def channels_json() -> str:
+    """What the reference frames are."""
+    return _json({"reference_frame": {"Levels": _FRAMES}})
+
+
+def motion_json(columns: Sequence[Channel], task: str, rate_hz: float, version: str) -> str:
+    """What is recorded, and how often."""
+    counts = Counter(one.type for one in columns)
+    return _json(
+        {
+            "TaskName": task,
+            "SamplingFrequency": rate_hz,
+            "RecordingDuration": len(columns[0].values) / rate_hz,
+            "TrackingSystemName": "markers, model of the body and force plates, by bsip",
+            "SoftwareVersions": f"bsip {version}",
+            "MotionChannelCount": len(columns),
+            "TrackedPointsCount": len({one.tracked_point for one in columns}),
+            "MissingValues": "n/a",
+        }
+        | {f"{kind}ChannelCount": number for kind, number in sorted(counts.items())}
+    )
+
+
+def _json(content: dict) -> str:
+    return json.dumps(content, indent=2) + "\n"

@@ -1,0 +1,310 @@
+"""`bsip export --what recording`: faults of known size are taken off a recording, and nothing else.
+
+The diagnosis is written by hand with the sizes that were hidden, so what is compared is the writer.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import ezc3d
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.ndimage import uniform_filter1d
+
+from bsip_cli import __version__
+from bsip_cli.artifacts import empty_table, write_artifact
+from bsip_cli.commands.export import Request, export_session
+from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.read import read_recording
+from bsip_cli.running.provenance import file_hash
+from bsip_cli.running.session import run_session
+from bsip_cli.simulate.injection.folder import inject_study
+from bsip_cli.simulate.options import Asked, Laboratory, Rates, StudyOptions
+from bsip_cli.simulate.study import simulate_study
+from bsip_cli.stages.diagnosis_rows import nothing
+from tests.exports.test_export_command import NOTES, Results, write_person
+
+STEM = "sub-01_task-squat_run-1"
+OPTIONS = StudyOptions(
+    participants=1,
+    seed=8,
+    sexes="M",
+    tasks=("static", "squat"),
+    durations_s={"static": 1.0, "squat": 3.0},
+    rates={"default": Rates(marker_hz=50, analog_hz=250)},
+    laboratory=Laboratory(plate_per_foot=True),
+)
+PAIR, SWAPS = ("RKNEL", "RKNEM"), ((0.5, 0.9), (1.0, 2.0))
+
+# What is hidden, and the same as a diagnosis says it: the file's y and z are the plate's reversed.
+Fault = tuple[Asked, tuple[str, str, list[float]]]
+
+
+def fault(effect: str, size: float, hidden: str, target: str, *values: float) -> Fault:
+    return Asked(effect, size, hidden), (effect, target, list(values))
+
+
+GAIN = fault("plate_gain", 0.06, "fz,plate=1", "1 fz", 0.06)
+ZERO = fault("plate_zero", 20.0, "fz,plate=2", "2 fz", -20.0)
+LEAK = fault("plate_crosstalk", 0.04, "fz:fx,plate=2", "2 fz>fx", -0.04)
+TURNED = fault("plate_rotation", 0.08, "yaw,plate=1", "1", 0.0, 0.0, 0.08)
+ASIDE = fault("plate_translation", 0.03, "x,plate=2", "2", 0.03, 0.0, 0.0)
+LATE = fault("sync_offset", 0.03, "-", "", 0.03)
+SLOW = fault("clock_drift", 0.002, "-", "", 0.002)
+LEVER_NM = 1.2  # 4 % of what is on plate 2, at the depth of its sensor under its surface
+
+
+@dataclass(frozen=True)
+class Study:
+    """As it was, with something hidden in it, and what is known of the latter."""
+
+    plain: Path
+    made: Results
+
+    def diagnosed_as(self, *causes: tuple[str, str, list[float]], alike: Sequence = ()) -> None:
+        """``alike``: effect and target of what cannot be told from the causes."""
+        verdict = "ambiguous" if alike else "named"
+        group = [*((effect, target) for effect, target, _ in causes), *alike]
+        rows = [
+            nothing(0.01, (STEM,)) | {"effect": effect, "target": target, "class_id": "A"}
+            for effect, target in (group if alike else ())
+        ]
+        table = pd.DataFrame(rows) if rows else empty_table("overall-diagnosis")
+        facts = [
+            {
+                "effect": effect,
+                "target": target,
+                "trials": [STEM],
+                "verdict": verdict,
+                "values": values,
+                "folds": [values] * 5,
+            }
+            for effect, target, values in causes
+        ]
+        wrenches = (self.made.out / "sub-01").glob("*_wrench.parquet")
+        made_by = {"inputs": {path.name: file_hash(path) for path in wrenches}}
+        notes = NOTES | {"made_by": made_by, "facts": {"causes": facts}}
+        path = self.made.artifact("diagnosis")
+        write_artifact(path, "overall-diagnosis", table, notes)
+
+    def exported(self, code: int = 0) -> Path:
+        to = self.made.study.with_name("corrected")
+        request = Request(what="recording", to=to)
+        assert export_session(self.made.study, self.made.out, (), None, request) == code
+        return to / "sub-01" / f"{STEM}.c3d"
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("plain") / "study"
+    simulate_study(folder, OPTIONS)
+    return folder
+
+
+@pytest.fixture
+def hide(tmp_path, plain):
+    def hidden(*asked: Asked, change: Callable[[Path], None] | None = None) -> Study:
+        made = Results(tmp_path / "study", tmp_path / "out")
+        if asked:
+            hiding = StudyOptions(effects=asked, effect_tasks=("squat",))
+            inject_study(plain, made.study, hiding)
+        else:
+            shutil.copytree(plain, made.study)
+        for path in made.study.rglob("*.c3d") if change else ():
+            change(path)
+        assert run_session("ingest", made.study, made.out, (), None, jobs=1, force=False) == 0
+        write_person(made, "sub-01")
+        swaps = [
+            dict.fromkeys(empty_table("marker-events").columns, 0.0)
+            | {"kind": "swap", "sentence": "", "marker": PAIR[0], "partner": PAIR[1]}
+            | {"start_s": start, "end_s": end - 0.01, "put_right": True}
+            for start, end in SWAPS
+            if any(one.name == "marker_swap" for one in asked)
+        ]
+        for task in ("squat_run-1", "static"):
+            path = made.out / "sub-01" / f"sub-01_task-{task}_marker-events.parquet"
+            table = pd.DataFrame(swaps) if swaps and task != "static" else None
+            events = empty_table("marker-events") if table is None else table
+            write_artifact(path, "marker-events", events, NOTES)
+        return Study(plain, made)
+
+    return hidden
+
+
+def both(study: Study, path: Path) -> tuple[Recording, Recording]:
+    """The recording as it was before anything was hidden, and as it is exported."""
+    return read_recording(study.plain / "sub-01" / path.name), read_recording(path)
+
+
+def wrenches(recording: Recording) -> np.ndarray:
+    """(2, n, 6)."""
+    return np.stack([plate.wrench() for plate in recording.plates])
+
+
+@pytest.mark.parametrize("faults", [(GAIN, ZERO), (TURNED, ASIDE), (LEAK,)])
+def test_plates_read_what_they_would_have_read(hide, faults, capsys):
+    study = hide(*(asked for asked, _ in faults))
+    study.diagnosed_as(*(cause for _, cause in faults))
+    path = study.exported()
+    said = capsys.readouterr().err
+    before, after = both(study, path)
+    apart = np.abs(wrenches(after) - wrenches(before)).max(axis=(0, 1))
+    assert (apart[:3] < 0.05).all() and (apart[3:] < (LEVER_NM if LEAK in faults else 0.02)).all()
+    assert np.array_equal(before.markers_m, after.markers_m, equal_nan=True)
+    for _, (effect, target, _) in faults:
+        assert f"{STEM}: corrected: {effect} {target}: " in said
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("faults", [(GAIN, LATE), (ASIDE, SLOW), (LATE, SLOW)])
+def test_forces_are_back_at_their_time(hide, faults, capsys):
+    """Noise between samples is interpolated twice, so tenths of a second are compared."""
+    study = hide(*(asked for asked, _ in faults))
+    study.diagnosed_as(*(cause for _, cause in faults))
+    path = study.exported()
+    said = capsys.readouterr().err
+    before, after = both(study, path)
+    first = round((after.time0_s - before.time0_s) * before.marker_rate_hz)
+    assert 0 < before.n_frames - first - after.n_frames <= 4
+    shown = before.markers_m[first : first + after.n_frames]
+    assert np.array_equal(shown, after.markers_m, equal_nan=True)
+    now, then = wrenches(after), wrenches(before)[:, 5 * first :][:, : 5 * after.n_frames]
+    apart = uniform_filter1d(now - then, 25, axis=1)[:, 25:-25]
+    assert np.abs(apart[..., :3]).max() < 0.5 and np.abs(apart[..., 3:]).max() < 0.3
+    spoilt = wrenches(read_recording(study.made.study / "sub-01" / path.name))
+    spoilt = spoilt[:, : now.shape[1]] - wrenches(before)[:, 5 * first :][:, : now.shape[1]]
+    assert np.abs(uniform_filter1d(spoilt, 25, axis=1)[:, 25:-25]).max() > 3.0
+    assert "frames at the end left out: their forces were not recorded" in said
+
+
+def test_labels_are_exchanged_back_and_the_file_says_so(hide, capsys):
+    study = hide(
+        *(
+            Asked("marker_swap", end - start, f"{'+'.join(PAIR)},start_s={start}")
+            for start, end in SWAPS
+        )
+    )
+    study.diagnosed_as()
+    path = study.exported()
+    said = capsys.readouterr().err
+    before, after = both(study, path)
+    assert np.allclose(before.markers_m, after.markers_m, atol=1e-7, equal_nan=True)
+    assert np.array_equal(wrenches(before), wrenches(after))
+    words = f"labels {' and '.join(PAIR)} exchanged from 1.000 to 1.990 s"
+    assert words in said
+    old, new = (ezc3d.c3d(str(one)) for one in (study.made.study / "sub-01" / path.name, path))
+    entry = " ".join(new["parameters"]["BSIP"]["CORRECTED"]["value"])
+    assert words in entry and f"bsip {__version__}: corrected by" in entry
+    assert file_hash(study.made.study / "sub-01" / path.name) in entry.replace(" ", "")
+    assert all_else_is_equal(old, new)
+
+
+def all_else_is_equal(old, new) -> bool:
+    """Parameters, analog channels, and all points but the exchanged ones."""
+    for group, parameters in old["parameters"].items():
+        for name, entry in parameters.items():
+            if not name.startswith("__") and name != "DATA_START":
+                copy = new["parameters"][group][name]
+                assert np.array_equal(np.asarray(entry["value"]), np.asarray(copy["value"])), name
+                assert entry["type"] == copy["type"], name
+    labels = old["parameters"]["POINT"]["LABELS"]["value"]
+    others = [k for k, label in enumerate(labels) if label not in PAIR]
+    for part in ("points", "analogs"):
+        a, b = old["data"][part], new["data"][part]
+        if part == "points":
+            a, b = a[:, others], b[:, others]
+        assert np.array_equal(a, b, equal_nan=True), part
+    return True
+
+
+def test_channels_that_ingest_corrects_are_corrected_in_the_file(hide, tmp_path, capsys):
+    """Moments in N mm that are said to be N m, in all trials."""
+
+    def misread(path: Path) -> None:
+        c3d = ezc3d.c3d(str(path))
+        units = c3d["parameters"]["ANALOG"]["UNITS"]["value"]
+        assert "Nmm" in units
+        c3d["parameters"]["ANALOG"]["UNITS"]["value"] = ["Nm" if u == "Nmm" else u for u in units]
+        c3d.write(str(path))
+
+    study = hide(change=misread)
+    study.diagnosed_as()
+    path = study.exported()
+    said = capsys.readouterr().err
+    for plate in "12":
+        assert f"{STEM}: corrected: plate {plate}: read the moments in N mm" in said
+    before, after = both(study, path)
+    assert np.abs(wrenches(after) - wrenches(before)).max() < 0.01
+    units = ezc3d.c3d(str(path))["parameters"]["ANALOG"]["UNITS"]["value"]
+    assert "Nm" in units and "Nmm" not in units
+
+
+def test_what_is_no_fault_of_the_recording_stays_and_is_said(hide, capsys):
+    study = hide(GAIN[0])
+    study.diagnosed_as(("added_mass", "hand_r", [1.0, 0.0, 0.0, 0.0]))
+    path = study.exported()
+    said = capsys.readouterr().err
+    assert path.read_bytes() == (study.made.study / "sub-01" / path.name).read_bytes()
+    why = "added_mass hand_r: no fault of the plates, the clocks or the labels"
+    assert f"{STEM}: not corrected: {why}" in said
+    assert "sub-01_task-static: nothing to correct" in said
+    assert (path.parents[1] / "participants.tsv").exists()
+
+
+def test_what_cannot_be_told_from_another_cause_stays(hide, capsys):
+    study = hide(GAIN[0])
+    study.diagnosed_as(GAIN[1], alike=[("added_mass", "hand_r")])
+    path = study.exported()
+    assert path.read_bytes() == (study.made.study / "sub-01" / path.name).read_bytes()
+    said = capsys.readouterr().err
+    assert "plate_gain 1 fz: it cannot be distinguished from added_mass hand_r here" in said
+
+
+def test_what_the_diagnosis_did_not_size_is_said(hide, capsys):
+    study = hide(GAIN[0])
+    study.diagnosed_as(alike=[("plate_gain", "all fz")])
+    study.exported()
+    assert "not corrected: plate_gain all fz: of unknown size" in capsys.readouterr().err
+
+
+def test_of_faults_of_the_plates_that_look_alike_one_is_taken_off(hide, capsys):
+    study = hide(ZERO[0])
+    study.diagnosed_as(ZERO[1], alike=[("plate_zero", "1 fz")])
+    before, after = both(study, study.exported())
+    assert np.abs(wrenches(after) - wrenches(before)).max() < 0.05
+    assert "taken off (as likely plate_zero 1 fz, with the same sum of forces)" in (
+        capsys.readouterr().err
+    )
+
+
+def test_a_recording_that_changed_since_is_refused(hide, capsys):
+    study = hide(GAIN[0])
+    study.diagnosed_as(GAIN[1])
+    file = study.made.study / "sub-01" / f"{STEM}.c3d"
+    file.write_bytes((study.plain / "sub-01" / file.name).read_bytes())
+    study.exported(code=2)
+    said = capsys.readouterr().err
+    assert f"{file}: has changed since it was read or diagnosed" in said
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--what", "recording"), "makes a folder of its own"),
+        (("--what", "bids"), "makes a folder of its own"),
+        (("--what", "recording", "--to", "{study}/new"), "lies in the study or its results"),
+        (("--what", "recording", "--to", "{study}/.."), "lies in the study or its results"),
+        (("--what", "joints", "--method", "OM"), "knows no --format, --model-file"),
+        (("--what", "opensim", "--format", "osim"), "knows no --format, --model-file"),
+    ],
+)
+def test_options_that_do_not_fit_are_one_sentence(tmp_path, plain, options, words):
+    results = Results(plain, tmp_path / "out")
+    done = results.call(*(one.format(study=plain) for one in options))
+    assert done.returncode == 2
+    assert words in done.stderr and len(done.stderr.strip().splitlines()) == 1

@@ -15,7 +15,7 @@ _MOST_BLOCKS = 600  # longer ones in longer trials
 _STAYS_S = 0.5  # on each side of a slip
 _SLIP = 3.0  # spreads of what pose and step leave unexplained
 # A normal vector of three directions is this long once in 3e7 draws: 40 markers at 600 places give
-# one false alarm in a thousand trials, were the errors as the model says.
+# one false positive in a thousand trials, were the errors as the model says.
 _CHANCE = 6.0
 # Skin travels over the bone by some 15 mm in half a radian; a slip moves the pose too, by far less
 # for its size, and may not hide behind that.

@@ -154,7 +154,7 @@ def score_of_clean_trial(out: Path, participant: str, session: str, stem: str) -
 
 
 def _quiet(case: str, kind: str, place: str, session: str, answers: list[Answer]) -> Score:
-    """Recordings with nothing hidden: all that is named is an alarm."""
+    """Recordings with nothing hidden: all that is named is a false positive."""
     verdict, says = _verdict(NOTHING, set(), "", answers)
     wrong = [f"{alarm} ({_where(a)})" for a in answers for alarm in a.alarms()]
     if answers and not wrong:

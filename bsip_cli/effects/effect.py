@@ -51,6 +51,7 @@ class Effect(ABC):
     of_the_person: ClassVar[bool] = False  # the same in every trial of a person
     of_the_body: ClassVar[bool] = False  # of the person, and in one trial if in another
     of_the_plates: ClassVar[bool] = False  # the truth is what was measured, less the change
+    looks: ClassVar[str]  # what a person sees of it in the curves
     remedy: ClassVar[str]  # what would separate it from its rivals
     least_named: ClassVar[Mapping[str, float]] = {}  # of a parameter: smaller ones are not told
 

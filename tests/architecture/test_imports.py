@@ -25,7 +25,7 @@ ALLOWED = {
     "__main__": "cli",
     "commands": "__init__ artifacts body config errors files pipeline recordings report running "
     "schemas stages statistics study",
-    "reference": "cli commands config pipeline schemas",
+    "reference": "cli config effects pipeline report schemas",
     "cli": "__init__ commands errors pipeline running simulate study",
     "body": "config errors files stated",
     "dynamics": "body errors",

@@ -78,7 +78,7 @@ def test_comments_belong_to_the_option_below():
     first = option_texts()[0]
     assert first.name == "marker_set"
     assert first.comment.startswith("Which markers mean what")
-    assert first.comment.endswith("bsip says which).")
+    assert first.comment.endswith("bsip says which.")
 
 
 def test_unit_is_taken_out_of_the_comment():

@@ -59,3 +59,8 @@ def test_files_named_in_code_are_there():
 def test_the_pages_are_short_enough():
     read = [ROOT / "README.md", *DOCS.glob("*.md")]
     assert sum(len(text_of(page).split()) for page in read) <= MOST_WORDS
+
+
+def test_every_page_is_in_the_site():
+    named = set(re.findall(r": (\w+\.md)$", text_of(ROOT / "mkdocs.yml"), flags=re.MULTILINE))
+    assert named == {page.name for page in DOCS.glob("*.md")}

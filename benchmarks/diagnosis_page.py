@@ -12,7 +12,7 @@ from benchmarks.injected_causes import Cause
 BELOW = "missed, below what is seen"
 RIGHT, IN_CLASS, ALIKE = "right name", "right class", "named as what looks alike"
 ELSEWHERE = "right effect, other place"
-PUT_RIGHT, MISSED, WRONG, REFUSED = "put right by ik", "missed", "another name", "not possible"
+PUT_RIGHT, MISSED, WRONG, REFUSED = "corrected by ik", "missed", "another name", "not possible"
 INJECTED = (
     "injected",
     "seen from",

@@ -171,7 +171,7 @@ def _found(effect: str) -> str:
     named, group = int(row["right name"]), int(row["right class"])
     said = f"named in {named} of {row['cases']}"
     said += f", in a group in {group}" if group else ""
-    said += f", corrected before in {row['put right']}" if row["put right"] != "0" else ""
+    said += f", corrected before in {row['corrected']}" if row["corrected"] != "0" else ""
     with (_RESULTS / "blind_estimates.csv").open(encoding="utf-8", newline="") as file:
         held = [one["95 % CI holds it"] for one in csv.DictReader(file) if one["effect"] == effect]
     counts = [tuple(map(int, text.split(" of "))) for text in held]

@@ -343,7 +343,7 @@ SCHEMAS = {
             1,
             "what was found, corrected and excluded at ingest",
             (
-                _text("check", "what was looked at"),
+                _text("check", "what was examined"),
                 _text("subject", "plate, marker or segment"),
                 _text("found", "what was found"),
                 _text("expected", "what was expected"),

@@ -27,7 +27,7 @@ _FRAMES = 24
 
 
 def swapped_limbs(fit: MarkerFit, refit: Refit) -> Labelling:
-    """Labels of the limbs put right, with the events.
+    """Labels of the limbs corrected, with the events.
 
     All markers of one limb pull the other limb's model over, or turn the trunk round, so single
     pairs need not show it. Where the markers fit badly, the poses are fitted again to some frames

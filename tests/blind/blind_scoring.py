@@ -18,7 +18,7 @@ UNEXPLAINED = "unexplained"
 PERSON = "participant"  # the source that is no trial
 # From best to worst for a hidden effect of the catalogue.
 RIGHT_NAME, RIGHT_CLASS = "right name", "right class"
-PUT_RIGHT, MISSED, SILENT = "put right", "missed", "no answer"
+PUT_RIGHT, MISSED, SILENT = "corrected", "missed", "no answer"
 WRONG_CLASS, WRONG_NAME = "wrong class", "wrong name"
 VERDICTS = (
     *(RIGHT_NAME, RIGHT_CLASS, PUT_RIGHT, UNEXPLAINED),

@@ -5,6 +5,7 @@
 # make cohort   simulate twelve people with 120 s sequences and run them
 # make COHORT=path [OUT=path] [-j 4]   your study: so many participants at once, then the tables of
 #               all; only what changed is done again, who fails is named and stops nobody
+# make docs     the pages of docs/ as a site, in out/site
 # make cluster COHORT=path [OUT=path] [PROFILE=slurm]   the same by Snakemake (workflow/README.md)
 PYTHON ?= python3
 JOBS ?= 2
@@ -14,8 +15,9 @@ READY ?= .venv/ready
 COHORT ?=
 PROFILE ?= plain
 CLUSTER ?= .venv-cluster
+DOCS ?= .venv-docs
 
-.PHONY: sample test test-long blind cohort check clean study cluster locks
+.PHONY: sample test test-long blind cohort check clean study cluster locks docs
 
 sample: $(READY)
 	$(BIN)/bsip run sample_data --out out/sample --jobs $(JOBS)
@@ -41,6 +43,10 @@ cohort: .venv/ready
 	test -d out/cohort_study || $(BIN)/bsip simulate out/cohort_study --preset cohort
 	$(BIN)/bsip run out/cohort_study --out out/cohort --jobs $(JOBS)
 	$(BIN)/bsip show out/cohort
+
+docs: $(DOCS)/ready
+	$(DOCS)/bin/mkdocs build --strict --quiet
+	@echo out/site/index.html
 
 # --- a study of your own --------------------------------------------------------------------------
 # bsip itself knows what is up to date. Paths go through the environment: whatever stands in them, the
@@ -75,25 +81,29 @@ endif
 	touch .venv/ready
 
 $(CLUSTER)/ready: requirements-cluster.lock
-	$(PYTHON) -m venv $(CLUSTER)
-	$(CLUSTER)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements-cluster.lock
+$(DOCS)/ready: requirements-docs.lock
+$(CLUSTER)/ready $(DOCS)/ready:
+	$(PYTHON) -m venv $(@D)
+	$(@D)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement $<
 	touch $@
 
-# Both locks anew from pyproject.toml, with the versions that they have;
+# All locks anew from pyproject.toml, with the versions that they have;
 # make locks UPGRADE=--upgrade takes the newest that fit.
 UV = uv==0.13.9
 UPGRADE ?=
 LOCK = --no-config --quiet pip compile --universal --python-version 3.11 --generate-hashes \
 	--no-annotate --custom-compile-command "make locks" $(UPGRADE)
-CLUSTER_NEEDS = import tomllib; \
-	print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["cluster"], sep="\n")
+NEEDS = import sys, tomllib; \
+	print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"][sys.argv[1]], sep="\n")
 
 locks:
 	@tool=$$(mktemp -d) && trap "rm -rf $$tool" EXIT && $(PYTHON) -m venv $$tool && \
 	$$tool/bin/python -m pip install --quiet --disable-pip-version-check $(UV) && \
 	$$tool/bin/uv $(LOCK) pyproject.toml --extra dev --output-file requirements.lock && \
-	$(PYTHON) -c '$(CLUSTER_NEEDS)' > $$tool/cluster.in && \
-	$$tool/bin/uv $(LOCK) $$tool/cluster.in --output-file requirements-cluster.lock
+	for extra in cluster docs; do \
+		$(PYTHON) -c '$(NEEDS)' $$extra > $$tool/$$extra.in && \
+		$$tool/bin/uv $(LOCK) $$tool/$$extra.in --output-file requirements-$$extra.lock || exit 1; \
+	done
 
 clean:
-	rm -rf .venv $(CLUSTER) out
+	rm -rf .venv $(CLUSTER) $(DOCS) out

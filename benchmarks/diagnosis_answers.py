@@ -55,7 +55,7 @@ class Answer:
     """Of one case. refused : why nothing could be injected or diagnosed. place : the target of
     the injected cause as the diagnosis should print it.
 
-    swaps : pairs of labels that ``ik`` put right. gains : per component what ``extend`` gained on
+    swaps : pairs of labels that ``ik`` corrected. gains : per component what ``extend`` gained on
     data held out, with its interval [%]. limits : by effect, target and parameter (parted by bars)
     the least size that some trial would show. said : warnings of the stages.
     """

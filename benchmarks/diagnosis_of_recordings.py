@@ -1,6 +1,6 @@
 """What bsip says of real recordings as they are, and with one injected cause each.
 
-    python -m benchmarks.diagnosis_of_recordings DATA --write docs/diagnosis_of_recordings.md
+    python -m benchmarks.diagnosis_of_recordings DATA --write
 
 DATA is a folder with the recordings listed in SUBJECTS; those that are missing are left out. Every
 case leaves a file in --results and is not run again while that is there: remove the folder to
@@ -18,9 +18,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from benchmarks.diagnosis_answers import Answer, answer_of
-from benchmarks.diagnosis_page import page
+from benchmarks.diagnosis_page import tables
 from benchmarks.injected_causes import CAUSES, Cause
-from benchmarks.measure import ROOT, run_child
+from benchmarks.measure import RESULTS, ROOT, markdown, run_child, write_csv
 from benchmarks.recordings import STUDIES, Source, make_study
 
 STAGES = ("ingest", "scale", "ik", "regress", "identify", "reconstruct", "diagnose", "extend")
@@ -90,7 +90,7 @@ SUBJECTS = (
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path)
-    parser.add_argument("--write", type=Path, help="write the page here instead of printing it")
+    parser.add_argument("--write", action="store_true", help="into docs/results")
     parser.add_argument("--results", type=Path, default=Path("out/diagnosis_of_recordings"))
     parser.add_argument("--only", action="append", help="a recording's name")
     parser.add_argument("--no-runs", action="store_true", help="write what is there already")
@@ -98,11 +98,11 @@ def main() -> None:
     chosen = [one for one in SUBJECTS if not arguments.only or one.source.name in arguments.only]
     for subject in () if arguments.no_runs else chosen:
         run_subject(subject, arguments.data, arguments.results)
-    text = page(read_results(arguments.results, SUBJECTS), CAUSES, AS_IT_IS)
-    if arguments.write:
-        arguments.write.write_text(text, encoding="utf-8")
-    else:
-        print(text)
+    found = tables(read_results(arguments.results, SUBJECTS), CAUSES, AS_IT_IS)
+    for name, (header, rows) in found.items():
+        print(f"{name}\n\n{markdown(header, rows)}\n")
+        if arguments.write and rows:
+            write_csv(RESULTS / f"{name}.csv", header, rows)
 
 
 def run_subject(subject: Subject, data: Path, results: Path) -> None:

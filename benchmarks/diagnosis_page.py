@@ -1,4 +1,4 @@
-"""The page about the diagnosis of real recordings."""
+"""The tables about the diagnosis of real recordings."""
 
 from __future__ import annotations
 
@@ -8,41 +8,44 @@ import numpy as np
 
 from benchmarks.diagnosis_answers import COMPONENTS, Answer, Balance, Found
 from benchmarks.injected_causes import Cause
-from benchmarks.measure import markdown
 
 BELOW = "missed, below what is seen"
 RIGHT, IN_CLASS, ALIKE = "right name", "right class", "named as what looks alike"
 ELSEWHERE = "right effect, other place"
-PUT_RIGHT, MISSED, WRONG, REFUSED = "put right by ik", "missed", "another name", "not possible"
+PUT_RIGHT, MISSED, WRONG, REFUSED = "corrected by ik", "missed", "another name", "not possible"
+INJECTED = (
+    "injected",
+    "seen from",
+    "answer",
+    "as",
+    "size found (95 % interval)",
+    "beside it",
+    "gone",
+    "mean held-out gain by `extend` [%]",
+)
+Table = tuple[Sequence[str], list[list[str]]]  # header and rows
 _SIGN = 0.5  # of the injected size: a smaller change of what stood there already is none
 
 
-def page(
+def tables(
     results: Mapping[str, Mapping[str, Answer]], causes: Sequence[Cause], as_it_is: str
-) -> str:
-    """Everything, from the stored answers: by recording, and by cause in words."""
-    if not results:
-        return "No recordings were found.\n"
+) -> dict[str, Table]:
+    """Everything, from the stored answers: header and rows by name."""
     plain = {name: answers[as_it_is] for name, answers in results.items() if as_it_is in answers}
-    parts = [
-        _HEAD,
-        "Cases that were not run are not listed.\n",
-        "## As they are\n",
-        _as_they_are(plain),
-        "\n## Balance of forces\n",
-        _BALANCE,
-        _balances(plain),
-        "\n## With one injected cause\n",
-        _INJECTED,
+    injected = [
+        [name, *row]
+        for name, answers in results.items()
+        if name in plain
+        for row in injected_rows(plain[name], answers, causes)
     ]
-    for name, answers in results.items():
-        if len(answers) > 1 and name in plain:
-            parts += [f"\n### {name}\n", injected_table(plain[name], answers, causes)]
-    parts.append(_ODD)
-    return "\n".join(parts) + "\n"
+    return {
+        "real_diagnosis": _as_they_are(plain),
+        "real_balance": _balances(plain),
+        "real_injected": (("recording", *INJECTED), injected),
+    }
 
 
-def _as_they_are(plain: Mapping[str, Answer]) -> str:
+def _as_they_are(plain: Mapping[str, Answer]) -> Table:
     rows = []
     for name, answer in plain.items():
         if answer.refused:
@@ -71,7 +74,7 @@ def _as_they_are(plain: Mapping[str, Answer]) -> str:
         "held-out gain of the diagnosis [%]",
         "held-out gain by `extend`, all causes [%]",
     ]
-    return markdown(header, rows)
+    return header, rows
 
 
 def _called(one: Found) -> str:
@@ -97,14 +100,14 @@ def _all_gains(answer: Answer) -> str:
 # --- balance of forces ------------------------------------------------------------------------
 
 
-def _balances(plain: Mapping[str, Answer]) -> str:
+def _balances(plain: Mapping[str, Answer]) -> Table:
     rows = [
         [name, one.trial, f"{one.seconds:.1f}", *_forces(one), f"{one.plates_kg:.2f}"]
         for name, answer in plain.items()
         for one in answer.balances
     ]
     header = ["recording", "trial", "time [s]", "fx [N]", "fy [N]", "fz [N]", "fz / g [kg]"]
-    return markdown(header, rows)
+    return header, rows
 
 
 def _forces(one: Balance) -> list[str]:
@@ -115,16 +118,15 @@ def _forces(one: Balance) -> list[str]:
 # --- injected causes --------------------------------------------------------------------------
 
 
-def injected_table(before: Answer, answers: Mapping[str, Answer], causes: Sequence[Cause]) -> str:
+def injected_rows(
+    before: Answer, answers: Mapping[str, Answer], causes: Sequence[Cause]
+) -> list[list[str]]:
     """One row per cause injected into a recording."""
-    rows = [
+    return [
         [cause.words, *_row(cause, before, answers[cause.words])]
         for cause in causes
         if cause.words in answers
     ]
-    header = ["injected", "seen from", "answer", "as", "size found (95 % interval)"]
-    header += ["beside it", "gone"]
-    return markdown([*header, "mean held-out gain by `extend` [%]"], rows)
 
 
 def _row(cause: Cause, before: Answer, after: Answer) -> list[str]:
@@ -198,54 +200,3 @@ def _found_size(cause: Cause, before: Answer, one: Found) -> str:
         low, high = parameter.factor * low - base, parameter.factor * high - base
         text += f" ({low:.3g} to {high:.3g})"
     return text + (f", beside {base:.3g} before" if stood else "")
-
-
-_HEAD = """# Diagnosis of real recordings
-
-Made by `python -m benchmarks.diagnosis_of_recordings ../shared/data --write
-docs/diagnosis_of_recordings.md`. The recordings belong to others and are not part of the project.
-"""
-
-_ODD = """
-## What is odd in them
-
-- `biobuddy_ech`: 4.8 and 5.3 kg between the static and the one-leg trials. Both hands stand still
-  (1 to 2 mm) 0.92 m above the floor and 0.84 m apart while the trunk sways by 5 to 16 mm; the mean
-  force that the plates miss has hardly a moment along itself, as a single push, and its line runs
-  between the hands. In the static trial sideways forces and weight are right. So it is a rail, and
-  neither a plate's gain nor a tilted lab.
-- `opencap_subject4` and `btk_pig`: the plates read 2.6 to 4.1 % less than the stated mass in quiet
-  standing. That is a class: gain, offset, or the stated mass.
-- `opencap_subject4`: the vertical forces are late by 5 to 6 ms (5.5 ms in sitstand, 6.1 ms in
-  squats, 4.7 to 8.6 ms in quarters of both), by regression of the measured on the simulated force
-  and its derivative.
-- `figaroh_human`: the forces are late by 7 to 10 ms in every component (9 ms in the vertical one,
-  standard error 1 ms; 7, 9, 8, 8 and 10 ms in fifths of the trial), 0.27 of a frame, by regression
-  of the measured on the simulated forces and the measured ones' derivative. The diagnosis
-  tells clocks that do not agree, but not evenly. A mean horizontal force of 5.2 N beside a weight
-  of 925 N is a plate or a lab that tilts by 0.3 degrees. From 45.6 s on RWRA and RWRB bear each
-  other's labels: `ik` puts them right. Markers smoothed beforehand smear that exchange, and it is
-  told as two that slip.
-- `figaroh_human`: the moment about the vertical is off by 11.9 N m throughout, the largest cause
-  there; what in the lab makes it is not known.
-- `return11_static`: the plates read 3.6 kg more than stated, and its file has markers on a bar (BL,
-  BR) whose mass nobody states.
-- `hamner_other`: the forces are late by 12 ms in both runs, or follow the motion as tissue that
-  swings does: with the delay in the model the vertical force errs by half as much on data held out.
-- Recordings that are refused have labels that no shipped marker set knows.
-"""
-
-_BALANCE = """Mean force over the frames in which every contact is on a plate: measured / simulated
-by RM. Over many seconds the mean horizontal force on a body that goes nowhere is zero, and the
-mean vertical one its weight, whatever its inertial parameters are.
-"""
-
-_INJECTED = """`bsip inject` hides one cause in a copy: causes of the lab in all moving trials,
-those of a plate's vertical channel, of a marker and of a load in the first one only. "Seen from":
-the size that `bsip diagnose` says it would find in 95 of 100 recordings like these as they are; it
-says none for markers. Where the same cause stood there before, it is that of another one like it,
-in other places and trials. "Right class": it is among causes that the recordings cannot tell apart.
-Sizes are less what the same cause had before; signs follow the plate's own axes, which may point
-down. "Beside it": other causes that are named, "(new)" if they were not before; "gone": what was
-named before and is not now.
-"""

@@ -7,14 +7,21 @@ import statistics
 import tempfile
 from pathlib import Path
 
-from benchmarks.measure import ROOT, machine, markdown
+from benchmarks.measure import RESULTS, machine, markdown, write_csv
 from benchmarks.participant import run_stage
-from benchmarks.sections import replace_section
 from bsip_cli.simulate.options import Asked, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 
 TARGET_CPU_S, TRIAL_S = 60.0, 30.0
-PAGE, SECTION = ROOT / "docs" / "benchmarks.md", "diagnosis_time"
+FILE = RESULTS / "diagnosis_time.csv"
+HEADER = (
+    "recordings",
+    "hidden",
+    "median [CPU-s]",
+    "most [CPU-s]",
+    "of which starting [CPU-s]",
+    "most per trial, of 60 CPU-s",
+)
 BEFORE = ("ingest", "scale", "ik", "regress", "identify", "reconstruct")
 HIDDEN = {
     "nothing": (),
@@ -50,7 +57,8 @@ def cpu_s(tasks: tuple[str, ...], hidden: tuple[Asked, ...], seed: int) -> tuple
         return work, run_stage("diagnose", study, out).cpu_s
 
 
-def table(seeds: list[int]) -> str:
+def rows_of(seeds: list[int]) -> list[list[str]]:
+    """One per set of recordings and what is hidden in them."""
     rows = []
     for told, tasks in TASKS.items():
         for name, hidden in HIDDEN.items():
@@ -60,19 +68,18 @@ def table(seeds: list[int]) -> str:
             each = max(whole) / len(tasks)
             rows.append([told, name, f"{statistics.median(whole):.1f}"])
             rows[-1] += [f"{max(whole):.1f}", f"{start:.1f}", f"{each / TARGET_CPU_S:.2f}"]
-    header = ["recordings", "hidden", "median [CPU-s]", "most [CPU-s]"]
-    return markdown([*header, "of which starting [CPU-s]", "most per trial, of 60 CPU-s"], rows)
+    return rows
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--people", type=int, default=3)
-    parser.add_argument("--write", action="store_true", help=f"into {PAGE.name}")
+    parser.add_argument("--write", action="store_true", help=f"into {FILE.name}")
     options = parser.parse_args()
-    content = table([100 + k for k in range(options.people)])
-    print(f"machine: {machine()}; {options.people} people\n\n{content}")
+    rows = rows_of([100 + k for k in range(options.people)])
+    print(f"machine: {machine()}; {options.people} people\n\n{markdown(HEADER, rows)}")
     if options.write:
-        replace_section(PAGE, SECTION, content)
+        write_csv(FILE, HEADER, rows)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """A table of every recording in a folder: what was read, corrected and refused, and the mass.
 
-    python -m benchmarks.every_recording ../shared/data --write docs/recordings.md
+    python -m benchmarks.every_recording ../shared/data --write
 
 The standing mass is compared with the sum of the plates as the file's own numbers give it without
 any correction: by ezc3d for C3D files, by the vertical columns for TRC with MOT and for CSV.
@@ -18,7 +18,7 @@ import ezc3d
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
-from benchmarks.sections import replace_section
+from benchmarks.measure import RESULTS, markdown, write_csv
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.model import Recording
@@ -27,7 +27,7 @@ from bsip_cli.recordings.read import read_recording
 from bsip_cli.recordings.resample import sample_at_frames, wrench_at_marker_rate
 from tests.real.figaroh_csv import convert
 
-SECTION = "every recording"
+FILE = RESULTS / "real_every_recording.csv"
 _PAIRS = {"squat2_pig61/markers.trc": "squat2_pig61/grf.mot"}  # names that do not belong together
 _NO_RECORDING = {"q+Forces_sampled_30Hz_filtered.csv": "joint coordinates, no markers"}
 _HEAD = (
@@ -83,13 +83,13 @@ class Row:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path)
-    parser.add_argument("--write", type=Path, help="put the table into this page")
+    parser.add_argument("--write", action="store_true", help=f"into {FILE.name}")
     arguments = parser.parse_args()
-    content = table(all_rows(arguments.data))
+    rows = all_rows(arguments.data)
+    cells = [row.cells() for row in rows]
+    print(f"{summary(rows)}\n\n{markdown(_HEAD, cells)}")
     if arguments.write:
-        replace_section(arguments.write, SECTION, content)
-    else:
-        print(content)
+        write_csv(FILE, _HEAD, cells)
 
 
 def all_rows(data: Path) -> list[Row]:
@@ -99,19 +99,16 @@ def all_rows(data: Path) -> list[Row]:
         return [_row(path, data, Path(scratch)) for path in paths]
 
 
-def table(rows: list[Row]) -> str:
-    """The rows as Markdown, and in a sentence what they come to."""
-    lines = ["| " + " | ".join(_HEAD) + " |", "|" + "---|" * len(_HEAD)]
-    lines += ["| " + " | ".join(row.cells()) + " |" for row in rows]
+def summary(rows: list[Row]) -> str:
+    """In a sentence what they come to."""
     refused = sum(row.read == "refused" for row in rows)
     standing = [row.weighed for row in rows if row.weighed and row.weighed.is_standing]
     gaps = [abs(one.difference_percent()) for one in standing if np.isfinite(one.alone_kg)]
-    summary = (
+    return (
         f"{len(rows)} files, {refused} refused. Quiet standing in {len(standing)}; in "
         f"{sum(gap < 1 for gap in gaps)} of the {len(gaps)} that can be compared bsip's mass is "
         f"within 1 % of the other (largest difference {max(gaps, default=0):.2f} %)."
     )
-    return summary + "\n\n" + "\n".join(lines)
 
 
 def _row(path: Path, data: Path, scratch: Path) -> Row:

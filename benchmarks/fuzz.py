@@ -1,6 +1,6 @@
 """Thousands of damaged files: what bsip answers, how long it takes, how much memory.
 
-    python -m benchmarks.fuzz --cases 400 --data ../shared/data --write docs/recordings.md
+    python -m benchmarks.fuzz --cases 400 --data ../shared/data --write
 
 Per kind of file CASES copies are damaged (tests/fuzz/damage.py) and ingested in processes with
 limits of time and memory; with DATA the real C3D files of tests/fuzz/fuzz_study.py too. The
@@ -15,12 +15,13 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from benchmarks.sections import replace_section
+from benchmarks.measure import RESULTS, write_csv
 from tests.fuzz.fuzz_run import Result, run_cases
 from tests.fuzz.fuzz_study import REAL, TARGETS
 
-SECTION = "fuzz"
+FILE = RESULTS / "damaged_files.csv"
 _STATES = ("refused", "said", "unchanged", "silent", "bug", "died")
+HEADER = ("file", "cases", *_STATES, "slowest [s]", "peak [MB]")
 
 
 def main() -> None:
@@ -28,7 +29,7 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=400, help="per kind of file")
     parser.add_argument("--real-cases", type=int, default=60, help="per real C3D file")
     parser.add_argument("--data", type=Path, help="folder of real recordings")
-    parser.add_argument("--write", type=Path, help="put the table into this page")
+    parser.add_argument("--write", action="store_true", help=f"into {FILE.name}")
     arguments = parser.parse_args()
     results: dict[str, list[Result]] = {}
     with tempfile.TemporaryDirectory() as scratch:
@@ -40,25 +41,21 @@ def main() -> None:
             results[target] = run_cases(target, 0, arguments.real_cases, folder, arguments.data)
             _tell(target, results[target])
     if arguments.write:
-        replace_section(arguments.write, SECTION, table(results))
+        write_csv(FILE, HEADER, rows_of(results))
     sys.exit(any(one.is_failure() for ones in results.values() for one in ones))
 
 
-def table(results: dict[str, list[Result]]) -> str:
+def rows_of(results: dict[str, list[Result]]) -> list[list[str]]:
     """A row per kind of file: cases by answer, the slowest, the largest."""
-    lines = [
-        "| file | cases | " + " | ".join(_STATES) + " | slowest [s] | peak [MB] |",
-        "|---|" + "---|" * (len(_STATES) + 3),
-    ]
+    rows = []
     for target, ones in results.items():
         counts = Counter(one.state for one in ones)
         name = TARGETS[target][0] if target in TARGETS else REAL[target]
         cells = [name, str(len(ones)), *(str(counts[state]) for state in _STATES)]
         cells += [f"{max(one.seconds for one in ones):.1f}"]
         cells += [f"{max(one.peak_MB for one in ones):.0f}"]
-        lines.append("| " + " | ".join(cells) + " |")
-    n = sum(len(ones) for ones in results.values())
-    return f"{n} cases.\n\n" + "\n".join(lines)
+        rows.append(cells)
+    return rows
 
 
 def _tell(target: str, ones: list[Result]) -> None:

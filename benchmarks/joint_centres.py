@@ -18,9 +18,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.measure import ROOT, machine, markdown
+from benchmarks.measure import RESULTS, machine, markdown, write_csv
 from benchmarks.participant import run_stage
-from benchmarks.sections import replace_section
 from bsip_cli.artifacts import read_artifact
 from bsip_cli.body.names import without_side
 from bsip_cli.body.person import Person, rigid_motion
@@ -29,7 +28,7 @@ from bsip_cli.simulate.options import StudyOptions
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages.frames import person_from
 
-PAGE, SECTION = ROOT / "docs" / "benchmarks.md", "joint_centres"
+FILE = RESULTS / "joint_centres.csv"
 TASKS = ("static", "sequence", "squat")
 SKELETON = "hansen2017"
 BY = ("regression", "bsip scale")
@@ -54,7 +53,7 @@ def main() -> None:
     parser.add_argument("--people", type=int, default=10)
     parser.add_argument("--seed", type=int, default=31)
     parser.add_argument("--sequence-s", type=float, default=60.0)
-    parser.add_argument("--write", action="store_true", help=f"into {PAGE.name}")
+    parser.add_argument("--write", action="store_true", help=f"into {FILE.name}")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         study = Path(folder, "study")
@@ -63,11 +62,11 @@ def main() -> None:
             study,
             StudyOptions(options.people, options.seed, tasks=TASKS, durations_s=durations),
         )
-        rows = list(errors_of(study, options.people))
-    content = table(pd.DataFrame(rows))
-    print(f"machine: {machine()}; {options.people} people\n\n{content}")
+        found = pd.DataFrame(errors_of(study, options.people))
+    header, rows = ["joint", "distance [mm]", "joints", *BY], summary(found)
+    print(f"machine: {machine()}; {options.people} people\n\n{markdown(header, rows)}")
     if options.write:
-        replace_section(PAGE, SECTION, content)
+        write_csv(FILE, header, rows)
 
 
 def errors_of(study: Path, people: int) -> Iterator[dict]:
@@ -131,7 +130,7 @@ def anchors(person: Person, truth: Truth, segment: int) -> tuple[np.ndarray, np.
     return np.stack(model), np.stack(true)
 
 
-def table(found: pd.DataFrame) -> str:
+def summary(found: pd.DataFrame) -> list[list[str]]:
     """Median and 90th percentile of the distances per joint, both sides together."""
     measures = ["from the true centre", "from the true axis"]
     lines = []
@@ -142,7 +141,7 @@ def table(found: pd.DataFrame) -> str:
                 continue
             cells = [_cell(mine[mine["by"] == by][measure]) for by in BY]
             lines.append([joint, measure, str(len(mine[mine["by"] == BY[0]])), *cells])
-    return markdown(["joint", "distance [mm]", "joints", *BY], lines)
+    return lines
 
 
 def _cell(values: pd.Series) -> str:

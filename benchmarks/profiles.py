@@ -18,16 +18,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import bsip_cli
-from benchmarks.measure import ROOT, machine, markdown
+from benchmarks.measure import RESULTS, machine, markdown, write_csv
 from benchmarks.participant import run_stage, study_options
-from benchmarks.sections import replace_section
 from bsip_cli.pipeline import STAGES, Stage
 from bsip_cli.running.runner import perform
 from bsip_cli.running.session import OpenedStudy, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.simulate.study import simulate_study
 
-PAGE, SECTION = ROOT / "docs" / "benchmarks.md", "profiles"
+FILE = RESULTS / "profiles.csv"
 PACKAGE = Path(bsip_cli.__file__).parent
 SEED, SHOWN = 2017, 6
 
@@ -73,13 +72,13 @@ def profiled(stages: list[Stage], opened: OpenedStudy, out: Path) -> cProfile.Pr
 def row_of(name: str, times: Counter[str]) -> list[str]:
     total = sum(times.values())
     parts = [f"{place} {100 * own / total:.0f} %" for place, own in times.most_common(SHOWN)]
-    return [name, f"{total:.1f}", "; ".join(part.replace("|", "\\|") for part in parts)]
+    return [name, f"{total:.1f}", "; ".join(parts)]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sequence-s", type=float, default=120.0, help="[s]")
-    parser.add_argument("--write", action="store_true", help=f"into {PAGE.name}")
+    parser.add_argument("--write", action="store_true", help=f"into {FILE.name}")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         study, out = Path(folder, "study"), Path(folder, "out")
@@ -90,10 +89,10 @@ def main() -> None:
         for name in dict.fromkeys(stage.name for stage in STAGES):
             stages = [stage for stage in STAGES if stage.name == name]
             rows.append(row_of(name, own_times(profiled(stages, opened, out))))
-    content = markdown(["stage", "with the profiler [s]", "own time"], rows)
-    print(f"machine: {machine()}\n\n{content}")
+    header = ["stage", "with the profiler [s]", "own time"]
+    print(f"machine: {machine()}\n\n{markdown(header, rows)}")
     if options.write:
-        replace_section(PAGE, SECTION, content)
+        write_csv(FILE, header, rows)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """What bsip makes of real recordings: marker residuals, and errors of RM and OM.
 
-    python -m benchmarks.recordings DATA --write docs/recordings.md
+    python -m benchmarks.recordings DATA --write
 
 DATA is a folder with the recordings listed in STUDIES; those that are missing are left out.
 """
@@ -17,9 +17,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.every_recording import SECTION as EVERY
-from benchmarks.fuzz import SECTION as FUZZ
-from benchmarks.sections import marks, read_section, replace_section
+from benchmarks.measure import RESULTS, markdown, write_csv
 from bsip_cli.statistics.methods import METHODS
 from tests.real.figaroh_csv import convert
 
@@ -97,21 +95,20 @@ _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path)
-    parser.add_argument("--write", type=Path, help="write the page here instead of printing it")
+    parser.add_argument("--write", action="store_true", help="into docs/results")
     arguments = parser.parse_args()
-    page = render(arguments.data)
-    if arguments.write:
-        kept = {name: read_section(arguments.write, name) for name in (EVERY, FUZZ)}
-        arguments.write.write_text(page, encoding="utf-8")
-        for name, content in kept.items():
-            replace_section(arguments.write, name, content)
-    else:
-        print(page)
+    for name, rows in tables(arguments.data).items():
+        header = list(rows[0]) if rows else []
+        cells = [list(row.values()) for row in rows]
+        print(markdown(header, cells) if rows else "No recordings were found.", end="\n\n")
+        if arguments.write and rows:
+            write_csv(RESULTS / f"{name}.csv", header, cells)
 
 
-def render(data: Path) -> str:
-    """The page: a table of markers and one of forces."""
-    markers, forces = [], []
+def tables(data: Path) -> dict[str, list[dict[str, str]]]:
+    """By file name a table of markers and one of forces."""
+    markers: list[dict[str, str]] = []
+    forces: list[dict[str, str]] = []
     with tempfile.TemporaryDirectory() as scratch:
         for k, source in enumerate(STUDIES):
             study = Path(scratch) / f"study{k}"
@@ -120,8 +117,7 @@ def render(data: Path) -> str:
             out = run(study)
             markers += marker_rows(source.name, out)
             forces += force_rows(source.name, out)
-    marked = {"every": "\n".join(marks(EVERY)), "fuzz": "\n".join(marks(FUZZ))}
-    return _PAGE.format(markers=_table(markers), forces=_table(forces), **marked)
+    return {"real_markers": markers, "real_forces": forces}
 
 
 def make_study(study: Path, data: Path, source: Source) -> bool:
@@ -204,79 +200,6 @@ def force_rows(name: str, out: Path) -> list[dict[str, str]]:
             row[component] = " / ".join(values)
         rows.append(row)
     return rows
-
-
-def _table(rows: list[dict[str, str]]) -> str:
-    if not rows:
-        return "No recordings were found."
-    header = list(rows[0])
-    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    lines += ["| " + " | ".join(row[name] for name in header) + " |" for row in rows]
-    return "\n".join(lines)
-
-
-_PAGE = """# Real recordings
-
-Made by `python -m benchmarks.recordings ../shared/data --write docs/recordings.md`; the last two
-tables by scripts of their own. The recordings belong to others and are not part of the project.
-
-## Markers after scaling
-
-Root mean square over frames of the distance of each marker from its model; the median over the
-markers, all of them together, and the three worst.
-
-{markers}
-
-In `biobuddy_ech` the knee's and elbow's epicondyles change places between trials. `ik` puts them
-right, but the calibration meets them as labelled: they only calibrate there (weight 0.02 in the
-marker set), and where the trials disagree their places are a compromise. `figaroh_human`'s right
-wrist markers change places at 45.6 s and are put right too. The fingertip markers of
-`biobuddy_ech` (RFT3, LFT3) sit on fingers, which the hand does not carry rigidly. Acromion markers
-stand out in `opencap_subject4` and `figaroh_human`: the shoulder girdle moves, and this skeleton
-has none.
-
-## Forces and centre of pressure: RM / RM+mass / OM
-
-RMSE in N, N m and mm. `held out`: data that did not identify OM.
-
-{forces}
-
-What is odd in them, and not the inertial parameters' fault: in the one-leg trials of `biobuddy_ech`
-both hands hold a rail that bears 4 kg (see the [diagnosis](diagnosis_of_recordings.md)), so OM,
-identified from them, misses the static weight; the plates of `opencap_subject4` read 4 % under the
-stated mass in all trials but walking.
-
-## Every recording
-
-Made by `python -m benchmarks.every_recording ../shared/data --write docs/recordings.md`: each file
-alone, before a marker set is chosen and before unloaded plates are zeroed. `bsip` is the mean
-vertical force of all plates over g, `alone` the same frames as ezc3d's extraction has them (TRC and
-CSV: the vertical columns) without any correction. `standing` are the frames of the longest calm
-stretch of at least 0.8 s; `all` is every usable frame of a trial without one, which is no mass.
-
-{every}
-
-What is left open. `edge_nimble/JH_01`: reversed, plate 1 presses, inside its outline; but both
-loads rise and fall together, which a person who shifts weight cannot do, and its centre of pressure
-is 0.42 m from the nearest foot. As recorded, the sum stays within 0.6 N: a zero lost by about
-1100 N explains all of it, a wrong sign does not. The file does not tell the zero, so the plate
-stays reversed, with a warning. Three plates of `TYPE-3.c3d` pull in the samples of
-FORCE_PLATFORM:ZERO, and differ by that baseline. `type1.C3D`, `kyowadengyo.c3d` and `evart.c3d`
-hold other counts than ezc3d takes from their parameters; the forces of the first two (up to 732 and
-787 N, under the feet) bear the header out, those of the third are volts without a calibration.
-
-## Damaged files
-
-Made by `python -m benchmarks.fuzz --data ../shared/data --write docs/recordings.md`: bytes flipped,
-emptied, moved and cut, words set to extremes, text cells and lines mangled. `refused`: in words;
-`said`: read, with a warning that the sound file does not have; `unchanged`: the same numbers.
-`silent` would be another number without a word, `bug` a traceback, `died` a killed process (20 s,
-or 1.5 GB above the sound file). Numbers count as changed if the median of a marker moves by 2 mm,
-of a wrench by 1 %, or any by far; digits of a participant's mass or height in a table of good form
-are the user's word.
-
-{fuzz}
-"""
 
 
 if __name__ == "__main__":

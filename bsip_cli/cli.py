@@ -356,7 +356,7 @@ def markers(file, marker_set, prefix, write):
     default="",
     metavar="sub-01",
     help="Whose all these recordings are; without it, folders, the files' subjects and the names "
-    "of files tell people apart.",
+    "of files distinguish people.",
 )
 @click.option("--link", is_flag=True, help="Symbolic links instead of copies.")
 def init(given, out, participant, link):

@@ -1,14 +1,17 @@
-"""The reference pages in docs/, rendered from the code: commands, options, artifacts.
+"""The reference pages in docs/, rendered from the code: commands, options, artifacts, faults.
 
 ``python -m bsip_cli.reference docs`` writes them; a test fails where they differ from the code.
 """
 
 from __future__ import annotations
 
+import csv
 import re
 import sys
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
@@ -17,12 +20,16 @@ from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
 
 from bsip_cli.cli import cli
-from bsip_cli.commands.published import shown
 from bsip_cli.config import Config, Section, shipped
-from bsip_cli.pipeline import STAGES, Stage, producer
-from bsip_cli.schemas import SCHEMAS, Level, Schema
+from bsip_cli.effects.catalogue import CATALOGUE
+from bsip_cli.effects.effect import Effect
+from bsip_cli.pipeline import STAGES, Stage
+from bsip_cli.report.effect_words import EFFECT_WORDS
+from bsip_cli.report.usual_sizes import USUAL, usual_words
+from bsip_cli.schemas import SCHEMAS, Column, Level, Schema
 
 REGENERATE = "python -m bsip_cli.reference docs"
+_COMMON = 3  # places that have the same column or option: it is explained once
 _NOTE = f"<!-- Made by `{REGENERATE}`; change the code instead. -->"
 
 
@@ -32,7 +39,7 @@ def pages() -> dict[str, str]:
         "cli.md": cli_page(),
         "options.md": options_page(),
         "artifacts.md": artifacts_page(),
-        "published.md": published_page(),
+        "faults.md": faults_page(),
     }
 
 
@@ -49,15 +56,6 @@ def _page(title: str, parts: Iterable[str]) -> str:
     return "\n\n".join([_NOTE, f"# {title}", *parts]) + "\n"
 
 
-def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [
-        header,
-        ["---"] * len(header),
-        *([cell.replace("|", "\\|") for cell in r] for r in rows),
-    ]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
 def _code(names: Iterable[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
@@ -66,25 +64,34 @@ def _code(names: Iterable[str]) -> str:
 
 
 def cli_page() -> str:
-    """Every command; those with the same arguments share one table of them."""
-    groups: dict[str, list[str]] = {}
+    """Every command with its own options; those of several are explained once."""
+    lines = {name: _option_lines(command) for name, command in cli.commands.items()}
+    seen = Counter(line for each in lines.values() for line in each)
+    common = [line for line, n in seen.items() if n > 1]
+    parts = [_paragraphs(cli), "## Options of several commands", "\n".join(common)]
+    groups: dict[tuple[str, ...], list[str]] = {}
     for name, command in cli.commands.items():
-        groups.setdefault(_arguments(command), []).append(name)
-    parts = [_paragraphs(cli)]
-    for arguments, names in groups.items():
-        usages = [f"bsip {name} {_usage(cli.commands[name])}" for name in names]
-        meanings = [(f"`bsip {name}`", _in_a_cell(cli.commands[name])) for name in names]
-        parts += [f"## {', '.join(names)}", "```\n" + "\n".join(usages) + "\n```"]
-        parts += [_table(("command", "what it does"), meanings), *filter(None, [arguments])]
+        groups.setdefault((_usage(command), *lines[name]), []).append(name)
+    for (usage, *options), names in groups.items():
+        own = [line for line in options if line not in common]
+        shared = [line.split("`")[1] for line in options if line in common]
+        heading = usage.replace("[OPTIONS] ", "")
+        parts += [f"## {', '.join(names)} {heading}", *_meanings(names)]
+        parts += ["Options:"] if own and len(names) > 1 else []
+        parts += ["\n".join(own)] if own else []
+        parts += [f"{'And' if own else 'Options:'} {_code(shared)}."] if shared else []
     return _page("The command line", parts)
+
+
+def _meanings(names: Sequence[str]) -> list[str]:
+    texts = [_paragraphs(cli.commands[name]) for name in names]
+    if len(names) == 1:
+        return texts
+    return ["\n".join(f"- {name}: {text}" for name, text in zip(names, texts, strict=True))]
 
 
 def _paragraphs(command: click.Command) -> str:
     return "\n\n".join(" ".join(text.split()) for text in (command.help or "").split("\n\n"))
-
-
-def _in_a_cell(command: click.Command) -> str:
-    return _paragraphs(command).replace("\n\n", " ")
 
 
 def _usage(command: click.Command) -> str:
@@ -92,10 +99,9 @@ def _usage(command: click.Command) -> str:
     return " ".join(command.collect_usage_pieces(context))
 
 
-def _arguments(command: click.Command) -> str:
+def _option_lines(command: click.Command) -> list[str]:
     options = [each for each in command.params if isinstance(each, click.Option)]
-    rows = [(f"`{_spelling(option)}`", _default(option), option.help or "") for option in options]
-    return _table(("option", "default", "meaning"), rows) if rows else ""
+    return [f"- `{_spelling(one)}`: {one.help or ''}{_default(one)}" for one in options]
 
 
 def _spelling(option: click.Option) -> str:
@@ -112,26 +118,65 @@ def _spelling(option: click.Option) -> str:
 
 def _default(option: click.Option) -> str:
     if option.required:
-        return "required"
-    return f"`{option.default}`" if option.show_default else ""
+        return " Required."
+    return f" Without it `{option.default}`." if option.show_default else ""
 
 
-# --- published values -------------------------------------------------------------------------
+# --- faults -----------------------------------------------------------------------------------
+
+_RESULTS = Path(__file__).parents[1] / "docs" / "results"
 
 
-def published_page() -> str:
-    """The papers' tables, and what in them cannot be as printed."""
-    about = (
-        "Tables of the three papers that the method comes from, and what their own numbers "
-        "contradict: differences of means against the middles of their intervals, t against the "
-        "interval, p against t, F against means and standard deviations, Cohen's d against every "
-        "usual definition, sums, marks, captions, units. Every printed number stands for all "
-        "that round to it; a reading is given where one change alone makes the numbers agree. "
-        "`bsip published audit` prints the same."
-    )
-    parts = [f"## What cannot be as printed\n\n{chr(10).join(shown('audit', None))}"]
-    parts.append(f"## As printed\n\n{chr(10).join(shown('show', None))}")
-    return _page("Published values", [about, *parts])
+def faults_page() -> str:
+    """Every effect of the catalogue: what it is, how it shows, how large, how sure, what to do."""
+    parts = [
+        "What `bsip diagnose` can name. *Usual* are the sizes that laboratories meet. *Sure*: how "
+        "often it was found where the blind suite had hidden it, in a few cases of a seed that "
+        "chose nothing ([all figures](results.md#is-the-right-fault-named)). *To tell it*: the "
+        "recording that separates it from faults that look alike. What else may be said is in "
+        "[how to read the report](report.md)."
+    ]
+    shown: dict[str, str] = {}
+    for effect in CATALOGUE:
+        words = EFFECT_WORDS[effect.name]
+        parts += [f"## {effect.name}: {words.title}", _what_it_is(effect)]
+        first = shown.setdefault(words.consequence, effect.name)
+        advice = (
+            words.consequence if first == effect.name else f"as for [{first}](#{_anchor(first)})."
+        )
+        usual = f"- Usual: {usual_words(effect.name)}." if effect.name in USUAL else ""
+        lines = [
+            f"- Looks like: {effect.looks}.",
+            usual,
+            f"- Sure: {_found(effect.name)}.",
+            f"- To tell it: {effect.remedy}.",
+            f"- What to do: {advice}",
+        ]
+        parts.append("\n".join(filter(None, lines)))
+    return _page("The faults", parts)
+
+
+def _anchor(effect: str) -> str:
+    return f"{effect} {EFFECT_WORDS[effect].title}".replace("'", "").replace(" ", "-").lower()
+
+
+def _what_it_is(effect: Effect) -> str:
+    return (sys.modules[type(effect).__module__].__doc__ or "").split("\n\n")[0].strip()
+
+
+def _found(effect: str) -> str:
+    """Of the blind suite's tables: cases, names, and intervals that hold the truth."""
+    with (_RESULTS / "blind_effects.csv").open(encoding="utf-8", newline="") as file:
+        row = {one["hidden"]: one for one in csv.DictReader(file)}[effect]
+    named, group = int(row["right name"]), int(row["right class"])
+    said = f"named in {named} of {row['cases']}"
+    said += f", in a group in {group}" if group else ""
+    said += f", corrected before in {row['corrected']}" if row["corrected"] != "0" else ""
+    with (_RESULTS / "blind_estimates.csv").open(encoding="utf-8", newline="") as file:
+        held = [one["95 % CI holds it"] for one in csv.DictReader(file) if one["effect"] == effect]
+    counts = [tuple(map(int, text.split(" of "))) for text in held]
+    inside, intervals = (sum(column) for column in zip(*counts, strict=True)) if counts else (0, 0)
+    return f"{said}; {inside} of {intervals} intervals hold the truth" if intervals else said
 
 
 # --- options ----------------------------------------------------------------------------------
@@ -184,18 +229,19 @@ def options_page() -> str:
         "file does not name keeps its default. Names in `[brackets]` are sections of the file."
     ]
     for section in dict.fromkeys(option.section for option in options):
-        rows = [_option_row(option) for option in options if option.section == section]
+        lines = [_option_line(option) for option in options if option.section == section]
         names = [section] if section else [option.name for option in options if not option.section]
-        readers = [stage.label for stage in STAGES if set(names) & set(stage.options)]
+        readers = dict.fromkeys(s.name for s in STAGES if set(names) & set(s.options))
         parts += [f"## `[{section}]`" if section else "## At the top of the file"]
-        parts += [f"Read by {', '.join(readers or ['the study layout'])}."]
-        parts += [_table(("option", "default", "unit", "allowed", "meaning"), rows)]
+        parts += [f"Read by {', '.join(readers or ['the study layout'])}.", "\n".join(lines)]
     return _page("The options", parts)
 
 
-def _option_row(option: OptionText) -> tuple[str, ...]:
+def _option_line(option: OptionText) -> str:
     limits = _limits(field_of(option.section, option.name))
-    return (f"`{option.name}`", f"`{option.default}`", option.unit, limits, option.meaning)
+    value = f"`{option.default}` {option.unit}".strip()
+    allowed = f" ({limits})" if limits else ""
+    return f"- `{option.name}` = {value}{allowed}: {option.meaning}"
 
 
 def field_of(section: str, name: str) -> FieldInfo:
@@ -234,52 +280,76 @@ _PLACES: dict[Level, str] = {
 
 def artifacts_page() -> str:
     """Every stage with what it reads and writes, and every column of what is written."""
+    seen = Counter(column for schema in SCHEMAS.values() for column in schema.columns)
+    common = tuple(column for column, n in seen.items() if n >= _COMMON)
+    written = {kind for stage in STAGES for kind in stage.writes}
     parts = [
         "Parquet files, one table each. A column's unit, frame and meaning stand in the file too, "
-        "and beside them, as JSON under the key `bsip`: the kind and version of the table, the "
-        "stage and versions that made it, the SHA-256 of every input (of the group's artifacts one "
-        'for each participant, over the lines "name hash" of all that was read), the options the '
-        "stage read, its warnings. `*` in a column's name stands for a family of columns. Of a "
-        "session's trial, names begin with sub-XX_ses-SES_task-TASK."
+        "and as JSON under the key `bsip` what made it: kind, version, stage, versions of the "
+        "libraries, SHA-256 of every input, options, warnings. `bsip info FILE` prints both. `*` "
+        "stands for a family of columns; files of a session begin with sub-XX_ses-SES.",
+        "## Columns of many artifacts",
+        "Where a table below ends with some of these, it has them too.",
+        _columns(common),
     ]
+    shown: dict[tuple[Column, ...], str] = {}
     for stage in STAGES:
-        parts += _stage_parts(stage)
-    written = {kind for stage in STAGES for kind in stage.writes}
+        parts += [f"## {stage.label}", stage.summary, _facts(stage)]
+        for kind in stage.writes:
+            schema = SCHEMAS[kind]
+            place = _PLACES[schema.level].format(kind=schema.file_name)
+            parts += _schema_parts(schema, place, common, shown)
     parts += ["## Beside them"]
     places = {"refusal": "OUT/sub-XX/…_refusal-STAGE.parquet"}
     for kind in [kind for kind in SCHEMAS if kind not in written]:
         place = places.get(kind) or _PLACES[SCHEMAS[kind].level].format(kind=kind)
-        parts += _schema_parts(SCHEMAS[kind], place)
+        parts += _schema_parts(SCHEMAS[kind], place, common, shown)
     return _page("The artifacts", parts)
 
 
-def _stage_parts(stage: Stage) -> list[str]:
-    reads = [f"[{kind}](#{kind}) ({producer(kind).name})" for kind in stage.reads]
-    more = [f"[{kind}](#{kind}) ({producer(kind).name})" for kind in stage.reads_if_there]
-    facts = [
-        f"- reads: {', '.join(reads) or 'the recording'}",
-        *([f"- reads where they are there: {', '.join(more)}"] if more else []),
-        f"- writes: {', '.join(f'[{kind}](#{kind})' for kind in stage.writes)}",
-        f"- options: {_code(stage.options)}",
-    ]
-    parts = [f"## Stage {stage.label}", stage.summary, "\n".join(facts)]
-    for kind in stage.writes:
-        parts += _schema_parts(
-            SCHEMAS[kind], _PLACES[SCHEMAS[kind].level].format(kind=SCHEMAS[kind].file_name)
-        )
-    return parts
+def _facts(stage: Stage) -> str:
+    facts = [("Reads", _links(stage.reads) or "the recording")]
+    if stage.reads_if_there:
+        facts.append(("where there are any", _links(stage.reads_if_there)))
+    if stage.options:
+        facts.append(("options", _code(stage.options)))
+    return "; ".join(f"{name}: {what}" for name, what in facts) + "."
 
 
-def _schema_parts(schema: Schema, place: str) -> list[str]:
-    rows = [(f"`{c.name}`", c.type, c.unit, c.frame, c.meaning) for c in schema.columns]
+def _links(kinds: Sequence[str]) -> str:
+    return ", ".join(f"[{kind}](#{kind})" for kind in kinds)
+
+
+def _schema_parts(
+    schema: Schema,
+    place: str,
+    common: Sequence[Column],
+    shown: dict[tuple[Column, ...], str],
+) -> list[str]:
+    """Heading, place and columns; those that an earlier artifact has are not repeated."""
     sentence = (
         f"{schema.meaning[0].upper()}{schema.meaning[1:]}. `{place}`, version {schema.version}."
     )
-    return [
-        f"### {schema.kind}",
-        sentence,
-        _table(("column", "type", "unit", "frame", "meaning"), rows),
-    ]
+    parts = [f"### {schema.kind}", sentence]
+    if schema.columns in shown:
+        earlier = shown[schema.columns]
+        return [*parts, f"Columns as in [{earlier}](#{earlier})."]
+    shown[schema.columns] = schema.kind
+    own = [column for column in schema.columns if column not in common]
+    shared = [column.name for column in schema.columns if column in common]
+    parts += [_columns(own)] if own else []
+    return [*parts, *([f"And {_code(shared)}."] if shared else [])]
+
+
+def _columns(columns: Iterable[Column]) -> str:
+    """A line per column; neighbours of one meaning share one."""
+    lines = []
+    for same, group in groupby(columns, key=lambda c: (c.type, c.unit, c.frame, c.meaning)):
+        kind, unit, frame, meaning = same
+        number = unit if kind == "float" else f"{kind} {unit}".removesuffix(" 1").strip()
+        of = ", ".join(filter(None, [number, frame]))
+        lines.append(f"- {_code(column.name for column in group)} ({of}): {meaning}")
+    return "\n".join(lines)
 
 
 if __name__ == "__main__":

@@ -53,8 +53,7 @@ def _text(name: str, meaning: str) -> Column:
 _TIME = Column("time_s", "float", "s", "time from the start of the recording")
 _METHOD = _text(
     "method",
-    "measured, RM, RM+mass (RM, all masses and tensors times one number), OM, another estimator, "
-    "or OM+<effect>: extended",
+    "measured, RM, RM+mass, OM, another estimator, or OM+<effect>: extended",
 )
 _SEGMENT = _text("segment", "segment of the skeleton")
 _WRENCH = (
@@ -79,7 +78,7 @@ def _bsip_columns() -> tuple[Column, ...]:
             f"{_without_unit(n)}_data_share",
             "float",
             "1",
-            "part of the prior's variance that the data removed",
+            "posterior variance reduction by the data",
         )
         for n in _BSIP_UNITS
     ]
@@ -87,20 +86,20 @@ def _bsip_columns() -> tuple[Column, ...]:
 
 
 def _spread_columns() -> tuple[Column, ...]:
-    rod = "of the length of a rod with the segment's mass and mean moment of inertia"
+    rod = "of the length of a rod with its mass and mean moment"
     return (
-        Column("mass_spread_percent", "float", "%", "how far people's masses stray from the table"),
+        Column("mass_spread_percent", "float", "%", "sd of people about the table: masses"),
         *_floats(
             "com_x_spread_percent com_y_spread_percent com_z_spread_percent",
             "%",
-            f"how far people's centres of mass stray from the table, {rod}; lengths' errors too",
+            f"centres of mass, {rod}; lengths' errors too",
             "segment",
         ),
         Column(
             "moments_spread_percent",
             "float",
             "%",
-            "how far people's moments of inertia stray from the table, the mass known",
+            "moments of inertia, the mass known",
         ),
     )
 
@@ -136,8 +135,7 @@ def _ratio(name: str, meaning: str) -> tuple[Column, ...]:
             f"log_error_{name}",
             "float",
             "1",
-            "standard error of its logarithm: between trials (of one trial: from its independent "
-            "samples; of all: between movements), widened by Student's t; nan where nothing tells",
+            "standard error of its logarithm, widened by Student's t; nan where not known",
         ),
     )
 
@@ -164,14 +162,14 @@ _COMPARISON = (
     *_floats(
         "count_a count_b",
         "1",
-        "participants in whom the first, the second method is (significantly) better",
+        "participants in whom the first, the second is (significantly) better",
     ),
     _text("reason", "why the test is not possible, or what to mind"),
 )
 
 _JOINT_AXIS = (
     _text("joint", "joint of the skeleton"),
-    _text("axis", "where a positive moment about it turns the distal segment"),
+    _text("axis", "where a positive moment turns the distal segment"),
 )
 
 _GAIN = (
@@ -193,10 +191,10 @@ _DIAGNOSIS = (
     _text("unit", "of estimate and interval"),
     *_floats("ci_low ci_high", "as unit", "95 % interval"),
     Column("p_value", "float", "1", "1 less the probability, where no test gives another"),
-    Column("gain_percent", "float", "%", "squared white residual that goes on held-out data"),
+    Column("gain_percent", "float", "%", "squared white residual explained on held-out data"),
     *_floats("gain_ci_low gain_ci_high", "%", "95 % interval of the gain"),
     _text("verdict", "named, ambiguous or rejected"),
-    _text("class_id", "causes that cannot be told apart here share it"),
+    _text("class_id", "ambiguity group: members cannot be distinguished here"),
     _text("sentence", "for people"),
     _text("trials", "recordings that show it"),
     Column("probability", "float", "1", "that it is there, given what else is found"),
@@ -221,7 +219,7 @@ _ERROR_BUDGET = (
     _text("data", "what was held out; empty where the term has no gain"),
     _text("trial", "whose error it is; empty: all trials of the person together"),
     Column("scale", "float", "1", "how many times as large as usual the term is, in the mean"),
-    _text("alike", "terms from which these recordings hardly tell it"),
+    _text("alike", "terms that these recordings hardly distinguish from it"),
 )
 
 _FAULT = (
@@ -258,8 +256,8 @@ SCHEMAS = {
                 _text("reversed_channel", "the one channel whose sign is the other"),
                 *_floats("half_size_x_m half_size_y_m", "m", "half the widened outline", "plate"),
                 _text("refusal", "why the plate was left out"),
-                _text("rivals", "repairs that would each do, apart by |; not told apart"),
-                _text("doubted", "what of it is believed as the file says, though they would do"),
+                _text("rivals", "corrections that cannot be distinguished, separated by |"),
+                _text("doubted", "what is believed as the file says all the same"),
                 _text("repeats", "the plates whose copy or sum it is"),
                 *(
                     column
@@ -347,7 +345,7 @@ SCHEMAS = {
             1,
             "what was found, corrected and excluded at ingest",
             (
-                _text("check", "what was looked at"),
+                _text("check", "what was examined"),
                 _text("subject", "plate, marker or segment"),
                 _text("found", "what was found"),
                 _text("expected", "what was expected"),
@@ -417,7 +415,7 @@ SCHEMAS = {
                     "plate_mass_kg",
                     "float",
                     "kg",
-                    "mass that the plates tell in all trials, known loads taken off",
+                    "by the plates in all trials, without known loads",
                 ),
                 _text(
                     "mass_note", "gross disagreement of stated mass and plates, or what is missing"
@@ -485,9 +483,8 @@ SCHEMAS = {
                     "statistic",
                     "float",
                     "1",
-                    "jump, offset: size over the spread it is judged against; slip: unlikeliness "
-                    "as a number of standard deviations, or as of an offset if the pose follows "
-                    "it; swap: residual as labelled over exchanged",
+                    "jump, offset: size over its spread; slip: significance in standard "
+                    "deviations; swap: residual as labelled over exchanged",
                 ),
                 _text("sentence", "the same in words"),
                 Column(
@@ -600,14 +597,13 @@ SCHEMAS = {
                     "distance",
                     "float",
                     "1",
-                    "squared distance of the body from the table in the spread of people, all "
-                    "segments together; empty for RM+mass",
+                    "squared distance from the table in sd of people; empty for RM+mass",
                 ),
                 Column(
                     "probability",
                     "float",
                     "1",
-                    "part of people whose body, identified from such data, is as far or further",
+                    "part of people who are as far or further by such data",
                 ),
                 Column("rare", "bool", "", "below 1 in 100: do not use these parameters"),
                 _text("farthest", "the segments that make half of the distance, in words"),
@@ -617,10 +613,10 @@ SCHEMAS = {
             "used-blocks",
             "participant",
             1,
-            "stretches that identified the parameters",
+            "intervals that identified the parameters",
             (
                 _text("trial", "identification trial"),
-                *_floats("start_s end_s", "s", "stretch that was used"),
+                *_floats("start_s end_s", "s", "interval that was used"),
             ),
         ),
         Schema(
@@ -692,7 +688,7 @@ SCHEMAS = {
                     "limit",
                     "float",
                     "as unit",
-                    "size that is found in 95 of 100 recordings; inf where no possible one is",
+                    "size named in 95 of 100 recordings; inf: none",
                 ),
                 _text("trials", "recordings that would show it"),
             ),
@@ -920,7 +916,7 @@ SCHEMAS = {
                 _text("since", "first session of a change; empty: in all of the laboratory's"),
                 _text("sentence", "for people"),
                 _text("laboratory", "1, 2 ... by the place of the plates, that of most persons 1"),
-                _text("class_id", "causes that cannot be told apart share it"),
+                _text("class_id", "ambiguity group: members cannot be distinguished"),
                 _text("scope", "laboratory, session or person"),
                 _text("who", "session that deviates; empty: all, or all since one"),
             ),
@@ -932,7 +928,7 @@ SCHEMAS = {
             "one row per participant, trial, method and variable",
             (
                 _text("participant", "participant_id"),
-                _text("trial", "stem of the trial or empty"),
+                _text("trial", "trial id, or empty"),
                 _text("task", "movement, or all"),
                 _text(
                     "role", "of the trial: sequence (identified OM) or validation; empty if none"

@@ -91,7 +91,7 @@ def _size(recording: Recording) -> str:
 
 
 def _findings(recording: Recording) -> list[str]:
-    """What reading the points had to put right."""
+    """What reading the points had to correct."""
     return [
         f"{finding.found}: {finding.action}" + (f" ({finding.subject})" if finding.subject else "")
         for finding in recording.findings

@@ -189,7 +189,7 @@ def _shared_text(sentences: tuple[str, ...], columns: int) -> Iterator[str]:
 
 def verdict_text(name: str, found: Verdict, right: tuple[str, ...], columns: int) -> str:
     """A diagnosis for a terminal of so many columns: causes numbered, lines broken; ``right`` says
-    what was put right before."""
+    what was corrected before."""
     width = _width(columns)
     lines = [f"\n## Is anything wrong: {printable(name)}", _wrapped(found.headline, width)]
     for number, cause in enumerate(found.causes, start=1):

@@ -18,7 +18,7 @@ _ROUNDS = 2  # a clock's rate is wrong by 0.3 % at most: each round leaves as mu
 
 
 def is_of_the_forces(cause: Cause) -> bool:
-    """Whether the measured forces are wrong, and can be put right."""
+    """Whether the measured forces are wrong, and can be corrected."""
     return cause.effect.of_the_plates or isinstance(cause.effect, Delay)
 
 

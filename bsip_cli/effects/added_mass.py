@@ -25,6 +25,7 @@ class AddedMass(Effect):
     name = "added_mass"
     of_the_lab = False
     on_its_segment = True
+    looks = "more weight than stated, and forces that go with the acceleration of one segment"
     remedy = "weigh the person as recorded, and record once without the load"
     least_named = MappingProxyType({"mass": 0.2})  # less is what the segment may differ by
 

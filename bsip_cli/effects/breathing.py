@@ -22,6 +22,7 @@ class Breathing(Effect):
     name = "breathing"
     of_the_lab = False
     on_its_segment = True
+    looks = "a slow swing of the vertical force in quiet parts, at the pace of breathing"
     remedy = "hold the breath for ten seconds"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

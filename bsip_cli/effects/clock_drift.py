@@ -17,6 +17,7 @@ class ClockDrift(Delay):
 
     name = "clock_drift"
     of_the_lab = True
+    looks = "a delay that grows through the trial: in step at its beginning, late at its end"
     remedy = "hop at the beginning and at the end of a long recording"
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:

@@ -25,7 +25,7 @@ class Delay(Effect):
 
 
 def put_right(scene: Scene, late_s: np.ndarray) -> np.ndarray:
-    """(N, 6) the measured wrench less the same put right by (N,) seconds; the trial's ends stay.
+    """(N, 6) the measured wrench less the same corrected by (N,) seconds; the trial's ends stay.
 
     From the measured course: the simulated one holds the noise of the motion, whose derivative
     would make every delay seem smaller than it is.

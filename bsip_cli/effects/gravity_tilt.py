@@ -17,6 +17,10 @@ class GravityTilt(Effect):
 
     name = "gravity_tilt"
     of_the_lab = True
+    looks = (
+        "a constant horizontal force in stance, in proportion to the weight and the same "
+        "on all plates; in flight the body falls aside"
+    )
     remedy = "hang a plumb line into the lab and measure it with two markers"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -25,6 +25,10 @@ class JointCentre(Effect):
     of_the_lab = False
     of_the_person = True
     of_the_body = True
+    looks = (
+        "moments and centre of pressure that err with the angle of one joint; its markers"
+        " fit worse as it bends"
+    )
     remedy = "record a trial that turns this joint alone, and scale with it"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

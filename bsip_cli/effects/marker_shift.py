@@ -27,6 +27,7 @@ class MarkerShift(Effect):
 
     name = "marker_shift"
     of_the_lab = False
+    looks = "the residual of one marker jumps and stays; the segment's pose jumps with it"
     remedy = "put the marker back to its place and record the trial again"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -28,6 +28,7 @@ class MarkerSwap(Effect):
     name = "marker_swap"
     of_the_lab = False
     least_named = MappingProxyType({"share": 0.5})  # labels are exchanged or not
+    looks = "residuals of two markers jump by their distance, and jump back at the end"
     remedy = "look at the labels of the two markers in the recording and exchange them"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -55,6 +55,7 @@ class MissingJoint(Effect):
     name = "missing_joint"
     of_the_lab = False
     of_the_person = True
+    looks = "markers of the trunk that fit badly when it bends, and moments that go with the bend"
     remedy = "put markers on both sides of T12/L1 and bend the trunk"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

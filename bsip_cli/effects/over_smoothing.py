@@ -26,6 +26,7 @@ class OverSmoothing(Effect):
     name = "over_smoothing"
     of_the_lab = True
     least_named = MappingProxyType({"share": 0.3})  # less belongs to another cut-off
+    looks = "peaks of the simulated force too low and too wide, in fast movements only"
     remedy = "export the trial again without the lab's filter"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

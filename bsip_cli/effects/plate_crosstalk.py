@@ -26,6 +26,10 @@ class PlateCrosstalk(Effect):
     name = "plate_crosstalk"
     of_the_lab = True
     of_the_plates = True
+    looks = (
+        "one channel repeats another one, smaller: a horizontal force or a moment with "
+        "the shape of the vertical force"
+    )
     remedy = "load the plate with a weight at several places"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

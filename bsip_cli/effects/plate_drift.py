@@ -16,6 +16,7 @@ class PlateDrift(Effect):
     name = "plate_drift"
     of_the_lab = False
     of_the_plates = True
+    looks = "a difference in one channel that grows evenly with time"
     remedy = "step off the plate at the beginning and at the end"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -25,6 +25,10 @@ class PlateGain(Effect):
     name = "plate_gain"
     of_the_lab = True
     of_the_plates = True
+    looks = (
+        "forces of one plate or channel are too large or too small in proportion; in "
+        "stance the mass is off by the same part"
+    )
     remedy = "weigh the person on a scale; lay a known weight on the plate"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -19,6 +19,10 @@ class PlateRotation(Effect):
     name = "plate_rotation"
     of_the_lab = True
     of_the_plates = True
+    looks = (
+        "horizontal forces that point aside in proportion to the force on the plate; with"
+        " a tilt, a horizontal force in quiet stance"
+    )
     remedy = "stand on the plate, push forwards and sideways, then turn by 90 degrees and repeat"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

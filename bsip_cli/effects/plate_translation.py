@@ -25,6 +25,10 @@ class PlateTranslation(Effect):
     name = "plate_translation"
     of_the_lab = True
     of_the_plates = True
+    looks = (
+        "the measured centre of pressure lies beside the simulated one by the same "
+        "distance wherever the person stands; forces agree"
+    )
     remedy = "stand on the plate with both feet, then turn by 90 degrees and stand again"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

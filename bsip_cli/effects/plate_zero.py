@@ -14,6 +14,7 @@ class PlateZero(Effect):
     name = "plate_zero"
     of_the_lab = True
     of_the_plates = True
+    looks = "a constant difference in one channel, with and without load"
     remedy = "step off the plate for five seconds"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

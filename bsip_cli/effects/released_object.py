@@ -20,6 +20,7 @@ class ReleasedObject(Effect):
     name = "released_object"
     of_the_lab = False
     on_its_segment = True
+    looks = "the weight falls at one moment, and until then forces go with a hand that speeds up"
     remedy = "stand still with the object and again without"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

@@ -21,6 +21,10 @@ class SegmentInertia(Effect):
     of_the_lab = False
     of_the_person = True
     of_the_body = True
+    looks = (
+        "forces that go with the acceleration of one segment in every trial, beyond what "
+        "people differ by"
+    )
     remedy = "record a sequence that moves this segment fast, and identify with it"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

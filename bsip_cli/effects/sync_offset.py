@@ -14,6 +14,10 @@ KNOWN_TO_S = 0.0002  # filters of plates and cameras delay a little too
 class SyncOffset(Delay):
     name = "sync_offset"
     of_the_lab = True
+    looks = (
+        "every rise of the simulated force leads or follows the measured one by the same "
+        "time; the error is largest where the force changes fastest"
+    )
     remedy = "hop three times in view of cameras and plates"
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:

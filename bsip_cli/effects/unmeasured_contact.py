@@ -27,6 +27,10 @@ class UnmeasuredContact(Effect):
     name = "unmeasured_contact"
     of_the_lab = False
     on_its_segment = True
+    looks = (
+        "for some seconds the plates lack a force that the motion needs; the balance over"
+        " long times is off too"
+    )
     remedy = "record without anything in reach"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:

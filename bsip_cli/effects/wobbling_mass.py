@@ -35,6 +35,10 @@ class WobblingMass(Effect):
     of_the_lab = False
     on_its_segment = True
     of_the_person = True
+    looks = (
+        "after impacts the measured force swings on at 2 to 8 Hz and dies away, which "
+        "the simulated one does not"
+    )
     remedy = "hop three times, or drop on the heels"
     least_named = MappingProxyType({"mass": 0.5})  # what swings to the sides only is none
 

@@ -86,7 +86,7 @@ _ORDER: tuple[Kind, ...] = ("swap", "offset", "slip", "jump")
 # Nothing is reported that stays within this many times what a marker is trusted to.
 BEYOND = 1.5
 _BEAR = "bear each other's labels"
-_DONE = {True: "put right", False: "not clear enough to put right, left as recorded"}
+_DONE = {True: "corrected", False: "not clear enough to correct, left as recorded"}
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ swap (marker_swaps.py)
     Both markers lie at least twice as near to the other's place in the model as to their own, or
     the line between them reverses from one frame to the next; or both arms
     (legs) fit twice as well exchanged. Where all markers involved then lie nearer to the model
-    (marker_exchange.py), the labels are put right and the poses fitted again before the rest is
+    (marker_exchange.py), the labels are corrected and the poses fitted again before the rest is
     judged; else they stay as recorded.
 jump
     The residual leaves its running median for less than a quarter second and comes back.
@@ -407,7 +407,7 @@ class Evidence:
     Attributes
     ----------
     events : in the order of time.
-    markers_m : (N, m, 3) the markers with exchanged labels put right.
+    markers_m : (N, m, 3) the markers with exchanged labels corrected.
     """
 
     events: tuple[MarkerEvent, ...]

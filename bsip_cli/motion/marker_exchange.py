@@ -1,4 +1,4 @@
-"""Exchanged labels are put right where that brings every marker involved nearer to the model."""
+"""Exchanged labels are corrected where that brings every marker involved nearer to the model."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class Labelling:
 
     Attributes
     ----------
-    fit : poses and markers with the labels put right.
+    fit : poses and markers with the labels corrected.
     order : (N, m) under each label, the recorded label of the marker that bears it now.
-    events : the exchanges that were found, put right or not.
+    events : the exchanges that were found, corrected or not.
     """
 
     fit: MarkerFit

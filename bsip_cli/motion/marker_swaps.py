@@ -38,7 +38,7 @@ class _Pair:
 
 
 def swaps(labelling: Labelling, refit: Refit) -> Labelling:
-    """Labels of pairs put right where that is clear, with the events.
+    """Labels of pairs corrected where that is clear, with the events.
 
     Two signs, and either is enough. The path's: the line between the two reverses from one frame
     to the next, which no segment does; it shows also where the pose follows the labels. The

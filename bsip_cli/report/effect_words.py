@@ -11,15 +11,15 @@ from bsip_cli.report.words import number, segment_label
 
 _FORCES = (
     "The measured forces are not the true ones, and everything identified from them inherits the "
-    "error: put it right in the lab or in the file, and run again."
+    "error: correct it in the lab or in the file, and run again."
 )
 _CLOCKS = (
     "Forces and markers are not of the same moments, and everything identified from them inherits "
-    "the error: put it right in the lab or in the file, and run again. A filter that only the "
+    "the error: correct it in the lab or in the file, and run again. A filter that only the "
     "forces have gone through delays them too."
 )
 _MOTION = (
-    "The motion is not the true one, and the simulated forces with it: put the markers right, and "
+    "The motion is not the true one, and the simulated forces with it: correct the markers, and "
     "run again."
 )
 _SKIN = (

@@ -274,13 +274,13 @@ def worth_telling(changes: pd.DataFrame) -> pd.DataFrame:
 
 
 def put_right_sentence(events: Sequence[tuple[str, pd.DataFrame]]) -> tuple[str, ...]:
-    """What ``ik`` has put right, from (stem, ``marker-events``); nothing where there was nothing."""
+    """What ``ik`` has corrected, from (stem, ``marker-events``); nothing where there was nothing."""
     said = [
-        f"in {trial_label(stem)} {text.removesuffix('; put right')}"
+        f"in {trial_label(stem)} {text.removesuffix('; corrected')}"
         for stem, table in events
         for text in table.loc[table["put_right"].astype(bool), "sentence"]
     ]
-    return (f"Put right already, before the search for causes: {'; '.join(said)}.",) if said else ()
+    return (f"Corrected already, before the search for causes: {'; '.join(said)}.",) if said else ()
 
 
 def consequences(causes: Sequence[Sequence[Candidate]]) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ _MOST_SAID = 5  # of a trial's sentences about single markers
 def run(unit: Unit) -> None:
     """Read markers and the person; write kinematics, marker-residuals and marker-events.
 
-    Poses and residuals are those after exchanged labels were put right.
+    Poses and residuals are those after exchanged labels were corrected.
     """
     skeleton = load_skeleton(unit.config.skeleton)
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)

@@ -37,7 +37,9 @@ def run(unit: Unit) -> None:
     kinematics, measured = unit.read("kinematics"), unit.read("wrench")
     judgement = judgement_of(unit, kinematics, measured)
     if not judgement.judged.any():
-        unit.warn(f"{unit.name}: no stretch in which every contact is on a plate; nothing to judge")
+        unit.warn(
+            f"{unit.name}: no interval in which every contact is on a plate; nothing to judge"
+        )
     raw = _wrenches(unit, person, kinematics, measured)
     wrenches = {name: judgement.filtered(wrench) for name, wrench in raw.items()}
     signals = {name: judgement.signals(wrench) for name, wrench in wrenches.items()}

@@ -59,7 +59,7 @@ def run(unit: Unit) -> None:
     _require_markers(unit, marker_set, calibration.person)
     mass = person_mass(unit, [one.trial for one in recorded], calibration.stature_m)
     if unit.config.marker_set == "auto":
-        unit.warn(f"{unit.name}: marker set {marker_set.name}, told from the labels")
+        unit.warn(f"{unit.name}: marker set {marker_set.name}, recognised by the labels")
         _warn_strangers(unit, marker_set, recorded)
     for note in calibration.notes:
         unit.warn(f"{unit.name}: {note}")

@@ -1,4 +1,4 @@
-"""Sway of the centre of pressure (Hansen 2017, table 3, with units and means put right)."""
+"""Sway of the centre of pressure (Hansen 2017, table 3, with units and means corrected)."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ ALLOWED = {
     "study",
     "commands": "__init__ artifacts body config diagnosis effects errors files instruments "
     "pipeline recordings report running schemas stages statistics study",
-    "reference": "cli commands config pipeline schemas",
+    "reference": "cli config effects pipeline report schemas",
     "cli": "__init__ commands errors pipeline running simulate study",
     "body": "config errors files stated",
     "dynamics": "body errors",

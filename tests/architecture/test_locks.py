@@ -21,6 +21,7 @@ NEEDS = {
         *PROJECT["build-system"]["requires"],
     ],
     "requirements-cluster.lock": EXTRAS["cluster"],
+    "requirements-docs.lock": EXTRAS["docs"],
 }
 HASH = re.compile(r"--hash=sha256:[0-9a-f]{64}")
 LOCKED = pytest.mark.parametrize(
@@ -44,7 +45,7 @@ def lines(lock: str) -> list[str]:
 
 @pytest.mark.parametrize("lock", NEEDS)
 def test_every_line_is_one_version_and_its_hashes(lock):
-    assert len(lines(lock)) > 30
+    assert len(lines(lock)) > 10
     for line in lines(lock):
         pin, *hashes = line.split(" --hash")
         assert [part.operator for part in Requirement(pin).specifier] == ["=="], line

@@ -1,14 +1,13 @@
-"""The tables of docs/recordings.md: every file has a row, and sections keep their page."""
+"""The tables of real recordings: every file has a row."""
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from benchmarks.every_recording import all_rows, table
-from benchmarks.sections import marks, read_section, replace_section
+from benchmarks.every_recording import FILE, all_rows, summary
 from tests.recordings.recording_writers import (
     PlateSpec,
     standing_markers,
@@ -44,28 +43,16 @@ def test_every_file_has_a_row(data):
         assert weighed.alone_kg == pytest.approx(alone_kg, abs=0.01)
         assert abs(weighed.difference_percent()) < 0.01
     assert "reversed all six components" in rows["lab/reversed.c3d"].findings
-    text = table(list(rows.values()))
+    text = summary(list(rows.values()))
     assert text.startswith("3 files, 1 refused. Quiet standing in 2; in 2 of the 2")
-    assert np.all([line.count("|") == 8 for line in text.splitlines()[2:]])
-
-
-def test_a_section_is_replaced_and_the_rest_kept(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("before\n" + "\n".join(marks("a")) + "\nbetween\n" + "\n".join(marks("b")))
-    replace_section(page, "a", "one")
-    replace_section(page, "a", "two")
-    assert read_section(page, "a") == "two" and read_section(page, "b") == ""
-    assert "one" not in page.read_text() and "between" in page.read_text()
-    with pytest.raises(ValueError, match="no section"):
-        replace_section(page, "c", "three")
 
 
 @pytest.mark.real
-def test_the_page_has_every_recording():
+def test_the_table_has_every_recording():
     real_data = ROOT.parent / "shared" / "data"
     if not real_data.is_dir():
         pytest.skip("the real recordings (shared/data beside the repository) are not here")
     names = {str(path.relative_to(real_data)) for path in real_data.glob("*/*")}
     wanted = {name for name in names if name.lower().endswith((".c3d", ".trc", ".csv"))}
-    rows = read_section(ROOT / "docs" / "recordings.md", "every recording").splitlines()
-    assert wanted == {row.split("|")[1].strip() for row in rows[4:]}
+    with FILE.open(encoding="utf-8", newline="") as file:
+        assert wanted == {row["recording"] for row in csv.DictReader(file)}

@@ -1,4 +1,4 @@
-"""The long blind suite: hide, diagnose, compare, and write the tables into the documentation.
+"""The long blind suite: hide, diagnose, compare, and write the tables into docs/results.
 
 Run from the checkout (``make blind``). One result file per case; what is there is not done again,
 so an interrupted run goes on. To judge another version of bsip remove the folder of results; with
@@ -17,11 +17,10 @@ from tqdm import tqdm
 
 from tests.blind.blind_batch import Batch, run_batch
 from tests.blind.blind_cases import Case, Session, long_suite
-from tests.blind.blind_running import DOCUMENT, ROOT, STAGES, write_atomically
+from tests.blind.blind_running import ROOT, STAGES, TABLES, write_atomically
 from tests.blind.blind_scoring import Score
-from tests.blind.blind_tables import between_marks, document, scores_frame
+from tests.blind.blind_tables import lead, scores_frame, tables, write_csv
 
-MARK = "tests/blind/blind_long.py"
 BATCH = 8  # people of one study; an interruption loses at most their work
 
 
@@ -33,14 +32,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     stages = STAGES if options.without_extend else (*STAGES, "reconstruct", "extend")
     if not options.only_tables:
         run_missing(sessions, options.results, stages, options.jobs, options.keep)
-    write_tables(options.results, settings, options.document)
+    write_tables(options.results, settings, options.tables)
 
 
 def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     add = parser.add_argument
     add("--results", type=Path, default=ROOT / "out" / "blind", help="folder of results")
-    add("--document", type=Path, default=DOCUMENT, help="Markdown file that gets the tables")
+    add("--tables", type=Path, default=TABLES, help="folder that gets them")
     add("--draws", type=int, default=10, help="cases per effect of the catalogue")
     add("--nulls", type=int, default=40, help="people with nothing hidden")
     add("--others", type=int, default=20, help="cases of two effects, and outside the catalogue")
@@ -99,15 +98,16 @@ def write_results(results: Path, sessions: Sequence[Session], done: Batch) -> No
 
 
 def write_tables(results: Path, settings: dict[str, int], target: Path) -> None:
-    """Put the tables of all results between the marks of the document."""
+    """The tables of all results as data files; what they come to is printed."""
     records = [json.loads(path.read_text()) for path in sorted(results.glob("cases/*.json"))]
     if not records:
         raise SystemExit(f"no results in {results}")
     scores = scores_frame([score for record in records for score in record["scores"]])
     spent = sum(record["cpu_s_recording"] + record["cpu_s_stages"] for record in records)
     asked = ", ".join(f"{name} {value}" for name, value in settings.items())
-    head = f"{len(records)} results ({asked}), {spent:.0f} CPU-s in all.\n\n"
-    between_marks(target, MARK, head + document(scores))
+    print(f"{len(records)} results ({asked}), {spent:.0f} CPU-s in all. {lead(scores)}")
+    for name, table in tables(scores).items():
+        write_csv(target, name, table)
 
 
 if __name__ == "__main__":

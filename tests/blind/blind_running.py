@@ -19,7 +19,7 @@ from pathlib import Path
 from tests.blind.blind_cases import HOST_TASKS, SESSION_TASKS, Case, Hidden, Session
 
 ROOT = Path(__file__).parents[2]
-DOCUMENT = ROOT / "docs" / "blind_suite.md"
+TABLES = ROOT / "docs" / "results"
 STAGES = ("ingest", "scale", "ik", "regress", "identify", "diagnose")
 DONE, BUG, REFUSED_SOME, NUMERICAL = 0, 1, 3, 4  # exit codes after which others may be done
 PEOPLE = 6  # that are tried until one can move as planned

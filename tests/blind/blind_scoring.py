@@ -18,7 +18,7 @@ UNEXPLAINED = "unexplained"
 PERSON = "participant"  # the source that is no trial
 # From best to worst for a hidden effect of the catalogue.
 RIGHT_NAME, RIGHT_CLASS = "right name", "right class"
-PUT_RIGHT, MISSED, SILENT = "put right", "missed", "no answer"
+PUT_RIGHT, MISSED, SILENT = "corrected", "missed", "no answer"
 WRONG_CLASS, WRONG_NAME = "wrong class", "wrong name"
 VERDICTS = (
     *(RIGHT_NAME, RIGHT_CLASS, PUT_RIGHT, UNEXPLAINED),
@@ -154,7 +154,7 @@ def score_of_clean_trial(out: Path, participant: str, session: str, stem: str) -
 
 
 def _quiet(case: str, kind: str, place: str, session: str, answers: list[Answer]) -> Score:
-    """Recordings with nothing hidden: all that is named is an alarm."""
+    """Recordings with nothing hidden: all that is named is a false positive."""
     verdict, says = _verdict(NOTHING, set(), "", answers)
     wrong = [f"{alarm} ({_where(a)})" for a in answers for alarm in a.alarms()]
     if answers and not wrong:

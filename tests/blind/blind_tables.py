@@ -1,4 +1,4 @@
-"""What all answers together say, as Markdown."""
+"""What all answers together say, as tables."""
 
 from __future__ import annotations
 
@@ -105,22 +105,22 @@ def by_place(scores: pd.DataFrame) -> pd.DataFrame:
     return counts["text"].unstack().fillna("")
 
 
-def false_alarms(scores: pd.DataFrame) -> pd.DataFrame:
+def false_positives(scores: pd.DataFrame) -> pd.DataFrame:
     """Recordings with nothing hidden, and in how many of them something is named."""
     quiet = scores[scores["effect"] == NOTHING]
     rows = []
     for kind, group in quiet.groupby("kind"):
-        alarms = (group["verdict"] != RIGHT_NAME).sum()
-        low, high = wilson(int(alarms), len(group))
+        count = (group["verdict"] != RIGHT_NAME).sum()
+        low, high = wilson(int(count), len(group))
         certain = (group["verdict"] == WRONG_NAME).sum()
         what = sorted({wrong for case in group["wrong"] for wrong in case})
         rows.append(
             {
                 "nothing hidden in": "a whole session" if kind == "null" else "one trial",
                 "cases": len(group),
-                "alarms": alarms,
+                "false positives": count,
                 "of which named": certain,
-                "alarm rate": f"{alarms / len(group):.1%} ({low:.1%} to {high:.1%})",
+                "rate": f"{count / len(group):.1%} ({low:.1%} to {high:.1%})",
                 "what": ", ".join(what),
             }
         )
@@ -248,37 +248,43 @@ def _with_total(table: pd.DataFrame) -> pd.DataFrame:
     return joined
 
 
-def document(scores: pd.DataFrame) -> str:
-    """All tables with their headings."""
+def lead(scores: pd.DataFrame) -> str:
+    """In two sentences how many are found."""
     estimates = estimates_frame(scores)
     single = scores[scores["kind"] == "single"]
     found = single["verdict"].isin(FOUND)
     classes = (single["verdict"] == RIGHT_CLASS).sum()
-    lead = (
+    return (
         f"Of {len(single)} effects hidden alone {found.sum()} are found ({classes} of them as a "
         f"class), {(single['verdict'] == WRONG_NAME).sum()} get a wrong name for certain. "
         f"{coverage(estimates)}"
     )
-    parts = [
-        ("Effects hidden alone", verdicts(scores)),
-        ("Right effect, wrong place", elsewhere(scores)),
-        ("False alarms", false_alarms(scores)),
-        ("Outside the catalogue", beyond(scores)),
-        ("Two at once", pairs(scores)),
-        ("What is taken for what", confusion(scores)),
-        ("Detection over size", detection(scores)),
-        ("Where it is hidden", by_place(scores)),
-        ("Estimates beside the truth", accuracy(estimates)),
-        ("Gain", gains(scores)),
-    ]
-    written = [f"### {title}\n\n{markdown(table)}" for title, table in parts if len(table)]
-    return "\n\n".join([lead, *written]) + "\n"
 
 
-def between_marks(target: Path, maker: str, text: str) -> None:
-    """Put what a script has made between its marks in a document."""
-    begin, end = f"<!-- made by {maker}: begin -->", f"<!-- made by {maker}: end -->"
-    before, rest = target.read_text(encoding="utf-8").split(begin)
-    _, after = rest.split(end)
-    written = f"{before}{begin}\n\n{text.strip()}\n\n{end}{after}"
-    write_atomically(target, written.rstrip("\n"))
+def tables(scores: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Those that have rows, by the names of their files."""
+    all_of_them = {
+        "blind_effects": verdicts(scores),
+        "blind_wrong_place": elsewhere(scores),
+        "blind_false_positives": false_positives(scores),
+        "blind_outside": beyond(scores),
+        "blind_pairs": pairs(scores),
+        "blind_confusion": confusion(scores),
+        "blind_sizes": detection(scores),
+        "blind_places": by_place(scores),
+        "blind_estimates": accuracy(estimates_frame(scores)),
+        "blind_gains": gains(scores),
+    }
+    return {name: table for name, table in all_of_them.items() if len(table)}
+
+
+def document(scores: pd.DataFrame) -> str:
+    """All tables for a terminal."""
+    written = [f"{name}\n\n{markdown(table)}" for name, table in tables(scores).items()]
+    return "\n\n".join([lead(scores), *written]) + "\n"
+
+
+def write_csv(folder: Path, name: str, table: pd.DataFrame) -> None:
+    """The table as a data file, its index first where that has a name."""
+    text = table.to_csv(index=bool(table.index.name), float_format="%.3g", lineterminator="\n")
+    write_atomically(folder / f"{name}.csv", text.rstrip("\n"))

@@ -17,11 +17,10 @@ import pandas as pd
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.presets import diagnosis
 from bsip_cli.simulate.study import simulate_study
-from tests.blind.blind_running import DOCUMENT, ROOT, STAGES, run_pipeline
+from tests.blind.blind_running import ROOT, STAGES, TABLES, run_pipeline
 from tests.blind.blind_scoring import read_answer
-from tests.blind.blind_tables import between_marks, markdown, wilson
+from tests.blind.blind_tables import markdown, wilson, write_csv
 
-MARK = "tests/blind/harsher_worlds.py"
 WORLDS = {
     "skin that moves twice as far": Richness(soft_tissue=2.0),
     "markers and plates three times as noisy": Richness(
@@ -51,7 +50,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         folder = options.results / f"world-{number}"
         alarms = alarms_in(folder, richness, options)
         rows.append({"world": world, "people": len(alarms), **counted(alarms)})
-    between_marks(options.document, MARK, summary(pd.DataFrame(rows)))
+    table = pd.DataFrame(rows)
+    print(summary(table))
+    write_csv(options.tables, "harsher_worlds", table)
 
 
 def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -60,7 +61,7 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--people", type=int, default=4, help="of every world")
     add("--seed", type=int, default=777, help="draws people and movements")
     add("--results", type=Path, default=ROOT / "out" / "harsher", help="folder of results")
-    add("--document", type=Path, default=DOCUMENT, help="Markdown file that gets the table")
+    add("--tables", type=Path, default=TABLES, help="folder that gets the table")
     add("--jobs", type=int, default=2, help="processes at once")
     return parser.parse_args(arguments)
 
@@ -81,14 +82,14 @@ def alarms_in(folder: Path, richness: Richness, options: argparse.Namespace) -> 
 
 def counted(alarms: list[list[str]]) -> dict[str, object]:
     raised = [", ".join(one) for one in alarms if one]
-    return {"alarms": len(raised), "what": "; ".join(raised)}
+    return {"false positives": len(raised), "what": "; ".join(raised)}
 
 
 def summary(table: pd.DataFrame) -> str:
-    people, alarms = int(table["people"].sum()), int(table["alarms"].sum())
+    people, alarms = int(table["people"].sum()), int(table["false positives"].sum())
     low, high = wilson(alarms, people)
     return (
-        f"{markdown(table)}\n\nOf {people} people {alarms} raise an alarm: "
+        f"{markdown(table)}\n\nOf {people} people {alarms} have a false positive: "
         f"{100 * alarms / people:.1f}% ({100 * low:.1f}% to {100 * high:.1f}%).\n"
     )
 

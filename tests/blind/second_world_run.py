@@ -1,7 +1,7 @@
 """Hold the diagnosis against people of another simulator (`second_world`).
 
 Run from the checkout. Every case, with nothing or something hidden in it, goes through ``bsip`` as
-a black box, from ``ingest`` to ``diagnose``; a Markdown table tells what was hidden beside what is
+a black box, from ``ingest`` to ``diagnose``; a table tells what was hidden beside what is
 said. With ``--seed`` people are drawn whom nobody has looked at. The recordings come from code that
 shares none with ``bsip_cli.simulate`` and none for forces with any part of ``bsip_cli``. A study or
 an answer that is there is not made again.
@@ -17,14 +17,12 @@ from pathlib import Path
 import pandas as pd
 from tqdm import tqdm
 
-from tests.blind.blind_running import DOCUMENT, ROOT, STAGES, CommandError, run_pipeline
-from tests.blind.blind_tables import between_marks, markdown
+from tests.blind.blind_running import ROOT, STAGES, TABLES, CommandError, run_pipeline
+from tests.blind.blind_tables import markdown, write_csv
 from tests.blind.second_world.drawn_people import drawn_cases
 from tests.blind.second_world.people import CASES, Case
 from tests.blind.second_world.study import PERSON, drawn, write_study
 
-MARK = "tests/blind/second_world_run.py"
-DRAWN = f"{MARK} --seed"
 NOTHING = "nothing"
 
 
@@ -39,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         asked = [(case, options.results / case.name) for case in cases]
         problems = list(tqdm(pool.map(answer, asked), total=len(asked), unit="case"))
     table = pd.DataFrame(row for case in people for row in rows_of(case, options.results))
-    between_marks(options.document, MARK if options.seed is None else DRAWN, markdown(table))
+    print(markdown(table))
+    write_csv(options.tables, options.results.name.replace("-", "_"), table)
     if said := [problem for problem in problems if problem]:
         raise SystemExit("\n".join(said))
 
@@ -48,7 +47,7 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     add = parser.add_argument
     add("--results", type=Path, help="folder of results, for each seed its own")
-    add("--document", type=Path, default=DOCUMENT, help="Markdown file that gets the table")
+    add("--tables", type=Path, default=TABLES, help="folder that gets the table")
     add("--seed", type=int, help="people drawn from it instead")
     add("--jobs", type=int, default=1, help="cases at once")
     add("--only", action="append", default=[], metavar="NAME", help="a case; may be repeated")

@@ -33,7 +33,7 @@ from tests.blind.blind_tables import (
     document,
     elsewhere,
     estimates_frame,
-    false_alarms,
+    false_positives,
     pairs,
     scores_frame,
     wilson,
@@ -254,15 +254,15 @@ def test_outside_the_catalogue_a_name_is_wrong_whatever_stands_beside(tmp_path):
         ([row("breathing", "ambiguous", class_id="1")], WRONG_CLASS, "breathing"),
     ],
 )
-def test_a_null_is_quiet_or_has_an_alarm(tmp_path, rows, verdict, says):
+def test_a_null_is_quiet_or_has_a_false_positive(tmp_path, rows, verdict, says):
     diagnosis(tmp_path, "sub-01", row("none"))
     diagnosis(tmp_path, SQUAT, *rows)
     null = only(score(tmp_path, hidden(place=SESSION)))
     clean = score_of_clean_trial(tmp_path, "sub-01", "session-001", SQUAT)
     assert (null.verdict, null.says) == (clean.verdict, clean.says) == (verdict, says)
     assert bool(null.wrong) == (verdict != RIGHT_NAME)
-    alarms = false_alarms(scores_frame([null.as_record(), clean.as_record()]))
-    assert alarms["alarms"].tolist() == [int(verdict != RIGHT_NAME)] * 2
+    found = false_positives(scores_frame([null.as_record(), clean.as_record()]))
+    assert found["false positives"].tolist() == [int(verdict != RIGHT_NAME)] * 2
 
 
 def test_a_shift_of_a_marker_is_compared_by_its_length(tmp_path):

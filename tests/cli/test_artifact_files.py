@@ -49,7 +49,7 @@ def test_columns_carry_unit_frame_and_meaning(written):
     field = pq.read_schema(written).field("start_s")
     assert field.type == pa.float64()
     assert field.metadata[b"unit"] == b"s"
-    assert field.metadata[b"meaning"] == b"stretch that was used"
+    assert field.metadata[b"meaning"] == b"interval that was used"
 
 
 @pytest.mark.parametrize("before", [None, b"what was there"])

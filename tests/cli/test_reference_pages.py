@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from bsip_cli.cli import cli
+from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.reference import REGENERATE, OptionText, option_texts, pages, write_pages
 from bsip_cli.schemas import SCHEMAS
 
@@ -26,27 +27,50 @@ def test_command_writes_the_pages(tmp_path):
 
 
 def test_every_command_with_its_options():
-    page = pages()["cli.md"]
+    sections = pages()["cli.md"].split("\n## ")
     for name, command in cli.commands.items():
-        assert f"bsip {name} [OPTIONS]" in page
-        assert all(each.opts[0] in page for each in command.params if each.opts[0][0] == "-")
+        (section,) = (
+            one for one in sections if name in one.partition("\n")[0].replace(",", "").split()
+        )
+        assert all(each.opts[0] in section for each in command.params if each.opts[0][0] == "-")
 
 
 def test_every_column_of_every_artifact():
     page = pages()["artifacts.md"]
     for kind, schema in SCHEMAS.items():
         section = page.partition(f"### {kind}\n")[2].partition("\n#")[0]
-        names = [line.split("`")[1] for line in section.splitlines() if line.startswith("| `")]
-        assert names == [column.name for column in schema.columns]
+        if "Columns as in" in section:
+            earlier = section.split("(#")[1].split(")")[0]
+            assert SCHEMAS[earlier].columns == schema.columns
+            continue
+        lines = [one for one in section.splitlines() if one.startswith(("- `", "And `"))]
+        names = [name for one in lines for name in one.partition(" (")[0].split("`")[1::2]]
+        assert sorted(names) == sorted(column.name for column in schema.columns)
+
+
+def test_common_columns_are_explained():
+    page = pages()["artifacts.md"]
+    explained = page.partition("## Columns of many artifacts")[2].partition("\n## ")[0]
+    for line in page.splitlines():
+        if line.startswith("And `"):
+            assert all(f"`{name}`" in explained for name in line.split("`")[1::2])
+
+
+def test_every_fault_with_its_chance_of_being_found():
+    page = pages()["faults.md"]
+    for effect in CATALOGUE:
+        section = page.partition(f"## {effect.name}: ")[2].partition("\n## ")[0]
+        assert effect.looks in section and effect.remedy in section
+    assert "named in 2 of 2; 5 of 5 intervals hold the truth" in page
 
 
 def test_option_with_unit_limits_and_reason():
     page = pages()["options.md"]
     assert (
-        "| `cop_min_force_percent_bw` | `30.0` | % body weight | > 0, < 100 | The centre of "
-        "pressure is computed while the vertical force is above this: it is a quotient" in page
+        "- `cop_min_force_percent_bw` = `30.0` % body weight (> 0, < 100): The centre of pressure "
+        "is computed while the vertical force is above this: it is a quotient" in page
     )
-    assert '| `method` | `"spline"` |  | `spline` or `butterworth` |' in page
+    assert '- `method` = `"spline"` (`spline` or `butterworth`): ' in page
 
 
 def test_comments_belong_to_the_option_below():
@@ -54,7 +78,7 @@ def test_comments_belong_to_the_option_below():
     first = option_texts()[0]
     assert first.name == "marker_set"
     assert first.comment.startswith("Which markers mean what")
-    assert first.comment.endswith("bsip says which).")
+    assert first.comment.endswith("bsip says which.")
 
 
 def test_unit_is_taken_out_of_the_comment():

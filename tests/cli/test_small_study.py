@@ -807,7 +807,7 @@ def test_exchanged_labels_are_put_right_before_the_poses(run):
     markers = markers.sort_values(["time_s", "marker"], kind="stable", ignore_index=True)
     write_artifact(path, "markers", markers, notes)
     outcome = perform(unit_of(run, "ik", stem))
-    assert any("; put right" in sentence for sentence in outcome.sentences)
+    assert any("; corrected" in sentence for sentence in outcome.sentences)
     events = read_artifact(run.path("marker-events", stem), "marker-events")
     (event,) = events[events["kind"] == "swap"].itertuples()
     assert {event.marker, event.partner} == set(swap)

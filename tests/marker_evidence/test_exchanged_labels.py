@@ -1,4 +1,4 @@
-"""Exchanged labels are put right where that is clear, and never to the worse."""
+"""Exchanged labels are corrected where that is clear, and never to the worse."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_a_swap_is_undone(a, b, frames):
     (event,) = found.events
     assert event.put_right
     assert found.put_right()
-    assert event.sentence.endswith("; put right")
+    assert event.sentence.endswith("; corrected")
     assert np.array_equal(found.markers_m, clean)
 
 
@@ -156,7 +156,7 @@ def test_a_swap_that_leaves_one_of_the_two_farther_off_is_only_reported(label):
     labelling, fit = suspected(label, 1.1)
     (event,) = labelling.events
     assert not event.put_right
-    assert event.sentence.endswith("; not clear enough to put right, left as recorded")
+    assert event.sentence.endswith("; not clear enough to correct, left as recorded")
     assert labelling.fit is fit
     assert np.array_equal(labelling.order, as_recorded(fit).order)
 

@@ -73,9 +73,9 @@ def test_a_motion_that_is_not_known_has_no_phase(record):
 
 
 def test_labels_put_right_are_told_on_the_first_screen_and_escaped(record):
-    events = marker_events().assign(put_right=True, sentence=f"{EVIL} and B bear labels; put right")
+    events = marker_events().assign(put_right=True, sentence=f"{EVIL} and B bear labels; corrected")
     told = replace(record, trials=(replace(record.trials[1], marker_events=events),))
-    (said,) = [b.text for b in verdict(told) if "Put right" in getattr(b, "text", "")]
+    (said,) = [b.text for b in verdict(told) if "Corrected" in getattr(b, "text", "")]
     assert f"in sequence (run 1) {EVIL} and B bear labels." in said
     assert EVIL not in render(participant_document(told))
 

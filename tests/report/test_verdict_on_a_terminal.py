@@ -23,12 +23,12 @@ def test_causes_are_numbered_and_lines_fit():
 
 
 def test_what_was_put_right_is_told_too():
-    events = marker_events().assign(put_right=True, sentence="A and B bear labels; put right")
+    events = marker_events().assign(put_right=True, sentence="A and B bear labels; corrected")
     right = put_right_sentence([(TRIALS[0], events)])
     assert right == (
-        "Put right already, before the search for causes: in sequence (run 1) A and B bear labels.",
+        "Corrected already, before the search for causes: in sequence (run 1) A and B bear labels.",
     )
-    assert "Put right already" in text_of(diagnosis(TRIALS), right=right)
+    assert "Corrected already" in text_of(diagnosis(TRIALS), right=right)
     assert put_right_sentence([(TRIALS[0], marker_events())]) == ()
 
 

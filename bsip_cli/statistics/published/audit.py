@@ -393,7 +393,7 @@ def _claim(paper: Paper, table: PrintedTable, claim: Claim) -> Iterator[Slip]:
         f"the {claim.where}",
         printed=f"{f'{claim.method} ' if claim.method else 'all rows '}{claim.says}{but}",
         recomputed="the table says the opposite" if whole else "not in these rows",
-        reading="true once the exchanged cells are put right" if is_put_right else "",
+        reading="true once the exchanged cells are corrected" if is_put_right else "",
     )
 
 

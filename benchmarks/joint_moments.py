@@ -19,11 +19,10 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import read_artifact
-from bsip_cli.simulate.calculus import derivative
-from bsip_cli.simulate.loads import GRAVITY
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S
-from bsip_cli.simulate.options import StudyOptions
-from bsip_cli.simulate.presets import preset
+from bsip_cli.simulate.numerics import derivative
+from bsip_cli.simulate.options import StudyOptions, preset
+from bsip_cli.simulate.plan import GRAVITY
 from bsip_cli.simulate.study import MOVEMENT, generator, participant_person, wobbling
 from bsip_cli.simulate.trial import Trial, simulate_trial
 

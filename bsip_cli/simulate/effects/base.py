@@ -12,12 +12,14 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from bsip_cli.body.names import SEGMENTS
 from bsip_cli.errors import UsageError
 from bsip_cli.simulate.instruments import Instruments
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
 
 NOWHERE = "none"  # what the target of an effect without a place may be
+SEGMENT_NAMES = "a segment: " + ", ".join(SEGMENTS)
 
 
 @dataclass(frozen=True)
@@ -103,16 +105,54 @@ class Effect:
         return ""
 
     def record(self) -> dict[str, Any]:
-        """The drawn parameters, for the truth."""
-        return {"effect": self.name, "target": self.place(), "unit": self.unit, **plain(self)}
+        """The drawn parameters, for the truth, as JSON has them."""
+        fields = {
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in asdict(self).items()
+        }
+        return {"effect": self.name, "target": self.place(), "unit": self.unit, **fields}
 
 
-def plain(effect: Effect) -> dict[str, Any]:
-    """The fields of an effect as JSON has them."""
-    return {
-        name: value.tolist() if isinstance(value, np.ndarray) else value
-        for name, value in asdict(effect).items()
-    }
+@dataclass(frozen=True, eq=False)
+class OnSegment(Effect):
+    """An effect at a segment, by default at its centre of mass."""
+
+    segment: str
+
+    @classmethod
+    def checked(cls, segment: str) -> str:
+        """The segment, if it is one."""
+        if segment not in SEGMENTS:
+            raise cls.wrong_target(segment)
+        return segment
+
+    def position_m(self, person: Person) -> np.ndarray:
+        """(3,) in the segment's frame."""
+        return person.segment_inertias()[self.segment].com_m
+
+    def place(self) -> str:
+        return self.segment
+
+    def facts(self, person: Person) -> dict[str, Any]:
+        return {"position_m": self.position_m(person).tolist()}
+
+
+class Measured(Effect):
+    """An effect of the lab's instruments, which measured data can have afterwards too."""
+
+    injectable = True
+    personal = False
+
+
+class OfPlates(Measured):
+    """One of the force plates."""
+
+    needs_plates = True
+
+
+def body_of(segment: str) -> str:
+    """The simulated body of a segment; things on the upper torso sit on the thorax."""
+    return "thorax" if segment == "upper_torso" else segment
 
 
 def direction(rng: np.random.Generator) -> np.ndarray:

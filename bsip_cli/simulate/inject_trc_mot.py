@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,9 +12,8 @@ import numpy as np
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.force_files import forces_beside
 from bsip_cli.files.regular import check_regular
-from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.injection.changes import changed_by
 from bsip_cli.simulate.instruments import Instruments, SensingPlate
+from bsip_cli.simulate.study import write_text
 
 METRES = {"m": 1.0, "mm": 1e-3}
 LOADED_N = 20.0
@@ -38,8 +37,10 @@ class ForceSet:
     torque: list[int]
 
 
-def inject_trc_mot(trc: Path, copy: Path, effects: Sequence[Effect]) -> Instruments:
-    """Write copies of a TRC file and of the MOT file beside it with the effects hidden in them.
+def inject_trc_mot(
+    trc: Path, copy: Path, change: Callable[[Instruments], Instruments]
+) -> Instruments:
+    """Write copies of a TRC file and of the MOT file beside it with a change of what they hold.
 
     copy : the TRC file to be written; the MOT file goes beside it.
 
@@ -50,26 +51,29 @@ def inject_trc_mot(trc: Path, copy: Path, effects: Sequence[Effect]) -> Instrume
     mot = forces_beside(trc)
     if mot is None:
         raise BadDataError("there are no forces beside it", expected="a .mot", file=trc)
-    markers, forces = _read_trc(trc), _read_mot(mot)
+    markers, labels, forces = *_read_trc(trc), _read_mot(mot)
     sets = _force_sets(forces, mot)
-    scale = _scale_m(markers, trc)
-    before = _instruments(markers, forces, sets, scale, trc)
-    after = changed_by(effects, before, trc)
-    _write(copy, _new_trc(markers, before, after, scale))
-    _write(
-        copy.with_name(copy.stem + mot.name[len(trc.stem) :]),
-        _new_mot(forces, sets, before, after),
-    )
+    names, values = markers.head[1].split("\t"), markers.head[2].split("\t")
+    unit = dict(zip(names, values, strict=False)).get("Units", "").strip()
+    if unit not in METRES:
+        raise BadDataError(f"markers are in {unit!r}", expected="m or mm", file=trc)
+    before = _instruments(markers, labels, forces, sets, METRES[unit], trc)
+    after = change(before)
+    write_text(copy, _new_trc(markers, before, after, METRES[unit]))
+    forces_copy = copy.with_name(copy.stem + mot.name[len(trc.stem) :])
+    write_text(forces_copy, _new_mot(forces, sets, before, after))
     return after
 
 
-def _read_trc(file: Path) -> Table:
+def _read_trc(file: Path) -> tuple[Table, tuple[str, ...]]:
+    """The table, and the markers' labels."""
     lines = _lines(file)
-    start = next((k for k in range(5, min(8, len(lines))) if _is_row(lines[k])), 0)
+    is_row = re.compile(r"\s*\d+\s+[-\d.]").match
+    start = next((k for k in range(5, min(8, len(lines))) if is_row(lines[k])), 0)
     if not start or not lines[0].startswith("PathFileType"):
         raise BadDataError("this is no TRC file", file=file)
-    width = 2 + 3 * len(_trc_labels(lines[:start]))
-    return Table(lines[:start], _values(lines[start:], "\t", width, file))
+    labels = tuple(name.strip() for name in lines[3].split("\t")[2:] if name.strip())
+    return _table(lines, start, "\t", 2 + 3 * len(labels), file), labels
 
 
 def _read_mot(file: Path) -> Table:
@@ -78,8 +82,7 @@ def _read_mot(file: Path) -> Table:
     if not ends:
         raise BadDataError("the line endheader is missing", file=file)
     start = ends[0] + 2
-    width = len("".join(lines[start - 1 : start]).split())
-    return Table(lines[:start], _values(lines[start:], None, width, file))
+    return _table(lines, start, None, len("".join(lines[start - 1 : start]).split()), file)
 
 
 def _lines(file: Path) -> list[str]:
@@ -90,20 +93,16 @@ def _lines(file: Path) -> list[str]:
         raise BadDataError(f"it cannot be read ({error.strerror})", file=file) from error
 
 
-def _is_row(line: str) -> bool:
-    return bool(re.match(r"\s*\d+\s+[-\d.]", line))
-
-
-def _values(lines: list[str], separator: str | None, least: int, file: Path) -> np.ndarray:
-    """(rows, columns), at least two and ``least``; an empty or unreadable field is NaN."""
-    rows = [line.rstrip("\r\n").split(separator) for line in lines if line.strip()]
+def _table(lines: list[str], start: int, separator: str | None, least: int, file: Path) -> Table:
+    """At least two rows and ``least`` columns; an empty or unreadable field is NaN."""
+    rows = [line.rstrip("\r\n").split(separator) for line in lines[start:] if line.strip()]
     width = max(map(len, rows), default=0)
     if len(rows) < 2 or width < least or len(rows) * width > file.stat().st_size:
         raise BadDataError("this is no table", expected="rows as long as the heading", file=file)
     table = np.full((len(rows), width), np.nan)
     for k, row in enumerate(rows):
         table[k, : len(row)] = [_number(field) for field in row]
-    return table
+    return Table(lines[:start], table)
 
 
 def _number(field: str) -> float:
@@ -113,27 +112,13 @@ def _number(field: str) -> float:
         return float("nan")
 
 
-def _trc_labels(head: list[str]) -> list[str]:
-    return [name.strip() for name in head[3].split("\t")[2:] if name.strip()]
-
-
-def _scale_m(table: Table, file: Path) -> float:
-    names, values = table.head[1].split("\t"), table.head[2].split("\t")
-    unit = dict(zip(names, values, strict=False)).get("Units", "").strip()
-    if unit not in METRES:
-        raise BadDataError(f"markers are in {unit!r}", expected="m or mm", file=file)
-    return METRES[unit]
-
-
 def _force_sets(table: Table, file: Path) -> list[ForceSet]:
     names = table.head[-1].split()
     column = {name: k for k, name in enumerate(names)}
     sets = []
     for prefix in [name[:-3] for name in names if name.endswith("_vx")]:
-        torque = prefix.replace("force", "torque")
-        for pattern in (f"{prefix}_m", f"{torque}_"):
-            wanted = [f"{prefix}_v{a}" for a in "xyz"] + [f"{prefix}_p{a}" for a in "xyz"]
-            wanted += [f"{pattern}{a}" for a in "xyz"]
+        for torque in (f"{prefix}_m", f"{prefix.replace('force', 'torque')}_"):
+            wanted = [f"{p}{a}" for p in (f"{prefix}_v", f"{prefix}_p", torque) for a in "xyz"]
             if all(name in column for name in wanted):
                 at = [column[name] for name in wanted]
                 sets.append(ForceSet(at[:3], at[3:6], at[6:]))
@@ -146,9 +131,13 @@ def _force_sets(table: Table, file: Path) -> list[ForceSet]:
 
 
 def _instruments(
-    markers: Table, forces: Table, sets: list[ForceSet], scale: float, file: Path
+    markers: Table,
+    labels: tuple[str, ...],
+    forces: Table,
+    sets: list[ForceSet],
+    scale: float,
+    file: Path,
 ) -> Instruments:
-    labels = _trc_labels(markers.head)
     times, samples = markers.values[:, 1], forces.values[:, 0]
     points = scale * markers.values[:, 2 : 2 + 3 * len(labels)].reshape(len(times), -1, 3)
     ratio = round(len(samples) / len(times))
@@ -165,43 +154,33 @@ def _instruments(
     if not even and ratio != 1:
         raise BadDataError("the frames' times are uneven", expected="even ones", file=file)
     plates = tuple(_plate(forces.values, each) for each in sets)
-    readings = np.stack(
-        [_reading(forces.values, each, plate) for each, plate in zip(sets, plates, strict=True)]
-    )
+    readings = []
+    for each, plate in zip(sets, plates, strict=True):
+        force, torque = forces.values[:, each.force], np.nan_to_num(forces.values[:, each.torque])
+        moment = np.cross(_points_m(forces.values, each, plate), force) + torque
+        readings.append(plate.reading(force, moment, np.zeros(3)))
+    total = np.nansum(np.stack(readings)[..., :3], axis=(0, 1))
     return Instruments(
-        labels=tuple(labels),
+        labels=labels,
         points_m=points,
         marker_hz=1.0 / step,
         plates=plates,
-        readings=readings,
+        readings=np.stack(readings),
         analog_hz=ratio / step,
-        up=_up(readings),
+        up=np.eye(3)[int(np.argmax(np.abs(total)))],  # the axis that carries most of the force
         stamps_s=None if even else times - times[0],
         surfaces_known=False,
     )
-
-
-def _up(readings: np.ndarray) -> np.ndarray:
-    """The lab axis that carries most of the force."""
-    force = np.nansum(readings[..., :3], axis=(0, 1))
-    return np.eye(3)[int(np.argmax(np.abs(force)))]
 
 
 def _plate(values: np.ndarray, each: ForceSet) -> SensingPlate:
     """A plate whose sensor lies where the force acts in the mean: the file has no better place."""
     load = np.linalg.norm(np.nan_to_num(values[:, each.force]), axis=1)
     loaded = (load > LOADED_N) & np.isfinite(values[:, each.point]).all(axis=1)
-    if not loaded.any():
-        return SensingPlate(np.eye(3), np.zeros(3), np.zeros(3))
-    sensor = np.average(values[:, each.point][loaded], axis=0, weights=load[loaded])
+    sensor = np.zeros(3)
+    if loaded.any():
+        sensor = np.average(values[:, each.point][loaded], axis=0, weights=load[loaded])
     return SensingPlate(np.eye(3), sensor, sensor)
-
-
-def _reading(values: np.ndarray, each: ForceSet, plate: SensingPlate) -> np.ndarray:
-    """(N, 6) force and its moment about the sensor."""
-    force = values[:, each.force]
-    moment = np.cross(_points_m(values, each, plate), force) + np.nan_to_num(values[:, each.torque])
-    return plate.reading(force, moment, np.zeros(3))
 
 
 def _points_m(values: np.ndarray, each: ForceSet, plate: SensingPlate) -> np.ndarray:
@@ -228,41 +207,25 @@ def _with_reading(
     return np.hstack([force, point, moment - np.cross(point, force)])
 
 
-def _first(before: Instruments, after: Instruments) -> int:
-    return round((after.start_s - before.start_s) * before.marker_hz)
-
-
 def _new_trc(table: Table, before: Instruments, after: Instruments, scale: float) -> str:
-    first, frames = _first(before, after), len(after.points_m)
+    first, (frames, count, _) = before.first_frame_of(after), after.points_m.shape
     values = table.values[first : first + frames].copy()
-    count = after.points_m.shape[1]
     values[:, 2 : 2 + 3 * count] = after.points_m.reshape(frames, -1) / scale
     head = list(table.head)
-    names, facts = head[1].split("\t"), head[2].split("\t")
-    pairs = zip(names, facts, strict=False)
-    facts = [str(frames) if name == "NumFrames" else fact for name, fact in pairs]
-    head[2] = "\t".join(facts)
-    rows = ["\t".join([f"{row[0]:.0f}", *map(_cell, row[1:])]) for row in values]
-    return "\n".join([*head, *rows]) + "\n"
+    pairs = zip(head[1].split("\t"), head[2].split("\t"), strict=False)
+    head[2] = "\t".join(str(frames) if name == "NumFrames" else fact for name, fact in pairs)
+    rows = (
+        [f"{row[0]:.0f}", *("" if np.isnan(x) else f"{x:.9g}" for x in row[1:])] for row in values
+    )
+    return "\n".join([*head, *map("\t".join, rows)]) + "\n"
 
 
 def _new_mot(table: Table, sets: list[ForceSet], before: Instruments, after: Instruments) -> str:
-    first = _first(before, after) * before.per_frame
+    first = before.first_frame_of(after) * before.per_frame
     values = table.values[first : first + after.readings.shape[1]].copy()
     for each, plate, reading in zip(sets, after.plates, after.readings, strict=True):
-        values[:, [*each.force, *each.point, *each.torque]] = _with_reading(
-            values, each, plate, reading, after.up
-        )
+        columns = [*each.force, *each.point, *each.torque]
+        values[:, columns] = _with_reading(values, each, plate, reading, after.up)
     head = [re.sub(r"(?i)^nRows=.*", f"nRows={len(values)}", line) for line in table.head]
     rows = ["\t".join(f"{x:.9g}" for x in row) for row in values]
     return "\n".join([*head, *rows]) + "\n"
-
-
-def _cell(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.9g}"
-
-
-def _write(file: Path, text: str) -> None:
-    partial = file.with_name(file.name + ".part")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(file)

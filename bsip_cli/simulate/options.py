@@ -6,16 +6,7 @@ from dataclasses import dataclass, field
 
 from bsip_cli.errors import UsageError
 
-ALL_TASKS = (
-    "static",
-    "sequence",
-    "throwing",
-    "basketball",
-    "squat",
-    "steps",
-    "walking",
-    "running",
-)
+ALL_TASKS = ("static", "sequence", "throwing", "basketball", "squat", "steps", "walking", "running")
 MORE_TASKS = ("hops", "stepon")
 
 
@@ -157,9 +148,7 @@ PRESETS = {
     ),
     # twelve people with a two-minute sequence at 100 Hz, as in a full study
     "cohort": StudyOptions(
-        participants=12,
-        seed=2017,
-        durations_s=dict(zip(ALL_TASKS, _COHORT_S, strict=True)),
+        participants=12, seed=2017, durations_s=dict(zip(ALL_TASKS, _COHORT_S, strict=True))
     ),
     # one person for hidden effects: stiff trunk, no ball, landings, and an unloaded plate
     "diagnosis": StudyOptions(

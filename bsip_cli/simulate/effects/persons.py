@@ -16,11 +16,7 @@ JOINTS = tuple(
     f"{joint}_{side}" for joint in ("hip", "shoulder", "knee", "ankle", "elbow") for side in "lr"
 )
 # Joints that a model finds between (or beside) markers of the segment above them.
-LANDMARKS = {
-    "knee": ("KNEL", "KNEM"),
-    "ankle": ("MALL", "MALM"),
-    "elbow": ("ELB", "ELBM"),
-}
+LANDMARKS = {"knee": ("KNEL", "KNEM"), "ankle": ("MALL", "MALM"), "elbow": ("ELB", "ELBM")}
 LEAST_RANGE_RAD = 0.25  # a trial that bends the waist less bends the spine less too
 
 

@@ -64,9 +64,9 @@ def check_injectable(effects: Sequence[Effect]) -> None:
 def _changed_by(effects: Sequence[Effect], instruments: Instruments, file: Path) -> Instruments:
     """Instruments with all effects, each of which must have changed something."""
     for effect in effects:
-        if effect.needs_plates and not instruments.plates:
+        if "plates" in effect.needs and not instruments.plates:
             raise BadDataError(f"{effect.name} needs force plates, and there are none", file=file)
-        if effect.needs_surface and not instruments.surfaces_known:
+        if "surface" in effect.needs and not instruments.surfaces_known:
             raise BadDataError(
                 f"{effect.name} needs to know where the plates lie, and a MOT file does not say",
                 file=file,

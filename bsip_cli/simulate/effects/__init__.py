@@ -1,4 +1,4 @@
-"""Effects hidden in recordings, by what they change; this table is all that the rest knows of them.
+"""Effects hidden in recordings: a class each, in the file of what it changes, and `effects.csv`.
 
 CATALOGUE holds those that a diagnosis should name, OUTSIDE those that it cannot know.
 """
@@ -11,43 +11,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from bsip_cli.errors import UsageError
-from bsip_cli.simulate.effects import loads, markers, persons, plates
-from bsip_cli.simulate.effects.base import NOWHERE, Effect, Target
+from bsip_cli.simulate.effects import loads, markers, persons, plates  # noqa: F401
+from bsip_cli.simulate.effects.base import KINDS, NOWHERE, TABLE, Effect, Target
 from bsip_cli.simulate.options import Asked, StudyOptions
 
-CATALOGUE: tuple[type[Effect], ...] = (
-    plates.SyncOffset,
-    plates.ClockDrift,
-    plates.PlateTranslation,
-    plates.PlateRotation,
-    plates.PlateGain,
-    plates.PlateCrosstalk,
-    plates.PlateZero,
-    plates.PlateDrift,
-    plates.GravityTilt,
-    loads.AddedMass,
-    loads.ReleasedObject,
-    loads.WobblingMass,
-    loads.Breathing,
-    loads.UnmeasuredContact,
-    persons.JointCentre,
-    persons.MissingJoint,
-    markers.MarkerShift,
-    markers.MarkerSwap,
-    markers.OverSmoothing,
-    persons.SegmentInertia,
+EFFECTS = {name: KINDS[name] for name in TABLE}
+CATALOGUE, OUTSIDE = (
+    tuple(kind for name, kind in EFFECTS.items() if name.startswith("outside_") == outside)
+    for outside in (False, True)
 )
-OUTSIDE: tuple[type[Effect], ...] = (
-    plates.BeltVibration,
-    plates.PlateHysteresis,
-    plates.PlateSaturation,
-    markers.RepeatedFrames,
-    loads.ElasticTether,
-    plates.LateChannel,
-    plates.LooseConnector,
-    plates.ClockJump,
-)
-EFFECTS = {effect.name: effect for effect in (*CATALOGUE, *OUTSIDE)}
 NO_TARGET = ("", "-")
 EFFECT = 4  # the stream of random numbers, beside those of `study`
 

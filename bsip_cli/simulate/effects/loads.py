@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 from bsip_cli.body.markersets import load_marker_set, shipped_names
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.errors import BadDataError, UsageError
-from bsip_cli.simulate.effects.base import SEGMENT_NAMES, Effect, OnSegment, Target, body_of
+from bsip_cli.simulate.effects.base import Effect, OnSegment, Target, body_of
 from bsip_cli.simulate.instruments import Instruments
 from bsip_cli.simulate.numerics import response, rotate, second_derivative, step, window
 from bsip_cli.simulate.people import Inertia, Person, combined
@@ -37,20 +37,13 @@ LOADED_N = 40.0
 
 
 @dataclass(frozen=True, eq=False)
-class AddedMass(OnSegment):
+class AddedMass(OnSegment, name="added_mass"):
     """A small ball of `size` kg on a segment, as of a bag or a cast; the scale did not see it.
 
     offset_m : (3,) from the segment's centre of mass, segment axes.
     """
 
     offset_m: np.ndarray
-
-    name = "added_mass"
-    unit = "kg"
-    least, most = 0.0, 60.0
-    targets = SEGMENT_NAMES + " (else drawn); in measured data also markers LABEL+LABEL"
-    injectable = True
-    needs_plates = True
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -77,7 +70,7 @@ class AddedMass(OnSegment):
 
 
 @dataclass(frozen=True, eq=False)
-class ReleasedObject(OnSegment):
+class ReleasedObject(OnSegment, name="released_object"):
     """A point mass of `size` kg that a segment carries until it lets go; it falls off the plate.
 
     release_share : when, as a part of each trial, unless release_s is given.
@@ -85,17 +78,6 @@ class ReleasedObject(OnSegment):
 
     release_share: float
     release_s: float | None
-
-    name = "released_object"
-    unit = "kg"
-    least, most = 0.0, 20.0
-    targets = SEGMENT_NAMES + (
-        " (else a hand); in measured data also markers LABEL+LABEL; release_s=TIME"
-    )
-    settings = ("release_s",)
-    spares_static = True
-    injectable = True
-    needs_plates = True
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -125,7 +107,7 @@ class ReleasedObject(OnSegment):
 
 
 @dataclass(frozen=True, eq=False)
-class WobblingMass(OnSegment):
+class WobblingMass(OnSegment, name="wobbling_mass"):
     """`size` kg of a segment hang on a spring and a damper, equal in all directions.
 
     They rest at the segment's centre of mass in quiet stance, so that mass and centre of
@@ -134,12 +116,6 @@ class WobblingMass(OnSegment):
 
     frequency_hz: float
     damping_ratio: float
-
-    name = "wobbling_mass"
-    unit = "kg"
-    least, most = 0.0, 30.0
-    targets = SEGMENT_NAMES + " (else a thigh or a part of the torso), frequency=HZ, damping=RATIO"
-    settings = ("frequency", "damping")
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -201,17 +177,11 @@ class Swinging(Load):
 
 
 @dataclass(frozen=True, eq=False)
-class Breathing(Effect):
+class Breathing(Effect, name="breathing"):
     """Moved mass times amplitude is `size`; it moves as a sine at the chest."""
 
     frequency_hz: float
     phase_rad: float
-
-    name = "breathing"
-    unit = "kg m"
-    least, most = 0.0, 1.0
-    targets = "frequency=HZ (else drawn near 0.25 Hz)"
-    settings = ("frequency",)
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -248,7 +218,7 @@ class ChestMotion(Load):
 
 
 @dataclass(frozen=True, eq=False)
-class UnmeasuredContact(OnSegment):
+class UnmeasuredContact(OnSegment, name="unmeasured_contact"):
     """A mostly upward force on a segment, as of a rail on a hand, of `size` N on average.
 
     window_share : start and end as parts of each trial, unless start_s and end_s are given.
@@ -261,14 +231,6 @@ class UnmeasuredContact(OnSegment):
     end_s: float | None
     heading_rad: float
     phase_rad: float
-
-    name = "unmeasured_contact"
-    unit = "N"
-    least, most = 0.0, 500.0
-    targets = SEGMENT_NAMES + " (else a hand), start_s=TIME, end_s=TIME"
-    settings = ("start_s", "end_s")
-    spares_static = True
-    hint = "a person who leans on something moves otherwise"
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -314,14 +276,8 @@ class Support(Load):
         return -self.force_n, -np.cross(r, self.force_n)
 
 
-class ElasticTether(Effect):
+class ElasticTether(Effect, name="outside_elastic_tether"):
     """A rubber band of `size` N/m pulls the pelvis back towards a fixed point."""
-
-    name = "outside_elastic_tether"
-    unit = "N/m"
-    least, most = 0.0, 600.0
-    spares_static = True
-    hint = "a person who is pulled moves otherwise"
 
     def plan(self, person: Person, plan: Plan) -> Plan:
         fastened = plan.pelvis_m[plan.keep.start] + np.array(FASTENED_M)

@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from bsip_cli.simulate.effects.base import Effect, Measured, Target, direction
+from bsip_cli.simulate.effects.base import Effect, Target, direction
 from bsip_cli.simulate.instruments import Instruments
 from bsip_cli.simulate.numerics import frame_of, rotate, runs, step
 
@@ -23,7 +23,7 @@ BURST_FRAMES = (4, 12)
 
 
 @dataclass(frozen=True, eq=False)
-class MarkerShift(Effect):
+class MarkerShift(Effect, name="marker_shift"):
     """A marker slips along the skin, within SLIP_S, and stays there.
 
     along : (3,) unit vector in the frame of the three markers that keep their distance to
@@ -35,14 +35,6 @@ class MarkerShift(Effect):
     along: np.ndarray
     from_share: float
     from_s: float | None
-
-    name = "marker_shift"
-    unit = "m"
-    least, most = 0.0, 0.15
-    targets = "a marker's label (else drawn), from_s=TIME of the slip in each trial"
-    settings = ("from_s",)
-    spares_static = True
-    injectable = True
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -80,7 +72,7 @@ def companion_frame(points_m: np.ndarray, column: int) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class MarkerSwap(Effect):
+class MarkerSwap(Effect, name="marker_swap"):
     """Two markers carry each other's label for `size` seconds.
 
     start_share : where the window lies in each trial, 0 at its start and 1 at its end,
@@ -92,14 +84,6 @@ class MarkerSwap(Effect):
     draw_of_pair: int
     start_share: float
     start_s: float | None
-
-    name = "marker_swap"
-    unit = "s"
-    least, most = 0.0, 600.0
-    targets = "LABEL+LABEL (else one of the five closest pairs), start_s=TIME"
-    settings = ("start_s",)
-    spares_static = True
-    injectable = True
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -134,12 +118,8 @@ class MarkerSwap(Effect):
         return f"{self.first}+{self.second}" if self.first else ""
 
 
-class OverSmoothing(Measured):
+class OverSmoothing(Effect, name="over_smoothing"):
     """The lab delivers its markers after a Butterworth low-pass (order 4, zero phase) at `size`."""
-
-    name = "over_smoothing"
-    unit = "Hz"
-    least, most = 0.3, 20.0
 
     def measured(self, instruments: Instruments) -> Instruments:
         rate = instruments.marker_hz
@@ -157,16 +137,10 @@ class OverSmoothing(Measured):
 
 
 @dataclass(frozen=True, eq=False)
-class RepeatedFrames(Effect):
+class RepeatedFrames(Effect, name="outside_repeated_frames"):
     """The cameras stall: bursts of frames repeat the last one; `size` is their part."""
 
     seed: int
-
-    name = "outside_repeated_frames"
-    unit = "1"
-    least, most = 0.0, 0.6
-    injectable = True
-    spares_static = True
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:

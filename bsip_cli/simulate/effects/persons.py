@@ -8,20 +8,17 @@ from typing import Self
 import numpy as np
 
 from bsip_cli.body.names import SEGMENTS
-from bsip_cli.simulate.effects.base import SEGMENT_NAMES, Effect, Target, direction
+from bsip_cli.simulate.effects.base import JOINTS, Effect, Target, direction
 from bsip_cli.simulate.people import Inertia, Person
 from bsip_cli.simulate.plan import Plan
 
-JOINTS = tuple(
-    f"{joint}_{side}" for joint in ("hip", "shoulder", "knee", "ankle", "elbow") for side in "lr"
-)
 # Joints that a model finds between (or beside) markers of the segment above them.
 LANDMARKS = {"knee": ("KNEL", "KNEM"), "ankle": ("MALL", "MALM"), "elbow": ("ELB", "ELBM")}
 LEAST_RANGE_RAD = 0.25  # a trial that bends the waist less bends the spine less too
 
 
 @dataclass(frozen=True, eq=False)
-class JointCentre(Effect):
+class JointCentre(Effect, name="joint_centre"):
     """The true centre lies at shift_m from where its landmarks put it (parent segment's axes).
 
     Hips and shoulders move against the markers; knees, ankles, elbows stay and their
@@ -30,12 +27,6 @@ class JointCentre(Effect):
 
     joint: str
     shift_m: np.ndarray
-
-    name = "joint_centre"
-    unit = "m"
-    least, most = 0.0, 0.08
-    targets = "a joint: " + ", ".join(JOINTS) + " (else drawn)"
-    hint = "markers do not tell what a joint would have been elsewhere"
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -59,17 +50,12 @@ class JointCentre(Effect):
         return self.joint
 
 
-class MissingJoint(Effect):
+class MissingJoint(Effect, name="missing_joint"):
     """The spine bends at T12/L1 through `size` rad, and the waist by as much less.
 
     In all three axes the same part of the trunk's motion; in a trial that bends the trunk by
     less than LEAST_RANGE_RAD, in proportion.
     """
-
-    name = "missing_joint"
-    unit = "rad"
-    least, most = 0.0, 1.2
-    targets = "spine (if none)"
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -90,7 +76,7 @@ class MissingJoint(Effect):
 
 
 @dataclass(frozen=True, eq=False)
-class SegmentInertia(Effect):
+class SegmentInertia(Effect, name="segment_inertia"):
     """A segment is heavier by the part `size` of its mass, and so are its second moments.
 
     The other segments are lighter in proportion: the person's mass stays. The centre of mass
@@ -98,12 +84,6 @@ class SegmentInertia(Effect):
     """
 
     segment: str
-
-    name = "segment_inertia"
-    unit = "1"
-    least, most = -0.6, 1.5
-    targets = SEGMENT_NAMES + " (else drawn)"
-    hint = "measured people have the segments they have"
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:

@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 
 from bsip_cli.errors import UsageError
-from bsip_cli.simulate.effects.base import OfPlates, Target
+from bsip_cli.simulate.effects.base import Effect, Target
 from bsip_cli.simulate.instruments import COMPONENTS, Instruments, SensingPlate
 from bsip_cli.simulate.numerics import from_rotation_vector
 
@@ -27,37 +27,25 @@ WANDERS_S = 1.5
 # --- clocks ---------------------------------------------------------------------------------------
 
 
-class SyncOffset(OfPlates):
+class SyncOffset(Effect, name="sync_offset"):
     """The force comes late by `size` (early if negative)."""
-
-    name = "sync_offset"
-    unit = "s"
-    least, most = -0.5, 0.5
 
     def measured(self, instruments: Instruments) -> Instruments:
         return instruments.with_forces_from(instruments.sample_times_s() - self.size)
 
 
-class ClockDrift(OfPlates):
+class ClockDrift(Effect, name="clock_drift"):
     """The force's delay grows by `size` seconds per second, from 0 at the start of a trial."""
-
-    name = "clock_drift"
-    unit = "1"
-    least, most = -0.02, 0.02
 
     def measured(self, instruments: Instruments) -> Instruments:
         return instruments.with_forces_from(instruments.sample_times_s() * (1.0 - self.size))
 
 
 @dataclass(frozen=True, eq=False)
-class ClockJump(OfPlates):
+class ClockJump(Effect, name="outside_clock_jump"):
     """From a moment on the force comes `size` seconds later: a buffer of the plates was lost."""
 
     from_share: float
-
-    name = "outside_clock_jump"
-    unit = "s"
-    least, most = -0.3, 0.3
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -74,7 +62,7 @@ class ClockJump(OfPlates):
 
 
 @dataclass(frozen=True, eq=False)
-class GravityTilt(OfPlates):
+class GravityTilt(Effect, name="gravity_tilt"):
     """The lab's axes are turned against the world by turn_rad (rotation vector, lab axes).
 
     Markers and forces turn together about the first plate's centre, so that the physics
@@ -82,11 +70,6 @@ class GravityTilt(OfPlates):
     """
 
     turn_rad: np.ndarray
-
-    name = "gravity_tilt"
-    unit = "rad"
-    least, most = -0.2, 0.2
-    targets = "the lab axis x or y that the vertical turns about (else a horizontal one is drawn)"
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -104,7 +87,7 @@ class GravityTilt(OfPlates):
         return replace(instruments, points_m=points, readings=np.stack(readings))
 
 
-class OfEveryPlate(OfPlates, ABC):
+class OfEveryPlate(Effect, ABC):
     """A plate reads otherwise, or each of them."""
 
     plate = 0  # its number; 0 for all
@@ -125,7 +108,7 @@ class OfEveryPlate(OfPlates, ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class PlateTranslation(OfEveryPlate):
+class PlateTranslation(OfEveryPlate, name="plate_translation"):
     """The plate truly lies at its stated place plus shift_m (lab axes).
 
     plate : its number, or 0 for all of them.
@@ -133,12 +116,6 @@ class PlateTranslation(OfEveryPlate):
 
     shift_m: np.ndarray
     plate: int
-
-    name = "plate_translation"
-    unit = "m"
-    least, most = -0.3, 0.3
-    targets = "a lab axis x, y or z (else a horizontal direction is drawn), plate=NUMBER"
-    settings = ("plate",)
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -154,18 +131,11 @@ class PlateTranslation(OfEveryPlate):
 
 
 @dataclass(frozen=True, eq=False)
-class PlateRotation(OfEveryPlate):
+class PlateRotation(OfEveryPlate, name="plate_rotation"):
     """The plate is truly turned by turn_rad (rotation vector, lab axes) about its centre."""
 
     turn_rad: np.ndarray
     plate: int
-
-    name = "plate_rotation"
-    unit = "rad"
-    least, most = -0.5, 0.5
-    needs_surface = True
-    targets = "yaw (if none), tilt_x or tilt_y (about lab axes), plate=NUMBER"
-    settings = ("plate",)
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -200,9 +170,6 @@ class ChannelFault(OfEveryPlate):
     channel: str
     plate: int
 
-    targets = "fx, fy, fz (if none), mx, my or mz, plate=NUMBER"
-    settings = ("plate",)
-
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
         channel = target.name or "fz"
@@ -222,63 +189,41 @@ class ChannelFault(OfEveryPlate):
         return self.channel + (f" of plate {self.plate}" if self.plate else "")
 
 
-class PlateGain(ChannelFault):
+class PlateGain(ChannelFault, name="plate_gain"):
     """The channel shows 1 + size times the truth."""
-
-    name = "plate_gain"
-    unit = "1"
-    least, most = -0.5, 0.5
 
     def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
         return (1.0 + self.size) * values
 
 
-class PlateZero(ChannelFault):
+class PlateZero(ChannelFault, name="plate_zero"):
     """A constant is added to the channel."""
-
-    name = "plate_zero"
-    unit = "N or N m"
-    least, most = -300.0, 300.0
 
     def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
         return values + self.size
 
 
-class PlateDrift(ChannelFault):
+class PlateDrift(ChannelFault, name="plate_drift"):
     """The channel's zero moves at a constant rate, from 0 at the start of each trial."""
-
-    name = "plate_drift"
-    unit = "N/s or N m/s"
-    least, most = -50.0, 50.0
 
     def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
         return values + self.size * times_s
 
 
-class LateChannel(ChannelFault):
+class LateChannel(ChannelFault, name="outside_late_channel"):
     """The channel comes `size` seconds late: its amplifier's filter is slower than the others'."""
-
-    name = "outside_late_channel"
-    unit = "s"
-    least, most = 0.0, 0.2
 
     def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
         return np.interp(times_s - self.size, times_s, values)
 
 
 @dataclass(frozen=True, eq=False)
-class PlateCrosstalk(OfEveryPlate):
+class PlateCrosstalk(OfEveryPlate, name="plate_crosstalk"):
     """Channel `to` shows size times channel `source` besides its own."""
 
     source: str
     to: str
     plate: int
-
-    name = "plate_crosstalk"
-    unit = "1 (m from force to moment)"
-    least, most = -0.5, 0.5
-    targets = "FROM:TO, two of fx, fy, fz, mx, my, mz (fz:fx if none), plate=NUMBER"
-    settings = ("plate",)
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -296,15 +241,11 @@ class PlateCrosstalk(OfEveryPlate):
 
 
 @dataclass(frozen=True, eq=False)
-class BeltVibration(OfEveryPlate):
+class BeltVibration(OfEveryPlate, name="outside_belt_vibration"):
     """Plates shake vertically by `size` N at about 5 Hz while somebody stands on them."""
 
     frequency_hz: float
     phase_rad: float
-
-    name = "outside_belt_vibration"
-    unit = "N"
-    least, most = 0.0, 300.0
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -316,12 +257,8 @@ class BeltVibration(OfEveryPlate):
         reading[:, 2] += self.size * wave * (np.abs(reading[:, 2]) > LOADED_N)
 
 
-class PlateHysteresis(OfEveryPlate):
+class PlateHysteresis(OfEveryPlate, name="outside_plate_hysteresis"):
     """Horizontal channels follow with a play of `size` N: they stick until moved by that much."""
-
-    name = "outside_plate_hysteresis"
-    unit = "N"
-    least, most = 0.0, 100.0
 
     def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
         for column in (0, 1):
@@ -340,32 +277,24 @@ def play(values: np.ndarray, width: float) -> np.ndarray:
     return result
 
 
-class PlateSaturation(OfEveryPlate):
+class PlateSaturation(OfEveryPlate, name="outside_plate_saturation"):
     """The vertical channel flattens: at 1000 N it shows the part `size` too little.
 
     The error grows with the square of the load.
     """
-
-    name = "outside_plate_saturation"
-    unit = "1"
-    least, most = 0.0, 0.3
 
     def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
         reading[:, 2] *= 1.0 - np.minimum(self.size * (reading[:, 2] / 1000.0) ** 2, 0.5)
 
 
 @dataclass(frozen=True, eq=False)
-class LooseConnector(OfEveryPlate):
+class LooseConnector(OfEveryPlate, name="outside_loose_connector"):
     """The vertical channel's gain wanders: a contact that opens and closes within seconds.
 
     `size` is the standard deviation of the gain.
     """
 
     seed: int
-
-    name = "outside_loose_connector"
-    unit = "1"
-    least, most = 0.0, 0.2
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:

@@ -21,12 +21,10 @@ import pandas as pd
 from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.artifacts import read_artifact
-from bsip_cli.simulate.calculus import derivative
-from bsip_cli.simulate.loads import GRAVITY
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S
-from bsip_cli.simulate.options import StudyOptions
-from bsip_cli.simulate.presets import preset
-from bsip_cli.simulate.stance import feet_wrenches
+from bsip_cli.simulate.numerics import derivative
+from bsip_cli.simulate.options import StudyOptions, preset
+from bsip_cli.simulate.plan import GRAVITY
 from bsip_cli.simulate.study import MOVEMENT, generator, participant_person, wobbling
 from bsip_cli.simulate.trial import Trial, simulate_trial
 
@@ -144,7 +142,7 @@ def _true_moments(person, trial: Trial, kind: str, side: str) -> np.ndarray:
         force += derivative(linear, STEP_S) - weight
         moment += derivative(angular, STEP_S) - np.cross(com, weight)
     if "foot" in LIMBS[kind]:
-        ground_force, ground_moment = feet_wrenches(trial, apart=True)[side]
+        ground_force, ground_moment = trial.feet_wrenches(apart=True)[side]
         force, moment = force - ground_force, moment - ground_moment
     own = f"{LIMBS[kind][0]}_{side}"
     above = "thorax" if kind == "shoulder" else PROXIMAL[kind]

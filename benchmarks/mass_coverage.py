@@ -24,21 +24,20 @@ from bsip_cli.recordings.momentum_mass import Stretch
 from bsip_cli.recordings.told_mass import ToldMass, told_mass
 from bsip_cli.running.unit import Unit
 from bsip_cli.simulate.balance import balanced
-from bsip_cli.simulate.curves import window
-from bsip_cli.simulate.effects.base import Target
-from bsip_cli.simulate.effects.places import body_of
-from bsip_cli.simulate.effects.unmeasured_contact import Support, UnmeasuredContact
-from bsip_cli.simulate.movements.standing import (
-    add_breath_of_motion,
-    add_squat,
-    add_sway,
-    plate_under,
-)
+from bsip_cli.simulate.effects.base import Target, body_of
+from bsip_cli.simulate.effects.loads import Support, UnmeasuredContact
+from bsip_cli.simulate.numerics import window
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
 from bsip_cli.simulate.people import Person, draw_person
 from bsip_cli.simulate.plan import Plan
 from bsip_cli.simulate.recording import write_trial
-from bsip_cli.simulate.sketch import sketch_for
+from bsip_cli.simulate.sketch import (
+    add_breath_of_motion,
+    add_squat,
+    add_sway,
+    plate_under,
+    sketch_for,
+)
 from bsip_cli.simulate.trial import THIN, Trial, simulate_trial, trial_of
 from bsip_cli.stages import ingest, survey
 from bsip_cli.study.study import load_study

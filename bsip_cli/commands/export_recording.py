@@ -196,9 +196,9 @@ class _Correction:
 
     def of(self, before: Instruments) -> Instruments:
         """The instruments corrected."""
-        after = before.with_points(self._points(before))
+        after = replace(before, points_m=self._points(before))
         if before.plates and self._plates:
-            after = after.with_readings(self._readings(before))
+            after = replace(after, readings=self._readings(before))
         return after.frames(self._kept.start, self._kept.stop)
 
     @cached_property

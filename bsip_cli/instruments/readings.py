@@ -30,8 +30,7 @@ class SensingPlate:
 
     def lab_wrench(self, reading: np.ndarray, about_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force and moment (N, 3) about a lab point, lab axes, from a reading (N, 6)."""
-        force = reading[:, :3] @ self.axes.T
-        moment = reading[:, 3:] @ self.axes.T
+        force, moment = reading[:, :3] @ self.axes.T, reading[:, 3:] @ self.axes.T
         return force, moment + np.cross(self.sensor_m - about_m, force)
 
     def reading(self, force: np.ndarray, moment: np.ndarray, about_m: np.ndarray) -> np.ndarray:
@@ -71,15 +70,13 @@ class Instruments:
 
     def frame_times_s(self) -> np.ndarray:
         """(F,) from the first frame."""
-        if self.stamps_s is not None:
-            return self.stamps_s
-        return np.arange(len(self.points_m)) / self.marker_hz
+        even = np.arange(len(self.points_m)) / self.marker_hz
+        return even if self.stamps_s is None else self.stamps_s
 
     def sample_times_s(self) -> np.ndarray:
         """(N,) from the first sample."""
-        if self.stamps_s is not None:
-            return self.stamps_s
-        return np.arange(self.readings.shape[1]) / self.analog_hz
+        even = np.arange(self.readings.shape[1]) / self.analog_hz
+        return even if self.stamps_s is None else self.stamps_s
 
     def column(self, label: str) -> int:
         """Where a marker stands among the points."""
@@ -88,12 +85,6 @@ class Instruments:
                 f"there is no marker {label!r}", expected=f"one of {', '.join(self.labels)}"
             )
         return self.labels.index(label)
-
-    def with_points(self, points_m: np.ndarray) -> Instruments:
-        return replace(self, points_m=points_m)
-
-    def with_readings(self, readings: np.ndarray) -> Instruments:
-        return replace(self, readings=readings)
 
     def frames(self, first: int, last: int) -> Instruments:
         """Only the frames first to last - 1, with their analog samples."""
@@ -106,6 +97,10 @@ class Instruments:
             stamps_s=None if self.stamps_s is None else self.stamps_s[first:last],
         )
 
+    def first_frame_of(self, cut: Instruments) -> int:
+        """At which frame of these ones those of a part of it begin."""
+        return round((cut.start_s - self.start_s) * self.marker_hz)
+
     def with_forces_from(self, times_s: np.ndarray) -> Instruments:
         """At each sample the reading of another time; frames without such a reading are cut.
 
@@ -116,15 +111,14 @@ class Instruments:
         UsageError : nothing is left.
         """
         count = self.readings.shape[1]
-        index = np.arange(count)
-        position = np.interp(times_s, self.sample_times_s(), index, left=-1.0, right=count)
-        frames, ratio = len(self.points_m), self.per_frame
+        at = self.sample_times_s()
+        position = np.interp(times_s, at, np.arange(count), left=-1.0, right=count)
         there = (position > -1e-6) & (position < count - 1 + 1e-6)
-        whole = np.flatnonzero(there.reshape(frames, ratio).all(axis=1))
+        whole = np.flatnonzero(there.reshape(len(self.points_m), self.per_frame).all(axis=1))
         if len(whole) < 2:
             raise UsageError("the plates' clock is so far off that nothing of the trial is left")
         read = np.stack([interpolated(r, position) for r in self.readings])
-        return self.with_readings(read).frames(int(whole[0]), int(whole[-1]) + 1)
+        return replace(self, readings=read).frames(int(whole[0]), int(whole[-1]) + 1)
 
 
 def interpolated(values: np.ndarray, position: np.ndarray) -> np.ndarray:
@@ -136,14 +130,13 @@ def interpolated(values: np.ndarray, position: np.ndarray) -> np.ndarray:
     position = np.where(np.abs(position - nearest) < 1e-6, nearest, position)
     base = np.clip(np.floor(position).astype(int), 1, len(values) - 3)
     s = (position - base)[:, None]
-    a, b, c, d = (values[base + k] for k in (-1, 0, 1, 2))
     weights = (
         -s * (s - 1) * (s - 2) / 6,
         (s + 1) * (s - 1) * (s - 2) / 2,
         -(s + 1) * s * (s - 2) / 2,
         (s + 1) * s * (s - 1) / 6,
     )
-    result = np.zeros_like(a)
-    for weight, value in zip(weights, (a, b, c, d), strict=True):
-        result += np.where(weight == 0.0, 0.0, weight * value)
+    result = np.zeros_like(values[base])
+    for k, weight in enumerate(weights, start=-1):
+        result += np.where(weight == 0.0, 0.0, weight * values[base + k])
     return result

@@ -2,11 +2,11 @@
 
 The way of the data: `people` draws a person; a movement in `movements` sketches joint
 angles, feet and support (`sketch`, `plan`); `balance` finds the pelvis' path that makes it
-physically possible; `kinematics` poses all bodies; `wrench` gets the ground wrench from the
+physically possible; `kinematics` poses all bodies and gets the ground wrench from the
 rate of momentum; `trial` splits it between the feet; `markers` and `recording` measure it
 as a lab would; `study` writes the folder, with the truth beside it.
 
-What `effects` hide changes the person, the plan or the instruments on this way; `injection`
+What `effects` hide changes the person, the plan or the instruments on this way; `inject`
 hides them in measured files. Nothing here is shared with the fitted side but names of
 segments and tables of markers.
 """

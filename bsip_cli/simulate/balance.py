@@ -23,17 +23,26 @@ from scipy.linalg import solve_banded
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from bsip_cli.errors import NumericalError
-from bsip_cli.simulate.calculus import HALF_WIDTH, bridge, derivative, integral
-from bsip_cli.simulate.kinematics import Turns, poses_of, turns_of
-from bsip_cli.simulate.loads import GRAVITY, total_load
-from bsip_cli.simulate.mixing import Mixer
+from bsip_cli.simulate.kinematics import (
+    Momentum,
+    Turns,
+    locked_inertia,
+    momentum_of,
+    poses_of,
+    turns_of,
+)
+from bsip_cli.simulate.numerics import (
+    HALF_WIDTH,
+    bridge,
+    derivative,
+    from_rotation_vector,
+    integral,
+    runs,
+    second_derivative,
+)
 from bsip_cli.simulate.people import Person
-from bsip_cli.simulate.plan import Plan
-from bsip_cli.simulate.poses import Poses
-from bsip_cli.simulate.rotations import from_rotation_vector
-from bsip_cli.simulate.wrench import Momentum, locked_inertia, momentum_of
+from bsip_cli.simulate.plan import G, Plan, Poses, total_load
 
-G = -GRAVITY[1]
 UP = np.array([0.0, 1.0, 0.0])
 SWAY_LIMIT_M = np.array([0.045, 0.020])  # ahead, aside
 LONGEST_BRIDGE_S = 0.30
@@ -51,6 +60,7 @@ DIVERGED_M = 50.0
 REFINING_SLACK = 0.0005  # reach kept back for what interpolation adds
 MOST_ROUNDS = 60
 MOST_LOWERINGS = 12
+MIXING_DEPTH = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,12 +90,14 @@ def balanced(person: Person, plan: Plan, thin: int = 1) -> Poses:
 
     thin : balance every `thin`-th sample only and interpolate (for long standing trials).
     """
-    coarse = plan
-    if thin > 1:
+    if thin == 1:
+        state, height = _within_reach(person, plan)
+    else:
         coarse = replace(plan.thinned(thin), longest_reach=plan.longest_reach - REFINING_SLACK)
-    state, height = _within_reach(person, coarse)
-    if thin > 1:
-        state = _refined(coarse, state, plan)
+        state, height = _within_reach(person, coarse)
+        spline = make_interp_spline(np.arange(len(coarse)) * coarse.step_s, state.pelvis_m, k=5)
+        path = spline(np.arange(len(plan)) * plan.step_s)
+        state = State(path, np.zeros_like(path))
     poses = state.poses(person, plan, turns_of(person, plan))
     excess = poses.excess_reach_m.max()
     if excess > 0.0:
@@ -103,12 +115,18 @@ def _within_reach(person: Person, plan: Plan) -> tuple[State, float]:
     state = State(plan.pelvis_m, np.zeros_like(plan.pelvis_m))
     final = False
     for _ in range(MOST_LOWERINGS):
-        state, poses, left = _balance(person, _lowered(plan, lowered), state, final)
+        height = None if plan.com_height_m is None else plan.com_height_m - lowered
+        low = replace(plan, pelvis_m=plan.pelvis_m - lowered[:, None] * UP, com_height_m=height)
+        state, poses, left = _balance(person, low, state, final)
         excess = poses.excess_reach_m
         if excess.max() == 0.0 and final and left < ROUGH_M:
             break
         final = final or excess.max() == 0.0
-        further = _lowering(excess, plan)
+        # smooth, and the same throughout each flight
+        needed = 1.06 * excess + np.where(excess > 0.0, 0.002, 0.0)
+        near = _near_flights(plan, LOWERING_REACH_S)
+        lower = _dilated(needed, LOWERING_REACH_S, plan.step_s)
+        further = near * needed.max() + (1.0 - near) * lower
         lowered = lowered + further
         state = state.moved(-further[:, None] * UP)
     if not left < ROUGH_M:
@@ -122,14 +140,6 @@ def _out_of_balance(left: float) -> NumericalError:
         expected=f"less than {1000 * ROUGH_M:g}",
         remedy="use another seed or a smaller effect",
     )
-
-
-def _lowering(excess_m: np.ndarray, plan: Plan) -> np.ndarray:
-    """How much lower to go (T,): smooth, and the same throughout each flight."""
-    needed = 1.06 * excess_m + np.where(excess_m > 0.0, 0.002, 0.0)
-    near = _near_flights(plan, LOWERING_REACH_S)
-    lower = _dilated(needed, LOWERING_REACH_S, plan.step_s)
-    return near * needed.max() + (1.0 - near) * lower
 
 
 def _near_flights(plan: Plan, reach_s: float) -> np.ndarray:
@@ -147,11 +157,6 @@ def _dilated(values: np.ndarray, reach_s: float, step_s: float) -> np.ndarray:
     return gaussian_filter1d(wide, samples / 4.0, mode="nearest", truncate=3.9)
 
 
-def _lowered(plan: Plan, by_m: np.ndarray) -> Plan:
-    height = None if plan.com_height_m is None else plan.com_height_m - by_m
-    return replace(plan, pelvis_m=plan.pelvis_m - by_m[:, None] * UP, com_height_m=height)
-
-
 def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[State, Poses, float]:
     """The fixed-point iteration; a rough one, without turns in flight, unless `final`.
 
@@ -161,42 +166,59 @@ def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[Sta
     if plan.sway_share:
         state, cop = _with_sway(person, plan, turns, state, cop)
     tolerance, mixer = ROUGH_M, Mixer()
-    if final:
-        tolerance = CLOSE_ENOUGH_M if plan.flights else STANDING_CLOSE_ENOUGH_M
-    if final and plan.loads and plan.flights:
-        tolerance = LOADED_CLOSE_ENOUGH_M
-    edge = EDGE_S / plan.step_s if plan.loads else 0
-    inner = slice(round(edge), len(plan) - round(edge))
+    if final and plan.flights:
+        tolerance = LOADED_CLOSE_ENOUGH_M if plan.loads else CLOSE_ENOUGH_M
+    elif final:
+        tolerance = STANDING_CLOSE_ENOUGH_M
+    edge = round(EDGE_S / plan.step_s) if plan.loads else 0
+    inner = slice(edge, len(plan) - edge)
     for _ in range(MOST_ROUNDS):
         poses = state.poses(person, plan, turns)
         momentum = momentum_of(person.inertias, poses, plan.step_s)
-        load_force, load_moment = total_load(plan.all_loads(), poses, plan.step_s)
-        shift = _com_target(plan, momentum, cop, load_force, load_moment) - momentum.com_m
+        load = total_load(plan.all_loads(), poses, plan.step_s)
+        shift = _com_target(plan, momentum, cop, *load) - momentum.com_m
         turn = np.zeros_like(shift)
         if final and plan.flights:
             locked = locked_inertia(person.inertias, poses, momentum.com_m)
-            rate = _turn_rate(plan, state.turn_rate, momentum, locked, load_force, load_moment)
-            turn = rate - state.turn_rate
+            turn = _turn_rate(plan, state.turn_rate, momentum, locked, *load) - state.turn_rate
         turned = plan.step_s * np.abs(turn).sum(axis=0)
         left = max(np.abs(shift[inner]).max(), turned.max())
         if not left < DIVERGED_M:
             raise _out_of_balance(left)
         if plan.loads:  # what is carried couples the pelvis' path and turns
-            shift, turn = _mixed(mixer, state, shift, turn)
+            point = np.stack([state.pelvis_m, RATE_WEIGHT_S * state.turn_rate])
+            shift, turn = mixer.step(point, np.stack([shift, RATE_WEIGHT_S * turn]))
+            turn = turn / RATE_WEIGHT_S
         state = State(state.pelvis_m + shift, state.turn_rate + turn)
         if left < tolerance:
             break
     return state, state.poses(person, plan, turns), float(left)
 
 
-def _mixed(
-    mixer: Mixer, state: State, shift: np.ndarray, turn: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Better corrections of path and turning rate, both weighed alike."""
-    point = np.stack([state.pelvis_m, RATE_WEIGHT_S * state.turn_rate])
-    plain = np.stack([shift, RATE_WEIGHT_S * turn])
-    step = mixer.step(point.ravel(), plain.ravel()).reshape(point.shape)
-    return step[0], step[1] / RATE_WEIGHT_S
+class Mixer:
+    """Remembers the last steps of an iteration x -> x + step(x) and proposes better ones.
+
+    Anderson mixing: Walker and Ni, Anderson acceleration for fixed-point iterations, SIAM J.
+    Numer. Anal. 2011.
+    """
+
+    def __init__(self) -> None:
+        self._points: list[np.ndarray] = []
+        self._steps: list[np.ndarray] = []
+
+    def step(self, point: np.ndarray, plain: np.ndarray) -> np.ndarray:
+        """The step to take from a point where the plain iteration would take `plain` (same shape).
+
+        Of the remembered points that combination is left whose plain step would be smallest.
+        """
+        self._points = [*self._points[-MIXING_DEPTH:], point.ravel()]
+        self._steps = [*self._steps[-MIXING_DEPTH:], plain.ravel()]
+        if len(self._steps) == 1:
+            return plain
+        moved = np.diff(np.stack(self._points), axis=0)
+        changed = np.diff(np.stack(self._steps), axis=0)
+        share, *_ = np.linalg.lstsq(changed.T, plain.ravel(), rcond=1e-10)
+        return plain - (share @ (moved + changed)).reshape(plain.shape)
 
 
 def _with_sway(
@@ -204,14 +226,12 @@ def _with_sway(
 ) -> tuple[State, np.ndarray]:
     """Stand over the planned COP, and leave a part of the COP's natural excursion in it."""
     for _ in range(3):
-        poses = state.poses(person, plan, turns)
-        momentum = momentum_of(person.inertias, poses, plan.step_s)
+        momentum = momentum_of(person.inertias, state.poses(person, plan, turns), plan.step_s)
         miss = np.zeros_like(momentum.com_m)
         miss[:, [0, 2]] = cop - momentum.com_m[:, [0, 2]]
         state = state.moved(miss)
     turning = derivative(momentum.spin(), plan.step_s)
-    weight = momentum.mass_kg * G
-    excursion = np.stack([turning[:, 2], -turning[:, 0]], axis=1) / weight
+    excursion = np.stack([turning[:, 2], -turning[:, 0]], axis=1) / (momentum.mass_kg * G)
     kept = SWAY_LIMIT_M * np.tanh(plan.sway_share * excursion / SWAY_LIMIT_M)
     return state, cop + gaussian_filter1d(kept, 0.03 / plan.step_s, axis=0, mode="nearest")
 
@@ -224,55 +244,40 @@ def _com_target(
     load_moment: np.ndarray,
 ) -> np.ndarray:
     """(T, 3) path of the centre of mass that puts the COP where it is planned."""
-    height = _height_target(plan, momentum, load_force)
-    mass = momentum.mass_kg
-    lift = mass * (derivative(derivative(height, plan.step_s), plan.step_s) + G)
+    height, mass = _height_target(plan, momentum, load_force), momentum.mass_kg
+    lift = mass * (second_derivative(height, plan.step_s) + G)
     load = derivative(momentum.spin(), plan.step_s) + load_moment
     for first, last in plan.flights:  # only the loads act, and the spin is kept
         air = slice(first, last + 1)
         lift[air] = -load_force[air, 1]
         load[air] = np.cross(momentum.com_m[air], load_force[air])
-    total = lift + load_force[:, 1]
-    table = _CartTable(mass * height, lift, plan.step_s)
-    ahead = _ahead(table, total * cop_m[:, 0] - load[:, 2], plan)
-    aside = table.solve(total * cop_m[:, 1] + load[:, 0], 0.0)
+    total, table = lift + load_force[:, 1], (mass * height, lift, plan.step_s)
+    moment, speed = total * cop_m[:, 0] - load[:, 2], plan.speed_m_s
+    ahead = _cart_table(*table, moment, speed)
+    if speed:  # a gait enters and leaves at the speed it has in its middle
+        middle = len(ahead) // 2
+        speed = (ahead[middle + 1] - ahead[middle - 1]) / (2.0 * plan.step_s)
+        ahead = _cart_table(*table, moment, speed)
+    aside = _cart_table(*table, total * cop_m[:, 1] + load[:, 0], 0.0)
     return np.stack([ahead, height, aside], axis=1)
 
 
-@dataclass(frozen=True, eq=False)
-class _CartTable:
-    """lift c - mass height c'' = moment, for the centre of mass c (T,) in one direction.
+def _cart_table(
+    mass_height: np.ndarray, lift: np.ndarray, step_s: float, moment: np.ndarray, speed: float
+) -> np.ndarray:
+    """c (T,), the centre of mass in one direction, of lift c - mass height c'' = moment (T,).
 
-    mass_height : (T,) [kg m]. lift : (T,) vertical force on the body [N].
+    mass_height : (T,) [kg m]. lift : (T,) vertical force on the body [N]. speed : c' at both ends.
     """
-
-    mass_height: np.ndarray
-    lift: np.ndarray
-    step_s: float
-
-    def solve(self, moment: np.ndarray, speed: float) -> np.ndarray:
-        """c (T,) with c' = speed at both ends."""
-        n = len(moment)
-        stiffness = self.mass_height / self.step_s**2
-        bands = np.zeros((3, n))
-        bands[0, 2:] = -stiffness[1:-1]
-        bands[1, 1:-1] = self.lift[1:-1] + 2.0 * stiffness[1:-1]
-        bands[2, :-2] = -stiffness[1:-1]
-        right = moment.copy()
-        bands[1, 0], bands[0, 1], right[0] = -1.0, 1.0, speed * self.step_s
-        bands[1, -1], bands[2, -2], right[-1] = 1.0, -1.0, speed * self.step_s
-        return solve_banded((1, 1), bands, right)
-
-
-def _ahead(table: _CartTable, moment: np.ndarray, plan: Plan) -> np.ndarray:
-    """The forward path; a gait enters and leaves at the speed it has in its middle."""
-    speed = plan.speed_m_s
-    path = table.solve(moment, speed)
-    if speed:
-        middle = len(path) // 2
-        speed = (path[middle + 1] - path[middle - 1]) / (2.0 * plan.step_s)
-        path = table.solve(moment, speed)
-    return path
+    stiffness = mass_height / step_s**2
+    bands = np.zeros((3, len(moment)))
+    bands[0, 2:] = -stiffness[1:-1]
+    bands[1, 1:-1] = lift[1:-1] + 2.0 * stiffness[1:-1]
+    bands[2, :-2] = -stiffness[1:-1]
+    right = moment.copy()
+    bands[1, 0], bands[0, 1], right[0] = -1.0, 1.0, speed * step_s
+    bands[1, -1], bands[2, -2], right[-1] = 1.0, -1.0, speed * step_s
+    return solve_banded((1, 1), bands, right)
 
 
 def _height_target(plan: Plan, momentum: Momentum, load_force: np.ndarray) -> np.ndarray:
@@ -284,30 +289,29 @@ def _height_target(plan: Plan, momentum: Momentum, load_force: np.ndarray) -> np
     """
     if plan.com_height_m is None:
         return momentum.com_m[:, 1]
-    height = plan.com_height_m.copy()
+    height, dt = plan.com_height_m.copy(), plan.step_s
     if not plan.all_loads():
         return height
     for (first, last), (before, after) in zip(plan.flights, _stances(plan), strict=True):
         sink = -load_force[first : last + 1, 1] / momentum.mass_kg
-        speed = integral(sink, plan.step_s)
+        speed = integral(sink, dt)
         speed = speed - speed[-1]
-        rise = integral(speed, plan.step_s)
+        rise = integral(speed, dt)
         rise = rise - rise[-1]
         height[first : last + 1] += rise
         k = HALF_WIDTH + 1  # beside the edges, where differences reach out of the flight
-        takeoff = np.array([rise[0], speed[0], sink[0], (sink[k] - sink[0]) / (k * plan.step_s)])
-        landing = np.array([0.0, 0.0, sink[-1], (sink[-1] - sink[-k - 1]) / (k * plan.step_s)])
-        height[first - before : first] += _bridge_from_rest(takeoff, before, plan.step_s)
+        takeoff = np.array([rise[0], speed[0], sink[0], (sink[k] - sink[0]) / (k * dt)])
+        landing = np.array([0.0, 0.0, sink[-1], (sink[-1] - sink[-k - 1]) / (k * dt)])
+        height[first - before : first] += _from_rest(takeoff, before, dt)
         # the same bridge, run backwards in time
-        settled = _bridge_from_rest(landing * [1.0, -1.0, 1.0, -1.0], after, plan.step_s)
+        settled = _from_rest(landing * [1.0, -1.0, 1.0, -1.0], after, dt)
         height[last + 1 : last + 1 + after] += settled[::-1]
     return height
 
 
-def _bridge_from_rest(end: np.ndarray, samples: int, step_s: float) -> np.ndarray:
-    """(samples,) from nothing to a state: value, first, second and third derivative (4,)."""
-    times = np.arange(samples) * step_s
-    return bridge(np.zeros((4, 1)), end[:, None], samples * step_s, times)[:, 0]
+def _from_rest(end: np.ndarray, samples: int, step_s: float) -> np.ndarray:
+    """(samples,) a `bridge` from nothing to a state."""
+    return bridge(np.zeros(4), end, samples * step_s, np.arange(samples) * step_s)
 
 
 def _stances(plan: Plan) -> list[tuple[int, int]]:
@@ -315,8 +319,7 @@ def _stances(plan: Plan) -> list[tuple[int, int]]:
     longest = round(LONGEST_BRIDGE_S / plan.step_s)
     starts = [first for first, _ in plan.flights] + [len(plan)]
     ends = [-1] + [last for _, last in plan.flights]
-    grounded = [min(longest, a - b - 1) for a, b in zip(starts, ends, strict=True)]
-    return list(pairwise(grounded))
+    return list(pairwise(min(longest, a - b - 1) for a, b in zip(starts, ends, strict=True)))
 
 
 def _turn_rate(
@@ -336,31 +339,13 @@ def _turn_rate(
     weight = _near_flights(plan, TURN_REACH_S)
     haste = LOADED_HASTE if plan.loads else HASTE
     result = np.zeros_like(rate)
-    for group in _runs(weight > 0.0):
+    for group in runs(weight > 0.0):
         w = weight[group, None]
         torque = np.cross(momentum.com_m[group], load_force[group]) - load_moment[group]
         spin = momentum.spin()[group] - integral(torque, plan.step_s)
         mobility = np.linalg.inv(locked[group])
-        lacking = w * (rate[group] - haste * _apply(mobility, spin))
+        lacking = w * (rate[group] - haste * np.einsum("tij,tj->ti", mobility, spin))
         gain = haste * np.einsum("t,tij->ij", weight[group], mobility)
         kept = np.linalg.solve(gain, -lacking.sum(axis=0))
-        result[group] = lacking + haste * w * _apply(mobility, kept)
+        result[group] = lacking + haste * w * np.einsum("tij,j->ti", mobility, kept)
     return result
-
-
-def _apply(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    return np.einsum("tij,j->ti" if vectors.ndim == 1 else "tij,tj->ti", matrices, vectors)
-
-
-def _runs(mask: np.ndarray) -> list[slice]:
-    """The stretches of samples where the mask holds."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _refined(coarse: Plan, state: State, plan: Plan) -> State:
-    """Interpolate the coarse pelvis path to the plan's samples (quintic spline)."""
-    coarse_s = np.arange(len(coarse)) * coarse.step_s
-    fine_s = np.arange(len(plan)) * plan.step_s
-    path = make_interp_spline(coarse_s, state.pelvis_m, k=5)(fine_s)
-    return State(path, np.zeros_like(path))

@@ -13,14 +13,9 @@ import click
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.files.folders import is_folder, lies_in
 from bsip_cli.files.regular import check_regular, fault_of
-from bsip_cli.simulate.asked import effects_of, pair_up
-from bsip_cli.simulate.injection.folder import (
-    inject_recording,
-    inject_study,
-    write_truth_of_recording,
-)
-from bsip_cli.simulate.options import StudyOptions
-from bsip_cli.simulate.presets import preset
+from bsip_cli.simulate.effects import effects_of, pair_up
+from bsip_cli.simulate.inject import inject_recording, inject_study, write_truth
+from bsip_cli.simulate.options import StudyOptions, preset
 from bsip_cli.simulate.study import simulate_study
 
 
@@ -45,21 +40,21 @@ def simulate_command(
     options = preset(preset_name)
     if participants is not None:
         options = replace(options, participants=participants, sexes="")
-    if seed is not None:
-        options = replace(options, seed=seed)
     if sequence_s is not None:
         options = replace(options, durations_s={**options.durations_s, "sequence": sequence_s})
-    if tasks:
-        options = replace(options, tasks=tuple(tasks))
-    if plate_per_foot:
-        laboratory = replace(options.laboratory, plate_per_foot=True)
-        options = replace(options, laboratory=laboratory)
-    if soft_tissue == "measured":
-        options = replace(options, richness=replace(options.richness, measured_tissue=True))
-    if shoulder_girdle:
-        options = replace(options, richness=replace(options.richness, girdle=True))
-    asked = pair_up(effects, sizes, targets)
-    options = replace(options, run=run, effects=asked, effect_tasks=tuple(effect_tasks))
+    richness = replace(
+        options.richness, measured_tissue=soft_tissue == "measured", girdle=shoulder_girdle
+    )
+    options = replace(
+        options,
+        seed=options.seed if seed is None else seed,
+        tasks=tuple(tasks) or options.tasks,
+        laboratory=replace(options.laboratory, plate_per_foot=plate_per_foot),
+        richness=richness,
+        run=run,
+        effects=pair_up(effects, sizes, targets),
+        effect_tasks=tuple(effect_tasks),
+    )
     with _writing(study):
         simulate_study(study, options)
     click.echo(f"bsip simulate: {options.participants} people in {printable(str(study))}", err=True)
@@ -92,13 +87,11 @@ def inject_command(
         )
     _check_new(out)
     with _writing(out):
-        done = inject_study(source, out, options, participants)
-    for error in done.refused:
+        changed, refused = inject_study(source, out, options, participants)
+    for error in refused:
         click.echo(f"bsip inject: {error}", err=True)
-    click.echo(
-        f"bsip inject: {len(done.changed)} recordings changed in {printable(str(out))}", err=True
-    )
-    return BadDataError.exit_code if done.refused or not done.changed else 0
+    click.echo(f"bsip inject: {len(changed)} recordings changed in {printable(str(out))}", err=True)
+    return BadDataError.exit_code if refused or not changed else 0
 
 
 def _inject_one(source: Path, out: Path, options: StudyOptions) -> int:
@@ -109,7 +102,8 @@ def _inject_one(source: Path, out: Path, options: StudyOptions) -> int:
     hidden = effects_of(options, 1)
     with _writing(copy):
         facts = inject_recording(source, copy, hidden)
-        write_truth_of_recording(copy, hidden, facts)
+        record = {"effects": [effect.record() for effect in hidden], **facts}
+        write_truth(copy.with_name(f"{copy.stem}_injected.json"), record)
     click.echo(f"bsip inject: {printable(str(copy))}", err=True)
     return 0
 

@@ -1,7 +1,15 @@
-"""Where the 38 markers sit on a person, and how the skin under them moves.
+"""Where the markers sit on a person, and how the soft tissue under them moves.
 
 Landmarks are placed about the true joint centres so that the usual regressions (Reed, as
 Dumas 2007 and 2018 use them) predict those centres wrongly by the drawn offsets.
+
+Soft tissue as measured on people is larger on trunk and thighs, curved in the pose, and swings.
+Travel of markers against the bone: thigh cluster 18 mm and 10 degrees, shank 17 mm in the swing of
+gait under fluoroscopy (CAMS-Knee data, PMC8631460); pelvis and thigh 3 to 54 mm in range, by marker
+and movement (Fiorentino 2017, Gait Posture); back 9 to 11 mm between extension and flexion (Zemp
+2014, PLoS ONE 9:e95426). Limbs' tissue vibrates near the frequencies of running's impacts
+(Wakeling and Nigg 2001, J Appl Physiol 90:412). Assumed, without a source: how much of a segment
+swings as one mass, its damping, and the trunk's frequency.
 """
 
 from __future__ import annotations
@@ -10,31 +18,47 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bsip_cli.simulate import tissue
 from bsip_cli.simulate.options import Richness
 
 ASIS_FROM_LUMBAR = {"M": (0.335, 0.032, 0.5), "F": (0.340, -0.049, 0.5)}  # pelvis widths
 CERVICAL_SHARE = {"M": (0.55, 8.0), "F": (0.53, 14.0)}  # thorax widths, degrees
 SHOULDER_FROM_ACROMION = (0.42, -67.0)  # thorax widths, degrees
 STERNUM_SLOPE_DEG = 25.0
-SKIN_SIZE_M = {  # travel of a marker against the bone for a large joint movement
-    "thigh": 0.014,
-    "shank": 0.005,
-    "upper_arm": 0.007,
-    "forearm": 0.005,
-    "thorax": 0.005,
-    "clavicle": 0.005,
-    "lower_torso": 0.005,
+# Of the sternoclavicular joint from the notch of the sternum, thorax axes, right side (Holzbaur
+# 2005), in the width of the thorax; how far it lies from there in people.
+JOINT_FROM_NOTCH = np.array([0.0063, 0.0069, 0.0255]) / 0.136
+JOINT_OFFSET_M = 0.005
+# Travel of a marker against the bone for a large joint movement: light, and as measured.
+SKIN_SIZE_M = {
+    "thigh": (0.014, 0.018),
+    "shank": (0.005, 0.007),
+    "upper_arm": (0.007, 0.007),
+    "forearm": (0.005, 0.005),
+    "thorax": (0.005, 0.012),
+    "clavicle": (0.005, 0.005),
+    "lower_torso": (0.005, 0.012),
 }
-OTHER_SKIN_SIZE_M = 0.0015
+OTHER_SKIN_SIZE_M = (0.0015, 0.0015)
+CURVED_SHARE = 0.5  # travel with the square of a joint's sine, of that with the sine
+SWINGING = {  # share of the segment's mass, and the range of its frequency [Hz]
+    "thigh_l": (0.3, (8.0, 11.0)),
+    "thigh_r": (0.3, (8.0, 11.0)),
+    "shank_l": (0.2, (8.0, 11.0)),
+    "shank_r": (0.2, (8.0, 11.0)),
+    "upper_torso": (0.1, (5.0, 8.0)),
+    "lower_torso": (0.2, (5.0, 8.0)),
+}
+DAMPING_RATIO = (0.2, 0.4)
+MARKER_SHARE = (0.3, 1.0)  # of the tissue's swing that a marker over it shows
+Places = dict[str, tuple[str, np.ndarray]]
+"""By label, the bone under a marker and the place (3,) in that bone's frame."""
 
 
 @dataclass(frozen=True, eq=False)
 class Marker:
     """One skin marker.
 
-    body : the bone it belongs to.
-    position_m : (3,) rest position in the body's frame.
+    body : the bone it belongs to. position_m : (3,) rest position in the body's frame.
     skin_gain_m : (3, 12) travel per sine of the proximal (3) and distal (3) joint rotation, and
         per square of these.
     lag_s2 : travel against the marker's acceleration [m per m/s2].
@@ -48,101 +72,137 @@ class Marker:
     swing_share: float
 
 
-def place_markers(
-    rng: np.random.Generator,
-    sex: str,
-    lengths: dict[str, float],
-    joints: dict[str, np.ndarray],
-    errors: dict[str, np.ndarray],
-    hinges: dict[str, np.ndarray],
-    widths: dict[str, float],
-    ankle_height: float,
-    richness: Richness,
-) -> dict[str, Marker]:
-    """All markers of a person. Lengths in m; `errors` as drawn with the joints."""
-    places = {
-        **_head(lengths),
-        **_trunk(sex, lengths, errors, widths),
-        **_pelvis(sex, errors, widths),
+@dataclass(frozen=True)
+class Swing:
+    """Part of a segment that hangs on its bone by a spring and a damper."""
+
+    mass_share: float
+    frequency_hz: float
+    damping_ratio: float
+
+
+@dataclass(frozen=True, eq=False)
+class Build:
+    """A person's sizes and joints, as in `Person`.
+
+    widths_m : of pelvis and thorax, and half that of the shoulders.
+    errors_m : for ljc, cjc and shoulder_*, true joint centre minus what landmarks predict (3,).
+    """
+
+    sex: str
+    lengths_m: dict[str, float]
+    widths_m: dict[str, float]
+    ankle_height_m: float
+    joints_m: dict[str, np.ndarray]
+    errors_m: dict[str, np.ndarray]
+    hinges: dict[str, np.ndarray]
+
+
+def kind_of(body: str) -> str:
+    """A body's name without its side."""
+    return body.removesuffix("_l").removesuffix("_r")
+
+
+def heel_and_toe_m(foot_length_m: float) -> tuple[float, float]:
+    """X of the heel and of the metatarsal heads from the ankle joint, foot flat."""
+    return -0.27 * foot_length_m, 0.73 * foot_length_m
+
+
+def draw_tissue(rng: np.random.Generator) -> dict[str, Swing]:
+    """What swings, by segment; left and right at frequencies of their own."""
+    return {
+        segment: Swing(share, float(rng.uniform(*range_hz)), float(rng.uniform(*DAMPING_RATIO)))
+        for segment, (share, range_hz) in SWINGING.items()
     }
+
+
+def place_markers(rng: np.random.Generator, build: Build, richness: Richness) -> dict[str, Marker]:
+    """The 38 markers of a person."""
+    places = {**_head_and_trunk(build), **_pelvis(build)}
     for side, sign in (("l", -1.0), ("r", 1.0)):
-        places |= _arm(side, sign, lengths, joints, errors, hinges, widths)
-        places |= _leg(side, sign, lengths, hinges, ankle_height)
-    return skin_markers(places, rng, richness)
+        places |= {**_arm(build, side, sign), **_leg(build, side, sign)}
+    return _skin_markers(places, rng, richness)
 
 
-def skin_markers(
-    places: dict[str, tuple[str, np.ndarray]], rng: np.random.Generator, richness: Richness
+def with_girdle(
+    rng: np.random.Generator, build: Build, markers: dict[str, Marker], richness: Richness
+) -> tuple[dict[str, np.ndarray], dict[str, Marker]]:
+    """Joints with sternoclavicular_* (thorax axes), and 51 markers, with those of the clavicles.
+
+    The clavicles have no mass of their own: the thorax keeps that of the girdle, as every model
+    with massless clavicles has it.
+    """
+    joints, markers = dict(build.joints_m), dict(markers)
+    places: Places = {"OCC": ("head", np.array([-0.09, 0.7 * build.lengths_m["head"], 0.0]))}
+    for side, sign in (("l", -1.0), ("r", 1.0)):
+        offset = richness.joint_centre_offset * JOINT_OFFSET_M * rng.standard_normal(3)
+        from_notch = build.widths_m["thorax"] * JOINT_FROM_NOTCH * np.array([1.0, 1.0, sign])
+        joint = markers["IJ"].position_m + from_notch + offset
+        joints[f"sternoclavicular_{side}"] = joint
+        label = f"{side.upper()}AC"
+        acromion = markers[label].position_m - joint
+        markers[label] = replace(markers[label], body=f"clavicle_{side}", position_m=acromion)
+        places |= _girdle_and_clusters(build, side, sign, acromion)
+    return joints, markers | _skin_markers(places, rng, richness)
+
+
+def _skin_markers(
+    places: Places, rng: np.random.Generator, richness: Richness
 ) -> dict[str, Marker]:
-    """Markers at these places of bodies, palpated with an error, on skin that slides."""
-    bodies = sorted({body for body, _ in places.values()})
-    sliding = {body: rng.standard_normal((3, 6)) for body in bodies}
+    """Markers at these places, palpated with an error, on skin that slides; the share is drawn."""
+    sliding = {
+        body: rng.standard_normal((3, 6)) for body in sorted({body for body, _ in places.values()})
+    }
     markers = {}
     for label, (body, position) in places.items():
         error = richness.placement_error_m * rng.standard_normal(3)
         own = rng.standard_normal((3, 6))
         lag = 1.5e-4 * np.exp(0.3 * rng.standard_normal())
-        size = SKIN_SIZE_M.get(body.removesuffix("_l").removesuffix("_r"), OTHER_SKIN_SIZE_M)
+        size, _ = SKIN_SIZE_M.get(kind_of(body), OTHER_SKIN_SIZE_M)
         gain = richness.soft_tissue * size * (0.8 * sliding[body] + 0.6 * own) / np.sqrt(3.0)
         lag *= richness.soft_tissue * min(size / 0.007, 1.0)
         markers[label] = Marker(body, position + error, np.hstack([gain, 0.0 * gain]), lag, 0.0)
-    return _with_measured_tissue(markers, rng, richness) if richness.measured_tissue else markers
-
-
-def _with_measured_tissue(
-    markers: dict[str, Marker], rng: np.random.Generator, richness: Richness
-) -> dict[str, Marker]:
-    """Larger where `tissue` says so, and curved in the pose; the share of its swing is drawn."""
-    changed = {}
-    for label, marker in markers.items():
-        kind = marker.body.removesuffix("_l").removesuffix("_r")
-        usual = SKIN_SIZE_M.get(kind, OTHER_SKIN_SIZE_M)
-        size = tissue.SKIN_SIZE_M.get(kind, usual)
+    for label, marker in markers.items() if richness.measured_tissue else ():
+        usual, size = SKIN_SIZE_M.get(kind_of(marker.body), OTHER_SKIN_SIZE_M)
         straight = marker.skin_gain_m[:, :6] * size / usual
-        curved = tissue.CURVED_SHARE * richness.soft_tissue * size * rng.standard_normal((3, 6))
+        curved = CURVED_SHARE * richness.soft_tissue * size * rng.standard_normal((3, 6))
         gain = np.hstack([straight, curved / np.sqrt(3.0)])
-        share = richness.soft_tissue * float(rng.uniform(*tissue.MARKER_SHARE))
-        changed[label] = replace(marker, skin_gain_m=gain, swing_share=share)
-    return changed
+        share = richness.soft_tissue * float(rng.uniform(*MARKER_SHARE))
+        markers[label] = replace(marker, skin_gain_m=gain, swing_share=share)
+    return markers
 
 
-def _head(lengths: dict[str, float]) -> dict[str, tuple[str, np.ndarray]]:
-    h = lengths["head"]
+def _in_plane(degrees: float) -> np.ndarray:
+    """(3,) unit vector ahead, raised by an angle."""
+    return np.array([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees)), 0.0])
+
+
+def _head_and_trunk(build: Build) -> Places:
+    """Landmarks of the head, and of the thorax in the thorax frame (origin CJC)."""
+    h, size, width = (
+        build.lengths_m["head"],
+        build.lengths_m["upper_torso"],
+        build.widths_m["thorax"],
+    )
+    share, angle = CERVICAL_SHARE[build.sex]
+    c7 = -build.errors_m["cjc"] - share * width * _in_plane(angle - STERNUM_SLOPE_DEG)
     return {
         "RTEM": ("head", np.array([0.03, 0.62 * h, 0.075])),
         "LTEM": ("head", np.array([0.03, 0.62 * h, -0.075])),
         "FHEAD": ("head", np.array([0.115, 0.75 * h, 0.0])),
-    }
-
-
-def _trunk(
-    sex: str, lengths: dict[str, float], errors: dict[str, np.ndarray], widths: dict[str, float]
-) -> dict[str, tuple[str, np.ndarray]]:
-    """Thorax landmarks in the thorax frame (origin CJC)."""
-    size = lengths["upper_torso"]
-    share, angle = CERVICAL_SHARE[sex]
-    width = widths["thorax"]
-    rise = np.deg2rad(angle - STERNUM_SLOPE_DEG)
-    slope = np.deg2rad(-STERNUM_SLOPE_DEG)
-    c7 = -errors["cjc"] - share * width * np.array([np.cos(rise), np.sin(rise), 0.0])
-    sternum = c7 + width * np.array([np.cos(slope), np.sin(slope), 0.0])
-    return {
         "C7": ("thorax", c7),
-        "IJ": ("thorax", sternum),
+        "IJ": ("thorax", c7 + width * _in_plane(-STERNUM_SLOPE_DEG)),
         "T10": ("thorax", np.array([-0.235 * size, -0.50 * size, 0.0])),
         "XIPH": ("thorax", np.array([0.21 * size, -0.40 * size, 0.0])),
         "RSCAP": ("thorax", np.array([-0.25 * size, -0.30 * size, 0.19 * size])),
     }
 
 
-def _pelvis(
-    sex: str, errors: dict[str, np.ndarray], widths: dict[str, float]
-) -> dict[str, tuple[str, np.ndarray]]:
+def _pelvis(build: Build) -> Places:
     """Spines of the pelvis in the lower torso's frame (origin at the true LJC)."""
-    width = widths["pelvis"]
-    x, y, z = np.array(ASIS_FROM_LUMBAR[sex]) * width
+    width, shift = build.widths_m["pelvis"], -build.errors_m["ljc"]
+    x, y, z = np.array(ASIS_FROM_LUMBAR[build.sex]) * width
     back, aside = x - 0.68 * width, 0.045
-    shift = -errors["ljc"]
     return {
         "RASIS": ("lower_torso", np.array([x, y, z]) + shift),
         "LASIS": ("lower_torso", np.array([x, y, -z]) + shift),
@@ -151,59 +211,54 @@ def _pelvis(
     }
 
 
-def _arm(
-    side: str,
-    sign: float,
-    lengths: dict[str, float],
-    joints: dict[str, np.ndarray],
-    errors: dict[str, np.ndarray],
-    hinges: dict[str, np.ndarray],
-    widths: dict[str, float],
-) -> dict[str, tuple[str, np.ndarray]]:
+def _arm(build: Build, side: str, sign: float) -> Places:
     """Arm landmarks; the styloids move with the hand (pronation is at the wrist)."""
-    S = side.upper()
-    share, angle = SHOULDER_FROM_ACROMION
-    down = np.deg2rad(angle)
-    below = share * widths["thorax"] * np.array([np.cos(down), np.sin(down), 0.0])
-    acromion = joints[f"shoulder_{side}"] - errors[f"shoulder_{side}"] - below
-    arm, forearm = lengths[f"upper_arm_{side}"], lengths[f"forearm_{side}"]
-    elbow = np.array([0.0, -arm, 0.0]) + 0.036 * sign * hinges[f"elbow_{side}"]
+    S, lengths = side.upper(), build.lengths_m
     upper, lower, hand = f"upper_arm_{side}", f"forearm_{side}", f"hand_{side}"
+    share, angle = SHOULDER_FROM_ACROMION
+    shoulder = build.joints_m[f"shoulder_{side}"] - build.errors_m[f"shoulder_{side}"]
+    elbow = np.array([0.0, -lengths[upper], 0.0]) + 0.036 * sign * build.hinges[f"elbow_{side}"]
     return {
-        f"{S}AC": ("thorax", acromion),
-        f"{S}UA": (upper, np.array([0.008, -0.5 * arm, sign * 0.047])),
+        f"{S}AC": ("thorax", shoulder - share * build.widths_m["thorax"] * _in_plane(angle)),
+        f"{S}UA": (upper, np.array([0.008, -0.5 * lengths[upper], sign * 0.047])),
         f"{S}ELB": (upper, elbow),
-        f"{S}FA": (lower, np.array([-0.01, -0.45 * forearm, sign * 0.038])),
+        f"{S}FA": (lower, np.array([-0.01, -0.45 * lengths[lower], sign * 0.038])),
         f"{S}WRR": (hand, np.array([0.003, 0.0, sign * 0.029])),
         f"{S}WRU": (hand, np.array([-0.003, 0.0, -sign * 0.029])),
         f"{S}HAND": (hand, np.array([-0.016, -lengths[hand], sign * 0.003])),
     }
 
 
-def _leg(
-    side: str,
-    sign: float,
-    lengths: dict[str, float],
-    hinges: dict[str, np.ndarray],
-    ankle_height: float,
-) -> dict[str, tuple[str, np.ndarray]]:
+def _leg(build: Build, side: str, sign: float) -> Places:
     """Leg landmarks; foot markers about the ankle joint, sole at -ankle_height."""
-    S = side.upper()
-    knee = np.array([0.0, -lengths[f"thigh_{side}"], 0.0])
-    across = 0.050 * sign * hinges[f"knee_{side}"]
-    ankle = np.array([0.0, -lengths[f"shank_{side}"], 0.0])
+    S, lengths, low = side.upper(), build.lengths_m, 0.036 - build.ankle_height_m
     thigh, shank, foot = f"thigh_{side}", f"shank_{side}", f"foot_{side}"
+    knee, ankle = (np.array([0.0, -lengths[body], 0.0]) for body in (thigh, shank))
+    across = 0.050 * sign * build.hinges[f"knee_{side}"]
     heel, front = heel_and_toe_m(lengths[foot])
     return {
         f"{S}KNEL": (thigh, knee + across),
         f"{S}KNEM": (thigh, knee - across),
         f"{S}MALL": (shank, ankle + np.array([-0.006, -0.006, sign * 0.037])),
         f"{S}MALM": (shank, ankle + np.array([0.006, 0.006, -sign * 0.037])),
-        f"{S}CAL": (foot, np.array([heel, 0.036 - ankle_height, 0.0])),
-        f"{S}MT2": (foot, np.array([front, 0.036 - ankle_height, -sign * 0.008])),
+        f"{S}CAL": (foot, np.array([heel, low, 0.0])),
+        f"{S}MT2": (foot, np.array([front, low, -sign * 0.008])),
     }
 
 
-def heel_and_toe_m(foot_length_m: float) -> tuple[float, float]:
-    """X of the heel and of the metatarsal heads from the ankle joint, foot flat."""
-    return -0.27 * foot_length_m, 0.73 * foot_length_m
+def _girdle_and_clusters(build: Build, side: str, sign: float, acromion: np.ndarray) -> Places:
+    """What a side has more of with a clavicle."""
+    S, lengths = side.upper(), build.lengths_m
+    clavicle, arm, thigh, shank, foot = (
+        f"{name}_{side}" for name in ("clavicle", "upper_arm", "thigh", "shank", "foot")
+    )
+    elbow = np.array([0.0, -lengths[arm], 0.0]) - 0.036 * sign * build.hinges[f"elbow_{side}"]
+    _, front = heel_and_toe_m(lengths[foot])
+    return {
+        f"{S}CLA": (clavicle, 0.5 * acromion + np.array([0.015, 0.008, 0.0])),
+        f"{S}AA": (clavicle, acromion + np.array([-0.035, -0.005, -0.01 * sign])),
+        f"{S}ELBM": (arm, elbow),
+        f"{S}THI": (thigh, np.array([0.02, -0.55 * lengths[thigh], sign * 0.075])),
+        f"{S}TIB": (shank, np.array([0.02, -0.5 * lengths[shank], sign * 0.05])),
+        f"{S}MT5": (foot, np.array([front - 0.02, 0.02 - build.ankle_height_m, sign * 0.04])),
+    }

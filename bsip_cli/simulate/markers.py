@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from bsip_cli.simulate.calculus import response
-from bsip_cli.simulate.landmarks import Marker
+from bsip_cli.simulate.landmarks import Marker, Swing, kind_of
+from bsip_cli.simulate.numerics import response, rotate, transpose, unskew
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import Person
-from bsip_cli.simulate.poses import Poses
-from bsip_cli.simulate.rotations import rotate, transpose, unskew
-from bsip_cli.simulate.tissue import Swing
+from bsip_cli.simulate.plan import Poses
 
 LAG_SMOOTHING_S = 0.02
 DRIFT_SMOOTHING_S = 0.3
@@ -19,19 +17,20 @@ GAP_FRAMES = (5, 40)
 GAPS_PER_TRIAL = 1.5  # beyond the first one
 GAPS_PER_SECOND = 0.12
 LONGEST_GAP_SHARE = 0.15  # of a trial
-# The bones whose turning against a marker's bone moves the skin over it.
+# The bones whose turning against a marker's bone moves the skin over it; * is the marker's side.
 NEIGHBOURS = {
     "lower_torso": ("thigh_l", "thigh_r"),
     "thorax": ("lower_torso", "head"),
     "head": ("thorax", "thorax"),
-    "clavicle": ("thorax", "upper_arm"),
-    "upper_arm": ("thorax", "forearm"),
-    "forearm": ("upper_arm", "hand"),
-    "hand": ("forearm", "forearm"),
-    "thigh": ("lower_torso", "shank"),
-    "shank": ("thigh", "foot"),
-    "foot": ("shank", "shank"),
+    "clavicle": ("thorax", "upper_arm*"),
+    "upper_arm": ("thorax", "forearm*"),
+    "forearm": ("upper_arm*", "hand*"),
+    "hand": ("forearm*", "forearm*"),
+    "thigh": ("lower_torso", "shank*"),
+    "shank": ("thigh*", "foot*"),
+    "foot": ("shank*", "shank*"),
 }
+MOVED_BY_THE_ARM = {"RAC": "upper_arm_r", "LAC": "upper_arm_l", "RSCAP": "upper_arm_r"}
 
 
 def rigid_paths(person: Person, poses: Poses) -> dict[str, np.ndarray]:
@@ -50,72 +49,39 @@ def marker_paths(
     for label, path in paths.items():
         marker = person.markers[label]
         if richness.soft_tissue:
-            swing = person.tissue.get(_segment_of(marker.body))
-            late = (
-                _lag(marker, path, rate_hz)
-                if swing is None
-                else _swing(marker, swing, path, rate_hz)
-            )
+            segment = "upper_torso" if marker.body == "thorax" else marker.body
+            late = _late(marker, person.tissue.get(segment), path, rate_hz)
             path = path + _skin_travel(label, marker, poses) + late
-        paths[label] = path + _noise(len(path), rate_hz, richness, rng)
+        white = richness.marker_noise_m * rng.standard_normal(path.shape)
+        width = DRIFT_SMOOTHING_S * rate_hz
+        slow = gaussian_filter1d(rng.standard_normal(path.shape), width, axis=0, mode="reflect")
+        # a Gaussian filter of width s leaves 1 / sqrt(2 s sqrt(pi)) of white noise's deviation
+        gain = np.sqrt(2.0 * DRIFT_SMOOTHING_S * rate_hz * np.sqrt(np.pi))
+        paths[label] = path + (white + richness.marker_drift_m * gain * slow)
     return _with_gaps(paths, rate_hz, rng) if richness.gaps else paths
 
 
 def _skin_travel(label: str, marker: Marker, poses: Poses) -> np.ndarray:
     """(T, 3) travel of a marker over its bone, a smooth function of the nearby joints."""
-    own = poses.rotation[marker.body]
-    turns = [
-        unskew(transpose(own) @ poses.rotation[body]) for body in _neighbours(label, marker.body)
-    ]
+    own, side = poses.rotation[marker.body], marker.body[-2:]
+    first, second = (name.replace("*", side) for name in NEIGHBOURS[kind_of(marker.body)])
+    bodies = (first, MOVED_BY_THE_ARM.get(label, second))
+    turns = [unskew(transpose(own) @ poses.rotation[body]) for body in bodies]
     sines = np.concatenate(turns, axis=1)
-    travel = np.hstack([sines, sines**2]) @ marker.skin_gain_m.T
-    return rotate(own, travel)
+    return rotate(own, np.hstack([sines, sines**2]) @ marker.skin_gain_m.T)
 
 
-def _neighbours(label: str, body: str) -> tuple[str, str]:
-    side = body[-2:] if body.endswith(("_l", "_r")) else ""
-    first, second = NEIGHBOURS[body.removesuffix(side)]
-    if label in ("RAC", "LAC", "RSCAP"):
-        second = f"upper_arm_{label[0].lower()}"
-    sided = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
-    first, second = (name + side if name in sided else name for name in (first, second))
-    return first, second
-
-
-def _lag(marker: Marker, path: np.ndarray, rate_hz: float) -> np.ndarray:
-    """(T, 3) the soft tissue stays behind when the bone accelerates."""
-    if len(path) < 5:
+def _late(marker: Marker, swing: Swing | None, path: np.ndarray, rate_hz: float) -> np.ndarray:
+    """(T, 3) soft tissue stays behind when the bone accelerates, or shares a swing driven by it."""
+    if swing is None and len(path) < 5:
         return np.zeros_like(path)
-    acceleration = _acceleration(path, rate_hz)
-    smooth = gaussian_filter1d(acceleration, LAG_SMOOTHING_S * rate_hz, axis=0, mode="nearest")
-    return -marker.lag_s2 * smooth
-
-
-def _swing(marker: Marker, swing: Swing, path: np.ndarray, rate_hz: float) -> np.ndarray:
-    """(T, 3) the marker's share of a swing that the bone's acceleration drives."""
+    acceleration = np.gradient(np.gradient(path, 1.0 / rate_hz, axis=0), 1.0 / rate_hz, axis=0)
+    if swing is None:
+        width = LAG_SMOOTHING_S * rate_hz
+        return -marker.lag_s2 * gaussian_filter1d(acceleration, width, axis=0, mode="nearest")
     w, z = 2.0 * np.pi * swing.frequency_hz, swing.damping_ratio
-    acceleration = _acceleration(path, rate_hz)
-    return marker.swing_share * response(
-        [-1.0], [1.0, 2.0 * z * w, w * w], acceleration, 1.0 / rate_hz
-    )
-
-
-def _acceleration(path: np.ndarray, rate_hz: float) -> np.ndarray:
-    return np.gradient(np.gradient(path, 1.0 / rate_hz, axis=0), 1.0 / rate_hz, axis=0)
-
-
-def _segment_of(body: str) -> str:
-    return "upper_torso" if body == "thorax" else body
-
-
-def _noise(frames: int, rate_hz: float, richness: Richness, rng: np.random.Generator) -> np.ndarray:
-    white = richness.marker_noise_m * rng.standard_normal((frames, 3))
-    slow = gaussian_filter1d(
-        rng.standard_normal((frames, 3)), DRIFT_SMOOTHING_S * rate_hz, axis=0, mode="reflect"
-    )
-    # a Gaussian filter of width s leaves 1 / sqrt(2 s sqrt(pi)) of white noise's deviation
-    gain = np.sqrt(2.0 * DRIFT_SMOOTHING_S * rate_hz * np.sqrt(np.pi))
-    return white + richness.marker_drift_m * gain * slow
+    denominator = [1.0, 2.0 * z * w, w * w]
+    return marker.swing_share * response([-1.0], denominator, acceleration, 1.0 / rate_hz)
 
 
 def _with_gaps(

@@ -1,19 +1,12 @@
-"""What a simulated study may vary. Every richness can be turned off."""
+"""What a simulated study may vary, and ready-made studies. Every richness can be turned off."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-ALL_TASKS = (
-    "static",
-    "sequence",
-    "throwing",
-    "basketball",
-    "squat",
-    "steps",
-    "walking",
-    "running",
-)
+from bsip_cli.errors import UsageError
+
+ALL_TASKS = ("static", "sequence", "throwing", "basketball", "squat", "steps", "walking", "running")
 MORE_TASKS = ("hops", "stepon")
 
 
@@ -22,8 +15,8 @@ class Richness:
     """How much the simulated world differs from the model that is fitted to it.
 
     soft_tissue : scale of the markers' motion against the bone (0 = rigid).
-    measured_tissue : whether it is that of measured people (`tissue`): larger on trunk and thighs,
-        curved in the pose, and swinging with part of the segments' mass.
+    measured_tissue : whether it is that of measured people (`landmarks`): larger on trunk and
+        thighs, curved in the pose, and swinging with part of the segments' mass.
     marker_noise_m : white noise, standard deviation per axis.
     marker_drift_m : slow correlated noise, standard deviation per axis.
     gaps : whether markers get lost for 5 to 40 frames.
@@ -139,3 +132,33 @@ class StudyOptions:
 
     def rates_of(self, task: str) -> Rates:
         return self.rates.get(task, self.rates.get("default", Rates()))
+
+
+_SLOW, _QUICK = Rates(50, 250), Rates(100, 500)
+_SAMPLE_S = (1.0, 27.0, 2.2, 2.5, 3.4, 3.6, 1.2, 0.8)
+_COHORT_S = (3.0, 120.0, 3.0, 3.0, 8.0, 6.0, 1.2, 0.8)
+_DIAGNOSIS_S = {"static": 3.0, "sequence": 60.0, "squat": 10.0, "hops": 6.0, "stepon": 9.0}
+PRESETS = {
+    # six people, small enough to ship (under 11 MB): slow trials at 50 Hz
+    "sample": StudyOptions(
+        seed=2014,
+        sexes="MFMFMF",
+        durations_s=dict(zip(ALL_TASKS, _SAMPLE_S, strict=True)),
+        rates={"default": _QUICK} | dict.fromkeys(("static", "sequence", "squat", "steps"), _SLOW),
+    ),
+    # twelve people with a two-minute sequence at 100 Hz, as in a full study
+    "cohort": StudyOptions(
+        participants=12, seed=2017, durations_s=dict(zip(ALL_TASKS, _COHORT_S, strict=True))
+    ),
+    # one person for hidden effects: stiff trunk, no ball, landings, and an unloaded plate
+    "diagnosis": StudyOptions(
+        participants=1, seed=2026, tasks=tuple(_DIAGNOSIS_S), durations_s=_DIAGNOSIS_S
+    ),
+}
+
+
+def preset(name: str) -> StudyOptions:
+    """The options of a preset."""
+    if name not in PRESETS:
+        raise UsageError(f"unknown preset {name!r}", expected=" or ".join(PRESETS))
+    return PRESETS[name]

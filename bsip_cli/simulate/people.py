@@ -16,17 +16,17 @@ from importlib.resources import files
 import numpy as np
 
 from bsip_cli.body.names import SEGMENTS
-from bsip_cli.simulate.girdle import with_girdle
-from bsip_cli.simulate.inertia import (
-    Inertia,
-    combined,
-    nearest_physical,
-    varied_tensor,
+from bsip_cli.simulate.landmarks import (
+    Build,
+    Marker,
+    Swing,
+    draw_tissue,
+    kind_of,
+    place_markers,
+    with_girdle,
 )
-from bsip_cli.simulate.landmarks import Marker, place_markers
+from bsip_cli.simulate.numerics import from_rotation_vector
 from bsip_cli.simulate.options import Richness
-from bsip_cli.simulate.rotations import from_rotation_vector
-from bsip_cli.simulate.tissue import Swing, draw_tissue
 
 BODIES = ("lower_torso", "abdomen", "thorax", *SEGMENTS[2:])
 SIDES = ("l", "r")
@@ -47,6 +47,73 @@ MASS_SPREAD = {"upper_arm": 0.15, "forearm": 0.15, "hand": 0.15}
 COM_SPREAD_M = {"lower_torso": 0.011, "thorax": 0.012, "abdomen": 0.012, "thigh": 0.007}
 
 
+# --- rigid bodies ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Inertia:
+    """A rigid body's mass distribution.
+
+    com_m : (3,) centre of mass from the body's origin, body axes.
+    tensor_kgm2 : (3, 3) inertia tensor about the centre of mass, body axes.
+    """
+
+    mass_kg: float
+    com_m: np.ndarray
+    tensor_kgm2: np.ndarray
+
+    def is_physical(self) -> bool:
+        """Positive mass and positive definite second moments (pseudo-inertia > 0)."""
+        moments = np.linalg.eigvalsh(second_moments(self.tensor_kgm2))
+        return self.mass_kg > 0.0 and bool(moments.min() > 0.0)
+
+
+def second_moments(tensor: np.ndarray) -> np.ndarray:
+    """Integral of r r^T dm about the centre of mass, from the inertia tensor."""
+    return 0.5 * np.trace(tensor) * np.eye(3) - tensor
+
+
+def tensor_of(moments: np.ndarray) -> np.ndarray:
+    """Inertia tensor from the integral of r r^T dm."""
+    return np.trace(moments) * np.eye(3) - moments
+
+
+def nearest_physical(tensor: np.ndarray, least_share: float = 0.02) -> np.ndarray:
+    """Raise too small principal second moments to a share of the largest one."""
+    values, axes = np.linalg.eigh(second_moments(tensor))
+    values = np.maximum(values, least_share * values.max())
+    return tensor_of(axes @ np.diag(values) @ axes.T)
+
+
+def varied_tensor(tensor: np.ndarray, rng: np.random.Generator, share: float) -> np.ndarray:
+    """Another physical tensor; the mean of many is the given one.
+
+    It is that of equal points drawn from a normal distribution with the given second moments
+    (Wishart), so many that each moment has the relative standard deviation `share`. The axes of
+    a slender body turn little, those of a round one freely.
+    """
+    count = max(3, round(2.0 / share**2))
+    points = rng.standard_normal((count, 3)) @ np.linalg.cholesky(second_moments(tensor)).T
+    return tensor_of(points.T @ points / count)
+
+
+def combined(parts: list[tuple[Inertia, np.ndarray]]) -> Inertia:
+    """One body out of several that share their axes.
+
+    parts : (inertia, origin (3,) of the part in the frame of the whole).
+    """
+    mass = sum(part.mass_kg for part, _ in parts)
+    com = sum(part.mass_kg * (origin + part.com_m) for part, origin in parts) / mass
+    tensor = np.zeros((3, 3))
+    for part, origin in parts:
+        d = origin + part.com_m - com
+        tensor += part.tensor_kgm2 + part.mass_kg * (d @ d * np.eye(3) - np.outer(d, d))
+    return Inertia(mass, com, tensor)
+
+
+# --- the person -----------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True, eq=False)
 class Person:
     """A simulated person; the truth.
@@ -56,8 +123,7 @@ class Person:
         neck (always zero), shoulder_* in the thorax, hip_* in lower_torso, and so on;
         sternoclavicular_* in the thorax, if the shoulders move against it.
     hinges : unit axes (3,) of elbow_* in the upper arm and knee_* in the thigh.
-    inertias : of the 16 bodies.
-    ankle_height_m : of the ankle joint above the sole.
+    inertias : of the 16 bodies. ankle_height_m : of the ankle joint above the sole.
     tissue : what of the segments swings on its bone.
     """
 
@@ -77,14 +143,9 @@ class Person:
 
     def segment_inertias(self) -> dict[str, Inertia]:
         """The 15 fitted segments; the upper torso is the upright sum of its two parts."""
-        origin_abdomen = -(self.joints_m["tjc"] + self.joints_m["cjc"])
-        upper = combined(
-            [
-                (self.inertias["thorax"], np.zeros(3)),
-                (self.inertias["abdomen"], origin_abdomen),
-            ]
-        )
-        parts = {**self.inertias, "upper_torso": upper}
+        abdomen = -(self.joints_m["tjc"] + self.joints_m["cjc"])
+        upper = [(self.inertias["thorax"], np.zeros(3)), (self.inertias["abdomen"], abdomen)]
+        parts = {**self.inertias, "upper_torso": combined(upper)}
         return {name: parts[name] for name in SEGMENTS}
 
 
@@ -106,22 +167,21 @@ class MeanSegment:
 def mean_segments(sex: str) -> dict[str, MeanSegment]:
     """The mean man's or woman's segments (Dumas 2007, trunk parts 2015), right side."""
     table = files("bsip_cli.simulate").joinpath("mean_person.csv").read_text(encoding="utf-8")
-    rows = [row for row in csv.DictReader(table.splitlines()) if row["sex"] == sex]
-    return {row["segment"]: _mean_segment(row) for row in rows}
-
-
-def _mean_segment(row: dict[str, str]) -> MeanSegment:
-    radii = {k: float(row[k]) / 100 for k in ("rxx", "ryy", "rzz", "rxy", "rxz", "ryz")}
-    entry = {k: np.sign(r) * r**2 for k, r in radii.items()}
-    tensor = np.array([[entry["r" + "".join(sorted(i + j))] for j in "xyz"] for i in "xyz"])
-    com = np.array([float(row[f"com_{axis}_percent"]) / 100 for axis in "xyz"])
-    return MeanSegment(
-        row["origin"],
-        float(row["mass_percent"]),
-        com,
-        nearest_physical(tensor),
-        float(row["mean_length_m"]),
-    )
+    segments = {}
+    for row in csv.DictReader(table.splitlines()):
+        if row["sex"] != sex:
+            continue
+        radii = {k: float(row[k]) / 100 for k in ("rxx", "ryy", "rzz", "rxy", "rxz", "ryz")}
+        entry = {k: np.sign(r) * r**2 for k, r in radii.items()}
+        tensor = np.array([[entry["r" + "".join(sorted(i + j))] for j in "xyz"] for i in "xyz"])
+        segments[row["segment"]] = MeanSegment(
+            origin=row["origin"],
+            mass_percent=float(row["mass_percent"]),
+            com=np.array([float(row[f"com_{axis}_percent"]) / 100 for axis in "xyz"]),
+            tensor=nearest_physical(tensor),
+            length_m=float(row["mean_length_m"]),
+        )
+    return segments
 
 
 def draw_person(rng: np.random.Generator, richness: Richness, sex: str = "") -> Person:
@@ -130,38 +190,23 @@ def draw_person(rng: np.random.Generator, richness: Richness, sex: str = "") -> 
     stature = float(np.clip(rng.normal(*STATURE_M[sex]), 1.48, 2.0))
     body_mass_index = float(np.clip(rng.normal(*BODY_MASS_INDEX), 19.0, 30.0))
     mass = body_mass_index * stature**2
-    size = stature / MEAN_STATURE_M[sex]
-    lengths = _draw_lengths(rng, sex, size)
-    widths = {
-        "pelvis": PELVIS_WIDTH_M[sex] * size * _factor(rng, 0.05),
-        "thorax": THORAX_WIDTH_M[sex] * size * _factor(rng, 0.05),
-        "shoulder": HALF_SHOULDER_WIDTH_M[sex] * size * _factor(rng, 0.03),
-    }
-    ankle_height = 0.045 * stature
-    joints, predicted = _draw_joints(rng, sex, lengths, widths, richness.joint_centre_offset)
-    hinges = _draw_hinges(rng, richness.hinge_tilt)
-    inertias = _draw_inertias(
-        rng, sex, mass, lengths, joints["tjc"], body_mass_index, richness.inertia_variation
-    )
-    markers = place_markers(
-        rng, sex, lengths, joints, predicted, hinges, widths, ankle_height, richness
-    )
+    build = _draw_build(rng, sex, stature, richness)
+    inertias = _draw_inertias(rng, build, mass, body_mass_index, richness.inertia_variation)
+    joints, markers = build.joints_m, place_markers(rng, build, richness)
     if richness.girdle:
-        joints, markers = with_girdle(
-            rng, joints, markers, lengths, hinges, widths["thorax"], ankle_height, richness
-        )
+        joints, markers = with_girdle(rng, build, markers, richness)
     return Person(
         sex=sex,
         stature_m=stature,
         mass_kg=mass,
-        lengths_m=lengths,
+        lengths_m=build.lengths_m,
         joints_m=joints,
-        hinges=hinges,
+        hinges=build.hinges,
         inertias=inertias,
         markers=markers,
-        ankle_height_m=ankle_height,
-        pelvis_width_m=widths["pelvis"],
-        thorax_width_m=widths["thorax"],
+        ankle_height_m=build.ankle_height_m,
+        pelvis_width_m=build.widths_m["pelvis"],
+        thorax_width_m=build.widths_m["thorax"],
         trunk_bend=richness.trunk_bend,
         tissue=draw_tissue(rng) if richness.measured_tissue else {},
     )
@@ -172,18 +217,26 @@ def _factor(rng: np.random.Generator, spread: float) -> float:
     return float(np.exp(spread * rng.standard_normal() - 0.5 * spread**2))
 
 
-def _draw_lengths(rng: np.random.Generator, sex: str, size: float) -> dict[str, float]:
-    mean = mean_segments(sex)
-    lengths = {
-        name: mean[name].length_m * size * _factor(rng, 0.035)
-        for name in ("head", "thorax", "abdomen")
-    }
+def _draw_build(rng: np.random.Generator, sex: str, stature: float, richness: Richness) -> Build:
+    """Lengths, widths, joints and hinges, in this order of draws."""
+    size, mean = stature / MEAN_STATURE_M[sex], mean_segments(sex)
+    trunk = ("head", "thorax", "abdomen")
+    lengths = {name: mean[name].length_m * size * _factor(rng, 0.035) for name in trunk}
     lengths["upper_torso"] = lengths["thorax"] + lengths["abdomen"]
     for name in LIMB_LENGTHS:
         both = mean[name].length_m * size * _factor(rng, 0.035)
-        for side in SIDES:
-            lengths[f"{name}_{side}"] = both * _factor(rng, 0.005)
-    return {name: float(length) for name, length in lengths.items()}
+        lengths |= {f"{name}_{side}": both * _factor(rng, 0.005) for side in SIDES}
+    widths = {
+        "pelvis": PELVIS_WIDTH_M[sex] * size * _factor(rng, 0.05),
+        "thorax": THORAX_WIDTH_M[sex] * size * _factor(rng, 0.05),
+        "shoulder": HALF_SHOULDER_WIDTH_M[sex] * size * _factor(rng, 0.03),
+    }
+    joints, errors = _draw_joints(rng, sex, lengths, widths, richness.joint_centre_offset)
+    hinges = {}
+    for hinge in [f"{joint}_{side}" for joint in ("elbow", "knee") for side in SIDES]:
+        tilt = np.deg2rad(3.0) * richness.hinge_tilt * rng.standard_normal(3)
+        hinges[hinge] = from_rotation_vector(tilt) @ np.array([0.0, 0.0, 1.0])
+    return Build(sex, lengths, widths, 0.045 * stature, joints, errors, hinges)
 
 
 def _draw_joints(
@@ -191,15 +244,12 @@ def _draw_joints(
     sex: str,
     lengths: dict[str, float],
     widths: dict[str, float],
-    offset_scale: float,
+    scale: float,
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """True joints in their parents' frames, and how far landmarks mispredict some of them.
-
-    The second dictionary holds, for ljc, cjc and shoulder_*, true minus predicted (3,).
-    """
+    """True joints in their parents' frames, and how far landmarks mispredict some of them."""
 
     def offset(size_m: float) -> np.ndarray:
-        return offset_scale * size_m * rng.standard_normal(3)
+        return scale * size_m * rng.standard_normal(3)
 
     errors = {
         "ljc": offset(0.006),
@@ -208,97 +258,50 @@ def _draw_joints(
         "shoulder_r": offset(0.006),
     }
     lumbar = np.array(LUMBAR_FROM_ASIS[sex]) * widths["pelvis"]
-    tjc_x = -0.01 * offset_scale
+    tjc_x = -0.01 * scale
     joints = {
         "tjc": np.array([tjc_x, lengths["abdomen"], 0.0]),
         "cjc": np.array([-tjc_x, lengths["thorax"], 0.0]),
     }
+    ends = {"elbow": "upper_arm", "wrist": "forearm", "knee": "thigh", "ankle": "shank"}
     for side, sign in SIDE_SIGN.items():
-        mirror = np.array([1.0, 1.0, sign])
-        hip = mirror * HIP_FROM_ASIS[sex] * widths["pelvis"]
+        hip = np.array([1.0, 1.0, sign]) * HIP_FROM_ASIS[sex] * widths["pelvis"]
         joints[f"hip_{side}"] = hip + offset(0.0065) - (lumbar + errors["ljc"])
         shoulder_y = -0.045 * lengths["upper_torso"] / 0.477
         joints[f"shoulder_{side}"] = np.array([0.005, shoulder_y, sign * widths["shoulder"]])
-        joints[f"elbow_{side}"] = np.array([0.0, -lengths[f"upper_arm_{side}"], 0.0])
-        joints[f"wrist_{side}"] = np.array([0.0, -lengths[f"forearm_{side}"], 0.0])
-        joints[f"knee_{side}"] = np.array([0.0, -lengths[f"thigh_{side}"], 0.0])
-        joints[f"ankle_{side}"] = np.array([0.0, -lengths[f"shank_{side}"], 0.0])
+        for joint, body in ends.items():
+            joints[f"{joint}_{side}"] = np.array([0.0, -lengths[f"{body}_{side}"], 0.0])
     return joints, errors
 
 
-def _draw_hinges(rng: np.random.Generator, tilt_scale: float) -> dict[str, np.ndarray]:
-    hinges = {}
-    for joint in ("elbow", "knee"):
-        for side in SIDES:
-            tilt = np.deg2rad(3.0) * tilt_scale * rng.standard_normal(3)
-            hinges[f"{joint}_{side}"] = from_rotation_vector(tilt) @ np.array([0.0, 0.0, 1.0])
-    return hinges
-
-
 def _draw_inertias(
-    rng: np.random.Generator,
-    sex: str,
-    mass: float,
-    lengths: dict[str, float],
-    tjc: np.ndarray,
-    body_mass_index: float,
-    scale: float,
+    rng: np.random.Generator, build: Build, mass: float, body_mass_index: float, scale: float
 ) -> dict[str, Inertia]:
     """True inertial parameters: the mean person's, varied, summing to the mass."""
-    mean = mean_segments(sex)
+    mean, lengths = mean_segments(build.sex), build.lengths_m
     common = {name: _factor(rng, scale * MASS_SPREAD.get(name, 0.11)) for name in mean}
-    masses = {
-        body: mean[kind].mass_percent
-        * common[kind]
-        * (_factor(rng, 0.03 * scale) if kind != body else 1.0)
-        for body, kind in _kinds().items()
-    }
+    masses = {}
+    for body in BODIES:
+        kind = kind_of(body)
+        own = _factor(rng, 0.03 * scale) if kind != body else 1.0
+        masses[body] = mean[kind].mass_percent * common[kind] * own
     total = sum(masses.values())
-    return {
-        body: _draw_inertia(
-            rng,
-            body,
-            mean[kind],
-            mass * masses[body] / total,
-            _table_length(body, lengths, sex),
-            tjc if mean[kind].origin == "TJC" else np.zeros(3),  # others: the body's own origin
-            body_mass_index,
-            scale,
-        )
-        for body, kind in _kinds().items()
-    }
-
-
-def _kinds() -> dict[str, str]:
-    """The row of the mean person for each of the 16 bodies."""
-    return {b: b.removesuffix("_l").removesuffix("_r") for b in BODIES}
-
-
-def _table_length(body: str, lengths: dict[str, float], sex: str) -> float:
-    """The length [m] that the mean person's row is scaled by."""
-    if body == "lower_torso":  # its own length follows the trunk's
-        mean = mean_segments(sex)
-        upper = mean["thorax"].length_m + mean["abdomen"].length_m
-        return mean["lower_torso"].length_m * lengths["upper_torso"] / upper
-    return lengths[body]
-
-
-def _draw_inertia(
-    rng: np.random.Generator,
-    body: str,
-    mean: MeanSegment,
-    mass: float,
-    length: float,
-    origin: np.ndarray,
-    body_mass_index: float,
-    scale: float,
-) -> Inertia:
-    mirror = np.array([1.0, 1.0, -1.0 if body.endswith("_l") else 1.0])
-    kind = body.removesuffix("_l").removesuffix("_r")
-    com = origin + mirror * mean.com * length
-    com = com + scale * COM_SPREAD_M.get(kind, 0.004) * rng.standard_normal(3)
-    if body in ("abdomen", "lower_torso"):  # a belly shifts the trunk's mass forward
-        com[0] += scale * 0.0015 * (body_mass_index - BODY_MASS_INDEX[0])
-    tensor = np.outer(mirror, mirror) * mean.tensor * mass * length**2
-    tensor = varied_tensor(tensor, rng, 0.12 * scale) if scale else tensor
-    return Inertia(mass, com, tensor)
+    trunk = mean["thorax"].length_m + mean["abdomen"].length_m
+    inertias = {}
+    for body in BODIES:
+        kind, row, own_mass = kind_of(body), mean[kind_of(body)], mass * masses[body] / total
+        # the pelvis' own length follows the trunk's
+        pelvis = row.length_m * lengths["upper_torso"] / trunk
+        length = pelvis if body == "lower_torso" else lengths[body]
+        mirror = np.array([1.0, 1.0, -1.0 if body.endswith("_l") else 1.0])
+        origin = (
+            build.joints_m["tjc"] if row.origin == "TJC" else np.zeros(3)
+        )  # else the body's own
+        com = origin + mirror * row.com * length
+        com = com + scale * COM_SPREAD_M.get(kind, 0.004) * rng.standard_normal(3)
+        if body in ("abdomen", "lower_torso"):  # a belly shifts the trunk's mass forward
+            com[0] += scale * 0.0015 * (body_mass_index - BODY_MASS_INDEX[0])
+        tensor = np.outer(mirror, mirror) * row.tensor * own_mass * length**2
+        tensor = varied_tensor(tensor, rng, 0.12 * scale) if scale else tensor
+        inertias[body] = Inertia(own_mass, com, tensor)
+    return inertias

@@ -1,4 +1,4 @@
-"""Write a trial as a motion-capture lab would: a C3D file with markers and force plates."""
+"""Measure a trial as a motion-capture lab would, and write it as a C3D file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from bsip_cli.simulate.markers import marker_paths
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import STEP_S
-from bsip_cli.simulate.stance import feet_wrenches
 from bsip_cli.simulate.trial import Contact, Trial
 
 SIMULATION_HZ = round(1.0 / STEP_S)
@@ -37,14 +36,10 @@ class Pose:
         """(..., 3) points in the lab."""
         return points_m @ self.rotation.T + self.offset_m
 
-    def vectors(self, vectors: np.ndarray) -> np.ndarray:
-        """(..., 3) directions in the lab."""
-        return vectors @ self.rotation.T
-
     def wrench(self, force: np.ndarray, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force and moment (T, 3) in the lab, the moment about the lab's origin."""
-        turned = self.vectors(force)
-        return turned, self.vectors(moment) + np.cross(self.offset_m, turned)
+        turned = force @ self.rotation.T
+        return turned, moment @ self.rotation.T + np.cross(self.offset_m, turned)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +74,7 @@ class Plate:
 
 def walkway_pose(trial: Trial, laboratory: Laboratory, heading_error_rad: float) -> Pose:
     """Where the walkway lies so that the plan's plate centre meets the lab's first plate."""
-    heading = np.deg2rad(laboratory.facing_deg) + heading_error_rad
-    rotation = _walkway_axes(heading)
+    rotation = _walkway_axes(np.deg2rad(laboratory.facing_deg) + heading_error_rad)
     ahead, aside = trial.plan.plate_centre_m
     centre = np.array([*laboratory.plate_centre_m, 0.0])
     return Pose(rotation, centre - rotation @ np.array([ahead, 0.0, aside]))
@@ -95,18 +89,16 @@ def _walkway_axes(heading_rad: float) -> np.ndarray:
 def plates_of(laboratory: Laboratory) -> list[Plate]:
     """The lab's plates: one after the other in the walking direction, or one for each foot."""
     ahead, up, right = _walkway_axes(np.deg2rad(laboratory.facing_deg)).T
-    axes = np.stack([ahead, right, -up], axis=1)
+    axes, depth = np.stack([ahead, right, -up], axis=1), laboratory.plate_depth_m
     first = np.array([*laboratory.plate_centre_m, 0.0])
     length, width = laboratory.plate_size_m
-    depth = laboratory.plate_depth_m
     if laboratory.plate_per_foot:
         half = 0.5 * (width - PLATE_GAP_M)
         aside = 0.5 * (half + PLATE_GAP_M) * right
         return [Plate(axes, first + side * aside, (length, half), depth) for side in (-1, 1)]
     pitch = (length + PLATE_GAP_M) * ahead
-    return [
-        Plate(axes, first + k * pitch, (length, width), depth) for k in range(laboratory.plates)
-    ]
+    places = [first + k * pitch for k in range(laboratory.plates)]
+    return [Plate(axes, place, (length, width), depth) for place in places]
 
 
 def plate_wrenches(
@@ -117,14 +109,13 @@ def plate_wrenches(
     apart : whether a plate feels one foot only, and so what the feet push against each other.
     """
     wrenches = [(np.zeros_like(trial.force_n), np.zeros_like(trial.force_n)) for _ in plates]
-    feet = feet_wrenches(trial, apart)
+    feet = trial.feet_wrenches(apart)
     for contact in trial.contacts:
         index = _plate_of(contact, plates, pose)
         if index is None:
             continue
-        window = slice(
-            round(contact.start_s * SIMULATION_HZ), round(contact.end_s * SIMULATION_HZ) + 1
-        )
+        start, end = (round(s * SIMULATION_HZ) for s in (contact.start_s, contact.end_s))
+        window = slice(start, end + 1)
         force, moment = pose.wrench(*(part[window] for part in feet[contact.side]))
         wrenches[index][0][window] += force
         wrenches[index][1][window] += moment
@@ -138,8 +129,7 @@ def _plate_of(contact: Contact, plates: list[Plate], pose: Pose) -> int | None:
     distances = [plate.distance_m(place) for plate in plates]
     if contact.on_plate:
         return int(np.argmin(distances))
-    met = [index for index, distance in enumerate(distances) if index and distance == 0.0]
-    return met[0] if met else None
+    return next((k for k, distance in enumerate(distances) if k and distance == 0.0), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +167,6 @@ def measure_trial(
     frames = len(trial.time_s) * rates.marker_hz // SIMULATION_HZ
     sampled = trial.poses.part(slice(0, None, SIMULATION_HZ // rates.marker_hz))
     paths = marker_paths(person, sampled, rates.marker_hz, richness, rng)
-    points = np.stack([pose.points(path[:frames]) for path in paths.values()], axis=1)
     samples = frames * rates.analog_hz // rates.marker_hz
     every = SIMULATION_HZ // rates.analog_hz
     wrenches = plate_wrenches(trial, plates, pose, laboratory.plate_per_foot)
@@ -187,7 +176,7 @@ def measure_trial(
     ]
     delivered = Instruments(
         labels=tuple(paths),
-        points_m=points,
+        points_m=np.stack([pose.points(path[:frames]) for path in paths.values()], axis=1),
         marker_hz=rates.marker_hz,
         plates=tuple(plate.sensing() for plate in plates),
         readings=np.stack(readings),
@@ -196,25 +185,11 @@ def measure_trial(
     )
     for effect in effects:
         delivered = effect.measured(delivered)
-    channels = np.hstack([_noisy_channels(r, richness, rng) for r in delivered.readings])
-    return Measurement(
-        list(delivered.labels), delivered.points_m, channels, plates, rates, pose, delivered.start_s
-    )
-
-
-def _noisy_channels(
-    reading: np.ndarray, richness: Richness, rng: np.random.Generator
-) -> np.ndarray:
-    """(N, 6) channels of one plate in N and N mm."""
     noise = np.repeat([richness.force_noise_n, richness.moment_noise_nm], 3)
     unit = np.repeat([1.0, MM], 3)
-    return unit * (reading + noise * rng.standard_normal(reading.shape))
-
-
-def quantised(channels: np.ndarray) -> np.ndarray:
-    """Channels (N, 6 per plate) rounded to the steps of a 16-bit converter, and clipped."""
-    steps = np.tile(FULL_SCALE / ADC_STEPS, channels.shape[1] // 6)
-    return np.clip(np.round(channels / steps), -ADC_STEPS, ADC_STEPS - 1) * steps
+    noisy = [unit * (r + noise * rng.standard_normal(r.shape)) for r in delivered.readings]
+    points, start = delivered.points_m, delivered.start_s
+    return Measurement(list(delivered.labels), points, np.hstack(noisy), plates, rates, pose, start)
 
 
 def write_trial(
@@ -229,20 +204,11 @@ def write_trial(
     subject: str = "sub-01",
     effects: Sequence[Effect] = (),
 ) -> Measurement:
-    """Measure a trial and write it; returns what was measured."""
+    """Measure a trial and write it as C3D: points in mm, plates of type 2 in N and N mm."""
     measurement = measure_trial(
         trial, person, rates, laboratory, richness, rng, heading_error_rad, effects
     )
-    write_measurement(path, measurement, richness.quantised, subject)
-    return measurement
-
-
-def write_measurement(
-    path: Path, measurement: Measurement, quantise: bool = True, subject: str = "sub-01"
-) -> None:
-    """Write one C3D file: points in mm, plates of type 2 in N and N mm."""
-    c3d = ezc3d.c3d()
-    rates, plates, labels = measurement.rates, measurement.plates, measurement.labels
+    c3d, plates, labels = ezc3d.c3d(), measurement.plates, measurement.labels
     names = [f"{name}{k + 1}" for k in range(len(plates)) for name in CHANNELS]
     point, analog = c3d["parameters"]["POINT"], c3d["parameters"]["ANALOG"]
     point["RATE"]["value"] = [float(rates.marker_hz)]
@@ -259,21 +225,20 @@ def write_measurement(
     c3d["parameters"]["SUBJECTS"]["USES_PREFIXES"]["value"] = np.array([0])
     c3d.add_parameter("MANUFACTURER", "COMPANY", ["simulation"])
     c3d.add_parameter("MANUFACTURER", "SOFTWARE", ["bsip simulate"])
-    _add_points(c3d, measurement.points_m)
-    channels = quantised(measurement.channels) if quantise else measurement.channels
-    c3d["data"]["analogs"] = channels.T[None]
-    c3d.write(str(path))
-
-
-def _add_points(c3d: ezc3d.c3d, points_m: np.ndarray) -> None:
-    """Points (frames, markers, 3); a lost one has NaN coordinates and residual -1."""
-    frames, markers, _ = points_m.shape
-    lost = np.isnan(points_m).any(axis=2).T
+    frames, markers, _ = measurement.points_m.shape
+    lost = np.isnan(measurement.points_m).any(axis=2).T
     homogeneous = np.ones((4, markers, frames))
-    homogeneous[:3] = MM * points_m.transpose(2, 1, 0)
-    c3d["data"]["points"] = homogeneous
-    c3d["data"]["meta_points"]["residuals"] = np.where(lost, -1.0, 0.0)[None]
-    c3d["data"]["meta_points"]["camera_masks"] = np.zeros((7, markers, frames), dtype=bool)
+    homogeneous[:3] = MM * measurement.points_m.transpose(2, 1, 0)
+    data, channels = c3d["data"], measurement.channels
+    data["points"] = homogeneous
+    data["meta_points"]["residuals"] = np.where(lost, -1.0, 0.0)[None]
+    data["meta_points"]["camera_masks"] = np.zeros((7, markers, frames), dtype=bool)
+    if richness.quantised:  # to the steps of a 16-bit converter, and clipped
+        steps = np.tile(FULL_SCALE / ADC_STEPS, len(plates))
+        channels = np.clip(np.round(channels / steps), -ADC_STEPS, ADC_STEPS - 1) * steps
+    data["analogs"] = channels.T[None]
+    c3d.write(str(path))
+    return measurement
 
 
 def _add_plates(c3d: ezc3d.c3d, plates: list[Plate]) -> None:

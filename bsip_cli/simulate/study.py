@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
 from bsip_cli.errors import UsageError
-from bsip_cli.simulate.asked import effects_of, touches
-from bsip_cli.simulate.effects.places import body_of
-from bsip_cli.simulate.effects.wobbling_mass import WobblingMass
+from bsip_cli.simulate.effects import effects_of, touches
+from bsip_cli.simulate.effects.base import Effect, body_of
+from bsip_cli.simulate.effects.loads import WobblingMass
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
-from bsip_cli.simulate.options import ALL_TASKS, MORE_TASKS, Rates, StudyOptions
-from bsip_cli.simulate.people import Person, draw_person
-from bsip_cli.simulate.recording import SIMULATION_HZ, write_trial
-from bsip_cli.simulate.trial import simulate_trial
-from bsip_cli.simulate.truth import ParticipantTruth, StudyTruth, person_record, trial_record
+from bsip_cli.simulate.options import ALL_TASKS, MORE_TASKS, StudyOptions
+from bsip_cli.simulate.people import Inertia, Person, draw_person
+from bsip_cli.simulate.recording import SIMULATION_HZ, Measurement, write_trial
+from bsip_cli.simulate.trial import Trial, simulate_trial
 
 HEADING_SPREAD_RAD = np.deg2rad(2.0)
 SCALE_SPREAD_KG = 0.1
@@ -26,17 +26,39 @@ PERSON, MOVEMENT, RECORDING, LABORATORY = range(4)
 TASK_STREAMS = (*ALL_TASKS, "", *MORE_TASKS)  # new tasks at the end: old studies stay the same
 
 
+@dataclass(frozen=True)
+class ParticipantTruth:
+    """A participant of a simulated study: the person and the facts of each trial."""
+
+    participant: str
+    person: Person
+    trials: dict[str, dict[str, object]]
+
+
+@dataclass(frozen=True)
+class StudyTruth:
+    """All participants of a simulated study."""
+
+    participants: tuple[ParticipantTruth, ...]
+
+
 def simulate_study(folder: Path, options: StudyOptions) -> StudyTruth:
     """Write participants.tsv, study.toml, the recordings and truth/ into the folder."""
     folder = Path(folder)
     check_options(options)
     (folder / "truth").mkdir(parents=True, exist_ok=True)
-    truths = [
-        simulate_participant(folder, options, number)
-        for number in range(1, options.participants + 1)
-    ]
-    _write_text(folder / "participants.tsv", _participants_table(options, truths))
-    _write_text(folder / "study.toml", _settings(options))
+    numbers = range(1, options.participants + 1)
+    truths = [simulate_participant(folder, options, number) for number in numbers]
+    lines = ["participant_id\tsex\tmass_kg\theight_m"]  # as a lab notes them: a scale, a wall
+    for number, truth in zip(numbers, truths, strict=True):
+        scale = generator(options, number, LABORATORY, "static")
+        person = truth.person
+        mass = person.mass_kg + SCALE_SPREAD_KG * scale.standard_normal()
+        lines.append(f"{truth.participant}\t{person.sex}\t{mass:.1f}\t{person.stature_m:.2f}")
+    write_text(folder / "participants.tsv", "\n".join(lines) + "\n")
+    with_girdle = 'marker_set = "robert17"\nskeleton = "robert17"\n'
+    settings = with_girdle if options.richness.girdle else 'marker_set = "hansen2017"\n'
+    write_text(folder / "study.toml", settings)
     return StudyTruth(tuple(truths))
 
 
@@ -52,17 +74,13 @@ def check_options(options: StudyOptions) -> None:
         )
     if options.participants < 1:
         raise UsageError("no participants", expected="at least one")
-    for task in options.tasks:
-        _check_rates(options.rates_of(task))
-
-
-def _check_rates(rates: Rates) -> None:
-    whole = SIMULATION_HZ % rates.marker_hz == 0 and SIMULATION_HZ % rates.analog_hz == 0
-    if not whole or rates.analog_hz % rates.marker_hz:
-        raise UsageError(
-            f"marker rate {rates.marker_hz} Hz with analog rate {rates.analog_hz} Hz",
-            expected="divisors of 1000 Hz, the analog rate a multiple of the marker rate",
-        )
+    for rates in map(options.rates_of, options.tasks):
+        whole = SIMULATION_HZ % rates.marker_hz == 0 and SIMULATION_HZ % rates.analog_hz == 0
+        if not whole or rates.analog_hz % rates.marker_hz:
+            raise UsageError(
+                f"marker rate {rates.marker_hz} Hz with analog rate {rates.analog_hz} Hz",
+                expected="divisors of 1000 Hz, the analog rate a multiple of the marker rate",
+            )
 
 
 def generator(options: StudyOptions, number: int, use: int, task: str = "") -> np.random.Generator:
@@ -99,10 +117,11 @@ def simulate_participant(folder: Path, options: StudyOptions, number: int) -> Pa
         stem = f"{name}_task-{task}" + ("" if task == "static" else f"_run-{options.run}")
         active = [e for e in effects if touches(e, task, options.effect_tasks)]
         body = [*wobbling(person), *active]
+        seed = seed_of(options, number, MOVEMENT, task)
         trial = simulate_trial(
             person,
             task,
-            generator(options, number, MOVEMENT, task),
+            np.random.default_rng(seed),
             options.durations_s.get(task, DEFAULT_DURATION_S[task]),
             ball_mass,
             body,
@@ -119,19 +138,16 @@ def simulate_participant(folder: Path, options: StudyOptions, number: int) -> Pa
             name,
             body,
         )
-        trials[stem] = trial_record(
-            trial, measurement, active, seed_of(options, number, MOVEMENT, task)
-        )
-    truth = ParticipantTruth(name, person, trials)
+        trials[stem] = _trial_record(trial, measurement, active, seed)
     record = {
         "participant_id": name,
         "options": asdict(options),
-        "person": person_record(person),
+        "person": _person_record(person),
         "effects": [{**effect.record(), **effect.facts(person)} for effect in effects],
         "trials": trials,
     }
-    _write_text(folder / "truth" / f"{name}_truth.json", json.dumps(record, indent=1) + "\n")
-    return truth
+    write_text(folder / "truth" / f"{name}_truth.json", json.dumps(record, indent=1) + "\n")
+    return ParticipantTruth(name, person, trials)
 
 
 def wobbling(person: Person) -> list[WobblingMass]:
@@ -147,24 +163,85 @@ def wobbling(person: Person) -> list[WobblingMass]:
     ]
 
 
-def _settings(options: StudyOptions) -> str:
-    if options.richness.girdle:
-        return 'marker_set = "robert17"\nskeleton = "robert17"\n'
-    return 'marker_set = "hansen2017"\n'
+def _person_record(person: Person) -> dict[str, object]:
+    """The person in SI units, segment axes."""
+    parts = {name: person.inertias[name] for name in ("abdomen", "thorax")}
+    segments = person.segment_inertias()
+    return {
+        "sex": person.sex,
+        "mass_kg": person.mass_kg,
+        "stature_m": person.stature_m,
+        "pelvis_width_m": person.pelvis_width_m,
+        "thorax_width_m": person.thorax_width_m,
+        "ankle_height_m": person.ankle_height_m,
+        "trunk_bend": person.trunk_bend,
+        "swinging_tissue": {name: asdict(swing) for name, swing in person.tissue.items()},
+        "segment_lengths_m": person.lengths_m,
+        "joints_in_parent_m": {name: p.tolist() for name, p in person.joints_m.items()},
+        "hinge_axes": {name: axis.tolist() for name, axis in person.hinges.items()},
+        "segments": {name: _inertia_record(part) for name, part in segments.items()},
+        "trunk_parts": {name: _inertia_record(part) for name, part in parts.items()},
+        "markers": {
+            label: {"body": marker.body, "position_m": marker.position_m.tolist()}
+            for label, marker in person.markers.items()
+        },
+    }
 
 
-def _participants_table(options: StudyOptions, truths: list[ParticipantTruth]) -> str:
-    """As a lab would note it: mass from a scale, height from a wall."""
-    lines = ["participant_id\tsex\tmass_kg\theight_m"]
-    for number, truth in enumerate(truths, start=1):
-        scale = generator(options, number, LABORATORY, "static")
-        mass = truth.person.mass_kg + SCALE_SPREAD_KG * scale.standard_normal()
-        height = truth.person.stature_m
-        lines.append(f"{truth.participant}\t{truth.person.sex}\t{mass:.1f}\t{height:.2f}")
-    return "\n".join(lines) + "\n"
+def _inertia_record(part: Inertia) -> dict[str, float]:
+    """Names and conventions of the inertial-parameter artifact (about the centre of mass)."""
+    tensor = part.tensor_kgm2
+    record = {"mass_kg": part.mass_kg}
+    record |= {f"com_{a}_m": part.com_m[i] for i, a in enumerate("xyz")}
+    record |= {f"i{a}{a}_kgm2": tensor[i, i] for i, a in enumerate("xyz")}
+    record |= {"ixy_kgm2": tensor[0, 1], "ixz_kgm2": tensor[0, 2], "iyz_kgm2": tensor[1, 2]}
+    return {name: float(value) for name, value in record.items()}
 
 
-def _write_text(path: Path, text: str) -> None:
+def _trial_record(
+    trial: Trial, measurement: Measurement, effects: Sequence[Effect], seed: list[int]
+) -> dict[str, object]:
+    """Contacts, ball, effects, plate pose and summary of one trial.
+
+    Times are on the movement's clock, on which the file starts at `recorded_from_s`.
+    """
+    pose, plan, ball = measurement.pose, trial.plan, trial.plan.ball
+    times = plan.recorded_times_s()
+    spans = [(times[first], times[last]) for first, last in plan.flights]
+    length = len(trial.time_s) * plan.step_s
+    return {
+        "seed": seed,
+        "duration_s": len(measurement.points_m) / measurement.rates.marker_hz,
+        "recorded_from_s": measurement.start_s,
+        "effects": [effect.name for effect in effects],
+        "ball": ball
+        and {
+            "segment": ball.body,
+            "mass_kg": ball.mass_kg,
+            "position_m": ball.position_m.tolist(),
+            "release_s": ball.release_s,
+        },
+        "contacts": [
+            {
+                "side": contact.side,
+                "start_s": contact.start_s,
+                "end_s": contact.end_s,
+                "on_plate": contact.on_plate,
+            }
+            for contact in trial.contacts
+        ],
+        "flights_s": [
+            [round(float(a), 3), round(float(b), 3)] for a, b in spans if b > 0.0 and a < length
+        ],
+        "all_contacts_measured_share": float(np.mean(trial.all_contacts_measured())),
+        "largest_vertical_force_n": float(trial.plate_force_n()[:, 1].max()),
+        "walkway_to_lab": {"rotation": pose.rotation.tolist(), "offset_m": pose.offset_m.tolist()},
+        **plan.notes,
+    }
+
+
+def write_text(path: Path, text: str) -> None:
+    """Under a temporary name first: no half file under the final one."""
     partial = path.with_name(path.name + ".part")
     partial.write_text(text, encoding="utf-8")
     partial.replace(path)

@@ -9,13 +9,15 @@ import numpy as np
 
 from bsip_cli.simulate.balance import balanced
 from bsip_cli.simulate.effects.base import Effect
+from bsip_cli.simulate.kinematics import ground_wrench
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
+from bsip_cli.simulate.numerics import runs
 from bsip_cli.simulate.people import SIDES, Person
-from bsip_cli.simulate.plan import STEP_S, Foot, Plan
-from bsip_cli.simulate.poses import Poses
-from bsip_cli.simulate.wrench import ground_wrench
+from bsip_cli.simulate.plan import STEP_S, Plan, Poses
 
 THIN = 4  # trials without flight are balanced at 250 Hz and interpolated
+PUSH = 0.06  # of standing feet against each other, of the less loaded foot's vertical force
+LOADED_N = 1.0
 
 
 @dataclass(frozen=True)
@@ -51,22 +53,43 @@ class Trial:
     contacts: tuple[Contact, ...]
     plan: Plan
 
-    def plate_wrench(self) -> tuple[np.ndarray, np.ndarray]:
-        """Force and moment (T, 3) of the contacts on the first plate."""
-        force, moment = np.zeros_like(self.force_n), np.zeros_like(self.force_n)
+    def plate_force_n(self) -> np.ndarray:
+        """(T, 3) of the contacts on the first plate."""
+        force = np.zeros_like(self.force_n)
         for side in SIDES:
-            on = self.on_plate[side][:, None]
-            force += on * self.feet_force_n[side]
-            moment += on * self.feet_moment_nm[side]
-        return force, moment
+            force += self.on_plate[side][:, None] * self.feet_force_n[side]
+        return force
 
     def all_contacts_measured(self) -> np.ndarray:
         """(T,) no foot on the ground beside the plate."""
-        off = [
-            ~self.on_plate[side] & (np.abs(self.feet_force_n[side]).max(axis=1) > 0.0)
-            for side in SIDES
-        ]
-        return ~(off[0] | off[1])
+        on_ground = {side: np.abs(self.feet_force_n[side]).max(axis=1) > 0.0 for side in SIDES}
+        return ~np.any([on_ground[side] & ~self.on_plate[side] for side in SIDES], axis=0)
+
+    def feet_wrenches(self, apart: bool) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Force and moment (T, 3) of each foot; ``apart``: with the push between them.
+
+        The push acts along the line between the feet's centres of pressure, so that nobody but the
+        plates feels it.
+        """
+        feet = {side: (self.feet_force_n[side], self.feet_moment_nm[side]) for side in SIDES}
+        if not apart:
+            return feet
+        centres = {side: _centre_of_pressure(*feet[side]) for side in SIDES}
+        one, other = SIDES
+        line = centres[other] - centres[one]
+        line /= np.maximum(np.linalg.norm(line, axis=1), 1e-9)[:, None]
+        load = np.minimum(feet[one][0][:, 1], feet[other][0][:, 1])
+        push = PUSH * np.where(load > LOADED_N, load, 0.0)[:, None] * line
+        for side, own in ((one, push), (other, -push)):
+            force, moment = feet[side]
+            feet[side] = (force + own, moment + np.cross(centres[side], own))
+        return feet
+
+
+def _centre_of_pressure(force: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """(T, 3) on the floor; Y is up."""
+    load = np.where(force[:, 1] > LOADED_N, force[:, 1], np.inf)
+    return np.stack([moment[:, 2] / load, np.zeros(len(load)), -moment[:, 0] / load], axis=1)
 
 
 def simulate_trial(
@@ -89,59 +112,41 @@ def simulate_trial(
 
 
 def trial_of(person: Person, task: str, plan: Plan, poses: Poses) -> Trial:
-    """Wrenches of a balanced movement, cut to what is recorded."""
-    force, moment = ground_wrench(person.inertias, poses, plan.step_s, plan.all_loads())
-    keep, planned = plan.keep, plan.cop_m()
-    feet_force, feet_moment = {}, {}
-    for side in SIDES:
-        foot = plan.feet[side]
-        feet_force[side], feet_moment[side] = _foot_wrench(foot, planned, force, moment, keep)
-    samples = keep.stop - keep.start
+    """Wrenches of a balanced movement, cut to what is recorded.
+
+    Each foot has its share of the force, acting under that foot: its COP differs from its plan as
+    the whole body's COP differs from its own plan, and the free moment is shared like the force.
+    """
+    keep = plan.keep
+    wrench = ground_wrench(person.inertias, poses, plan.step_s, plan.all_loads())
+    force, moment = (part[keep] for part in wrench)
+    planned, feet_force, feet_moment = plan.cop_m()[keep], {}, {}
+    for side, foot in plan.feet.items():
+        share, aside = foot.share[keep, None], foot.cop_m[keep] - planned
+        lever = np.stack([aside[:, 0], np.zeros(len(aside)), aside[:, 1]], axis=1)
+        feet_force[side] = share * force
+        feet_moment[side] = share * moment + np.cross(lever, feet_force[side])
     return Trial(
         task=task,
-        time_s=np.arange(samples) * STEP_S,
+        time_s=np.arange(keep.stop - keep.start) * STEP_S,
         poses=poses.part(keep),
-        force_n=force[keep],
-        moment_nm=moment[keep],
+        force_n=force,
+        moment_nm=moment,
         feet_force_n=feet_force,
         feet_moment_nm=feet_moment,
-        on_plate={side: plan.feet[side].on_plate[keep] for side in SIDES},
+        on_plate={side: foot.on_plate[keep] for side, foot in plan.feet.items()},
         contacts=_contacts(plan),
         plan=plan,
     )
 
 
-def _foot_wrench(
-    foot: Foot, planned_cop: np.ndarray, force: np.ndarray, moment: np.ndarray, keep: slice
-) -> tuple[np.ndarray, np.ndarray]:
-    """A foot's part of the wrench: its share of the force, acting under that foot.
-
-    The foot's COP differs from its plan as the whole body's COP differs from its own plan,
-    and the free moment is shared like the force.
-    """
-    share = foot.share[keep, None]
-    aside = foot.cop_m[keep] - planned_cop[keep]
-    lever = np.stack([aside[:, 0], np.zeros(len(aside)), aside[:, 1]], axis=1)
-    part = share * force[keep]
-    return part, share * moment[keep] + np.cross(lever, part)
-
-
 def _contacts(plan: Plan) -> tuple[Contact, ...]:
     """The loaded stretches of each foot within the recording, in order of time."""
     contacts = []
-    for side in SIDES:
-        foot, keep = plan.feet[side], plan.keep
-        loaded = (foot.share[keep] > 1e-9).astype(int)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], loaded, [0]])))
-        for a, b in zip(edges[::2], edges[1::2], strict=True):
-            cop = foot.cop_m[keep][a:b].mean(axis=0)
-            contacts.append(
-                Contact(
-                    side,
-                    round(a * STEP_S, 3),
-                    round((b - 1) * STEP_S, 3),
-                    bool(foot.on_plate[keep][a:b].any()),
-                    (float(cop[0]), float(cop[1])),
-                )
-            )
+    for side, foot in plan.feet.items():
+        share, cop, on_plate = (a[plan.keep] for a in (foot.share, foot.cop_m, foot.on_plate))
+        for part in runs(share > 1e-9):
+            start, end = round(part.start * STEP_S, 3), round((part.stop - 1) * STEP_S, 3)
+            ahead, aside = cop[part].mean(axis=0).tolist()
+            contacts.append(Contact(side, start, end, bool(on_plate[part].any()), (ahead, aside)))
     return tuple(sorted(contacts, key=lambda contact: (contact.start_s, contact.side)))

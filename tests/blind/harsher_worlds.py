@@ -14,8 +14,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from bsip_cli.simulate.options import Richness
-from bsip_cli.simulate.presets import diagnosis
+from bsip_cli.simulate.options import Richness, diagnosis
 from bsip_cli.simulate.study import simulate_study
 from tests.blind.blind_running import ROOT, STAGES, TABLES, run_pipeline
 from tests.blind.blind_scoring import read_answer

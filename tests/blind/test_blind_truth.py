@@ -15,7 +15,7 @@ from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Plate, Scene
 from bsip_cli.instruments.readings import Instruments
-from bsip_cli.simulate.asked import drawn, pair_up
+from bsip_cli.simulate.effects import drawn, pair_up
 from bsip_cli.simulate.effects.base import Effect as HiddenEffect
 from bsip_cli.simulate.options import Asked, Laboratory, StudyOptions
 from bsip_cli.simulate.recording import plates_of

@@ -15,8 +15,8 @@ from bsip_cli.pipeline import STAGES
 from bsip_cli.running.runner import Outcome, perform
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
-from bsip_cli.simulate.inertia import Inertia, combined
 from bsip_cli.simulate.options import Rates, StudyOptions
+from bsip_cli.simulate.people import Inertia, combined
 from bsip_cli.simulate.recording import write_trial
 from bsip_cli.simulate.study import participant_person, simulate_study
 from bsip_cli.simulate.trial import simulate_trial

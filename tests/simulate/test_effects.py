@@ -11,18 +11,22 @@ import pytest
 
 from bsip_cli.errors import UsageError
 from bsip_cli.instruments.readings import Instruments, SensingPlate, interpolated
-from bsip_cli.simulate.asked import drawn, effects_of, pair_up, touches
-from bsip_cli.simulate.calculus import derivative
-from bsip_cli.simulate.effects import CATALOGUE, EFFECTS, OUTSIDE
-from bsip_cli.simulate.effects.breathing import ChestMotion
-from bsip_cli.simulate.effects.outside import play
-from bsip_cli.simulate.effects.wobbling_mass import Swinging
-from bsip_cli.simulate.loads import GRAVITY
-from bsip_cli.simulate.mixing import Mixer
+from bsip_cli.simulate.balance import Mixer
+from bsip_cli.simulate.effects import (
+    CATALOGUE,
+    EFFECTS,
+    OUTSIDE,
+    drawn,
+    effects_of,
+    pair_up,
+    touches,
+)
+from bsip_cli.simulate.effects.loads import ChestMotion, Swinging
+from bsip_cli.simulate.effects.plates import play
+from bsip_cli.simulate.numerics import about_z, derivative
 from bsip_cli.simulate.options import Asked, Laboratory, Rates, Richness, StudyOptions
-from bsip_cli.simulate.poses import Poses
+from bsip_cli.simulate.plan import GRAVITY, Poses
 from bsip_cli.simulate.recording import MM, Measurement, measure_trial
-from bsip_cli.simulate.rotations import about_z
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.simulate.trial import Trial, simulate_trial
 from tests.simulate.conftest import person_of

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from bsip_cli.errors import UsageError
+from bsip_cli.simulate import inject as injection
 from bsip_cli.simulate.command import inject_command, simulate_command
-from bsip_cli.simulate.injection import folder as injection
 
 ASKED = {"effects": ["plate_zero"], "sizes": [12.0], "targets": [], "effect_tasks": []}
 RECORDINGS = (

@@ -6,9 +6,17 @@ import numpy as np
 import pytest
 
 from bsip_cli.body.names import SEGMENTS
-from bsip_cli.simulate.inertia import Inertia, combined, nearest_physical, second_moments
 from bsip_cli.simulate.options import Richness
-from bsip_cli.simulate.people import HIP_FROM_ASIS, LUMBAR_FROM_ASIS, draw_person, mean_segments
+from bsip_cli.simulate.people import (
+    HIP_FROM_ASIS,
+    LUMBAR_FROM_ASIS,
+    Inertia,
+    combined,
+    draw_person,
+    mean_segments,
+    nearest_physical,
+    second_moments,
+)
 
 LABELS = """
 RTEM LTEM FHEAD C7 T10 XIPH IJ RSCAP RASIS LASIS RPSIS LPSIS RAC LAC RUA LUA RELB LELB

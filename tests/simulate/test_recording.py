@@ -11,8 +11,7 @@ import pytest
 
 from bsip_cli.errors import UsageError
 from bsip_cli.simulate.markers import marker_paths, rigid_paths
-from bsip_cli.simulate.options import Laboratory, Rates, Richness, StudyOptions
-from bsip_cli.simulate.presets import preset
+from bsip_cli.simulate.options import Laboratory, Rates, Richness, StudyOptions, preset
 from bsip_cli.simulate.recording import (
     FULL_SCALE,
     plate_wrenches,

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bsip_cli.simulate.inertia import Inertia
-from bsip_cli.simulate.loads import GRAVITY
-from bsip_cli.simulate.poses import Poses
-from bsip_cli.simulate.rotations import about_z
+from bsip_cli.simulate.kinematics import ground_wrench, momentum_of
+from bsip_cli.simulate.numerics import about_z
+from bsip_cli.simulate.people import Inertia
+from bsip_cli.simulate.plan import GRAVITY, Poses
 from bsip_cli.simulate.trial import Trial
-from bsip_cli.simulate.wrench import centre_of_pressure, ground_wrench, momentum_of
 
 STEP_S = 0.001
 STANDING = ("static", "sequence", "squat", "throwing")
@@ -120,7 +119,7 @@ def test_each_foot_carries_its_load_under_itself(trial, task):
     for side in "lr":
         force, moment = here.feet_force_n[side], here.feet_moment_nm[side]
         loaded = force[:, 1] > 30.0
-        cop = centre_of_pressure(force, moment)[loaded]
+        cop = centre_of_pressure(force[loaded], moment[loaded])
         ankle = here.poses.origin_m[f"foot_{side}"][loaded][:, [0, 2]]
         assert np.abs(cop - ankle).max() < 0.24
     assert not here.all_contacts_measured().all() or task == "running"
@@ -143,6 +142,11 @@ def test_the_ball_changes_the_wrench_until_it_is_released(trial, person):
     )
 
 
+def centre_of_pressure(force: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """(T, 2) X and Z on the ground where the horizontal moments vanish."""
+    return np.stack([moment[:, 2], -moment[:, 0]], axis=1) / force[:, 1:2]
+
+
 def _loaded_cop(trial: Trial) -> np.ndarray:
     loaded = trial.force_n[:, 1] > 50.0
-    return centre_of_pressure(trial.force_n, trial.moment_nm)[loaded]
+    return centre_of_pressure(trial.force_n[loaded], trial.moment_nm[loaded])

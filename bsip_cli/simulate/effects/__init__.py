@@ -1,70 +1,108 @@
-"""Effects hidden in recordings; this table is all that the rest knows of them.
+"""Effects hidden in recordings: a class each, in the file of what it changes, and `effects.csv`.
 
 CATALOGUE holds those that a diagnosis should name, OUTSIDE those that it cannot know.
 """
 
 from __future__ import annotations
 
-from bsip_cli.simulate.effects.added_mass import AddedMass
-from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.effects.breathing import Breathing
-from bsip_cli.simulate.effects.clocks import ClockDrift, SyncOffset
-from bsip_cli.simulate.effects.gravity_tilt import GravityTilt
-from bsip_cli.simulate.effects.joint_centre import JointCentre
-from bsip_cli.simulate.effects.marker_errors import MarkerShift, MarkerSwap, OverSmoothing
-from bsip_cli.simulate.effects.missing_joint import MissingJoint
-from bsip_cli.simulate.effects.outside import (
-    BeltVibration,
-    ClockJump,
-    ElasticTether,
-    LateChannel,
-    LooseConnector,
-    PlateHysteresis,
-    PlateSaturation,
-    RepeatedFrames,
-)
-from bsip_cli.simulate.effects.plate_channels import (
-    PlateCrosstalk,
-    PlateDrift,
-    PlateGain,
-    PlateZero,
-)
-from bsip_cli.simulate.effects.plate_pose import PlateRotation, PlateTranslation
-from bsip_cli.simulate.effects.released_object import ReleasedObject
-from bsip_cli.simulate.effects.segment_inertia import SegmentInertia
-from bsip_cli.simulate.effects.unmeasured_contact import UnmeasuredContact
-from bsip_cli.simulate.effects.wobbling_mass import WobblingMass
+import difflib
+from collections.abc import Sequence
 
-CATALOGUE: tuple[type[Effect], ...] = (
-    SyncOffset,
-    ClockDrift,
-    PlateTranslation,
-    PlateRotation,
-    PlateGain,
-    PlateCrosstalk,
-    PlateZero,
-    PlateDrift,
-    GravityTilt,
-    AddedMass,
-    ReleasedObject,
-    WobblingMass,
-    Breathing,
-    UnmeasuredContact,
-    JointCentre,
-    MissingJoint,
-    MarkerShift,
-    MarkerSwap,
-    OverSmoothing,
-    SegmentInertia,
+import numpy as np
+
+from bsip_cli.errors import UsageError
+from bsip_cli.simulate.effects import loads, markers, persons, plates  # noqa: F401
+from bsip_cli.simulate.effects.base import KINDS, NOWHERE, TABLE, Effect, Target
+from bsip_cli.simulate.options import Asked, StudyOptions
+
+EFFECTS = {name: KINDS[name] for name in TABLE}
+CATALOGUE, OUTSIDE = (
+    tuple(kind for name, kind in EFFECTS.items() if name.startswith("outside_") == outside)
+    for outside in (False, True)
 )
-OUTSIDE: tuple[type[Effect], ...] = (
-    BeltVibration,
-    PlateHysteresis,
-    PlateSaturation,
-    RepeatedFrames,
-    ElasticTether,
-    LateChannel,
-    LooseConnector,
-    ClockJump,
-)
-EFFECTS = {effect.name: effect for effect in (*CATALOGUE, *OUTSIDE)}
+NO_TARGET = ("", "-")
+EFFECT = 4  # the stream of random numbers, beside those of `study`
+
+
+def pair_up(
+    names: Sequence[str], sizes: Sequence[float], targets: Sequence[str], simulated: bool = True
+) -> tuple[Asked, ...]:
+    """Match names, sizes and targets in the order they are given.
+
+    simulated : whether the effects are for simulated recordings or for measured ones.
+
+    Raises
+    ------
+    UsageError : unknown effect; not one size for each; targets for some effects only; a size
+        out of bounds or a target that the effect cannot have.
+    """
+    for name in names:
+        if name not in EFFECTS:
+            near = difflib.get_close_matches(name, EFFECTS, n=1, cutoff=0.0)[0]
+            raise UsageError(
+                f"unknown effect {name!r}, did you mean {near!r}?", expected=", ".join(EFFECTS)
+            )
+    if len(sizes) != len(names):
+        raise UsageError(
+            f"{len(names)} effects with {len(sizes)} sizes", expected="one --size per --effect"
+        )
+    if len(targets) not in (0, len(names)):
+        raise UsageError(
+            f"{len(names)} effects with {len(targets)} targets",
+            expected="no --target, or one per --effect (- for none)",
+        )
+    asked = tuple(map(Asked, names, sizes, targets or [""] * len(names)))
+    for one in asked:
+        effect = drawn(one, np.random.default_rng(0))
+        if simulated:
+            effect.check_simulated()
+    return asked
+
+
+def drawn(asked: Asked, rng: np.random.Generator) -> Effect:
+    """The effect, with what its target leaves open drawn."""
+    kind = EFFECTS[asked.name]
+    if not kind.least <= asked.size <= kind.most or asked.size == 0.0:
+        raise UsageError(
+            f"{asked.name} of size {asked.size:g}",
+            expected=f"{kind.least:g} to {kind.most:g} {kind.unit}, not 0",
+        )
+    target = _parsed(asked)
+    if target.name and kind.targets == NOWHERE:
+        raise kind.wrong_target(target.name)
+    return kind.draw(asked.size, target, rng)
+
+
+def _parsed(asked: Asked) -> Target:
+    """Split ``NAME,key=number,...`` and check the keys."""
+    kind, name = EFFECTS[asked.name], ""
+    settings: dict[str, float] = {}
+    for part in asked.target.split(",") if asked.target not in NO_TARGET else []:
+        key, equals, number = part.partition("=")
+        if not equals and not name and not settings:
+            name = part
+            continue
+        try:
+            settings[key] = float(number)
+        except ValueError as error:
+            raise kind.wrong_target(asked.target) from error
+        if key not in kind.settings:
+            raise kind.wrong_target(asked.target)
+    return Target(name, settings)
+
+
+def effects_of(options: StudyOptions, number: int) -> tuple[Effect, ...]:
+    """The effects of a participant; those of the lab are the same for all."""
+    effects = []
+    for index, one in enumerate(options.effects):
+        owner = number if EFFECTS[one.name].personal else 0
+        rng = np.random.default_rng([options.seed, owner, EFFECT, index])
+        effects.append(drawn(one, rng))
+    return tuple(effects)
+
+
+def touches(effect: Effect, task: str, tasks: tuple[str, ...]) -> bool:
+    """Whether the effect is in the trials of a task; `tasks` as asked for, or empty."""
+    if tasks:
+        return task in tasks
+    return not (effect.spares_static and task == "static")

@@ -7,17 +7,27 @@ the same in every trial that it touches.
 
 from __future__ import annotations
 
+import csv
 from dataclasses import asdict, dataclass, field
+from importlib.resources import files
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from bsip_cli.body.names import SEGMENTS
 from bsip_cli.errors import UsageError
 from bsip_cli.instruments.readings import Instruments
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
 
 NOWHERE = "none"  # what the target of an effect without a place may be
+JOINTS = tuple(
+    f"{joint}_{side}" for joint in ("hip", "shoulder", "knee", "ankle", "elbow") for side in "lr"
+)
+_FILE = files("bsip_cli.simulate.effects").joinpath("effects.csv")
+TABLE = {row["name"]: row for row in csv.DictReader(_FILE.read_text("utf-8").splitlines())}
+KINDS: dict[str, type[Effect]] = {}
+"""The classes by name, as far as they are imported."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +48,12 @@ class Target:
 class Effect:
     """Base of all effects. A concrete one is a frozen dataclass of its drawn parameters.
 
-    name, unit : of the effect and of its size. least, most : bounds of the size.
+    name : as in `effects.csv`, which has the rest. unit, least, most : of the size, its bounds.
     targets : what a target may be, in words. settings : keys that a target may set.
     spares_static : not in static trials, unless they are asked for.
     personal : drawn for each participant; else once for the lab.
-    injectable : whether it can be hidden in measured data.
-    needs_plates : whether it works on forces. needs_surface : and on where a plate lies.
-    hint : for those that are not, why.
+    injectable : whether it can be hidden in measured data. hint : for those that are not, why.
+    needs : "plates" where it works on forces, and "surface" where on a plate's place.
     """
 
     size: float
@@ -53,14 +62,26 @@ class Effect:
     unit: ClassVar[str]
     least: ClassVar[float]
     most: ClassVar[float]
-    targets: ClassVar[str] = NOWHERE
-    settings: ClassVar[tuple[str, ...]] = ()
-    spares_static: ClassVar[bool] = False
-    injectable: ClassVar[bool] = False
-    needs_plates: ClassVar[bool] = False
-    needs_surface: ClassVar[bool] = False
-    personal: ClassVar[bool] = True
-    hint: ClassVar[str] = "the person would have moved otherwise"
+    targets: ClassVar[str]
+    settings: ClassVar[list[str]]
+    spares_static: ClassVar[bool]
+    personal: ClassVar[bool]
+    injectable: ClassVar[bool]
+    hint: ClassVar[str]
+    needs: ClassVar[list[str]]
+
+    def __init_subclass__(cls, name: str = "") -> None:
+        if not name:  # a base of several
+            return
+        row = TABLE[name]
+        cls.name, cls.unit, cls.hint = name, row["unit"], row["hint"]
+        cls.least, cls.most = float(row["least"]), float(row["most"])
+        cls.targets = row["targets"].format(segments=", ".join(SEGMENTS), joints=", ".join(JOINTS))
+        cls.settings, cls.needs = row["settings"].split(), row["needs"].split()
+        cls.spares_static = row["spares_static"] == "yes"
+        cls.injectable = row["injectable"] == "yes"
+        cls.personal = row["drawn_for"] == "person"
+        KINDS[name] = cls
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
@@ -103,16 +124,41 @@ class Effect:
         return ""
 
     def record(self) -> dict[str, Any]:
-        """The drawn parameters, for the truth."""
-        return {"effect": self.name, "target": self.place(), "unit": self.unit, **plain(self)}
+        """The drawn parameters, for the truth, as JSON has them."""
+        fields = {
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in asdict(self).items()
+        }
+        return {"effect": self.name, "target": self.place(), "unit": self.unit, **fields}
 
 
-def plain(effect: Effect) -> dict[str, Any]:
-    """The fields of an effect as JSON has them."""
-    return {
-        name: value.tolist() if isinstance(value, np.ndarray) else value
-        for name, value in asdict(effect).items()
-    }
+@dataclass(frozen=True, eq=False)
+class OnSegment(Effect):
+    """An effect at a segment, by default at its centre of mass."""
+
+    segment: str
+
+    @classmethod
+    def checked(cls, segment: str) -> str:
+        """The segment, if it is one."""
+        if segment not in SEGMENTS:
+            raise cls.wrong_target(segment)
+        return segment
+
+    def position_m(self, person: Person) -> np.ndarray:
+        """(3,) in the segment's frame."""
+        return person.segment_inertias()[self.segment].com_m
+
+    def place(self) -> str:
+        return self.segment
+
+    def facts(self, person: Person) -> dict[str, Any]:
+        return {"position_m": self.position_m(person).tolist()}
+
+
+def body_of(segment: str) -> str:
+    """The simulated body of a segment; things on the upper torso sit on the thorax."""
+    return "thorax" if segment == "upper_torso" else segment
 
 
 def direction(rng: np.random.Generator) -> np.ndarray:

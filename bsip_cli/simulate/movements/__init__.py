@@ -9,38 +9,26 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bsip_cli.simulate.movements.basketball import basketball
 from bsip_cli.simulate.movements.gait import running, walking
-from bsip_cli.simulate.movements.hops import hops
+from bsip_cli.simulate.movements.jumps import basketball, hops
 from bsip_cli.simulate.movements.sequence import sequence
-from bsip_cli.simulate.movements.standing import squat, static
-from bsip_cli.simulate.movements.stepon import stepon
-from bsip_cli.simulate.movements.steps import steps
-from bsip_cli.simulate.movements.throwing import throwing
+from bsip_cli.simulate.movements.standing import squat, static, throwing
+from bsip_cli.simulate.movements.stepping import stepon, steps
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
 
-MOVEMENTS: dict[str, Callable[[Person, np.random.Generator, float, float], Plan]] = {
-    "static": static,
-    "sequence": sequence,
-    "throwing": throwing,
-    "basketball": basketball,
-    "squat": squat,
-    "steps": steps,
-    "walking": walking,
-    "running": running,
-    "hops": hops,
-    "stepon": stepon,
+Movement = Callable[[Person, np.random.Generator, float, float], Plan]
+_TABLE: dict[str, tuple[Movement, float]] = {
+    "static": (static, 2.0),
+    "sequence": (sequence, 120.0),
+    "throwing": (throwing, 3.0),
+    "basketball": (basketball, 3.0),
+    "squat": (squat, 6.0),
+    "steps": (steps, 5.0),
+    "walking": (walking, 1.2),
+    "running": (running, 0.8),
+    "hops": (hops, 5.0),
+    "stepon": (stepon, 9.0),
 }
-DEFAULT_DURATION_S = {
-    "static": 2.0,
-    "sequence": 120.0,
-    "throwing": 3.0,
-    "basketball": 3.0,
-    "squat": 6.0,
-    "steps": 5.0,
-    "walking": 1.2,
-    "running": 0.8,
-    "hops": 5.0,
-    "stepon": 9.0,
-}
+MOVEMENTS = {task: movement for task, (movement, _) in _TABLE.items()}
+DEFAULT_DURATION_S = {task: duration_s for task, (_, duration_s) in _TABLE.items()}

@@ -1,4 +1,4 @@
-"""Quiet standing and squats, both feet on the plate."""
+"""Both feet on the plate: quiet stance, squats, and an overarm throw."""
 
 from __future__ import annotations
 
@@ -6,36 +6,30 @@ from itertools import pairwise
 
 import numpy as np
 
-from bsip_cli.simulate.curves import wander, window
+from bsip_cli.simulate.numerics import soft_polyline, step, window
 from bsip_cli.simulate.people import SIDES, Person
 from bsip_cli.simulate.plan import Plan
-from bsip_cli.simulate.sketch import Sketch, sketch_for
+from bsip_cli.simulate.sketch import (
+    add_breath_of_motion,
+    add_squat,
+    add_sway,
+    held_ball,
+    plate_under,
+    sketch_for,
+)
 
-SWAY_M = (0.004, 0.003)  # ahead, aside
-
-
-def plate_under(sketch: Sketch, rng: np.random.Generator) -> tuple[float, float]:
-    """A plate centre near the middle of natural stance."""
-    return (sketch.mid_foot_m() + rng.normal(0.0, 0.02), rng.normal(0.0, 0.03))
-
-
-def add_sway(sketch: Sketch, rng: np.random.Generator, scale: float = 1.0) -> None:
-    """Slow wandering of the COP: along the feet, and between them while both carry load."""
-    t = sketch.t_s
-    ahead = wander(t, rng, scale * SWAY_M[0], 0.15, 0.8)
-    aside = wander(t, rng, scale * SWAY_M[1], 0.15, 0.8) / (2.0 * sketch.half_stance_m())
-    for side in SIDES:
-        sketch.feet[side].cop_ahead_m += ahead
-    aside *= 4.0 * sketch.feet["r"].share * sketch.feet["l"].share
-    sketch.feet["r"].share += aside
-    sketch.feet["l"].share -= aside
-
-
-def add_breath_of_motion(sketch: Sketch, rng: np.random.Generator, size_rad: float) -> None:
-    """Tiny wandering of all joint angles of the upper body, and of the pelvis."""
-    for angle in [*sketch.angles.values(), sketch.pelvis_angles]:
-        for column in np.atleast_2d(angle.T):
-            column += wander(sketch.t_s, rng, size_rad, 0.15, 0.7)
+RIGHT_HANDED_SHARE = 0.9
+SOFTNESS_S = 0.032
+STAGGER_M = 0.11  # each foot from the middle
+# Of a throw, in degrees at: start, cocked, release, followed through, back.
+SHOULDER_FLEXION = (0.0, 115.0, 45.0, 5.0, 0.0)
+SHOULDER_ABDUCTION = (0.0, 75.0, 78.0, 35.0, 0.0)
+ELBOW = (0.0, 95.0, 12.0, 10.0, 0.0)
+SNAP = (0.0, -30.0, 10.0, 30.0, 0.0)
+FREE_SHOULDER = (0.0, 50.0, 20.0, 0.0, 0.0)
+FREE_ELBOW = (0.0, 15.0, 60.0, 50.0, 0.0)
+TURN = (0.0, -38.0, 16.0, 34.0, 0.0)
+LEAN = (0.0, 8.0, -14.0, -28.0, 0.0)
 
 
 def static(person: Person, rng: np.random.Generator, duration_s: float, _ball: float) -> Plan:
@@ -52,25 +46,59 @@ def squat(person: Person, rng: np.random.Generator, duration_s: float, _ball: fl
     """Several squats with the arms raised in front."""
     sketch = sketch_for(person, duration_s)
     count = max(2, round(duration_s / 1.7))
-    times = np.linspace(0.1, duration_s - 0.1, count + 1)
     down = np.zeros_like(sketch.t_s)
-    for start, end in pairwise(times):
-        depth = rng.uniform(0.6, 1.0)
-        pause = rng.uniform(0.0, 0.15)
+    for start, end in pairwise(np.linspace(0.1, duration_s - 0.1, count + 1)):
+        depth, pause = rng.uniform(0.6, 1.0), rng.uniform(0.0, 0.15)
         down += depth * window(sketch.t_s, start + pause, end, 0.5 * (end - start - pause))
     add_squat(sketch, down, 0.16 * person.stature_m)
     for side in SIDES:
-        lift = np.deg2rad(rng.uniform(55.0, 75.0)) * down
-        sketch.angles[f"shoulder_{side}"][:, 0] += lift
+        sketch.angles[f"shoulder_{side}"][:, 0] += np.deg2rad(rng.uniform(55.0, 75.0)) * down
     add_breath_of_motion(sketch, rng, np.deg2rad(0.4))
     add_sway(sketch, rng)
     return sketch.plan(plate_centre_m=plate_under(sketch, rng), sway_share=0.3)
 
 
-def add_squat(sketch: Sketch, down: np.ndarray, depth_m: float) -> None:
-    """Lower the pelvis by depth_m times `down` (T,), and lean the trunk with it."""
-    sketch.pelvis_m[:, 1] -= depth_m * down
-    lean = np.deg2rad(60.0) * depth_m * down
-    sketch.pelvis_angles[:, 0] -= 1.6 * lean
-    sketch.angles["waist"][:, 0] -= 1.5 * lean
-    sketch.angles["neck"][:, 0] += 1.5 * lean
+def throwing(
+    person: Person, rng: np.random.Generator, duration_s: float, ball_mass_kg: float
+) -> Plan:
+    """Stand with one foot ahead, cock the arm, throw, follow through, stand."""
+    sketch = sketch_for(person, duration_s)
+    angles, feet = sketch.angles, sketch.feet
+    side, other = ("r", "l") if rng.random() < RIGHT_HANDED_SHARE else ("l", "r")
+    feet[side].ahead_m -= STAGGER_M
+    feet[other].ahead_m += STAGGER_M
+    throw_s, release = rng.uniform(0.20, 0.26), 0.5 * duration_s
+    frames = np.array([0.15, release - throw_s, release, release + 0.22, duration_s - 0.15])
+
+    def curve(degrees: tuple[float, ...], early_s: float = 0.0) -> np.ndarray:
+        size = np.deg2rad(np.array(degrees)) * rng.uniform(0.85, 1.1)
+        return soft_polyline(sketch.t_s, frames - early_s, size, SOFTNESS_S)
+
+    angles[f"shoulder_{side}"][:, 0] += curve(SHOULDER_FLEXION)
+    angles[f"shoulder_{side}"][:, 1] += curve(SHOULDER_ABDUCTION)
+    angles[f"elbow_{side}"] += curve(ELBOW, 0.01)
+    angles[f"wrist_{side}"][:, 0] += curve(SNAP)
+    # the free arm points ahead, then comes in
+    angles[f"shoulder_{other}"][:, 0] += curve(FREE_SHOULDER)
+    angles[f"elbow_{other}"] += curve(FREE_ELBOW)
+    turn = (1.0 if side == "r" else -1.0) * curve(TURN, 0.04)
+    angles["waist"][:, 2] += 0.7 * turn
+    sketch.pelvis_angles[:, 2] += 0.3 * turn
+    angles["waist"][:, 0] += curve(LEAN)
+    angles["neck"][:, 2] -= 0.7 * turn
+    dip = step(sketch.t_s, frames[0], frames[1]) - step(sketch.t_s, frames[3], frames[4])
+    add_squat(sketch, dip, 0.04 * person.stature_m)
+    for name in SIDES:
+        angles[f"wrist_{name}"][:, 2] -= np.deg2rad(20.0) * dip
+    ahead = 0.25 * soft_polyline(sketch.t_s, frames, np.array([0, -1.0, 0.6, 1.0, 0]), 0.08)
+    feet[other].share += ahead
+    feet[side].share -= ahead
+    add_breath_of_motion(sketch, rng, np.deg2rad(0.4))
+    add_sway(sketch, rng, 0.6)
+    ball = held_ball(sketch, rng, side, release, ball_mass_kg)
+    return sketch.plan(
+        plate_centre_m=plate_under(sketch, rng),
+        sway_share=0.3,
+        ball=ball,
+        notes={"throwing_side": side},
+    )

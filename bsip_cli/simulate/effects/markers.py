@@ -1,26 +1,29 @@
-"""Markers that slip, are mistaken for each other, or are smoothed before they are delivered."""
+"""Markers that slip, are mistaken for each other, are smoothed, or stand still.
+
+Names that begin with ``outside_`` are outside the catalogue.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.instruments.readings import Instruments
-from bsip_cli.simulate.curves import step
 from bsip_cli.simulate.effects.base import Effect, Target, direction
-from bsip_cli.simulate.rotations import frame_of, rotate
+from bsip_cli.simulate.numerics import frame_of, rotate, runs, step
 
 SLIP_S = 0.05
 COMPANIONS = 3
 CLOSE_PAIRS = 5
 LEAST_FRAMES = 15  # a shorter stretch between gaps is not smoothed
+BURST_FRAMES = (4, 12)
 
 
 @dataclass(frozen=True, eq=False)
-class MarkerShift(Effect):
+class MarkerShift(Effect, name="marker_shift"):
     """A marker slips along the skin, within SLIP_S, and stays there.
 
     along : (3,) unit vector in the frame of the three markers that keep their distance to
@@ -33,34 +36,22 @@ class MarkerShift(Effect):
     from_share: float
     from_s: float | None
 
-    name = "marker_shift"
-    unit = "m"
-    least, most = 0.0, 0.15
-    targets = "a marker's label (else drawn), from_s=TIME of the slip in each trial"
-    settings = ("from_s",)
-    spares_static = True
-    injectable = True
-
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        number = int(rng.integers(1 << 16))
-        share = float(rng.uniform(0.2, 0.6))
+        number, share = int(rng.integers(1 << 16)), float(rng.uniform(0.2, 0.6))
         from_s = target.settings.get("from_s")
         return cls(size, target.name, number, direction(rng), share, from_s)
 
-    def label(self, instruments: Instruments) -> str:
-        """The marker that slips."""
-        return self.marker or instruments.labels[self.draw_of_marker % len(instruments.labels)]
-
     def measured(self, instruments: Instruments) -> Instruments:
-        column = instruments.column(self.label(instruments))
+        drawn = instruments.labels[self.draw_of_marker % len(instruments.labels)]
+        column = instruments.column(self.marker or drawn)
         times = instruments.frame_times_s()
         start = self.from_share * times[-1] if self.from_s is None else self.from_s
         slipped = step(times, start, start + SLIP_S)
         frame = companion_frame(instruments.points_m, column)
         points = instruments.points_m.copy()
         points[:, column] += self.size * slipped[:, None] * rotate(frame, self.along)
-        return instruments.with_points(points)
+        return replace(instruments, points_m=points)
 
     def place(self) -> str:
         return self.marker
@@ -80,8 +71,8 @@ def companion_frame(points_m: np.ndarray, column: int) -> np.ndarray:
     return frame_of(b - a, c - a)
 
 
-@dataclass(frozen=True)
-class MarkerSwap(Effect):
+@dataclass(frozen=True, eq=False)
+class MarkerSwap(Effect, name="marker_swap"):
     """Two markers carry each other's label for `size` seconds.
 
     start_share : where the window lies in each trial, 0 at its start and 1 at its end,
@@ -94,14 +85,6 @@ class MarkerSwap(Effect):
     start_share: float
     start_s: float | None
 
-    name = "marker_swap"
-    unit = "s"
-    least, most = 0.0, 600.0
-    targets = "LABEL+LABEL (else one of the five closest pairs), start_s=TIME"
-    settings = ("start_s",)
-    spares_static = True
-    injectable = True
-
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
         first, _, second = target.name.partition("+")
@@ -110,58 +93,66 @@ class MarkerSwap(Effect):
         number, share = int(rng.integers(CLOSE_PAIRS)), float(rng.uniform(0.2, 0.8))
         return cls(size, first, second, number, share, target.settings.get("start_s"))
 
-    def pair(self, instruments: Instruments) -> tuple[str, str]:
-        """The two labels."""
+    def _pair(self, instruments: Instruments) -> tuple[int, int]:
+        """The columns of the two markers."""
         if self.first:
-            return self.first, self.second
+            return instruments.column(self.first), instruments.column(self.second)
         points = np.nanmedian(instruments.points_m, axis=0)
         distance = np.linalg.norm(points[:, None] - points[None], axis=2)
         distance[np.tril_indices(len(points))] = np.inf
         flat = np.argsort(np.nan_to_num(distance, nan=np.inf), axis=None)[self.draw_of_pair]
         a, b = np.unravel_index(flat, distance.shape)
-        return instruments.labels[a], instruments.labels[b]
+        return int(a), int(b)
 
     def measured(self, instruments: Instruments) -> Instruments:
-        a, b = (instruments.column(label) for label in self.pair(instruments))
+        a, b = self._pair(instruments)
         times = instruments.frame_times_s()
         free = max(times[-1] - self.size, 0.0)
         start = self.start_share * free if self.start_s is None else self.start_s
         inside = np.flatnonzero((times >= start) & (times < start + self.size))
         points = instruments.points_m.copy()
         points[inside, a], points[inside, b] = points[inside, b].copy(), points[inside, a].copy()
-        return instruments.with_points(points)
+        return replace(instruments, points_m=points)
 
     def place(self) -> str:
         return f"{self.first}+{self.second}" if self.first else ""
 
 
-@dataclass(frozen=True)
-class OverSmoothing(Effect):
+class OverSmoothing(Effect, name="over_smoothing"):
     """The lab delivers its markers after a Butterworth low-pass (order 4, zero phase) at `size`."""
 
-    name = "over_smoothing"
-    unit = "Hz"
-    least, most = 0.3, 20.0
-    injectable = True
-    personal = False
-
     def measured(self, instruments: Instruments) -> Instruments:
-        if self.size >= 0.5 * instruments.marker_hz:
+        rate = instruments.marker_hz
+        if self.size >= 0.5 * rate:
             return instruments
         # two passes of order 2: the corner is raised so that both together cut at `size`
         corner = self.size / (np.sqrt(2.0) - 1.0) ** 0.25
-        filters = butter(
-            2, min(corner, 0.49 * instruments.marker_hz), fs=instruments.marker_hz, output="sos"
-        )
+        filters = butter(2, min(corner, 0.49 * rate), fs=rate, output="sos")
         points = instruments.points_m.copy()
         for column in range(points.shape[1]):
-            for part in stretches(np.isfinite(points[:, column]).all(axis=1)):
+            for part in runs(np.isfinite(points[:, column]).all(axis=1)):
                 if part.stop - part.start >= LEAST_FRAMES:
                     points[part, column] = sosfiltfilt(filters, points[part, column], axis=0)
-        return instruments.with_points(points)
+        return replace(instruments, points_m=points)
 
 
-def stretches(mask: np.ndarray) -> list[slice]:
-    """The runs of frames where the mask (F,) holds."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+@dataclass(frozen=True, eq=False)
+class RepeatedFrames(Effect, name="outside_repeated_frames"):
+    """The cameras stall: bursts of frames repeat the last one; `size` is their part."""
+
+    seed: int
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        return cls(size, int(rng.integers(1 << 31)))
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        frames = len(instruments.points_m)
+        rng = np.random.default_rng([self.seed, frames])
+        source = np.arange(frames)
+        longest = BURST_FRAMES[1]
+        while np.mean(source != np.arange(frames)) < self.size and frames > 2 * longest:
+            first = int(rng.integers(1, frames - longest))
+            length = int(rng.integers(BURST_FRAMES[0], longest + 1))
+            source[first : first + length] = source[first - 1]
+        return replace(instruments, points_m=instruments.points_m[source])

@@ -1,0 +1,383 @@
+"""What a body carries, leans on or is pulled by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+from scipy.signal import butter, sosfiltfilt
+
+from bsip_cli.body.markersets import load_marker_set, shipped_names
+from bsip_cli.body.names import SEGMENTS
+from bsip_cli.errors import BadDataError, UsageError
+from bsip_cli.instruments.readings import Instruments
+from bsip_cli.simulate.effects.base import Effect, OnSegment, Target, body_of
+from bsip_cli.simulate.numerics import response, rotate, second_derivative, step, window
+from bsip_cli.simulate.people import Inertia, Person, combined
+from bsip_cli.simulate.plan import GRAVITY, Ball, G, Load, Plan, Poses
+
+HANDS = ["hand_l", "hand_r"]
+BALL_RADIUS_M = 0.03
+OFF_AXIS_M, ALONG_M = 0.05, 0.05
+IN_FRONT_M = 0.04
+OPENING_S = 0.04
+HEAVY = ("thigh_l", "thigh_r", "upper_torso", "lower_torso")
+MOST_OF_SEGMENT = 0.8
+OUTWARD = np.array([0.8, 0.6, 0.0])  # of the chest: ahead and up, thorax axes
+RAMP_S = 0.4
+ASIDE = 0.15  # horizontal part of a support
+UNSTEADINESS, PACE_HZ = 0.15, 0.6
+CLEAR_OF_FLIGHT_S = 0.3
+SLACK_M = 0.1
+FASTENED_M = (-1.2, 0.1, 0.3)  # a tether's far end from the first place of the pelvis
+CUTOFF_HZ = 10.0
+LOADED_N = 40.0
+
+
+@dataclass(frozen=True, eq=False)
+class AddedMass(OnSegment, name="added_mass"):
+    """A small ball of `size` kg on a segment, as of a bag or a cast; the scale did not see it.
+
+    offset_m : (3,) from the segment's centre of mass, segment axes.
+    """
+
+    offset_m: np.ndarray
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        segment = target.name or str(rng.choice(SEGMENTS))
+        angle, along = rng.uniform(-np.pi, np.pi), rng.uniform(-ALONG_M, ALONG_M)
+        aside = OFF_AXIS_M * np.array([np.cos(angle), 0.0, np.sin(angle)])
+        return cls(size, segment, aside + np.array([0.0, along, 0.0]))
+
+    def check_simulated(self) -> None:
+        self.checked(self.segment)
+
+    def position_m(self, person: Person) -> np.ndarray:
+        return super().position_m(person) + self.offset_m
+
+    def body(self, person: Person) -> Person:
+        tensor = 0.4 * self.size * BALL_RADIUS_M**2 * np.eye(3)
+        ball = Inertia(self.size, self.position_m(person), tensor)
+        body, origin = body_of(self.segment), np.zeros(3)
+        heavier = combined([(person.inertias[body], origin), (ball, origin)])
+        return replace(person, inertias={**person.inertias, body: heavier})
+
+    def injected(self, instruments: Instruments) -> Instruments:
+        return with_mass_at(instruments, self.segment, self.size)
+
+
+@dataclass(frozen=True, eq=False)
+class ReleasedObject(OnSegment, name="released_object"):
+    """A point mass of `size` kg that a segment carries until it lets go; it falls off the plate.
+
+    release_share : when, as a part of each trial, unless release_s is given.
+    """
+
+    release_share: float
+    release_s: float | None
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        segment, share = target.name or str(rng.choice(HANDS)), float(rng.uniform(0.35, 0.65))
+        return cls(size, segment, share, target.settings.get("release_s"))
+
+    def check_simulated(self) -> None:
+        self.checked(self.segment)
+
+    def position_m(self, person: Person) -> np.ndarray:
+        return super().position_m(person) + np.array([IN_FRONT_M, 0.0, 0.0])
+
+    def _hold(self, times_s: np.ndarray, length_s: float) -> tuple[np.ndarray, float]:
+        """1 while held, 0 when gone, with an opening hand of OPENING_S between; and the release."""
+        release = self.release_share * length_s if self.release_s is None else self.release_s
+        return 1.0 - step(times_s, release - 0.5 * OPENING_S, release + 0.5 * OPENING_S), release
+
+    def plan(self, person: Person, plan: Plan) -> Plan:
+        hold, release = self._hold(plan.recorded_times_s(), plan.recorded_length_s())
+        place = self.position_m(person)
+        return plan.with_load(Ball(body_of(self.segment), self.size, place, hold, release))
+
+    def injected(self, instruments: Instruments) -> Instruments:
+        length = len(instruments.points_m) / instruments.marker_hz
+        hold, _ = self._hold(instruments.sample_times_s(), length)
+        return with_mass_at(instruments, self.segment, self.size, hold)
+
+
+@dataclass(frozen=True, eq=False)
+class WobblingMass(OnSegment, name="wobbling_mass"):
+    """`size` kg of a segment hang on a spring and a damper, equal in all directions.
+
+    They rest at the segment's centre of mass in quiet stance, so that mass and centre of
+    mass stay the person's.
+    """
+
+    frequency_hz: float
+    damping_ratio: float
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        segment = target.name or str(rng.choice(HEAVY))
+        frequency = target.get("frequency", float(rng.uniform(3.5, 7.0)))
+        damping = target.get("damping", float(rng.uniform(0.1, 0.3)))
+        cls.checked(segment)
+        if not 0.5 <= frequency <= 20.0 or not 0.01 <= damping <= 1.0:
+            raise UsageError(
+                f"a wobbling mass of {frequency:g} Hz with damping {damping:g}",
+                expected="0.5 to 20 Hz and 0.01 to 1",
+            )
+        return cls(size, segment, frequency, damping)
+
+    def position_m(self, person: Person) -> np.ndarray:
+        return person.inertias[body_of(self.segment)].com_m
+
+    def body(self, person: Person) -> Person:
+        """The bone keeps what does not wobble."""
+        body = body_of(self.segment)
+        part = person.inertias[body]
+        if self.size > MOST_OF_SEGMENT * part.mass_kg:
+            raise UsageError(
+                f"{self.size:g} kg of {self.segment} cannot wobble",
+                expected=f"at most {MOST_OF_SEGMENT * part.mass_kg:.1f} kg, 80 % of the segment",
+            )
+        rest = Inertia(part.mass_kg - self.size, part.com_m, part.tensor_kgm2)
+        return replace(person, inertias={**person.inertias, body: rest})
+
+    def plan(self, person: Person, plan: Plan) -> Plan:
+        body, place = body_of(self.segment), self.position_m(person)
+        swinging = Swinging(body, self.size, place, self.frequency_hz, self.damping_ratio)
+        return plan.with_load(swinging)
+
+
+@dataclass(frozen=True, eq=False)
+class Swinging(Load):
+    """A point mass on a spring and a damper at a point of a body.
+
+    Its displacement u against that point r obeys u'' + 2 z w u' + w^2 u = -r''.
+    """
+
+    body: str
+    mass_kg: float
+    position_m: np.ndarray
+    frequency_hz: float
+    damping_ratio: float
+
+    def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """The force of spring and damper, which bears the mass' weight too."""
+        r = poses.point(self.body, self.position_m)
+        acceleration = second_derivative(r, step_s)
+        w, z = 2.0 * np.pi * self.frequency_hz, self.damping_ratio
+        denominator = [1.0, 2.0 * z * w, w * w]
+        travel = response([-1.0], denominator, acceleration, step_s)
+        own = response([2.0 * z * w, w * w], denominator, acceleration, step_s)
+        force = self.mass_kg * (own - GRAVITY)
+        return force, np.cross(r + travel, force)
+
+
+@dataclass(frozen=True, eq=False)
+class Breathing(Effect, name="breathing"):
+    """Moved mass times amplitude is `size`; it moves as a sine at the chest."""
+
+    frequency_hz: float
+    phase_rad: float
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        frequency = target.get("frequency", float(rng.uniform(0.2, 0.32)))
+        if not 0.05 <= frequency <= 2.0:
+            raise UsageError(f"breathing at {frequency:g} Hz", expected="0.05 to 2 Hz")
+        return cls(size, frequency, float(rng.uniform(-np.pi, np.pi)))
+
+    def plan(self, person: Person, plan: Plan) -> Plan:
+        times = plan.recorded_times_s()
+        wave = np.sin(2.0 * np.pi * self.frequency_hz * times + self.phase_rad)
+        dipole = self.size * wave[:, None] * OUTWARD
+        return plan.with_load(ChestMotion("thorax", person.inertias["thorax"].com_m, dipole))
+
+    def place(self) -> str:
+        return "upper_torso"
+
+
+@dataclass(frozen=True, eq=False)
+class ChestMotion(Load):
+    """Mass that leaves its place in a body: mass times displacement (T, 3), body axes."""
+
+    over_time = ("dipole_kgm",)
+    body: str
+    position_m: np.ndarray
+    dipole_kgm: np.ndarray
+
+    def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """What it takes more than the same mass at rest in the body, to first order."""
+        r = poses.point(self.body, self.position_m)
+        dipole = rotate(poses.rotation[self.body], self.dipole_kgm)
+        force, acceleration = second_derivative(dipole, step_s), second_derivative(r, step_s)
+        return force, np.cross(r, force) + np.cross(dipole, acceleration - GRAVITY)
+
+
+@dataclass(frozen=True, eq=False)
+class UnmeasuredContact(OnSegment, name="unmeasured_contact"):
+    """A mostly upward force on a segment, as of a rail on a hand, of `size` N on average.
+
+    window_share : start and end as parts of each trial, unless start_s and end_s are given.
+    heading_rad : of the small horizontal part, from ahead. phase_rad : of its unsteadiness.
+    Near a flight the person lets go.
+    """
+
+    window_share: tuple[float, float]
+    start_s: float | None
+    end_s: float | None
+    heading_rad: float
+    phase_rad: float
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        segment = cls.checked(target.name or str(rng.choice(HANDS)))
+        start = float(rng.uniform(0.15, 0.35))
+        share = (start, start + float(rng.uniform(0.3, 0.45)))
+        start_s, end_s = target.settings.get("start_s"), target.settings.get("end_s")
+        heading, phase = rng.uniform(-np.pi, np.pi, 2).tolist()
+        return cls(size, segment, share, start_s, end_s, heading, phase)
+
+    def plan(self, person: Person, plan: Plan) -> Plan:
+        times = plan.recorded_times_s()
+        start, end = (share * plan.recorded_length_s() for share in self.window_share)
+        start = start if self.start_s is None else self.start_s
+        end = end if self.end_s is None else self.end_s
+        strength = window(times, start, end, RAMP_S)
+        strength *= 1.0 + UNSTEADINESS * np.sin(2 * np.pi * PACE_HZ * times + self.phase_rad)
+        inside = (times >= start) & (times <= end)
+        strength = strength / strength[inside].mean() if inside.any() else strength
+        for first, last in plan.flights:
+            a, b = times[first] - CLEAR_OF_FLIGHT_S, times[last] + CLEAR_OF_FLIGHT_S
+            strength *= 1.0 - window(times, a, b, CLEAR_OF_FLIGHT_S)
+        aside = ASIDE * np.array([np.cos(self.heading_rad), 0.0, np.sin(self.heading_rad)])
+        force = self.size * strength[:, None] * (np.array([0.0, 1.0, 0.0]) + aside)
+        return plan.with_load(Support(body_of(self.segment), self.position_m(person), force))
+
+
+@dataclass(frozen=True, eq=False)
+class Support(Load):
+    """An outside force on a point of the body.
+
+    position_m : (3,) in the body's frame. force_n : (T, 3) on the body.
+    """
+
+    over_time = ("force_n",)
+    body: str
+    position_m: np.ndarray
+    force_n: np.ndarray
+
+    def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """What the body exerts on the support."""
+        r = poses.point(self.body, self.position_m)
+        return -self.force_n, -np.cross(r, self.force_n)
+
+
+class ElasticTether(Effect, name="outside_elastic_tether"):
+    """A rubber band of `size` N/m pulls the pelvis back towards a fixed point."""
+
+    def plan(self, person: Person, plan: Plan) -> Plan:
+        fastened = plan.pelvis_m[plan.keep.start] + np.array(FASTENED_M)
+        return plan.with_load(Band(self.size, fastened))
+
+
+@dataclass(frozen=True, eq=False)
+class Band(Load):
+    """An elastic band from a fixed point (3,) to the pelvis, taut from the start."""
+
+    stiffness_n_m: float
+    fastened_m: np.ndarray
+
+    def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """What the body exerts on the band."""
+        r = poses.origin_m["lower_torso"]
+        away = r - self.fastened_m
+        length = np.linalg.norm(away, axis=1, keepdims=True)
+        rest = float(np.linalg.norm(FASTENED_M)) - SLACK_M
+        force = self.stiffness_n_m * np.maximum(length - rest, 0.0) * away / length
+        return force, np.cross(r, force)
+
+
+# --- in measured data -----------------------------------------------------------------------------
+
+
+def with_mass_at(
+    instruments: Instruments, where: str, mass_kg: float, hold: np.ndarray | None = None
+) -> Instruments:
+    """Plates as they would read with a point mass in the middle of some markers.
+
+    Its weight and its acceleration act on the plates that carry the person at that moment, shared
+    as they share the person's weight. What it would have done to the movement is left out.
+
+    where : a segment, or labels joined by "+". hold : (N,) 1 while it is carried.
+
+    Raises
+    ------
+    UsageError : no such marker.
+    BadDataError : the markers are lost for more than half of the trial.
+    """
+    times, samples = instruments.frame_times_s(), instruments.sample_times_s()
+    spline = make_interp_spline(times, _smooth_path(instruments, where), k=5)
+    place, acceleration = (
+        f(np.minimum(samples, times[-1])) for f in (spline, spline.derivative(2))
+    )
+    force = mass_kg * (acceleration + G * instruments.up)
+    force = force if hold is None else hold[:, None] * force
+    pairs = list(zip(instruments.readings, instruments.plates, strict=True))
+    vertical = np.stack([r[:, :3] @ plate.axes.T @ instruments.up for r, plate in pairs])
+    # the readings are the force on the person, or that on the plate
+    sign = 1.0 if np.nansum(vertical) > 0.0 else -1.0
+    load = np.nan_to_num(sign * vertical)
+    load = np.where(load > LOADED_N, load, 0.0)
+    shares = load / np.maximum(load.sum(axis=0), LOADED_N)
+    readings = instruments.readings.copy()
+    for index, plate in enumerate(instruments.plates):
+        part = sign * shares[index][:, None] * force
+        about = plate.sensor_m
+        readings[index] += plate.reading(part, np.cross(place - about, part), about)
+    return replace(instruments, readings=readings)
+
+
+def _smooth_path(instruments: Instruments, where: str) -> np.ndarray:
+    """(F, 3) middle of the markers, gaps bridged, low-passed."""
+    labels = markers_of(where, instruments.labels)
+    if not labels:
+        raise UsageError(
+            f"no marker of {where!r} is in the recording",
+            expected=f"labels joined by '+', of {', '.join(instruments.labels)}",
+        )
+    middle = instruments.points_m[:, [instruments.column(label) for label in labels]].mean(axis=1)
+    times, seen = instruments.frame_times_s(), np.isfinite(middle).all(axis=1)
+    if seen.mean() < 0.5 or len(times) < 30:
+        raise BadDataError(
+            f"the markers {', '.join(labels)} are all seen in {seen.sum()} of {len(seen)} frames",
+            expected="more than half of them, and at least 30 frames",
+        )
+    path = np.stack([np.interp(times, times[seen], column[seen]) for column in middle.T], axis=1)
+    cutoff = min(CUTOFF_HZ, 0.4 * instruments.marker_hz)
+    return sosfiltfilt(butter(2, cutoff, fs=instruments.marker_hz, output="sos"), path, axis=0)
+
+
+def markers_of(where: str, labels: tuple[str, ...]) -> list[str]:
+    """The recording's labels that are meant: themselves joined by "+", or those of a segment.
+
+    Prefixes (``Subject:RASI``) need not be given. For a segment the shipped marker set that
+    knows most of the labels decides. Empty if there are none.
+    """
+    bare = {label.rpartition(":")[2]: label for label in labels} | {x: x for x in labels}
+    asked = where.split("+")
+    if all(name in bare for name in asked):
+        return [bare[name] for name in asked]
+    best: dict[str, list[str]] = {}
+    for name in shipped_names():
+        found: dict[str, list[str]] = {}
+        for marker in load_marker_set(name).markers:
+            names = [one for one in (marker.label, *marker.aliases) if one in bare]
+            if names:
+                found.setdefault(marker.segment, []).append(bare[names[0]])
+        if sum(map(len, found.values())) > sum(map(len, best.values())):
+            best = found
+    return best.get(where, [])

@@ -1,0 +1,306 @@
+"""Force plates that are late, lie elsewhere, or read wrongly.
+
+Channels are the six components in the plate's own axes, moments about its sensor. Names that begin
+with ``outside_`` are outside the catalogue: the right verdict on them is `unexplained`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from bsip_cli.errors import UsageError
+from bsip_cli.instruments.readings import COMPONENTS, Instruments, SensingPlate
+from bsip_cli.simulate.effects.base import Effect, Target
+from bsip_cli.simulate.numerics import from_rotation_vector
+
+AXES = ("x", "y", "z")
+TURNS = {"yaw": 2, "tilt_x": 0, "tilt_y": 1}
+LOADED_N = 40.0
+BELT_HZ = 5.0
+WANDERS_S = 1.5
+
+
+# --- clocks ---------------------------------------------------------------------------------------
+
+
+class SyncOffset(Effect, name="sync_offset"):
+    """The force comes late by `size` (early if negative)."""
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        return instruments.with_forces_from(instruments.sample_times_s() - self.size)
+
+
+class ClockDrift(Effect, name="clock_drift"):
+    """The force's delay grows by `size` seconds per second, from 0 at the start of a trial."""
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        return instruments.with_forces_from(instruments.sample_times_s() * (1.0 - self.size))
+
+
+@dataclass(frozen=True, eq=False)
+class ClockJump(Effect, name="outside_clock_jump"):
+    """From a moment on the force comes `size` seconds later: a buffer of the plates was lost."""
+
+    from_share: float
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        return cls(size, float(rng.uniform(0.35, 0.65)))
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        times = instruments.sample_times_s()
+        return instruments.with_forces_from(
+            times - self.size * (times > self.from_share * times[-1])
+        )
+
+
+# --- plates ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class GravityTilt(Effect, name="gravity_tilt"):
+    """The lab's axes are turned against the world by turn_rad (rotation vector, lab axes).
+
+    Markers and forces turn together about the first plate's centre, so that the physics
+    stays whole; only gravity no longer points down the lab's vertical.
+    """
+
+    turn_rad: np.ndarray
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        if target.name not in ("", "x", "y"):
+            raise cls.wrong_target(target.name)
+        return cls(size, size * _axis(target.name, rng))
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        turn, pivot = from_rotation_vector(self.turn_rad), instruments.plates[0].centre_m
+        points = (instruments.points_m - pivot) @ turn.T + pivot
+        readings = []
+        for reading, plate in zip(instruments.readings, instruments.plates, strict=True):
+            force, moment = plate.lab_wrench(reading, pivot)
+            readings.append(plate.reading(force @ turn.T, moment @ turn.T, pivot))
+        return replace(instruments, points_m=points, readings=np.stack(readings))
+
+
+class OfEveryPlate(Effect, ABC):
+    """A plate reads otherwise, or each of them."""
+
+    plate = 0  # its number; 0 for all
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        number, count = self.plate, len(instruments.plates)
+        if not 0 <= number <= count:
+            raise UsageError(f"there is no plate {number}", expected=f"1 to {count}, or 0 for all")
+        readings, times = instruments.readings.copy(), instruments.sample_times_s()
+        for index, plate in enumerate(instruments.plates):
+            if number in (0, index + 1):
+                self.read(readings[index], plate, times)
+        return replace(instruments, readings=readings)
+
+    @abstractmethod
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        """Change a plate's true reading (N, 6) into what it shows, at times (N,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlateTranslation(OfEveryPlate, name="plate_translation"):
+    """The plate truly lies at its stated place plus shift_m (lab axes).
+
+    plate : its number, or 0 for all of them.
+    """
+
+    shift_m: np.ndarray
+    plate: int
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        if target.name and target.name not in AXES:
+            raise cls.wrong_target(target.name)
+        return cls(size, size * _axis(target.name, rng), int(target.get("plate", 0)))
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        reading[:, 3:] -= np.cross(plate.axes.T @ self.shift_m, reading[:, :3])
+
+    def place(self) -> str:
+        return f"plate {self.plate}" if self.plate else "all plates"
+
+
+@dataclass(frozen=True, eq=False)
+class PlateRotation(OfEveryPlate, name="plate_rotation"):
+    """The plate is truly turned by turn_rad (rotation vector, lab axes) about its centre."""
+
+    turn_rad: np.ndarray
+    plate: int
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        name = target.name or "yaw"
+        if name not in TURNS:
+            raise cls.wrong_target(name)
+        return cls(size, size * np.eye(3)[TURNS[name]], int(target.get("plate", 0)))
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        force, moment = plate.lab_wrench(reading, plate.centre_m)
+        turn = from_rotation_vector(self.turn_rad)
+        reading[:] = plate.reading(force @ turn, moment @ turn, plate.centre_m)
+
+    def place(self) -> str:
+        return f"plate {self.plate}" if self.plate else "all plates"
+
+
+def _axis(name: str, rng: np.random.Generator) -> np.ndarray:
+    """(3,) a lab axis, or a drawn horizontal direction."""
+    heading = rng.uniform(-np.pi, np.pi)
+    drawn = np.array([np.cos(heading), np.sin(heading), 0.0])
+    return np.eye(3)[AXES.index(name)] if name else drawn
+
+
+# --- channels -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelFault(OfEveryPlate):
+    """An error of one channel. plate : its number, or 0 for all."""
+
+    channel: str
+    plate: int
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        channel = target.name or "fz"
+        if channel not in COMPONENTS:
+            raise cls.wrong_target(channel)
+        return cls(size, channel, int(target.get("plate", 0)))
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        column = COMPONENTS.index(self.channel)
+        reading[:, column] = self.shown(reading[:, column], times_s)
+
+    @abstractmethod
+    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+        """What the channel (N,) shows instead of its true values."""
+
+    def place(self) -> str:
+        return self.channel + (f" of plate {self.plate}" if self.plate else "")
+
+
+class PlateGain(ChannelFault, name="plate_gain"):
+    """The channel shows 1 + size times the truth."""
+
+    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+        return (1.0 + self.size) * values
+
+
+class PlateZero(ChannelFault, name="plate_zero"):
+    """A constant is added to the channel."""
+
+    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+        return values + self.size
+
+
+class PlateDrift(ChannelFault, name="plate_drift"):
+    """The channel's zero moves at a constant rate, from 0 at the start of each trial."""
+
+    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+        return values + self.size * times_s
+
+
+class LateChannel(ChannelFault, name="outside_late_channel"):
+    """The channel comes `size` seconds late: its amplifier's filter is slower than the others'."""
+
+    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+        return np.interp(times_s - self.size, times_s, values)
+
+
+@dataclass(frozen=True, eq=False)
+class PlateCrosstalk(OfEveryPlate, name="plate_crosstalk"):
+    """Channel `to` shows size times channel `source` besides its own."""
+
+    source: str
+    to: str
+    plate: int
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        source, _, to = (target.name or "fz:fx").partition(":")
+        if source not in COMPONENTS or to not in COMPONENTS or source == to:
+            raise cls.wrong_target(target.name)
+        return cls(size, source, to, int(target.get("plate", 0)))
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        source, to = COMPONENTS.index(self.source), COMPONENTS.index(self.to)
+        reading[:, to] += self.size * reading[:, source]
+
+    def place(self) -> str:
+        return f"{self.source}:{self.to}" + (f" of plate {self.plate}" if self.plate else "")
+
+
+@dataclass(frozen=True, eq=False)
+class BeltVibration(OfEveryPlate, name="outside_belt_vibration"):
+    """Plates shake vertically by `size` N at about 5 Hz while somebody stands on them."""
+
+    frequency_hz: float
+    phase_rad: float
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        frequency = BELT_HZ * float(rng.uniform(0.8, 1.2))
+        return cls(size, frequency, float(rng.uniform(-np.pi, np.pi)))
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        wave = np.sin(2.0 * np.pi * self.frequency_hz * times_s + self.phase_rad)
+        reading[:, 2] += self.size * wave * (np.abs(reading[:, 2]) > LOADED_N)
+
+
+class PlateHysteresis(OfEveryPlate, name="outside_plate_hysteresis"):
+    """Horizontal channels follow with a play of `size` N: they stick until moved by that much."""
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        for column in (0, 1):
+            reading[:, column] = play(reading[:, column], self.size)
+
+
+def play(values: np.ndarray, width: float) -> np.ndarray:
+    """(N,) output of a backlash of this full width; lost samples leave it where it is."""
+    result, at = np.empty_like(values), values[0]
+    for k, value in enumerate(values):
+        if value - at > 0.5 * width:
+            at = value - 0.5 * width
+        elif at - value > 0.5 * width:
+            at = value + 0.5 * width
+        result[k] = at
+    return result
+
+
+class PlateSaturation(OfEveryPlate, name="outside_plate_saturation"):
+    """The vertical channel flattens: at 1000 N it shows the part `size` too little.
+
+    The error grows with the square of the load.
+    """
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        reading[:, 2] *= 1.0 - np.minimum(self.size * (reading[:, 2] / 1000.0) ** 2, 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class LooseConnector(OfEveryPlate, name="outside_loose_connector"):
+    """The vertical channel's gain wanders: a contact that opens and closes within seconds.
+
+    `size` is the standard deviation of the gain.
+    """
+
+    seed: int
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        return cls(size, int(rng.integers(1 << 31)))
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        knots = np.arange(times_s[0], times_s[-1] + WANDERS_S, WANDERS_S)
+        drawn = np.random.default_rng([self.seed, len(times_s)]).standard_normal(len(knots))
+        reading[:, 2] *= 1.0 + self.size * np.interp(times_s, knots, drawn)

@@ -8,11 +8,15 @@ from __future__ import annotations
 from bsip_cli.simulate.effects.added_mass import AddedMass
 from bsip_cli.simulate.effects.base import Effect
 from bsip_cli.simulate.effects.breathing import Breathing
+from bsip_cli.simulate.effects.camera_frame import CameraFrame
 from bsip_cli.simulate.effects.clocks import ClockDrift, SyncOffset
+from bsip_cli.simulate.effects.external_force import ExternalForce
 from bsip_cli.simulate.effects.gravity_tilt import GravityTilt
+from bsip_cli.simulate.effects.implement import Implement
 from bsip_cli.simulate.effects.joint_centre import JointCentre
 from bsip_cli.simulate.effects.marker_errors import MarkerShift, MarkerSwap, OverSmoothing
 from bsip_cli.simulate.effects.missing_joint import MissingJoint
+from bsip_cli.simulate.effects.object_handled import ObjectHandled
 from bsip_cli.simulate.effects.outside import (
     BeltVibration,
     ClockJump,
@@ -56,6 +60,10 @@ CATALOGUE: tuple[type[Effect], ...] = (
     MarkerSwap,
     OverSmoothing,
     SegmentInertia,
+    Implement,
+    CameraFrame,
+    ExternalForce,
+    ObjectHandled,
 )
 OUTSIDE: tuple[type[Effect], ...] = (
     BeltVibration,

@@ -74,7 +74,7 @@ class Implement(Effect):
     def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """The change is linear in the moment."""
         centre, shape = centre_m(values), values[4]
-        mass = 1 / np.linalg.norm(centre)
+        mass = 1 / float(np.linalg.norm(centre))
         about_centre = (shape - 1) * (centre @ centre * np.eye(3) - np.outer(centre, centre))
         grips = scene.once((self.name, target), lambda: _grips(scene, _held_by(target)))
         each = [

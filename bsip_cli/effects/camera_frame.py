@@ -7,25 +7,18 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.dynamics.segment_motion import UP
-from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.gravity_tilt import Turned
 from bsip_cli.effects.scene import Scene
 
 
-class CameraFrame(Effect):
+class CameraFrame(Turned):
     """All markers are turned about the origin by the angles about x and y (rotation vector).
 
     A turn about the vertical is one of all plates the other way: ``plate_rotation``.
     """
 
     name = "camera_frame"
-    of_the_lab = True
     remedy = "lay the calibration frame of the cameras on a plate, level, and calibrate again"
-
-    def targets(self, scene: Scene) -> tuple[str, ...]:
-        return ("",)
-
-    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
-        return tuple(Parameter(f"angle_{axis}", "rad", -0.2, 0.2, 0.01) for axis in "xy")
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """The same motion turned back, under the same gravity."""
@@ -37,13 +30,6 @@ class CameraFrame(Effect):
         return np.hstack(
             [back.apply(force) - force, back.apply(moment) - moment + np.cross(moved, weight)]
         )
-
-    def reported(
-        self, scene: Scene, target: str, values: np.ndarray
-    ) -> tuple[tuple[str, str, float], ...]:
-        """The angle, and its parts about the lab's axes."""
-        parts = super().reported(scene, target, values)
-        return (("angle", "rad", float(np.hypot(*values))), *parts)
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         degrees = np.degrees(np.hypot(*values))

@@ -12,6 +12,7 @@ from bsip_cli.effects.gravity_tilt import GravityTilt
 from bsip_cli.effects.implement import Implement
 from bsip_cli.effects.joint_centre import JointCentre
 from bsip_cli.effects.marker_shift import MarkerShift
+from bsip_cli.effects.marker_slide import MarkerSlide
 from bsip_cli.effects.marker_swap import MarkerSwap
 from bsip_cli.effects.missing_joint import MissingJoint
 from bsip_cli.effects.object_handled import ObjectHandled
@@ -53,5 +54,6 @@ CATALOGUE: tuple[Effect, ...] = (
     CameraFrame(),
     ExternalForce(),
     ObjectHandled(),
+    MarkerSlide(),
 )
 EFFECTS = {effect.name: effect for effect in CATALOGUE}

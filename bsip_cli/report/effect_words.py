@@ -77,6 +77,7 @@ EFFECT_WORDS = {
     "missing_joint": EffectWords("trunk bends where the model is stiff", _PERSON),
     "soft_tissue": EffectWords("soft tissue that moves with the trunk's posture", _SKIN),
     "marker_shift": EffectWords("marker not in its place", _MOTION),
+    "marker_slide": EffectWords("marker that slides", _MOTION),
     "marker_swap": EffectWords("two markers exchanged", _MOTION),
     "over_smoothing": EffectWords("markers smoothed too much", _MOTION),
     "segment_inertia": EffectWords("other inertial parameters of a segment", _PERSON),
@@ -166,6 +167,7 @@ MAIN_NUMBERS = {
     "gravity_tilt": ("angle",),
     "unmeasured_contact": ("force",),
     "marker_shift": ("shift",),
+    "marker_slide": ("way",),
     "soft_tissue": ("size",),
     "unexplained": ("amplitude", "stiffness", "curvature", "error", "nonlinearity", "lacking"),
 }

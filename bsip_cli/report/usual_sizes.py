@@ -40,6 +40,7 @@ USUAL: dict[str, Usual] = {
     "unmeasured_contact": Usual(("force_x", "force_y", "force_z"), "N", 20.0, 40.0),
     "joint_centre": Usual(("shift_x", "shift_y", "shift_z"), "m", 0.015, 0.04),
     "missing_joint": Usual(("flexion", "lateral", "axial"), "1", 0.2, 0.6),
+    "marker_slide": Usual(("x", "y", "z"), "m", 0.01, 0.04),
     "marker_shift": Usual(("x", "y", "z", "shift_x", "shift_y", "shift_z"), "m", 0.02, 0.04),
 }
 

@@ -103,6 +103,7 @@ CATALOGUE: dict[str, Range] = {
     "camera_frame": Range(0.009, 0.035, ("-",), (SESSION,)),
     "external_force": Range(20.0, 80.0, BODY, ("squat", SESSION)),
     "object_handled": Range(0.3, 2.0, HANDS, ("squat",)),
+    "marker_slide": Range(0.02, 0.04, MARKERS, ("squat",)),
 }
 OUTSIDE: dict[str, Range] = {
     "outside_belt_vibration": Range(15.0, 40.0, ("-",), (SESSION, "squat")),

@@ -142,6 +142,12 @@ def _shifted_marker(record: Record, trial: Record) -> tuple[str, dict[str, float
     return record["marker"], {"shift": record["size"], "from_time": start}
 
 
+def _sliding(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    """Its direction is drawn in the frame of neighbouring markers: only its length is known."""
+    start, end = (share * trial["duration_s"] for share in record["window_share"])
+    return record["marker"], {"way": record["size"], "start": start, "end": end}
+
+
 def _swapped(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
     start = record["start_s"]
     if start is None:
@@ -181,6 +187,7 @@ MAPPINGS: dict[str, Callable[[Record, Record], tuple[str, dict[str, float]]]] = 
     "camera_frame": _gravity,
     "external_force": _pushed,
     "object_handled": _handled,
+    "marker_slide": _sliding,
 }
 
 

@@ -122,6 +122,7 @@ PERSONAL = {
     "implement": (0.4, "hand_r"),
     "external_force": (50.0, "upper_torso"),
     "object_handled": (1.2, "hand_l"),
+    "marker_slide": (0.03, "LELB"),
 }
 
 

@@ -34,7 +34,7 @@ VOCABULARY = """
 sync_offset clock_drift plate_translation plate_rotation plate_gain plate_crosstalk plate_zero
 plate_drift gravity_tilt added_mass released_object wobbling_mass breathing unmeasured_contact
 joint_centre missing_joint marker_shift marker_swap over_smoothing segment_inertia
-implement camera_frame external_force object_handled
+implement camera_frame external_force object_handled marker_slide
 """
 SIZES = {
     "sync_offset": 0.02,
@@ -61,6 +61,7 @@ SIZES = {
     "camera_frame": 0.02,
     "external_force": 60.0,
     "object_handled": 2.0,
+    "marker_slide": 0.03,
     "outside_belt_vibration": 20.0,
     "outside_plate_hysteresis": 8.0,
     "outside_plate_saturation": 0.05,
@@ -447,6 +448,20 @@ def test_cameras_that_are_turned_turn_the_markers_and_leave_the_forces():
     a, b = plain.points_m, turned.points_m
     np.testing.assert_allclose(b[..., 0], a[..., 0], atol=1e-9)
     np.testing.assert_allclose(b[..., 1], np.cos(0.02) * a[..., 1] - np.sin(0.02) * a[..., 2])
+
+
+def test_a_marker_slides_within_its_window_and_stays_on_its_segment():
+    sliding = ("marker_slide", 0.03, "RELB")
+    plain, slid = measured_with("squat"), measured_with("squat", sliding)
+    column = plain.labels.index("RELB")
+    off = np.linalg.norm(slid.points_m - plain.points_m, axis=2)
+    times = np.arange(len(off)) / plain.rates.marker_hz
+    start, end = (share * times[-1] for share in effect_of(*sliding).window_share)
+    assert not np.delete(off, column, axis=1).any()
+    assert off[times < start, column].max() < 1e-9
+    np.testing.assert_allclose(off[times > end, column], 0.03)
+    middle = off[np.argmin(np.abs(times - 0.5 * (start + end))), column]
+    assert middle == pytest.approx(0.015, abs=0.001)
 
 
 def test_a_body_with_loads_still_obeys_newton_and_euler():

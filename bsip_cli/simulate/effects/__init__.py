@@ -15,6 +15,7 @@ from bsip_cli.simulate.effects.gravity_tilt import GravityTilt
 from bsip_cli.simulate.effects.implement import Implement
 from bsip_cli.simulate.effects.joint_centre import JointCentre
 from bsip_cli.simulate.effects.marker_errors import MarkerShift, MarkerSwap, OverSmoothing
+from bsip_cli.simulate.effects.marker_slide import MarkerSlide
 from bsip_cli.simulate.effects.missing_joint import MissingJoint
 from bsip_cli.simulate.effects.object_handled import ObjectHandled
 from bsip_cli.simulate.effects.outside import (
@@ -64,6 +65,7 @@ CATALOGUE: tuple[type[Effect], ...] = (
     CameraFrame,
     ExternalForce,
     ObjectHandled,
+    MarkerSlide,
 )
 OUTSIDE: tuple[type[Effect], ...] = (
     BeltVibration,

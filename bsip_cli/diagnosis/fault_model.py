@@ -34,6 +34,7 @@ _SETTLED = 0.3  # change of the logarithm of the evidence
 _DIFFERENCE = 0.05  # of the typical size: a moment in time moves by a part of a frame at least
 _CORRECTIONS = 3  # of the values about which the columns are
 _EXACT = 0.02  # of the typical size
+_GIVEN = 1e-9  # spread of what the data do not move [typical]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,12 +114,11 @@ def columns_of(session: Session, one: Hypothesis, trial: int) -> FaultColumns:
 
 def _prior_root(session: Session, one: Hypothesis) -> np.ndarray:
     """(k,) spreads before the data of all parameters [typical]: a scanned one may be anywhere."""
-    return np.array(
-        [
-            (p.most - p.least) / np.sqrt(12) / p.typical if p.scan else 1.0
-            for p in one.parameters(session)
-        ]
-    )
+    spreads = [
+        (p.most - p.least) / np.sqrt(12) / p.typical if p.scan else 1.0
+        for p in one.parameters(session)
+    ]
+    return np.where([p.is_given for p in one.parameters(session)], _GIVEN, spreads)
 
 
 @dataclass(frozen=True, eq=False)

@@ -113,7 +113,8 @@ def _places(parts: Sequence[dict[Candidate, slice]], alone: Sequence[int]) -> It
             if held[candidate] == 1 or not candidate.effect.of_the_body:
                 yield Place(candidate, (t,))
     for candidate in dict.fromkeys(c for one in parts for c in one):
-        holding = tuple(t for t, one in enumerate(parts) if candidate in one)
+        asked = alone if candidate.effect.while_moving else range(len(parts))
+        holding = tuple(t for t in asked if candidate in parts[t])
         if candidate.effect.lasts and len(holding) > 1:
             yield Place(candidate, holding)
 

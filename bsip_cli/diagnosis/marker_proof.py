@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import logit
 from scipy.stats import chi2
 
 from bsip_cli.body.names import in_words
@@ -28,14 +29,17 @@ from bsip_cli.diagnosis.hypothesis import Candidate, Hypothesis
 from bsip_cli.dynamics.lowpass import stride_to
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.marker_slide import LEAST_S, ramp, ramp_of
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH
+from bsip_cli.statistics.effective_samples import effective_samples
 
 ENOUGH_HZ = 10.0  # for a course of many seconds
 BENT = 0.25  # of the markers' squared residuals, their means left out: less is skin that follows
 OWN = 0.5  # of a marker's own squared residual: else its skin slides more than it slips
 _UNKNOWN = (np.nan, np.nan, np.nan)
-SLIP, BEND, SOFT_TISSUE = "marker_shift", "missing_joint", "soft_tissue"
+SLIP, SLIDE = "marker_shift", "marker_slide"
+BEND, SOFT_TISSUE = "missing_joint", "soft_tissue"
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ class Proof:
 
     def finding(self, scene: Scene, trial: str, gain: Gain | None) -> Finding:
         """As the diagnosis prints it. gain : of the forces."""
-        whose = "the marker's" if self.effect.name == SLIP else "all markers'"
+        whose = "the marker's" if self.effect.name in (SLIP, SLIDE) else "all markers'"
         is_shown = gain is not None and gain.is_real()
         reported = self.effect.reported(scene, self.target, self.values)
         drawn = [self.effect.reported(scene, self.target, one) for one in self.draws]
@@ -94,21 +98,48 @@ class Proof:
         )
 
 
-def slips_of(scene: Scene, slips: Sequence[Slip], rng: np.random.Generator) -> tuple[Proof, ...]:
-    """The slips that a trial's markers show, of those that were found in them."""
+def slips_of(
+    scene: Scene, slips: Sequence[Slip], named_from: float, rng: np.random.Generator
+) -> tuple[Proof, ...]:
+    """The slips that a trial's markers show, of those that were found in them; slides where these
+    are likelier than ``named_from``."""
     fewer = _slower(scene)
     left, found = fewer.residual_m, []
     if left is None:
         return ()
     for slip in slips:
         p_value = float(chi2.sf(slip.statistic**2, 3))
-        one = _sized(fewer, left, EFFECTS[SLIP], slip.marker, (slip.start_s, 0.0), rng)
+        effect, scanned = _manner(fewer, left, slip, named_from)
+        one = _sized(fewer, left, effect, slip.marker, scanned, rng)
         one = replace(one, p_value=p_value, share=_own_share(fewer, left, one))
         if one.share < OWN or np.linalg.norm(one.values[:3]) < slip.least_m:
             continue
         found.append(one)
         left = left - _left(one.effect, fewer, one.target, one.values)
     return tuple(found)
+
+
+def _manner(
+    scene: Scene, residual_m: np.ndarray, slip: Slip, named_from: float
+) -> tuple[Effect, tuple[float, ...]]:
+    """Whether a marker slips at a moment or slides, and when: by Schwarz's criterion, a slide
+    having one number more, from as many samples of its residual as are independent."""
+    at_once = EFFECTS[SLIP], (slip.start_s, 0.0)
+    own = residual_m[:, _number(scene, slip.marker)]
+    seen = np.isfinite(own).all(axis=1)
+    times_s, own = scene.times_s[seen], own[seen]
+    if _is_throughout(scene, slip.start_s) or np.ptp(times_s) < LEAST_S:
+        return at_once
+    start, end = ramp_of(times_s, own)
+    left = []
+    for course in (times_s >= slip.start_s, ramp(times_s, start, end)):
+        columns = np.column_stack([np.ones(len(own)), course])
+        left.append(own - columns @ np.linalg.lstsq(columns, own, rcond=None)[0])
+    samples = sum(effective_samples(course) for course in left[1].T)
+    gain = np.log((left[0] ** 2).sum() / (left[1] ** 2).sum())
+    if 0.5 * samples * gain - 0.5 * np.log(samples) < logit(named_from):
+        return at_once
+    return EFFECTS[SLIDE], (0.5 * (start + end), end - start, 0.0)
 
 
 def alone_and_shaken(

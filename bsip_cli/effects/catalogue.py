@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from bsip_cli.effects.added_mass import AddedMass
 from bsip_cli.effects.breathing import Breathing
+from bsip_cli.effects.camera_frame import CameraFrame
 from bsip_cli.effects.clock_drift import ClockDrift
 from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.external_force import ExternalForce
 from bsip_cli.effects.gravity_tilt import GravityTilt
+from bsip_cli.effects.implement import Implement
 from bsip_cli.effects.joint_centre import JointCentre
 from bsip_cli.effects.marker_shift import MarkerShift
+from bsip_cli.effects.marker_slide import MarkerSlide
 from bsip_cli.effects.marker_swap import MarkerSwap
 from bsip_cli.effects.missing_joint import MissingJoint
+from bsip_cli.effects.object_handled import ObjectHandled
 from bsip_cli.effects.over_smoothing import OverSmoothing
 from bsip_cli.effects.plate_crosstalk import PlateCrosstalk
 from bsip_cli.effects.plate_drift import PlateDrift
@@ -45,5 +50,10 @@ CATALOGUE: tuple[Effect, ...] = (
     MarkerSwap(),
     OverSmoothing(),
     SegmentInertia(),
+    Implement(),
+    CameraFrame(),
+    ExternalForce(),
+    ObjectHandled(),
+    MarkerSlide(),
 )
 EFFECTS = {effect.name: effect for effect in CATALOGUE}

@@ -29,6 +29,7 @@ class Parameter:
         time); empty for a parameter that is zero where the effect is absent.
     known_to : standard deviation that no recording betters, since the truth is less simple than
         the effect's model: nobody leans on a rail along a ramp.
+    is_given : it keeps the value that is tried: the data do not tell it.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Parameter:
     typical: float
     scan: tuple[float, ...] = ()
     known_to: float = 0.0
+    is_given: bool = False
 
 
 class Effect(ABC):
@@ -50,6 +52,7 @@ class Effect(ABC):
     of_the_lab: ClassVar[bool]  # the same in every trial of a recording session
     of_the_person: ClassVar[bool] = False  # the same in every trial of a person
     of_the_body: ClassVar[bool] = False  # of the person, and in one trial if in another
+    while_moving: ClassVar[bool] = False  # not of who stands still to be calibrated
     of_the_plates: ClassVar[bool] = False  # the truth is what was measured, less the change
     on_its_segment: ClassVar[bool] = False  # the change is what moves or holds more at the target
     looks: ClassVar[str]  # what a person sees of it in the curves

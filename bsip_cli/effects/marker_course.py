@@ -12,11 +12,11 @@ from bsip_cli.effects.scene import Scene
 RISE_S = 0.04  # standard deviation of the ramp that smoothing leaves of a sudden change
 
 
-def step(times_s: np.ndarray, at_s: float) -> np.ndarray:
+def step(times_s: np.ndarray, at_s: float, rise_s: float = RISE_S) -> np.ndarray:
     """(3, N) a smooth step from 0 to 1 and its first two derivatives [1/s, 1/s2]."""
-    x = (times_s - at_s) / RISE_S
-    slope = np.exp(-0.5 * x**2) / np.sqrt(2 * np.pi) / RISE_S
-    return np.stack([ndtr(x), slope, -x * slope / RISE_S])
+    x = (times_s - at_s) / rise_s
+    slope = np.exp(-0.5 * x**2) / np.sqrt(2 * np.pi) / rise_s
+    return np.stack([ndtr(x), slope, -x * slope / rise_s])
 
 
 def wrench_parts(scene: Scene, errors_m: np.ndarray, markers: Sequence[int]) -> np.ndarray:

@@ -35,7 +35,7 @@ class MarkerShift(Effect):
         if scene.residual_m is None:
             return scene.person.markers
         residual = scene.residual_m
-        return scene.once(self.name, lambda: _suspects(scene, residual))
+        return scene.once("astray", lambda: _suspects(scene, residual))
 
     def agrees(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Whether the marker's own residual follows."""
@@ -64,13 +64,19 @@ class MarkerShift(Effect):
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         m = scene.person.markers.index(target)
         parts = scene.once(
-            (self.name, m), lambda: wrench_parts(scene, self._directions(scene, m), [m])
+            ("of a marker", m), lambda: wrench_parts(scene, self._directions(scene, m), [m])
         )
-        return during(_course(scene, values), parts) @ values[:3]
+        return during(self.course(scene, values), parts) @ values[:3]
+
+    def course(self, scene: Scene, values: np.ndarray) -> np.ndarray:
+        """(3, N) the part of the shift by which the marker is off, and its derivatives."""
+        course = step(scene.times_s, values[3])
+        course[0] -= values[4]
+        return course
 
     def marker_change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         m = scene.person.markers.index(target)
-        slipped = _course(scene, values)[0][:, None]
+        slipped = self.course(scene, values)[0][:, None]
         errors = slipped * (self._directions(scene, m)[:, 0] @ values[:3])
         return scene.pose_response.left(errors[:, None, :, None], [m])[..., 0]
 
@@ -125,13 +131,6 @@ def _suspects(scene: Scene, residual_m: np.ndarray) -> tuple[str, ...]:
         if max(lasting, jump) > ASTRAY_M:
             found.append(name)
     return tuple(found)
-
-
-def _course(scene: Scene, values: np.ndarray) -> np.ndarray:
-    """(3, N) the part of the shift by which the marker is off, and its derivatives."""
-    course = step(scene.times_s, values[3])
-    course[0] -= values[4]
-    return course
 
 
 def _level_change(residual_m: np.ndarray, rate_hz: float) -> int | None:

@@ -8,13 +8,13 @@ from bsip_cli.effects.channel_words import OF_A_PLATE
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.plate_frame import (
     CHANNELS,
-    in_plate,
-    in_world,
+    in_channel,
     loaded_alone_or_all,
     plates_called,
     plates_of,
+    shown,
 )
-from bsip_cli.effects.scene import Plate, Scene
+from bsip_cli.effects.scene import Scene
 
 MOST = 0.08  # makers state 1 to 3 %; what leaks more is no crosstalk
 
@@ -42,8 +42,8 @@ class PlateCrosstalk(Effect):
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         name, pair = target.rsplit(" ", 1)
         source, sink = (CHANNELS.index(c) for c in pair.split(">"))
-        leaks = (_leak(plate, source, sink) for plate in plates_of(scene, name))
-        return values[0] * np.sum(list(leaks), axis=0)
+        leaks = [in_channel(p, sink, shown(p, source)) for p in plates_of(scene, name)]
+        return values[0] * np.sum(leaks, axis=0)
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         name, pair = target.rsplit(" ", 1)
@@ -52,11 +52,3 @@ class PlateCrosstalk(Effect):
             f"{100 * values[0]:+.1f} % of {OF_A_PLATE[source]} of {plates_called(name)} leaks into "
             f"{OF_A_PLATE[sink]}"
         )
-
-
-def _leak(plate: Plate, source: int, sink: int) -> np.ndarray:
-    """(N, 6) if all of one channel leaked into another."""
-    reading = in_plate(plate, np.nan_to_num(plate.wrench))
-    change = np.zeros_like(reading)
-    change[:, sink] = reading[:, source]
-    return in_world(plate, change)

@@ -5,22 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.effects.channel_words import OF_A_PLATE, unit_of
-from bsip_cli.effects.effect import Effect, Parameter
-from bsip_cli.effects.plate_frame import CHANNELS, in_world, loaded_plates, plate_of
+from bsip_cli.effects.effect import Parameter
+from bsip_cli.effects.plate_frame import ChannelCourse
 from bsip_cli.effects.scene import Scene
 
 
-class PlateDrift(Effect):
+class PlateDrift(ChannelCourse):
     """Linear, zero where the trial begins."""
 
     name = "plate_drift"
     of_the_lab = False
-    of_the_plates = True
     looks = "a difference in one channel that grows evenly with time"
     remedy = "step off the plate at the beginning and at the end"
-
-    def targets(self, scene: Scene) -> tuple[str, ...]:
-        return tuple(f"{p} {c}" for p in loaded_plates(scene) for c in CHANNELS)
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         duration = float(np.ptp(scene.times_s))
@@ -28,11 +24,8 @@ class PlateDrift(Effect):
             return (Parameter("drift", "N/s", -20.0, 20.0, 15.0 / duration),)
         return (Parameter("drift", "N m/s", -10.0, 10.0, 7.0 / duration),)
 
-    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
-        name, channel = target.rsplit(" ", 1)
-        reading = np.zeros((len(scene.times_s), 6))
-        reading[:, CHANNELS.index(channel)] = values[0] * (scene.times_s - scene.times_s[0])
-        return in_world(plate_of(scene, name), reading)
+    def course(self, scene: Scene) -> np.ndarray:
+        return scene.times_s - scene.times_s[0]
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         name, channel = target.rsplit(" ", 1)

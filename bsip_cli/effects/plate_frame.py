@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.scene import Plate, Scene
 
 CHANNELS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -64,6 +65,36 @@ def in_world(plate: Plate, reading: np.ndarray) -> np.ndarray:
     return np.hstack([force, reading[:, 3:] @ axes + np.cross(about, force)])
 
 
+def in_channel(plate: Plate, channel: int, course: np.ndarray | float) -> np.ndarray:
+    """(N, 6) wrench about the world's origin of a course (N,) that one channel shows."""
+    reading = np.zeros((len(plate.wrench), 6))
+    reading[:, channel] = course
+    return in_world(plate, reading)
+
+
+def shown(plate: Plate, channel: int) -> np.ndarray:
+    """(N,) what a channel shows, 0 where there is no reading."""
+    return in_plate(plate, np.nan_to_num(plate.wrench))[:, channel]
+
+
 def sensor_m(plate: Plate) -> np.ndarray:
     """(3,) the point that the plate's moments are about."""
     return plate.centre_m() if plate.sensor_m is None else plate.sensor_m
+
+
+class ChannelCourse(Effect):
+    """A channel of a plate shows a course too much, whatever it measures."""
+
+    of_the_plates = True
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        return tuple(f"{p} {c}" for p in loaded_plates(scene) for c in CHANNELS)
+
+    def course(self, scene: Scene) -> np.ndarray:
+        """(N,) for a size of one."""
+        return np.ones(len(scene.times_s))
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        name, channel = target.rsplit(" ", 1)
+        course = values[0] * self.course(scene)
+        return in_channel(plate_of(scene, name), CHANNELS.index(channel), course)

@@ -8,13 +8,13 @@ from bsip_cli.effects.channel_words import OF_A_PLATE
 from bsip_cli.effects.effect import Effect, Parameter
 from bsip_cli.effects.plate_frame import (
     CHANNELS,
-    in_plate,
-    in_world,
+    in_channel,
     loaded_alone_or_all,
     plates_of,
     plates_that,
+    shown,
 )
-from bsip_cli.effects.scene import Plate, Scene
+from bsip_cli.effects.scene import Scene
 
 TYPICAL = 0.04  # a quarter of it is not told: plates of one lab differ by some tenths of a percent
 
@@ -40,18 +40,11 @@ class PlateGain(Effect):
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         name, channel = target.rsplit(" ", 1)
         share, k = values[0] / (1 + values[0]), CHANNELS.index(channel)
-        return np.sum([_scaled(plate, k, share) for plate in plates_of(scene, name)], axis=0)
+        parts = [in_channel(p, k, share * shown(p, k)) for p in plates_of(scene, name)]
+        return np.sum(parts, axis=0)
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         name, channel = target.rsplit(" ", 1)
         order = "large" if values[0] > 0 else "small"
         reads = plates_that(name, "reads", "read")
         return f"{reads} {OF_A_PLATE[channel]} {100 * abs(values[0]):.1f} % too {order}"
-
-
-def _scaled(plate: Plate, channel: int, share: float) -> np.ndarray:
-    """(N, 6) a share of what one channel shows."""
-    reading = in_plate(plate, np.nan_to_num(plate.wrench))
-    part = np.zeros_like(reading)
-    part[:, channel] = share * reading[:, channel]
-    return in_world(plate, part)

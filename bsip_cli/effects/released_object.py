@@ -24,11 +24,11 @@ class ReleasedObject(Effect):
     remedy = "stand still with the object and again without"
 
     def targets(self, scene: Scene) -> tuple[str, ...]:
-        return tuple(s for s in scene.person.skeleton.segments if s.startswith("hand"))
+        return hands(scene)
 
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         start, end = scene.times_s[0], scene.times_s[-1]
-        first, last = scene.once(self.name, lambda: _seen_between(scene))
+        first, last = seen_between(scene)
         number = int(np.ceil((last - first) / STEP_S)) + 1
         moments = tuple(np.linspace(first, last, number).tolist())
         return (
@@ -40,20 +40,28 @@ class ReleasedObject(Effect):
         mass, release = values
         # A ramp over one frame keeps the derivative with respect to the moment alive.
         held = np.clip((release - scene.times_s) * scene.rate_hz + 0.5, 0.0, 1.0)
-        carried = scene.once((self.name, target), lambda: _carried(scene, target))
-        return mass * held[:, None] * carried
+        return mass * held[:, None] * carried(scene, target)
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """Seen with the object and without it."""
-        first, last = scene.once(self.name, lambda: _seen_between(scene))
+        first, last = seen_between(scene)
         return super().possible(scene, target, values) and first <= values[1] <= last
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         return f"the {in_words(target)} holds {values[0]:.2f} kg and lets go at {values[1]:.2f} s"
 
 
-def _seen_between(scene: Scene) -> tuple[float, float]:
+def hands(scene: Scene) -> tuple[str, ...]:
+    """What may hold something."""
+    return tuple(s for s in scene.person.skeleton.segments if s.startswith("hand"))
+
+
+def seen_between(scene: Scene) -> tuple[float, float]:
     """First and last moment of a release that is seen from both sides [s]."""
+    return scene.once("seen from both sides", lambda: _seen_between(scene))
+
+
+def _seen_between(scene: Scene) -> tuple[float, float]:
     times = scene.times_s[scene.valid]
     if not len(times):
         return float(scene.times_s[0]), float(scene.times_s[-1])
@@ -61,6 +69,7 @@ def _seen_between(scene: Scene) -> tuple[float, float]:
     return float(times[seen - 1]), float(times[-seen])
 
 
-def _carried(scene: Scene, target: str) -> np.ndarray:
+def carried(scene: Scene, target: str) -> np.ndarray:
     """(N, 6) ground wrench of 1 kg at the segment's centre of mass."""
-    return scene.point(target, scene.centre_of(target)).carrying_wrench()
+    point = scene.centre_of(target)
+    return scene.once(("carried", target), lambda: scene.point(target, point).carrying_wrench())

@@ -232,6 +232,11 @@ class Scene:
         i = self.person.skeleton.index(segment)
         return self.motion.point(i, self.person.origin_in_joint_m[i] + offset_m)
 
+    def wrenches(self, segment: int) -> np.ndarray:
+        """(N, 6, 10) ground wrench about the world's origin for each inertial parameter of a body
+        fixed in a segment, about its joint centre."""
+        return self.once(("wrenches", segment), lambda: self.motion.wrenches(segment))
+
     def centre_of(self, segment: str) -> np.ndarray:
         """(3,) centre of mass of a segment from its origin [m]."""
         i = self.person.skeleton.index(segment)

@@ -42,9 +42,7 @@ class SegmentInertia(Effect):
 
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         i = scene.person.skeleton.index(target)
-        return scene.once((self.name, i), lambda: scene.motion.wrenches(i)) @ (
-            _changes(scene, target) @ values
-        )
+        return scene.wrenches(i) @ (_changes(scene, target) @ values)
 
     def possible(self, scene: Scene, target: str, values: np.ndarray) -> bool:
         """A body with these parameters exists, with its centre of mass inside the segment."""

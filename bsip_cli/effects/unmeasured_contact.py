@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from bsip_cli.body.names import in_words
-from bsip_cli.dynamics.regressor import skew
 from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.external_force import missing_wrenches
 from bsip_cli.effects.scene import Scene
 
 WINDOWS_S = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0, 64.0)
@@ -80,8 +80,7 @@ class UnmeasuredContact(Effect):
         ramp = min(RAMP_S, length / 2)
         inside = length / 2 - np.abs(scene.times_s - middle)
         touching = np.clip(inside / ramp, 0.0, 1.0) / (1 - ramp / length)  # 1 on average
-        missing = scene.once((self.name, target), lambda: _missing_wrenches(scene, target))
-        return touching[:, None, None] * missing
+        return touching[:, None, None] * missing_wrenches(scene, target)
 
     def reported(
         self, scene: Scene, target: str, values: np.ndarray
@@ -135,10 +134,3 @@ def _unseen(scene: Scene, edge: float, ramp: float, backwards: bool = False) -> 
     last = float(times[before][-1]) if before.any() else float(times[0])
     hidden = edge + ramp <= first
     return (first - ramp, min(last, first - ramp)) if hidden else (edge, edge)
-
-
-def _missing_wrenches(scene: Scene, target: str) -> np.ndarray:
-    """(N, 6, 3) what the plates lack for a unit force on the segment's centre of mass."""
-    point = scene.point(target, scene.centre_of(target)).position_m
-    forces = np.broadcast_to(np.eye(3), (len(point), 3, 3))
-    return -np.concatenate([forces, skew(point)], axis=1)

@@ -22,6 +22,10 @@ _MOTION = (
     "The motion is not the true one, and the simulated forces with it: correct the markers, and "
     "run again."
 )
+_FRAME = (
+    "Motion and forces do not share their axes, and everything identified from them inherits the "
+    "error: calibrate the cameras again, or turn the markers back, and run again."
+)
 _SKIN = (
     "The pose of the trunk, and the simulated forces with it, is only as good as markers on soft "
     "tissue can be: put markers over bone, and run again."
@@ -73,9 +77,14 @@ EFFECT_WORDS = {
     "missing_joint": EffectWords("trunk bends where the model is stiff", _PERSON),
     "soft_tissue": EffectWords("soft tissue that moves with the trunk's posture", _SKIN),
     "marker_shift": EffectWords("marker not in its place", _MOTION),
+    "marker_slide": EffectWords("marker that slides", _MOTION),
     "marker_swap": EffectWords("two markers exchanged", _MOTION),
     "over_smoothing": EffectWords("markers smoothed too much", _MOTION),
     "segment_inertia": EffectWords("other inertial parameters of a segment", _PERSON),
+    "implement": EffectWords("club, racket or stick in the hand", _LOAD),
+    "camera_frame": EffectWords("cameras turned against plates and gravity", _FRAME),
+    "external_force": EffectWords("constant force beside the plates", _CONTACT),
+    "object_handled": EffectWords("object picked up and put down", _LOAD),
     "unexplained": EffectWords(
         "something without a name",
         "Neither the forces nor the identified parameters should be trusted further than section 2 "
@@ -149,11 +158,16 @@ def unnamed_label(number_name: str, where: str) -> str:
 MAIN_NUMBERS = {
     "added_mass": ("mass",),
     "released_object": ("mass",),
+    "implement": ("mass",),
+    "object_handled": ("mass",),
+    "camera_frame": ("angle",),
+    "external_force": ("force",),
     "wobbling_mass": ("mass",),
     "breathing": ("amplitude",),
     "gravity_tilt": ("angle",),
     "unmeasured_contact": ("force",),
     "marker_shift": ("shift",),
+    "marker_slide": ("way",),
     "soft_tissue": ("size",),
     "unexplained": ("amplitude", "stiffness", "curvature", "error", "nonlinearity", "lacking"),
 }
@@ -174,7 +188,12 @@ _PARTS = {  # of a size with several parts: which one the interval is of
     "mass": "mass",
     "amplitude": "mass times amplitude",
 }
-_TOLD = ("added_mass", "released_object", "plate_gain")  # their sentence has one such number only
+_TOLD = (
+    "added_mass",
+    "released_object",
+    "object_handled",
+    "plate_gain",
+)  # their sentence has one such number only
 
 
 def parameter_label(effect: str, parameter: str) -> str:

@@ -9,7 +9,7 @@ from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.report.effect_words import place_label
 from bsip_cli.report.words import listing
 
-_LOADS = ("added_mass", "released_object", "wobbling_mass")
+_LOADS = ("added_mass", "released_object", "object_handled", "implement", "wobbling_mass")
 _APART: dict[frozenset[str], str] = {
     frozenset(pair): words
     for pairs, words in (
@@ -83,7 +83,7 @@ def _places(effect: str, rivals: Sequence[tuple[str, str]]) -> str:
             "look for what is worn or loose there, or keep still but for one at a time: "
             f"{listing(where)}"
         )
-    if effect == "unmeasured_contact":
+    if effect in ("unmeasured_contact", "external_force"):
         return f"watch, or film, what touches the person: {listing(where)}"
     return _own(effect)
 

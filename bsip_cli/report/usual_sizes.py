@@ -31,11 +31,16 @@ USUAL: dict[str, Usual] = {
     "gravity_tilt": Usual(("angle_x", "angle_y"), "rad", 0.0087266, 0.034907),
     "added_mass": Usual(("mass",), "kg", 0.5, 1.5),
     "released_object": Usual(("mass",), "kg", 0.3, 0.7),
+    "implement": Usual(("moment",), "kg m", 0.08, 0.5),  # from a racket to a bat
+    "camera_frame": Usual(("angle_x", "angle_y"), "rad", 0.0087266, 0.034907),
+    "external_force": Usual(("force_x", "force_y", "force_z"), "N", 20.0, 80.0),
+    "object_handled": Usual(("mass",), "kg", 0.3, 2.0),
     "wobbling_mass": Usual(("mass",), "kg", 3.0, 4.5),
     "breathing": Usual(("cosine", "sine"), "kg m", 0.05, 0.3),
     "unmeasured_contact": Usual(("force_x", "force_y", "force_z"), "N", 20.0, 40.0),
     "joint_centre": Usual(("shift_x", "shift_y", "shift_z"), "m", 0.015, 0.04),
     "missing_joint": Usual(("flexion", "lateral", "axial"), "1", 0.2, 0.6),
+    "marker_slide": Usual(("x", "y", "z"), "m", 0.01, 0.04),
     "marker_shift": Usual(("x", "y", "z", "shift_x", "shift_y", "shift_z"), "m", 0.02, 0.04),
 }
 

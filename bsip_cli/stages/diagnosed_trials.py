@@ -155,7 +155,11 @@ def diagnosed(
     measured, residual = full.one(scene.measured), full.one(scene.measured - scene.predicted)
     contact = unit.facts("identification")["external_contacts"].get(trial.stem)
     rng = np.random.default_rng(crc32(trial.stem.encode()))
-    found = slips_of(fewer, _slips(unit, trial), rng) if trial.role != STATIC else ()
+    found = (
+        slips_of(fewer, _slips(unit, trial), options.named_from, rng)
+        if trial.role != STATIC
+        else ()
+    )
     markers = alone_and_shaken(fewer, found)
     terms = [
         Term(

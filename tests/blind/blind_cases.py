@@ -99,6 +99,11 @@ CATALOGUE: dict[str, Range] = {
     "marker_swap": Range(0.5, 2.0, PAIRS, ("squat", "stepon")),
     "over_smoothing": Range(2.0, 5.0, ("-",), (SESSION, "hops", SESSION, "squat")),
     "segment_inertia": Range(0.3, 0.6, HEAVY, (SESSION,), True),
+    "implement": Range(0.2, 0.8, HANDS, (SESSION,)),
+    "camera_frame": Range(0.009, 0.035, ("-",), (SESSION,)),
+    "external_force": Range(20.0, 80.0, BODY, ("squat", SESSION)),
+    "object_handled": Range(0.3, 2.0, HANDS, ("squat",)),
+    "marker_slide": Range(0.02, 0.04, MARKERS, ("squat",)),
 }
 OUTSIDE: dict[str, Range] = {
     "outside_belt_vibration": Range(15.0, 40.0, ("-",), (SESSION, "squat")),

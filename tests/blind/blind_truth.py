@@ -110,6 +110,26 @@ def _contact(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
     return record["segment"], {"start": start, "end": end, "force": size, **parts}
 
 
+def _pushed(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    walkway = record["size"] * np.array(record["direction"])
+    force = np.array(trial["walkway_to_lab"]["rotation"]) @ walkway
+    parts = {f"force_{axis}": float(x) for axis, x in zip("xyz", force, strict=True)}
+    return record["segment"], {"force": record["size"], **parts}
+
+
+def _handled(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    begin = trial["recorded_from_s"]
+    length = trial["duration_s"] + begin
+    start, end = (share * length - begin for share in record["window_share"])
+    return record["segment"], {"mass": record["size"], "start": start, "end": end}
+
+
+def _implement(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    distance = float(np.linalg.norm(record["centre_m"]))
+    inertia = record["size"] * (distance**2 + record["spread_m"] ** 2)
+    return record["segment"], {"mass": record["size"], "centre": distance, "inertia": inertia}
+
+
 def _missing_joint(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
     return "upper_torso", {"flexion": trial["missing_joint_range_rad"]}
 
@@ -120,6 +140,12 @@ def _shifted_marker(record: Record, trial: Record) -> tuple[str, dict[str, float
     if start is None:
         start = record["from_share"] * trial["duration_s"]
     return record["marker"], {"shift": record["size"], "from_time": start}
+
+
+def _sliding(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
+    """Its direction is drawn in the frame of neighbouring markers: only its length is known."""
+    start, end = (share * trial["duration_s"] for share in record["window_share"])
+    return record["marker"], {"way": record["size"], "start": start, "end": end}
 
 
 def _swapped(record: Record, trial: Record) -> tuple[str, dict[str, float]]:
@@ -157,6 +183,11 @@ MAPPINGS: dict[str, Callable[[Record, Record], tuple[str, dict[str, float]]]] = 
     "over_smoothing": _sized("cutoff"),
     # What share of the error a segment's table values make is not known to the simulator.
     "segment_inertia": lambda record, trial: (record["segment"], {}),
+    "implement": _implement,
+    "camera_frame": _gravity,
+    "external_force": _pushed,
+    "object_handled": _handled,
+    "marker_slide": _sliding,
 }
 
 

@@ -119,6 +119,10 @@ PERSONAL = {
     "marker_swap": (0.5, PAIRS[0]),
     "over_smoothing": (3.0, ""),
     "segment_inertia": (0.3, "thigh_r"),
+    "implement": (0.4, "hand_r"),
+    "external_force": (50.0, "upper_torso"),
+    "object_handled": (1.2, "hand_l"),
+    "marker_slide": (0.03, "LELB"),
 }
 
 

@@ -38,7 +38,7 @@ def seen(name: str = "", target: str = "", *values: float, skin_m: float = SKIN_
 
 
 def proofs(scene: Scene, *slips: Slip) -> tuple[Proof, ...]:
-    return slips_of(scene, slips, np.random.default_rng(0))
+    return slips_of(scene, slips, 0.95, np.random.default_rng(0))
 
 
 def numbers(scene: Scene, proof: Proof) -> dict[str, tuple[float, float, float]]:
@@ -60,6 +60,17 @@ def test_a_slip_has_the_size_that_the_markers_show():
     low, moment, high = numbers(scene, found)["from_time"]
     assert moment == 5.0 and high - low == pytest.approx(0.12, abs=0.06)
     assert found.p_value < 1e-12
+
+
+def test_a_slide_is_no_slip():
+    """From 3 to 9 s; what looks for slips finds one in it."""
+    scene = seen("marker_slide", SLIP.marker, 0.02, 0.0, -0.015, 6.0, 6.0, 0.0, skin_m=0.0015)
+    (found,) = proofs(scene, SLIP)
+    assert (found.effect.name, found.target) == ("marker_slide", "LKNEL")
+    low, size, high = numbers(scene, found)["way"]
+    assert low < 0.025 < high and size == pytest.approx(0.025, abs=0.004)
+    assert numbers(scene, found)["start"][1] == pytest.approx(3.0, abs=0.8)
+    assert numbers(scene, found)["end"][1] == pytest.approx(9.0, abs=0.8)
 
 
 def test_a_marker_that_sits_wrong_throughout_has_its_size():

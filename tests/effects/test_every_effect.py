@@ -34,6 +34,11 @@ VOCABULARY = [
     "marker_swap",
     "over_smoothing",
     "segment_inertia",
+    "implement",
+    "camera_frame",
+    "external_force",
+    "object_handled",
+    "marker_slide",
 ]
 UNITS = {"m", "rad", "1", "s", "Hz", "kg", "kg m", "kg m2", "N", "N m", "N/s", "N m/s"}
 EVERY = [pytest.param(effect, id=effect.name) for effect in CATALOGUE]

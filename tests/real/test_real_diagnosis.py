@@ -95,3 +95,20 @@ def test_hands_on_a_rail_are_the_missing_kilograms(tmp_path):
     assert abs(borne["sub-01_task-righthip"] - 52) < 3
     assert abs(borne["sub-01_task-rightknee"] - 46) < 3
     assert identifying(tmp_path / "out") == set()
+
+
+def test_a_golf_club_is_an_implement_in_both_hands(tmp_path):
+    """A driver: about 0.3 kg, its centre 0.8 m from the hands, 0.24 kg m2 about them."""
+    files = {f"sub-01_task-swing_run-{k}.c3d": f"golf_french/swing{k}.c3d" for k in (1, 3, 5)}
+    files["sub-01_task-static.c3d"] = "golf_french/static.c3d"
+    markers = DATA / "golf_french" / "marker_set_by_hand.toml"
+    options = f'marker_set = "{markers}"\n[roles]\nsequence = ["swing"]\n'
+    study = make_study(tmp_path / "study", ["sub-01\tM\tn/a\tn/a"], options, files)
+    found = diagnosis_of(study, tmp_path / "out")
+    club = found[found["effect"] == "implement"].set_index("parameter")
+    assert set(club["target"]) == {"hand_l+hand_r"} and set(club["verdict"]) == {"named"}
+    assert 0.2 < club.loc["mass", "estimate"] < 0.5
+    assert 0.6 < club.loc["centre", "estimate"] < 1.0
+    assert club.loc["inertia", "ci_low"] < 0.24 < club.loc["inertia", "ci_high"]
+    faults = found[found["effect"].isin(["marker_shift", "marker_slide", "marker_swap"])]
+    assert len(set(faults["target"])) <= 1

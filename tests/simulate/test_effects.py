@@ -38,6 +38,7 @@ VOCABULARY = """
 sync_offset clock_drift plate_translation plate_rotation plate_gain plate_crosstalk plate_zero
 plate_drift gravity_tilt added_mass released_object wobbling_mass breathing unmeasured_contact
 joint_centre missing_joint marker_shift marker_swap over_smoothing segment_inertia
+implement camera_frame external_force object_handled marker_slide
 """
 SIZES = {
     "sync_offset": 0.02,
@@ -60,6 +61,11 @@ SIZES = {
     "marker_swap": 1.0,
     "over_smoothing": 2.0,
     "segment_inertia": 0.4,
+    "implement": 0.5,
+    "camera_frame": 0.02,
+    "external_force": 60.0,
+    "object_handled": 2.0,
+    "marker_slide": 0.03,
     "outside_belt_vibration": 20.0,
     "outside_plate_hysteresis": 8.0,
     "outside_plate_saturation": 0.05,
@@ -368,6 +374,9 @@ def test_an_added_mass_weighs_and_keeps_flight_free():
         ("released_object", 1.5, "hand_r"),
         ("breathing", 0.05, ""),
         ("unmeasured_contact", 40.0, "hand_l"),
+        ("implement", 0.5, "hand_r"),
+        ("external_force", 60.0, "upper_torso"),
+        ("object_handled", 1.5, "hand_l"),
     ],
 )
 def test_flight_stays_free_of_ground_force(asked):
@@ -401,6 +410,62 @@ def test_an_unmeasured_contact_takes_its_mean_force_off_the_plate():
     weight = person_of(PERSON_SEED).mass_kg * G
     assert trial.force_n[800:2400, 1].mean() == pytest.approx(weight - 80.0, abs=1.0)
     assert trial.force_n[2450:2900, 1].mean() == pytest.approx(weight, abs=1.0)
+
+
+def test_a_constant_force_takes_itself_off_the_plate():
+    trial = trial_with("static", ("external_force", 60.0, "upper_torso"))
+    effect = effect_of("external_force", 60.0, "upper_torso")
+    expected = [0.0, person_of(PERSON_SEED).mass_kg * G, 0.0] - 60.0 * effect.direction
+    np.testing.assert_allclose(trial.force_n.mean(axis=0), expected, atol=1.0)
+    assert effect.facts(person_of(PERSON_SEED))["upwards_n"] > 57.0
+
+
+def test_an_object_weighs_from_picking_up_to_putting_down():
+    trial = trial_with("static", ("object_handled", 2.0, "hand_l"))
+    effect = effect_of("object_handled", 2.0, "hand_l")
+    start, end = (round(1000 * t) for t in effect.window_s(DURATION_S["static"]))
+    weight, force = person_of(PERSON_SEED).mass_kg * G, trial.force_n[:, 1]
+    assert force[start + 60 : end - 60].mean() == pytest.approx(weight + 2.0 * G, abs=0.5)
+    for part in (slice(20, start - 60), slice(end + 60, -20)):
+        assert force[part].mean() == pytest.approx(weight, abs=1.0)
+
+
+def test_an_implement_weighs_where_its_centre_is():
+    """The person leans to balance it: the moment is that of all weights where they are."""
+    trial, person = trial_with("static", ("implement", 0.5, "hand_r")), person_of(PERSON_SEED)
+    effect, poses = effect_of("implement", 0.5, "hand_r"), trial.poses
+    held = person.segment_inertias()["hand_r"].com_m + effect.centre_m
+    parts = [(body, one.mass_kg, one.com_m) for body, one in person.inertias.items()]
+    expected = np.zeros((2, 3))
+    for body, mass_kg, place in (*parts, ("hand_r", 0.5, held)):
+        weight = np.array([0.0, mass_kg * G, 0.0])
+        at = poses.point(body, place)[trial.plan.keep].mean(axis=0)
+        expected += weight, np.cross(at, weight)
+    np.testing.assert_allclose(trial.force_n.mean(axis=0), expected[0], atol=0.3)
+    np.testing.assert_allclose(trial.moment_nm.mean(axis=0), expected[1], atol=0.3)
+    assert 0.3 <= effect.facts(person)["distance_m"] <= 0.9
+
+
+def test_cameras_that_are_turned_turn_the_markers_and_leave_the_forces():
+    plain, turned = measured_with("static"), measured_with("static", ("camera_frame", 0.02, "x"))
+    np.testing.assert_array_equal(plain.channels, turned.channels)
+    a, b = plain.points_m, turned.points_m
+    np.testing.assert_allclose(b[..., 0], a[..., 0], atol=1e-9)
+    np.testing.assert_allclose(b[..., 1], np.cos(0.02) * a[..., 1] - np.sin(0.02) * a[..., 2])
+
+
+def test_a_marker_slides_within_its_window_and_stays_on_its_segment():
+    sliding = ("marker_slide", 0.03, "RELB")
+    plain, slid = measured_with("squat"), measured_with("squat", sliding)
+    column = plain.labels.index("RELB")
+    off = np.linalg.norm(slid.points_m - plain.points_m, axis=2)
+    times = np.arange(len(off)) / plain.rates.marker_hz
+    start, end = (share * times[-1] for share in effect_of(*sliding).window_share)
+    assert not np.delete(off, column, axis=1).any()
+    assert off[times < start, column].max() < 1e-9
+    np.testing.assert_allclose(off[times > end, column], 0.03)
+    middle = off[np.argmin(np.abs(times - 0.5 * (start + end))), column]
+    assert middle == pytest.approx(0.015, abs=0.001)
 
 
 def test_a_body_with_loads_still_obeys_newton_and_euler():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -27,7 +27,11 @@ HEAVY = ("thigh_l", "thigh_r", "upper_torso", "lower_torso")
 MOST_OF_SEGMENT = 0.8
 OUTWARD = np.array([0.8, 0.6, 0.0])  # of the chest: ahead and up, thorax axes
 RAMP_S = 0.4
-ASIDE = 0.15  # horizontal part of a support
+ASIDE, MOST_ASIDE = 0.15, 0.3  # horizontal part of a support, of a constant force
+CENTRES_M = (0.3, 0.9)  # from the hand: of a racket, of a driver
+SPREADS = (0.3, 0.7)  # of the mass about its centre, over the centre's distance
+LEAST_RADIUS_M = 0.01
+MOST_TILT_RAD = 0.8
 UNSTEADINESS, PACE_HZ = 0.15, 0.6
 CLEAR_OF_FLIGHT_S = 0.3
 SLACK_M = 0.1
@@ -274,6 +278,97 @@ class Support(Load):
         """What the body exerts on the support."""
         r = poses.point(self.body, self.position_m)
         return -self.force_n, -np.cross(r, self.force_n)
+
+
+@dataclass(frozen=True, eq=False)
+class ExternalForce(OnSegment, name="external_force"):
+    """`size` N on a segment's centre of mass, mostly upwards and always the same; not in trials
+    with a flight, which would be another one.
+
+    direction : (3,) unit vector, walkway axes (Y up).
+    """
+
+    direction: np.ndarray
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        segment = cls.checked(target.name or str(rng.choice(SEGMENTS)))
+        aside, heading = rng.uniform(0.0, MOST_ASIDE), rng.uniform(-np.pi, np.pi)
+        up = np.sqrt(1 - aside**2)
+        return cls(size, segment, np.array([aside * np.cos(heading), up, aside * np.sin(heading)]))
+
+    def plan(self, person: Person, plan: Plan) -> Plan:
+        if plan.flights:
+            return plan
+        force = np.tile(self.size * self.direction, (len(plan), 1))
+        return plan.with_load(Support(body_of(self.segment), self.position_m(person), force))
+
+    def facts(self, person: Person) -> dict[str, Any]:
+        return {"upwards_n": float(self.size * self.direction[1])}
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectHandled(OnSegment, name="object_handled"):
+    """A point mass of `size` kg that a segment picks up and puts down again, beside the plates.
+
+    window_share : start and end as parts of each trial.
+    """
+
+    window_share: tuple[float, float]
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        segment = cls.checked(target.name or str(rng.choice(HANDS)))
+        start = float(rng.uniform(0.2, 0.35))
+        return cls(size, segment, (start, start + float(rng.uniform(0.25, 0.4))))
+
+    def window_s(self, length_s: float) -> tuple[float, float]:
+        """Start and end in a trial of this length."""
+        start, end = (share * length_s for share in self.window_share)
+        return start, end
+
+    def plan(self, person: Person, plan: Plan) -> Plan:
+        start, end = self.window_s(plan.recorded_length_s())
+        half = 0.5 * OPENING_S
+        hold = window(plan.recorded_times_s(), start - half, end + half, OPENING_S)
+        place = self.position_m(person) + np.array([IN_FRONT_M, 0.0, 0.0])
+        return plan.with_load(Ball(body_of(self.segment), self.size, place, hold, end))
+
+
+@dataclass(frozen=True, eq=False)
+class Implement(OnSegment, name="implement"):
+    """Two balls of `size` kg together on a line through the hand's centre of mass, held through
+    each trial.
+
+    centre_m : (3,) of both from there, hand's axes. spread_m : of each from their common centre.
+    """
+
+    centre_m: np.ndarray
+    spread_m: float
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        hand = target.name or str(rng.choice(HANDS))
+        if hand not in HANDS:
+            raise cls.wrong_target(hand)
+        distance = target.get("distance", float(rng.uniform(*CENTRES_M)))
+        azimuth, out = rng.uniform(-np.pi, np.pi), rng.uniform(-MOST_TILT_RAD, MOST_TILT_RAD)
+        flat = np.cos(out)
+        axis = np.array([np.sin(out), flat * np.cos(azimuth), flat * np.sin(azimuth)])
+        return cls(size, hand, distance * axis, distance * float(rng.uniform(*SPREADS)))
+
+    def body(self, person: Person) -> Person:
+        distance = float(np.linalg.norm(self.centre_m))
+        axis = self.centre_m / max(distance, LEAST_RADIUS_M)
+        across = self.spread_m**2 * (np.eye(3) - np.outer(axis, axis))
+        tensor = self.size * (across + LEAST_RADIUS_M**2 * np.eye(3))
+        held = Inertia(self.size, self.position_m(person) + self.centre_m, tensor)
+        body, origin = body_of(self.segment), np.zeros(3)
+        heavier = combined([(person.inertias[body], origin), (held, origin)])
+        return replace(person, inertias={**person.inertias, body: heavier})
+
+    def facts(self, person: Person) -> dict[str, Any]:
+        return {"distance_m": float(np.linalg.norm(self.centre_m))}
 
 
 class ElasticTether(Effect, name="outside_elastic_tether"):

@@ -13,9 +13,10 @@ from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.instruments.readings import Instruments
 from bsip_cli.simulate.effects.base import Effect, Target, direction
-from bsip_cli.simulate.numerics import frame_of, rotate, runs, step
+from bsip_cli.simulate.numerics import frame_of, glide, rotate, runs, step
 
 SLIP_S = 0.05
+SOFT = 0.1  # of the window of a slide, in which it speeds up, and slows down
 COMPANIONS = 3
 CLOSE_PAIRS = 5
 LEAST_FRAMES = 15  # a shorter stretch between gaps is not smoothed
@@ -51,6 +52,39 @@ class MarkerShift(Effect, name="marker_shift"):
         frame = companion_frame(instruments.points_m, column)
         points = instruments.points_m.copy()
         points[:, column] += self.size * slipped[:, None] * rotate(frame, self.along)
+        return replace(instruments, points_m=points)
+
+    def place(self) -> str:
+        return self.marker
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerSlide(Effect, name="marker_slide"):
+    """A marker slides along the skin for a part of the trial, and stays there.
+
+    along : (3,) unit vector in the frame of the three markers that keep their distance to
+        it best. window_share : start and end as parts of a trial.
+    """
+
+    marker: str
+    draw_of_marker: int
+    along: np.ndarray
+    window_share: tuple[float, float]
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        number, start = int(rng.integers(1 << 16)), float(rng.uniform(0.1, 0.4))
+        share = (start, start + float(rng.uniform(0.3, 0.5)))
+        return cls(size, target.name, number, direction(rng), share)
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        drawn = instruments.labels[self.draw_of_marker % len(instruments.labels)]
+        column = instruments.column(self.marker or drawn)
+        times = instruments.frame_times_s()
+        start, end = (share * times[-1] for share in self.window_share)
+        way = self.size * glide(times, start, end, SOFT * (end - start))
+        points = instruments.points_m.copy()
+        points[:, column] += way[:, None] * rotate(companion_frame(points, column), self.along)
         return replace(instruments, points_m=points)
 
     def place(self) -> str:

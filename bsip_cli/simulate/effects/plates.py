@@ -87,6 +87,25 @@ class GravityTilt(Effect, name="gravity_tilt"):
         return replace(instruments, points_m=points, readings=np.stack(readings))
 
 
+@dataclass(frozen=True, eq=False)
+class CameraFrame(Effect, name="camera_frame"):
+    """All markers are turned by turn_rad (rotation vector, lab axes) about the lab's origin."""
+
+    turn_rad: np.ndarray
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        heading = rng.uniform(-np.pi, np.pi)
+        axes = {"": [np.cos(heading), np.sin(heading), 0.0], "x": [1.0, 0, 0], "y": [0, 1.0, 0]}
+        if target.name not in axes:
+            raise cls.wrong_target(target.name)
+        return cls(size, size * np.array(axes[target.name]))
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        turn = from_rotation_vector(self.turn_rad)
+        return replace(instruments, points_m=instruments.points_m @ turn.T)
+
+
 class OfEveryPlate(Effect, ABC):
     """A plate reads otherwise, or each of them."""
 

@@ -1,0 +1,53 @@
+"""Loads, forces, turned cameras and a sliding marker, hidden by the simulator and found by the
+command line, which sees no truth."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+pytestmark = pytest.mark.long
+STAGES = ("ingest", "scale", "ik", "regress", "identify", "reconstruct", "diagnose")
+TASKS = ("static", "sequence", "squat")
+HIDDEN = [
+    ("implement", 0.3, "hand_r,distance=0.7", "mass", 701),
+    ("camera_frame", 0.0175, "-", "angle", 701),
+    ("external_force", 40.0, "lower_torso", "force", 701),
+    ("object_handled", 1.0, "hand_l", "mass", 701),
+    ("marker_slide", 0.03, "LKNEL", "way", 641),
+]
+
+
+def bsip(*arguments: str | Path) -> None:
+    command = [sys.executable, "-m", "bsip_cli", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def said(folder: Path, seed: int, *hidden: str) -> pd.DataFrame:
+    """What is named or in a group, of one person."""
+    tasks = [word for task in TASKS for word in ("--task", task)]
+    options = ("--preset", "diagnosis", "--seed", str(seed), "--sequence-s", "20", *tasks)
+    bsip("simulate", folder / "study", *options, *hidden)
+    for stage in STAGES:
+        bsip(stage, folder / "study", "--out", folder / "out")
+    table = pd.read_parquet(folder / "out" / "sub-01" / "sub-01_diagnosis.parquet")
+    return table[table["verdict"] != "rejected"]
+
+
+@pytest.mark.parametrize(("effect", "size", "target", "parameter", "seed"), HIDDEN)
+def test_what_is_hidden_is_named_with_its_size(tmp_path, effect, size, target, parameter, seed):
+    hidden = ("--effect", effect, "--size", str(size), "--target", target)
+    found = said(tmp_path, seed, *hidden)
+    assert set(found["effect"]) == {effect} and set(found["verdict"]) == {"named"}
+    assert set(found["target"]) == {"" if target == "-" else target.split(",")[0]}
+    sizes = found.loc[found["parameter"] == parameter, "estimate"]
+    assert len(sizes) and sizes.between(0.8 * size, 1.25 * size).all()
+
+
+def test_nothing_hidden_is_nothing_named(tmp_path):
+    assert set(said(tmp_path, 503)["effect"]) == {"none"}

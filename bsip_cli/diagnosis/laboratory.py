@@ -21,6 +21,7 @@ from bsip_cli.diagnosis.error_terms import SHARE
 from bsip_cli.diagnosis.fault_model import SIZES
 from bsip_cli.diagnosis.shared_faults import STATED_MASS, Coordinate, Information
 from bsip_cli.effects.effect import Parameter
+from bsip_cli.effects.sync_offset import SyncOffset
 
 _STEPS = 100  # of expectation and maximisation, at most
 _STEADY = 0.01  # change of every scale
@@ -56,35 +57,49 @@ class Persons:
 
 
 def persons_of(
-    informations: Sequence[Information], mass_sd: Sequence[float], deviation: float
+    informations: Sequence[Information],
+    mass_sd: Sequence[float],
+    deviation: float,
+    tissue_lag_s: float,
 ) -> Persons:
     """Lay out what was kept of each.
 
     mass_sd : (M,) standard deviation of each stated mass, part of it. deviation : usual standard
-    deviation from person to person [typical].
+    deviation from person to person [typical]. tissue_lag_s : what skin that swings does to the
+    delay in all persons alike, standard deviation.
     """
     known = {
         x: p for one in informations for x, p in zip(one.coordinates, one.parameters, strict=True)
     }
     coordinates = tuple(sorted(known))
-    count = len(coordinates)
-    precision, pull = np.zeros((len(informations), count, count)), np.zeros((len(mass_sd), count))
-    for k, one in enumerate(informations):
-        at = [coordinates.index(x) for x in one.coordinates]
-        precision[k][np.ix_(at, at)], pull[k, at] = one.precision, one.pull
     is_mass = np.array([one.effect == STATED_MASS.name for one in coordinates])
     masses = np.array(mass_sd) / STATED_MASS.parameter.typical
+    lag = [tissue_lag_s / known[x].typical * (x.effect == SyncOffset.name) for x in coordinates]
     kinds = [(one.effect, *one.target.split(" ")[1:], one.parameter) for one in coordinates]
     numbers = {kind: k for k, kind in enumerate(dict.fromkeys(kinds))}
     return Persons(
         coordinates,
         tuple(known[one] for one in coordinates),
-        precision,
-        pull,
+        *_laid(coordinates, informations),
         np.where(is_mass, masses[:, None], deviation),
         np.array([numbers[kind] for kind in kinds]),
-        np.where(is_mass, np.median(masses), SHARE),  # one scale weighs all: it may err too
+        np.where(
+            is_mass, np.median(masses), np.hypot(SHARE, lag)
+        ),  # one scale weighs all, and errs
     )
+
+
+def _laid(
+    coordinates: Sequence[Coordinate], informations: Sequence[Information]
+) -> tuple[np.ndarray, np.ndarray]:
+    """(M, C, C) precision and (M, C) pull of each person, among all coordinates."""
+    count = len(coordinates)
+    precision = np.zeros((len(informations), count, count))
+    pull = np.zeros((len(informations), count))
+    for k, one in enumerate(informations):
+        at = [coordinates.index(x) for x in one.coordinates]
+        precision[k][np.ix_(at, at)], pull[k, at] = one.precision, one.pull
+    return precision, pull
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,3 +240,32 @@ def squares_of(persons: Persons, scale: np.ndarray) -> np.ndarray:
 def log_prior_of_scales(scale: np.ndarray) -> float:
     """Logarithm of their density before the data, less a constant."""
     return -0.5 * WEIGHT_OF_FAULTS * float((2 * np.log(scale) + 1 / scale**2 - 1).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Pooled:
+    """All that a laboratory's persons tell, to be kept: nothing of it grows with their number.
+
+    precision (C, C), pull (C,) : of the sizes, as in ``Sums``. spread (C,) : standard deviation of
+    a person's deviations. root (C, K) : of the covariance of the sizes before the data, the faults
+    that were found among them.
+    """
+
+    coordinates: tuple[Coordinate, ...]
+    precision: np.ndarray
+    pull: np.ndarray
+    spread: np.ndarray
+    root: np.ndarray
+
+    def posterior(self) -> Posterior:
+        """By all persons."""
+        return posterior_of(Sums(self.precision, self.pull, 0.0), self.root)
+
+    def without(self, own: Sequence[Information]) -> Pooled:
+        """By all others: what a person's sessions have added is taken away."""
+        precision, pull = _laid(self.coordinates, own)
+        variance, _ = _deviations(precision, np.tile(self.spread, (len(own), 1)))
+        across = precision @ variance
+        added = (precision - across @ precision).sum(axis=0)
+        pulled = (pull - np.einsum("mij,mj->mi", across, pull)).sum(axis=0)
+        return replace(self, precision=self.precision - added, pull=self.pull - pulled)

@@ -17,6 +17,7 @@ from bsip_cli.diagnosis.findings import SCALE_ERROR
 from bsip_cli.diagnosis.laboratory import (
     Offset,
     Persons,
+    Pooled,
     Posterior,
     Sums,
     anything,
@@ -150,9 +151,17 @@ class Laboratory:
 
     def posterior(self, but: int | None = None, sums: Sums | None = None) -> Posterior:
         """Of the coordinates, of all that is there but one fault."""
+        return posterior_of(self.sums if sums is None else sums, self._root(but))
+
+    def _root(self, but: int | None = None) -> np.ndarray:
         there = [s * self.causes[k].directions for k, s in self.found.items() if k != but]
-        root = np.column_stack([np.diag(self.persons.ordinary), *there])
-        return posterior_of(self.sums if sums is None else sums, root)
+        return np.column_stack([np.diag(self.persons.ordinary), *there])
+
+    def pooled(self) -> Pooled:
+        """What is kept of it for the diagnosis of each person."""
+        persons, sums = self.persons, self.sums
+        spread = np.median(persons.usual, axis=0) * self.scale[persons.groups]
+        return Pooled(persons.coordinates, sums.precision, sums.pull, spread, self._root())
 
 
 def laboratory_of(persons: Persons, causes: tuple[Cause, ...], prior_odds: float) -> Laboratory:

@@ -57,7 +57,7 @@ def drawn(
 
 
 def fitted(told: list[Information]) -> Laboratory:
-    persons = persons_of(told, [0.008] * len(told), BETWEEN)
+    persons = persons_of(told, [0.008] * len(told), BETWEEN, 0.0)
     return laboratory_of(persons, causes_of(persons, CENTRES_M), ODDS)
 
 
@@ -98,14 +98,18 @@ def test_nothing_is_named_where_nothing_is():
 
 
 def test_deviations_follow_from_the_persons():
-    few = scales_of(persons_of(drawn(np.random.default_rng(3), {}, 12, 0.05), [0.008] * 12, 0.2))
-    many = scales_of(persons_of(drawn(np.random.default_rng(3), {}, 12, 0.8), [0.008] * 12, 0.2))
+    few = scales_of(
+        persons_of(drawn(np.random.default_rng(3), {}, 12, 0.05), [0.008] * 12, 0.2, 0.0)
+    )
+    many = scales_of(
+        persons_of(drawn(np.random.default_rng(3), {}, 12, 0.8), [0.008] * 12, 0.2, 0.0)
+    )
     assert np.median(many / few) > 2
 
 
 def test_persons_are_a_sum():
     told = drawn(np.random.default_rng(4), {DELAY: 1.0}, 6)
-    persons = persons_of(told, [0.008] * 6, BETWEEN)
+    persons = persons_of(told, [0.008] * 6, BETWEEN, 0.0)
     scale = np.ones(persons.groups.max() + 1)
     whole = sums_of(persons, scale)
     parts = sums_of(persons, scale, range(2)).with_(sums_of(persons, scale, range(2, 6)))
@@ -117,7 +121,7 @@ def test_persons_are_a_sum():
 def test_the_sums_are_those_of_all_deviations_at_once():
     """With every person's deviation a coefficient of its own, the posterior is the same."""
     told = drawn(np.random.default_rng(5), {DELAY: 1.0}, 3)
-    persons = persons_of(told, [0.008] * 3, BETWEEN)
+    persons = persons_of(told, [0.008] * 3, BETWEEN, 0.0)
     root = np.diag(persons.ordinary + 1.0)
     short = posterior_of(sums_of(persons, np.ones(persons.groups.max() + 1)), root)
     count = len(persons.ordinary)
@@ -173,7 +177,7 @@ def test_all_plates_turned_are_each_turned_and_shifted():
     empty = np.zeros((len(known), len(known)))
     told = Information(coordinates, parameters, np.ones(len(known)), empty, empty[0])
     centres = {plate.name: plate.centre_m() for plate in scene.plates}
-    persons = persons_of([told], [0.008], BETWEEN)
+    persons = persons_of([told], [0.008], BETWEEN, 0.0)
     causes = causes_of(persons, centres)
     cause = next(c for c in causes if (c.effect, c.target) == (PlateRotation.name, "all"))
     effects = {effect.name: effect for effect in OF_A_LABORATORY}

@@ -10,7 +10,7 @@ person adds J - J V J and h - J V h to what is known of theta, V = (J + T^-2)^-1
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from bsip_cli.diagnosis.error_model import WEIGHT_OF_FAULTS
 from bsip_cli.diagnosis.error_terms import SHARE
 from bsip_cli.diagnosis.fault_model import SIZES
 from bsip_cli.diagnosis.shared_faults import STATED_MASS, Coordinate, Information
+from bsip_cli.effects.clock_drift import ClockDrift
 from bsip_cli.effects.effect import Parameter
 from bsip_cli.effects.sync_offset import SyncOffset
 
@@ -34,6 +35,7 @@ class Persons:
     precision (M, C, C), pull (M, C) : of each alone; 0 where nothing is told.
     usual (M, C) : standard deviation of the deviations before the data. groups (C,) : whose
     deviations have one scale. ordinary (C,) : what every laboratory has of a fault.
+    alike (C, K) : root of the covariance of what persons' bodies do alike.
     """
 
     coordinates: tuple[Coordinate, ...]
@@ -43,6 +45,7 @@ class Persons:
     usual: np.ndarray
     groups: np.ndarray
     ordinary: np.ndarray
+    alike: np.ndarray
 
     @property
     def told(self) -> np.ndarray:
@@ -56,17 +59,45 @@ class Persons:
         return replace(self, precision=precision, pull=pull, usual=usual)
 
 
+@dataclass(frozen=True)
+class Lag:
+    """Soft tissue that lags in all persons alike passes for a delay, other early than late in a
+    stance, and so for a clock's rate.
+
+    size_s : standard deviation. moments_s : mean and standard deviation of the moments that tell of
+    the clock, from the start of a recording.
+    """
+
+    size_s: float
+    moments_s: tuple[float, float]
+
+    def root(
+        self, coordinates: Sequence[Coordinate], known: Mapping[Coordinate, Parameter]
+    ) -> np.ndarray:
+        """(C, 2) of the covariance [typical]: the same at all moments, and about their mean."""
+        mean_s, sd_s = self.moments_s
+        root = np.zeros((len(coordinates), 2))
+        for k, one in enumerate(coordinates):
+            if one.effect == SyncOffset.name:
+                root[k] = np.array([1.0, -mean_s / sd_s]) * self.size_s / known[one].typical
+            elif one.effect == ClockDrift.name:
+                root[k, 1] = self.size_s / sd_s / known[one].typical
+        return root
+
+
+NO_LAG = Lag(0.0, (0.0, 1.0))
+
+
 def persons_of(
     informations: Sequence[Information],
     mass_sd: Sequence[float],
     deviation: float,
-    tissue_lag_s: float,
+    lag: Lag = NO_LAG,
 ) -> Persons:
     """Lay out what was kept of each.
 
     mass_sd : (M,) standard deviation of each stated mass, part of it. deviation : usual standard
-    deviation from person to person [typical]. tissue_lag_s : what skin that swings does to the
-    delay in all persons alike, standard deviation.
+    deviation from person to person [typical].
     """
     known = {
         x: p for one in informations for x, p in zip(one.coordinates, one.parameters, strict=True)
@@ -74,7 +105,6 @@ def persons_of(
     coordinates = tuple(sorted(known))
     is_mass = np.array([one.effect == STATED_MASS.name for one in coordinates])
     masses = np.array(mass_sd) / STATED_MASS.parameter.typical
-    lag = [tissue_lag_s / known[x].typical * (x.effect == SyncOffset.name) for x in coordinates]
     kinds = [(one.effect, *one.target.split(" ")[1:], one.parameter) for one in coordinates]
     numbers = {kind: k for k, kind in enumerate(dict.fromkeys(kinds))}
     return Persons(
@@ -83,9 +113,8 @@ def persons_of(
         *_laid(coordinates, informations),
         np.where(is_mass, masses[:, None], deviation),
         np.array([numbers[kind] for kind in kinds]),
-        np.where(
-            is_mass, np.median(masses), np.hypot(SHARE, lag)
-        ),  # one scale weighs all, and errs
+        np.where(is_mass, np.median(masses), SHARE),  # one scale weighs all: it may err too
+        lag.root(coordinates, known),
     )
 
 

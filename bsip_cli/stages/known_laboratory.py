@@ -55,10 +55,16 @@ class Known:
                 )
 
     def causes(self, trials: Sequence[FaultTrial]) -> Iterator[dict]:
-        """The same for ``extend``: in full, and of the same sizes for every fold."""
-        values = {(one.effect.name, one.target): one.values.tolist() for one in self._named()}
+        """The same for ``extend``: in full, and of the same sizes for every fold; of single plates
+        and the clock as the others alone tell them."""
+        sizes = dict(zip(self.coordinates, self.mean.tolist(), strict=True))
         for found in self.findings(trials):
-            mine = values[found.effect, found.target]
+            parameters = EFFECTS[found.effect].parameters(trials[0].scene, found.target)
+            mine = [
+                sizes.get(Coordinate(found.effect, found.target, p.name), x.value / p.typical)
+                * p.typical
+                for p, x in zip(parameters, found.numbers, strict=True)
+            ]
             yield {
                 "effect": found.effect,
                 "target": found.target,

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.diagnosis.findings import Number, interval_words
-from bsip_cli.diagnosis.laboratory import persons_of
+from bsip_cli.diagnosis.laboratory import Lag, persons_of
 from bsip_cli.diagnosis.laboratory_deviations import Deviation, deviations_of
 from bsip_cli.diagnosis.laboratory_search import (
     Cause,
@@ -46,13 +46,18 @@ _NO_SCENE = cast(Scene, None)  # faults of a laboratory speak of no trial
 
 @dataclass(frozen=True, eq=False)
 class _Session:
-    """One session of a person; plates: corners (4, 3) in the world by name."""
+    """One session of a person.
+
+    plates : corners (4, 3) in the world by name. moments_s : mean and standard deviation of those
+    that tell of the clock.
+    """
 
     name: str
     person: str
     told: Information
     mass_sd: float
     plates: Mapping[str, np.ndarray]
+    moments_s: tuple[float, float]
 
 
 def run(unit: Unit) -> None:
@@ -129,12 +134,14 @@ def _sessions(unit: Unit) -> Iterator[_Session]:
             rows = table[table["session"] == session]
             name = f"{participant.id}_ses-{session}" if session else participant.id
             plates = facts["sessions"][session]["plates"]
+            mean_s, sd_s = facts["sessions"][session]["moments_s"]
             yield _Session(
                 name,
                 participant.id,
                 information_in(rows),
                 facts["mass_sd"] or _UNWEIGHED,
                 {plate: np.array(corners) for plate, corners in plates.items()},
+                (mean_s, sd_s),
             )
 
 
@@ -160,11 +167,12 @@ def _alike(a: Mapping[str, np.ndarray], b: Mapping[str, np.ndarray]) -> bool:
 
 def _fitted(unit: Unit, sessions: Sequence[_Session]) -> Laboratory:
     mine = unit.config.laboratory
+    mean_s, sd_s = np.mean([one.moments_s for one in sessions], axis=0).tolist()
     persons = persons_of(
         [one.told for one in sessions],
         [one.mass_sd for one in sessions],
         mine.between_persons,
-        0.001 * mine.tissue_lag_ms,
+        Lag(0.001 * mine.tissue_lag_ms, (mean_s, sd_s)),
     )
     centres = {name: x.mean(axis=0) for one in sessions for name, x in one.plates.items()}
     causes = causes_of(persons, centres)

@@ -38,7 +38,7 @@ FAULTS = (  # of the first plate, [typical sizes]: 10 ms, 20 mm, 1 degree, 4 %
     Coordinate("plate_gain", "1 fz", "gain"),
 )
 COUNTS = (4, 8, 16, 64)
-MANY = (10, 100)
+MANY = (10, 100, 1000)
 
 
 class Pool:

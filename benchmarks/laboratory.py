@@ -6,7 +6,7 @@ POOL: results of `bsip laboratory` for simulated persons of one sound laboratory
 by the simulator's own route. Persons are drawn from it with replacement, and one fault is added to
 what they tell: J theta to the pull. Printed are the errors beside the Cramer-Rao bound (deviations
 between persons known), how often 95 % intervals hold, names that are false in laboratories without
-a fault, and time and memory of up to a thousand persons.
+a fault, and time and memory of hundreds of persons.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ FAULTS = (  # of the first plate, [typical sizes]: 10 ms, 20 mm, 1 degree, 4 %
     Coordinate("plate_gain", "1 fz", "gain"),
 )
 COUNTS = (4, 8, 16, 64)
-MANY = (10, 100, 1000)
+MANY = (10, 100, 300)
 
 
 class Pool:

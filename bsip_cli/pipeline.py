@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # artifacts needs pandas, and `bsip --help` must not wait for it
@@ -149,6 +150,15 @@ STAGES = (
         module="bsip_cli.stages.laboratory_information",
     ),
     Stage(
+        "laboratory",
+        "cohort",
+        "The faults of plates, clock and vertical, by all persons recorded there together.",
+        reads=("laboratory-information",),
+        writes=("laboratory", "laboratory-sums"),
+        options=("diagnosis", "laboratory"),
+        module="bsip_cli.stages.laboratory",
+    ),
+    Stage(
         "diagnose",
         "participant",
         "What the simulation gets wrong: its cause, how large, how sure.",
@@ -164,6 +174,7 @@ STAGES = (
             "regression",
             "identification",
         ),
+        reads_if_there=("laboratory-information", "laboratory-sums", "laboratory"),
         writes=("overall-diagnosis", "overall-error-budget", "detection"),
         options=("skeleton", "loads", "roles", "ik", "prior", "diagnosis", "reconstruct"),
         module="bsip_cli.stages.diagnose",
@@ -264,15 +275,6 @@ STAGES = (
         module="bsip_cli.stages.choose",
     ),
     Stage(
-        "laboratory",
-        "cohort",
-        "The faults of plates, clock and vertical, by all persons recorded there together.",
-        reads=("laboratory-information",),
-        writes=("laboratory",),
-        options=("diagnosis", "laboratory"),
-        module="bsip_cli.stages.laboratory",
-    ),
-    Stage(
         "stats",
         "cohort",
         "Tests and summaries over all participants.",
@@ -346,6 +348,12 @@ def by_level(stages: Iterable[Stage]) -> tuple[tuple[Stage, ...], tuple[Stage, .
     stages = tuple(stages)
     of_all = tuple(stage for stage in stages if stage.level == "cohort")
     return tuple(stage for stage in stages if stage not in of_all), of_all
+
+
+def in_turn(stages: Iterable[Stage]) -> Iterator[tuple[Stage, ...]]:
+    """Stages of each participant, then those of all, and so on: what is told of all serves each."""
+    for _, same in groupby(stages, key=lambda stage: stage.level == "cohort"):
+        yield tuple(same)
 
 
 def producer(kind: str) -> Stage:

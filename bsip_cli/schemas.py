@@ -922,6 +922,20 @@ SCHEMAS = {
             ),
         ),
         Schema(
+            "laboratory-sums",
+            "cohort",
+            1,
+            "what all persons together tell of each laboratory, for the diagnosis of each",
+            (
+                _text("laboratory", "as in laboratory"),
+                *_FAULT[:3],
+                Column("spread", "float", "1", "standard deviation between persons [typical]"),
+                Column("pull", "float", "1", "precision times likeliest sizes [typical]"),
+                Column("precision_*", "float", "1", "with the number of this row [per typical^2]"),
+                Column("root_*", "float", "1", "root of the covariance before the data [typical]"),
+            ),
+        ),
+        Schema(
             "values",
             "cohort",
             2,

@@ -10,7 +10,7 @@ person adds J - J V J and h - J V h to what is known of theta, V = (J + T^-2)^-1
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,9 @@ from bsip_cli.diagnosis.error_model import WEIGHT_OF_FAULTS
 from bsip_cli.diagnosis.error_terms import SHARE
 from bsip_cli.diagnosis.fault_model import SIZES
 from bsip_cli.diagnosis.shared_faults import STATED_MASS, Coordinate, Information
+from bsip_cli.effects.clock_drift import ClockDrift
 from bsip_cli.effects.effect import Parameter
+from bsip_cli.effects.sync_offset import SyncOffset
 
 _STEPS = 100  # of expectation and maximisation, at most
 _STEADY = 0.01  # change of every scale
@@ -33,6 +35,7 @@ class Persons:
     precision (M, C, C), pull (M, C) : of each alone; 0 where nothing is told.
     usual (M, C) : standard deviation of the deviations before the data. groups (C,) : whose
     deviations have one scale. ordinary (C,) : what every laboratory has of a fault.
+    alike (C, K) : root of the covariance of what persons' bodies do alike.
     """
 
     coordinates: tuple[Coordinate, ...]
@@ -42,6 +45,7 @@ class Persons:
     usual: np.ndarray
     groups: np.ndarray
     ordinary: np.ndarray
+    alike: np.ndarray
 
     @property
     def told(self) -> np.ndarray:
@@ -55,8 +59,40 @@ class Persons:
         return replace(self, precision=precision, pull=pull, usual=usual)
 
 
+@dataclass(frozen=True)
+class Lag:
+    """Soft tissue that lags in all persons alike passes for a delay, other early than late in a
+    stance, and so for a clock's rate.
+
+    size_s : standard deviation. moments_s : mean and standard deviation of the moments that tell of
+    the clock, from the start of a recording.
+    """
+
+    size_s: float
+    moments_s: tuple[float, float]
+
+    def root(
+        self, coordinates: Sequence[Coordinate], known: Mapping[Coordinate, Parameter]
+    ) -> np.ndarray:
+        """(C, 2) of the covariance [typical]: the same at all moments, and about their mean."""
+        mean_s, sd_s = self.moments_s
+        root = np.zeros((len(coordinates), 2))
+        for k, one in enumerate(coordinates):
+            if one.effect == SyncOffset.name:
+                root[k] = np.array([1.0, -mean_s / sd_s]) * self.size_s / known[one].typical
+            elif one.effect == ClockDrift.name:
+                root[k, 1] = self.size_s / sd_s / known[one].typical
+        return root
+
+
+NO_LAG = Lag(0.0, (0.0, 1.0))
+
+
 def persons_of(
-    informations: Sequence[Information], mass_sd: Sequence[float], deviation: float
+    informations: Sequence[Information],
+    mass_sd: Sequence[float],
+    deviation: float,
+    lag: Lag = NO_LAG,
 ) -> Persons:
     """Lay out what was kept of each.
 
@@ -67,11 +103,6 @@ def persons_of(
         x: p for one in informations for x, p in zip(one.coordinates, one.parameters, strict=True)
     }
     coordinates = tuple(sorted(known))
-    count = len(coordinates)
-    precision, pull = np.zeros((len(informations), count, count)), np.zeros((len(mass_sd), count))
-    for k, one in enumerate(informations):
-        at = [coordinates.index(x) for x in one.coordinates]
-        precision[k][np.ix_(at, at)], pull[k, at] = one.precision, one.pull
     is_mass = np.array([one.effect == STATED_MASS.name for one in coordinates])
     masses = np.array(mass_sd) / STATED_MASS.parameter.typical
     kinds = [(one.effect, *one.target.split(" ")[1:], one.parameter) for one in coordinates]
@@ -79,12 +110,25 @@ def persons_of(
     return Persons(
         coordinates,
         tuple(known[one] for one in coordinates),
-        precision,
-        pull,
+        *_laid(coordinates, informations),
         np.where(is_mass, masses[:, None], deviation),
         np.array([numbers[kind] for kind in kinds]),
         np.where(is_mass, np.median(masses), SHARE),  # one scale weighs all: it may err too
+        lag.root(coordinates, known),
     )
+
+
+def _laid(
+    coordinates: Sequence[Coordinate], informations: Sequence[Information]
+) -> tuple[np.ndarray, np.ndarray]:
+    """(M, C, C) precision and (M, C) pull of each person, among all coordinates."""
+    count = len(coordinates)
+    precision = np.zeros((len(informations), count, count))
+    pull = np.zeros((len(informations), count))
+    for k, one in enumerate(informations):
+        at = [coordinates.index(x) for x in one.coordinates]
+        precision[k][np.ix_(at, at)], pull[k, at] = one.precision, one.pull
+    return precision, pull
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,3 +269,32 @@ def squares_of(persons: Persons, scale: np.ndarray) -> np.ndarray:
 def log_prior_of_scales(scale: np.ndarray) -> float:
     """Logarithm of their density before the data, less a constant."""
     return -0.5 * WEIGHT_OF_FAULTS * float((2 * np.log(scale) + 1 / scale**2 - 1).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Pooled:
+    """All that a laboratory's persons tell, to be kept: nothing of it grows with their number.
+
+    precision (C, C), pull (C,) : of the sizes, as in ``Sums``. spread (C,) : standard deviation of
+    a person's deviations. root (C, K) : of the covariance of the sizes before the data, the faults
+    that were found among them.
+    """
+
+    coordinates: tuple[Coordinate, ...]
+    precision: np.ndarray
+    pull: np.ndarray
+    spread: np.ndarray
+    root: np.ndarray
+
+    def posterior(self) -> Posterior:
+        """By all persons."""
+        return posterior_of(Sums(self.precision, self.pull, 0.0), self.root)
+
+    def without(self, own: Sequence[Information]) -> Pooled:
+        """By all others: what a person's sessions have added is taken away."""
+        precision, pull = _laid(self.coordinates, own)
+        variance, _ = _deviations(precision, np.tile(self.spread, (len(own), 1)))
+        across = precision @ variance
+        added = (precision - across @ precision).sum(axis=0)
+        pulled = (pull - np.einsum("mij,mj->mi", across, pull)).sum(axis=0)
+        return replace(self, precision=self.precision - added, pull=self.pull - pulled)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from string import ascii_uppercase
 
@@ -17,6 +18,7 @@ from bsip_cli.diagnosis.findings import SCALE_ERROR
 from bsip_cli.diagnosis.laboratory import (
     Offset,
     Persons,
+    Pooled,
     Posterior,
     Sums,
     anything,
@@ -150,9 +152,39 @@ class Laboratory:
 
     def posterior(self, but: int | None = None, sums: Sums | None = None) -> Posterior:
         """Of the coordinates, of all that is there but one fault."""
+        return posterior_of(self.sums if sums is None else sums, self._root(but))
+
+    def _root(self, but: int | None = None) -> np.ndarray:
         there = [s * self.causes[k].directions for k, s in self.found.items() if k != but]
-        root = np.column_stack([np.diag(self.persons.ordinary), *there])
-        return posterior_of(self.sums if sums is None else sums, root)
+        return np.column_stack([np.diag(self.persons.ordinary), self.persons.alike, *there])
+
+    def sizes(self, k: int, named_from: float, rng: np.random.Generator) -> tuple[Size, ...]:
+        """Of a cause, if it is there."""
+        needed = needed_of(self.log_prior[k], named_from)
+        return sizes_of(_drawn(self, k, rng), self.causes[k].parameters, needed, rng)
+
+    def with_other_scales(self, groups: frozenset[int]) -> list[tuple[Sums, float]]:
+        """Sums with the deviations of some groups so many times as large, and the logarithm of the
+        evidence for each; once for all causes of these groups."""
+        if groups not in self._kept:
+            touched = np.isin(np.arange(len(self.scale)), list(groups))
+            self._kept[groups] = []
+            for times in _TIMES:
+                scale = np.where(touched, times * self.scale, self.scale)
+                sums = sums_of(self.persons, scale)
+                log = posterior_of(sums, anything(self.persons)).log_evidence
+                self._kept[groups].append((sums, log + log_prior_of_scales(scale)))
+        return self._kept[groups]
+
+    @cached_property
+    def _kept(self) -> dict[frozenset[int], list[tuple[Sums, float]]]:
+        return {}
+
+    def pooled(self) -> Pooled:
+        """What is kept of it for the diagnosis of each person."""
+        persons, sums = self.persons, self.sums
+        spread = np.median(persons.usual, axis=0) * self.scale[persons.groups]
+        return Pooled(persons.coordinates, sums.precision, sums.pull, spread, self._root())
 
 
 def laboratory_of(persons: Persons, causes: tuple[Cause, ...], prior_odds: float) -> Laboratory:
@@ -246,26 +278,20 @@ def _verdict(
     named_from: float,
     rng: np.random.Generator,
 ) -> Verdict:
-    cause = lab.causes[k]
-    needed = needed_of(lab.log_prior[k], named_from)
-    sizes = sizes_of(_drawn(lab, k, rng), cause.parameters, needed, rng)
+    sizes = lab.sizes(k, named_from, rng)
     if said == "rejected" and all(np.isinf(one.limit) for one in sizes):
         said = "inconclusive"
-    return Verdict(cause, said, class_id, probability, sizes)
+    return Verdict(lab.causes[k], said, class_id, probability, sizes)
 
 
 def _drawn(lab: Laboratory, k: int, rng: np.random.Generator) -> np.ndarray:
     """(D, k) sizes [typical] of a cause from the posterior if it is there, over how large the
     persons' deviations may be: few persons do not tell it."""
-    cause, persons = lab.causes[k], lab.persons
-    touched = np.zeros(len(lab.scale), dtype=bool)
-    touched[persons.groups[cause.directions.any(axis=1)]] = True
+    cause = lab.causes[k]
+    touched = lab.persons.groups[cause.directions.any(axis=1)]
     offsets, logs = [], []
-    for times in _TIMES:
-        scale = np.where(touched, times * lab.scale, lab.scale)
-        sums = sums_of(persons, scale)
-        log = posterior_of(sums, anything(persons)).log_evidence
-        logs.append(log + log_prior_of_scales(scale))
+    for sums, log in lab.with_other_scales(frozenset(touched.tolist())):
+        logs.append(log)
         offsets.append(lab.posterior(k, sums).offset(sums, cause.directions))
     shares = np.exp(np.array(logs) - logsumexp(logs))
     counts = rng.multinomial(_DRAWS, shares / shares.sum())

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import binary_erosion
 
+from bsip_cli.diagnosis.error_model import Term, TrialErrors
 from bsip_cli.diagnosis.error_terms import FAULT, INERTIA, as_simulated, is_of_instruments
 from bsip_cli.diagnosis.fault_model import FaultTrial, Fitted, fitted, session_of, summed
 from bsip_cli.diagnosis.hypothesis import Hypothesis
@@ -80,10 +81,38 @@ def information_of(trials: Sequence[SharedTrial]) -> Information:
 
 def _without_the_shared(trial: FaultTrial) -> FaultTrial:
     """Without the ordinary terms that are asked of the laboratory."""
+    kept = tuple(x for x in _own_terms(trial.errors) if x.scale != f"{INERTIA} in all")
+    return replace(trial, errors=replace(trial.errors, terms=kept))
+
+
+def _own_terms(errors: TrialErrors) -> list[Term]:
     names = {FAULT + effect.name for effect in OF_A_LABORATORY}
-    terms = trial.errors.terms
-    kept = (x for x in terms if x.term not in names and x.scale != f"{INERTIA} in all")
-    return replace(trial, errors=replace(trial.errors, terms=tuple(kept)))
+    return [one for one in errors.terms if one.term not in names]
+
+
+def with_known(
+    trial: FaultTrial, coordinates: Sequence[Coordinate], mean: np.ndarray, root: np.ndarray
+) -> FaultTrial:
+    """A trial whose shared faults are known from others, instead of as all laboratories have them.
+
+    mean (C,), root (C, K) : of their sizes and of the covariance of these [typical].
+    """
+    scene, filter_ = as_simulated(trial.scene), trial.errors.filter
+    columns = np.zeros((*trial.errors.residual.shape, len(coordinates)))
+    for effect in OF_A_LABORATORY:
+        for target in effect.targets(trial.scene):
+            parameters = effect.parameters(trial.scene, target)
+            mine = [Coordinate(effect.name, target, one.name) for one in parameters]
+            if mine[0] in coordinates:
+                at = [coordinates.index(one) for one in mine]
+                typical = np.array([one.typical for one in parameters])
+                slope = effect.tangent(scene, target, np.zeros(len(typical))) * typical
+                columns[..., at] = filter_(slope)
+    name = f"{FAULT}laboratory"
+    term = Term(name, "", name, False, columns, mixing=root)
+    residual = trial.errors.residual - columns @ mean
+    terms = (*_own_terms(trial.errors), term)
+    return replace(trial, errors=replace(trial.errors, residual=residual, terms=terms))
 
 
 def _hypotheses(trials: Sequence[FaultTrial]) -> list[Hypothesis]:

@@ -15,6 +15,8 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.study import Participant
 
+_MOVED = "what all persons together tell has moved"
+
 
 def why_stale(unit: Unit) -> str:
     """Why a unit has work to do, as a clause; empty if all that it writes is there and true.
@@ -47,7 +49,8 @@ def stale_upstream(unit: Unit, participant: Participant | None, stages: Collecti
     before -= {stage.label for stage in stages}
     for stage in STAGES:
         for other in units_of(stage, unit, participant) if stage.label in before else ():
-            if why := _untrue(other):
+            why = _untrue(other)
+            if why and why != _MOVED:  # such a person counts in the group all the same
                 return f"what `bsip {stage.name}` made of {other.name} is not up to date ({why})"
     return ""
 
@@ -115,7 +118,10 @@ def _differs(known: Mapping | None, wanted: Mapping) -> str:
     options = _names(known["options"], wanted["options"])
     if options:
         return f"other options ({', '.join(options)})"
-    return f"other input ({', '.join(_names(known['inputs'], wanted['inputs'])[:3])})"
+    inputs = _names(known["inputs"], wanted["inputs"])
+    if all(name.endswith(" of the group") for name in inputs):
+        return _MOVED
+    return f"other input ({', '.join(inputs[:3])})"
 
 
 def _names(one: Mapping, other: Mapping) -> list[str]:

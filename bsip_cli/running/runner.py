@@ -27,13 +27,14 @@ from bsip_cli.errors import (
     printable,
 )
 from bsip_cli.files import fingerprints
-from bsip_cli.pipeline import STAGES, Stage, by_level, producer
+from bsip_cli.pipeline import STAGES, Stage, by_level, in_turn, producer
 from bsip_cli.running.endings import end_if_asked
 from bsip_cli.running.freshness import stale_upstream, was_changed, why_stale
 from bsip_cli.running.lock import held_alone
 from bsip_cli.running.provenance import code_hash, library_versions
 from bsip_cli.running.unit import Unit
 from bsip_cli.running.workers import Died, work_on
+from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.study import Participant, Study, Trial
 from bsip_cli.study.trials import listed
 
@@ -63,6 +64,9 @@ class Manner:
     jobs: int = 1
 
 
+_Part = Literal["first", "last", "some"]  # of all stages about one participant
+
+
 @dataclass(frozen=True)
 class _Task:
     """Stages of one participant, or of the cohort; ``doubtful``: whose results may be stale."""
@@ -74,6 +78,7 @@ class _Task:
     manner: Manner
     participant: Participant | None = None
     doubtful: frozenset[str] = frozenset()
+    part: _Part = "some"
 
     @property
     def name(self) -> str:
@@ -87,33 +92,31 @@ class _Task:
 def run_stages(
     stages: tuple[Stage, ...], study: Study, out: Path, config: Config, manner: Manner
 ) -> Generator[Outcome, None, None]:
-    """Run ``stages`` participant by participant, then those of the cohort; yield what became.
+    """Run ``stages`` participant by participant and those of the cohort in turn; yield what became.
 
     Raises
     ------
     EndedError
         A signal asked this process or one of its workers to end.
     """
-    personal, shared = by_level(stages)
-    doubtful = {participant.id for participant in study.participants}
-    if personal:
+    personal, _ = by_level(stages)
+    whole = all(stage in personal for stage in by_level(STAGES)[0])
+    troubled: set[str] = set()
+    for mine in in_turn(stages):
+        if mine[0].level == "cohort":
+            doubtful = troubled if whole else {one.id for one in study.participants}
+            group = _Task(mine, study, out, config, manner, doubtful=frozenset(doubtful))
+            yield from (outcome for _, outcome in _outcomes([group], 1))
+            continue
+        part: _Part = ("last" if personal[-1] in mine else "first") if whole else "some"
         alone = (
             # all that a process needs to know
-            _Task(personal, Study(study.root, (participant,)), out, config, manner, participant)
-            for participant in study.participants
+            _Task(mine, Study(study.root, (one,)), out, config, manner, one, part=part)
+            for one in study.participants
         )
-        troubled = set()
         for owner, outcome in _outcomes(alone, manner.jobs):
             troubled |= {owner} if outcome.exit_code else set()
             yield outcome
-        doubtful = troubled if _is_whole(personal) else doubtful
-    if shared:
-        group = _Task(shared, study, out, config, manner, doubtful=frozenset(doubtful))
-        yield from (outcome for _, outcome in _outcomes([group], 1))
-
-
-def _is_whole(stages: tuple[Stage, ...]) -> bool:
-    return all(stage in stages for stage in by_level(STAGES)[0])
 
 
 def _outcomes(tasks: Iterable[_Task], jobs: int) -> Iterator[tuple[str, Outcome]]:
@@ -143,7 +146,7 @@ def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
                 is_true &= outcome.state in ("done", "fresh")
                 yield task.name, outcome
             time.sleep(fingerprints.STEP_S)  # for what was written last to have its own time
-            _remember(task, _state(task) if is_true else "")
+            _remember(task, _state(task) if is_true and task.part == "last" else "")
     except BsipError as error:
         yield task.name, _stopped(task, error)
     except OSError as error:
@@ -170,13 +173,17 @@ def _is_unchanged(task: _Task) -> bool:
 
 def _state(task: _Task) -> str:
     """All that decides whether a participant's results are up to date, as a hash; of all stages."""
-    if task.participant is None or not _is_whole(task.stages):
+    if task.participant is None or task.part == "some":
         return ""
     named = (Path(task.config.marker_set), Path(task.config.skeleton))
     options = [path for path in named if path.suffix == ".toml"]
     recordings = [file for trial in task.participant.trials for file in trial.files]
-    files = fingerprints.snapshot(task.folder, [*recordings, *options])
-    code = [code_hash(stage.module) for stage in task.stages]
+    stages = by_level(STAGES)[0]
+    kinds = {k for stage in stages for k in stage.inputs if SCHEMAS[k].level == "cohort"}
+    group = [task.out / "group" / f"group_{SCHEMAS[k].file_name}.parquet" for k in sorted(kinds)]
+    of_all = [path for path in group if path.exists()]
+    files = fingerprints.snapshot(task.folder, [*recordings, *options, *of_all])
+    code = [code_hash(stage.module) for stage in stages]
     facts = (files, code, library_versions(), task.config.model_dump_json(), task.participant)
     return hashlib.sha256(repr(facts).encode()).hexdigest() if files else ""
 

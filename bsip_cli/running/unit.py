@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -14,7 +16,7 @@ import pandas as pd
 
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact, write_artifact_in_parts
 from bsip_cli.config import Config, Load
-from bsip_cli.errors import printable
+from bsip_cli.errors import BadDataError, printable
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.running.provenance import describe, hash_of_files
@@ -240,7 +242,9 @@ class Unit:
         """Of every input; in the group, of everything of a participant together."""
         if self.participant is not None:
             files = self.inputs()
-            return {name: file_hash(path) for name, path in files.items() if path.exists()}
+            hashes = {name: file_hash(path) for name, path in files.items() if path.exists()}
+            of_all = [k for k in self.stage.inputs if SCHEMAS[k].level == "cohort" and self._has(k)]
+            return hashes | {f"{k} of the group": _digest(self.facts(k)["answer"]) for k in of_all}
         everybody = ((person.id, self._files_of(person)) for person in self.study.participants)
         people = {name: hash_of_files(files) for name, files in everybody if files}
         files = self._files_of(None) | self._files_of_options()
@@ -265,6 +269,13 @@ class Unit:
         """What the producing stage said of its result as a whole."""
         return read_header(self.path(kind, trial, participant), kind)["provenance"]["facts"]
 
+    def said_before(self, kind: str) -> dict:
+        """Facts of what the unit has written last; empty where that cannot be read."""
+        try:
+            return self.facts(kind)
+        except BadDataError:
+            return {}
+
     def write(self, kind: str, frame: pd.DataFrame, facts: dict | None = None) -> None:
         write_artifact(self.path(kind), kind, frame, self._notes(facts or {}))
 
@@ -288,6 +299,11 @@ class Unit:
         notes |= {"amended_by": self.made_by, "rows_made": len(made)}
         whole = pd.concat([made, rows], ignore_index=True) if len(rows) else made
         write_artifact(path, kind, whole, notes)
+
+
+def _digest(answer: object) -> str:
+    """Of what a result of the group tells its participants."""
+    return hashlib.sha256(json.dumps(answer, sort_keys=True).encode()).hexdigest()
 
 
 def _owners_of_refusals(participant: Participant | None, *trials: Trial | None) -> list[str]:

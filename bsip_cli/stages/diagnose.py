@@ -27,6 +27,7 @@ from bsip_cli.stages.diagnosis_facts import detection_rows, facts_of
 from bsip_cli.stages.diagnosis_rows import rows_of
 from bsip_cli.stages.error_budget import error_budget
 from bsip_cli.stages.frames import person_from
+from bsip_cli.stages.known_laboratory import Known, known_laboratory
 
 ASKED = (*CATALOGUE, *PATTERNS)
 
@@ -44,7 +45,8 @@ def run(unit: Unit) -> None:
     free = [one for one in trials if one.held is None]
     rng = np.random.default_rng(crc32(unit.name.encode()))
     if any(one.moves for one in free):
-        found, library, held = _searched(unit, free)
+        known = known_laboratory(unit)
+        found, library, held = _searched(unit, free, known)
         named_from = unit.config.diagnosis.named_from
         more = findings_of(found, held, named_from, rng)
         findings = (*_still_open(findings, more), *more)
@@ -53,6 +55,11 @@ def run(unit: Unit) -> None:
         limits = detection_rows(found, library, named_from)
         findings = (*_of_markers(free, found, held, findings, rng), *findings)
         facts["causes"] = [*_proven(free, found, held), *facts["causes"]]
+        if known is not None:
+            mine = [one.for_faults for one in free]
+            findings = (*known.findings(mine), *findings)
+            facts["causes"] = [*known.causes(mine), *facts["causes"]]
+            limits = known.limits(limits)
     findings = (*(one.held.finding(one.trial.stem) for one in trials if one.held), *findings)
     budget, large = error_budget(unit, trials, facts["causes"])
     findings = (*_beside(findings, large), *findings)
@@ -75,14 +82,17 @@ def _still_open(of_mass: Sequence[Finding], more: Sequence[Finding]) -> tuple[Fi
     return () if is_told else tuple(of_mass)
 
 
-def _searched(unit: Unit, trials: Sequence[Diagnosed]) -> tuple[Found, Library, HeldOut]:
-    """Faults that the forces show, beside what the markers prove."""
+def _searched(
+    unit: Unit, trials: Sequence[Diagnosed], known: Known | None
+) -> tuple[Found, Library, HeldOut]:
+    """Faults that the forces show, beside what the markers prove and other persons tell."""
     options = unit.config.diagnosis
-    session = session_of([one.for_faults for one in trials])
+    told = [one.for_faults for one in trials]
+    session = session_of(told if known is None else [known.beside(one) for one in told])
     alone = [t for t, one in enumerate(trials) if one.moves]
     library = library_of(session, ASKED, alone, options.fault_prior_odds)
-    known = [slip.hypothesis(t) for t, one in enumerate(trials) for slip in one.slips]
-    found = search(session, library, options.named_from, known)
+    slips = [slip.hypothesis(t) for t, one in enumerate(trials) for slip in one.slips]
+    found = search(session, library, options.named_from, slips)
     return found, library, held_out(found.fit)
 
 

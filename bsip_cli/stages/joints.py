@@ -320,8 +320,8 @@ def _extended(
         among = [causes[j] for j in own[: place + 1]]
         if not all(_is_carried(cause) for cause in among):
             unit.warn(
-                f"{unit.name}: no joint moments of {method_of(among)}: what moves joints or markers, "
-                "tilts the vertical or is held in both hands is not carried to the joints"
+                f"{unit.name}: no joint moments of {method_of(among)}: what moves joints or "
+                "markers, tilts the vertical or is held in both hands is not carried to the joints"
             )
             return
         ground = trial.ground(_corrected(trial, scene, among))

@@ -1,6 +1,7 @@
 """laboratory (cohort): the faults of plates, clock and vertical by all persons together.
 
-Reads laboratory-information of all who have it, one after the other. Writes laboratory.
+Reads laboratory-information of all who have it, one after the other. Writes laboratory, and
+laboratory-sums, by which each person's diagnosis knows what the others tell.
 """
 
 from __future__ import annotations
@@ -14,48 +15,60 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.diagnosis.findings import Number, interval_words
-from bsip_cli.diagnosis.laboratory import persons_of
+from bsip_cli.diagnosis.laboratory import Lag, persons_of
 from bsip_cli.diagnosis.laboratory_deviations import Deviation, deviations_of
 from bsip_cli.diagnosis.laboratory_search import (
     Cause,
+    Laboratory,
     Size,
     Verdict,
     causes_of,
     laboratory_of,
     verdicts_of,
 )
-from bsip_cli.diagnosis.shared_faults import STATED_MASS, Coordinate, Information
+from bsip_cli.diagnosis.shared_faults import STATED_MASS, Information
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.plate_frame import ALL
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.effects.scene import Scene
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
+from bsip_cli.stages.shared_faults import information_in, pooled_rows
 
 _SAME_PLACE_M = (
     0.02  # of every corner: what laboratories meet of a plate that is not where it is said
 )
+_MOVED = 0.1  # of its standard deviation: less makes no diagnosis untrue
 _UNWEIGHED = 0.1  # spread of a mass that nobody stated, part of it
 _NO_SCENE = cast(Scene, None)  # faults of a laboratory speak of no trial
 
 
 @dataclass(frozen=True, eq=False)
 class _Session:
-    """One session of a person; plates: corners (4, 3) in the world by name."""
+    """One session of a person.
+
+    plates : corners (4, 3) in the world by name. moments_s : mean and standard deviation of those
+    that tell of the clock.
+    """
 
     name: str
     person: str
     told: Information
     mass_sd: float
     plates: Mapping[str, np.ndarray]
+    moments_s: tuple[float, float]
 
 
 def run(unit: Unit) -> None:
     rows: list[dict] = []
     laboratories = _laboratories(list(_sessions(unit)))
+    sums: list[dict] = []
+    found: dict[str, Laboratory] = {}
     for number, sessions in enumerate(laboratories, start=1):
-        rows += _rows(unit, str(number), sessions)
+        lab = found[str(number)] = _fitted(unit, sessions)
+        rows += _rows(unit, str(number), sessions, lab)
+        sums += pooled_rows(str(number), lab.pooled())
     if len(laboratories) > 1:
         counts = ", ".join(
             f"{len({s.person for s in one})} in laboratory {k}"
@@ -72,9 +85,40 @@ def run(unit: Unit) -> None:
         sentence = "no recording has motion with every contact on a plate"
         unit.warn(f"laboratory: nothing can be said: {sentence}")
         rows = [_row(("inconclusive", "", ""), verdict="inconclusive", sentence=sentence)]
+    facts = {
+        "persons": {
+            str(k): {s.person: s.name for s in one} for k, one in enumerate(laboratories, start=1)
+        },
+        "answer": _answer(unit, found),
+    }
     table = pd.DataFrame(rows, columns=column_names("laboratory"))
-    facts = {str(k): [s.name for s in one] for k, one in enumerate(laboratories, start=1)}
-    unit.write("laboratory", table, {"sessions": facts})
+    unit.write("laboratory", table, facts)
+    families = [name for row in sums for name in row if name.startswith(("precision_", "root_"))]
+    columns = [*column_names("laboratory-sums"), *dict.fromkeys(families)]
+    unit.write("laboratory-sums", pd.DataFrame(sums, columns=columns), facts)
+
+
+def _answer(unit: Unit, found: Mapping[str, Laboratory]) -> dict:
+    """Mean and standard deviation of every number [typical]; those of before where none has moved
+    by a tenth of its standard deviation: what was made with them stays true."""
+    now = {}
+    for number, lab in found.items():
+        posterior, coordinates = lab.posterior(), lab.persons.coordinates
+        sd = np.sqrt(np.diag(posterior.covariance))
+        names = [" ".join((x.effect, x.target, x.parameter)) for x in coordinates]
+        numbers = zip(names, posterior.mean.tolist(), sd.tolist(), strict=True)
+        now[number] = {name: [mean, spread] for name, mean, spread in numbers}
+    before = unit.said_before("laboratory-sums").get("answer", {})
+    return before if _is_near(before, now) else now
+
+
+def _is_near(before: Mapping, now: Mapping) -> bool:
+    if before.keys() != now.keys() or any(before[k].keys() != now[k].keys() for k in now):
+        return False
+    pairs = [(before[k][name], now[k][name]) for k in now for name in now[k]]
+    moved = np.abs(np.array([np.subtract(new, old) for old, new in pairs]))
+    spread = np.array([min(old[1], new[1]) for old, new in pairs])
+    return bool((moved < _MOVED * spread[:, None]).all())
 
 
 # --- reading ------------------------------------------------------------------------------------
@@ -90,26 +134,15 @@ def _sessions(unit: Unit) -> Iterator[_Session]:
             rows = table[table["session"] == session]
             name = f"{participant.id}_ses-{session}" if session else participant.id
             plates = facts["sessions"][session]["plates"]
+            mean_s, sd_s = facts["sessions"][session]["moments_s"]
             yield _Session(
                 name,
                 participant.id,
-                _information(rows),
+                information_in(rows),
                 facts["mass_sd"] or _UNWEIGHED,
                 {plate: np.array(corners) for plate, corners in plates.items()},
+                (mean_s, sd_s),
             )
-
-
-def _information(rows: pd.DataFrame) -> Information:
-    names = ("effect", "target", "parameter")
-    keys = rows[[*names]].itertuples(index=False)
-    numbers = rows[["parameter", "unit", "most", "typical", "known_to"]].itertuples(index=False)
-    return Information(
-        tuple(Coordinate(*one) for one in keys),
-        tuple(Parameter(n, u, -most, most, t, known_to=k) for n, u, most, t, k in numbers),
-        rows["trials"].to_numpy(),
-        rows[[f"precision_{k}" for k in range(len(rows))]].to_numpy(),
-        rows["pull"].to_numpy(),
-    )
 
 
 def _laboratories(sessions: Sequence[_Session]) -> list[list[_Session]]:
@@ -132,12 +165,24 @@ def _alike(a: Mapping[str, np.ndarray], b: Mapping[str, np.ndarray]) -> bool:
 # --- rows ---------------------------------------------------------------------------------------
 
 
-def _rows(unit: Unit, laboratory: str, sessions: Sequence[_Session]) -> Iterator[dict]:
-    options, mine = unit.config.diagnosis, unit.config.laboratory
-    told = [one.told for one in sessions]
-    persons = persons_of(told, [one.mass_sd for one in sessions], mine.between_persons)
+def _fitted(unit: Unit, sessions: Sequence[_Session]) -> Laboratory:
+    mine = unit.config.laboratory
+    mean_s, sd_s = np.mean([one.moments_s for one in sessions], axis=0).tolist()
+    persons = persons_of(
+        [one.told for one in sessions],
+        [one.mass_sd for one in sessions],
+        mine.between_persons,
+        Lag(0.001 * mine.tissue_lag_ms, (mean_s, sd_s)),
+    )
     centres = {name: x.mean(axis=0) for one in sessions for name, x in one.plates.items()}
-    lab = laboratory_of(persons, causes_of(persons, centres), options.fault_prior_odds)
+    causes = causes_of(persons, centres)
+    return laboratory_of(persons, causes, unit.config.diagnosis.fault_prior_odds)
+
+
+def _rows(
+    unit: Unit, laboratory: str, sessions: Sequence[_Session], lab: Laboratory
+) -> Iterator[dict]:
+    options, mine = unit.config.diagnosis, unit.config.laboratory
     rng = np.random.default_rng(crc32(unit.name.encode()))
     for one in verdicts_of(lab, options.named_from, rng):
         counts = _counts(sessions, one.cause)

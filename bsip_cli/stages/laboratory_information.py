@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import pandas as pd
 
 from bsip_cli.body.skeleton import load_skeleton
@@ -48,6 +49,7 @@ def run(unit: Unit) -> None:
             sessions[session] = {
                 "plates": _corners([scene for _, scene in mine]),
                 "trials": [one.trial.stem for one in told],
+                "moments_s": _moments([one.scene for one in told if one.moves]),
             }
     if not sessions:
         unit.warn(
@@ -78,6 +80,14 @@ def _rows(session: str, told: Information) -> list[dict]:
         }
         for k, (one, parameter, trials) in enumerate(numbers)
     ]
+
+
+def _moments(scenes: Sequence[Scene]) -> list[float]:
+    """Mean of the moments, from the start of each trial, at which they tell of the clock, and their
+    standard deviation."""
+    times = [one.times_s[one.valid] - one.times_s[0] for one in scenes]
+    whole = np.concatenate(times)
+    return [float(whole.mean()), float(whole.std())]
 
 
 def _corners(scenes: Sequence[Scene]) -> dict[str, list[list[float]]]:

@@ -146,6 +146,7 @@ def test_stages_do_not_know_each_other():
         "stages.gain_rows",
         "stages.identification_problem",
         "stages.joint_peaks",
+        "stages.known_laboratory",
         "stages.known_loads",
         "stages.diagnosed_trials",
         "stages.person_mass",
@@ -153,6 +154,7 @@ def test_stages_do_not_know_each_other():
         "stages.reconstructed",
         "stages.session_reading",
         "stages.report",
+        "stages.shared_faults",
         "stages.trial_scene",
     }
     pairs = {

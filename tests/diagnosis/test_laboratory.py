@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bsip_cli.diagnosis.laboratory import persons_of, posterior_of, scales_of, sums_of
+from bsip_cli.diagnosis.fault_model import FaultTrial
+from bsip_cli.diagnosis.filtering import slow
+from bsip_cli.diagnosis.laboratory import (
+    NO_LAG,
+    Lag,
+    persons_of,
+    posterior_of,
+    scales_of,
+    sums_of,
+)
 from bsip_cli.diagnosis.laboratory_deviations import deviations_of
 from bsip_cli.diagnosis.laboratory_search import (
     Laboratory,
@@ -13,8 +22,15 @@ from bsip_cli.diagnosis.laboratory_search import (
     laboratory_of,
     verdicts_of,
 )
-from bsip_cli.diagnosis.shared_faults import OF_A_LABORATORY, STATED_MASS, Coordinate, Information
+from bsip_cli.diagnosis.shared_faults import (
+    OF_A_LABORATORY,
+    STATED_MASS,
+    Coordinate,
+    Information,
+    with_known,
+)
 from bsip_cli.effects.plate_rotation import PlateRotation
+from tests.diagnosis.noisy_trial import errors_of, late, noisy
 from tests.effects.moving_scene import moving
 
 CENTRES_M = {"1": np.array([0.2, 0.3, 0.0]), "2": np.array([0.2, -0.3, 0.0])}
@@ -112,6 +128,39 @@ def test_persons_are_a_sum():
     assert np.allclose(whole.precision, parts.precision)
     assert np.allclose(whole.pull, parts.pull)
     assert whole.log_factor == pytest.approx(parts.log_factor)
+
+
+def test_what_the_others_tell_is_the_sum_less_the_own():
+    told = drawn(np.random.default_rng(9), {DELAY: 1.0}, 6)
+    lab = fitted(told)
+    less = lab.pooled().without([told[2]])
+    others = sums_of(lab.persons, lab.scale, [0, 1, 3, 4, 5])
+    assert np.allclose(less.precision, others.precision, atol=1e-9)
+    assert np.allclose(less.pull, others.pull, atol=1e-9)
+    mine = lab.persons.coordinates.index(DELAY)
+    assert less.posterior().covariance[mine, mine] > lab.posterior().covariance[mine, mine]
+
+
+def test_what_is_known_of_the_clock_is_no_residual_any_more():
+    """And what is not known of it stays as a term of that size."""
+    scene = late(noisy(moving(), 1), 0.01)
+    trial = FaultTrial(errors_of(scene), slow(scene))
+    known = with_known(trial, (DELAY,), np.array([1.0]), np.array([[0.05]]))
+    before, after = ((x.errors.residual**2).mean(axis=0)[:3] for x in (trial, known))
+    assert (after < 0.2 * before).all()
+    (term,) = (x for x in known.errors.terms if x.term == "fault:laboratory")
+    slope = (known.errors.residual - trial.errors.residual)[..., None]
+    assert np.allclose(term.of_unit_variance, -0.05 * slope)
+    assert not any(x.term == "fault:sync_offset" for x in known.errors.terms)
+
+
+def test_a_lag_of_skin_in_all_persons_alike_is_no_clock():
+    """Two milliseconds in everybody, of however many persons; else it would be named."""
+    told = drawn(np.random.default_rng(10), {DELAY: 0.2}, 40, 0.02)
+    for lag, expected in ((NO_LAG, True), (Lag(0.0015, (1.0, 0.3)), False)):
+        persons = persons_of(told, [0.008] * len(told), BETWEEN, lag)
+        lab = laboratory_of(persons, causes_of(persons, CENTRES_M), ODDS)
+        assert any(lab.causes[k].effect == "sync_offset" for k in lab.found) == expected
 
 
 def test_the_sums_are_those_of_all_deviations_at_once():

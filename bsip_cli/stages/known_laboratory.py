@@ -1,0 +1,132 @@
+"""What a person's diagnosis knows of plates, clock and vertical from the others recorded there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.diagnosis.fault_model import FaultTrial
+from bsip_cli.diagnosis.findings import Finding, Number, interval_words
+from bsip_cli.diagnosis.held_out import FOLDS
+from bsip_cli.diagnosis.shared_faults import OF_A_LABORATORY, Coordinate, with_known
+from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.running.unit import Unit
+from bsip_cli.stages.shared_faults import information_in, pooled_in
+
+_FAULTS = {one.name for one in OF_A_LABORATORY}
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """coordinates (C,), mean (C,) and root (C, C) of the covariance of the sizes [typical] by all
+    other persons; rows : of the ``laboratory`` table, by all."""
+
+    coordinates: tuple[Coordinate, ...]
+    mean: np.ndarray
+    root: np.ndarray
+    rows: pd.DataFrame
+
+    def beside(self, trial: FaultTrial) -> FaultTrial:
+        return with_known(trial, self.coordinates, self.mean, self.root)
+
+    def findings(self, trials: Sequence[FaultTrial]) -> Iterator[Finding]:
+        """What the laboratory was found to have, in the trials on whose plates it is."""
+        for cause in self._named():
+            held = [one for one in trials if cause.target in cause.effect.targets(one.scene)]
+            if held:
+                words = cause.effect.sentence(held[0].scene, cause.target, cause.values)
+                known = f"; this is known from the laboratory ({cause.persons} persons)"
+                yield Finding(
+                    cause.effect.name,
+                    cause.target,
+                    tuple(one.name for one in held),
+                    "named",
+                    "",
+                    1 - cause.probability,
+                    (np.nan, np.nan, np.nan),
+                    cause.numbers,
+                    words + interval_words(cause.numbers) + known,
+                    cause.probability,
+                    "laboratory",
+                )
+
+    def causes(self, trials: Sequence[FaultTrial]) -> Iterator[dict]:
+        """The same for ``extend``: in full, and of the same sizes for every fold; of single plates
+        and the clock as the others alone tell them."""
+        sizes = dict(zip(self.coordinates, self.mean.tolist(), strict=True))
+        for found in self.findings(trials):
+            parameters = EFFECTS[found.effect].parameters(trials[0].scene, found.target)
+            mine = [
+                sizes.get(Coordinate(found.effect, found.target, p.name), x.value / p.typical)
+                * p.typical
+                for p, x in zip(parameters, found.numbers, strict=True)
+            ]
+            yield {
+                "effect": found.effect,
+                "target": found.target,
+                "trials": list(found.trials),
+                "verdict": "named",
+                "values": mine,
+                "folds": [mine] * FOLDS,
+                "bounds": {},
+            }
+
+    def limits(self, own: pd.DataFrame) -> pd.DataFrame:
+        """Of ``detection``, those of the laboratory where all persons would show less."""
+        key = ["effect", "target", "parameter"]
+        theirs = self.rows.set_index(key)["limit"]
+        both = pd.Index(own[key].itertuples(index=False, name=None))
+        smaller = np.fmin(own["limit"].to_numpy(), theirs.reindex(both).to_numpy())
+        together = own["trials"].str.count(",")
+        return own.assign(limit=np.where(together == together.max(), smaller, own["limit"]))
+
+    def _named(self) -> Iterator[_Cause]:
+        named = self.rows[self.rows["verdict"] == "named"]
+        for (effect, target), rows in named.groupby(["effect", "target"], sort=False):
+            yield _Cause(str(effect), str(target), rows.to_dict("records"))
+
+
+class _Cause:
+    """A fault that the laboratory was found to have."""
+
+    def __init__(self, effect: str, target: str, rows: Sequence[dict[Any, Any]]) -> None:
+        self.effect, self.target = EFFECTS[effect], target
+        self.values = np.array([one["estimate"] for one in rows])
+        self.numbers = tuple(
+            Number(x["parameter"], x["unit"], x["estimate"], x["ci_low"], x["ci_high"])
+            for x in rows
+        )
+        self.persons, self.probability = int(rows[0]["persons"]), float(rows[0]["probability"])
+
+
+def known_laboratory(unit: Unit) -> Known | None:
+    """None where no others were recorded there, or where nobody has asked."""
+    if not unit.has("laboratory-information", "laboratory-sums", "laboratory"):
+        return None
+    own = unit.read("laboratory-information")
+    persons = {
+        number: mine
+        for number, everybody in unit.facts("laboratory-sums")["persons"].items()
+        if (mine := everybody.get(unit.name))
+    }
+    others = {k: unit.facts("laboratory-sums")["persons"][k].keys() - {unit.name} for k in persons}
+    if len(persons) != 1 or not all(others.values()):
+        return None  # of several laboratories, or alone
+    (number,) = persons
+    pooled = unit.read("laboratory-sums", laboratory=[number])
+    told = [information_in(rows) for _, rows in own.groupby("session", sort=False)]
+    posterior = pooled_in(pooled).without(told).posterior()
+    at = [k for k, one in enumerate(pooled_in(pooled).coordinates) if one.effect in _FAULTS]
+    table = unit.read("laboratory", laboratory=[number], scope=["laboratory"])
+    covariance = posterior.covariance[np.ix_(at, at)]
+    values, vectors = np.linalg.eigh(covariance)
+    return Known(
+        tuple(pooled_in(pooled).coordinates[k] for k in at),
+        posterior.mean[at],
+        vectors * np.sqrt(np.maximum(values, 0.0)),
+        table,
+    )

@@ -98,10 +98,10 @@ class Candidate:
         text = re.sub(_REASON, "", text) if self.verdict == "rejected" else text
         return re.sub(_MINUS, "−", text)
 
-    def told(self) -> str:
+    def told(self, remarks: bool = True) -> str:
         """Its sentence with the interval of its main number, and what the markers alone say."""
         main, what = self.main_number(), self.what()
-        found = _REMARK.search(self.sentence)
+        found = _REMARK.search(self.sentence) if remarks else None
         remark = found[0] if found else ""
         interval = main.interval(bool(_SIGNED.search(what))) if main else ""
         if main is None or not interval:

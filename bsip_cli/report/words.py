@@ -18,10 +18,6 @@ METHODS = {
     OM: "OM (identified)",
     EXTENDED: "OM with the causes found",
 }
-WHAT_METHODS_ARE = (
-    "RM: parameters from an anthropometric table. RM+mass: the same, all masses and tensors times "
-    "one number, the yardstick for OM. OM: parameters identified from"
-)
 COMPONENTS = {
     "cop_ap": "COP, anterior-posterior",
     "cop_ml": "COP, medio-lateral",

@@ -16,7 +16,7 @@ from bsip_cli.artifacts import (
     write_artifact,
     write_artifact_in_parts,
 )
-from bsip_cli.config import Config, Load
+from bsip_cli.config import Config, Load, load_config
 from bsip_cli.errors import printable
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.pipeline import STAGES, Stage, producer
@@ -218,6 +218,11 @@ class Unit:
         return hashes | people | {name: f"left out: {why}" for name, why in self.left_out.items()}
 
     # --- reading and writing ----------------------------------------------------------------
+
+    @staticmethod
+    def shipped_options() -> dict:
+        """Every option's value in configs/default.toml."""
+        return load_config([]).model_dump()
 
     def read(
         self,

@@ -137,9 +137,8 @@ def light_of(
         title = f"{_LARGE}{beside}"
     looked = count(len(looked_at(detection, diagnosis)), "recording")
     share = np.nan if budget is None else fault_share(budget)
-    how_large = (
-        "" if np.isnan(share) else f" What has a name makes {number(share, 0)} % of the error."
-    )
+    size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
+    how_large = "" if np.isnan(share) else f" What has a name makes {size} of the error."
     return Light(state, title, f"Searched: {looked}.{how_large}")
 
 

@@ -20,9 +20,8 @@ from bsip_cli.report.blocks import (
     Terms,
 )
 from bsip_cli.report.budget import FIRST, LEAST_TOLD_SIZE, overall_pieces, size_of
-from bsip_cli.report.candidates import Candidate, candidates_of, causes_of
+from bsip_cli.report.candidates import Candidate, candidates_of, causes_of, looked_at
 from bsip_cli.report.effect_words import separating_recording
-from bsip_cli.report.limits import looked_at
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.sticks import Motion, Pose, poses_of
 from bsip_cli.report.verdict import cause_line, consequences, light_of

@@ -10,9 +10,17 @@ import pandas as pd
 
 from bsip_cli.report.blocks import Light, State
 from bsip_cli.report.budget import budget_sentences, fault_share
-from bsip_cli.report.candidates import UNNAMED, Candidate, candidates_of, causes_of
+from bsip_cli.report.candidates import (
+    OF_THE_WEIGHT,
+    UNNAMED,
+    Candidate,
+    candidates_of,
+    causes_of,
+    limits_of,
+    limits_sentence,
+    looked_at,
+)
 from bsip_cli.report.effect_words import EFFECT_WORDS, WEIGHT, beside_usual, separating_recording
-from bsip_cli.report.limits import OF_THE_WEIGHT, limits_of, limits_sentence, looked_at
 from bsip_cli.report.words import (
     capital,
     component_label,

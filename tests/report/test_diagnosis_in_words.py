@@ -8,7 +8,7 @@ from bsip_cli.diagnosis.marker_proof import SOFT_TISSUE
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.report.blocks import Paragraph
 from bsip_cli.report.budget import budget_sentences, fault_share, overall_pieces, pieces
-from bsip_cli.report.candidates import UNNAMED, candidates_of, causes_of
+from bsip_cli.report.candidates import UNNAMED, candidates_of, causes_of, limits_of, limits_sentence
 from bsip_cli.report.effect_words import (
     EFFECT_WORDS,
     USUAL,
@@ -16,7 +16,6 @@ from bsip_cli.report.effect_words import (
     separating_recording,
     size_words,
 )
-from bsip_cli.report.limits import limits_of, limits_sentence
 from bsip_cli.report.participant.diagnosis import limit_blocks, ranking
 from bsip_cli.report.verdict import (
     cause_text,

@@ -8,7 +8,7 @@ from math import inf, isfinite
 import pandas as pd
 
 from bsip_cli.report.blocks import Block, Cell, Grid, Heading, Mark, Numbered, Paragraph, Section
-from bsip_cli.report.candidates import Candidate, candidates_of
+from bsip_cli.report.candidates import Candidate, Limit, candidates_of, limits_of
 from bsip_cli.report.effect_words import (
     USUAL,
     effect_title,
@@ -17,7 +17,6 @@ from bsip_cli.report.effect_words import (
     size_words,
     usual_words,
 )
-from bsip_cli.report.limits import Limit, limits_of
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import (
     NOT_RUN,

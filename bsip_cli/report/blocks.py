@@ -91,7 +91,7 @@ class Bar:
 @dataclass(frozen=True)
 class Scale:
     """A number between what is good and what is too large, all in one unit; ``words`` say which it
-    is, ``source`` where the yardstick comes from. Numbers are the texts that are shown."""
+    is. Numbers are the texts that are shown."""
 
     title: str
     shown: str
@@ -101,7 +101,6 @@ class Scale:
     limit_part: float
     good: str
     limit: str
-    source: str
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from bsip_cli.report.yardsticks import (
     COP_LIMIT_M,
     FORCE_LIMIT_PERCENT,
     MARKERS,
+    SOURCES,
     Yardstick,
     errors_of,
     yardsticks,
@@ -49,7 +50,7 @@ _WORDS = {
 
 def front(record: ParticipantRecord) -> tuple[Block, ...]:
     """The blocks of the first page, in the order in which a reader asks."""
-    light = light_of(record.diagnosis, record.detection, record.budget)
+    light = light_for(record)
     return (
         *portrait(record),
         Terms((*who(record),)),
@@ -58,6 +59,7 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         *budget_bar(record),
         Heading("How large are the errors?"),
         Scales(scales(record)),
+        Paragraph(SOURCES, "note"),
         Heading("Which parameters to use"),
         Paragraph(use_sentence(record)),
         Heading("What to do next"),
@@ -65,11 +67,22 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
     )
 
 
+def light_for(record: ParticipantRecord) -> Light:
+    """That of the diagnosis; where no fault was found and an error is large all the same, that."""
+    light = light_of(record.diagnosis, record.detection, record.budget)
+    large = [y.title.lower() for y, value in measured_of(record) if y.words(value) == "large"]
+    if light.state != "fine" or not large:
+        return light
+    title = "No fault found, but an error is large"
+    text = f"Large: {listing(large)}; no fault of the catalogue explains it. {light.text}"
+    return Light("inconclusive", title, text)
+
+
 def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     """Names and what is known: the person, the recordings, the software."""
     facts = record.facts
     mass, plates = float(facts["mass_kg"]), float(facts["plate_mass_kg"])
-    person = f"{_SEXES.get(facts['sex'], 'person')}, {number(mass, 1)} kg ({facts['mass_source']}"
+    person = f"{_SEXES.get(facts['sex'], 'sex not stated')}, {number(mass, 1)} kg ({facts['mass_source']}"
     if np.isfinite(plates) and facts["mass_source"] != "plates":
         person += f"; the plates say {signed(100.0 * (plates / mass - 1.0), 1)} %"
     yield "Person", f"{record.id}, {person}), {number(facts['height_m'], 2)} m"
@@ -223,15 +236,15 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
         if len(cause) > 1
     ][:1]
     said += consequences(causes)
-    if light.state == "inconclusive":
+    large = [y.title for y, value in measured_of(record) if y.words(value) == "large"]
+    if light.state == "inconclusive" and not large:
         said.append(
             "Record a movement in which every foot that touches the ground stands on a plate."
         )
     if light.state == "fine":
         said.append("Nothing needs to be corrected: use forces and parameters as they are.")
-    large = [y.title for y, value in measured_of(record) if y.words(value) == "large"]
     if large and light.state != "large":
-        said.append(f"Large: {listing(large)}. Look at where and when, under the errors below.")
+        said.append("Look at where and when the error is large, below, and at the recording there.")
     return [*said[:_MOST]] if len(said) > 1 else [*said, *advice(record)][:_MOST]
 
 

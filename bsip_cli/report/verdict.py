@@ -168,7 +168,8 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     main = one.main_number()
     usual = beside_usual(one.effect, main) if main else ""
     where = where_seen(one.trials, everywhere)
-    return f"{capital(one.told(remarks=False))}, {where}{usual}{sure}."
+    what = one.what().partition("; ")[0] if is_large(cause) else one.told(remarks=False)
+    return f"{capital(what)}, {where}{usual}{sure}."
 
 
 def _seen_in(everywhere: Sequence[str]) -> tuple[str, ...]:

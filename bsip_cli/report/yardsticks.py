@@ -18,8 +18,10 @@ COP, FORCE, MARKERS = "cop_mm", "vertical_force_percent_bw", "markers_mm"
 COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_percent"
 """Options of the diagnosis: errors that are called large."""
 
-_PUBLISHED = "Hansen 2017, table 4"
-_LIMIT = "Hicks 2015"
+SOURCES = (
+    "Published: Hansen 2017, table 4. Large: Hicks 2015. Markers: OpenSim's checklist, for standing "
+    "and moving."
+)
 _MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
 """RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,
 Best Practices)."""
@@ -37,7 +39,6 @@ class Yardstick:
     limit: float
     good_words: str
     limit_words: str
-    source: str
 
     def words(self, value: float) -> str:
         if not np.isfinite(value):
@@ -58,13 +59,11 @@ class Yardstick:
             self.limit / end,
             f"{self.good_words} {number(self.good)} {self.unit}",
             f"{self.limit_words} {number(self.limit, 0)} {self.unit}",
-            self.source,
         )
 
 
 def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstick, ...]:
     """Of the centre of pressure, the vertical force and the markers."""
-    source = f"{_PUBLISHED}; {_LIMIT}"
     words = ("published", "large from")
     cop = ("Centre of pressure (COP) error", "mm", _published("cop_error"), 1e3 * cop_limit_m)
     force = (
@@ -74,8 +73,8 @@ def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstic
         force_limit_percent,
     )
     return (
-        Yardstick(COP, *cop, *words, source),
-        Yardstick(FORCE, *force, *words, source),
+        Yardstick(COP, *cop, *words),
+        Yardstick(FORCE, *force, *words),
         Yardstick(
             MARKERS,
             "Markers from model",
@@ -84,7 +83,6 @@ def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstic
             _MARKER_LIMIT_MM,
             "standing",
             "moving",
-            "limits of OpenSim's checklist",
         ),
     )
 

@@ -180,6 +180,20 @@ def test_the_light_has_four_states(record):
     assert light_of(None, None).state == "inconclusive"
 
 
+def test_no_fault_and_a_large_error_is_not_fine(record):
+    nothing = record.diagnosis[record.diagnosis["verdict"] == "rejected"]
+    trials = tuple(
+        replace(t, fit=t.fit.assign(rmse_percent_bw=5.5 * t.fit["rmse_percent_bw"].notna()))
+        for t in record.trials
+    )
+    large = replace(record, diagnosis=nothing, trials=trials)
+    (light,) = (block for block in front(large) if isinstance(block, Light))
+    assert (light.state, light.title) == ("inconclusive", "No fault found, but an error is large")
+    assert "Large: vertical force error" in light.text
+    *_, to_do = front(large)
+    assert not any("Nothing needs to be corrected" in item for item in to_do.items)
+
+
 def test_what_is_fine_is_to_be_used_as_it_is(record):
     nothing = record.diagnosis[record.diagnosis["verdict"] == "rejected"]
     *_, to_do = front(replace(record, diagnosis=nothing, refusals=()))

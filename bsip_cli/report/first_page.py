@@ -93,7 +93,7 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     used = listing([trial.label for trial in record.identification_trials()])
     yield "Identified from", used
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
-    yield "Software", f"bsip {', '.join(versions)}; files and options are listed below"
+    yield "Software", f"bsip {', '.join(versions)}"
     if record.facts["mass_note"]:
         yield "Mass", f"{capital(str(record.facts['mass_note']))}."
 
@@ -160,8 +160,7 @@ def budget_bar(record: ParticipantRecord) -> tuple[Block, ...]:
         Bar(
             "What makes the error of the table's parameters",
             tuple((piece.label, piece.share) for piece in pieces),
-            f"Shares of the squared error ({listing(told)}). COP: centre of pressure. Hatched: "
-            "nothing explains it.",
+            f"Shares of the squared error ({listing(told)}). COP: centre of pressure.",
         ),
     )
 

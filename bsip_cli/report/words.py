@@ -127,7 +127,3 @@ def component_label(component: str) -> str:
 def method_rank(method: str) -> tuple[int, str]:
     """By which methods are sorted: measured first, those without a label last."""
     return (list(METHODS).index(method) if method in METHODS else len(METHODS)), method
-
-
-def method_label(method: str) -> str:
-    return METHODS.get(method, method)

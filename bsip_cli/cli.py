@@ -410,12 +410,13 @@ def compare_loads(study, out, participant, config_file, heavy, plain):
 
 @cli.command()
 @click.argument("out", type=click.Path(path_type=Path))
-def show(out):
-    """Print the tables of a finished run, what is wrong in its recordings, and where its reports
-    lie."""
+@click.option("--full", is_flag=True, help="Everything: tables, causes with all their numbers.")
+def show(out, full):
+    """Print what a finished run found: the most important first, a line per finding, and where the
+    reports lie."""
     from bsip_cli.commands.show import shown
 
-    for part in shown(out):
+    for part in shown(out, full):
         click.echo(part)
 
 

@@ -24,8 +24,7 @@ from bsip_cli.config import Config, Section, shipped
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.effect import Effect
 from bsip_cli.pipeline import STAGES, Stage
-from bsip_cli.report.effect_words import EFFECT_WORDS
-from bsip_cli.report.usual_sizes import USUAL, usual_words
+from bsip_cli.report.effect_words import EFFECT_WORDS, USUAL, usual_words
 from bsip_cli.schemas import SCHEMAS, Column, Level, Schema
 
 REGENERATE = "python -m bsip_cli.reference docs"

@@ -12,7 +12,7 @@ import pandas as pd
 from bsip_cli.artifacts import remove
 from bsip_cli.errors import BadDataError, BsipError, UsageError, printable
 from bsip_cli.pipeline import Stage
-from bsip_cli.report.tables.markdown import to_markdown
+from bsip_cli.report.tables.formats import to_markdown
 from bsip_cli.report.tables.model import Column, Row, Table
 from bsip_cli.report.words import number, segment_label
 from bsip_cli.running.lock import held_alone

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from bsip_cli.report.tables.markdown import to_markdown
+from bsip_cli.report.tables.formats import to_markdown
 from bsip_cli.report.tables.published import audited, printed
 from bsip_cli.statistics.published.paper import Paper, load_paper, names
 

@@ -1,4 +1,4 @@
-"""What ``bsip show`` prints of a finished run: tables, diagnoses in words, where reports lie."""
+"""What ``bsip show`` prints of a finished run: a line per finding, or all with its tables."""
 
 from __future__ import annotations
 
@@ -12,21 +12,32 @@ import pandas as pd
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
 from bsip_cli.body.names import in_words
 from bsip_cli.errors import BadDataError, UsageError, printable
+from bsip_cli.report.budget import overall_pieces
+from bsip_cli.report.candidates import candidates_of, causes_of, looked_at
 from bsip_cli.report.cohort.laboratory import named_sentences, unnamed_sentences
+from bsip_cli.report.participant.joints import largest_changes
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.shared import SHARED, Searched, searched, shared_causes
 from bsip_cli.report.tables.build import show as tables_of
-from bsip_cli.report.verdict import Verdict, put_right_sentence, verdict_of
+from bsip_cli.report.verdict import (
+    Verdict,
+    cause_line,
+    light_of,
+    put_right_sentence,
+    verdict_of,
+)
+from bsip_cli.report.words import listing
 from bsip_cli.running.freshness import outdated
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.statistics.methods import OM, is_extended
 from bsip_cli.study.trials import listed
 
 _WIDEST = 100  # letters in a line
+_MOST = 5  # causes of a person, without --full
 
 
-def shown(out: Path) -> Iterator[str]:
-    """The parts of the answer, in order.
+def shown(out: Path, full: bool = False) -> Iterator[str]:
+    """The parts of the answer, in order; with ``full`` tables and causes with all their numbers.
 
     Raises
     ------
@@ -44,32 +55,38 @@ def shown(out: Path) -> Iterator[str]:
         )
     tables = tables_of(out)
     people = sorted(out.glob("sub-*/*_diagnosis.parquet"))
-    notes = [*_mass_notes(out), *_choices(out)]
-    if not tables and not people and not notes:
+    notes = [*_mass_notes(out), *(_choices(out) if full else ())]
+    if not tables and not people and not [*notes, *_choices(out)]:
         raise UsageError(
             "there are no tables and no diagnoses",
             file=out,
             remedy="run `bsip run` first, or name the folder that it was given with --out",
         )
     yield from ["\n".join(notes)] if notes else []
-    yield from ["\n".join(map(printable, tables.split("\n")))] if tables else []
+    if full and tables:
+        yield "\n".join(map(printable, tables.split("\n")))
     everybody, unread = [], []
-    for folder in sorted(path for path in out.glob("sub-*") if path.is_dir()):
+    folders = sorted(path for path in out.glob("sub-*") if path.is_dir())
+    for folder in folders:
         try:
-            if found := _person(folder):
+            if found := _person(folder, full, len(folders) == 1):
                 everybody.append(found[0])
                 yield found[1]
         except BadDataError as error:
             unread.append(folder.name)
             yield f"\n{error}"
-        try:
-            yield from _joints(folder, _width(get_terminal_size().columns))
-        except BadDataError as error:
-            yield str(error)
+        if full:
+            try:
+                yield from _joints(folder, _width(get_terminal_size().columns))
+            except BadDataError as error:
+                yield str(error)
     yield from _laboratory(out)
     yield from _no_more_true(out, get_terminal_size().columns)
     yield from _shared_text(shared_causes(everybody), get_terminal_size().columns)
-    for report in (out / "group" / "report.html", *sorted(out.glob("sub-*/report.html"))):
+    reports = [out / "group" / "report.html"] if len(folders) > 1 else []
+    if full or not reports:
+        reports += sorted(out.glob("sub-*/report.html"))
+    for report in reports:
         if report.exists():
             yield f"report: {printable(str(report))}"
     if unread:
@@ -115,13 +132,17 @@ def _choices(out: Path) -> Iterator[str]:
             yield _wrapped(text, _width(get_terminal_size().columns))
 
 
-def _person(folder: Path) -> tuple[Searched, str] | None:
+def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | None:
     """What was searched in a participant's recordings and what came out, in words."""
     diagnosis, detection = (_table(folder, kind) for kind in ("overall-diagnosis", "detection"))
     if diagnosis is None or detection is None:
         return None
-    gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
     facts = read_header(_path(folder, "overall-diagnosis"))["provenance"]["facts"]
+    if not full:
+        lines = list(_findings(folder, diagnosis, detection))
+        lines = lines if alone else lines[:1]
+        return searched(folder.name, diagnosis, facts), "\n".join(lines)
+    gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
     budget = _table(folder, "overall-error-budget")
     found = verdict_of(diagnosis, detection, gains, changes, budget)
     right = put_right_sentence(_marker_events(folder))
@@ -129,24 +150,54 @@ def _person(folder: Path) -> tuple[Searched, str] | None:
     return searched(folder.name, diagnosis, facts), text
 
 
-def _joints(folder: Path, width: int) -> Iterator[str]:
-    """What OM, and what was named, change most at a joint: a line each."""
+def _findings(folder: Path, diagnosis: pd.DataFrame, detection: pd.DataFrame) -> Iterator[str]:
+    """A line each, the most important first: whether anything is wrong, the causes, what makes the
+    error, which parameters to use, what is changed at the joints."""
+    width = _width(get_terminal_size().columns)
+    budget, choice = (_table(folder, kind) for kind in ("overall-error-budget", "choice"))
+    light = light_of(diagnosis, detection, budget)
+    use = "" if choice is None else f" Use {choice['use'].iloc[0]}."
+    yield _wrapped(f"{folder.name}: {light.title}. {light.text}{use}", width)
+    causes = causes_of(candidates_of(diagnosis))
+    everywhere = looked_at(detection, diagnosis)
+    for number, cause in enumerate(causes[:_MOST], start=1):
+        yield _wrapped(cause_line(cause, everywhere), width, f"{number:2d}. ")
+    if len(causes) > _MOST:
+        yield f"  - {len(causes) - _MOST} more causes: --full"
+    if budget is not None and (pieces := overall_pieces(budget)):
+        parts = listing([f"{one.label} {one.share:.0f} %" for one in pieces])
+        yield _wrapped(f"The error of the table's parameters (RM): {parts}.", width, "  - ")
+    if choice is not None:
+        said = str(choice["sentence"].iloc[0]).partition(". ")[0].rstrip(".")
+        yield _wrapped(f"{said}.", width, "  - ")
+    for said in largest_changes(_peaks(folder)):
+        yield _wrapped(f"{said}.", width, "  - ")
+
+
+def _peaks(folder: Path) -> pd.DataFrame:
+    """``joint-peaks`` of all trials, with a column ``trial``."""
     ending = f"_{SCHEMAS['joint-peaks'].file_name}.parquet"
     files = sorted(folder.glob(f"{folder.name}_*{ending}"))
     tables = [
         read_artifact(path, "joint-peaks").assign(trial=path.name.removesuffix(ending))
         for path in files
     ]
-    if not tables:
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+
+
+def _joints(folder: Path, width: int) -> Iterator[str]:
+    """What OM, and what was named, change most at a joint: a line each."""
+    peaks, lines = _peaks(folder), []
+    if peaks.empty:
         return
-    peaks, lines = pd.concat(tables), []
     for asked in (peaks["method"].eq(OM), peaks["method"].map(is_extended).astype(bool)):
         rows = peaks[asked].dropna(subset="change_Nm")
         if len(rows):
             most = rows.iloc[int(rows["change_Nm"].abs().argmax())]
             lines.append(_wrapped(_change_in_words(most.to_dict()), width, "  - "))
     if lines:
-        title = f"{printable(folder.name)}: largest changes of joint moments (*{ending} has all)"
+        name = printable(folder.name)
+        title = f"{name}: largest changes of joint moments (*_joint-peaks.parquet has all)"
         yield "\n".join([f"\n{_wrapped(title, width)}", *lines])
 
 

@@ -1,4 +1,4 @@
-"""What a report is made of, as data: a document of sections of paragraphs, grids and pictures."""
+"""What a report is made of, as data: a first page, and folded sections of texts, grids, pictures."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from bsip_cli.report.poses import Poses
+import pandas as pd
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Mark = Literal["", "better", "warning", "group"]
 Tone = Literal["plain", "good", "warning", "note"]
+State = Literal["fine", "cause", "large", "inconclusive"]
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,72 @@ class Numbered:
 
 
 @dataclass(frozen=True)
+class Terms:
+    """Names, each with what is to be said of it."""
+
+    kind: ClassVar[str] = "terms"
+    pairs: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Links:
+    """Words and addresses (relative), one after the other, after a text."""
+
+    kind: ClassVar[str] = "links"
+    text: str
+    to: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Light:
+    """The answer to whether anything is wrong."""
+
+    kind: ClassVar[str] = "light"
+    state: State
+    title: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A whole cut into pieces: label and share [%], which add up to 100; a share below zero makes
+    the rest larger and has no length."""
+
+    kind: ClassVar[str] = "bar"
+    title: str
+    pieces: tuple[tuple[str, float], ...]
+    note: str
+
+    def lengths(self) -> tuple[float, ...]:
+        """[%] of what is above zero."""
+        whole = sum(max(share, 0.0) for _, share in self.pieces)
+        return tuple(100.0 * max(share, 0.0) / whole for _, share in self.pieces)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A number between what is good and what is too large, all in one unit; ``words`` say which it
+    is. Numbers are the texts that are shown."""
+
+    title: str
+    shown: str
+    words: str
+    part: float
+    good_part: float
+    limit_part: float
+    good: str
+    limit: str
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Numbers side by side, each on its way to its limit."""
+
+    kind: ClassVar[str] = "scales"
+    scales: tuple[Scale, ...]
+
+
+@dataclass(frozen=True)
 class Cell:
     """One cell: its text, how it is set off, and where it leads (a relative link) if anywhere."""
 
@@ -53,7 +120,7 @@ class Cell:
     link: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Grid:
     """A table.
 
@@ -63,6 +130,7 @@ class Grid:
     rows : as many cells each as ``head``; a string is a plain cell.
     groups : titles over several columns, with how many they span; empty for none.
     words : how many leading columns hold words (set to the left; the others are numbers).
+    name, data : the numbers behind it, written as a CSV file of that name; empty for none.
     """
 
     kind: ClassVar[str] = "grid"
@@ -71,21 +139,32 @@ class Grid:
     caption: str = ""
     groups: tuple[tuple[str, int], ...] = ()
     words: int = 1
+    name: str = ""
+    data: pd.DataFrame | None = None
 
     def cells(self) -> list[list[Cell]]:
         """The rows with every cell as a ``Cell``."""
         return [[c if isinstance(c, Cell) else Cell(c) for c in row] for row in self.rows]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Picture:
-    """A figure with its caption; a ``name`` has it written as files of that name too."""
+    """A figure, and what a reader wants to know of it.
+
+    Attributes
+    ----------
+    shows : what is drawn. reading : what better and worse look like. action : what to do then.
+    name : of its files: NAME.svg, and NAME.csv with ``data``, the numbers behind it.
+    """
 
     kind: ClassVar[str] = "picture"
     figure: Figure
-    caption: str
+    name: str
+    shows: str
     alt: str
-    name: str = ""
+    reading: str = ""
+    action: str = ""
+    data: pd.DataFrame | None = None
 
     def width_percent(self) -> float:
         """Width on the page, so that letters are equally large in all figures."""
@@ -100,22 +179,32 @@ class Picture:
         return to_svg(self.figure)
 
 
-@dataclass(frozen=True)
-class Film:
-    """Poses that move when asked to; ``alt`` for those who cannot see it."""
+@dataclass(frozen=True, eq=False)
+class Portrait(Picture):
+    """A figure that stands at the side of the first page."""
 
-    kind: ClassVar[str] = "film"
-    poses: Poses
-    caption: str
-    alt: str
+    kind: ClassVar[str] = "portrait"
 
 
-Block = Paragraph | Heading | Bullets | Numbered | Grid | Picture | Film
+Block = (
+    Paragraph
+    | Heading
+    | Bullets
+    | Numbered
+    | Terms
+    | Links
+    | Light
+    | Bar
+    | Scales
+    | Grid
+    | Picture
+    | Portrait
+)
 
 
 @dataclass(frozen=True)
 class Section:
-    """``anchor`` is the section's address in the page."""
+    """``anchor`` is the section's address in the page; folded until somebody asks."""
 
     anchor: str
     title: str
@@ -124,10 +213,17 @@ class Section:
 
 @dataclass(frozen=True)
 class Document:
+    """``front`` is the first page, which is printed alone where no section is open."""
+
     title: str
     subtitle: str
+    front: tuple[Block, ...]
     sections: tuple[Section, ...]
 
-    def pictures(self) -> Iterator[Picture]:
+    def blocks(self) -> Iterator[Block]:
+        yield from self.front
         for section in self.sections:
-            yield from (block for block in section.blocks if isinstance(block, Picture))
+            yield from section.blocks
+
+    def pictures(self) -> Iterator[Picture]:
+        yield from (block for block in self.blocks() if isinstance(block, Picture))

@@ -13,16 +13,14 @@ from bsip_cli.report.words import (
     component_label,
     listing,
     number,
-    segment_label,
     signed,
-    trial_label,
 )
 
 FIRST = ("fz", "cop_ap", "cop_ml")  # components that a reader asks for first
 REST = "all others"
 UNKNOWN = "unknown"
-TABLE = "inertial_parameters"
 _FAULT = "fault:"
+_LAST = ("noise", UNKNOWN)
 _WORDS = {
     "inertial_parameters": "the table's segment parameters",
     "joint_centres": "joint centres",
@@ -34,7 +32,6 @@ _WORDS = {
     "unknown": UNKNOWN,
 }
 _WORTH = 5.0  # percent of the squared error: less is in the rest
-_MOST = 4  # segments that are told
 LEAST_TOLD_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
 
 
@@ -48,20 +45,40 @@ class Piece:
 
 def pieces(budget: pd.DataFrame, trial: str, component: str) -> tuple[Piece, ...]:
     """The largest first; what is small together, then unknown and noise. Their sum is 100."""
-    rows = budget[
-        (budget["trial"] == trial) & (budget["component"] == component) & (budget["target"] == "")
-    ].set_index("term")
+    whole = (budget["trial"] == trial) & (budget["target"] == "")
+    return _cut(budget[whole & (budget["component"] == component)].set_index("term"))
+
+
+def overall_pieces(budget: pd.DataFrame) -> tuple[Piece, ...]:
+    """Of all trials, the mean over the vertical force and both directions of the centre of pressure,
+    as far as their errors are of interest; terms that look alike in one count together in all."""
+    shares = _overall(budget)
+    return () if shares.empty else _cut(shares)
+
+
+def fault_share(budget: pd.DataFrame) -> float:
+    """Of the same error, what faults make [%]; NaN where no error is of interest."""
+    shares = _overall(budget)
+    faults = shares.index.astype(str).str.startswith(_FAULT)
+    return float(shares.loc[faults, "share_percent"].sum()) if len(shares) else np.nan
+
+
+def _overall(budget: pd.DataFrame) -> pd.DataFrame:
+    told = [one for one in FIRST if size_of(budget, "", one)[0] >= LEAST_TOLD_SIZE]
+    mine = budget[(budget["trial"] == "") & (budget["target"] == "")]
+    by_term = mine[mine["component"].isin(told)].groupby("term", sort=False)
+    alike = by_term["alike"].agg(lambda texts: ", ".join(filter(None, map(str, texts))))
+    return pd.DataFrame({"share_percent": by_term["share_percent"].mean(), "alike": alike})
+
+
+def _cut(rows: pd.DataFrame) -> tuple[Piece, ...]:
     found = [_together(rows, terms) for terms in _groups(rows)]
-    large = [one for one in found if abs(one.share) >= _WORTH and one.label not in _last()]
+    large = [one for one in found if abs(one.share) >= _WORTH and one.label not in _LAST]
     large.sort(key=lambda one: -one.share)
-    last = [one for one in found if one.label in _last()]
+    last = [one for one in found if one.label in _LAST]
     others = 100.0 - sum(one.share for one in (*large, *last))
     rest = [Piece(REST, others)] if abs(others) >= 0.5 else []
     return (*large, *rest, *last)
-
-
-def _last() -> tuple[str, str]:
-    return _WORDS["noise"], UNKNOWN
 
 
 def _groups(rows: pd.DataFrame) -> Iterator[tuple[str, ...]]:
@@ -91,12 +108,13 @@ def term_words(term: str) -> str:
 def size_of(budget: pd.DataFrame, trial: str, component: str) -> tuple[float, str]:
     """RM's error of a component, and its unit."""
     row = _total(budget, trial, component)
-    return float(row["rms"]), str(row["unit"])
+    return (np.nan, "") if row is None else (float(row["rms"]), str(row["unit"]))
 
 
-def _total(budget: pd.DataFrame, trial: str, component: str) -> pd.Series:
+def _total(budget: pd.DataFrame, trial: str, component: str) -> pd.Series | None:
     mine = (budget["trial"] == trial) & (budget["component"] == component)
-    return budget[mine & (budget["term"] == "total")].iloc[0]
+    rows = budget[mine & (budget["term"] == "total")]
+    return None if rows.empty else rows.iloc[0]
 
 
 def budget_sentences(budget: pd.DataFrame) -> tuple[str, ...]:
@@ -113,6 +131,7 @@ def _sentence(budget: pd.DataFrame, component: str) -> str:
         return ""
     parts = [f"{one.label} {number(one.share, 0)} %" for one in pieces(budget, "", component)]
     total = _total(budget, "", component)
+    assert total is not None
     worth = ""
     if np.isfinite(total["gain_percent"]):
         change, low, high = (
@@ -126,22 +145,3 @@ def _sentence(budget: pd.DataFrame, component: str) -> str:
         f"What makes RM's error of {number(size, 1)} {unit} in {component_label(component)}: "
         f"{listing(parts)}.{worth}"
     )
-
-
-def segment_shares(budget: pd.DataFrame) -> Iterator[tuple[str, str]]:
-    """Per component, which segments of the table make most of RM's error."""
-    rows = budget[(budget["term"] == TABLE) & (budget["target"] != "") & (budget["trial"] == "")]
-    for component, mine in rows.groupby("component", sort=False):
-        largest = mine[mine["share_percent"] >= _WORTH].nlargest(_MOST, "share_percent")
-        parts = [
-            f"{segment_label(r['target'])} {number(r['share_percent'], 0)} % "
-            f"({number(r['share_low'], 0)} to {number(r['share_high'], 0)})"
-            for r in largest.to_dict("records")
-        ]
-        yield component_label(str(component)), "; ".join(parts) or "none"
-
-
-def trials_of(budget: pd.DataFrame) -> tuple[tuple[str, str], ...]:
-    """Stems and labels of the trials that have a budget; first all of them together."""
-    stems = [stem for stem in budget["trial"].unique() if stem]
-    return (("", "all trials"), *((stem, trial_label(stem)) for stem in stems))

@@ -2,12 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
+from typing import Protocol
 
 from bsip_cli.body.names import SEGMENTS
+from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.plate_frame import plates_called
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
-from bsip_cli.report.words import number, segment_label
+from bsip_cli.report.words import listing, number, segment_label
+
+
+class Number(Protocol):
+    """A parameter of a fault, as estimated."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def value(self) -> float: ...
+
 
 _FORCES = (
     "The measured forces are not the true ones, and everything identified from them inherits the "
@@ -87,8 +103,8 @@ EFFECT_WORDS = {
     "object_handled": EffectWords("object picked up and put down", _LOAD),
     "unexplained": EffectWords(
         "something without a name",
-        "Neither the forces nor the identified parameters should be trusted further than section 2 "
-        "of the report says: look there at when, and how fast, the difference comes and goes.",
+        "Neither the forces nor the identified parameters should be trusted further than the "
+        "report says: look there at when the difference comes and goes.",
     ),
 }
 
@@ -208,3 +224,146 @@ def size_words(parameter: str, unit: str, size: float) -> str:
     factor, readable = readable_unit(parameter, unit)
     value = factor * size
     return with_unit(number(value, digits_of(value)), readable)
+
+
+# --- sizes that laboratories meet ----------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Usual:
+    """From ``least`` to ``most``, in ``unit``, of the parameters named (the same for all)."""
+
+    parameters: tuple[str, ...]
+    unit: str
+    least: float
+    most: float
+
+
+USUAL: dict[str, Usual] = {
+    "sync_offset": Usual(("delay",), "s", 0.005, 0.02),
+    "clock_drift": Usual(("rate_error",), "1", 2e-4, 5e-4),
+    "plate_translation": Usual(("x", "y"), "m", 0.01, 0.03),
+    "plate_rotation": Usual(
+        ("tilt_x", "tilt_y", "yaw"), "rad", 0.017453, 0.069813
+    ),  # 1 to 4 degrees
+    "plate_gain": Usual(("gain",), "1", 0.02, 0.05),
+    "plate_crosstalk": Usual(("coefficient",), "1", 0.01, 0.03),
+    "plate_zero": Usual(("offset",), "N", 8.0, 25.0),
+    "plate_drift": Usual(("drift",), "N/s", 0.3, 2.0),  # 10 to 20 N over 10 to 30 s
+    "gravity_tilt": Usual(("angle_x", "angle_y"), "rad", 0.0087266, 0.034907),
+    "added_mass": Usual(("mass",), "kg", 0.5, 1.5),
+    "released_object": Usual(("mass",), "kg", 0.3, 0.7),
+    "wobbling_mass": Usual(("mass",), "kg", 3.0, 4.5),
+    "breathing": Usual(("cosine", "sine"), "kg m", 0.05, 0.3),
+    "unmeasured_contact": Usual(("force_x", "force_y", "force_z"), "N", 20.0, 40.0),
+    "joint_centre": Usual(("shift_x", "shift_y", "shift_z"), "m", 0.015, 0.04),
+    "missing_joint": Usual(("flexion", "lateral", "axial"), "1", 0.2, 0.6),
+    "marker_shift": Usual(("x", "y", "z", "shift_x", "shift_y", "shift_z"), "m", 0.02, 0.04),
+    "implement": Usual(("moment",), "kg m", 0.08, 0.5),  # from a racket to a bat
+    "camera_frame": Usual(("angle_x", "angle_y"), "rad", 0.0087266, 0.034907),
+    "external_force": Usual(("force_x", "force_y", "force_z"), "N", 20.0, 80.0),
+    "object_handled": Usual(("mass",), "kg", 0.3, 2.0),
+    "marker_slide": Usual(("x", "y", "z"), "m", 0.01, 0.04),
+}
+
+
+def usual_words(effect: str) -> str:
+    """``5 to 20 ms``."""
+    usual = USUAL[effect]
+    factor, unit = readable_unit(usual.parameters[0], usual.unit)
+    return with_unit(f"{factor * usual.least:.3g} to {factor * usual.most:.3g}", unit)
+
+
+def beside_usual(effect: str, size: Number) -> str:
+    """``, as large as laboratories meet (5 to 20 ms)``; empty where nothing usual is known."""
+    usual = USUAL.get(effect)
+    if usual is None or size.name not in usual.parameters or size.unit != usual.unit:
+        return ""
+    how = "smaller than" if abs(size.value) < usual.least else "as large as"
+    how = "larger than" if abs(size.value) > usual.most else how
+    return f", {how} laboratories meet ({usual_words(effect)})"
+
+
+# --- recordings that separate causes --------------------------------------------------------------
+
+_LOADS = ("added_mass", "released_object", "object_handled", "implement", "wobbling_mass")
+_APART: dict[frozenset[str], str] = {
+    frozenset(pair): words
+    for pairs, words in (
+        (
+            [("plate_gain", "plate_zero"), ("plate_zero", "plate_crosstalk")],
+            "step off the plate for five seconds: an offset stays when nobody stands there",
+        ),
+        (
+            [("plate_zero", "added_mass"), ("plate_zero", "gravity_tilt")],
+            "step off the plate for five seconds: an offset stays when nobody stands there",
+        ),
+        (
+            [("plate_gain", "added_mass")],
+            "weigh the person as recorded on a scale, and lay a known weight on the plate",
+        ),
+        (
+            [("gravity_tilt", "plate_rotation"), ("gravity_tilt", "plate_crosstalk")],
+            "hop three times: a fault of the plate grows with the force on it, a tilted vertical "
+            "does not",
+        ),
+        (
+            [("plate_rotation", "plate_crosstalk")],
+            "stand on the plate and push forwards and sideways, and lay a known weight at several "
+            "places: a tilted plate changes every force, a leaking channel only one",
+        ),
+        (
+            [("gravity_tilt", "unexplained"), ("plate_zero", "unexplained")],
+            "stand still for ten seconds at three places of the plate with nothing attached to the "
+            "person: a tilt or an offset stays, whatever pulls is gone",
+        ),
+        (
+            [("sync_offset", "clock_drift")],
+            "hop three times at the beginning and at the end of a long recording",
+        ),
+        ([("missing_joint", "soft_tissue")], EFFECTS["missing_joint"].remedy),
+        (
+            [("breathing", "unexplained")],
+            "stand still for thirty seconds, the breath held in the last ten",
+        ),
+    )
+    for pair in pairs
+}
+_UNKNOWN = "look at plates, cables and everything that touches the person, and record again"
+
+
+def separating_recording(rivals: Sequence[tuple[str, str]]) -> str:
+    """What to record, without a final stop, for rivals as (effect, target)."""
+    effects = list(dict.fromkeys(effect for effect, _ in rivals))
+    advice = [_places(effect, rivals) for effect in effects if _count(effect, rivals) > 1]
+    for pair in combinations(effects, 2):
+        known = _APART.get(frozenset(pair))
+        advice += [known] if known else [_own(effect) for effect in pair]
+    return "; ".join(_without_beginnings(advice)) or _UNKNOWN
+
+
+def _without_beginnings(advice: list[str]) -> list[str]:
+    """Each once, and none that another says with more words."""
+    each = list(dict.fromkeys(advice))
+    return [one for one in each if not any(o != one and o.startswith(one) for o in each)]
+
+
+def _count(effect: str, rivals: Sequence[tuple[str, str]]) -> int:
+    return len({target for name, target in rivals if name == effect})
+
+
+def _places(effect: str, rivals: Sequence[tuple[str, str]]) -> str:
+    """The same effect at several places: they have to move, or be loaded, one at a time."""
+    where = [place_label(effect, target) for name, target in rivals if name == effect]
+    if effect in _LOADS:
+        return (
+            "look for what is worn or loose there, or keep still but for one at a time: "
+            f"{listing(where)}"
+        )
+    if effect in ("unmeasured_contact", "external_force"):
+        return f"watch, or film, what touches the person: {listing(where)}"
+    return _own(effect)
+
+
+def _own(effect: str) -> str:
+    return EFFECTS[effect].remedy if effect in EFFECTS else _UNKNOWN

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
-from bsip_cli.report.blocks import Block, Cell, Grid, Heading
+from bsip_cli.report.blocks import Block, Bullets, Grid, Heading, Paragraph, Terms
 from bsip_cli.report.records import Message, Origin, messages_of
+from bsip_cli.report.words import labelled
 
 _HASH_DIGITS = 12
+_MOST_WARNINGS = 8
 
 
 @dataclass(frozen=True)
@@ -36,30 +39,38 @@ class HowMade:
             made.messages.update(dict.fromkeys(messages_of(origin)))
         return made
 
+    def number(self, option: str, otherwise: float) -> float:
+        """An option that was run with."""
+        return float(next(iter(self.options.get(option, ())), otherwise))
 
-def options_grids(made: HowMade) -> list[Block]:
-    """Options, versions, and the recordings with the start of their hashes."""
-    blocks: list[Block] = [
-        Heading("Options"),
-        Grid(("option", "value"), _rows(made.options), words=2),
-        Heading("Versions"),
-        Grid(("software", "version"), _rows(made.versions), words=2),
+
+def how_made(made: HowMade, defaults: Mapping[str, Any]) -> list[Block]:
+    """Warnings, versions, options that differ from the shipped ones, and the recordings with the
+    start of their hashes."""
+    said = [
+        f"{stage}{f' ({unit})' if unit else ''}: {labelled(text)}"
+        for stage, unit, text in made.messages
     ]
+    blocks: list[Block] = [Heading("Warnings")]
+    if said:
+        blocks.append(Bullets(tuple(said[:_MOST_WARNINGS])))
+    if len(said) > _MOST_WARNINGS:
+        blocks.append(Paragraph(f"{len(said) - _MOST_WARNINGS} more in the artifacts.", "note"))
+    if not said:
+        blocks.append(Paragraph("No stage had anything to warn of."))
+    shipped = {name: {value} for name, value in _flat(defaults)}
+    changed = {n: v for n, v in made.options.items() if n in shipped and v != shipped[n]}
+    blocks.append(Heading("Options that differ from the shipped ones"))
+    if changed:
+        blocks.append(Terms(tuple((n, " / ".join(sorted(v))) for n, v in sorted(changed.items()))))
+    else:
+        blocks.append(Paragraph("None."))
+    versions = (f"{name} {' / '.join(sorted(v))}" for name, v in sorted(made.versions.items()))
+    blocks += [Heading("Versions"), Paragraph(", ".join(versions))]
     if made.files:
         rows = tuple((name, made.files[name][:_HASH_DIGITS]) for name in sorted(made.files))
-        blocks += [
-            Heading("Recordings and files read"),
-            Grid(("file", "SHA-256 (start)"), rows, words=2),
-        ]
+        blocks.append(Grid(("file read", "SHA-256 (start)"), rows, words=2))
     return blocks
-
-
-def _rows(values: Mapping[str, set[str]]) -> tuple[tuple[str | Cell, ...], ...]:
-    """A name and its value; several values of one name are set off: stages differ."""
-    return tuple(
-        (name, Cell(" / ".join(sorted(found)), "warning" if len(found) > 1 else ""))
-        for name, found in sorted(values.items())
-    )
 
 
 def _flat(options: Mapping, before: str = "") -> Iterable[tuple[str, str]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import re
 from pathlib import Path
 
@@ -12,15 +11,16 @@ from markupsafe import Markup
 
 from bsip_cli.errors import printable
 from bsip_cli.report.blocks import Document
-from bsip_cli.report.film import film_data
+
+FILES = "figures"
+"""Folder beside the page that holds its figures and the numbers behind them."""
 
 _BEFORE_UNIT = re.compile(r"(?<=[\d)]) (?=(?:mm|ms|kg|m|s|N|Hz)\b|%)|(?<=N) (?=m\b)|(?<=%) (?=BW)")
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
 def render(document: Document) -> str:
-    """The page: figures as data, nothing from the network, no script but its own, which the page's
-    policy names by its hash; all texts escaped."""
+    """The page: figures as data, nothing from the network, no script at all; all texts escaped."""
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES),
         autoescape=True,
@@ -31,10 +31,9 @@ def render(document: Document) -> str:
     )
     environment.filters["svg_source"] = _svg_source
     environment.filters["tied"] = _tied
-    environment.filters["film_data"] = film_data
-    style, script = (Markup(_own(name)) for name in ("report.css", "report.js"))
+    style = Markup((_TEMPLATES / "report.css").read_text(encoding="utf-8"))
     return environment.get_template("report.html.j2").render(
-        document=document, style=style, script=script, script_hash=_hash(script)
+        document=document, style=style, files=FILES
     )
 
 
@@ -42,16 +41,6 @@ def _cleaned(value: object) -> object:
     """Names of files and markers may hold control characters; what templates make is clean."""
     is_foreign = isinstance(value, str) and not isinstance(value, Markup)
     return printable(str(value)) if is_foreign else value
-
-
-def _own(name: str) -> str:
-    return (_TEMPLATES / name).read_text(encoding="utf-8")
-
-
-def _hash(script: str) -> str:
-    """As a content security policy names an inline script."""
-    digest = hashlib.sha256(script.encode()).digest()
-    return f"sha256-{base64.b64encode(digest).decode('ascii')}"
 
 
 def _tied(text: str) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,7 @@ import pandas as pd
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
 from bsip_cli.report.words import EXTENDED, method_rank, trial_label
-from bsip_cli.statistics.methods import MEASURED, is_extended
+from bsip_cli.statistics.methods import MEASURED, RM, is_extended
 
 
 @dataclass(frozen=True)
@@ -38,19 +39,21 @@ class Refusal:
 
 @dataclass(frozen=True, eq=False)
 class TrialRecord:
-    """One trial; a table is None where a stage did not make it."""
+    """One trial; a table is None where a stage did not make it. ``file_date``: when the recording's
+    file was last changed (ISO), empty where it is not there."""
 
     stem: str
     task: str
     role: str
     quality: pd.DataFrame | None
-    contacts: pd.DataFrame | None
     kinematics: pd.DataFrame | None
     residuals: pd.DataFrame | None
     reconstruction: pd.DataFrame | None
     fit: pd.DataFrame | None
-    posturography: pd.DataFrame | None
     marker_events: pd.DataFrame | None = None
+    joint_moments: pd.DataFrame | None = None
+    joint_peaks: pd.DataFrame | None = None
+    file_date: str = ""
 
     @property
     def label(self) -> str:
@@ -60,21 +63,20 @@ class TrialRecord:
 @dataclass(frozen=True, eq=False)
 class ParticipantRecord:
     """One participant; ``facts`` is the single row of the ``person`` artifact, ``loads`` the known
-    loads as (trial label, words). ``diagnosis``, ``detection``, ``budget``, ``gains`` and ``changes`` (of a model
-    extended by what was found), and ``choice`` are None where their stages have not run."""
+    loads as (trial label, words). ``diagnosis``, ``detection``, ``budget``, ``gains`` and
+    ``changes`` (of a model extended by what was found), and ``choice`` are None where their stages
+    have not run. ``defaults`` : every option's shipped value."""
 
     id: str
     facts: pd.Series
-    skeleton: pd.DataFrame
-    marker_positions: pd.DataFrame
     bsip: pd.DataFrame
-    base_parameters: pd.DataFrame
     excitation: pd.DataFrame
     identification: pd.DataFrame
     body: Person
     trials: tuple[TrialRecord, ...]
     refusals: tuple[Refusal, ...]
     origins: tuple[Origin, ...]
+    defaults: Mapping[str, Any]
     loads: tuple[tuple[str, str], ...] = ()
     diagnosis: pd.DataFrame | None = None
     detection: pd.DataFrame | None = None
@@ -99,12 +101,18 @@ class ParticipantRecord:
         named = {stem for row in self.identification["trials"] for stem in str(row).split(", ")}
         return tuple(trial for trial in self.trials if trial.stem in named)
 
-    def option(self, section: str, name: str, otherwise: float) -> float:
-        """An option that a stage was run with."""
-        for origin in self.origins:
-            if name in origin.options.get(section, {}):
-                return float(origin.options[section][name])
-        return otherwise
+    def moving_trials(self) -> tuple[TrialRecord, ...]:
+        """Those in which somebody moves: standing still tells no method apart."""
+        return tuple(trial for trial in self.trials if trial.role != "static")
+
+    def use(self) -> str:
+        """The method whose parameters are to be used; the table's where nothing was chosen."""
+        return RM if self.choice is None or self.choice.empty else str(self.choice["use"].iloc[0])
+
+    def option(self, section: str, name: str) -> float:
+        """An option that a stage was run with, or as shipped."""
+        ran = [o.options[section] for o in self.origins if name in o.options.get(section, {})]
+        return float((ran or [self.defaults[section]])[0][name])
 
 
 Message = tuple[str, str, str]

@@ -9,13 +9,11 @@ import pandas as pd
 
 from bsip_cli.body.person import Person
 from bsip_cli.motion.inverse_kinematics import tree_of
-from bsip_cli.report.poses import Poses
 from bsip_cli.report.records import clock_of, flags_of, signals_of
 
 _FORCES = ("fx_N", "fy_N", "fz_N")
 _HEAD_RADIUS_M = 0.1
 _ON_GROUND_PERCENTILE = 2.0
-_GAP_S = 0.1  # a film does not freeze longer
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,31 +39,49 @@ class Motion:
     body_weight_N: float
 
 
-def poses_at_instants(motion: Motion, instants: int) -> Poses | None:
-    """Poses at evenly spread instants; None where no frame is determined."""
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Positions and force in the person's axes (anterior, right, up).
+
+    Attributes
+    ----------
+    bones_m : (b, 2, 3) end points; sides : (b,) ``l``, ``r`` or empty.
+    head_m : (3,) centre; head_radius_m : its radius. markers_m : (m, 3) as the model carries them.
+    force_at_m : (3,) where the ground force acts; force_N : (3,), NaN where it is not measured.
+    ground_m : height of the ground. body_weight_N : what an arrow of half a body height stands for.
+    """
+
+    time_s: float
+    bones_m: np.ndarray
+    sides: tuple[str, ...]
+    head_m: np.ndarray
+    head_radius_m: float
+    markers_m: np.ndarray
+    force_at_m: np.ndarray
+    force_N: np.ndarray
+    ground_m: float
+    body_weight_N: float
+
+    def tip_m(self) -> np.ndarray:
+        """(3,) tip of the force's arrow."""
+        top = float(self.head_m[2]) + self.head_radius_m - self.ground_m
+        return self.force_at_m + self.force_N * 0.5 * top / self.body_weight_N
+
+    def reach_m(self) -> float:
+        """How far the bones reach from the pelvis on the average."""
+        return float(np.linalg.norm(self.bones_m - self.bones_m[0, 0], axis=-1).mean())
+
+    def is_loaded(self) -> bool:
+        """The plates carry half the body's weight at least."""
+        return bool(self.force_N[2] > 0.5 * self.body_weight_N)
+
+
+def poses_of(motion: Motion, instants: int) -> tuple[Pose, ...]:
+    """Poses at evenly spread instants; none where no frame is determined."""
     rows = _compared(motion)
     if rows.empty:
-        return None
-    return _poses(motion, rows.iloc[np.unique(np.linspace(0, len(rows) - 1, instants).astype(int))])
-
-
-def poses_of_stretch(motion: Motion, longest_s: float, rate_hz: float) -> Poses | None:
-    """Poses of the longest stretch without a gap, its middle if it lasts longer than asked, at
-    about this rate; None where no frame is determined."""
-    rows = _compared(motion)
-    if rows.empty:
-        return None
-    times = rows["time_s"].to_numpy()
-    gaps = np.flatnonzero(np.diff(times) > _GAP_S) + 1
-    longest = max(np.split(np.arange(len(times)), gaps), key=len)
-    start, end = times[longest[0]], times[longest[-1]]
-    spare = max(0.0, end - start - longest_s) / 2
-    wanted = np.arange(start + spare, end - spare + 0.5 / rate_hz, 1 / rate_hz)
-    chosen = longest[np.abs(times[longest][:, None] - wanted).argmin(axis=0)]
-    return _poses(motion, rows.iloc[np.unique(chosen)])
-
-
-def _poses(motion: Motion, rows: pd.DataFrame) -> Poses:
+        return ()
+    rows = rows.iloc[np.unique(np.linspace(0, len(rows) - 1, instants).astype(int))]
     body = motion.body
     q = rows[[f"q_{name}" for name in body.skeleton.q_names]].to_numpy()
     R, p = tree_of(body).forward(q)
@@ -75,21 +91,26 @@ def _poses(motion: Motion, rows: pd.DataFrame) -> Poses:
     end = _points(R, p, lines.ends, lines.end_m) @ axes.T
     head = body.skeleton.index("head") if "head" in body.skeleton.segments else 0
     centre = _centre_of_markers(body, head, np.array([0.0, 0.15, 0.0]))
+    heads = (p[:, head] + R[:, head] @ centre) @ axes.T
+    markers = _points(R, p, body.marker_segments, body.markers_in_joint_m()) @ axes.T
     low = np.minimum(start[..., 2], end[..., 2]).min(axis=1)
     times = rows["time_s"].to_numpy()
     ground = float(np.percentile(low, _ON_GROUND_PERCENTILE))
     force, point = _forces(motion.reconstruction, times, axes, ground)
-    return Poses(
-        time_s=times,
-        bones_m=np.stack([start, end], axis=2),
-        sides=lines.sides,
-        head_m=(p[:, head] + R[:, head] @ centre) @ axes.T,
-        head_radius_m=_HEAD_RADIUS_M,
-        markers_m=_points(R, p, body.marker_segments, body.markers_in_joint_m()) @ axes.T,
-        force_m=point,
-        forces_N=force,
-        ground_m=ground,
-        body_weight_N=motion.body_weight_N,
+    return tuple(
+        Pose(
+            float(times[k]),
+            np.stack([start[k], end[k]], axis=1),
+            lines.sides,
+            heads[k],
+            _HEAD_RADIUS_M,
+            markers[k],
+            point[k],
+            force[k],
+            ground,
+            motion.body_weight_N,
+        )
+        for k in range(len(times))
     )
 
 

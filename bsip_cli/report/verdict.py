@@ -8,11 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from bsip_cli.report.budget import budget_sentences
-from bsip_cli.report.candidates import UNNAMED, Candidate, candidates_of, causes_of
-from bsip_cli.report.effect_words import EFFECT_WORDS, WEIGHT
-from bsip_cli.report.limits import OF_THE_WEIGHT, limits_of, limits_sentence, looked_at
-from bsip_cli.report.separating import separating_recording
+from bsip_cli.report.blocks import Light, State
+from bsip_cli.report.budget import budget_sentences, fault_share
+from bsip_cli.report.candidates import (
+    OF_THE_WEIGHT,
+    UNNAMED,
+    Candidate,
+    candidates_of,
+    causes_of,
+    limits_of,
+    limits_sentence,
+    looked_at,
+)
+from bsip_cli.report.effect_words import EFFECT_WORDS, WEIGHT, beside_usual, separating_recording
 from bsip_cli.report.words import (
     capital,
     component_label,
@@ -33,6 +41,8 @@ _OF_THE_LAB = (
     "It is a matter of the laboratory: whoever else was recorded there has it too, if it is there."
 )
 _NOTHING = "Nothing is wrong above the noise."
+_LARGE = "Large error, cause unknown"
+NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 
 
 @dataclass(frozen=True)
@@ -102,12 +112,64 @@ def headline(diagnosis: pd.DataFrame) -> str:
     parts = [f"{count(named, 'cause')} named"] if named else []
     if classes:
         how_many = str(classes) if named else count(classes, "cause")
-        parts.append(
-            f"{how_many} narrowed down to several that these recordings cannot distinguish"
-        )
+        parts.append(f"{how_many} narrowed down to several")
     if unnamed:
         parts.append(f"{unnamed if parts else count(unnamed, 'cause')} without a name")
     return f"Something is wrong: {listing(parts)}."
+
+
+def light_of(
+    diagnosis: pd.DataFrame | None,
+    detection: pd.DataFrame | None,
+    budget: pd.DataFrame | None = None,
+) -> Light:
+    """Whether anything is wrong, for the first page: fine, a cause named, a large error that nothing
+    explains, or inconclusive."""
+    if diagnosis is None or detection is None:
+        return Light("inconclusive", "Not examined", NOT_RUN)
+    if diagnosis.empty:
+        return Light("inconclusive", "Inconclusive", _NO_TRIAL.removeprefix("Inconclusive: "))
+    causes = causes_of(candidates_of(diagnosis))
+    unsure = [c[0] for c in causes if c[0].effect == "inconclusive"]
+    if unsure:
+        return Light("inconclusive", "Inconclusive", f"{capital(unsure[0].what())}.")
+    if not causes:
+        limits = limits_sentence(limits_of(detection, diagnosis))
+        return Light("fine", "Fine: nothing is wrong above the noise", limits)
+    large = [c for c in causes if is_large(c)]
+    state: State = "large" if large else "cause"
+    title = headline(diagnosis).removesuffix(".")
+    if large:
+        others = len(causes) - len(large)
+        beside = f"; {count(others, 'other cause')} found beside it" if others else ""
+        title = f"{_LARGE}{beside}"
+    looked = count(len(looked_at(detection, diagnosis)), "recording")
+    share = np.nan if budget is None else fault_share(budget)
+    size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
+    how_large = "" if np.isnan(share) else f" What has a name makes {size} of the error."
+    return Light(state, title, f"Searched: {looked}.{how_large}")
+
+
+def is_large(cause: Sequence[Candidate]) -> bool:
+    """An error beyond the yardsticks that nothing explains, as ``large_errors`` finds it."""
+    first = cause[0]
+    named = {one.name for one in first.numbers}
+    return first.effect == UNNAMED and not first.target and named == {"error"}
+
+
+def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
+    """What, how large beside what laboratories meet, where and how sure, as short as possible."""
+    sure = probability_words(probability_of(cause))
+    sure = f"; probability {sure}" if sure else ""
+    if len(cause) > 1:
+        members = " or ".join(one.label for one in cause)
+        return f"One of {len(cause)} that cannot be told apart here: {members}{sure}."
+    (one,) = cause
+    main = one.main_number()
+    usual = beside_usual(one.effect, main) if main else ""
+    where = where_seen(one.trials, everywhere)
+    what = one.what().partition("; ")[0] if is_large(cause) else one.told(remarks=False)
+    return f"{capital(what)}, {where}{usual}{sure}."
 
 
 def _seen_in(everywhere: Sequence[str]) -> tuple[str, ...]:

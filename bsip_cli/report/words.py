@@ -18,10 +18,6 @@ METHODS = {
     OM: "OM (identified)",
     EXTENDED: "OM with the causes found",
 }
-WHAT_METHODS_ARE = (
-    "RM: parameters from an anthropometric table. RM+mass: the same, all masses and tensors times "
-    "one number, the yardstick for OM. OM: parameters identified from"
-)
 COMPONENTS = {
     "cop_ap": "COP, anterior-posterior",
     "cop_ml": "COP, medio-lateral",
@@ -131,7 +127,3 @@ def component_label(component: str) -> str:
 def method_rank(method: str) -> tuple[int, str]:
     """By which methods are sorted: measured first, those without a label last."""
     return (list(METHODS).index(method) if method in METHODS else len(METHODS)), method
-
-
-def method_label(method: str) -> str:
-    return METHODS.get(method, method)

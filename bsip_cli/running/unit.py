@@ -15,7 +15,7 @@ from typing import Any
 import pandas as pd
 
 from bsip_cli.artifacts import read_artifact, read_header, write_artifact, write_artifact_in_parts
-from bsip_cli.config import Config, Load
+from bsip_cli.config import Config, Load, load_config
 from bsip_cli.errors import BadDataError, printable
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.pipeline import STAGES, Stage, producer
@@ -252,6 +252,11 @@ class Unit:
         return hashes | people | {name: f"left out: {why}" for name, why in self.left_out.items()}
 
     # --- reading and writing ----------------------------------------------------------------
+
+    @staticmethod
+    def shipped_options() -> dict:
+        """Every option's value in configs/default.toml."""
+        return load_config([]).model_dump()
 
     def read(
         self,

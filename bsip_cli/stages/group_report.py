@@ -1,46 +1,36 @@
 """Report (cohort): one HTML page with the papers' tables and the gain per participant.
 
-Reads values, comparisons, person, identification, tables-files, and where it is there
-overall-diagnosis and laboratory; links to the participants' reports where report-files are there.
-Writes group-report-files.
+Reads values, comparisons, person, identification, tables-files, and where they are there
+overall-diagnosis, choice and laboratory; links to the participants' reports where report-files are
+there. Writes group-report-files.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 import pandas as pd
 
-from bsip_cli.pipeline import STAGES, producer, stages_named
-from bsip_cli.report.cohort.document import cohort_document
-from bsip_cli.report.cohort.people import SHOWN
-from bsip_cli.report.cohort.ratios import TASK_ERRORS, errors_per_task, ratios_of
-from bsip_cli.report.cohort.record import CohortRecord, Member
-from bsip_cli.report.figures.workflow import Step
+from bsip_cli.report.cohort.document import SHOWN, cohort_document
+from bsip_cli.report.cohort.record import CohortRecord, Member, ratios_of, yardsticks_of
 from bsip_cli.report.origins import HowMade
-from bsip_cli.report.page import render
 from bsip_cli.report.records import Origin
 from bsip_cli.report.shared import Searched, searched
 from bsip_cli.report.tables.build import build_tables
 from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.stages.report import files_frame, origin_of, refusals_of, write_figures, write_text
+from bsip_cli.stages.report import files_frame, origin_of, refusals_of, write_page
 from bsip_cli.statistics.cohort import Criteria
-from bsip_cli.statistics.methods import OM
+from bsip_cli.statistics.methods import OM, RM
 from bsip_cli.study.study import Participant
 
 
 def run(unit: Unit) -> None:
     document = cohort_document(record_of(unit))
-    folder = unit.out / "group"
-    files = [
-        write_text(folder / "report.html", render(document)),
-        *write_figures(folder / "figures", document),
-    ]
-    unit.write("group-report-files", files_frame(unit.out, files))
+    unit.write("group-report-files", files_frame(unit.out, write_page(unit, document)))
 
 
 # --- reading ------------------------------------------------------------------------------------
@@ -55,33 +45,30 @@ def record_of(unit: Unit) -> CohortRecord:
     def read(table: str, variable: str) -> pd.DataFrame:
         return unit.read("values", table=[table], variable=[variable])
 
+    use = {person.id: _use(unit, person) for person in unit.study.participants}
+    errors = yardsticks_of(read, use)
     return CohortRecord(
-        members=tuple(_member(unit, participant) for participant in unit.study.participants),
+        members=tuple(
+            _member(unit, person, use[person.id], errors.get(person.id, {}))
+            for person in unit.study.participants
+        ),
         ratios=ratios_of(read),
-        task_errors={name: errors_per_task(read, name) for name in TASK_ERRORS},
         tables=build_tables(
             unit.read("comparisons"), criteria, facts["fitted_on"], facts["missing"]
         ),
         table_files=tuple(unit.read("tables-files")["file"]),
         missing=tuple(_missing_sentence(gone) for gone in facts["missing"]),
         made=HowMade.of(_origins(unit)),
-        steps=steps(),
+        defaults=unit.shipped_options(),
         laboratory=unit.read("laboratory") if unit.has("laboratory") else None,
     )
 
 
-def steps() -> tuple[Step, ...]:
-    """The stages of the pipeline, those of one name as one."""
-    names = tuple(dict.fromkeys(stage.name for stage in STAGES))
-    return tuple(_step(name) for name in names)
-
-
-def _step(name: str) -> Step:
-    stages = stages_named(name)
-    before = {producer(kind).name for stage in stages for kind in stage.inputs} - {name}
-    levels = tuple(dict.fromkeys(stage.level for stage in stages))
-    order = dict.fromkeys(stage.name for stage in STAGES if stage.name in before)
-    return Step(name, levels, stages[0].summary, tuple(order))
+def _use(unit: Unit, participant: Participant) -> str:
+    """Which parameters to use; the table's where nothing was chosen."""
+    if not unit.path("choice", participant=participant).exists():
+        return RM
+    return str(unit.read("choice", participant=participant)["use"].iloc[0])
 
 
 def _missing_sentence(gone: dict) -> str:
@@ -89,7 +76,7 @@ def _missing_sentence(gone: dict) -> str:
     return f"{gone['sentence']}: not in table{'s' if len(numbers) > 1 else ''} {listing(numbers)}"
 
 
-def _member(unit: Unit, participant: Participant) -> Member:
+def _member(unit: Unit, participant: Participant, use: str, errors: Mapping[str, float]) -> Member:
     return Member(
         participant.id,
         _shown(unit, "person", participant),
@@ -97,6 +84,8 @@ def _member(unit: Unit, participant: Participant) -> Member:
         unit.path("report-files", participant=participant).exists(),
         refusals_of(unit, participant),
         _searched(unit, participant),
+        use if errors else "",
+        errors,
     )
 
 

@@ -1,13 +1,14 @@
-"""Report (participant): one HTML page with its figures, and the main figures as files.
+"""Report (participant): one HTML page; its figures and the numbers behind them as files.
 
-Reads quality, contacts, skeleton, marker-positions, person, kinematics, marker-residuals,
-marker-events, bsip, base-parameters, excitation, identification, reconstruction, fit,
-posturography; where they are there overall-diagnosis, overall-error-budget, detection,
-overall-gain, bsip-change, choice. Writes report-files.
+Reads quality, skeleton, marker-positions, person, kinematics, marker-residuals, marker-events,
+bsip, excitation, identification, reconstruction, fit; where they are there overall-diagnosis,
+overall-error-budget, detection, overall-gain, bsip-change, choice, joint-moments, joint-peaks.
+Writes report-files.
 """
 
 from __future__ import annotations
 
+from datetime import date
 from pathlib import Path
 
 import pandas as pd
@@ -15,9 +16,8 @@ import pandas as pd
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header, write_atomically
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.files.fingerprints import file_hash
-from bsip_cli.report.blocks import Document
-from bsip_cli.report.figures.canvas import to_png
-from bsip_cli.report.page import render
+from bsip_cli.report.blocks import Document, Grid, Picture
+from bsip_cli.report.page import FILES, render
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import (
     Origin,
@@ -35,14 +35,15 @@ from bsip_cli.study.study import Participant, Trial
 
 _TABLES = {  # field of a trial's record: kind of artifact
     "quality": "quality",
-    "contacts": "contacts",
     "kinematics": "kinematics",
     "residuals": "marker-residuals",
     "marker_events": "marker-events",
     "reconstruction": "reconstruction",
     "fit": "fit",
-    "posturography": "posturography",
+    "joint_moments": "joint-moments",
+    "joint_peaks": "joint-peaks",
 }
+_DIGITS = "%.6g"  # of a number in a CSV file
 _FOUND = {  # field of a participant's record: kind that is there only if its stage has run
     "diagnosis": "overall-diagnosis",
     "detection": "detection",
@@ -54,28 +55,20 @@ _FOUND = {  # field of a participant's record: kind that is there only if its st
 def run(unit: Unit) -> None:
     assert unit.participant is not None
     document = participant_document(record_of(unit))
-    folder = unit.out / unit.participant.id
-    files = [
-        write_text(folder / "report.html", render(document)),
-        *write_figures(folder / "figures", document),
-    ]
-    unit.write("report-files", files_frame(unit.out, files))
+    unit.write("report-files", files_frame(unit.out, write_page(unit, document)))
 
 
-def write_text(path: Path, text: str) -> Path:
-    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
-    return path
-
-
-def write_figures(folder: Path, document: Document) -> list[Path]:
-    """The named figures of a document as SVG and PNG."""
-    files = []
-    for picture in document.pictures():
-        if picture.name:
-            files += [
-                _write_bytes(folder / f"{picture.name}.svg", picture.svg),
-                _write_bytes(folder / f"{picture.name}.png", to_png(picture.figure)),
-            ]
+def write_page(unit: Unit, document: Document) -> list[Path]:
+    """The page, its figures, and the numbers behind them."""
+    folder = unit.out / (unit.participant.id if unit.participant else "group")
+    page = render(document).encode()
+    files = [_write_bytes(folder / "report.html", page)]
+    for block in document.blocks():
+        if isinstance(block, Picture):
+            files.append(_write_bytes(folder / FILES / f"{block.name}.svg", block.svg))
+        if isinstance(block, Picture | Grid) and block.data is not None:
+            numbers = block.data.to_csv(index=False, float_format=_DIGITS).encode()
+            files.append(_write_bytes(folder / FILES / f"{block.name}.csv", numbers))
     return files
 
 
@@ -101,16 +94,14 @@ def record_of(unit: Unit) -> ParticipantRecord:
     return ParticipantRecord(
         id=unit.participant.id,
         facts=unit.read("person").iloc[0],
-        skeleton=skeleton,
-        marker_positions=markers,
         bsip=unit.read("bsip"),
-        base_parameters=unit.read("base-parameters"),
         excitation=unit.read("excitation"),
         identification=unit.read("identification"),
         body=person_from(skeleton, markers, load_skeleton(unit.config.skeleton)),
         trials=tuple(_trial_record(unit, trial, usable) for trial in _by_role(unit.participant)),
         refusals=refusals_of(unit, unit.participant),
         origins=_origins(unit, usable),
+        defaults=unit.shipped_options(),
         loads=_loads(unit),
         gains=_extended(unit, "overall-gain"),
         changes=_extended(unit, "bsip-change"),
@@ -146,7 +137,12 @@ def _trial_record(unit: Unit, trial: Trial, usable: dict[str, set[Trial]]) -> Tr
     for name in ("reconstruction", "fit"):
         table = tables[name]
         tables[name] = with_all_causes(table) if table is not None else None
-    return TrialRecord(trial.stem, trial.task, trial.role, **tables)
+    return TrialRecord(trial.stem, trial.task, trial.role, **tables, file_date=_date(trial.path))
+
+
+def _date(path: Path) -> str:
+    """When the file was last changed; empty where it is not there."""
+    return str(date.fromtimestamp(path.stat().st_mtime)) if path.exists() else ""
 
 
 def refusals_of(unit: Unit, participant: Participant) -> tuple[Refusal, ...]:

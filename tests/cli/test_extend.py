@@ -297,12 +297,12 @@ def test_om_is_extended_by_the_estimator_that_made_it(run):
 
 
 def test_nothing_of_an_earlier_diagnosis_is_told(run):
-    told = "\n".join(shown(run.out))
+    told = "\n".join(shown(run.out, full=True))
     assert "What it does to the forces" in told
     path = run.path("overall-diagnosis")
     table, notes = run.read("overall-diagnosis"), read_header(path)["provenance"]
     write_artifact(path, "overall-diagnosis", table.assign(p_value=2e-4), notes)
-    told = "\n".join(shown(run.out))
+    told = "\n".join(shown(run.out, full=True))
     assert "What it does to the forces" not in told and "run `bsip extend`" in told
 
 

@@ -239,7 +239,12 @@ def test_listed_files_are_there_with_their_hash(first_run):
 
 
 def test_show_prints_the_tables(first_run, bsip):
-    answer = bsip("show", first_run.out)
+    brief = bsip("show", first_run.out)
+    assert brief.code == 0
+    assert len(brief.out.splitlines()) <= 24
+    assert [f"sub-0{k}: " in brief.out for k in (1, 2)] == [True, True]
+    assert "| " not in brief.out
+    answer = bsip("show", first_run.out, "--full")
     assert answer.code == 0
     assert str(first_run.out / "sub-02" / "report.html") in answer.out
     assert answer.out.count("| ") > 20

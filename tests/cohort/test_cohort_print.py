@@ -9,14 +9,11 @@ import pytest
 
 from bsip_cli.artifacts import read_header
 from bsip_cli.report.tables.build import BESIDE, NAMES, render_markdown, show
-from bsip_cli.report.tables.csv import to_csv
-from bsip_cli.report.tables.labels import segment
-from bsip_cli.report.tables.latex import escape as latex
-from bsip_cli.report.tables.latex import to_latex
-from bsip_cli.report.tables.markdown import escape as markdown
-from bsip_cli.report.tables.markdown import to_markdown
+from bsip_cli.report.tables.formats import escape_latex as latex
+from bsip_cli.report.tables.formats import escape_markdown as markdown
+from bsip_cli.report.tables.formats import to_csv, to_latex, to_markdown
+from bsip_cli.report.tables.labels import interval, mean_sd, number, p_value, segment
 from bsip_cli.report.tables.model import Column, Row, Table
-from bsip_cli.report.tables.numbers import interval, mean_sd, number, p_value
 from bsip_cli.statistics.cohort import Criteria
 
 NASTY = r"50% of A&B_1 #2 {x} ~y ^z $5 \end{table} a|b <b>*bold*</b> `c`"

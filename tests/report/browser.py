@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import fcntl
 import json
 import os
+import re
 import select
 import shutil
 import subprocess
@@ -48,6 +50,16 @@ class Page:
         )
         assert "exceptionDetails" not in found, found["exceptionDetails"]
         return found["result"].get("value")
+
+    def resize(self, width: int) -> None:
+        """The window of a phone, or of a desktop."""
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
+        self._ask("Emulation.setDeviceMetricsOverride", **size)
+
+    def sheets(self) -> int:
+        """How many pages of A4 it is in print."""
+        printed = self._ask("Page.printToPDF", preferCSSPageSize=True, printBackground=True)
+        return len(re.findall(rb"/Type\s*/Page\b", base64.b64decode(printed["data"])))
 
     def _ask(self, method: str, **parameters: Any) -> dict[str, Any]:
         self._number += 1

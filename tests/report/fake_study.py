@@ -12,10 +12,12 @@ import pandas as pd
 from bsip_cli.artifacts import write_artifact
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.schemas import SCHEMAS, bsip_names, share_name
+from bsip_cli.stages.joint_peaks import peaks_of
 from bsip_cli.statistics.methods import MEASURED, METHODS, OM, RM, RM_MASS
 from bsip_cli.study.study import Participant, Study, Trial
 
 MASS_KG, GRAVITY = 62.8, 9.80665
+LEFT_OUT = {"knee_l": "both feet are on one plate: 3 frames", "elbow_r": ""}
 MASS_FACTOR, ONE_NUMBER = 0.96, 0.9  # of RM+mass: its masses, and its errors, over RM's
 EVIL = "<script>alert('$x_1$')</script>"
 TASKS = {"static": "static", "sequence": "sequence", "basketball": "validation"}
@@ -116,7 +118,6 @@ class Artifacts:
         self.write("skeleton", self.skeleton_rows())
         self.write("marker-positions", self.markers())
         self.write("bsip", self.bsip())
-        self.write("base-parameters", base_parameters())
         self.write("excitation", excitation(self.skeleton))
         self.write("identification", self.identification(), None, f"mind {EVIL}")
         self.write("choice", choice())
@@ -130,12 +131,15 @@ class Artifacts:
 
     def write_trial(self, trial: Trial) -> None:
         self.write("quality", quality(), trial)
-        self.write("contacts", self.contacts(trial), trial)
         self.write("kinematics", self.kinematics(trial), trial)
         self.write("marker-residuals", self.residuals(trial), trial)
         self.write("marker-events", marker_events(), trial)
         self.write("reconstruction", self.reconstruction(trial), trial)
         self.write("fit", self.fit(trial), trial)
+        if trial.task != "static":
+            moments = self.joint_moments(trial)
+            self.write("joint-moments", moments, trial)
+            self.write("joint-peaks", peaks_of(moments, MASS_KG, LEFT_OUT), trial)
         self.write("posturography", posturography(), trial)
         self.write("correlation-difference", empty("correlation-difference"), trial)
 
@@ -275,20 +279,6 @@ class Artifacts:
         t = self.times(trial)
         return (t > 0.3) & (t < t[-1] - 0.4)
 
-    def contacts(self, trial: Trial) -> pd.DataFrame:
-        t, valid = self.times(trial), self.valid(trial)
-        lifted = (t > 1.0) & (t < 1.4)
-        return pd.DataFrame(
-            {
-                "time_s": t,
-                "left_on_ground": ~lifted,
-                "right_on_ground": np.ones(len(t), bool),
-                "left_on_plate": valid & ~lifted,
-                "right_on_plate": valid,
-                "valid": valid,
-            }
-        )
-
     def kinematics(self, trial: Trial) -> pd.DataFrame:
         t = self.times(trial)
         still = trial.task == "static"
@@ -365,6 +355,29 @@ class Artifacts:
             )
         return pd.concat(parts, ignore_index=True)
 
+    def joint_moments(self, trial: Trial) -> pd.DataFrame:
+        """Of the left knee and the right elbow; OM and a named fault make both larger."""
+        t, valid = self.times(trial), self.valid(trial)
+        sizes = {RM: 1.0, OM: 1.1, "OM+plate_rotation": 1.2}
+        parts = [
+            pd.DataFrame({"time_s": t, "method": method, "joint": joint, "axis": axis}).assign(
+                force_N=0.0,
+                force_sd_N=1.0,
+                moment_Nm=np.where(valid, size * top * np.sin(2 * np.pi * t / 2.5), np.nan),
+                moment_sd_Nm=2.0,
+                power_W=0.0,
+                power_sd_W=1.0,
+                valid=valid,
+            )
+            for method, size in sizes.items()
+            for joint, axes, top in (
+                ("knee_l", ("extension", "adduction"), 80.0),
+                ("elbow_r", ("flexion",), 5.0),
+            )
+            for axis in axes
+        ]
+        return pd.concat(parts, ignore_index=True)
+
     def fit(self, trial: Trial) -> pd.DataFrame:
         rows = []
         for method, size in self.sizes().items():
@@ -432,22 +445,6 @@ def quality() -> pd.DataFrame:
                 "level": "info",
             },
         ]
-    )
-
-
-def base_parameters() -> pd.DataFrame:
-    return pd.DataFrame(
-        {
-            "name": [f"parameter {k}" for k in range(14)],
-            "expression": [
-                f"mx(thigh_r) + {0.1 * k:.1f} m(shank_r) + m(foot_r)" for k in range(14)
-            ],
-            "value": np.linspace(0.1, 2.0, 14),
-            "unit": ["kg m"] * 14,
-            "sd": [0.01] * 14,
-            "sigma_percent": np.linspace(1.0, 77.0, 14),
-            "rm_value": np.linspace(0.1, 1.8, 14),
-        }
     )
 
 

@@ -10,9 +10,8 @@ import pytest
 
 from bsip_cli.artifacts import empty_table
 from bsip_cli.report.blocks import Grid
-from bsip_cli.report.cohort.document import cohort_document
-from bsip_cli.report.cohort.ratios import Ratios
-from bsip_cli.report.cohort.record import CohortRecord
+from bsip_cli.report.cohort.document import cohort_document, is_far
+from bsip_cli.report.cohort.record import CohortRecord, Ratios
 from bsip_cli.report.origins import HowMade
 from bsip_cli.report.words import MISSING
 from bsip_cli.schemas import column_names
@@ -77,14 +76,43 @@ def test_person_of_whom_nothing_was_identified(reports, tmp_path):
 
 def test_empty_cohort_gives_sentences(reports):
     record = record_of(reports.unit("report"))
-    nobody = {name: rows.iloc[:0] for name, rows in record.task_errors.items()}
     none = Ratios({}, held_out=False)
-    bare = CohortRecord(record.members[2:], none, nobody, (), (), (), HowMade(), record.steps)
+    bare = CohortRecord(record.members[2:], none, (), (), (), HowMade(), record.defaults)
     document = cohort_document(bare)
-    texts = [getattr(block, "text", "") for s in document.sections for block in s.blocks]
+    texts = [getattr(block, "text", "") for block in document.blocks()]
     assert "No trial could be compared with both methods." in texts
+    assert "No errors are known." in texts
     assert "No tables were made." in texts
-    assert [picture.name for picture in document.pictures()] == ["fig2_workflow"]
+    assert not list(document.pictures())
+
+
+def test_one_person_is_not_tested(reports):
+    record = record_of(reports.unit("report"))
+    document = cohort_document(replace(record, members=record.members[:1]))
+    (tables,) = [one for one in document.sections if one.anchor == "tables"]
+    said, files = tables.blocks
+    assert "there is nothing to test" in said.text
+    assert files.to
+
+
+def test_the_first_page_has_a_dot_per_person(reports, page):
+    front = page[: page.index("</main>")]
+    numbers = pd.read_csv(reports.out / "group" / "figures" / "yardsticks.csv")
+    assert list(numbers["participant"]) == ["sub-01", "sub-02", "sub-03"]
+    values = reports.unit("report").read("values", table=["table4"], variable=["grf_vertical"])
+    own = values[(values["participant"] == "sub-01") & (values["method"] == "OM")]
+    (held_out,) = own.loc[own["data"] == "held_out", "value"]
+    assert numbers["vertical_force_percent_bw"][0] == pytest.approx(held_out, rel=1e-4)
+    assert np.isnan(numbers["cop_mm"][2])
+    assert "Who could not be used, and why" in front
+
+
+def test_a_reader_is_led_to_those_who_lie_far_out():
+    usual = np.array([10.0, 11.0, 12.0, 13.0, 14.0, np.nan])
+    assert not is_far(usual, 5.0, 30.0).any()
+    assert list(is_far(np.append(usual, 25.0), 5.0, 30.0)).index(True) == 6
+    assert not is_far(np.append(usual, 25.0), 26.0, 30.0).any()  # as good as published
+    assert is_far(np.array([31.0]), 5.0, 30.0).all()
 
 
 def test_second_run_gives_the_same_bytes(reports):

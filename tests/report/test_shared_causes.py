@@ -11,8 +11,7 @@ from scipy.stats import norm
 
 from bsip_cli.report.blocks import Bullets, Grid
 from bsip_cli.report.cohort import diagnoses
-from bsip_cli.report.cohort.ratios import Ratios
-from bsip_cli.report.cohort.record import CohortRecord, Member
+from bsip_cli.report.cohort.record import CohortRecord, Member, Ratios
 from bsip_cli.report.origins import HowMade
 from bsip_cli.report.shared import named_people, searched, shared_causes
 from tests.report.fake_study import diagnosis
@@ -123,7 +122,7 @@ def test_many_people_are_counted():
 def cohort(**tables: pd.DataFrame | None) -> CohortRecord:
     found = {n: None if t is None else searched(n, t, FACTS) for n, t in tables.items()}
     members = tuple(Member(name, {}, {}, True, (), one) for name, one in found.items())
-    return CohortRecord(members, Ratios({}, held_out=False), {}, (), (), (), HowMade(), ())
+    return CohortRecord(members, Ratios({}, held_out=False), (), (), (), HowMade(), {})
 
 
 def text_of(record: CohortRecord) -> str:
@@ -154,14 +153,15 @@ def test_what_is_shared_stands_in_the_section():
 @pytest.mark.parametrize(
     ("tables", "said"),
     [
-        ({"ann": TURNED, "bob": NOTHING}, "Something is wrong in 1 of 2 participants: ann."),
-        ({"bob": NOTHING}, "Nothing wrong above the noise was found in 1 participant."),
-        ({"bob": None}, "Nobody's recordings were searched for errors"),
-        ({"bob": TURNED.iloc[:0]}, "No recording has motion"),
+        ({"ann": TURNED, "bob": NOTHING}, "Something is wrong in 1 of 2 participants. In ann."),
+        ({"bob": NOTHING}, "Nothing wrong above the noise in 1 participant."),
+        ({"bob": None}, "Inconclusive. Nobody's recordings were searched for errors"),
+        ({"bob": TURNED.iloc[:0]}, "Inconclusive. No recording has motion"),
     ],
 )
 def test_the_verdict_of_all(tables, said):
-    assert diagnoses.verdict(cohort(**tables)).text.startswith(said)
+    light = diagnoses.light(cohort(**tables))
+    assert f"{light.title}. {light.text}".startswith(said)
 
 
 def test_what_a_probability_means_is_said_where_something_was_found():

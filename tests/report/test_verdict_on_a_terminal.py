@@ -2,9 +2,9 @@
 
 import pandas as pd
 
-from bsip_cli.commands.show import verdict_text
+from bsip_cli.commands.show import shown, verdict_text
 from bsip_cli.report.verdict import put_right_sentence, verdict_of
-from tests.report.fake_study import detection, diagnosis, marker_events
+from tests.report.fake_study import Artifacts, detection, diagnosis, marker_events
 
 TRIALS = ["sub-01_task-sequence_run-1", "sub-01_task-basketball_run-1"]
 
@@ -37,3 +37,24 @@ def test_a_file_cannot_send_commands_to_the_terminal():
     text = text_of(table)
     assert "Marker ?[2J?KNEE? sits wrong" in text
     assert all(c.isprintable() or c == "\n" for c in text)
+
+
+def test_a_person_fits_on_a_screen_the_most_important_first(reports, tmp_path):
+    person = reports.study.participants[0]
+    Artifacts(tmp_path, person).write_all()
+    text = "\n".join(shown(tmp_path))
+    assert len(text.splitlines()) <= 24 and max(map(len, text.splitlines())) <= 100
+    assert text.startswith("sub-01: Something is wrong: 1 cause named and 1 narrowed down")
+    flat = " ".join(text.split())
+    assert " 1. Plate 1 is turned by +2.0 degrees" in flat
+    assert "Use OM: it errs less." in flat
+    assert "Identification (OM against RM) changes" in flat
+    full = "\n".join(shown(tmp_path, full=True))
+    assert "## Is anything wrong: sub-01" in full and len(full) > len(text)
+
+
+def test_of_several_people_each_has_a_line(reports):
+    text = "\n".join(shown(reports.out))
+    assert "sub-01: Something is wrong" in text and "sub-02: Something is wrong" in text
+    assert "Plate 1 is turned" not in text
+    assert text.rstrip().endswith("report: " + str(reports.out / "group" / "report.html"))

@@ -4,10 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bsip_cli.report.figures.canvas import plain, runs, thinned
+from bsip_cli.report.figures.canvas import middle_of_longest, plain, runs, thinned
 from bsip_cli.report.gains import Gain, gains_of, one_number_alone, pooled_gains
 from bsip_cli.report.page import _tied
-from bsip_cli.report.windows import hull_of, middle_of_longest
 from bsip_cli.report.words import (
     component_label,
     count,
@@ -91,11 +90,6 @@ def test_window_is_the_middle_of_the_longest_stretch():
     assert np.ptp(time[window]) == pytest.approx(10.0, abs=0.11)
     assert middle_of_longest(time, np.zeros(300, dtype=bool), 10.0) == slice(0, 0)
     assert middle_of_longest(time, time < 4.0, 10.0) == slice(0, 40)
-
-
-def test_hull():
-    assert hull_of(np.array([0, 0, 1, 0, 1, 0, 0], dtype=bool), 1) == slice(1, 6)
-    assert hull_of(np.zeros(4, dtype=bool), 1) == slice(0, 0)
 
 
 def test_gains():

@@ -1,4 +1,4 @@
-"""Section 3: what is wrong in whose recordings, and what several people share."""
+"""What is wrong in whose recordings, and what several people share."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Paragraph, Section
+from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Light, Paragraph, Section
 from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.shared import SHARED, Cause, Searched, named_people, shared_causes
-from bsip_cli.report.verdict import probability_of, probability_words
+from bsip_cli.report.verdict import is_large, probability_of, probability_words
 from bsip_cli.report.words import MISSING, capital, count, labelled, listing
 
 _NOT_RUN = "Nobody's recordings were searched for errors: run `bsip diagnose`."
@@ -20,26 +20,27 @@ _SOME_ARE_WRONG = (
 )
 
 
-def verdict(record: CohortRecord) -> Paragraph:
-    """One paragraph on whether anything is wrong."""
+def light(record: CohortRecord) -> Light:
+    """Whether anything is wrong in anybody's recordings."""
     people = _people(record)
     asked = [p for p in people if p.was_searched]
     if not asked:
-        return Paragraph(f"{_NO_TRIAL}." if people else _NOT_RUN, "note")
-    wrong = [p.id for p in asked if p.causes]
+        return Light("inconclusive", "Inconclusive", f"{_NO_TRIAL}." if people else _NOT_RUN)
+    wrong = [p for p in asked if p.causes]
     how_many = count(len(asked), "participant")
     if not wrong:
-        return Paragraph(f"Nothing wrong above the noise was found in {how_many}.", "good")
-    return Paragraph(
-        f"Something is wrong in {len(wrong)} of {how_many}: {named_people(wrong)}. The section on "
-        "what is wrong in the recordings says what.",
-        "warning",
-    )
+        return Light("fine", f"Nothing wrong above the noise in {how_many}", "")
+    large = [p.id for p in wrong if any(is_large(cause) for cause in p.causes)]
+    names = named_people([p.id for p in wrong])
+    said = f"In {names}." + (f" Large, cause unknown: {named_people(large)}." if large else "")
+    shared = " ".join(shared_causes(people)[:2])
+    title = f"Something is wrong in {len(wrong)} of {how_many}"
+    return Light("large" if large else "cause", title, f"{said} {shared}".rstrip())
 
 
 def section(record: CohortRecord) -> Section:
     people = _people(record)
-    blocks: list[Block] = [] if people else [verdict(record)]
+    blocks: list[Block] = [] if people else [Paragraph(_NOT_RUN, "note")]
     blocks += _unsearched(record)
     blocks += [Paragraph(text, "good") for text in _nothing_found(people)]
     reports = {m.id for m in record.members if m.has_report}

@@ -1,34 +1,239 @@
-"""The report of the cohort: its sections in order."""
+"""The report of the cohort: a first page, and folded sections."""
 
 from __future__ import annotations
 
-from bsip_cli.report.blocks import Document
-from bsip_cli.report.cohort import (
-    diagnoses,
-    gain,
-    laboratory,
-    limits,
-    people,
-    published_tables,
-    summary,
-)
-from bsip_cli.report.cohort.record import CohortRecord
-from bsip_cli.report.words import WHAT_METHODS_ARE
+from collections.abc import Iterator
+from pathlib import PurePosixPath
 
-SECTIONS = (
-    summary.section,
-    people.section,
-    diagnoses.section,
-    laboratory.section,
-    gain.section,
-    published_tables.section,
-    limits.section,
+import numpy as np
+import pandas as pd
+
+from bsip_cli.report.blocks import (
+    Block,
+    Bullets,
+    Cell,
+    Document,
+    Grid,
+    Heading,
+    Links,
+    Paragraph,
+    Picture,
+    Section,
+    Terms,
 )
+from bsip_cli.report.cohort import diagnoses, gain, laboratory
+from bsip_cli.report.cohort.record import CohortRecord, Member
+from bsip_cli.report.figures.strips import Strip, strips
+from bsip_cli.report.origins import how_made
+from bsip_cli.report.tables.build import BUILDERS
+from bsip_cli.report.tables.model import Table
+from bsip_cli.report.words import MISSING, count, listing, number, signed, significant, trial_label
+from bsip_cli.report.yardsticks import COP_LIMIT_M, FORCE_LIMIT_PERCENT, Yardstick, yardsticks
+
+SHOWN = {
+    "person": ("calibration_trial", "sex", "mass_kg", "plate_mass_kg", "height_m", "marker_rms_m"),
+    "identification": ("duration_s", "condition_number"),
+}
+"""Columns of a participant's artifacts that are shown."""
+
+_MOST = 6  # sentences of a kind on the first page
+_FAR = 3.0
+"""Robust standard deviations (median absolute deviation times 1.4826) beyond the median: Leys 2013,
+J Exp Soc Psychol 49, 764."""
+_FEWEST = 5  # persons among whom one can lie far out
 
 
 def cohort_document(record: CohortRecord) -> Document:
     return Document(
-        title="Cohort: segment inertial parameters and ground forces",
-        subtitle=f"{WHAT_METHODS_ARE} each person's own movement and ground forces.",
-        sections=tuple(section(record) for section in SECTIONS),
+        title="Cohort: does the motion explain the ground forces?",
+        subtitle="Ground forces computed from the motion, compared with the force plates.",
+        front=tuple(_front(record)),
+        sections=(
+            Section("people", "Who took part?", (_people(record),)),
+            diagnoses.section(record),
+            laboratory.section(record),
+            gain.section(record),
+            Section("tables", "The papers' tables", tuple(_tables(record))),
+            Section("made", "How was it made?", tuple(how_made(record.made, record.defaults))),
+        ),
     )
+
+
+# --- first page ---------------------------------------------------------------------------------
+
+
+def _front(record: CohortRecord) -> Iterator[Block]:
+    done = [m for m in record.members if m.facts is not None and m.identification is not None]
+    everyone = count(len(record.members), "participant")
+    uses = [m.use for m in record.members if m.use]
+    used = listing([f"{name} for {uses.count(name)}" for name in dict.fromkeys(uses)], "not known")
+    software = ", ".join(sorted(record.made.versions.get("bsip", ())))
+    yield Terms(
+        (
+            ("Participants", f"{len(done)} of {everyone} have identified parameters"),
+            ("Parameters to use", f"{used} (OM: identified; RM: table; RM+mass: table, scaled)"),
+            ("Software", f"bsip {software}"),
+        )
+    )
+    yield diagnoses.light(record)
+    yield Heading("How large are the errors?")
+    yield from _strips(record)
+    yield Heading("The laboratory")
+    yield from laboratory.first(record)
+    missing = _missing(record)
+    yield Heading("Who could not be used, and why")
+    if missing:
+        yield Bullets(tuple(missing[:_MOST]), "warning")
+        if len(missing) > _MOST:
+            yield Paragraph(f"{len(missing) - _MOST} more in the participants' reports.", "note")
+    else:
+        yield Paragraph("Nobody is missing.")
+
+
+def _yardsticks(record: CohortRecord) -> tuple[Yardstick, ...]:
+    diagnosis = record.defaults["diagnosis"]
+    limits = (
+        record.made.number(f"diagnosis.{name}", float(diagnosis[name]))
+        for name in (COP_LIMIT_M, FORCE_LIMIT_PERCENT)
+    )
+    return yardsticks(*limits)
+
+
+def _strips(record: CohortRecord) -> Iterator[Block]:
+    members = record.members
+    rows = {"participant": [member.id for member in members]}
+    drawn, far_out = [], []
+    for one in _yardsticks(record):
+        values = np.array([member.yardstick(one.name) for member in members], dtype=float)
+        far = is_far(values, one.good, one.limit)
+        title = f"{one.title} [{one.unit}]".replace("Centre of pressure (COP)", "COP")
+        names = tuple(member.id for member in members)
+        drawn.append(Strip(title, values, names, far, one.good, one.limit))
+        rows[one.name] = list(values)
+        far_out += [
+            (f"{member.id} ({one.title.partition(' (')[0].lower()} {number(v)} {one.unit})", member)
+            for member, v, is_out in zip(members, values, far, strict=True)
+            if is_out
+        ]
+    if not any(np.isfinite(strip.values).any() for strip in drawn):
+        yield Paragraph("No errors are known.", "warning")
+        return
+    yield Picture(
+        strips(drawn),
+        "yardsticks",
+        "A dot per person, with the parameters to use; the line is the median. Blue: as good as "
+        "published (Hansen 2017, table 4; markers: a standing person). Red: large (Hicks 2015; "
+        "OpenSim's checklist).",
+        "Strips of dots: errors per person.",
+        "low and close together is good. All high: the laboratory. One high: that person.",
+        "",
+        pd.DataFrame(rows),
+    )
+    linked = tuple((words, member.link()) for words, member in far_out if member.link())
+    if linked:
+        yield Links("Far from the others, or large:", linked[: 2 * _MOST])
+    elif far_out:
+        yield Paragraph(f"Far from the others, or large: {listing([w for w, _ in far_out])}.")
+    else:
+        yield Paragraph("Nobody lies far from the others, and no error is large.")
+
+
+def is_far(values: np.ndarray, good: float, limit: float) -> np.ndarray:
+    """(p,) of values that are large, or not good and far above the others."""
+    known = values[np.isfinite(values)]
+    beyond = np.inf
+    if len(known) >= _FEWEST:
+        middle = float(np.median(known))
+        beyond = middle + _FAR * 1.4826 * float(np.median(np.abs(known - middle)))
+    return np.nan_to_num(values) > min(limit, max(good, beyond))
+
+
+def _missing(record: CohortRecord) -> list[str]:
+    sentences = list(record.missing)
+    for member in record.members:
+        sentences += [
+            f"{', '.join(filter(None, (member.id, r.unit)))}, {r.stage} refused: {r.sentence}"
+            for r in member.refusals
+        ]
+        if member.identification is None and not any(member.id in s for s in sentences):
+            sentences.append(f"{member.id} has no identified parameters; no refusal says why.")
+    return list(dict.fromkeys(sentences))
+
+
+# --- people -------------------------------------------------------------------------------------
+
+
+def _people(record: CohortRecord) -> Grid:
+    head = (
+        "participant",
+        "calibrated on",
+        "sex",
+        "use",
+        "mass [kg]",
+        "plates against it [%]",
+        "height [m]",
+        *(f"{one.title} [{one.unit}]" for one in _yardsticks(record)),
+        "identified on [s]",
+        "condition number",
+        "refusals",
+    )
+    rows = tuple(_person(record, member) for member in record.members)
+    return Grid(head, rows, words=4)
+
+
+def _person(record: CohortRecord, member: Member) -> tuple[str | Cell, ...]:
+    name = Cell(member.id, link=member.link())
+    refusals = Cell(str(len(member.refusals)), "warning" if member.refusals else "")
+    if member.facts is None:
+        return (name, *[MISSING] * 11, refusals)
+    facts, identified = member.facts, member.identification or {}
+    values = ((one, member.yardstick(one.name)) for one in _yardsticks(record))
+    return (
+        name,
+        trial_label(str(facts["calibration_trial"])),
+        str(facts["sex"]),
+        member.use or MISSING,
+        number(facts["mass_kg"], 2),
+        signed(100.0 * (facts["plate_mass_kg"] / facts["mass_kg"] - 1.0), 1),
+        number(facts["height_m"], 2),
+        *(Cell(number(v), "warning" if one.words(v) == "large" else "") for one, v in values),
+        number(identified.get("duration_s")),
+        significant(identified.get("condition_number")),
+        refusals,
+    )
+
+
+# --- tables -------------------------------------------------------------------------------------
+
+
+def _tables(record: CohortRecord) -> Iterator[Block]:
+    """With their legends; tests compare people, so a single one has none."""
+    people = [member for member in record.members if member.identification is not None]
+    if not record.tables:
+        yield Paragraph("No tables were made.", "warning")
+    elif len(people) < 2:
+        yield Paragraph("Tests compare people: of one person there is nothing to test.", "note")
+    else:
+        for table in record.tables[: len(BUILDERS)]:  # those beside print are in the files
+            yield Heading(table.title)
+            yield from _table(table)
+            yield from (Paragraph(note, "note") for note in table.notes)
+    if record.table_files:
+        files = [(PurePosixPath(file).name, f"../{file}") for file in record.table_files]
+        yield Links("The tables as files:", tuple(files))
+
+
+def _table(table: Table) -> Iterator[Block]:
+    columns = table.printed_columns()
+    if not table.rows:
+        yield Paragraph("There are no numbers for this table.", "note")
+        return
+    words = next((k for k, column in enumerate(columns) if not column.text), len(columns))
+    rows: list[tuple[str | Cell, ...]] = []
+    group = ""
+    for row in table.rows:
+        if row.group != group:
+            group = row.group
+            rows.append((Cell(group, "group"), *[""] * (len(columns) - 1)))
+        rows.append(table.printed_cells(row))
+    yield Grid(tuple(column.heading for column in columns), tuple(rows), words=max(1, words))

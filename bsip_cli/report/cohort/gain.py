@@ -1,79 +1,101 @@
-"""Section 5: the gain of identification, participant by participant."""
+"""The gain of identification, participant by participant."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
+import pandas as pd
 
-from bsip_cli.report.blocks import Block, Heading, Paragraph, Picture, Section
-from bsip_cli.report.cohort.record import CohortRecord
-from bsip_cli.report.figures.errors_per_task import ErrorsPerTask, errors_per_task
-from bsip_cli.report.figures.gain_dots import GainDots, gain_dots
-from bsip_cli.report.words import component_label
-from bsip_cli.statistics.methods import METHODS, RM
-
-_ERRORS = (
-    ("cop_error", "COP error [mm]", "errors_cop"),
-    ("grf_vertical", "vertical force error [% BW]", "errors_vertical_force"),
-)
-_DATA = {"identification": "used to identify", "held_out": "held out"}
+from bsip_cli.report.blocks import Block, Grid, Paragraph, Picture, Section
+from bsip_cli.report.cohort.record import CohortRecord, Ratios
+from bsip_cli.report.figures.strips import gain_dots
+from bsip_cli.report.gains import one_number_alone
+from bsip_cli.report.words import component_label, listing, percent, signed
+from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
 
 
 def section(record: CohortRecord) -> Section:
-    blocks = [*_dots(record), Heading("Errors per movement")]
-    for variable, quantity, name in _ERRORS:
-        blocks += _per_task(record, variable, quantity, name)
-    return Section("gain", "How much identification gains", tuple(blocks))
+    return Section("gain", "Do identified parameters follow the forces better?", (*_gain(record),))
 
 
-def _dots(record: CohortRecord) -> list[Block]:
-    ratios, names = record.ratios, tuple(record.ratios.of_component)
+def _gain(record: CohortRecord) -> Iterator[Block]:
+    ratios = record.ratios
+    names = tuple(ratios.of_component)
     if not names:
-        return [Paragraph("There is no error of both methods to compare.", "warning")]
-    of_method = {
-        method: np.array([ratios.over_rm(name, method) for name in names])
-        for method in METHODS
-        if method != RM
-    }
-    data = GainDots(tuple(component_label(name) for name in names), of_method)
-    where = "held-out data" if record.ratios.held_out else "the data that identified the parameters"
-    caption = (
-        f"Error of RM+mass and of OM over error of RM, on {where}; a dot per participant (in the "
-        "order of the participants, from top to bottom), the bar their geometric mean. What RM+mass "
-        "gains is one number's doing, no gain of identification. The scale is one of ratios: half "
-        "and double lie equally far from 1."
-    )
-    return [
-        Picture(
-            gain_dots(data),
-            caption,
-            "Dots: error ratios RM+mass to RM and OM to RM per component.",
-            "gain",
+        yield Paragraph("No trial could be compared with both methods.", "warning")
+        return
+    if not ratios.held_out:
+        yield Paragraph(
+            "Nobody has held-out data: these numbers are from the data that identified the "
+            "parameters, and favour OM.",
+            "warning",
         )
-    ]
+    worse = [component_label(name) for name in names if _is_worse(ratios.over_rival(name))]
+    yield Paragraph(
+        f"RM or RM+mass follows better on the whole, or in more participants, in: {listing(worse)}."
+        if worse
+        else "OM follows better than RM and RM+mass in every component.",
+        "warning" if worse else "good",
+    )
+    yield from _one_number(ratios)
+    others = [method for method in METHODS if method != RM]
+    of_method = {m: np.array([ratios.over_rm(name, m) for name in names]) for m in others}
+    where = "held-out data" if ratios.held_out else "the data that identified the parameters"
+    data = pd.concat(table.assign(component=name) for name, table in ratios.of_component.items())
+    yield Picture(
+        gain_dots([component_label(name) for name in names], of_method),
+        "gain",
+        f"Error of RM+mass and of OM over error of RM, on {where}; a dot per participant, the bar "
+        "their geometric mean.",
+        "Dots: error ratios per component.",
+        "left of 1 follows better. What RM+mass gains is one number's doing, no gain of "
+        "identification.",
+        "use OM only where its dots lie left of those of RM+mass.",
+        data.reset_index(),
+    )
+    yield Grid(
+        ("component", RM_MASS, OM, "OM better", "RM or RM+mass better", "the same", "all"),
+        tuple(_row(name, ratios) for name in names),
+        f"Change of the error from RM. The same: within {percent(SAME_WITHIN)} %.",
+        groups=(("", 1), ("typical change [%]", 2), ("number of participants", 4)),
+    )
 
 
-def _per_task(record: CohortRecord, variable: str, quantity: str, name: str) -> list[Block]:
-    rows = record.task_errors[variable].dropna(subset=list(METHODS), how="all")
-    if rows.empty:
-        return [Paragraph(f"There is no {quantity} to show.", "note")]
-    keys = list(dict.fromkeys(zip(rows["task"], rows["data"], strict=True)))
-    people = sorted(rows["participant"].unique())
-    wide = rows.set_index(["task", "data", "participant"])
-    errors = {
-        method: np.array(
-            [[wide[method].get((*key, person), np.nan) for person in people] for key in keys]
-        )
-        for method in METHODS
-    }
-    tasks, data = zip(*((task, _DATA.get(how, how)) for task, how in keys), strict=True)
-    caption = (
-        f"{quantity} per movement and participant (mean over the runs); from left to right "
-        "RM, RM+mass and OM, thick lines are the means. The COP error is the length of the errors "
-        "in both directions."
-        if variable == "cop_error"
-        else f"{quantity} per movement and participant, as above."
+def _one_number(ratios: Ratios) -> Iterator[Block]:
+    """What one number for the whole mass does without identification."""
+    name = "grf_vertical"
+    if name in ratios.of_component:
+        rm_mass, om = (_typical(ratios.over_rm(name, method)) for method in (RM_MASS, OM))
+        if np.isfinite(rm_mass):
+            over = (1 + om) / (1 + rm_mass) - 1
+            yield Paragraph(one_number_alone(component_label(name), rm_mass, om, over))
+
+
+def _typical(ratios: np.ndarray) -> float:
+    """Relative change of the errors, their geometric mean; NaN without any."""
+    known = ratios[np.isfinite(ratios)]
+    return float(np.exp(np.log(known).mean())) - 1.0 if len(known) else float("nan")
+
+
+def _counts(ratios: np.ndarray) -> tuple[int, int, int]:
+    """In how many participants OM is better, in how many worse, and of how many."""
+    better, worse = int((ratios < 1 - SAME_WITHIN).sum()), int((ratios > 1 + SAME_WITHIN).sum())
+    return better, worse, int(np.isfinite(ratios).sum())
+
+
+def _is_worse(ratios: np.ndarray) -> bool:
+    better, worse, _ = _counts(ratios)
+    return _typical(ratios) > 0.0 or worse > better
+
+
+def _row(component: str, ratios: Ratios) -> tuple[str, ...]:
+    better, worse, everyone = _counts(ratios.over_rival(component))
+    return (
+        component_label(component),
+        *(signed(100.0 * _typical(ratios.over_rm(component, m))) for m in (RM_MASS, OM)),
+        str(better),
+        str(worse),
+        str(everyone - better - worse),
+        str(everyone),
     )
-    figure = errors_per_task(ErrorsPerTask(tasks, data, errors, quantity))
-    return [
-        Picture(figure, caption, f"Points: {quantity} of RM, RM+mass and OM per movement.", name)
-    ]

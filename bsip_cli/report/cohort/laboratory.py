@@ -1,4 +1,4 @@
-"""Section 4: plates, clock and vertical by all persons together, and what to do."""
+"""Plates, clock and vertical by all persons together, and what to do."""
 
 from __future__ import annotations
 
@@ -28,14 +28,23 @@ _WHAT_TO_DO = (
 )
 
 
+def first(record: CohortRecord) -> Iterator[Block]:
+    """For the first page: what is wrong with it, or what would have been named."""
+    if record.laboratory is None:
+        yield Paragraph(_NOT_RUN, "note")
+        return
+    said = tuple(named_sentences(record.laboratory))
+    if said:
+        yield Bullets(said, "warning")
+        yield Paragraph(_WHAT_TO_DO, "note")
+    yield from (Paragraph(text, "good") for text in unnamed_sentences(record.laboratory))
+
+
 def section(record: CohortRecord) -> Section:
     table = record.laboratory
     if table is None:
         return Section("laboratory", "The laboratory", (Paragraph(_NOT_RUN, "note"),))
-    blocks: list[Block] = []
-    if sentences := tuple(named_sentences(table)):
-        blocks += [Bullets(sentences, "warning"), Paragraph(_WHAT_TO_DO, "note")]
-    blocks += [Paragraph(text, "good") for text in unnamed_sentences(table)]
+    blocks: list[Block] = [*first(record)]
     for number, rows in table[table["scope"] == "laboratory"].groupby("laboratory"):
         cells = tuple(_row(row) for row in rows.to_dict("records") if _is_listed(row))
         blocks.append(Grid(_HEAD, cells, f"Laboratory {number}. {_CAPTION}", words=3))

@@ -1,210 +1,79 @@
-"""Section 2: what the simulation gets wrong, of which causes, and what could not be seen."""
+"""What is wrong, and how sure that is: causes, their size and effect, and what could not be seen."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from math import inf, isfinite
 
-import numpy as np
 import pandas as pd
 
-from bsip_cli.report.blocks import (
-    Block,
-    Cell,
-    Grid,
-    Heading,
-    Mark,
-    Numbered,
-    Paragraph,
-    Picture,
-    Section,
-    Tone,
+from bsip_cli.report.blocks import Block, Cell, Grid, Heading, Mark, Numbered, Paragraph, Section
+from bsip_cli.report.candidates import Candidate, Limit, candidates_of, limits_of
+from bsip_cli.report.effect_words import (
+    USUAL,
+    effect_title,
+    parameter_label,
+    place_label,
+    size_words,
+    usual_words,
 )
-from bsip_cli.report.budget import (
-    FIRST,
-    LEAST_TOLD_SIZE,
-    pieces,
-    segment_shares,
-    size_of,
-    trials_of,
-)
-from bsip_cli.report.candidates import Candidate, candidates_of
-from bsip_cli.report.figures.candidate_gains import CandidateGains, candidate_gains
-from bsip_cli.report.figures.error_bars import Bar, error_bars
-from bsip_cli.report.participant import detection, residual
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import (
-    change_sentence,
+    NOT_RUN,
     probability_words,
     put_right_sentence,
     verdict_of,
-    worth_telling,
 )
-from bsip_cli.report.words import (
-    MISSING,
-    capital,
-    component_label,
-    labelled,
-    number,
-    segment_label,
-    signed,
-)
-from bsip_cli.statistics.methods import OM
+from bsip_cli.report.words import MISSING, number, percent
 
-NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
-_MOST_IN_FIGURE = 12
-_LEAST_GAIN = 0.05  # percent: less prints as none
-
-
-def verdict(record: ParticipantRecord) -> list[Block]:
-    """What stands on the first screen."""
-    if record.diagnosis is None or record.detection is None:
-        return [Paragraph(NOT_RUN, "note")]
-    tables = (record.diagnosis, record.detection, record.gains, record.changes)
-    said = verdict_of(*tables, record.budget)
-    tone: Tone = "warning" if said.found or record.diagnosis.empty else "good"
-    blocks: list[Block] = [Paragraph(said.headline, tone)]
-    if said.causes:
-        blocks.append(Numbered(said.causes))
-    rest = (*put_right(record), *said.results, *said.advice, said.limits)
-    return [*blocks, *budget_bars(record), *(Paragraph(text) for text in rest if text)]
-
-
-def budget_bars(record: ParticipantRecord) -> list[Block]:
-    """What makes RM's error, trial by trial."""
-    budget = record.budget
-    if budget is None or budget.empty:
-        return []
-    bars = []
-    for stem, label in trials_of(budget):
-        for component in FIRST:
-            size, unit = size_of(budget, stem, component)
-            if size >= LEAST_TOLD_SIZE:
-                parts = tuple((p.label, p.share) for p in pieces(budget, stem, component))
-                name = f"{label}: {component_label(component)}, {number(size, 1)} {unit}"
-                bars.append(Bar(name, parts))
-    caption = (
-        "What makes the error of the table's parameters (RM), and how large it is. Each colour is "
-        "something that a simulation gets wrong; what stands left of zero makes the error smaller "
-        "where it is. Hatched: what nothing explains. Good: little is hatched, and the error is "
-        "small. Much that is hatched in a large error: something is wrong that has no name here; "
-        "look at the recording. A large part of the table's parameters: identified ones (OM) help."
-    )
-    text = "Bars: shares of the squared error by cause."
-    return [Picture(error_bars(bars), caption, text, "error_budget")]
-
-
-def put_right(record: ParticipantRecord) -> tuple[str, ...]:
-    """What of the markers was wrong and is no longer, before anything was diagnosed."""
-    tables = [(trial.stem, trial.marker_events) for trial in record.trials]
-    return put_right_sentence([(stem, t) for stem, t in tables if t is not None])
+_NEAREST = 4  # rejected causes that are listed
+_TOLD_BY_PART = ("plate_translation", "plate_rotation", "plate_gain", "missing_joint")
+_FAR = 20.0  # times the largest usual size: not seen at all
 
 
 def section(record: ParticipantRecord) -> Section:
-    odds = f"{record.option('diagnosis', 'fault_prior_odds', 0.1):g}"
-    named_from = f"{100 * record.option('diagnosis', 'named_from', 0.95):g}"
-    blocks: list[Block] = [
-        Paragraph(
-            "One statistical model explains the difference between measured and simulated ground "
-            "forces: by noise, by ordinary errors of ordinary size (segment parameters, joint "
-            "centres, markers, smoothing), and by causes from a catalogue of faults of plates, "
-            "clocks, markers and model. Causes join it one after the other, the most probable "
-            f"first, while one more is more probable than none. Before the data its odds are {odds} "
-            "to 1, spread evenly over the catalogue; the recordings decide the rest. Where "
-            "nearly every cause seems to explain something of a recording, that recording counts "
-            f"for less. A single name is said from a probability of {named_from} % on, else "
-            "the smallest group of names that holds as much; what is less probable is not told."
-        )
-    ]
     if record.diagnosis is None or record.detection is None:
-        blocks.append(Paragraph(NOT_RUN, "note"))
-    else:
-        blocks += [
-            Heading("The causes found, and those that came nearest"),
-            *ranking(candidates_of(record.diagnosis)),
-        ]
-        if record.gains is not None and len(record.gains):
-            blocks += [Heading("What the forces gain"), *gain_blocks(record.gains)]
-        if record.changes is not None and len(record.changes):
-            blocks += [Heading("What the body's parameters become"), *change_blocks(record)]
-        blocks += [
-            Heading("What might have gone unseen"),
-            *detection.blocks(record.detection, record.diagnosis, named_from),
-        ]
-    blocks += [*residual.blocks(record), *_segments(record)]
-    return Section("diagnosis", "What the simulation gets wrong", tuple(blocks))
-
-
-def _segments(record: ParticipantRecord) -> list[Block]:
-    """Which segments of the table make RM's error."""
-    if record.budget is None or record.budget.empty:
-        return []
-    return [
-        Heading("Which segments of the table are wrong"),
+        blocks: tuple[Block, ...] = (Paragraph(NOT_RUN, "note"),)
+        return Section("wrong", "Is anything wrong, and how sure is that?", blocks)
+    tables = (record.diagnosis, record.detection, record.gains, record.changes)
+    said = verdict_of(*tables)
+    events = [(t.stem, t.marker_events) for t in record.trials if t.marker_events is not None]
+    named_from = percent(record.option("diagnosis", "named_from"))
+    blocks = (
+        *([Numbered(said.causes)] if said.causes else [Paragraph(said.headline)]),
+        *(Paragraph(text) for text in (*put_right_sentence(events), *said.results)),
+        *ranking(candidates_of(record.diagnosis)),
+        Heading("What might have gone unseen"),
+        *limit_blocks(record.detection, record.diagnosis),
+        Heading("How this was decided"),
         Paragraph(
-            "The part of RM's squared error that goes with the mass, centre of mass and inertia of "
-            "each segment. Neighbours can take each other's part, and a share below zero makes the "
-            "error larger where it is; all segments together are the table's part of the budget."
+            "One statistical model explains the difference between measured and simulated forces by "
+            "noise, by ordinary errors of ordinary size (parameters, joint centres, markers, "
+            "smoothing) and by faults of a catalogue, which join one after the other while one more "
+            f"is more probable than none. A single name is said from {named_from} % on, else the "
+            "smallest group that holds as much."
         ),
-        Grid(
-            ("component", "largest shares of RM's squared error, with 95 % interval"),
-            tuple(segment_shares(record.budget)),
-            "Segments whose parameters make RM's error, all trials together",
-            words=2,
-        ),
-    ]
+    )
+    return Section("wrong", "Is anything wrong, and how sure is that?", blocks)
 
 
-# --- ranking ------------------------------------------------------------------------------------
+# --- causes -------------------------------------------------------------------------------------
 
 
-def ranking(candidates: Sequence[Candidate]) -> list[Block]:
-    """The candidates as a figure and in words."""
+def ranking(candidates: Sequence[Candidate]) -> tuple[Block, ...]:
+    """The causes that were found, and the nearest of those that were not."""
     if not candidates:
-        return [Paragraph("No cause of the catalogue came near.")]
-    numbered = list(enumerate(candidates, start=1))
-    known = [(k, one) for k, one in numbered if np.isfinite(one.gain[0])][:_MOST_IN_FIGURE]
-    blocks: list[Block] = []
-    if known:
-        gain, low, high = np.array([one.gain for _, one in known]).T
-        figure = candidate_gains(
-            CandidateGains(
-                tuple(_numbered(k, one) for k, one in known),
-                tuple(one.answer for _, one in known),
-                gain,
-                low,
-                high,
-            )
-        )
-        caption = (
-            "How much of the squared difference between measured and simulated forces (in units of "
-            "its noise) each cause that was found removes, given all others, in seconds that it was "
-            "not fitted to, with 95 % interval. An interval that reaches below zero may be no gain "
-            "at all; an arrow: it runs on. Letters in brackets: a group of which one is there; only "
-            "the member that is in the model has a gain."
-        )
-        blocks.append(Picture(figure, caption, "Dots: gain of each cause.", "diagnosis_causes"))
-    rows = tuple(_row(k, one) for k, one in numbered)
-    head = (
-        "cause",
-        "verdict",
-        "in words",
-        "recordings",
-        "scope",
-        "probability",
-        "changes [N or N m]",
-        "removes [%]",
-    )
+        return (Paragraph("No fault of the catalogue came near."),)
+    rejected = [one for one in candidates if one.verdict == "rejected"]
+    left_out = rejected[_NEAREST:]
+    rows = tuple(_row(k, one) for k, one in enumerate(candidates, start=1) if one not in left_out)
+    head = ("cause", "verdict", "recordings", "probability", "changes [N or N m]", "explains [%]")
     caption = (
-        "Causes that were found or came nearest. Scope: everybody recorded in the laboratory, this "
-        "person always, or single trials. Probability: that it is there, given all else that was "
-        "found. Changes: root mean square of what it does to the force or moment that it changes "
-        "most. Removes: of the squared difference in unseen seconds, with 95 % interval"
+        "Faults that were found or came nearest. Changes: root mean square in the force or moment "
+        "that changes most. Explains: of the squared difference in seconds that did not size it, "
+        "with 95 % interval."
     )
-    return [*blocks, Grid(head, rows, caption, words=5)]
-
-
-def _numbered(k: int, one: Candidate) -> str:
-    return f"{k}. {f'({one.class_id}) ' if one.class_id else ''}{one.label}"
+    return (Grid(head, rows, caption, words=3),)
 
 
 def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
@@ -215,87 +84,93 @@ def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
         "rejected": "not sure" if one.probability >= 0.5 else "not so",
     }
     return (
-        _numbered(k, one),
+        f"{k}. {f'({one.class_id}) ' if one.class_id else ''}{one.label}",
         Cell(answers.get(one.answer, one.answer), marks.get(one.verdict, "")),
-        capital(one.told()),
-        one.where(),
-        one.scope or MISSING,
+        one.where() if one.verdict != "rejected" else MISSING,
         probability_words(one.probability) or MISSING,
         number(one.rms_change, 1),
         one.removes(),
     )
 
 
-# --- gains --------------------------------------------------------------------------------------
+# --- limits -------------------------------------------------------------------------------------
 
 
-def gain_blocks(gains: pd.DataFrame) -> list[Block]:
-    """A ``gain`` table with rows: errors before and after the causes are in the model."""
-    rows = tuple(
-        (
-            component_label(r["component"]),
-            r["unit"],
-            number(r["rmse_before"], 2),
-            Cell(number(r["rmse_after"], 2), "better" if r["ci_low"] >= _LEAST_GAIN else ""),
-            f"{_whole(r['gain_percent'])} ({_whole(r['ci_low'])} to {_whole(r['ci_high'])})",
-        )
-        for r in gains.to_dict("records")
+def limit_blocks(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[Block, ...]:
+    """From the artifacts ``detection`` and ``diagnosis``."""
+    together = limits_of(detection, diagnosis)
+    alone = limits_of(detection, diagnosis, alone=True)
+    if not together:
+        return (Paragraph("The limits of detection are not known.", "note"),)
+    rows = tuple(row for effect in USUAL for row in _limit_rows(effect, together, alone))
+    head = ("fault", "in all recordings", "in one alone", "usual in laboratories")
+    caption = (
+        "Least size that would be named in 95 of 100 such recordings, from the best place and "
+        "recording to the worst. Good: below what is usual. Above: a usual fault may be there."
     )
-    return [
-        Paragraph(_data_words(gains)),
-        Grid(
-            ("component", "unit", "before", "after", "less by [%]"),
-            rows,
-            "Error of OM before and after the causes are in the model; ✓ marks a sure gain",
-            words=2,
-            groups=(("", 2), ("RMSE", 2), ("95 % interval", 1)),
-        ),
-    ]
+    return (*_never_seen(detection, diagnosis), Grid(head, rows, caption, words=4))
 
 
-def _whole(percent: float) -> str:
-    """Without decimals, but where only these tell it from zero."""
-    return number(percent, 0 if abs(percent) >= 1 else 1)
+def _never_seen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]:
+    """Causes, or parts of them, that these recordings do not show at all; what was found has no
+    limit either."""
+    told = set(diagnosis["effect"][diagnosis["verdict"] != "rejected"])
+    least: dict[str, dict[tuple[str, str], float]] = {}
+    for r in detection.to_dict("records"):
+        if r["effect"] not in told:
+            parts, part = least.setdefault(r["effect"], {}), (r["target"], r["parameter"])
+            parts[part] = min(r["limit"], parts.get(part, inf))
+    never = []
+    for effect, sizes in least.items():
+        hidden = [part for part, size in sizes.items() if not isfinite(size)]
+        if len(hidden) == len(sizes):
+            never.append(effect_title(effect))
+        elif hidden and effect in _TOLD_BY_PART:
+            words = "; ".join(_part(effect, *part) for part in hidden)
+            never.append(f"{effect_title(effect)} ({words})")
+    if not never:
+        return []
+    return [Paragraph(f"Not to be found here at any size that can be true: {', '.join(never)}.")]
 
 
-def _data_words(gains: pd.DataFrame) -> str:
-    """On which recordings, from ``held_out: a, b; identification: c``."""
-    kinds = {
-        "held_out": "seconds that identified no parameter",
-        "identification": "seconds that identified the parameters too",
-    }
-    parts = [text.partition(": ") for data in gains["data"].unique() for text in data.split("; ")]
-    said = [f"{labelled(stems)} ({kinds.get(kind, kind)})" for kind, _, stems in parts]
-    return (
-        "Every second was judged with sizes of the causes that were found without it, in "
-        f"{'; '.join(dict.fromkeys(said))}."
-    )
+def _part(effect: str, target: str, parameter: str) -> str:
+    """``plate 1, height``."""
+    places = [place_label(effect, target), parameter_label(effect, parameter)]
+    return ", ".join(filter(None, places))
 
 
-def change_blocks(record: ParticipantRecord) -> list[Block]:
-    """Masses and centres of mass before and after the causes are in the model."""
-    assert record.changes is not None
-    worth = worth_telling(record.changes)
-    if worth.empty:
-        return [Paragraph(change_sentence(record.changes))]
-    before = record.method(OM)
-    rows = tuple(
-        (
-            segment_label(r["segment"]),
-            number(before["mass_kg"].get(r["segment"]), 3),
-            number(before["mass_kg"].get(r["segment"], np.nan) + r["mass_change_kg"], 3),
-            signed(r["mass_change_kg"], 3),
-            number(1000 * r["com_change_m"], 1),
-        )
-        for r in worth.to_dict("records")
-    )
-    head = ("segment", "OM", "with the causes", "change", "centre of mass moves [mm]")
-    return [
-        Grid(
-            head,
-            rows,
-            "The identified parameters without and with the causes in the model, segments that "
-            "change",
-            groups=(("", 1), ("mass [kg]", 3), ("", 1)),
-        )
-    ]
+def _limit_rows(
+    effect: str, together: Sequence[Limit], alone: Sequence[Limit]
+) -> Iterator[tuple[str, ...]]:
+    """A row per unit: the range over all places and directions."""
+    lasting = [x for x in together if x.effect == effect and x.trials > 1]
+    single = [x for x in alone if x.effect == effect]
+    usual = USUAL[effect]
+    for unit in dict.fromkeys(x.unit for x in (*lasting, *single)):
+        columns = [
+            [x for x in limits if x.unit == unit and x.parameter in usual.parameters]
+            for limits in (lasting, single)
+        ]
+        if any(isfinite(x.size) for limits in columns for x in limits):
+            yield (
+                effect_title(effect),
+                *(_range(effect, limits) for limits in columns),
+                usual_words(effect) if usual.unit == unit else MISSING,
+            )
+
+
+def _range(effect: str, limits: Sequence[Limit]) -> str:
+    """``5.0 to 12 mm``; what no usual recording would show is not put in figures."""
+    if not limits:
+        return MISSING
+    best, worst = (end(limits, key=lambda x: x.size) for end in (min, max))
+    usual = USUAL[effect]
+    if not isfinite(best.size):
+        return "not at all"
+    if not isfinite(worst.size) or (usual.unit == best.unit and worst.size > _FAR * usual.most):
+        return f"from {best.in_words()}, or not at all"
+    words = [size_words(best.parameter, best.unit, size) for size in (best.size, worst.size)]
+    if words[0] == words[1]:
+        return words[0]
+    first = words[0].removesuffix("°") if words[0].endswith("°") else words[0].partition(" ")[0]
+    return f"{first} to {words[1]}"

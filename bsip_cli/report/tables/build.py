@@ -18,11 +18,8 @@ from bsip_cli.report.tables import (
     segment_mass,
     six_components,
 )
-from bsip_cli.report.tables.csv import to_csv
-from bsip_cli.report.tables.latex import to_latex
-from bsip_cli.report.tables.markdown import to_markdown
-from bsip_cli.report.tables.model import Table
-from bsip_cli.report.tables.results import Results
+from bsip_cli.report.tables.formats import to_csv, to_latex, to_markdown
+from bsip_cli.report.tables.model import Results, Table
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_values import Comparison
 

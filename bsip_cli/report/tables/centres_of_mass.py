@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from bsip_cli.report.tables import labels, notes, paired
-from bsip_cli.report.tables.model import Column, Row, Table
-from bsip_cli.report.tables.numbers import mean_sd
-from bsip_cli.report.tables.results import Results
+from bsip_cli.report.tables.labels import mean_sd
+from bsip_cli.report.tables.model import Column, Results, Row, Table
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_values import DIFFERENCE, Topic
 from bsip_cli.statistics.published.paper import load_paper

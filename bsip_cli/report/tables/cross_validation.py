@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from bsip_cli.report.tables import labels, notes, paired
-from bsip_cli.report.tables.model import Column, Row, Table
-from bsip_cli.report.tables.results import Results
+from bsip_cli.report.tables.model import Column, Results, Row, Table
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_values import Topic
 

@@ -1,9 +1,12 @@
-"""A table as data. Three renderers print it and know nothing of its content."""
+"""A table as data, and the comparisons of one table, found by what they are about."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+
+from bsip_cli.statistics.cohort_values import Comparison, Topic, joined
+from bsip_cli.statistics.methods import OM, RM
 
 Cell = str | float | int
 
@@ -62,3 +65,28 @@ def _printed(column: Column, row: Row) -> str:
     if all(value == "" for value in values):
         return ""
     return column.form(*values) + row.marks.get(column.heading, "")
+
+
+class Results:
+    """`topics` in the order in which they were computed."""
+
+    def __init__(self, comparisons: Iterable[Comparison]) -> None:
+        rows = tuple(comparisons)
+        self.topics = tuple(dict.fromkeys(row.topic for row in rows))
+        self._by_topic = {
+            topic: tuple(row for row in rows if row.topic == topic) for topic in self.topics
+        }
+        self._rows = {(row.topic, row.test, row.method_a, row.method_b): row for row in rows}
+
+    def find(self, topic: Topic, test: str, first: str = OM, second: str = RM) -> Comparison:
+        """The row, or one without any number if there is none."""
+        nothing = Comparison(topic, test, "added", first, second, reason="There are no such data.")
+        return self._rows.get((topic, test, first, second), nothing)
+
+    def about(self, topic: Topic) -> tuple[Comparison, ...]:
+        """Every row on the topic."""
+        return self._by_topic.get(topic, ())
+
+    def reasons(self, topic: Topic) -> str:
+        """Why tests on the topic are not possible, each reason once."""
+        return joined(*(row.reason for row in self.about(topic)))

@@ -6,8 +6,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from math import isnan
 
-from bsip_cli.report.tables.numbers import p_value
-from bsip_cli.report.tables.results import Results
+from bsip_cli.report.tables.labels import p_value
+from bsip_cli.report.tables.model import Results
 from bsip_cli.statistics.cohort_values import Comparison, Topic
 
 NAMED_AT_MOST = 6

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from bsip_cli.report.tables import notes
-from bsip_cli.report.tables.model import Cell, Column
-from bsip_cli.report.tables.numbers import count, counts_of, interval, mean_sd, number, p_value
-from bsip_cli.report.tables.results import Results
+from bsip_cli.report.tables.labels import count, counts_of, interval, mean_sd, number, p_value
+from bsip_cli.report.tables.model import Cell, Column, Results
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_values import Topic
 from bsip_cli.statistics.methods import OM, RIVALS, RM, RM_MASS

@@ -5,9 +5,8 @@ from __future__ import annotations
 from itertools import combinations
 
 from bsip_cli.report.tables import labels, notes, paired
-from bsip_cli.report.tables.model import Cell, Column, Row, Table
-from bsip_cli.report.tables.numbers import mean_sd, number, p_value
-from bsip_cli.report.tables.results import Results
+from bsip_cli.report.tables.labels import mean_sd, number, p_value
+from bsip_cli.report.tables.model import Cell, Column, Results, Row, Table
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_values import Comparison, Topic
 from bsip_cli.statistics.methods import MEASURED, OM, RM

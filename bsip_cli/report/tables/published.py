@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import nan
 
-from bsip_cli.report.tables.model import Cell, Column, Row, Table
-from bsip_cli.report.tables.numbers import count, mean_sd
-from bsip_cli.report.tables.results import Results
+from bsip_cli.report.tables.labels import count, mean_sd
+from bsip_cli.report.tables.model import Cell, Column, Results, Row, Table
 from bsip_cli.statistics.cohort_values import Comparison, Topic
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 from bsip_cli.statistics.published import paper as published

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from bsip_cli.report.tables import labels, notes, paired
-from bsip_cli.report.tables.model import Column, Row, Table
-from bsip_cli.report.tables.numbers import number, p_value
-from bsip_cli.report.tables.results import Results
+from bsip_cli.report.tables.labels import number, p_value
+from bsip_cli.report.tables.model import Column, Results, Row, Table
 from bsip_cli.statistics.cohort import DATA_SHARE, Criteria
 from bsip_cli.statistics.cohort_values import Topic
 from bsip_cli.statistics.methods import OM

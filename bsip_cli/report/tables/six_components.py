@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from bsip_cli.report.tables import labels, notes, paired
-from bsip_cli.report.tables.model import Cell, Column, Row, Table
-from bsip_cli.report.tables.numbers import count, counts_of, mean_sd, number, p_value
-from bsip_cli.report.tables.results import Results
+from bsip_cli.report.tables.labels import count, counts_of, mean_sd, number, p_value
+from bsip_cli.report.tables.model import Cell, Column, Results, Row, Table
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_values import Comparison, Topic, joined
 from bsip_cli.statistics.methods import OM, RM, RM_MASS

@@ -1,7 +1,4 @@
-"""The person as the model: bones, markers and the measured ground force, seen obliquely.
-
-As figure 1 of Hansen 2017.
-"""
+"""The person as the model: bones, markers and the measured ground force, seen obliquely."""
 
 from __future__ import annotations
 
@@ -10,48 +7,58 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from bsip_cli.report.figures.canvas import BLUE, FAINT, GREEN, INK, SOFT, house_style, new_figure
-from bsip_cli.report.poses import Poses
+from bsip_cli.report.figures.canvas import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    SOFT,
+    house_style,
+    new_figure,
+    plain,
+)
+from bsip_cli.report.sticks import Pose
 
 _YAW, _PITCH = np.radians(-140.0), np.radians(12.0)  # from the front, from their right
-_SIZE_MM = 95.0
-_LIMB_PT = 7.0
-_MARGIN_M = 0.08
+_WIDE_MM, _HIGH_MM = 62.0, 92.0
+_MARGIN_M = 0.06
 _TILE_M = 0.5
+_LIMBS = {"l": ("#9a9a9a", 2.2), "r": (INK, 1.8), "": (INK, 1.8)}
 
 
 @house_style()
-def body_model(poses: Poses, k: int) -> Figure:
-    """Pose number k."""
-    figure = new_figure(1.25 * _SIZE_MM, _SIZE_MM)
+def stick_figure(pose: Pose, trial: str) -> Figure:
+    """Left limbs grey, right ones black; the arrow of one body weight is half as long as the
+    person is tall."""
+    figure = new_figure(_HIGH_MM, _WIDE_MM)
     axes = figure.subplots()
-    centre = poses.bones_m[k, 0, 0].copy()
-    bones = projected(poses.bones_m[k], centre)
-    ground = projected(_tiles(poses.ground_m, centre), centre)
+    centre = pose.bones_m[0, 0]
+    ground = projected(_tiles(pose.ground_m, centre), centre)
     axes.add_collection(LineCollection(list(ground), colors=FAINT, linewidths=0.6))
-    axes.add_collection(
-        LineCollection(list(bones), colors="#dcdcdc", linewidths=_LIMB_PT, capstyle="round")
-    )
-    axes.add_collection(LineCollection(list(bones), colors=INK, linewidths=1.1, capstyle="round"))
-    head = projected(poses.head_m[k], centre)
-    axes.add_patch(Circle(tuple(head), poses.head_radius_m, fc="#dcdcdc", ec=INK, lw=1.1))
-    markers = projected(poses.markers_m[k], centre)
-    axes.plot(*markers.T, "o", ms=3.2, mfc="white", mec=BLUE, mew=1.0, label="markers")
-    foot, tip = (projected(x[k], centre) for x in (poses.force_m, poses.arrow_tips_m()))
-    points = [bones.reshape(-1, 2), markers, head[None] + poses.head_radius_m]
-    if np.isfinite(tip).all():
+    bones = projected(pose.bones_m, centre)
+    colours, widths = zip(*(_LIMBS[side] for side in pose.sides), strict=True)
+    axes.add_collection(LineCollection(list(bones), colors=colours, linewidths=widths))
+    head = projected(pose.head_m, centre)
+    axes.add_patch(Circle(tuple(head), pose.head_radius_m, fc="white", ec=INK, lw=1.4))
+    markers = projected(pose.markers_m, centre)
+    axes.plot(*markers.T, "o", ms=2.6, mfc="white", mec=BLUE, mew=0.8, label="markers")
+    points = [bones.reshape(-1, 2), markers, head[None] + pose.head_radius_m]
+    if np.isfinite(pose.force_N).all():
+        foot, tip = projected(pose.force_at_m, centre), projected(pose.tip_m(), centre)
         arrow = {"color": GREEN, "lw": 2.2, "arrowstyle": "-|>", "mutation_scale": 12}
         axes.annotate("", tuple(tip), tuple(foot), arrowprops=arrow)
-        size = float(np.linalg.norm(poses.forces_N[k]))
-        label = axes.annotate(f"{size:.0f} N", tuple(tip), (8, 4), textcoords="offset points")
+        label = axes.annotate(
+            f"{np.linalg.norm(pose.force_N):.0f} N", tuple(tip), (6, 2), textcoords="offset points"
+        )
         label.set(color=GREEN, fontsize=8.5, bbox={"fc": "white", "ec": "none", "pad": 1.0})
         points += [foot[None], tip[None]]
     everything = np.concatenate(points)
     low, high = everything.min(axis=0) - _MARGIN_M, everything.max(axis=0) + _MARGIN_M
-    axes.set_xlim(low[0], high[0] + _MARGIN_M)
+    axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
-    axes.legend(loc="lower left", frameon=False, fontsize=8, labelcolor=SOFT)
+    when = plain(trial) + f", {pose.time_s:.2f} s"
+    axes.text(0.5, 0.0, when, transform=axes.transAxes, fontsize=7.5, color=SOFT, ha="center")
     axes.set_axis_off()
     return figure
 

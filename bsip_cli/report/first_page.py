@@ -1,0 +1,256 @@
+"""The first page of a person's report: who, is anything wrong, how large, what to use and to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bsip_cli.report.blocks import (
+    Bar,
+    Block,
+    Bullets,
+    Heading,
+    Light,
+    Numbered,
+    Paragraph,
+    Portrait,
+    Scale,
+    Scales,
+    Terms,
+)
+from bsip_cli.report.budget import FIRST, LEAST_TOLD_SIZE, overall_pieces, size_of
+from bsip_cli.report.candidates import Candidate, candidates_of, causes_of, looked_at
+from bsip_cli.report.effect_words import separating_recording
+from bsip_cli.report.records import ParticipantRecord, TrialRecord
+from bsip_cli.report.sticks import Motion, Pose, poses_of
+from bsip_cli.report.verdict import cause_line, consequences, light_of
+from bsip_cli.report.words import capital, count, listing, number, signed
+from bsip_cli.report.yardsticks import (
+    COP_LIMIT_M,
+    FORCE_LIMIT_PERCENT,
+    MARKERS,
+    SOURCES,
+    Yardstick,
+    errors_of,
+    yardsticks,
+)
+from bsip_cli.statistics.choice import Difference
+from bsip_cli.statistics.methods import OM, RM, RM_MASS
+
+_SEXES = {"M": "man", "F": "woman"}
+_MOST = 3  # causes, and things to do
+_POSES = 8  # among which the one is chosen that is shown
+_WORDS = {
+    OM: "OM, the parameters identified from this person's movement",
+    RM_MASS: "RM+mass, the parameters of an anthropometric table, all masses times one number",
+    RM: "RM, the parameters of an anthropometric table (regression)",
+}
+
+
+def front(record: ParticipantRecord) -> tuple[Block, ...]:
+    """The blocks of the first page, in the order in which a reader asks."""
+    light = light_for(record)
+    return (
+        *portrait(record),
+        Terms((*who(record),)),
+        light,
+        *_causes(record),
+        *budget_bar(record),
+        Heading("How large are the errors?"),
+        Scales(scales(record)),
+        Paragraph(SOURCES, "note"),
+        Heading("Which parameters to use"),
+        Paragraph(use_sentence(record)),
+        Heading("What to do next"),
+        Bullets(tuple(to_do(record, light))),
+    )
+
+
+def light_for(record: ParticipantRecord) -> Light:
+    """That of the diagnosis; where no fault was found and an error is large all the same, that."""
+    light = light_of(record.diagnosis, record.detection, record.budget)
+    large = [y.title.lower() for y, value in measured_of(record) if y.words(value) == "large"]
+    if light.state != "fine" or not large:
+        return light
+    title = "No fault found, but an error is large"
+    text = f"Large: {listing(large)}; no fault of the catalogue explains it. {light.text}"
+    return Light("inconclusive", title, text)
+
+
+def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
+    """Names and what is known: the person, the recordings, the software."""
+    facts = record.facts
+    mass, plates = float(facts["mass_kg"]), float(facts["plate_mass_kg"])
+    person = f"{_SEXES.get(facts['sex'], 'sex not stated')}, {number(mass, 1)} kg ({facts['mass_source']}"
+    if np.isfinite(plates) and facts["mass_source"] != "plates":
+        person += f"; the plates say {signed(100.0 * (plates / mass - 1.0), 1)} %"
+    yield "Person", f"{record.id}, {person}), {number(facts['height_m'], 2)} m"
+    tasks = list(dict.fromkeys(trial.task for trial in record.trials))
+    dates = sorted(trial.file_date for trial in record.trials if trial.file_date)
+    saved = f"; files of {' to '.join(dict.fromkeys((dates[0], dates[-1])))}" if dates else ""
+    yield "Recordings", f"{len(record.trials)}: {listing(tasks)}{saved}"
+    used = listing([trial.label for trial in record.identification_trials()])
+    yield "Identified from", used
+    versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
+    yield "Software", f"bsip {', '.join(versions)}"
+    if record.facts["mass_note"]:
+        yield "Mass", f"{capital(str(record.facts['mass_note']))}."
+
+
+# --- the person ---------------------------------------------------------------------------------
+
+
+def portrait(record: ParticipantRecord) -> tuple[Block, ...]:
+    """The widest pose of the trials with a measured force; nothing without any pose."""
+    found = [(trial, pose) for trial in record.trials for pose in _poses(record, trial)]
+    if not found:
+        return ()
+    loaded = [one for one in found if one[1].is_loaded()] or found
+    trial, pose = max(loaded, key=lambda one: one[1].reach_m())
+    from bsip_cli.report.figures.person import stick_figure
+
+    shows = f"{trial.label}: left grey, right black, ground force green"
+    figure = stick_figure(pose, trial.label)
+    return (Portrait(figure, "person", shows, f"Stick figure. {shows}."),)
+
+
+def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
+    if trial.kinematics is None:
+        return ()
+    anterior = record.facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
+    weight = record.body_weight()
+    motion = Motion(record.body, trial.kinematics, trial.reconstruction, anterior, weight)
+    return poses_of(motion, _POSES)
+
+
+# --- is anything wrong --------------------------------------------------------------------------
+
+
+def _found(record: ParticipantRecord) -> tuple[tuple[Candidate, ...], ...]:
+    return () if record.diagnosis is None else causes_of(candidates_of(record.diagnosis))
+
+
+def cause_lines(record: ParticipantRecord) -> tuple[str, ...]:
+    """A line per cause that was found, the most probable first."""
+    if record.diagnosis is None or record.detection is None:
+        return ()
+    everywhere = looked_at(record.detection, record.diagnosis)
+    return tuple(cause_line(cause, everywhere) for cause in _found(record))
+
+
+def _causes(record: ParticipantRecord) -> Iterator[Block]:
+    lines = cause_lines(record)
+    if lines:
+        yield Numbered(lines[:_MOST])
+    if len(lines) > _MOST:
+        yield Paragraph(f"{len(lines) - _MOST} more below.", "note")
+
+
+def budget_bar(record: ParticipantRecord) -> tuple[Block, ...]:
+    """What makes the error of the table's parameters, as one bar."""
+    budget = record.budget
+    pieces = () if budget is None or budget.empty else overall_pieces(budget)
+    if budget is None or not pieces:
+        return ()
+    sizes = [(name, *size_of(budget, "", name)) for name in FIRST]
+    names = {"fz": "vertical force", "cop_ap": "COP forward", "cop_ml": "COP sideways"}
+    told = [f"{names[c]} {number(x)} {unit}" for c, x, unit in sizes if x >= LEAST_TOLD_SIZE]
+    return (
+        Bar(
+            "What makes the error of the table's parameters",
+            tuple((piece.label, piece.share) for piece in pieces),
+            f"Shares of the squared error ({listing(told)}). COP: centre of pressure.",
+        ),
+    )
+
+
+# --- how large ----------------------------------------------------------------------------------
+
+
+def measured_of(record: ParticipantRecord) -> tuple[tuple[Yardstick, float], ...]:
+    """The three yardsticks with this person's numbers, by the method that is to be used."""
+    fits = [trial.fit for trial in record.moving_trials() if trial.fit is not None]
+    values = errors_of(fits, record.use()) | {MARKERS: 1e3 * float(record.facts["marker_rms_m"])}
+    limits = (record.option("diagnosis", name) for name in (COP_LIMIT_M, FORCE_LIMIT_PERCENT))
+    return tuple((one, values[one.name]) for one in yardsticks(*limits))
+
+
+def scales(record: ParticipantRecord) -> tuple[Scale, ...]:
+    return tuple(yardstick.scale(value) for yardstick, value in measured_of(record))
+
+
+# --- which parameters ---------------------------------------------------------------------------
+
+
+def use_sentence(record: ParticipantRecord) -> str:
+    """Which method, by how much it is better than the others, and in which movements another."""
+    if record.choice is None or record.choice.empty:
+        return f"Use {_WORDS[RM]}: nothing was compared."
+    first = record.choice.iloc[0]
+    said = f"Use {_WORDS[str(first['use'])]}"
+    rivals = {OM: ("om", "the table's (RM)"), RM_MASS: ("rm_mass", "the table's own (RM)")}
+    name, other = rivals.get(str(first["use"]), ("om", "identified ones (OM)"))
+    change = _change(float(first[f"ratio_{name}"]), float(first[f"log_error_{name}"]))
+    if first["use"] == RM:
+        said += f": {other} change its error by {change}, which is no sure gain"
+    else:
+        said += f": against {other} the error changes by {change}"
+    judging = count(int(first["trials"]), "recording")
+    where = {
+        "whole_trials": f" in {judging} that identified nothing",
+        "held_out": f" in held-out seconds of {judging}",
+    }
+    said += f"{where.get(str(first['data']), '')}."
+    others = [
+        f"{method} for {listing(list(rows['movement']))}"
+        for method, rows in record.choice.iloc[1:].groupby("use")
+        if method != first["use"]
+    ]
+    rare = record.identification[record.identification["rare"].astype(bool)]
+    warned = [
+        f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare["method"]
+    ]
+    return " ".join([said, *([f"But {listing(others)}."] if others else []), *warned])
+
+
+def _change(ratio: float, log_error: float) -> str:
+    """``−45 to −31 %``: one standard error to either side."""
+    low, high = Difference.of_ratio(ratio, log_error).interval()
+    if not np.isfinite(low + high):
+        return f"{signed(100 * (ratio - 1))} %"
+    return f"{signed(100 * (low - 1))} to {signed(100 * (high - 1))} %"
+
+
+# --- what to do ---------------------------------------------------------------------------------
+
+
+def to_do(record: ParticipantRecord, light: Light) -> list[str]:
+    """At most three things, the most urgent first."""
+    causes = _found(record)
+    said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
+    said += [
+        f"To tell them apart: {separating_recording([(one.effect, one.target) for one in cause])}."
+        for cause in causes
+        if len(cause) > 1
+    ][:1]
+    said += consequences(causes)
+    large = [y.title for y, value in measured_of(record) if y.words(value) == "large"]
+    if light.state == "inconclusive" and not large:
+        said.append(
+            "Record a movement in which every foot that touches the ground stands on a plate."
+        )
+    if light.state == "fine":
+        said.append("Nothing needs to be corrected: use forces and parameters as they are.")
+    if large and light.state != "large":
+        said.append("Look at where and when the error is large, below, and at the recording there.")
+    return [*said[:_MOST]] if len(said) > 1 else [*said, *advice(record)][:_MOST]
+
+
+def advice(record: ParticipantRecord) -> list[str]:
+    """The movement that would tell most of the parameters, if any was computed."""
+    table = record.excitation
+    rows = table[table["quantity"] == "next"]
+    if rows.empty:
+        return []
+    return [f"To know the parameters better, record: {rows['text'].iloc[0]}."]

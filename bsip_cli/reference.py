@@ -166,7 +166,9 @@ def _what_it_is(effect: Effect) -> str:
 def _found(effect: str) -> str:
     """Of the blind suite's tables: cases, names, and intervals that hold the truth."""
     with (_RESULTS / "blind_effects.csv").open(encoding="utf-8", newline="") as file:
-        row = {one["hidden"]: one for one in csv.DictReader(file)}[effect]
+        row = {one["hidden"]: one for one in csv.DictReader(file)}.get(effect)
+    if row is None:
+        return "not yet in the tables of the blind suite"
     named, group = int(row["right name"]), int(row["right class"])
     said = f"named in {named} of {row['cases']}"
     said += f", in a group in {group}" if group else ""

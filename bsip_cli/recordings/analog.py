@@ -15,6 +15,7 @@ _FAR = 0.6  # of the largest value; the level of an unloaded plate is no limit
 _STUCK_S = 0.5
 _LOAD_CHANGE = 0.2  # of the largest load
 _LOST_S = 0.1
+_RISE_S = 0.005  # a foot takes longer to its peak: heel strike 10 to 20 ms (Whittle 1999)
 _ABRUPT_N = 100.0  # load beside samples that are all zero: they are lost
 # A spike beside the cubic through its neighbours must be larger than
 # - 5 % of the channel's size: among ten samples of a frame, less moves it by under half a per cent;
@@ -70,17 +71,25 @@ def check_samples(
 
 
 def lost_samples(channels: np.ndarray, load: np.ndarray, rate_hz: float) -> np.ndarray:
-    """Short stretches in which all channels (n, k) are zero beside loaded samples, (n,) bool.
+    """Short stretches in which all channels (n, k) are zero amid load, (n,) bool.
 
-    Longer ones may be flight on a plate whose small forces were set to zero. One sample on
-    each side, which may be half lost, belongs to them.
+    Loaded samples lie on both sides; or on one, with a jump that no foot makes in one sample and
+    twice as high as any step elsewhere: a touch-down is lost with what was before it. Longer
+    ones may be flight on a plate whose small forces were set to zero. One sample on each side,
+    which may be half lost, belongs to them.
     """
-    lost = np.zeros(len(load), bool)
-    heavy = np.concatenate([[False], np.abs(np.nan_to_num(load)) > _ABRUPT_N, [False]])
-    for start, stop in runs((channels == 0).all(axis=1)):
+    lost, size = np.zeros(len(load), bool), np.abs(np.nan_to_num(load))
+    heavy = np.concatenate([[False], size > _ABRUPT_N, [False]])
+    gone = runs((channels == 0).all(axis=1))
+    steps = np.abs(np.diff(size, prepend=0.0, append=0.0))  # into each sample, and out of the last
+    jumps = steps[gone]
+    steps[gone] = 0.0
+    foot = size.max(initial=0.0) / (_RISE_S * rate_hz)
+    leaps = (jumps > max(_ABRUPT_N, foot, 2.0 * steps.max())).any(axis=1)
+    for (start, stop), leap in zip(gone, leaps, strict=True):
         before = start == 0 or heavy[max(start - 1, 0) : start + 1].any()
         after = stop == len(load) or heavy[stop + 1 : stop + 3].any()
-        if before and after and stop - start <= _LOST_S * rate_hz:
+        if (leap or (before and after)) and stop - start <= _LOST_S * rate_hz:
             lost[max(start - 1, 0) : stop + 1] = True
     return lost
 

@@ -36,6 +36,7 @@ OTHER_COMMANDS = [
     "show",
     "published",
     "info",
+    "methods",
     "people",
 ]
 

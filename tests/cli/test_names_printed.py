@@ -51,7 +51,7 @@ def test_what_is_no_danger_stays():
 @pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
 def test_a_report(name):
     section = Section("s", name, (Paragraph(f"It is {name}, 5 mm."),))
-    page = render(Document(name, name, (section,)))
+    page = render(Document(name, name, (), (section,)))
     page.encode()
     assert "It is a?" in page and "5\N{NO-BREAK SPACE}mm" in page
     check(page)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.recordings import repeated_plates as copies
-from bsip_cli.recordings.analog import check_samples
+from bsip_cli.recordings.analog import check_samples, lost_samples
 
 RATE_HZ = 1000.0
 TIME_S = np.arange(4000) / RATE_HZ
@@ -82,3 +82,38 @@ def test_a_sum_is_known_by_most_samples_and_two_feet_are_no_copy(monkeypatch):
     assert repeated(monkeypatch, a=one, b=damaged) == {"b": ("a",)}
     assert repeated(monkeypatch, a=one, b=np.roll(one, 700)) == {}
     assert repeated(monkeypatch, a=other, b=1.03 * other) == {}
+
+
+def touching_down(rate_hz: float = 1000.0) -> np.ndarray:
+    """(n,) load of steps of a second, each after a second in the air; the plate's noise on it."""
+    t = np.arange(round(6 * rate_hz)) / rate_hz
+    stance = np.clip(np.sin(2 * np.pi * (t - 0.5) / 2.0), 0.0, None) ** 0.5
+    return 800.0 * stance + np.random.default_rng(4).normal(0.0, 0.8, len(t))
+
+
+def lost_of(load: np.ndarray, rate_hz: float = 1000.0) -> np.ndarray:
+    channels = np.column_stack([0.1 * load, 0.05 * load, load])
+    return lost_samples(channels, load, rate_hz)
+
+
+@pytest.mark.parametrize("first", [470, 1470])  # over a touch-down, over a lift-off
+def test_lost_samples_over_a_touch_down(first):
+    load = touching_down()
+    damaged = load.copy()
+    damaged[first : first + 60] = 0.0
+    found = lost_of(damaged)
+    assert found[first : first + 60].all() and found.sum() <= 62
+    assert not lost_of(load).any()
+
+
+@pytest.mark.parametrize("rate_hz", [500.0, 1000.0, 2000.0])
+def test_hops_whose_small_forces_are_set_to_zero_are_not_lost(rate_hz):
+    """In the air for 80 ms, and down again to twice the weight in 8 ms."""
+    t = np.arange(round(3 * rate_hz)) / rate_hz
+    t = (t + 0.2) % 0.4
+    load = np.interp(
+        t, [0.0, 0.08, 0.088, 0.12, 0.25, 0.399], [0.0, 0.0, 1600.0, 1100.0, 1900.0, 0.0]
+    )
+    load += np.random.default_rng(4).normal(0.0, 1.0, len(t))
+    load[load < 25.0] = 0.0
+    assert not lost_of(load, rate_hz).any()

@@ -139,7 +139,7 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "Use OM, the parameters identified from this person's movement" in first
     assert "the error changes by −46 to −34 % in 2 recordings that identified nothing." in first
     assert "But RM for basketball." in first
-    assert "put it right in the lab or in the file" in first
+    assert "correct it in the lab or in the file" in first
 
 
 def test_yardsticks_are_those_of_data_that_identified_nothing(record, first):

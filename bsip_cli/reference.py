@@ -73,7 +73,7 @@ def cli_page() -> str:
         groups.setdefault((_usage(command), *lines[name]), []).append(name)
     for (usage, *options), names in groups.items():
         own = [line for line in options if line not in common]
-        shared = [line.split("`")[1] for line in options if line in common]
+        shared = [line.split("`")[1].split()[0] for line in options if line in common]
         heading = usage.replace("[OPTIONS] ", "")
         parts += [f"## {', '.join(names)} {heading}", *_meanings(names)]
         parts += ["Options:"] if own and len(names) > 1 else []
@@ -322,9 +322,7 @@ def _schema_parts(
     shown: dict[tuple[Column, ...], str],
 ) -> list[str]:
     """Heading, place and columns; those that an earlier artifact has are not repeated."""
-    sentence = (
-        f"{schema.meaning[0].upper()}{schema.meaning[1:]}. `{place}`, version {schema.version}."
-    )
+    sentence = f"{schema.meaning[0].upper()}{schema.meaning[1:]}. `{place}`."
     parts = [f"### {schema.kind}", sentence]
     if schema.columns in shown:
         earlier = shown[schema.columns]

@@ -73,7 +73,7 @@ def cli_page() -> str:
         groups.setdefault((_usage(command), *lines[name]), []).append(name)
     for (usage, *options), names in groups.items():
         own = [line for line in options if line not in common]
-        shared = [line.split("`")[1] for line in options if line in common]
+        shared = [line.split("`")[1].split()[0] for line in options if line in common]
         heading = usage.replace("[OPTIONS] ", "")
         parts += [f"## {', '.join(names)} {heading}", *_meanings(names)]
         parts += ["Options:"] if own and len(names) > 1 else []
@@ -130,33 +130,27 @@ def faults_page() -> str:
     """Every effect of the catalogue: what it is, how it shows, how large, how sure, what to do."""
     parts = [
         "What `bsip diagnose` can name. *Usual* are the sizes that laboratories meet. *Sure*: how "
-        "often it was found where the blind suite had hidden it, in a few cases of a seed that "
-        "chose nothing ([all figures](results.md#is-the-right-fault-named)). *To tell it*: the "
-        "recording that separates it from faults that look alike. What else may be said is in "
+        "often it was named, and how many 95 % intervals held the truth, where the blind suite had "
+        "hidden it ([all figures](results.md#is-the-right-fault-named)); without it, none was "
+        "hidden yet. *To tell it*: the recording that separates it from faults that look alike. "
+        "What it means for the results stands [at the end](#what-to-do), what else may be said in "
         "[how to read the report](report.md)."
     ]
-    shown: dict[str, str] = {}
+    advice: dict[str, list[str]] = {}
     for effect in CATALOGUE:
         words = EFFECT_WORDS[effect.name]
         parts += [f"## {effect.name}: {words.title}", _what_it_is(effect)]
-        first = shown.setdefault(words.consequence, effect.name)
-        advice = (
-            words.consequence if first == effect.name else f"as for [{first}](#{_anchor(first)})."
-        )
-        usual = f"- Usual: {usual_words(effect.name)}." if effect.name in USUAL else ""
+        advice.setdefault(words.consequence, []).append(effect.name)
+        found = _found(effect.name)
         lines = [
             f"- Looks like: {effect.looks}.",
-            usual,
-            f"- Sure: {_found(effect.name)}.",
+            f"- Usual: {usual_words(effect.name)}." if effect.name in USUAL else "",
+            f"- Sure: {found}." if found else "",
             f"- To tell it: {effect.remedy}.",
-            f"- What to do: {advice}",
         ]
         parts.append("\n".join(filter(None, lines)))
-    return _page("The faults", parts)
-
-
-def _anchor(effect: str) -> str:
-    return f"{effect} {EFFECT_WORDS[effect].title}".replace("'", "").replace(" ", "-").lower()
+    consequences = [f"- {_code(names)}: {text}" for text, names in advice.items()]
+    return _page("The faults", [*parts, "## What to do", "\n".join(consequences)])
 
 
 def _what_it_is(effect: Effect) -> str:
@@ -164,11 +158,11 @@ def _what_it_is(effect: Effect) -> str:
 
 
 def _found(effect: str) -> str:
-    """Of the blind suite's tables: cases, names, and intervals that hold the truth."""
+    """Of the blind suite's tables: cases, names, and intervals that hold the truth; or nothing."""
     with (_RESULTS / "blind_effects.csv").open(encoding="utf-8", newline="") as file:
         row = {one["hidden"]: one for one in csv.DictReader(file)}.get(effect)
     if row is None:
-        return "not yet in the tables of the blind suite"
+        return ""
     named, group = int(row["right name"]), int(row["right class"])
     said = f"named in {named} of {row['cases']}"
     said += f", in a group in {group}" if group else ""
@@ -177,7 +171,7 @@ def _found(effect: str) -> str:
         held = [one["95 % CI holds it"] for one in csv.DictReader(file) if one["effect"] == effect]
     counts = [tuple(map(int, text.split(" of "))) for text in held]
     inside, intervals = (sum(column) for column in zip(*counts, strict=True)) if counts else (0, 0)
-    return f"{said}; {inside} of {intervals} intervals hold the truth" if intervals else said
+    return f"{said}, {inside} of {intervals} intervals" if intervals else said
 
 
 # --- options ----------------------------------------------------------------------------------
@@ -328,9 +322,7 @@ def _schema_parts(
     shown: dict[tuple[Column, ...], str],
 ) -> list[str]:
     """Heading, place and columns; those that an earlier artifact has are not repeated."""
-    sentence = (
-        f"{schema.meaning[0].upper()}{schema.meaning[1:]}. `{place}`, version {schema.version}."
-    )
+    sentence = f"{schema.meaning[0].upper()}{schema.meaning[1:]}. `{place}`."
     parts = [f"### {schema.kind}", sentence]
     if schema.columns in shown:
         earlier = shown[schema.columns]

@@ -15,7 +15,7 @@ jump
 slip
     The mean residual goes to another level and stays there, and the joint angles do not explain
     it.
-offset (marker_offsets.py)
+offset
     The median residual of the whole trial is far beyond the spread and that of the others.
 
 A marker that slips or sits wrong drags the pose, and its neighbours' residuals with it. The

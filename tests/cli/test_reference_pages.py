@@ -9,6 +9,7 @@ import pytest
 from bsip_cli.cli import cli
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.reference import REGENERATE, OptionText, option_texts, pages, write_pages
+from bsip_cli.report.effect_words import EFFECT_WORDS
 from bsip_cli.schemas import SCHEMAS
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -61,7 +62,14 @@ def test_every_fault_with_its_chance_of_being_found():
     for effect in CATALOGUE:
         section = page.partition(f"## {effect.name}: ")[2].partition("\n## ")[0]
         assert effect.looks in section and effect.remedy in section
-    assert "named in 2 of 2; 5 of 5 intervals hold the truth" in page
+    assert "- Sure: named in 2 of 2, 5 of 5 intervals." in page
+
+
+def test_every_fault_with_what_to_do():
+    advice = pages()["faults.md"].partition("\n## What to do\n")[2]
+    for effect in CATALOGUE:
+        (line,) = (one for one in advice.splitlines() if f"`{effect.name}`" in one)
+        assert EFFECT_WORDS[effect.name].consequence in line
 
 
 def test_option_with_unit_limits_and_reason():

@@ -21,8 +21,8 @@ from tests.blind.blind_tables import document, scores_frame
 SEED = 7
 pytestmark = pytest.mark.long
 
-# What the suite forgives, of 20 effects hidden alone, 4 in pairs, 2 outside the catalogue.
-MISSES_ALLOWED = 4
+# What the suite forgives, of 25 effects hidden alone, 4 in pairs, 2 outside the catalogue.
+MISSES_ALLOWED = 5
 WRONG_NAMES_ALLOWED = 1
 MISSES_ALLOWED_IN_PAIRS = 2
 WRONG_TARGETS_ALLOWED = 3

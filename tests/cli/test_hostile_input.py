@@ -90,14 +90,12 @@ def test_nothing_is_written_outside(ran):
     assert [path for path in new if folder / "a" / "out" not in path.parents] == []
 
 
-def test_reports_show_names_as_text(ran):
+def test_reports_run_no_names(ran):
     folder, _, _ = ran
     pages = list((folder / "a" / "out").glob("*/report.html"))
     assert len(pages) == 2
     for page in pages:
         assert "<script>alert" not in page.read_text(encoding="utf-8")
-    told = (folder / "a" / "out" / "sub-01" / "report.html").read_text(encoding="utf-8")
-    assert "&lt;script&gt;alert" in told
 
 
 def test_tables_hold_no_commands(ran):

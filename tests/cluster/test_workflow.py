@@ -215,8 +215,9 @@ def test_the_same_artifacts_as_make(tmp_path):
     place = Place(tmp_path)
     place.install(f'#!/bin/sh\nexec {sys.executable} -m bsip_cli "$@"\n')
     given = ("COHORT=study", "OUT=out")
-    done = place.make("cluster", *given)
-    assert done.returncode == 0, done.stderr
+    for _ in range(2):  # the second brings the laboratory into each diagnosis
+        done = place.make("cluster", *given)
+        assert done.returncode == 0, done.stderr
     of_workflow = place.content()
     done = place.make("cluster", *given)
     assert done.returncode == 0, done.stderr

@@ -16,9 +16,12 @@ from bsip_cli import __version__
 from bsip_cli.artifacts import is_made_from
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.cause import Cause, delay_by
-from bsip_cli.diagnosis.corrected_wrench import corrected_plates, is_of_the_forces
+from bsip_cli.diagnosis.corrected_wrench import (
+    corrected_plates,
+    is_fault_of_forces,
+    is_of_the_forces,
+)
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.marker_swap import MarkerSwap
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
@@ -30,14 +33,13 @@ from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot
 from bsip_cli.pipeline import Stage
 from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.plate_reading import PlateReading
-from bsip_cli.recordings.read import open_recording
 from bsip_cli.recordings.settle import SessionReading, Verdict
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import OpenedStudy, follow
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.found_causes import causes_of
 from bsip_cli.stages.frames import markers_from, person_from
-from bsip_cli.stages.session_reading import reading_of
+from bsip_cli.stages.session_reading import opened, reading_of
 from bsip_cli.stages.trial_scene import plates_of
 
 _READER = Stage(
@@ -61,19 +63,19 @@ _SAME_M = 1e-5  # a trajectory of the file and of the artifact
 _EXACT = 1e-3  # of the largest change of a plate's wrench, that its channels must reproduce
 
 
-def export_recordings(opened: OpenedStudy, out: Path, folder: Path) -> int:
+def export_recordings(asked: OpenedStudy, out: Path, folder: Path) -> int:
     """Copy the study into a new folder, its recordings corrected; the exit code."""
-    study = opened.study
+    study = asked.study
     _copy_study(study.root, out, folder)
 
     def running() -> Generator[Outcome, None, None]:
         for participant in study.participants:
             for trial in participant.trials:
-                unit = Unit(_READER, study, out, opened.config, participant, trial)
+                unit = Unit(_READER, study, out, asked.config, participant, trial)
                 yield _corrected(unit, folder)
 
     total = sum(len(one.trials) for one in study.participants)
-    return follow("export", opened.refusals, running(), total, folder)
+    return follow("export", asked.refusals, running(), total, folder)
 
 
 def _copy_study(root: Path, out: Path, folder: Path) -> None:
@@ -156,7 +158,9 @@ class _Correction:
                 self._swaps.append((first, second, *cause.values[1:3].tolist()))
             elif not is_of_the_forces(cause):
                 self.left.append(f"{words}: no fault of the plates, the clocks or the labels")
-            elif not all(_of_the_forces(effect) for effect, _ in alike):
+            elif not all(
+                effect in EFFECTS and is_fault_of_forces(EFFECTS[effect]) for effect, _ in alike
+            ):
                 self.left.append(f"{words}: it cannot be distinguished from {others} here")
             else:
                 self.causes[cause] = others
@@ -287,8 +291,7 @@ class _Correction:
 def _opened(unit: Unit) -> tuple[Opened, SessionReading]:
     assert unit.trial is not None
     session = reading_of(unit, unit.trial)
-    found = open_recording(unit.trial.path).with_plates(unit.config.ingest.plates)
-    return session.frame.of(found), session
+    return session.frame.of(opened(unit, unit.trial)), session
 
 
 def _alike(cause: Cause, told: pd.DataFrame) -> list[tuple[str, str]]:
@@ -305,12 +308,6 @@ def _told_of(trial: str, told: pd.DataFrame) -> list[tuple[str, str]]:
     here = np.array([trial in names.split(", ") for names in told["trials"]], dtype=bool)
     rows = told[here & told["effect"].isin(list(EFFECTS)) & (told["verdict"] != "rejected")]
     return list(dict.fromkeys(zip(rows["effect"], rows["target"], strict=True)))
-
-
-def _of_the_forces(effect: str) -> bool:
-    return effect in EFFECTS and (
-        EFFECTS[effect].of_the_plates or isinstance(EFFECTS[effect], Delay)
-    )
 
 
 def _exchanged(events: pd.DataFrame) -> list[tuple[str, str, float, float]]:

@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from bsip_cli.diagnosis.cause import Cause, change_by, delay_by
 from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.plate_frame import ALL, loaded_plates, plate_of
 from bsip_cli.effects.plate_rotation import PlateRotation
 from bsip_cli.effects.scene import Plate, Scene
@@ -19,7 +20,12 @@ _ROUNDS = 2  # a clock's rate is wrong by 0.3 % at most: each round leaves as mu
 
 def is_of_the_forces(cause: Cause) -> bool:
     """Whether the measured forces are wrong, and can be corrected."""
-    return cause.effect.of_the_plates or isinstance(cause.effect, Delay)
+    return is_fault_of_forces(cause.effect)
+
+
+def is_fault_of_forces(effect: Effect) -> bool:
+    """Of the plates, or of the clock that they have."""
+    return effect.of_the_plates or isinstance(effect, Delay)
 
 
 def corrected_wrench(

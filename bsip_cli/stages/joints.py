@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.interpolate import interp1d
 
-from bsip_cli.body.names import in_words
+from bsip_cli.body.names import SEGMENTS, in_words
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.cause import Cause, method_of
@@ -333,7 +333,8 @@ def _extended(
 
 def _is_carried(cause: Cause) -> bool:
     effect = cause.effect
-    return is_of_the_forces(cause) or effect.on_its_segment or isinstance(effect, SegmentInertia)
+    at_one_segment = effect.on_its_segment and cause.target in SEGMENTS
+    return is_of_the_forces(cause) or at_one_segment or isinstance(effect, SegmentInertia)
 
 
 def _besides(

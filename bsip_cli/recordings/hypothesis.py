@@ -164,7 +164,8 @@ class Hypothesis:
 def _with(repair: PlateReading, now: PlateReading) -> PlateReading:
     """One more repair of a plate's numbers, which may be exchanged or have a channel reversed."""
     if repair.reversed_channel:
-        return replace(now, reversed_channel=repair.reversed_channel)
+        about = now.about if repair.about == "stated" else repair.about
+        return replace(now, reversed_channel=repair.reversed_channel, about=about)
     return replace(repair, place_of=now.place_of, reversed_channel=now.reversed_channel)
 
 

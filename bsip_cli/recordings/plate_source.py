@@ -90,7 +90,6 @@ class C3dPlate:
     wrench: LocalWrench
     usable: np.ndarray  # (n,) bool
     rotation_world_lab: np.ndarray  # (3, 3)
-    z_up: bool = False
 
     @property
     def name(self) -> str:
@@ -147,7 +146,7 @@ class C3dPlate:
         if np.linalg.det(change) > 0 or corners_only:
             return replace(self, description=description)
         wrench = LocalWrench(self.wrench.force_N * _Z, -self.wrench.moment_Nm * _Z)
-        return replace(self, description=description, wrench=wrench, z_up=not self.z_up)
+        return replace(self, description=description, wrench=wrench)
 
     def alternatives(self) -> Iterable[PlateReading]:
         """Type 3 has no moments of its own, type 1 no point that they are about."""
@@ -177,12 +176,14 @@ class C3dPlate:
         return replace(read, corners_m=read.centre_m() + local @ read.rotation_lab_plate().T)
 
     def _surface_m(self, reading: PlateReading) -> np.ndarray:
-        """From the sensor's origin to the surface, plate frame, (3,)."""
+        """From the sensor's origin to the surface, plate frame, (3,): it lies under the surface,
+        whichever way the order of the corners turns the plate's z."""
         offset = surface_offset_m(self.description)
         if reading.about != "stated":
             offset = offset * (np.array([-1, -1, 1]) if reading.about == "reversed" else [0, 0, 1])
             offset[2] *= abs(offset[2]) < _THICK_M
-        return offset * _Z if self.z_up else offset
+        axes = self.rotation_world_lab @ self.read_description(reading).rotation_lab_plate()
+        return offset * _Z if axes[2, 2] > 0 else offset
 
     def _at_surface(self, reading: PlateReading) -> LocalWrench:
         """Before the sign of a reading."""
@@ -291,8 +292,8 @@ class ForceOnPoint:
             abouts += ("origin", "fixed")
         for point, moment, about in product(points, (1.0, 1e-3, -1.0, -1e-3), abouts):
             yield PlateReading(moment_scale=moment, point_scale=point, about=about)
-        for channel in CHANNELS[:3]:
-            yield PlateReading(reversed_channel=channel)
+        for channel, about in product(CHANNELS, abouts):
+            yield PlateReading(reversed_channel=channel, about=about)
 
     def findings(self, reading: PlateReading) -> list[Finding]:
         return []
@@ -333,7 +334,8 @@ class ForceOnPoint:
         return np.hstack([np.diag(reading.force_signs()), np.zeros((3, 9))])
 
     def _scaled_moment(self, reading: PlateReading) -> np.ndarray:
-        return np.hstack([_NONE, reading.moment_scale * np.eye(3), _NONE, _NONE])
+        scaled = np.diag(reading.moment_scale * reading.moment_signs())
+        return np.hstack([_NONE, scaled, _NONE, _NONE])
 
     def _at_origin(self, reading: PlateReading) -> np.ndarray:
         """Moment of the force at its point about the lab's origin."""

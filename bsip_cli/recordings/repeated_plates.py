@@ -21,7 +21,7 @@ def repeated_plates(
 ) -> dict[str, tuple[str, ...]]:
     """Names of plates whose force is that of another, or the sum of others, in every trial.
 
-    A sum is known by three plates that are loaded; of two copies the later one repeats.
+    Fewer terms are tried first, so that each is needed; of two copies the later one repeats.
     """
     repeated: dict[str, tuple[str, ...]] = {}
     forces = [{name: _force(source) for name, source in trial.items()} for trial in trials]
@@ -41,15 +41,13 @@ def repeated_plates(
 
 
 def _is_sum(trials: Sequence[Mapping[str, np.ndarray]], name: str, terms: Sequence[str]) -> bool:
-    """In every trial that has them all, at least one of which loads each term."""
+    """In every trial that has them all."""
     common = [trial for trial in trials if name in trial and all(t in trial for t in terms)]
     if not common:
         return False
     forces = np.stack([np.concatenate([t[n] for t in common]) for n in (name, *terms)])
     forces = forces[:, np.isfinite(forces).all(axis=0)]
-    size = np.linalg.norm(forces[0])
-    is_loaded = all(np.linalg.norm(force) > _BEARS * size for force in forces[1:])
-    if not (size > 0 and is_loaded):
+    if not forces[0].any():
         return False
     # Plates that bear nothing are alike; a few samples may be damaged on one of them.
     loaded = forces.max(axis=0) > _BEARS * forces.max()

@@ -16,7 +16,7 @@ ALLOWED = {
     "errors": "",
     "files": "errors",
     "config": "errors files",
-    "schemas": "",
+    "schemas": "config files",
     "artifacts": "errors files schemas",
     "pipeline": "schemas",
     "stated": "",

@@ -23,11 +23,10 @@ from bsip_cli.stages.reconstructed import (
     parameters_of,
     reconstruction_rows,
 )
-from bsip_cli.statistics.correlation_tests import fisher_z_difference, williams_t
 from bsip_cli.statistics.effective_samples import effective_samples_of_pair
-from bsip_cli.statistics.fit_measures import fit_measures
+from bsip_cli.statistics.fit_measures import fit_measures, posturography
+from bsip_cli.statistics.hypothesis_tests import fisher_z_difference, williams_t
 from bsip_cli.statistics.methods import MEASURED
-from bsip_cli.statistics.posturography import posturography
 
 
 def run(unit: Unit) -> None:

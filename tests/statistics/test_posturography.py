@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.statistics.posturography import posturography
+from bsip_cli.statistics.fit_measures import posturography
 
 RATE_HZ = 100.0
 TURN = 2 * np.pi * np.arange(10_001) / 1000  # ten turns in 100 s

@@ -15,7 +15,7 @@ from typing import Literal
 
 import pandas as pd
 
-from bsip_cli.artifacts import remove, write_artifact, write_atomically
+from bsip_cli.artifacts import remove, write_artifact, write_bytes
 from bsip_cli.config import Config
 from bsip_cli.errors import (
     BadDataError,
@@ -198,8 +198,7 @@ def _remember(task: _Task, state: str) -> None:
     recordings = [task.study.root / task.participant.id] if task.participant else []
     kept = fingerprints.to_keep([task.folder, *recordings], state).encode()
     if fingerprints.kept_in(task.folder) != kept:
-        path = task.folder / fingerprints.NAME
-        write_atomically(path, lambda temporary: temporary.write_bytes(kept))
+        write_bytes(task.folder / fingerprints.NAME, kept)
 
 
 def _units(task: _Task) -> Iterator[tuple[Stage, Trial | None]]:

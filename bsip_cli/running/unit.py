@@ -14,7 +14,13 @@ from typing import Any
 
 import pandas as pd
 
-from bsip_cli.artifacts import read_artifact, read_header, write_artifact, write_artifact_in_parts
+from bsip_cli.artifacts import (
+    Rows,
+    read_artifact,
+    read_header,
+    write_artifact,
+    write_artifact_in_parts,
+)
 from bsip_cli.config import Config, Load, load_config
 from bsip_cli.errors import BadDataError, printable
 from bsip_cli.files.fingerprints import file_hash
@@ -281,7 +287,7 @@ class Unit:
         except BadDataError:
             return {}
 
-    def write(self, kind: str, frame: pd.DataFrame, facts: dict | None = None) -> None:
+    def write(self, kind: str, frame: Rows, facts: dict | None = None) -> None:
         write_artifact(self.path(kind), kind, frame, self._notes(facts or {}))
 
     def write_in_parts(

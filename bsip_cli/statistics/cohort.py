@@ -18,6 +18,7 @@ from bsip_cli.statistics.cohort_values import (
     Comparison,
     Topic,
     Value,
+    joined,
     per_participant,
     topics,
 )
@@ -161,7 +162,7 @@ def methods_beside_each_other(
     of_each = [lilliefors_test(column) for column in table.T]
     pairs = combinations(range(len(methods)), 2)
     differences = {(i, j): lilliefors_test(table[:, i] - table[:, j]).p_value for i, j in pairs}
-    why = " ".join(dict.fromkeys(test.reason for test in of_each if test.reason))
+    why = joined(*(test.reason for test in of_each))
     normality = [test.p_value for test in of_each]
     cases: tuple[tuple[str, str, Origin, Any, Sequence[float], str], ...] = (
         ("one_way_anova", "t", "published", one_way_anova(list(table.T), alpha), normality, why),

@@ -45,6 +45,11 @@ class Comparison(TestResult):
         return cls(topic, **{name: row[name] for name in row if name not in of_topic})
 
 
+def joined(*reasons: str) -> str:
+    """Every reason once, in order."""
+    return " ".join(dict.fromkeys(filter(None, reasons)))
+
+
 HOLM_FAMILIES = ("paired_t", "wilcoxon")
 
 

@@ -48,7 +48,7 @@ def test_two_groups_are_a_t_test():
 def test_f_follows_from_means_and_sds_as_in_hansen_2017_table_3():
     """MV: 6.26 (2.70), 6.28 (2.60), 6.52 (1.76) of twelve: printed F = 0.04, p = 0.96."""
     z = stats.zscore(np.random.default_rng(0).normal(size=12), ddof=1)
-    test, post_hoc = one_way_anova([6.26 + 2.70 * z, 6.28 + 2.60 * z, 6.52 + 1.76 * z])
+    test, _post_hoc = one_way_anova([6.26 + 2.70 * z, 6.28 + 2.60 * z, 6.52 + 1.76 * z])
     assert test.statistic == pytest.approx(0.04, abs=0.005)
     assert test.p_value == pytest.approx(0.96, abs=0.005)
 
@@ -72,7 +72,7 @@ def test_one_way_not_possible(groups, words):
 
 def test_bushtucker():
     """Field, SPSS output 13.2 to 13.4: F(3, 21) = 3.79, epsilon 0.533, p 0.026 and 0.063."""
-    test, post_hoc = repeated_measures_anova(BUSHTUCKER)
+    test, _post_hoc = repeated_measures_anova(BUSHTUCKER)
     assert test.statistic == pytest.approx(3.794, abs=5e-4)
     assert test.epsilon == pytest.approx(0.533, abs=5e-4)
     assert (test.df1, test.df2) == pytest.approx((3 * test.epsilon, 21 * test.epsilon))
@@ -89,7 +89,7 @@ def test_against_statsmodels():
     person, column = np.divmod(np.arange(n * k), k)
     table = pd.DataFrame({"y": BUSHTUCKER.ravel(), "person": person, "column": column})
     expected = AnovaRM(table, "y", "person", ["column"]).fit().anova_table
-    test, post_hoc = repeated_measures_anova(BUSHTUCKER)
+    test, _post_hoc = repeated_measures_anova(BUSHTUCKER)
     assert test.statistic == pytest.approx(expected["F Value"].iloc[0])
 
 
@@ -113,7 +113,7 @@ def test_two_columns_are_a_paired_t_test():
 
 
 def test_post_hoc_is_paired_and_corrected():
-    test, post_hoc = repeated_measures_anova(BUSHTUCKER)
+    _test, post_hoc = repeated_measures_anova(BUSHTUCKER)
     assert len(post_hoc) == 6
     pair = post_hoc[0, 2]
     expected = stats.ttest_rel(BUSHTUCKER[:, 0], BUSHTUCKER[:, 2])
@@ -149,7 +149,7 @@ def test_two_equal_columns_leave_the_other_comparisons():
 def test_repeated_measures_not_possible(matrix, words):
     import re
 
-    test, post_hoc = repeated_measures_anova(matrix)
+    test, _post_hoc = repeated_measures_anova(matrix)
     assert re.search(words, test.reason)
     assert np.isnan([test.statistic, test.p_value, test.epsilon]).all()
 

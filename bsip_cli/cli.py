@@ -14,7 +14,7 @@ import click
 from bsip_cli import __version__
 from bsip_cli.errors import BsipError, not_readable
 from bsip_cli.pipeline import STAGES
-from bsip_cli.running.endings import EndedError, endings_kept, ignore_endings, raise_when_ended
+from bsip_cli.running.processes import EndedError, endings_kept, ignore_endings, raise_when_ended
 
 # One thread per process: results do not depend on the number of cores, and --jobs decides the load.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import sys
 from collections import Counter
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,16 +14,16 @@ import click
 from tqdm import tqdm
 
 from bsip_cli.body.markersets import load_marker_set
-from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.config import Config, load_config, with_estimators
+from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.config import Config, Load, load_config, with_estimators
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.pipeline import Stage, by_level, stages_named
 from bsip_cli.running.runner import Manner, Outcome, refusal_sentence, run_stages
 from bsip_cli.study.dataset import describe_dataset, make_out
-from bsip_cli.study.named_in_options import check_prefixes, check_segments, check_trials
 from bsip_cli.study.study import Study, load_study
 from bsip_cli.study.trials import listed
 
+_LOADS = "correct [[loads]] in study.toml"
 _SEVERITY = (0, 3, 4, 2, 1)  # of several exit codes the gravest counts
 
 
@@ -198,3 +199,67 @@ def _summary(command: str, outcomes: Iterable[Outcome], out: Path | None) -> Non
 
 def _exit_code(outcomes: Iterable[Outcome]) -> int:
     return max((outcome.exit_code for outcome in outcomes), key=_SEVERITY.index, default=0)
+
+
+# --- whether loads and prefixes of study.toml fit the study: nothing named that is not there ------
+
+
+def check_prefixes(prefixes: Mapping[str, str], study: Study) -> None:
+    """Every prefix belongs to a participant of the study.
+
+    Raises
+    ------
+    UsageError
+        The first that does not, with the nearest known name.
+    """
+    known = [participant.id for participant in study.participants]
+    _check_known("ingest.prefixes", prefixes, known, "correct [ingest] prefixes in study.toml")
+
+
+def check_segments(loads: Sequence[Load], skeleton: Skeleton) -> None:
+    """Every load sits on a segment of the skeleton that has mass.
+
+    Raises
+    ------
+    UsageError
+        The first load that does not, with the nearest known name.
+    """
+    for k, load in enumerate(loads):
+        _check_known(f"loads.{k}.segment", [load.segment], skeleton.body_names)
+
+
+def check_trials(loads: Sequence[Load], study: Study) -> None:
+    """Every load is carried in some trial, and names nothing that the study does not have.
+
+    Raises
+    ------
+    UsageError
+        The first load that names an unknown participant, task or run, or that no trial carries.
+    """
+    trials = [trial for participant in study.participants for trial in participant.trials]
+    participants = sorted({trial.participant_id for trial in trials})
+    tasks = sorted({trial.task for trial in trials})
+    runs = sorted({trial.run for trial in trials if trial.run is not None})
+    for k, load in enumerate(loads):
+        _check_known(f"loads.{k}.participants", load.participants, participants)
+        _check_known(f"loads.{k}.tasks", load.tasks, tasks)
+        _check_known(f"loads.{k}.runs", map(str, load.runs), [str(run) for run in runs])
+        if not any(load.is_carried_in(t.participant_id, t.task, t.run) for t in trials):
+            raise UsageError(
+                f"loads.{k}: {load.mass_kg:g} kg on {load.segment} are carried in no recording",
+                expected="participants, tasks and runs that some recording has together",
+                remedy=_LOADS,
+            )
+
+
+def _check_known(
+    option: str, names: Iterable[str], known: Collection[str], remedy: str = _LOADS
+) -> None:
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
+            raise UsageError(
+                f"{option}: there is no {name}" + (f" (did you mean {near[0]}?)" if near else ""),
+                expected=f"one of {', '.join(known)}" if known else "none, no recording has any",
+                remedy=remedy,
+            )

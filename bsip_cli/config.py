@@ -12,16 +12,9 @@ from typing import Annotated, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bsip_cli.errors import UsageError
-from bsip_cli.files.regular import read_toml
+from bsip_cli.files.regular import read_toml, shipped
 
 _MOST_FAULTS, _LONGEST_VALUE = 20, 80  # faults and characters that are told
-
-
-def shipped(*parts: str) -> Path:
-    """Path of a file that ships in ``configs/``, in a checkout as in an installed wheel."""
-    package = Path(__file__).parent
-    installed = package / "configs"
-    return (installed if installed.is_dir() else package.parent / "configs").joinpath(*parts)
 
 
 class Section(BaseModel):

@@ -6,8 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from bsip_cli.config import shipped
-from bsip_cli.files.regular import read_toml
+from bsip_cli.files.regular import read_toml, shipped
 
 Level = Literal["trial", "participant", "cohort"]
 

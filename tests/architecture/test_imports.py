@@ -16,7 +16,7 @@ ALLOWED = {
     "errors": "",
     "files": "errors",
     "config": "errors files",
-    "schemas": "config files",
+    "schemas": "files",
     "artifacts": "errors files schemas",
     "pipeline": "schemas",
     "stated": "",
@@ -28,7 +28,7 @@ ALLOWED = {
     "commands": "__init__ artifacts body config diagnosis effects errors files instruments "
     "pipeline recordings report running schemas stages statistics study",
     "reference": "cli config effects pipeline report schemas",
-    "cli": "__init__ commands errors pipeline running simulate study",
+    "cli": "__init__ commands errors files pipeline running simulate study",
     "body": "config errors files stated",
     "dynamics": "body errors",
     "caches": "",

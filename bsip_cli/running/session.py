@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import sys
 from collections import Counter
-from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ import click
 from tqdm import tqdm
 
 from bsip_cli.body.markersets import load_marker_set
-from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, Load, load_config, with_estimators
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.pipeline import Stage, by_level, stages_named
@@ -114,8 +114,10 @@ def open_study(
 def _check_names(config: Config, study: Study, refusals: list[BadDataError]) -> None:
     """Whether loads and prefixes name who and what is there, in the whole study."""
     if not refusals:  # else a load may belong to who or what was refused
-        check_trials(config.loads, study)
-        check_prefixes(config.ingest.prefixes, study)
+        _check_trials(config.loads, study)
+        known = [participant.id for participant in study.participants]
+        remedy = "correct [ingest] prefixes in study.toml"
+        _check_known("ingest.prefixes", config.ingest.prefixes, known, remedy)
 
 
 def _left_behind(out: Path, study: Study) -> str:
@@ -166,7 +168,9 @@ def _config(root: Path, config_file: Path | None) -> Config:
     )
     if config.marker_set != "auto":
         load_marker_set(config.marker_set)
-    check_segments(config.loads, load_skeleton(config.skeleton))
+    with_mass = load_skeleton(config.skeleton).body_names
+    for k, load in enumerate(config.loads):
+        _check_known(f"loads.{k}.segment", [load.segment], with_mass)
     return config
 
 
@@ -204,38 +208,8 @@ def _exit_code(outcomes: Iterable[Outcome]) -> int:
 # --- whether loads and prefixes of study.toml fit the study: nothing named that is not there ------
 
 
-def check_prefixes(prefixes: Mapping[str, str], study: Study) -> None:
-    """Every prefix belongs to a participant of the study.
-
-    Raises
-    ------
-    UsageError
-        The first that does not, with the nearest known name.
-    """
-    known = [participant.id for participant in study.participants]
-    _check_known("ingest.prefixes", prefixes, known, "correct [ingest] prefixes in study.toml")
-
-
-def check_segments(loads: Sequence[Load], skeleton: Skeleton) -> None:
-    """Every load sits on a segment of the skeleton that has mass.
-
-    Raises
-    ------
-    UsageError
-        The first load that does not, with the nearest known name.
-    """
-    for k, load in enumerate(loads):
-        _check_known(f"loads.{k}.segment", [load.segment], skeleton.body_names)
-
-
-def check_trials(loads: Sequence[Load], study: Study) -> None:
-    """Every load is carried in some trial, and names nothing that the study does not have.
-
-    Raises
-    ------
-    UsageError
-        The first load that names an unknown participant, task or run, or that no trial carries.
-    """
+def _check_trials(loads: Sequence[Load], study: Study) -> None:
+    """Every load is carried in some trial, and names nothing that the study does not have."""
     trials = [trial for participant in study.participants for trial in participant.trials]
     participants = sorted({trial.participant_id for trial in trials})
     tasks = sorted({trial.task for trial in trials})

@@ -25,7 +25,7 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH, coordinates_from, load_phi, loads_record, person_of
 from bsip_cli.statistics.effective_samples import effective_samples_of_pair
-from bsip_cli.statistics.fit_measures import fit_measures, posturography
+from bsip_cli.statistics.fit_measures import correlation, fit_measures, posturography
 from bsip_cli.statistics.hypothesis_tests import fisher_z_difference, williams_t
 from bsip_cli.statistics.methods import MEASURED, METHODS
 
@@ -250,9 +250,7 @@ def _correlations(signals: Signals, judged: np.ndarray) -> list[dict]:
     for a, b in combinations(methods, 2):
         for component in signals[MEASURED]:
             x, y, z = (signals[name][component] for name in (MEASURED, a, b))
-            r_a, r_b, r_ab = (
-                fit_measures(p, q, spans).pearson_r for p, q in ((x, y), (x, z), (y, z))
-            )
+            r_a, r_b, r_ab = (correlation(p, q, spans) for p, q in ((x, y), (x, z), (y, z)))
             n = min(effective_samples_of_pair(x, y, spans), effective_samples_of_pair(x, z, spans))
             williams = williams_t(r_a, r_b, r_ab, n)
             fisher = fisher_z_difference(r_a, n, r_b, n)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
-from bsip_cli.statistics.effective_samples import MINIMUM_SAMPLES, effective_samples_of_pair
+from bsip_cli.statistics.effective_samples import effective_samples_of_pair
 from bsip_cli.statistics.samples import Stretches, finite_stretches, is_constant, joined
 
 ELLIPSE_SHARE = 0.95
@@ -23,8 +23,7 @@ class FitMeasures:
     rmse is in the unit of the signals, rmse_percent_bw in percent of the body weight (nan
     without one), all others without unit. schwer_p lies in 0 .. 1, schwer_m in -1 .. infinity:
     both are 0 for equal signals. n counts the samples compared, n_effective the independent
-    pairs they are worth for the correlation. `reason` says in sentences why numbers are nan; it
-    is empty when none had to be left out.
+    pairs they are worth for the correlation.
     """
 
     rmse: float = nan
@@ -35,7 +34,6 @@ class FitMeasures:
     schwer_c: float = nan
     n: int = 0
     n_effective: float = nan
-    reason: str = ""
 
 
 def fit_measures(
@@ -67,48 +65,44 @@ def fit_measures(
     parts = finite_stretches(stretches, measured, computed)
     m, c = joined(measured, parts), joined(computed, parts)
     if len(m) == 0:
-        return FitMeasures(reason="There is no sample with both signals.")
+        return FitMeasures()
     rmse = float(np.sqrt(np.mean((c - m) ** 2)))
     percent = 100.0 * rmse / body_weight_N if body_weight_N else nan
-    r, why_no_r = _pearson(m, c)
-    magnitude, phase, why_no_metric = _magnitude_and_phase(m, c)
-    few = f"Under {MINIMUM_SAMPLES} samples there is no effective number."
-    why_no_number = few if len(m) < MINIMUM_SAMPLES else ""
+    magnitude, phase = _magnitude_and_phase(m, c)
     return FitMeasures(
         rmse=rmse,
         rmse_percent_bw=percent,
-        pearson_r=r,
+        pearson_r=_pearson(m, c),
         schwer_m=magnitude,
         schwer_p=phase,
         schwer_c=hypot(magnitude, phase),
         n=len(m),
         n_effective=effective_samples_of_pair(measured, computed, parts),
-        reason=" ".join(filter(None, [why_no_r, why_no_metric, why_no_number])),
     )
 
 
-def _pearson(m: NDArray[np.float64], c: NDArray[np.float64]) -> tuple[float, str]:
-    if len(m) < 2:
-        return nan, "One sample has no correlation."
-    constant = [name for name, s in (("measured", m), ("computed", c)) if is_constant(s)]
-    if constant:
-        verb = "signals are" if len(constant) > 1 else "signal is"
-        return nan, f"The {' and the '.join(constant)} {verb} constant: no correlation."
-    return float(np.clip(np.corrcoef(m, c)[0, 1], -1.0, 1.0)), ""
+def correlation(x: ArrayLike, y: ArrayLike, stretches: Stretches | None = None) -> float:
+    """Pearson's r of two signals, as in `fit_measures`."""
+    first, second = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    parts = finite_stretches(stretches, first, second)
+    return _pearson(joined(first, parts), joined(second, parts))
 
 
-def _magnitude_and_phase(
-    m: NDArray[np.float64], c: NDArray[np.float64]
-) -> tuple[float, float, str]:
+def _pearson(m: NDArray[np.float64], c: NDArray[np.float64]) -> float:
+    if len(m) < 2 or is_constant(m) or is_constant(c):
+        return nan
+    return float(np.clip(np.corrcoef(m, c)[0, 1], -1.0, 1.0))
+
+
+def _magnitude_and_phase(m: NDArray[np.float64], c: NDArray[np.float64]) -> tuple[float, float]:
+    """No magnitude and no phase error of a measured signal that is zero, no phase of a computed."""
     size_m, size_c = float(np.linalg.norm(m)), float(np.linalg.norm(c))
-    if size_m == 0.0:
-        return nan, nan, "The measured signal is zero: no magnitude and no phase error."
-    if size_c == 0.0:
-        return -1.0, nan, "The computed signal is zero: no phase error."
+    if size_m == 0.0 or size_c == 0.0:
+        return nan if size_m == 0.0 else -1.0, nan
     u, v = m / size_m, c / size_c
     # the arccos of Schwer's P, in the form that keeps its digits near 0 and pi (Kahan 2006)
     angle = 2.0 * atan2(float(np.linalg.norm(u - v)), float(np.linalg.norm(u + v)))
-    return size_c / size_m - 1.0, angle / pi, ""
+    return size_c / size_m - 1.0, angle / pi
 
 
 # --- sway of the centre of pressure (Hansen 2017, table 3, with units and means corrected) --------
@@ -116,7 +110,7 @@ def _magnitude_and_phase(
 
 @dataclass(frozen=True)
 class Posturography:
-    """Sway measures of one signal; what cannot be computed is nan and `reason` says why.
+    """Sway measures of one signal; what cannot be computed is nan.
 
     rms_*_mm : root mean square about the mean, the usual definition of sway.
     rms_*_origin_m : about the origin of the coordinates, which only tells where the person
@@ -133,7 +127,6 @@ class Posturography:
     ellipse_area_mm2: float = nan
     duration_s: float = nan
     n: int = 0
-    reason: str = ""
 
 
 def posturography(
@@ -169,7 +162,7 @@ def posturography(
     path = np.stack([joined(ap, parts), joined(ml, parts)])
     n = path.shape[1]
     if n == 0:
-        return Posturography(reason="There is no sample with a COP.")
+        return Posturography()
     rms_ap_mm, rms_ml_mm = path.std(axis=1) * MM_PER_M
     rms_ap_origin_m, rms_ml_origin_m = np.sqrt(np.mean(path**2, axis=1))
     length_m = sum(
@@ -177,11 +170,6 @@ def posturography(
         for start, stop in parts
     )
     duration_s = sum(stop - start - 1 for start, stop in parts) / rate_hz
-    reasons = []
-    if duration_s == 0.0:
-        reasons.append("No two samples follow each other: no path and no velocity.")
-    if n < 3:
-        reasons.append("Fewer than three samples span no ellipse.")
     return Posturography(
         rms_ap_mm=float(rms_ap_mm),
         rms_ml_mm=float(rms_ml_mm),
@@ -192,7 +180,6 @@ def posturography(
         ellipse_area_mm2=_ellipse_area(path * MM_PER_M) if n >= 3 else nan,
         duration_s=duration_s,
         n=n,
-        reason=" ".join(reasons),
     )
 
 

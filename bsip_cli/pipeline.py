@@ -73,7 +73,7 @@ def _stage(place: str, reads_recordings: bool = False, **names: str) -> Stage:
     name, level, module, part = (*place.split(), "")[:4]
     lists: Any = {key: tuple(text.split()) for key, text in names.items()}
     made: Any = {"level": level, "part": part, "reads_recordings": reads_recordings} | lists
-    return Stage(name, summary=_SUMMARIES[name], module=f"bsip_cli.stages.{module}", **made)
+    return Stage(name, summary=_SUMMARIES[name], module="bsip_cli.stages." + module, **made)
 
 
 STAGES = (

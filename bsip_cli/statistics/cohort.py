@@ -305,20 +305,10 @@ class PersonTest:
             "fisher_z": self.fisher.statistic,
             "fisher_p": self.fisher.p_value,
         }
-        component = self.topic.variable.removesuffix("_r")
+        about, component = self.topic, self.topic.variable.removesuffix("_r")
+        place = (self.participant, "", about.task, about.role, "", about.table)
         return tuple(
-            Value(
-                self.participant,
-                "",
-                self.topic.task,
-                self.topic.role,
-                "",
-                self.topic.table,
-                f"{component}_{name}",
-                PAIR,
-                number,
-                "1",
-            )
+            Value(*place, f"{component}_{name}", PAIR, number, "1")
             for name, number in numbers.items()
         )
 
@@ -341,14 +331,8 @@ def person_tests(table: str, runs: Iterable[CorrelationRun]) -> tuple[PersonTest
             for name in ("r_om", "r_rm", "r_om_rm")
         )
         n = float(sum(run.n_effective for run in known)) if known else nan
-        tests.append(
-            PersonTest(
-                participant,
-                topic,
-                williams_t(r_om, r_rm, r_om_rm, n),
-                fisher_z_difference(r_om, n, r_rm, n),
-            )
-        )
+        williams, fisher = williams_t(r_om, r_rm, r_om_rm, n), fisher_z_difference(r_om, n, r_rm, n)
+        tests.append(PersonTest(participant, topic, williams, fisher))
     return tuple(tests)
 
 
@@ -356,30 +340,23 @@ class PersonTestCounts:
     """What the participants' tests come to; keeps numbers of them, not the tests."""
 
     def __init__(self) -> None:
-        self._topics: dict[Topic, dict[str, _Results]] = {}
+        self._results: dict[tuple[Topic, str, Origin], _Results] = defaultdict(_Results)
 
     def add(self, tests: Iterable[PersonTest]) -> None:
         for test in tests:
-            topic = self._topics.setdefault(
-                test.topic, {"williams_t": _Results("added"), "fisher_z": _Results("published")}
-            )
-            topic["williams_t"].add(test.williams)
-            topic["fisher_z"].add(test.fisher)
+            self._results[test.topic, "williams_t", "added"].add(test.williams)
+            self._results[test.topic, "fisher_z", "published"].add(test.fisher)
 
     def comparisons(self, alpha: float) -> tuple[Comparison, ...]:
         """Median t and p of each topic, and in how many participants OM or RM is better."""
-        return tuple(
-            results.comparison(topic, test, alpha)
-            for topic, tests in self._topics.items()
-            for test, results in tests.items()
-        )
+        results = self._results.items()
+        return tuple(Comparison(*key, OM, RM, **found.numbers(alpha)) for key, found in results)
 
 
 @dataclass
 class _Results:
     """Statistic and p of one test in every participant, and why it is missing in some."""
 
-    origin: Literal["published", "added"]
     statistics: array[float] = field(default_factory=lambda: array("d"))
     p_values: array[float] = field(default_factory=lambda: array("d"))
     reasons: set[str] = field(default_factory=set)
@@ -390,25 +367,20 @@ class _Results:
         if test.reason:
             self.reasons.add(test.reason)
 
-    def comparison(self, topic: Topic, test: str, alpha: float) -> Comparison:
+    def numbers(self, alpha: float) -> dict[str, Any]:
         t, p = np.array(self.statistics), np.array(self.p_values)
         t, p = t[~np.isnan(p)], p[~np.isnan(p)]
         better, worse = (int(np.sum((sign * t > 0.0) & (p < alpha))) for sign in (1.0, -1.0))
         total = len(self.p_values)
         like = ", for instance" if len(self.reasons) > 1 else ""
         concerned = f"in {total - len(p)} of {total} participants{like}"
-        return Comparison(
-            topic,
-            test,
-            self.origin,
-            OM,
-            RM,
-            n=len(p),
-            statistic=float(np.median(t)) if len(p) else nan,
-            p_value=float(np.median(p)) if len(p) else nan,
-            effect_size=(better + worse) / len(p) if len(p) else nan,
-            effect_size_name="share of participants whose correlations differ",
-            count_a=better,
-            count_b=worse,
-            reason=f"{concerned}: {min(self.reasons)}" if self.reasons else "",
-        )
+        return {
+            "n": len(p),
+            "statistic": float(np.median(t)) if len(p) else nan,
+            "p_value": float(np.median(p)) if len(p) else nan,
+            "effect_size": (better + worse) / len(p) if len(p) else nan,
+            "effect_size_name": "share of participants whose correlations differ",
+            "count_a": better,
+            "count_b": worse,
+            "reason": f"{concerned}: {min(self.reasons)}" if self.reasons else "",
+        }

@@ -367,8 +367,14 @@ def _pooled_post_hoc(
         d = float(samples[i].mean() - samples[j].mean())
         e = sqrt(variance * (1.0 / len(samples[i]) + 1.0 / len(samples[j])))
         p = 2.0 * float(stats.t.sf(abs(d) / e, df))
-        interval = {"ci_low": d - critical * e, "ci_high": d + critical * e}
-        found[i, j] = TestResult(difference=d, statistic=d / e, df1=df, p_value=p, **interval)
+        found[i, j] = TestResult(
+            difference=d,
+            ci_low=d - critical * e,
+            ci_high=d + critical * e,
+            statistic=d / e,
+            df1=df,
+            p_value=p,
+        )
     return _bonferroni(found)
 
 

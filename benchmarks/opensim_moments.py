@@ -25,7 +25,7 @@ from bsip_cli.running.session import open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import person_from
 from bsip_cli.stages.joints import trial_of
-from bsip_cli.stages.reconstructed import parameters_of
+from bsip_cli.stages.reconstruct import parameters_of
 from tests.exports.opensim_files import by_coordinate, of_the_tool
 
 _READER = Stage("export", "trial", "", (), (), options=("skeleton", "joints"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 
 from bsip_cli.errors import BadDataError, ChangedError, not_writable
 from bsip_cli.files.fingerprints import BLANK, SEAL, file_hash, fingerprint, forget, seal
-from bsip_cli.schemas import SCHEMAS, Schema
+from bsip_cli.schemas import SCHEMAS, Schema, column_names
 
 _TYPES = {"float": pa.float64(), "int": pa.int64(), "bool": pa.bool_(), "text": pa.string()}
 
@@ -30,23 +30,35 @@ _SHAPE = {
 
 _UNFINISHED = ".bsip-part"
 
+Rows = pd.DataFrame | Sequence[Mapping[str, Any]]
+"""A table, or its rows."""
+
 
 def empty_table(kind: str) -> pd.DataFrame:
     """A table of this kind without rows."""
     return pd.DataFrame({column.name: [] for column in SCHEMAS[kind].columns}, dtype=object)
 
 
-def as_read(kind: str, frame: pd.DataFrame) -> pd.DataFrame:
+def table_of(kind: str, rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """Rows as a table: of each the columns of this kind, which all must have."""
+    names = column_names(kind)
+    if lacking := {name for row in rows for name in names if name not in row}:
+        raise ValueError(f"{kind}: missing columns {sorted(lacking)}")
+    return pd.DataFrame(list(rows), columns=names)
+
+
+def as_read(kind: str, frame: Rows) -> pd.DataFrame:
     """A table as it comes back from a file: the columns' types are those of its kind."""
     return _to_arrow(SCHEMAS[kind], frame).to_pandas()
 
 
-def write_artifact(path: Path, kind: str, frame: pd.DataFrame, provenance: Mapping) -> None:
+def write_artifact(path: Path, kind: str, frame: Rows, provenance: Mapping) -> None:
     """Write a table under its final name only when it is whole.
 
     Parameters
     ----------
-    frame : columns as the kind's schema says; a missing or an unknown one is a bug.
+    frame : columns as the kind's schema says; a missing or an unknown one is a bug. Or rows, of
+        which these columns are written.
     provenance : what made it; stored as JSON in the file's metadata.
     """
     header = _header(SCHEMAS[kind], provenance)
@@ -120,6 +132,17 @@ def write_atomically(path: Path, write) -> None:
         forget(path)
     except OSError as error:
         raise not_writable(path, error) from None
+
+
+def write_bytes(path: Path, content: bytes) -> Path:
+    """A small file, whole or not at all."""
+    write_atomically(path, lambda temporary: temporary.write_bytes(content))
+    return path
+
+
+def file_rows(out: Path, files: Iterable[Path]) -> list[dict[str, str]]:
+    """Of the artifacts that list files: each by its path below ``out``, with its hash."""
+    return [{"file": file.relative_to(out).as_posix(), "sha256": file_hash(file)} for file in files]
 
 
 def remove_unfinished(folder: Path) -> None:
@@ -259,7 +282,8 @@ def _not_an_artifact(path: Path, error: Exception) -> BadDataError:
     )
 
 
-def _to_arrow(schema: Schema, frame: pd.DataFrame) -> pa.Table:
+def _to_arrow(schema: Schema, rows: Rows) -> pa.Table:
+    frame = rows if isinstance(rows, pd.DataFrame) else table_of(schema.kind, rows)
     plain = [column.name for column in schema.columns if not column.name.endswith("*")]
     missing = [name for name in plain if name not in frame.columns]
     unknown = [name for name in frame.columns if schema.column(name) is None]

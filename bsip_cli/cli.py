@@ -1,10 +1,12 @@
-"""The command line: a few lines per command; heavy imports stay inside them."""
+"""The command line: a few lines per command, options from a table; heavy imports stay inside."""
 
 from __future__ import annotations
 
 import io
 import os
 import sys
+import tomllib
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -13,12 +15,47 @@ import click
 
 from bsip_cli import __version__
 from bsip_cli.errors import BsipError, not_readable
+from bsip_cli.files.regular import shipped
 from bsip_cli.pipeline import STAGES
-from bsip_cli.running.endings import EndedError, endings_kept, ignore_endings, raise_when_ended
+from bsip_cli.running.processes import EndedError, endings_kept, ignore_endings, raise_when_ended
 
 # One thread per process: results do not depend on the number of cores, and --jobs decides the load.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+
+_OPTIONS = tomllib.loads(shipped("commands.toml").read_text(encoding="utf-8"))
+_PATH = click.Path(path_type=Path)
+_TYPES = {"path": _PATH, "int": click.INT, "float": click.FLOAT}
+_OF_STUDY = ("--participant", "--config", "--jobs")
+_EFFECTS = ("--effect", "--size", "--target", "--effect-tasks")  # matched in the order given
+
+
+def _option(key: str) -> Any:
+    """An option of the table, by its name; behind that of its command where others differ."""
+    said = dict(_OPTIONS[key])
+    names = [key.split()[-1], *([said.pop("name")] if "name" in said else [])]
+    if "type" in said:
+        said["type"] = _TYPES[said["type"]]
+    if "choices" in said:
+        said["type"] = click.Choice(said.pop("choices"))
+    if "range" in said:
+        kind = click.FloatRange if said.get("type") is click.FLOAT else click.IntRange
+        said["type"] = kind(*said.pop("range"))
+    return click.option(*names, show_default=bool(said.get("default")), **said)
+
+
+def _with(*keys: str) -> Callable[[Any], Any]:
+    """A command with these options, in this order."""
+
+    def decorated(command: Any) -> Any:
+        for key in reversed(keys):
+            command = _option(key)(command)
+        return command
+
+    return decorated
+
+
+_study = click.argument("study", type=_PATH)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -32,40 +69,12 @@ def cli() -> None:
     """
 
 
-_OUT = click.option(
-    "--out", required=True, type=click.Path(path_type=Path), help="Folder for all results."
-)
-_PARTICIPANT = click.option(
-    "--participant",
-    "chosen",
-    multiple=True,
-    metavar="sub-01",
-    help="Only this participant (may be repeated).",
-)
-_CONFIG = click.option(
-    "--config",
-    "config_file",
-    type=click.Path(path_type=Path),
-    help="TOML file with options that differ from the study's.",
-)
-_JOBS = click.option(
-    "--jobs", default=1, show_default=True, type=click.IntRange(1), help="Participants at once."
-)
-
-
 def _stage_command(name: str, summary: str) -> click.Command:
+    own = {"identify": ("--estimator",), "report": ("--group",), "run": ("--group",)}
+
     @click.command(name, help=summary)
-    @click.argument("study", type=click.Path(path_type=Path))
-    @_OUT
-    @_PARTICIPANT
-    @_CONFIG
-    @_JOBS
-    @click.option("--force", is_flag=True, help="Redo what is up to date.")
-    @click.option(
-        "--verify",
-        is_flag=True,
-        help="Hash every file again, also those whose size and times have not changed.",
-    )
+    @_study
+    @_with("--out", *_OF_STUDY, "--force", "--verify", *own.get(name, ()))
     def command(study, out, chosen, config_file, **options):
         from bsip_cli.running.session import run_session
 
@@ -76,27 +85,12 @@ def _stage_command(name: str, summary: str) -> click.Command:
 
 for _stage in {stage.name: stage for stage in STAGES}.values():
     cli.add_command(_stage_command(_stage.name, _stage.summary))
-cli.commands["identify"].params.append(
-    click.Option(
-        ["--estimator", "estimators"],
-        multiple=True,
-        metavar="NAME",
-        help="Instead of identify.estimators (may be repeated): the first is OM, others appear "
-        "under their names.",
-    )
-)
 cli.add_command(_stage_command("run", "All stages, from recordings to the report."))
-for _name in ("report", "run"):
-    cli.commands[_name].params.append(
-        click.Option(["--group"], is_flag=True, help="Only what is about all participants.")
-    )
 
 
 @cli.command()
-@click.argument("study", type=click.Path(path_type=Path))
-@_PARTICIPANT
-@_CONFIG
-@_JOBS
+@_study
+@_with(*_OF_STUDY)
 def check(study, chosen, config_file, jobs):
     """Say what each recording of a study is taken for, and what fails; nothing is kept.
 
@@ -108,7 +102,7 @@ def check(study, chosen, config_file, jobs):
 
 
 @cli.command()
-@click.argument("study", type=click.Path(path_type=Path))
+@_study
 def people(study):
     """Print the participants of a study, one in a line, for scripts and job schedulers.
 
@@ -120,93 +114,10 @@ def people(study):
         click.echo(name)
 
 
-def _effect_options(command: Any) -> Any:
-    """What to hide in recordings; matched in the order given."""
-    options = (
-        click.option(
-            "--effect",
-            "effects",
-            multiple=True,
-            metavar="NAME",
-            help="Hide this effect (may be repeated, each with its --size).",
-        ),
-        click.option(
-            "--size",
-            "sizes",
-            multiple=True,
-            type=float,
-            help="Its size, in the effect's unit.",
-        ),
-        click.option(
-            "--target",
-            "targets",
-            multiple=True,
-            metavar="T",
-            help="Where it sits: segment, channel, marker or joint, and settings as key=number, "
-            "joined by commas; - for none. Drawn if not given.",
-        ),
-        click.option(
-            "--effect-tasks",
-            multiple=True,
-            metavar="TASK",
-            help="Only in the trials of this task (may be repeated).",
-        ),
-    )
-    for option in reversed(options):
-        command = option(command)
-    return command
-
-
 @cli.command()
-@click.argument("study", type=click.Path(path_type=Path))
-@click.option(
-    "--preset",
-    default="sample",
-    show_default=True,
-    type=click.Choice(["sample", "cohort", "diagnosis"]),
-    help="sample: 6 people, short trials, low rates; cohort: 12 people, 120 s sequences at 100 Hz; "
-    "diagnosis: one person, 60 s, with squats, hops and steps onto the plate.",
-)
-@click.option("--participants", type=click.IntRange(1, 10000), help="How many people.")
-@click.option("--seed", type=int, help="Draws other people and movements.")
-@click.option(
-    "--sequence-s",
-    type=click.FloatRange(5, 1200),
-    help="Length of the identification sequence [s].",
-)
-@click.option(
-    "--task",
-    "tasks",
-    multiple=True,
-    metavar="TASK",
-    help="Only recordings of this task (may be repeated); the others stay what they would be.",
-)
-@click.option(
-    "--run",
-    default=1,
-    show_default=True,
-    type=click.IntRange(1),
-    help="Number of the recordings: the same people move once more.",
-)
-@click.option(
-    "--plate-per-foot",
-    is_flag=True,
-    help="Two plates side by side, one under each foot, instead of one under both.",
-)
-@click.option(
-    "--soft-tissue",
-    default="light",
-    show_default=True,
-    type=click.Choice(["light", "measured"]),
-    help="light: skin moves with the sines of the joints; measured: as published of people, larger "
-    "on trunk and thighs, curved in the pose, with mass that swings at 5 to 11 Hz.",
-)
-@click.option(
-    "--shoulder-girdle",
-    is_flag=True,
-    help="Shoulders that move against the trunk, seen by 51 markers; fitted with 17 segments.",
-)
-@_effect_options
+@_study
+@_with("--preset", "--participants", "--seed", "--sequence-s", "--task", "--run")
+@_with("--plate-per-foot", "--soft-tissue", "--shoulder-girdle", *_EFFECTS)
 def simulate(study, preset, **options):
     """Make a study of simulated people whose inertial parameters are known.
 
@@ -219,17 +130,9 @@ def simulate(study, preset, **options):
 
 
 @cli.command()
-@click.argument("source", metavar="IN", type=click.Path(path_type=Path))
-@click.argument("out", type=click.Path(path_type=Path))
-@click.option(
-    "--participant",
-    "participants",
-    multiple=True,
-    metavar="sub-01",
-    help="Only in this participant's recordings (may be repeated).",
-)
-@click.option("--seed", default=1, show_default=True, type=int, help="Draws what is left open.")
-@_effect_options
+@click.argument("source", metavar="IN", type=_PATH)
+@click.argument("out", type=_PATH)
+@_with("inject --participant", "inject --seed", *_EFFECTS)
 def inject(source, out, participants, seed, **effects):
     """Hide effects in measured recordings, where that is physically possible.
 
@@ -241,88 +144,22 @@ def inject(source, out, participants, seed, **effects):
 
 
 @cli.command()
-@click.argument("study", type=click.Path(path_type=Path))
-@_OUT
-@_PARTICIPANT
-@click.option(
-    "--method",
-    help="Whose inertial parameters: OM, RM+mass, RM or the name of an estimator; without it, what "
-    "`bsip choose` found best over all movements.",
-)
-@click.option(
-    "--format",
-    "formats",
-    multiple=True,
-    type=click.Choice(["urdf", "mjcf", "osim", "biomod", "csv"]),
-    help="Only this format (may be repeated); without it, all.",
-)
-@click.option(
-    "--model-file",
-    type=click.Path(path_type=Path),
-    help="An .osim file (OpenSim 4) that gets the inertial parameters, in place of a model of "
-    "bsip's own tree.",
-)
-@click.option(
-    "--model-bodies",
-    metavar="MAP",
-    help="Which bodies of --model-file are which segments: rajagopal, gait2392 or a .toml file; "
-    "without it, the shipped map that fits.",
-)
-@click.option(
-    "--repair",
-    is_flag=True,
-    help="Replace inertia tensors that no body can have by the nearest possible ones, and say so; "
-    "without it such a person gets the .csv only.",
-)
-@click.option(
-    "--what",
-    type=click.Choice(["model", "recording", "opensim", "bids", "joints"]),
-    default="model",
-    show_default=True,
-    help="model: the person, for other software. recording: a copy of the study with the named "
-    "faults of plates, clocks and labels corrected. opensim: model, motion, forces of the feet and "
-    "the set-up of InverseDynamicsTool. bids: markers, pose and forces as BIDS-Motion. joints: "
-    "joint moments as CSV.",
-)
-@click.option(
-    "--to",
-    type=click.Path(path_type=Path),
-    help="Folder for the files, instead of OUT/sub-XX/export; recording and bids need one.",
-)
-@_CONFIG
-def export(
-    study, out, chosen, method, formats, model_file, model_bodies, repair, what, to, config_file
-):
+@_study
+@_with("--out", "--participant", "--method", "--format", "--model-file", "--model-bodies")
+@_with("--repair", "--what", "--to", "--config")
+def export(study, out, chosen, config_file, **asked):
     """Write files to go on with: people as models for Pinocchio, MuJoCo, OpenSim, biorbd and
     Visual3D (OUT/sub-XX/export/sub-XX_METHOD with .urdf, .xml, .osim, .bioMod and .csv), or with
     --what corrected recordings, motion with forces, or joint moments."""
     from bsip_cli.commands.export import Request, export_session
 
-    request = Request(method, formats, model_file, model_bodies, repair, what, to)
-    return export_session(study, out, chosen, config_file, request)
+    return export_session(study, out, chosen, config_file, Request(**asked))
 
 
 @cli.command()
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option(
-    "--marker-set",
-    default="auto",
-    show_default=True,
-    metavar="NAME",
-    help="Compare with this shipped set, or with a .toml file; auto guesses.",
-)
-@click.option(
-    "--prefix",
-    default="",
-    metavar="Subject:",
-    help="Whose markers count, where the file holds several people.",
-)
-@click.option(
-    "--write",
-    type=click.Path(path_type=Path),
-    help="Write a first marker set of the file's labels here, also where a set fits.",
-)
-def markers(file, marker_set, prefix, write):
+@click.argument("file", type=_PATH)
+@_with("--marker-set", "--prefix", "--write")
+def markers(**asked):
     """Print a recording's labels, the marker set they fit, and what is missing on which segment.
 
     FILE is a C3D or TRC file. Where no shipped set fits, a first one is written to
@@ -334,32 +171,13 @@ def markers(file, marker_set, prefix, write):
     """
     from bsip_cli.commands.markers import Request, markers_command
 
-    return markers_command(Request(file, marker_set, prefix, write))
+    return markers_command(Request(**asked))
 
 
 @cli.command()
-@click.argument(
-    "given",
-    metavar="FILES_OR_FOLDERS...",
-    nargs=-1,
-    required=True,
-    type=click.Path(path_type=Path),
-)
-@click.option(
-    "--out",
-    required=True,
-    type=click.Path(path_type=Path),
-    help="The study's folder: new, or empty. Nothing is ever written over.",
-)
-@click.option(
-    "--participant",
-    default="",
-    metavar="sub-01",
-    help="Whose all these recordings are; without it, folders, the files' subjects and the names "
-    "of files distinguish people.",
-)
-@click.option("--link", is_flag=True, help="Symbolic links instead of copies.")
-def init(given, out, participant, link):
+@click.argument("given", metavar="FILES_OR_FOLDERS...", nargs=-1, required=True, type=_PATH)
+@_with("init --out", "init --participant", "--link")
+def init(**asked):
     """Make a study of recordings: C3D files, and TRC files with their MOT or STO.
 
     Files get the names that a study needs (sub-01_task-walking_run-1); static trials are told by
@@ -372,29 +190,12 @@ def init(given, out, participant, link):
     """
     from bsip_cli.commands.init import Request, init_command
 
-    return init_command(Request(given, out, participant, link))
+    return init_command(Request(**asked))
 
 
 @cli.command("compare-loads")
-@click.argument("study", type=click.Path(path_type=Path))
-@_OUT
-@click.option("--participant", required=True, metavar="sub-01", help="Whose recordings.")
-@_CONFIG
-@click.option(
-    "--with",
-    "heavy",
-    default="",
-    metavar="TASK[,TASK]",
-    help="Tasks, or recordings as squat_run-2, that carry the load; without it, all that move and "
-    "carry a declared one.",
-)
-@click.option(
-    "--without",
-    "plain",
-    default="",
-    metavar="TASK[,TASK]",
-    help="Those to compare with; without it, all that move and carry none.",
-)
+@_study
+@_with("--out", "compare-loads --participant", "--config", "--with", "--without")
 def compare_loads(study, out, participant, config_file, heavy, plain):
     """Find a load that is known, to see how far its mass can be trusted.
 
@@ -409,8 +210,8 @@ def compare_loads(study, out, participant, config_file, heavy, plain):
 
 
 @cli.command()
-@click.argument("out", type=click.Path(path_type=Path))
-@click.option("--full", is_flag=True, help="Everything: tables, causes with all their numbers.")
+@click.argument("out", type=_PATH)
+@_with("--full")
 def show(out, full):
     """Print what a finished run found: the most important first, a line per finding, and where the
     reports lie."""
@@ -437,7 +238,7 @@ def published(what, paper):
 
 
 @cli.command()
-@click.argument("out", type=click.Path(path_type=Path))
+@click.argument("out", type=_PATH)
 def methods(out) -> None:
     """What was done with a study's data, with versions, options and references, in words to paste
     into a paper."""
@@ -447,7 +248,7 @@ def methods(out) -> None:
 
 
 @cli.command()
-@click.argument("artifact", required=False, type=click.Path(path_type=Path))
+@click.argument("artifact", required=False, type=_PATH)
 def info(artifact) -> None:
     """What an artifact holds and what made it; without one, the versions of bsip and of the
     libraries its numbers depend on (for bug reports)."""

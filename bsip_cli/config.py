@@ -12,16 +12,9 @@ from typing import Annotated, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bsip_cli.errors import UsageError
-from bsip_cli.files.regular import read_toml
+from bsip_cli.files.regular import read_toml, shipped
 
 _MOST_FAULTS, _LONGEST_VALUE = 20, 80  # faults and characters that are told
-
-
-def shipped(*parts: str) -> Path:
-    """Path of a file that ships in ``configs/``, in a checkout as in an installed wheel."""
-    package = Path(__file__).parent
-    installed = package / "configs"
-    return (installed if installed.is_dir() else package.parent / "configs").joinpath(*parts)
 
 
 class Section(BaseModel):
@@ -228,7 +221,7 @@ def config_of(*given: Mapping, file: str = "the options") -> Config:
         faults = error.errors()
         more = f"; and {len(faults) - _MOST_FAULTS} more" if len(faults) > _MOST_FAULTS else ""
         raise UsageError(
-            "; ".join(_fault(e, merged) for e in faults[:_MOST_FAULTS]) + more,
+            "; ".join(_fault(e) for e in faults[:_MOST_FAULTS]) + more,
             file=file,
             remedy="configs/default.toml lists every option with its unit",
         ) from None
@@ -250,7 +243,7 @@ def with_estimators(config: Config, names: tuple[str, ...]) -> Config:
         return Config.model_validate(values)
     except ValidationError as error:
         raise UsageError(
-            "; ".join(_fault(e, values) for e in error.errors() if len(e["loc"]) > 2),
+            "; ".join(_fault(e) for e in error.errors() if len(e["loc"]) > 2),
             remedy="check --estimator",
         ) from None
 
@@ -268,7 +261,7 @@ def _merge(base: Mapping, over: Mapping) -> dict:
     return merged
 
 
-def _fault(error: Mapping, values: Mapping) -> str:
+def _fault(error: Mapping) -> str:
     path = [str(part) for part in error["loc"]]
     name = ".".join(path)
     if error["type"] == "missing":

@@ -24,7 +24,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli import __version__
-from bsip_cli.artifacts import as_read
+from bsip_cli.artifacts import Rows, as_read
 from bsip_cli.body.exports.formats import FORMATS
 from bsip_cli.body.exports.identified import IdentifiedPerson
 from bsip_cli.body.inertia import from_readable
@@ -384,7 +384,7 @@ class _InMemory(Unit):
     ) -> dict:
         return self.kept[self._key(kind, trial)].facts
 
-    def write(self, kind: str, frame: pd.DataFrame, facts: dict | None = None) -> None:
+    def write(self, kind: str, frame: Rows, facts: dict | None = None) -> None:
         plain = json.loads(json.dumps(facts or {}))  # as it would come back from a file
         self.kept[self._key(kind)] = _Kept(as_read(kind, frame), plain, len(frame))
 

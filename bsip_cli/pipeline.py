@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # artifacts needs pandas, and `bsip --help` must not wait for it
     from bsip_cli.schemas import Level
@@ -27,8 +27,8 @@ class Stage:
     name: str
     level: Level
     summary: str
-    reads: tuple[str, ...]
-    writes: tuple[str, ...]
+    reads: tuple[str, ...] = ()
+    writes: tuple[str, ...] = ()
     options: tuple[str, ...] = ()
     module: str = ""
     reads_if_there: tuple[str, ...] = ()
@@ -46,293 +46,162 @@ class Stage:
         return (*self.reads, *self.reads_if_there)
 
 
+_SUMMARIES = {
+    "ingest": "Read recordings: markers and ground wrench in SI units, gaps filled, "
+    "contacts found.",
+    "scale": "Build the person's skeleton: lengths, joint centres, markers on their segments.",
+    "ik": "Joint coordinates, velocities and accelerations from the markers.",
+    "regress": "Inertial parameters from an anthropometric table (RM).",
+    "identify": "Inertial parameters that explain the measured ground forces (OM).",
+    "reconstruct": "Ground wrench and centre of pressure from the motion, "
+    "beside the measured ones.",
+    "laboratory": "The faults of plates, clock and vertical, "
+    "by all persons recorded there together.",
+    "diagnose": "What the simulation gets wrong: its cause, how large, how sure.",
+    "extend": "The model extended by what the diagnosis named, and what that gains.",
+    "joints": "Net forces, moments and powers at the joints, with standard deviations.",
+    "choose": "Which parameters to use, by the errors in movements that OM never saw.",
+    "stats": "Tests and summaries over all participants.",
+    "tables": "The papers' tables as CSV, Markdown and LaTeX.",
+    "report": "An HTML report per participant and one for the cohort.",
+}
+_SCENE = "markers kinematics marker-events wrench plates skeleton marker-positions"
+
+
+def _stage(place: str, reads_recordings: bool = False, **names: str) -> Stage:
+    """A stage by ``name level module part``; names of kinds and options by spaces."""
+    name, level, module, part = (*place.split(), "")[:4]
+    lists: Any = {key: tuple(text.split()) for key, text in names.items()}
+    made: Any = {"level": level, "part": part, "reads_recordings": reads_recordings} | lists
+    return Stage(name, summary=_SUMMARIES[name], module="bsip_cli.stages." + module, **made)
+
+
 STAGES = (
-    Stage(
-        "ingest",
-        "participant",
-        "Read recordings: markers and ground wrench in SI units, gaps filled, contacts found.",
-        reads=(),
-        writes=("readings",),
-        options=("ingest",),
-        module="bsip_cli.stages.survey",
-        part="session",
+    _stage(
+        "ingest participant survey session",
+        writes="readings",
+        options="ingest",
         reads_recordings=True,
     ),
-    Stage(
-        "ingest",
-        "trial",
-        "Read recordings: markers and ground wrench in SI units, gaps filled, contacts found.",
-        reads=("readings",),
-        writes=("markers", "wrench", "plates", "contacts", "quality"),
-        options=("marker_set", "loads", "ingest"),
-        module="bsip_cli.stages.ingest",
+    _stage(
+        "ingest trial ingest",
+        reads="readings",
+        writes="markers wrench plates contacts quality",
+        options="marker_set loads ingest",
         reads_recordings=True,
     ),
-    Stage(
-        "scale",
-        "participant",
-        "Build the person's skeleton: lengths, joint centres, markers on their segments.",
-        reads=("markers", "wrench"),
-        writes=("skeleton", "marker-positions", "person"),
-        options=("marker_set", "skeleton", "loads", "roles", "ingest", "scale", "ik"),
-        module="bsip_cli.stages.scale",
+    _stage(
+        "scale participant scale",
+        reads="markers wrench",
+        writes="skeleton marker-positions person",
+        options="marker_set skeleton loads roles ingest scale ik",
     ),
-    Stage(
-        "ik",
-        "trial",
-        "Joint coordinates, velocities and accelerations from the markers.",
-        reads=("markers", "skeleton", "marker-positions"),
-        writes=("kinematics", "marker-residuals", "marker-events"),
-        options=("skeleton", "ik", "smoothing"),
-        module="bsip_cli.stages.ik",
+    _stage(
+        "ik trial ik",
+        reads="markers skeleton marker-positions",
+        writes="kinematics marker-residuals marker-events",
+        options="skeleton ik smoothing",
     ),
-    Stage(
-        "regress",
-        "participant",
-        "Inertial parameters from an anthropometric table (RM).",
-        reads=("skeleton", "marker-positions", "person"),
-        writes=("regression",),
-        options=("skeleton", "scale", "regress", "prior"),
-        module="bsip_cli.stages.regress",
+    _stage(
+        "regress participant regress",
+        reads="skeleton marker-positions person",
+        writes="regression",
+        options="skeleton scale regress prior",
     ),
-    Stage(
-        "identify",
-        "participant",
-        "Inertial parameters that explain the measured ground forces (OM).",
-        reads=("kinematics", "wrench", "skeleton", "marker-positions", "regression"),
-        writes=(
-            "bsip",
-            "covariance",
-            "base-parameters",
-            "excitation",
-            "identification",
-            "used-blocks",
-        ),
-        options=("skeleton", "loads", "roles", "prior", "identify"),
-        module="bsip_cli.stages.identify",
+    _stage(
+        "identify participant identify",
+        reads="kinematics wrench skeleton marker-positions regression",
+        writes="bsip covariance base-parameters excitation identification used-blocks",
+        options="skeleton loads roles prior identify",
     ),
-    Stage(
-        "reconstruct",
-        "trial",
-        "Ground wrench and centre of pressure from the motion, beside the measured ones.",
-        reads=(
-            "kinematics",
-            "wrench",
-            "plates",
-            "skeleton",
-            "marker-positions",
-            "person",
-            "bsip",
-            "used-blocks",
-        ),
-        writes=("reconstruction", "fit", "correlation-difference", "posturography"),
-        options=("skeleton", "loads", "reconstruct"),
-        module="bsip_cli.stages.reconstruct",
+    _stage(
+        "reconstruct trial reconstruct",
+        reads="kinematics wrench plates skeleton marker-positions person bsip used-blocks",
+        writes="reconstruction fit correlation-difference posturography",
+        options="skeleton loads reconstruct",
     ),
-    Stage(
-        "laboratory",
-        "participant",
-        "The faults of plates, clock and vertical, by all persons recorded there together.",
-        reads=(
-            "markers",
-            "kinematics",
-            "marker-events",
-            "wrench",
-            "plates",
-            "skeleton",
-            "marker-positions",
-            "person",
-            "regression",
-            "identification",
-        ),
-        writes=("laboratory-information",),
-        options=("skeleton", "loads", "roles", "ik", "prior", "diagnosis", "reconstruct"),
-        module="bsip_cli.stages.laboratory_information",
+    _stage(
+        "laboratory participant laboratory_information",
+        reads=f"{_SCENE} person regression identification",
+        writes="laboratory-information",
+        options="skeleton loads roles ik prior diagnosis reconstruct",
     ),
-    Stage(
-        "laboratory",
-        "cohort",
-        "The faults of plates, clock and vertical, by all persons recorded there together.",
-        reads=("laboratory-information",),
-        writes=("laboratory", "laboratory-sums"),
-        options=("diagnosis", "laboratory"),
-        module="bsip_cli.stages.laboratory",
+    _stage(
+        "laboratory cohort laboratory",
+        reads="laboratory-information",
+        writes="laboratory laboratory-sums",
+        options="diagnosis laboratory",
     ),
-    Stage(
-        "diagnose",
-        "participant",
-        "What the simulation gets wrong: its cause, how large, how sure.",
-        reads=(
-            "markers",
-            "kinematics",
-            "marker-events",
-            "wrench",
-            "plates",
-            "skeleton",
-            "marker-positions",
-            "person",
-            "regression",
-            "identification",
-        ),
-        reads_if_there=("laboratory-information", "laboratory-sums", "laboratory"),
-        writes=("overall-diagnosis", "overall-error-budget", "detection"),
-        options=("skeleton", "loads", "roles", "ik", "prior", "diagnosis", "reconstruct"),
-        module="bsip_cli.stages.diagnose",
+    _stage(
+        "diagnose participant diagnose",
+        reads=f"{_SCENE} person regression identification",
+        reads_if_there="laboratory-information laboratory-sums laboratory",
+        writes="overall-diagnosis overall-error-budget detection",
+        options="skeleton loads roles ik prior diagnosis reconstruct",
     ),
-    Stage(
-        "diagnose",
-        "trial",
-        "What the simulation gets wrong: its cause, how large, how sure.",
-        reads=("overall-diagnosis", "overall-error-budget"),
-        writes=("diagnosis", "error-budget"),
-        module="bsip_cli.stages.diagnose_trial",
+    _stage(
+        "diagnose trial diagnose_trial",
+        reads="overall-diagnosis overall-error-budget",
+        writes="diagnosis error-budget",
     ),
-    Stage(
-        "extend",
-        "participant",
-        "The model extended by what the diagnosis named, and what that gains.",
-        reads=(
-            "overall-diagnosis",
-            "markers",
-            "kinematics",
-            "marker-events",
-            "wrench",
-            "plates",
-            "skeleton",
-            "marker-positions",
-            "regression",
-            "bsip",
-            "identification",
-            "used-blocks",
-        ),
-        writes=("extended-bsip", "bsip-change", "extended-skeleton"),
-        options=("skeleton", "loads", "ik", "prior", "identify"),
-        module="bsip_cli.stages.extend",
+    _stage(
+        "extend participant extend",
+        reads=f"overall-diagnosis {_SCENE} regression bsip identification used-blocks",
+        writes="extended-bsip bsip-change extended-skeleton",
+        options="skeleton loads ik prior identify",
     ),
-    Stage(
-        "extend",
-        "trial",
-        "The model extended by what the diagnosis named, and what that gains.",
-        reads=(
-            "overall-diagnosis",
-            "markers",
-            "kinematics",
-            "marker-events",
-            "wrench",
-            "plates",
-            "skeleton",
-            "marker-positions",
-            "person",
-            "bsip",
-            "used-blocks",
-            "extended-bsip",
-        ),
-        writes=("gain", "corrected-wrench"),
-        options=("skeleton", "loads", "ik", "reconstruct"),
-        module="bsip_cli.stages.extend_trial",
-        amends=("reconstruction", "fit"),
+    _stage(
+        "extend trial extend_trial",
+        reads=f"overall-diagnosis {_SCENE} person bsip used-blocks extended-bsip",
+        writes="gain corrected-wrench",
+        amends="reconstruction fit",
+        options="skeleton loads ik reconstruct",
     ),
-    Stage(
-        "extend",
-        "participant",
-        "The model extended by what the diagnosis named, and what that gains.",
-        reads=("gain",),
-        writes=("overall-gain",),
-        module="bsip_cli.stages.extend_gain",
-        part="gain",
+    _stage(
+        "extend participant extend_gain gain",
+        reads="gain",
+        writes="overall-gain",
     ),
-    Stage(
-        "joints",
-        "trial",
-        "Net forces, moments and powers at the joints, with standard deviations.",
-        reads=(
-            "markers",
-            "kinematics",
-            "marker-events",
-            "wrench",
-            "plates",
-            "contacts",
-            "skeleton",
-            "marker-positions",
-            "person",
-            "bsip",
-            "covariance",
-            "identification",
-            "overall-diagnosis",
-            "extended-bsip",
-        ),
-        writes=("joint-moments", "joint-peaks"),
-        options=("skeleton", "loads", "ik", "joints"),
-        module="bsip_cli.stages.joints",
+    _stage(
+        "joints trial joints",
+        reads="markers kinematics marker-events wrench plates contacts skeleton marker-positions "
+        "person bsip covariance identification overall-diagnosis extended-bsip",
+        writes="joint-moments joint-peaks",
+        options="skeleton loads ik joints",
     ),
-    Stage(
-        "choose",
-        "participant",
-        "Which parameters to use, by the errors in movements that OM never saw.",
-        reads=("identification", "used-blocks", "fit", "reconstruction"),
-        writes=("choice",),
-        options=("roles",),
-        module="bsip_cli.stages.choose",
+    _stage(
+        "choose participant choose",
+        reads="identification used-blocks fit reconstruction",
+        writes="choice",
+        options="roles",
     ),
-    Stage(
-        "stats",
-        "cohort",
-        "Tests and summaries over all participants.",
-        reads=("bsip", "fit", "posturography", "correlation-difference"),
-        writes=("values", "comparisons"),
-        options=("roles", "stats"),
-        module="bsip_cli.stages.stats",
+    _stage(
+        "stats cohort stats",
+        reads="bsip fit posturography correlation-difference",
+        writes="values comparisons",
+        options="roles stats",
     ),
-    Stage(
-        "tables",
-        "cohort",
-        "The papers' tables as CSV, Markdown and LaTeX.",
-        reads=("values", "comparisons"),
-        writes=("tables-files",),
-        options=("stats",),
-        module="bsip_cli.stages.tables",
+    _stage(
+        "tables cohort tables",
+        reads="values comparisons",
+        writes="tables-files",
+        options="stats",
     ),
-    Stage(
-        "report",
-        "participant",
-        "An HTML report per participant and one for the cohort.",
-        reads=(
-            "quality",
-            "skeleton",
-            "marker-positions",
-            "person",
-            "kinematics",
-            "marker-residuals",
-            "marker-events",
-            "bsip",
-            "excitation",
-            "identification",
-            "reconstruction",
-            "fit",
-        ),
-        reads_if_there=(
-            "overall-diagnosis",
-            "overall-error-budget",
-            "detection",
-            "overall-gain",
-            "bsip-change",
-            "choice",
-            "joint-moments",
-            "joint-peaks",
-        ),
-        writes=("report-files",),
-        options=("skeleton", "loads", "roles"),
-        module="bsip_cli.stages.report",
+    _stage(
+        "report participant report",
+        reads="quality skeleton marker-positions person kinematics marker-residuals marker-events "
+        "bsip excitation identification reconstruction fit",
+        reads_if_there="overall-diagnosis overall-error-budget detection overall-gain bsip-change "
+        "choice joint-moments joint-peaks",
+        writes="report-files",
+        options="skeleton loads roles",
     ),
-    Stage(
-        "report",
-        "cohort",
-        "An HTML report per participant and one for the cohort.",
-        reads=("values", "comparisons", "person", "identification", "tables-files"),
-        reads_if_there=("overall-diagnosis", "choice", "laboratory", "report-files"),
-        writes=("group-report-files",),
-        options=("stats",),
-        module="bsip_cli.stages.group_report",
+    _stage(
+        "report cohort group_report",
+        reads="values comparisons person identification tables-files",
+        reads_if_there="overall-diagnosis choice laboratory report-files",
+        writes="group-report-files",
+        options="stats",
     ),
 )
 

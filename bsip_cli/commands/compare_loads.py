@@ -15,11 +15,10 @@ from bsip_cli.pipeline import Stage
 from bsip_cli.report.tables.formats import to_markdown
 from bsip_cli.report.tables.model import Column, Row, Table
 from bsip_cli.report.words import number, segment_label
-from bsip_cli.running.lock import held_alone
-from bsip_cli.running.runner import Outcome, lacking
+from bsip_cli.running.runner import Outcome, held_alone, lacking
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.known_loads import loads_record
+from bsip_cli.stages.frames import loads_record
 from bsip_cli.stages.load_comparison import ALL, LOADED, TWO, compared
 from bsip_cli.study.study import Trial
 from bsip_cli.study.trials import listed

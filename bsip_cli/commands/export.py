@@ -36,8 +36,7 @@ from bsip_cli.errors import BadDataError, BsipError, UsageError
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.files.regular import check_regular
 from bsip_cli.pipeline import Stage
-from bsip_cli.running.lock import held_alone
-from bsip_cli.running.runner import Outcome, lacking
+from bsip_cli.running.runner import Outcome, held_alone, lacking
 from bsip_cli.running.session import follow, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names

@@ -37,10 +37,9 @@ from bsip_cli.recordings.settle import SessionReading, Verdict
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import OpenedStudy, follow
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.found_causes import causes_of
 from bsip_cli.stages.frames import markers_from, person_from
-from bsip_cli.stages.session_reading import opened, reading_of
-from bsip_cli.stages.trial_scene import plates_of
+from bsip_cli.stages.survey import opened, reading_of
+from bsip_cli.stages.trial_scene import causes_of, plates_of
 
 _READER = Stage(
     "export",
@@ -290,7 +289,7 @@ class _Correction:
 
 def _opened(unit: Unit) -> tuple[Opened, SessionReading]:
     assert unit.trial is not None
-    session = reading_of(unit, unit.trial)
+    session = reading_of(unit.read("readings"), unit.trial)
     return session.frame.of(opened(unit, unit.trial)), session
 
 

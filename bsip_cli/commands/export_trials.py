@@ -20,8 +20,7 @@ from bsip_cli.errors import BadDataError, BsipError
 from bsip_cli.pipeline import Stage
 from bsip_cli.recordings.analog import runs
 from bsip_cli.recordings.own_plates import SIDES
-from bsip_cli.running.lock import held_alone
-from bsip_cli.running.runner import Outcome, lacking
+from bsip_cli.running.runner import Outcome, held_alone, lacking
 from bsip_cli.running.session import OpenedStudy, follow
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH, coordinates_from, markers_from, person_from

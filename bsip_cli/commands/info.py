@@ -14,7 +14,7 @@ from bsip_cli import __version__
 from bsip_cli.artifacts import read_header
 from bsip_cli.errors import printable
 from bsip_cli.files.regular import check_regular
-from bsip_cli.running.provenance import library_versions
+from bsip_cli.running.unit import library_versions
 from bsip_cli.schemas import SCHEMAS
 
 

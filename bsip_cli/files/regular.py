@@ -103,3 +103,10 @@ def _not_toml(file: Path, why: str) -> UsageError:
         expected="TOML in UTF-8",
         remedy="correct that place",
     )
+
+
+def shipped(*parts: str) -> Path:
+    """Path of a file that ships in ``configs/``, in a checkout as in an installed wheel."""
+    package = Path(__file__).parents[1]
+    installed = package / "configs"
+    return (installed if installed.is_dir() else package.parent / "configs").joinpath(*parts)

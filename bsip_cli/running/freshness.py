@@ -10,8 +10,7 @@ from bsip_cli.artifacts import read_artifact, read_header
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.fingerprints import file_hash, fingerprint
 from bsip_cli.pipeline import STAGES, Stage, producer
-from bsip_cli.running.provenance import code_hash
-from bsip_cli.running.unit import Unit
+from bsip_cli.running.unit import Unit, code_hash
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.study import Participant
 

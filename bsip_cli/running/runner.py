@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import importlib
 import signal
 import time
 import traceback
 from collections.abc import Generator, Iterable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import pandas as pd
 
-from bsip_cli.artifacts import remove, write_artifact, write_atomically
+from bsip_cli.artifacts import remove, remove_unfinished, write_artifact, write_bytes
 from bsip_cli.config import Config
 from bsip_cli.errors import (
     BadDataError,
@@ -24,20 +25,19 @@ from bsip_cli.errors import (
     NumericalError,
     UsageError,
     not_readable,
+    not_writable,
     printable,
 )
 from bsip_cli.files import fingerprints
 from bsip_cli.pipeline import STAGES, Stage, by_level, in_turn, producer
-from bsip_cli.running.endings import end_if_asked
 from bsip_cli.running.freshness import stale_upstream, was_changed, why_stale
-from bsip_cli.running.lock import held_alone
-from bsip_cli.running.provenance import code_hash, library_versions
-from bsip_cli.running.unit import Unit
-from bsip_cli.running.workers import Died, work_on
+from bsip_cli.running.processes import Died, end_if_asked, work_on
+from bsip_cli.running.unit import Unit, code_hash, library_versions
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.study.study import Participant, Study, Trial
 from bsip_cli.study.trials import listed
 
+LOCK = ".lock"
 _SHORT_OF_MEMORY = "the process was killed (out of memory?); run again, with fewer --jobs"
 
 State = Literal["done", "fresh", "waiting", "refused", "unwritten", "bug", "noted"]
@@ -198,8 +198,7 @@ def _remember(task: _Task, state: str) -> None:
     recordings = [task.study.root / task.participant.id] if task.participant else []
     kept = fingerprints.to_keep([task.folder, *recordings], state).encode()
     if fingerprints.kept_in(task.folder) != kept:
-        path = task.folder / fingerprints.NAME
-        write_atomically(path, lambda temporary: temporary.write_bytes(kept))
+        write_bytes(task.folder / fingerprints.NAME, kept)
 
 
 def _units(task: _Task) -> Iterator[tuple[Stage, Trial | None]]:
@@ -357,3 +356,41 @@ def refusal_sentence(refusals: list[BadDataError]) -> Iterator[Outcome]:
     """Outcomes for participants that could not even be listed."""
     for refusal in refusals:
         yield Outcome("study", "study", "refused", (str(refusal),), refusal.exit_code)
+
+
+# --- only one program at a time writes into a folder of results -------------------------------
+
+
+@contextmanager
+def held_alone(folder: Path) -> Iterator[None]:
+    """Hold a folder's lock; the system lets go of it whatever becomes of the process.
+
+    What killed processes left half written there is taken away.
+
+    Raises
+    ------
+    UsageError
+        Another process holds it, or the folder cannot be written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handle = (folder / LOCK).open("a")
+    except OSError as error:
+        raise not_writable(folder, error) from None
+    with handle:
+        _lock(handle.fileno(), folder)
+        remove_unfinished(folder)
+        yield
+
+
+def _lock(descriptor: int, folder: Path) -> None:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise UsageError(
+            "another bsip is writing there",
+            file=folder,
+            remedy="wait until it has ended, and run again",
+        ) from None
+    except OSError as error:
+        raise not_writable(folder, error) from None

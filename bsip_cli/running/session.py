@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import sys
 from collections import Counter
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,15 +15,15 @@ from tqdm import tqdm
 
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.config import Config, load_config, with_estimators
+from bsip_cli.config import Config, Load, load_config, with_estimators
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.pipeline import Stage, by_level, stages_named
 from bsip_cli.running.runner import Manner, Outcome, refusal_sentence, run_stages
 from bsip_cli.study.dataset import describe_dataset, make_out
-from bsip_cli.study.named_in_options import check_prefixes, check_segments, check_trials
 from bsip_cli.study.study import Study, load_study
 from bsip_cli.study.trials import listed
 
+_LOADS = "correct [[loads]] in study.toml"
 _SEVERITY = (0, 3, 4, 2, 1)  # of several exit codes the gravest counts
 
 
@@ -113,8 +114,10 @@ def open_study(
 def _check_names(config: Config, study: Study, refusals: list[BadDataError]) -> None:
     """Whether loads and prefixes name who and what is there, in the whole study."""
     if not refusals:  # else a load may belong to who or what was refused
-        check_trials(config.loads, study)
-        check_prefixes(config.ingest.prefixes, study)
+        _check_trials(config.loads, study)
+        known = [participant.id for participant in study.participants]
+        remedy = "correct [ingest] prefixes in study.toml"
+        _check_known("ingest.prefixes", config.ingest.prefixes, known, remedy)
 
 
 def _left_behind(out: Path, study: Study) -> str:
@@ -165,7 +168,9 @@ def _config(root: Path, config_file: Path | None) -> Config:
     )
     if config.marker_set != "auto":
         load_marker_set(config.marker_set)
-    check_segments(config.loads, load_skeleton(config.skeleton))
+    with_mass = load_skeleton(config.skeleton).body_names
+    for k, load in enumerate(config.loads):
+        _check_known(f"loads.{k}.segment", [load.segment], with_mass)
     return config
 
 
@@ -198,3 +203,37 @@ def _summary(command: str, outcomes: Iterable[Outcome], out: Path | None) -> Non
 
 def _exit_code(outcomes: Iterable[Outcome]) -> int:
     return max((outcome.exit_code for outcome in outcomes), key=_SEVERITY.index, default=0)
+
+
+# --- whether loads and prefixes of study.toml fit the study: nothing named that is not there ------
+
+
+def _check_trials(loads: Sequence[Load], study: Study) -> None:
+    """Every load is carried in some trial, and names nothing that the study does not have."""
+    trials = [trial for participant in study.participants for trial in participant.trials]
+    participants = sorted({trial.participant_id for trial in trials})
+    tasks = sorted({trial.task for trial in trials})
+    runs = sorted({trial.run for trial in trials if trial.run is not None})
+    for k, load in enumerate(loads):
+        _check_known(f"loads.{k}.participants", load.participants, participants)
+        _check_known(f"loads.{k}.tasks", load.tasks, tasks)
+        _check_known(f"loads.{k}.runs", map(str, load.runs), [str(run) for run in runs])
+        if not any(load.is_carried_in(t.participant_id, t.task, t.run) for t in trials):
+            raise UsageError(
+                f"loads.{k}: {load.mass_kg:g} kg on {load.segment} are carried in no recording",
+                expected="participants, tasks and runs that some recording has together",
+                remedy=_LOADS,
+            )
+
+
+def _check_known(
+    option: str, names: Iterable[str], known: Collection[str], remedy: str = _LOADS
+) -> None:
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
+            raise UsageError(
+                f"{option}: there is no {name}" + (f" (did you mean {near[0]}?)" if near else ""),
+                expected=f"one of {', '.join(known)}" if known else "none, no recording has any",
+                remedy=remedy,
+            )

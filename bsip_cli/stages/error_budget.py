@@ -18,7 +18,7 @@ from bsip_cli.diagnosis.large_errors import Yardsticks, large_errors
 from bsip_cli.report.budget import term_words
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnosed_trials import Diagnosed
-from bsip_cli.stages.reconstructed import scale_of
+from bsip_cli.stages.reconstruct import scale_of
 
 _KIND = "overall-error-budget"
 _MORE_THAN_USUAL = 2.0  # times the usual size: what is usual is no cause of a large error

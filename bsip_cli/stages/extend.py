@@ -7,7 +7,6 @@ import pandas as pd
 
 from bsip_cli.artifacts import empty_table
 from bsip_cli.body.person import Person
-from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.cause import Cause, change_by, method_of
 from bsip_cli.effects.missing_joint import AXES, MissingJoint, split_torso
 from bsip_cli.identification.uncertainty import readable
@@ -15,16 +14,15 @@ from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.verdict import change_sentence
 from bsip_cli.report.words import segment_label
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.found_causes import body_beside, causes_of
-from bsip_cli.stages.frames import bsip_table, person_from
+from bsip_cli.stages.frames import bsip_table, person_of
 from bsip_cli.stages.identification_problem import (
     estimate_by,
     prior_from,
     problem_of,
     recordings_of,
 )
-from bsip_cli.stages.reconstructed import parameters_of
-from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.stages.reconstruct import parameters_of
+from bsip_cli.stages.trial_scene import body_beside, causes_of, scene_of
 from bsip_cli.statistics.methods import OM, RM
 from bsip_cli.study.study import Trial
 
@@ -34,16 +32,15 @@ _COM_CHANGE = ["com_x_change_m", "com_y_change_m", "com_z_change_m"]
 
 def run(unit: Unit) -> None:
     """Read the diagnosis and what identified OM; write the extended model's parameters."""
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
     causes = causes_of(unit)
     unit.write("extended-skeleton", _skeleton_rows(person, causes))
     bsip, trials = unit.read("bsip"), _identifying(unit)
     if causes and not trials:
         unit.warn(f"{unit.name}: nothing was identified, so there is no OM to extend")
     if not causes or not trials:
-        unit.write("extended-bsip", empty_table("extended-bsip"))
-        unit.write("bsip-change", empty_table("bsip-change"))
+        unit.write("extended-bsip", ())
+        unit.write("bsip-change", ())
         return
     extended = _extended(unit, person, bsip, causes, trials)
     changes = _changes(bsip, extended)

@@ -6,11 +6,10 @@ from zlib import crc32
 
 import numpy as np
 
-from bsip_cli.artifacts import empty_table
 from bsip_cli.diagnosis.error_gain import BlockErrors, pooled
 from bsip_cli.report.verdict import gain_sentence
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.gain_rows import gain_rows
+from bsip_cli.stages.reconstruct import gain_rows
 
 
 def run(unit: Unit) -> None:
@@ -18,7 +17,7 @@ def run(unit: Unit) -> None:
     facts = {trial.stem: unit.facts("gain", trial) for trial in unit.trials("gain")}
     concerned = {stem: one for stem, one in facts.items() if one}
     if not concerned:
-        unit.write("overall-gain", empty_table("overall-gain"))
+        unit.write("overall-gain", ())
         return
     components = next(iter(concerned.values()))["blocks"]
     errors = {

@@ -10,28 +10,25 @@ import pandas as pd
 
 from bsip_cli.artifacts import empty_table
 from bsip_cli.body.person import Person
-from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.cause import Blocks, Cause, method_of, unseen_change_by
 from bsip_cli.diagnosis.corrected_wrench import corrected_wrench, is_of_the_forces
 from bsip_cli.diagnosis.error_gain import BlockErrors, block_errors
 from bsip_cli.effects.scene import Scene
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.found_causes import blocks_of, body_beside, causes_of
-from bsip_cli.stages.frames import WRENCH, person_from
-from bsip_cli.stages.gain_rows import gain_rows
-from bsip_cli.stages.known_loads import load_phi
-from bsip_cli.stages.reconstructed import (
+from bsip_cli.stages.frames import WRENCH, load_phi, person_of
+from bsip_cli.stages.reconstruct import (
     Judgement,
     Signals,
     Wrenches,
     fit_rows,
+    gain_rows,
     judgement_of,
     over_the_same_frames,
     parameters_of,
     reconstruction_rows,
     scale_of,
 )
-from bsip_cli.stages.trial_scene import scene_of
+from bsip_cli.stages.trial_scene import blocks_of, body_beside, causes_of, scene_of
 from bsip_cli.statistics.methods import MEASURED, OM, RM, is_extended
 
 
@@ -41,10 +38,12 @@ def run(unit: Unit) -> None:
     causes, extended = causes_of(unit), unit.read("extended-bsip")
     own = [k for k, cause in enumerate(causes) if unit.trial.stem in cause.trials]
     if not own or extended.empty:
-        _nothing(unit)
+        for kind in ("gain", "corrected-wrench"):
+            unit.write(kind, ())
+        for kind in ("reconstruction", "fit"):
+            unit.amend(kind, empty_table(kind))  # RM and OM stand alone
         return
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
     measured = unit.read("wrench")
     judgement = judgement_of(unit, unit.read("kinematics"), measured)
     blocks = blocks_of(unit, unit.trial.stem)
@@ -69,14 +68,6 @@ def run(unit: Unit) -> None:
         facts=_facts(errors, last, judgement),
     )
     unit.write("corrected-wrench", _corrected(scene, measured, [causes[k] for k in own]))
-
-
-def _nothing(unit: Unit) -> None:
-    """No cause concerns the trial: RM and OM stand alone."""
-    for kind in ("gain", "corrected-wrench"):
-        unit.write(kind, empty_table(kind))
-    for kind in ("reconstruction", "fit"):
-        unit.amend(kind, empty_table(kind))
 
 
 def _scene(

@@ -1,13 +1,17 @@
-"""Between artifacts' tables and the arrays of science: person, markers, wrench."""
+"""Between artifacts' tables and the arrays of science: person, markers, wrench, known loads."""
 
 from __future__ import annotations
 
 import numpy as np
 import pandas as pd
 
+from bsip_cli.body.loads import PointMass, load_parameters
 from bsip_cli.body.person import Person
-from bsip_cli.body.skeleton import Skeleton
+from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.report.words import listing, segment_label
+from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names, share_name
+from bsip_cli.study.study import Trial
 
 WRENCH = ["fx_N", "fy_N", "fz_N", "mx_Nm", "my_Nm", "mz_Nm"]
 
@@ -51,6 +55,12 @@ def person_from(
     )
 
 
+def person_of(unit: Unit) -> Person:
+    """The unit's participant, with the configured skeleton."""
+    skeleton = load_skeleton(unit.config.skeleton)
+    return person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+
+
 def coordinates_from(
     frame: pd.DataFrame, skeleton: Skeleton
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -80,3 +90,25 @@ def bsip_table(
     table[[f"{name}_sd" for name in names]] = sd
     table[[share_name(name) for name in names]] = share
     return table
+
+
+# --- the known loads of a trial, as parameters for science and in words for people ----------------
+
+
+def load_phi(unit: Unit, person: Person, trial: Trial | None = None) -> np.ndarray:
+    """(10 n,) parameters of a trial's loads about the joint centres; the unit's own by default."""
+    loads = unit.loads(trial)
+    points = (PointMass(x.segment, x.mass_kg, np.array(x.position_m)) for x in loads)
+    return load_parameters(points, person)
+
+
+def load_words(unit: Unit, trial: Trial | None = None) -> str:
+    """``1 kg on the right shank and 2 kg on the upper torso``; empty without loads."""
+    loads = unit.loads(trial)
+    return listing([f"{x.mass_kg:g} kg on the {segment_label(x.segment)}" for x in loads], "")
+
+
+def loads_record(unit: Unit, trial: Trial | None = None) -> list[dict]:
+    """Segment, mass and position of each, for an artifact's facts."""
+    kept = {"segment", "mass_kg", "position_m"}
+    return [x.model_dump(mode="json", include=kept) for x in unit.loads(trial)]

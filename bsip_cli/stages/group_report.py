@@ -13,6 +13,7 @@ from typing import Any
 
 import pandas as pd
 
+from bsip_cli.artifacts import file_rows
 from bsip_cli.report.cohort.document import SHOWN, cohort_document
 from bsip_cli.report.cohort.record import CohortRecord, Member, ratios_of, yardsticks_of
 from bsip_cli.report.origins import HowMade
@@ -22,7 +23,7 @@ from bsip_cli.report.tables.build import build_tables
 from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.stages.report import files_frame, origin_of, refusals_of, write_page
+from bsip_cli.stages.report import origin_of, refusals_of, write_page
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.methods import OM, RM
 from bsip_cli.study.study import Participant
@@ -30,7 +31,7 @@ from bsip_cli.study.study import Participant
 
 def run(unit: Unit) -> None:
     document = cohort_document(record_of(unit))
-    unit.write("group-report-files", files_frame(unit.out, write_page(unit, document)))
+    unit.write("group-report-files", file_rows(unit.out, write_page(unit, document)))
 
 
 # --- reading ------------------------------------------------------------------------------------

@@ -21,8 +21,7 @@ from bsip_cli.identification.noise import even_noise, noise_of
 from bsip_cli.identification.prior import Prior, Spread, likeliest, prior_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names, spread_names
-from bsip_cli.stages.frames import WRENCH, acceleration_noise, coordinates_from
-from bsip_cli.stages.known_loads import load_phi
+from bsip_cli.stages.frames import WRENCH, acceleration_noise, coordinates_from, load_phi
 from bsip_cli.study.study import Trial
 
 # Where the iteration of the weights begins: force plates and skin make errors of this size.

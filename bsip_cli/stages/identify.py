@@ -25,7 +25,7 @@ from bsip_cli.identification.rarity import RARE, Rarity, rarity_of
 from bsip_cli.identification.uncertainty import Excitation, excitation, in_words, readable, root_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import spread_names
-from bsip_cli.stages.frames import WRENCH, bsip_table, person_from
+from bsip_cli.stages.frames import WRENCH, bsip_table, load_words, loads_record, person_from
 from bsip_cli.stages.identification_problem import (
     duration_s,
     estimate_by,
@@ -34,7 +34,6 @@ from bsip_cli.stages.identification_problem import (
     recordings_of,
     usable_frames,
 )
-from bsip_cli.stages.known_loads import load_words, loads_record
 from bsip_cli.stages.trial_scene import motion_and_wrench_of
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 from bsip_cli.study.study import Trial

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import astuple, fields
+from dataclasses import asdict
 
 import numpy as np
 import pandas as pd
 
 from bsip_cli.body.names import the_joint
 from bsip_cli.body.person import Person
-from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.motion.inverse_kinematics import Poses, solve_trial
-from bsip_cli.motion.marker_events import MarkerEvent, summaries
+from bsip_cli.motion.marker_events import summaries
 from bsip_cli.motion.marker_evidence import Evidence, marker_evidence
 from bsip_cli.motion.marker_fit import MarkerFit, marker_fit
 from bsip_cli.motion.smoothing import Motion, smooth_motion
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.frames import markers_from, ordered_markers, person_from
+from bsip_cli.stages.frames import markers_from, ordered_markers, person_of
 
 _MOST_SAID = 5  # of a trial's sentences about single markers
 
@@ -27,8 +27,7 @@ def run(unit: Unit) -> None:
 
     Poses and residuals are those after exchanged labels were corrected.
     """
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
     frame = unit.read("markers")
     times, labels, positions = markers_from(frame)
     markers = ordered_markers(labels, positions, person.markers)
@@ -45,7 +44,7 @@ def run(unit: Unit) -> None:
     motion = smooth_motion(person, poses.q, known, rate, markers=evidence.markers_m, **options)
     unit.write(
         "kinematics",
-        _kinematics(times, angle_sd, poses, motion, skeleton),
+        _kinematics(times, angle_sd, poses, motion, person.skeleton),
         facts={"marker_noise_m": motion.marker_noise_m, "marker_rms_m": poses.rms_m()},
     )
     unit.write(
@@ -58,10 +57,7 @@ def run(unit: Unit) -> None:
             }
         ),
     )
-    columns = [field.name for field in fields(MarkerEvent)]
-    unit.write(
-        "marker-events", pd.DataFrame([astuple(one) for one in evidence.events], columns=columns)
-    )
+    unit.write("marker-events", [asdict(one) for one in evidence.events])
 
 
 def _solved(unit: Unit, person: Person, markers: np.ndarray) -> tuple[Poses, np.ndarray]:
@@ -140,23 +136,24 @@ def _evidence(
     return found
 
 
-def _kinematics(times, angle_sd, poses: Poses, motion: Motion, skeleton):
+def _kinematics(
+    times: np.ndarray, angle_sd: np.ndarray, poses: Poses, motion: Motion, skeleton: Skeleton
+) -> pd.DataFrame:
+    known = {
+        "time_s": times,
+        "determined": motion.inner,
+        "marker_rms_m": poses.frame_rms_m(),
+        "angle_sd_rad": angle_sd,
+        "cutoff_hz": motion.cutoff_hz,
+    }
+    courses = {
+        "q": (motion.q, skeleton.q_names),
+        "v": (motion.v, skeleton.v_names),
+        "a": (motion.a, skeleton.v_names),
+        "sd": (motion.a_sd, skeleton.v_names),
+    }
     tables = [
-        pd.DataFrame(
-            {
-                "time_s": times,
-                "determined": motion.inner,
-                "marker_rms_m": poses.frame_rms_m(),
-                "angle_sd_rad": angle_sd,
-                "cutoff_hz": motion.cutoff_hz,
-            }
-        )
+        pd.DataFrame(values, columns=[f"{prefix}_{name}" for name in names])
+        for prefix, (values, names) in courses.items()
     ]
-    for prefix, values, names in (
-        ("q", motion.q, skeleton.q_names),
-        ("v", motion.v, skeleton.v_names),
-        ("a", motion.a, skeleton.v_names),
-        ("sd", motion.a_sd, skeleton.v_names),
-    ):
-        tables.append(pd.DataFrame(values, columns=[f"{prefix}_{name}" for name in names]))
-    return pd.concat(tables, axis=1)
+    return pd.concat([pd.DataFrame(known), *tables], axis=1)

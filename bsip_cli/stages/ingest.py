@@ -36,13 +36,13 @@ from bsip_cli.recordings.zero import plate_zero, subtract_zero
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH
 from bsip_cli.stages.person_mass import VAGUE_PERCENT, StatedMass, compared, stated_mass
-from bsip_cli.stages.session_reading import opened, reading_of
+from bsip_cli.stages.survey import opened, reading_of
 
 
 def run(unit: Unit) -> None:
     """Read one recording; write markers, wrench, plates, contacts and quality."""
-    assert unit.trial is not None
-    session = reading_of(unit, unit.trial)
+    assert unit.trial is not None and unit.participant is not None
+    session = reading_of(unit.read("readings"), unit.trial)
     recording = assemble(opened(unit, unit.trial), session)
     marker_set, told = _marker_set(unit, recording)
     labels, paired = with_pairs_named(
@@ -83,7 +83,13 @@ def run(unit: Unit) -> None:
         loaded = feet.measured & upright_frames(markers)
         mass = agreeing_mass(feet.total_N, trunk, loaded, recording.marker_rate_hz)
     contacts = contact_windows(feet, trunk, mass, recording.marker_rate_hz)
-    findings = [*about_mass, *findings, *contacts.reasons, *_stated_otherwise(unit, recording)]
+    stated_otherwise = against_table(
+        recording.stated,
+        unit.participant.mass_kg,
+        unit.participant.height_m,
+        unit.config.ingest.mass_tolerance_percent,
+    )
+    findings = [*about_mass, *findings, *contacts.reasons, *stated_otherwise]
     if recording.forces_note:
         unit.warn(f"{unit.name}: kinematics only: {recording.forces_note}")
     said = findings_about(session)  # once, of all trials
@@ -95,9 +101,10 @@ def run(unit: Unit) -> None:
     unit.write("markers", _marker_table(times, names, filled), facts | meant | person)
     known = {"mass_stretches": [one.record() for one in stretches]}
     unit.write("wrench", _wrench_table(times, wrench, contacts), facts | known)
-    unit.write("plates", _plate_table(recording))
+    unit.write("plates", _plate_rows(recording))
     unit.write("contacts", _contact_table(times, contacts))
-    unit.write("quality", _quality_table(marker_set, findings))
+    used = Finding("marker_set", "", marker_set.name, "", marker_set.description, "info")
+    unit.write("quality", [asdict(finding) for finding in (used, *findings)])
 
 
 def _without_zero(recording: Recording) -> tuple[Recording, list[Finding]]:
@@ -218,14 +225,6 @@ def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:
     return findings
 
 
-def _stated_otherwise(unit: Unit, recording: Recording) -> list[Finding]:
-    """Where the file states another person than participants.tsv."""
-    assert unit.participant is not None
-    mass_kg, height_m = unit.participant.mass_kg, unit.participant.height_m
-    tolerance = unit.config.ingest.mass_tolerance_percent
-    return against_table(recording.stated, mass_kg, height_m, tolerance)
-
-
 # --- tables -----------------------------------------------------------------------------------
 
 
@@ -235,48 +234,33 @@ def _marker_table(times: np.ndarray, names: list[str], filled: FilledMarkers) ->
         {
             "time_s": np.repeat(times, len(names)),
             "marker": np.tile(np.array(names, dtype=object), len(times)),
-            "x_m": positions[:, 0],
-            "y_m": positions[:, 1],
-            "z_m": positions[:, 2],
+            **dict(zip(("x_m", "y_m", "z_m"), positions.T, strict=True)),
             "filled": filled.filled.ravel(),
         }
     )
 
 
-def _wrench_table(times, wrench: FrameWrench, contacts: ContactWindows) -> pd.DataFrame:
+def _wrench_table(times: np.ndarray, wrench: FrameWrench, contacts: ContactWindows) -> pd.DataFrame:
     total = wrench.total if len(wrench.names) else np.full((len(times), 6), np.nan)
-    table = pd.DataFrame(total, columns=WRENCH)
-    table.insert(0, "time_s", times)
-    table["valid"] = contacts.valid
+    table = {"time_s": times, **dict(zip(WRENCH, total.T, strict=True)), "valid": contacts.valid}
     for name, rows in zip(wrench.names, wrench.per_plate, strict=True):
-        for k, column in enumerate(WRENCH):
-            table[f"plate{name}_{column}"] = rows[:, k]
-    return table
+        table |= {f"plate{name}_{c}": row for c, row in zip(WRENCH, rows.T, strict=True)}
+    return pd.DataFrame(table)
 
 
-def _plate_table(recording: Recording) -> pd.DataFrame:
-    rows = [
-        (plate.name, k + 1, *corner)
+def _plate_rows(recording: Recording) -> list[dict]:
+    return [
+        {"plate": plate.name, "corner": k + 1, "x_m": x, "y_m": y, "z_m": z}
         for plate in recording.plates
         if plate.corners_m is not None
-        for k, corner in enumerate(plate.corners_m)
+        for k, (x, y, z) in enumerate(plate.corners_m)
     ]
-    table = pd.DataFrame(rows, columns=["plate", "corner", "x_m", "y_m", "z_m"])
-    return table.astype({"plate": object, "corner": int, "x_m": float, "y_m": float, "z_m": float})
 
 
 def _contact_table(times: np.ndarray, contacts: ContactWindows) -> pd.DataFrame:
-    table = {"time_s": times}
+    table, nothing = {"time_s": times}, np.zeros(len(times), dtype=bool)
     for side, name in (("l", "left"), ("r", "right")):
-        nothing = np.zeros(len(times), dtype=bool)
         table[f"{name}_on_ground"] = contacts.on_ground.get(side, nothing)
         table[f"{name}_on_plate"] = contacts.on_plate.get(side, nothing)
     table["valid"] = contacts.valid
     return pd.DataFrame(table)
-
-
-def _quality_table(marker_set: MarkerSet, findings: list[Finding]) -> pd.DataFrame:
-    known = Finding("marker_set", "", marker_set.name, "", marker_set.description, "info")
-    columns = ["check", "subject", "found", "expected", "action", "level"]
-    rows = [[getattr(finding, name) for name in columns] for finding in (known, *findings)]
-    return pd.DataFrame(rows, columns=columns)

@@ -32,12 +32,17 @@ from bsip_cli.motion.jacobian import coordinate_covariance
 from bsip_cli.recordings.own_plates import SIDES, FootForces, Reading, foot_forces, plate_noise
 from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.found_causes import body_beside, causes_of
-from bsip_cli.stages.frames import WRENCH, acceleration_noise, coordinates_from, person_from
+from bsip_cli.stages.frames import (
+    WRENCH,
+    acceleration_noise,
+    coordinates_from,
+    load_phi,
+    loads_record,
+    person_from,
+)
 from bsip_cli.stages.joint_peaks import peaks_of
-from bsip_cli.stages.known_loads import load_phi, loads_record
-from bsip_cli.stages.reconstructed import parameters_of
-from bsip_cli.stages.trial_scene import outline, plate_names, scene_of
+from bsip_cli.stages.reconstruct import parameters_of
+from bsip_cli.stages.trial_scene import body_beside, causes_of, outline, plate_names, scene_of
 from bsip_cli.statistics.methods import OM, RM
 
 _POSES = 40  # in which the response to accelerations is computed; between them it is interpolated

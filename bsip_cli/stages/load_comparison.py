@@ -10,7 +10,6 @@ import pandas as pd
 
 from bsip_cli.body.inertia import PARAMETERS, UNITS, from_phi, readable_jacobian
 from bsip_cli.body.person import Person
-from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.errors import BadDataError
 from bsip_cli.identification.difference import change_of_segments, difference
 from bsip_cli.identification.estimator import Problem
@@ -18,7 +17,7 @@ from bsip_cli.identification.prior import Prior
 from bsip_cli.report.words import listing, segment_label
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
-from bsip_cli.stages.frames import person_from
+from bsip_cli.stages.frames import load_phi, person_of
 from bsip_cli.stages.identification_problem import (
     duration_s,
     estimate_by,
@@ -26,7 +25,6 @@ from bsip_cli.stages.identification_problem import (
     problem_of,
     recordings_of,
 )
-from bsip_cli.stages.known_loads import load_phi
 from bsip_cli.study.study import Trial
 
 TWO, LOADED, ALL = "two identifications", "loaded segments", "all"
@@ -40,8 +38,8 @@ def compared(unit: Unit, loads_off: Unit, sets: tuple[Sequence[Trial], Sequence[
 
     ``loads_off``: the same unit without the declared loads, which stay in the forces.
     """
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
+    skeleton = person.skeleton
     declared = load_phi(unit, person, sets[0][0]) - load_phi(unit, person, sets[1][0])
     bodies = [k for k, own in enumerate(declared.reshape(-1, 10)) if own.any()]
     loaded = [skeleton.bodies[k] for k in bodies]

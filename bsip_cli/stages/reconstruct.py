@@ -1,39 +1,44 @@
-"""reconstruct: ground wrench and COP from motion and inertia, beside the measured ones."""
+"""reconstruct: ground wrench and COP from motion and inertia, beside the measured ones.
+
+What extend shares: a trial's wrenches filtered, judged and tabulated alike.
+"""
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from itertools import combinations
 
 import numpy as np
 import pandas as pd
+from scipy import sparse
 
+from bsip_cli.artifacts import table_of
+from bsip_cli.body.gravity import GRAVITY_M_S2
+from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person
-from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.dynamics.lowpass import stretches
+from bsip_cli.diagnosis.error_gain import BlockErrors, error_gain
+from bsip_cli.dynamics.cop import anterior_and_right, centre_of_pressure
+from bsip_cli.dynamics.lowpass import lowpass_operator, stretches
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.frames import WRENCH, coordinates_from, person_from
-from bsip_cli.stages.known_loads import load_phi, loads_record
-from bsip_cli.stages.reconstructed import (
-    Wrenches,
-    fit_rows,
-    judgement_of,
-    over_the_same_frames,
-    parameters_of,
-    reconstruction_rows,
-)
-from bsip_cli.statistics.correlation_tests import fisher_z_difference, williams_t
+from bsip_cli.schemas import bsip_names
+from bsip_cli.stages.frames import WRENCH, coordinates_from, load_phi, loads_record, person_of
 from bsip_cli.statistics.effective_samples import effective_samples_of_pair
-from bsip_cli.statistics.fit_measures import fit_measures
-from bsip_cli.statistics.methods import MEASURED
-from bsip_cli.statistics.posturography import posturography
+from bsip_cli.statistics.fit_measures import correlation, fit_measures, posturography
+from bsip_cli.statistics.hypothesis_tests import fisher_z_difference, williams_t
+from bsip_cli.statistics.methods import MEASURED, METHODS
+
+_COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
+_SHORTEST_HELD_OUT_S = 0.5
+
+Wrenches = dict[str, np.ndarray]  # method: (N, 6) about the world's origin [N, N m]
+Signals = dict[str, dict[str, np.ndarray]]  # method: component: (N,) [N, N m, m]
 
 
 def run(unit: Unit) -> None:
     """Read motion, wrench, person and parameters; write reconstruction and its fit."""
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
     kinematics, measured = unit.read("kinematics"), unit.read("wrench")
     judgement = judgement_of(unit, kinematics, measured)
     if not judgement.judged.any():
@@ -66,19 +71,186 @@ def _wrenches(
     return wrenches | {name: simulated[..., k] for k, name in enumerate(methods)}
 
 
-# --- tables -----------------------------------------------------------------------------------
+# --- how a trial is judged ----------------------------------------------------------------------
 
 
-def _correlations(signals, judged) -> pd.DataFrame:
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """By what a trial's wrenches are compared.
+
+    Attributes
+    ----------
+    times_s : (N,). valid : (N,) frames with every contact on a plate and a determined pose.
+    used : (N,) frames that helped to identify. judged : (N,) frames that count.
+    data : held_out, or identification where no other data are left.
+    operator, frames : low-pass inside the valid stretches, and the frame of each output.
+    """
+
+    times_s: np.ndarray
+    valid: np.ndarray
+    used: np.ndarray
+    judged: np.ndarray
+    data: str
+    operator: sparse.csr_array
+    frames: np.ndarray
+    surface_height_m: float
+    anterior: np.ndarray
+    body_weight_N: float
+    min_force_N: float
+
+    def filtered(self, wrench: np.ndarray) -> np.ndarray:
+        """(N, 6) low-passed inside the valid stretches, as it was outside."""
+        smooth = wrench.copy()
+        smooth[self.frames] = self.operator @ np.nan_to_num(wrench)
+        return smooth
+
+    def signals(self, wrench: np.ndarray) -> dict[str, np.ndarray]:
+        """All judged components (N,) of a wrench [N, N m, m]."""
+        signals = dict(zip(_COMPONENTS, wrench.T, strict=True))
+        cop = centre_of_pressure(wrench, self.surface_height_m, self.min_force_N)
+        signals["cop_ap"], signals["cop_ml"] = anterior_and_right(cop, self.anterior)
+        signals["grf_vertical"] = signals["fz"]
+        return signals
+
+
+def over_the_same_frames(signals: Signals) -> Signals:
+    """The signals with centres of pressure only where the measured force and every method that is
+    compared have one: near take-off a newton decides whether there is one, and its error is large.
+    """
+    compared = [signals[name] for name in (MEASURED, *METHODS) if name in signals]
+    known = np.isfinite([one["cop_ap"] for one in compared]).all(axis=0)
+    return {
+        name: {
+            component: np.where(known, values, np.nan) if component.startswith("cop") else values
+            for component, values in one.items()
+        }
+        for name, one in signals.items()
+    }
+
+
+def judgement_of(unit: Unit, kinematics: pd.DataFrame, measured: pd.DataFrame) -> Judgement:
+    """From the trial's ``kinematics`` and ``wrench``, its plates, the person and used-blocks."""
+    facts, options = unit.read("person").iloc[0], unit.config.reconstruct
+    times = kinematics["time_s"].to_numpy()
+    valid = measured["valid"].to_numpy() & kinematics["determined"].to_numpy()
+    used = _used(unit, times)
+    judged, data = _judged(valid, used, times)
+    rate = 1.0 / float(np.median(np.diff(times)))
+    operator, frames = lowpass_operator(valid, rate, options.cutoff_hz)
+    weight = facts["mass_kg"] * GRAVITY_M_S2
+    return Judgement(
+        times,
+        valid,
+        used,
+        judged,
+        data,
+        operator,
+        frames,
+        _surface_height(unit),
+        facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float),
+        weight,
+        options.cop_min_force_percent_bw / 100 * weight,
+    )
+
+
+def parameters_of(bsip: pd.DataFrame, person: Person) -> tuple[list[str], np.ndarray]:
+    """Methods and the parameters (10 n, k) of the segments with mass, about the joint centres."""
+    methods = list(dict.fromkeys(bsip["method"]))
+    origins = person.origin_in_joint_m[list(person.skeleton.bodies)]
+    columns = []
+    for method in methods:
+        rows = bsip[bsip["method"] == method].set_index("segment")
+        rows = rows.loc[list(person.skeleton.body_names), list(bsip_names())].to_numpy()
+        columns.append(
+            np.concatenate(
+                [
+                    from_readable(row).moved(-origin).phi()
+                    for row, origin in zip(rows, origins, strict=True)
+                ]
+            )
+        )
+    return methods, np.stack(columns, axis=1)
+
+
+def _surface_height(unit: Unit) -> float:
+    """Height of the plates' surface [m]; the floor where no outline is known."""
+    corners = unit.read("plates")["z_m"].to_numpy()
+    return float(corners.mean()) if len(corners) else 0.0
+
+
+def _used(unit: Unit, times: np.ndarray) -> np.ndarray:
+    """(N,) frames that helped to identify the parameters."""
+    blocks = unit.read("used-blocks")
+    used = np.zeros(len(times), dtype=bool)
+    assert unit.trial is not None
+    for row in blocks[blocks["trial"] == unit.trial.stem].itertuples():
+        used |= (times >= row.start_s) & (times <= row.end_s)
+    return used
+
+
+def _judged(valid: np.ndarray, used: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, str]:
+    """Frames to judge by: those not used to identify, or all where none are left."""
+    fresh = valid & ~used
+    if used.any() and fresh.sum() * float(np.median(np.diff(times))) < _SHORTEST_HELD_OUT_S:
+        return valid, "identification"
+    return fresh, "held_out"
+
+
+# --- tables ---------------------------------------------------------------------------------
+
+
+def reconstruction_rows(judgement: Judgement, wrenches: Wrenches, signals: Signals) -> pd.DataFrame:
+    """Rows of ``reconstruction``, method by method."""
+    parts = []
+    for name, wrench in wrenches.items():
+        part = pd.DataFrame(wrench, columns=WRENCH)
+        part.insert(0, "time_s", judgement.times_s)
+        part.insert(1, "method", name)
+        part["cop_ap_m"], part["cop_ml_m"] = signals[name]["cop_ap"], signals[name]["cop_ml"]
+        part["valid"], part["used"] = judgement.valid, judgement.used
+        parts.append(part)
+    return pd.concat(parts, ignore_index=True)
+
+
+def scale_of(component: str) -> tuple[float, str]:
+    """Factor and unit in which people read a component's error."""
+    if component.startswith("cop"):
+        return 1000.0, "mm"
+    return 1.0, "N m" if component.startswith("m") else "N"
+
+
+def fit_rows(judgement: Judgement, signals: Signals) -> pd.DataFrame:
+    """Rows of ``fit``: every method of ``signals`` against the measured one."""
+    rows, spans = [], stretches(judgement.judged)
+    for method, computed in signals.items():
+        for component, values in computed.items() if method != MEASURED else ():
+            scale, unit = scale_of(component)
+            weight = judgement.body_weight_N if unit == "N" else None
+            fit = fit_measures(signals[MEASURED][component] * scale, values * scale, spans, weight)
+            known = {"method": method, "component": component, "unit": unit}
+            rows.append(known | asdict(fit) | {"data": judgement.data})
+    return table_of("fit", rows)
+
+
+def gain_rows(errors: dict[str, BlockErrors], method: str, data: str, seed: int) -> pd.DataFrame:
+    """The gain of an extended model per component; ``errors`` in the units that people read."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for component, one in errors.items():
+        gain = error_gain(one, rng)
+        known = {"component": component, "method": method, "unit": scale_of(component)[1]}
+        rows.append(known | asdict(gain) | {"gain_percent": gain.percent, "data": data})
+    return table_of("gain", rows)
+
+
+def _correlations(signals: Signals, judged: np.ndarray) -> list[dict]:
     rows = []
     methods = [name for name in signals if name != MEASURED]
     spans = stretches(judged)
     for a, b in combinations(methods, 2):
         for component in signals[MEASURED]:
             x, y, z = (signals[name][component] for name in (MEASURED, a, b))
-            r_a, r_b, r_ab = (
-                fit_measures(p, q, spans).pearson_r for p, q in ((x, y), (x, z), (y, z))
-            )
+            r_a, r_b, r_ab = (correlation(p, q, spans) for p, q in ((x, y), (x, z), (y, z)))
             n = min(effective_samples_of_pair(x, y, spans), effective_samples_of_pair(x, z, spans))
             williams = williams_t(r_a, r_b, r_ab, n)
             fisher = fisher_z_difference(r_a, n, r_b, n)
@@ -91,48 +263,20 @@ def _correlations(signals, judged) -> pd.DataFrame:
                     "r_b": r_b,
                     "r_ab": r_ab,
                     "n_effective": n,
-                    "williams_t": williams.t,
-                    "df": williams.df,
-                    "williams_p": williams.p,
-                    "fisher_z": fisher.z,
-                    "fisher_p": fisher.p,
+                    "williams_t": williams.statistic,
+                    "df": williams.df1,
+                    "williams_p": williams.p_value,
+                    "fisher_z": fisher.statistic,
+                    "fisher_p": fisher.p_value,
                     "reason": williams.reason,
                 }
             )
-    columns = [
-        "component",
-        "method_a",
-        "method_b",
-        "r_a",
-        "r_b",
-        "r_ab",
-        "n_effective",
-        "williams_t",
-        "df",
-        "williams_p",
-        "fisher_z",
-        "fisher_p",
-        "reason",
+    return rows
+
+
+def _sway(signals: Signals, judged: np.ndarray, times: np.ndarray) -> list[dict]:
+    rate, spans = 1.0 / float(np.median(np.diff(times))), stretches(judged)
+    return [
+        {"method": name} | asdict(posturography(one["cop_ap"], one["cop_ml"], rate, spans))
+        for name, one in signals.items()
     ]
-    return pd.DataFrame(rows, columns=columns)
-
-
-def _sway(signals, judged, times) -> pd.DataFrame:
-    rate = 1.0 / float(np.median(np.diff(times)))
-    rows = []
-    for method, values in signals.items():
-        sway = posturography(values["cop_ap"], values["cop_ml"], rate, stretches(judged))
-        rows.append(
-            {
-                "method": method,
-                "rms_ap_mm": sway.rms_ap_mm,
-                "rms_ml_mm": sway.rms_ml_mm,
-                "rms_ap_origin_m": sway.rms_ap_origin_m,
-                "rms_ml_origin_m": sway.rms_ml_origin_m,
-                "mean_velocity_mm_s": sway.mean_velocity_mm_s,
-                "sway_length_mm": sway.sway_length_mm,
-                "ellipse_area_mm2": sway.ellipse_area_mm2,
-                "duration_s": sway.duration_s,
-            }
-        )
-    return pd.DataFrame(rows)

@@ -6,24 +6,24 @@ import numpy as np
 
 from bsip_cli.body.anthropometry import regress
 from bsip_cli.body.inertia import Inertia, rod_length_m
-from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.body.strays import strays_of
 from bsip_cli.errors import BadDataError
 from bsip_cli.identification.prior import prior_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import spread_names
-from bsip_cli.stages.frames import bsip_table, person_from
+from bsip_cli.stages.frames import bsip_table, person_of
 from bsip_cli.stages.identification_problem import spread_from
 from bsip_cli.statistics.methods import RM
 
 
 def run(unit: Unit) -> None:
     """Read the skeleton and the person; write regression."""
-    skeleton = load_skeleton(unit.config.skeleton)
     facts = unit.read("person").iloc[0]
     if not np.isfinite(facts["mass_kg"]):
         raise BadDataError(facts["mass_note"], file=unit.name)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
+    skeleton = person.skeleton
     result = regress(person, facts["sex"], facts["mass_kg"], unit.config.regress.table)
     for segment, note in zip(skeleton.body_names, result.notes, strict=True):
         if note:

@@ -13,9 +13,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from bsip_cli.artifacts import is_made_from, read_artifact, read_header, write_atomically
-from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.files.fingerprints import file_hash
+from bsip_cli.artifacts import (
+    file_rows,
+    is_made_from,
+    read_artifact,
+    read_header,
+    write_bytes,
+)
 from bsip_cli.report.blocks import Document, Grid, Picture
 from bsip_cli.report.page import FILES, render
 from bsip_cli.report.participant.document import participant_document
@@ -29,8 +33,7 @@ from bsip_cli.report.records import (
 from bsip_cli.report.words import ROLES, trial_label
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.stages.frames import person_from
-from bsip_cli.stages.known_loads import load_words
+from bsip_cli.stages.frames import load_words, person_of
 from bsip_cli.study.study import Participant, Trial
 
 _TABLES = {  # field of a trial's record: kind of artifact
@@ -55,32 +58,21 @@ _FOUND = {  # field of a participant's record: kind that is there only if its st
 def run(unit: Unit) -> None:
     assert unit.participant is not None
     document = participant_document(record_of(unit))
-    unit.write("report-files", files_frame(unit.out, write_page(unit, document)))
+    unit.write("report-files", file_rows(unit.out, write_page(unit, document)))
 
 
 def write_page(unit: Unit, document: Document) -> list[Path]:
     """The page, its figures, and the numbers behind them."""
     folder = unit.out / (unit.participant.id if unit.participant else "group")
     page = render(document).encode()
-    files = [_write_bytes(folder / "report.html", page)]
+    files = [write_bytes(folder / "report.html", page)]
     for block in document.blocks():
         if isinstance(block, Picture):
-            files.append(_write_bytes(folder / FILES / f"{block.name}.svg", block.svg))
+            files.append(write_bytes(folder / FILES / f"{block.name}.svg", block.svg))
         if isinstance(block, Picture | Grid) and block.data is not None:
             numbers = block.data.to_csv(index=False, float_format=_DIGITS).encode()
-            files.append(_write_bytes(folder / FILES / f"{block.name}.csv", numbers))
+            files.append(write_bytes(folder / FILES / f"{block.name}.csv", numbers))
     return files
-
-
-def _write_bytes(path: Path, content: bytes) -> Path:
-    write_atomically(path, lambda temporary: temporary.write_bytes(content))
-    return path
-
-
-def files_frame(out: Path, files: list[Path]) -> pd.DataFrame:
-    """Rows of ``report-files`` and ``group-report-files``."""
-    rows = [{"file": file.relative_to(out).as_posix(), "sha256": file_hash(file)} for file in files]
-    return pd.DataFrame(rows, columns=["file", "sha256"])
 
 
 # --- reading ------------------------------------------------------------------------------------
@@ -89,7 +81,6 @@ def files_frame(out: Path, files: list[Path]) -> pd.DataFrame:
 def record_of(unit: Unit) -> ParticipantRecord:
     """Everything that is there of the unit's participant."""
     assert unit.participant is not None
-    skeleton, markers = unit.read("skeleton"), unit.read("marker-positions")
     usable = {kind: set(unit.trials(kind)) for kind in _TABLES.values()}
     return ParticipantRecord(
         id=unit.participant.id,
@@ -97,7 +88,7 @@ def record_of(unit: Unit) -> ParticipantRecord:
         bsip=unit.read("bsip"),
         excitation=unit.read("excitation"),
         identification=unit.read("identification"),
-        body=person_from(skeleton, markers, load_skeleton(unit.config.skeleton)),
+        body=person_of(unit),
         trials=tuple(_trial_record(unit, trial, usable) for trial in _by_role(unit.participant)),
         refusals=refusals_of(unit, unit.participant),
         origins=_origins(unit, usable),

@@ -44,7 +44,7 @@ def run(unit: Unit) -> None:
         for trial in unit.trials("markers", "wrench")
     ]
     still = _calibrating_trial(unit, recorded)
-    quiet = _quietest(still)
+    _, quiet = _unrest(still)
     marker_set = _marker_set(unit, still.trial)
     assert unit.participant is not None
     height_m = _height_m(unit, recorded)
@@ -72,22 +72,20 @@ def run(unit: Unit) -> None:
     unit.write("marker-positions", _marker_table(skeleton, calibration, fit))
     unit.write(
         "person",
-        pd.DataFrame(
-            [
-                {
-                    "sex": unit.participant.sex,
-                    "mass_kg": mass.mass_kg,
-                    "mass_source": mass.source,
-                    "plate_mass_kg": mass.plate_kg,
-                    "mass_note": mass.note,
-                    "height_m": calibration.stature_m,
-                    "anterior_x": calibration.anterior[0],
-                    "anterior_y": calibration.anterior[1],
-                    "calibration_trial": still.trial.stem,
-                    "marker_rms_m": fit.poses.rms_m(),
-                }
-            ]
-        ),
+        [
+            {
+                "sex": unit.participant.sex,
+                "mass_kg": mass.mass_kg,
+                "mass_source": mass.source,
+                "plate_mass_kg": mass.plate_kg,
+                "mass_note": mass.note,
+                "height_m": calibration.stature_m,
+                "anterior_x": calibration.anterior[0],
+                "anterior_y": calibration.anterior[1],
+                "calibration_trial": still.trial.stem,
+                "marker_rms_m": fit.poses.rms_m(),
+            }
+        ],
         facts={"marker_set": marker_set.name, "rms_before_m": fit.rms_before_m},
     )
 
@@ -177,11 +175,6 @@ def _calibrating_trial(unit: Unit, recorded: list[_Recorded]) -> _Recorded:
         f"{unit.name}: no static trial; the quietest second of {quietest.trial.stem} calibrates"
     )
     return quietest
-
-
-def _quietest(one: _Recorded) -> slice:
-    """The quietest second of a trial."""
-    return _unrest(one)[1]
 
 
 def _unrest(one: _Recorded) -> tuple[float, slice]:

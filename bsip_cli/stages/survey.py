@@ -1,21 +1,31 @@
-"""ingest, the session first: how the numbers of all its recordings are to be understood."""
+"""ingest, the session first: how the numbers of all its recordings are to be understood.
+
+Written as rows of ``readings``, and read back for each trial.
+"""
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import asdict, fields
 
 import pandas as pd
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.assemble import findings_about
+from bsip_cli.recordings.frame_change import FrameChange
 from bsip_cli.recordings.gate_limits import GateLimits
+from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.person_size import no_person
-from bsip_cli.recordings.settle import settle_session
+from bsip_cli.recordings.plate_reading import PlateReading
+from bsip_cli.recordings.read import open_recording
+from bsip_cli.recordings.settle import SessionReading, Verdict, settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
+from bsip_cli.recordings.under_the_feet import Evidence
 from bsip_cli.running.unit import Unit
-from bsip_cli.schemas import column_names
-from bsip_cli.stages.session_reading import opened, rows_of
 from bsip_cli.study.study import Trial
+
+_EVIDENCE = tuple(field.name for field in fields(Evidence))
+_CENTRE = ("centre_x_m", "centre_y_m", "centre_z_m")
+_HALF = ("half_size_x_m", "half_size_y_m")
 
 
 def run(unit: Unit) -> None:
@@ -38,7 +48,7 @@ def run(unit: Unit) -> None:
         whose = f"{unit.name}, session {session}" if session else unit.name
         for finding in findings_about(reading):
             unit.warn(f"{whose}: {finding.sentence()}")
-    unit.write("readings", pd.DataFrame(rows, columns=column_names("readings")))
+    unit.write("readings", rows)
 
 
 def _require_size(unit: Unit, seen: list[TrialSamples]) -> None:
@@ -56,3 +66,83 @@ def _survey(unit: Unit, trial: Trial) -> TrialSamples | None:
         return TrialSamples.of(opened(unit, trial))
     except BadDataError:
         return None
+
+
+# --- to rows and back -------------------------------------------------------------------------
+
+
+def opened(unit: Unit, trial: Trial) -> Opened:
+    """A trial's recording, of the plates that count."""
+    found: Opened = unit.recordings.get(trial.stem) or open_recording(trial.path)
+    return found.with_plates(unit.config.ingest.plates)
+
+
+def rows_of(session: str, reading: SessionReading) -> list[dict]:
+    """One row per plate; one without a name where none was loaded."""
+    frame = {"session": session, **asdict(reading.frame)}
+    plates = reading.plates or {"": Verdict()}
+    return [frame | {"plate": name} | _row(verdict) for name, verdict in plates.items()]
+
+
+def _row(verdict: Verdict) -> dict:
+    reading = asdict(verdict.reading)
+    nothing = float("nan")
+    centre = reading.pop("centre_m") or [nothing] * 3
+    half = reading.pop("half_size_m") or [nothing] * 2
+    row = reading | {
+        "reversed_round": reading.pop("mirrored"),
+        **dict(zip((*_CENTRE, *_HALF), (*centre, *half), strict=True)),
+        "refusal": verdict.refusal,
+        "rivals": "|".join(verdict.rivals),
+        "doubted": verdict.doubted,
+        "repeats": " ".join(verdict.repeats),
+    }
+    unknown = Evidence(*[nothing] * len(_EVIDENCE))
+    for when, found in (("before", verdict.before), ("after", verdict.after)):
+        row |= {f"{when}_{name}": value for name, value in asdict(found or unknown).items()}
+    return row
+
+
+def _verdict(row: dict) -> Verdict:
+    centre, half = (tuple(row[name] for name in names) for names in (_CENTRE, _HALF))
+    reading = PlateReading(
+        moment_scale=row["moment_scale"],
+        point_scale=row["point_scale"],
+        about=row["about"],
+        centre_m=None if pd.isna(centre[0]) else centre,
+        turn=int(row["turn"]),
+        mirrored=bool(row["reversed_round"]),
+        sign=int(row["sign"]),
+        place_of=row["place_of"],
+        reversed_channel=row["reversed_channel"],
+        half_size_m=None if pd.isna(half[0]) else half,
+    )
+    before, after = (
+        Evidence(*(row[f"{when}_{name}"] for name in _EVIDENCE)) for when in ("before", "after")
+    )
+    return Verdict(
+        reading,
+        before,
+        after,
+        refusal=row["refusal"],
+        rivals=tuple(filter(None, row["rivals"].split("|"))),
+        doubted=row["doubted"],
+        repeats=tuple(row["repeats"].split()),
+    )
+
+
+def reading_of(table: pd.DataFrame, trial: Trial) -> SessionReading:
+    """What the survey decided, by its ``readings``, for the session of a trial."""
+    rows = table[table["session"] == (trial.session or "")].to_dict("records")
+    if not rows:
+        return SessionReading()
+    first = rows[0]
+    frame = FrameChange(
+        first["moved"],
+        int(first["axis"]),
+        first["turned_deg"],
+        first["turned_sd_deg"],
+        first["unsure_m"],
+        bool(first["corners_only"]),
+    )
+    return SessionReading(frame, {row["plate"]: _verdict(row) for row in rows if row["plate"]})

@@ -5,12 +5,7 @@ Reads values, comparisons. Writes OUT/group/tables/*, tables-files.
 
 from __future__ import annotations
 
-import hashlib
-from pathlib import Path
-
-import pandas as pd
-
-from bsip_cli.artifacts import write_atomically
+from bsip_cli.artifacts import file_rows, write_bytes
 from bsip_cli.report.tables.build import RENDERERS, build_tables, folder
 from bsip_cli.running.unit import Unit
 from bsip_cli.statistics.cohort import Criteria
@@ -25,16 +20,9 @@ def run(unit: Unit) -> None:
         facts["fitted_on"],
         facts["missing"],
     )
-    written = []
+    files = []
     for table in tables:
         for ending, render in RENDERERS.items():
             path = folder(unit.out) / f"{table.name}.{ending}"
-            text = render(table)
-            _write(path, text)
-            file = path.relative_to(unit.out).as_posix()
-            written.append({"file": file, "sha256": hashlib.sha256(text.encode()).hexdigest()})
-    unit.write("tables-files", pd.DataFrame(written))
-
-
-def _write(path: Path, text: str) -> None:
-    write_atomically(path, lambda temporary: temporary.write_bytes(text.encode()))
+            files.append(write_bytes(path, render(table).encode()))
+    unit.write("tables-files", file_rows(unit.out, files))

@@ -1,4 +1,4 @@
-"""A trial's artifacts as the scene that effects and diagnosis work on."""
+"""A trial's artifacts as the scene that effects and diagnosis work on, and the named causes."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.body.person import Person
+from bsip_cli.diagnosis.cause import Blocks, Cause
+from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Plate, Scene
 from bsip_cli.motion.jacobian import marker_residuals
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.frames import WRENCH, coordinates_from, markers_from, ordered_markers
-from bsip_cli.stages.known_loads import load_phi
+from bsip_cli.stages.frames import WRENCH, coordinates_from, load_phi, markers_from, ordered_markers
 from bsip_cli.study.study import Trial
 
+_NAMED = ("named", "ambiguous")
 _LOADED_N = 20.0
 _HALF_M = 0.3  # of a plate whose outline no file tells
 
@@ -101,3 +103,34 @@ def _about_load(reading: np.ndarray) -> np.ndarray | None:
     force, moment = reading[loaded, :3].mean(axis=0), reading[loaded, 3:].mean(axis=0)
     middle = np.array([-moment[1] / force[2], moment[0] / force[2], 0.0])
     return middle + _HALF_M * np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
+
+
+# --- the causes that the diagnosis of a person named, as science takes them -----------------------
+
+
+def causes_of(unit: Unit) -> tuple[Cause, ...]:
+    """In the order of rank; what is unexplained is no cause that a model could be extended by."""
+    found = unit.facts("overall-diagnosis").get("causes", [])
+    return tuple(
+        Cause(
+            EFFECTS[one["effect"]],
+            one["target"],
+            tuple(one["trials"]),
+            np.array(one["values"]),
+            np.array(one["folds"]),
+        )
+        for one in found
+        if one["effect"] in EFFECTS and one["verdict"] in _NAMED
+    )
+
+
+def body_beside(unit: Unit, phi: np.ndarray) -> np.ndarray:
+    """(10 n,) the body beside which the causes were sized: RM's (10 n,), made as heavy as the
+    plates read where the diagnosis believes them instead of the stated mass."""
+    return phi * (1 + unit.facts("overall-diagnosis")["heavier_by"])
+
+
+def blocks_of(unit: Unit, stem: str) -> Blocks:
+    """How the diagnosis cut a trial that it looked at."""
+    facts = unit.facts("overall-diagnosis")
+    return Blocks(**facts["blocks"][stem], block_s=facts["block_s"], folds=facts["folds"])

@@ -2,35 +2,43 @@
 
 from __future__ import annotations
 
+from array import array
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from itertools import combinations
+from math import isnan, nan
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
-from bsip_cli.statistics.cohort_correlations import PAIR
-from bsip_cli.statistics.cohort_groups import methods_beside_each_other
 from bsip_cli.statistics.cohort_values import (
     DIFFERENCE,
     Comparison,
     Topic,
     Value,
+    joined,
     per_participant,
     topics,
 )
-from bsip_cli.statistics.methods import MEASURED, OM, RIVALS, RM
-from bsip_cli.statistics.paired_tests import (
-    MINIMUM_FOR_WILCOXON,
-    EquivalenceTest,
-    PairedComparison,
+from bsip_cli.statistics.hypothesis_tests import (
+    PostHoc,
+    cohens_d_pooled,
+    d_of_differences,
+    described_pair,
     equivalence_tost,
+    fisher_z_difference,
+    one_way_anova,
     paired_t,
+    repeated_measures_anova,
+    sign_test,
     wilcoxon,
+    williams_t,
 )
+from bsip_cli.statistics.methods import MEASURED, OM, RIVALS, RM
 from bsip_cli.statistics.samples import (
-    NormalityTest,
+    TestResult,
     finite_pairs,
     finite_values,
     lilliefors_test,
@@ -38,11 +46,25 @@ from bsip_cli.statistics.samples import (
     standard_deviation,
 )
 
-# --- oM against a rival over the participants: the published t test, and what stands beside it ----
-
-
 Sample = NDArray[np.float64]
 Origin = Literal["published", "added"]
+
+DATA_SHARE = "_data_share"
+"""Ending of the variable that says how far the data decided a mass."""
+
+PAIR = f"{OM}-{RM}"
+"""In the column of methods: of the difference between the two."""
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """alpha : level of every test. equivalence_percent : of RM's mean, what counts as equal."""
+
+    alpha: float
+    equivalence_percent: float
+
+
+# --- oM against a rival over the participants: the published t test, and what stands beside it ----
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +80,8 @@ class Pair:
     y: Sample
     origin: Origin
 
-    def finite(self) -> tuple[Sample, Sample]:
-        """Of the participants with both."""
-        return finite_pairs(self.x, self.y)
+    def row(self, test: str, origin: Origin, result: TestResult, **more: Any) -> Comparison:
+        return Comparison(self.topic, test, origin, OM, self.rival, **(vars(result) | more))
 
 
 def pairs_of(topic: Topic, values: Sequence[Value], origin: Origin) -> Iterator[Pair]:
@@ -72,162 +93,114 @@ def pairs_of(topic: Topic, values: Sequence[Value], origin: Origin) -> Iterator[
             yield Pair(topic, rival, x, y, origin if rival == RM else "added")
 
 
-def description(topic: Topic, method: str, x: Sample) -> Comparison:
+def description(topic: Topic, method: str, values: Sequence[Value]) -> Comparison:
     """Mean and SD of one method, without a test."""
-    values = finite_values(x)
-    return Comparison(
-        topic,
-        "description",
-        "published",
-        method,
-        n=len(values),
-        mean_a=mean_of(values),
-        sd_a=standard_deviation(values),
-    )
+    x = finite_values(per_participant(values, (method,))[:, 0])
+    found = {"n": len(x), "mean_a": mean_of(x), "sd_a": standard_deviation(x)}
+    return Comparison(topic, "description", "published", method, **found)  # type: ignore[arg-type]
 
 
 def pair_description(pair: Pair) -> Comparison:
     """Means and SDs of the participants with both methods, without a test."""
-    x, y = pair.finite()
-    return Comparison(
-        pair.topic,
-        "description",
-        pair.origin,
-        OM,
-        pair.rival,
-        n=len(x),
-        mean_a=mean_of(x),
-        sd_a=standard_deviation(x),
-        mean_b=mean_of(y),
-        sd_b=standard_deviation(y),
-        difference=mean_of(x - y),
-    )
+    return pair.row("description", pair.origin, described_pair(*finite_pairs(pair.x, pair.y)))
 
 
 def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
     """Paired t test with Cohen's d as printed; beside it d_z, and Wilcoxon's test."""
     test = paired_t(pair.x, pair.y, 1.0 - alpha)
-    normality = lilliefors_test(np.subtract(*pair.finite()), alpha)
-    paired_effect = Comparison(
-        pair.topic,
-        "d_z",
-        "added",
-        OM,
-        pair.rival,
-        test.n,
-        difference=test.mean_difference,
-        effect_size=test.d_paired,
-        effect_size_name="d_z",
-        reason=test.reason,
-    )
-    ranks = wilcoxon(pair.x, pair.y)
-    by_rank = Comparison(
-        pair.topic,
-        "wilcoxon",
-        "added",
-        OM,
-        pair.rival,
-        ranks.n,
-        difference=ranks.hodges_lehmann,
-        statistic=ranks.w,
-        p_value=ranks.p,
-        effect_size=ranks.rank_biserial,
-        effect_size_name="rank-biserial",
-        reason=ranks.reason,
-    )
-    return _t_row(pair, test, normality), paired_effect, by_rank
-
-
-def _t_row(pair: Pair, test: PairedComparison, normality: NormalityTest) -> Comparison:
-    return Comparison(
-        pair.topic,
+    normality = lilliefors_test(np.subtract(*finite_pairs(pair.x, pair.y)))
+    by_t = pair.row(
         "paired_t",
         pair.origin,
-        OM,
-        pair.rival,
-        test.n,
-        test.mean_x,
-        test.sd_x,
-        test.mean_y,
-        test.sd_y,
-        test.mean_difference,
-        test.ci_low,
-        test.ci_high,
-        statistic=test.t,
-        df1=test.df,
-        p_value=test.p,
-        effect_size=test.cohens_d_pooled,
+        test,
+        effect_size=cohens_d_pooled(test.mean_a, test.sd_a, test.mean_b, test.sd_b),
         effect_size_name=f"Cohen's d (pooled SD, {pair.rival} - OM)",
         lilliefors_p=normality.p_value,
         reason=test.reason or normality.reason,
     )
-
-
-def equivalence(pair: Pair, alpha: float, percent: float) -> Comparison:
-    """Do x and y differ by less than so many percent of the mean of y? p of the weaker side."""
-    bound = abs(mean_of(pair.finite()[1])) * percent / 100.0
-    test = equivalence_tost(pair.x, pair.y, bound, alpha)
-    return Comparison(
-        pair.topic,
-        "tost",
-        "added",
-        OM,
-        pair.rival,
-        test.n,
-        difference=test.mean_difference,
-        ci_low=test.ci_low,
-        ci_high=test.ci_high,
-        bound=bound,
-        statistic=_weaker_side(test),
-        df1=test.df,
-        p_value=test.p,
+    d_z = TestResult(
+        n=test.n,
+        difference=test.difference,
+        effect_size=d_of_differences(pair.x, pair.y),
+        effect_size_name="d_z",
         reason=test.reason,
     )
+    ranks = wilcoxon(pair.x, pair.y)
+    by_rank = pair.row("wilcoxon", "added", ranks, effect_size_name="rank-biserial")
+    return by_t, pair.row("d_z", "added", d_z), by_rank
 
 
-def _weaker_side(test: EquivalenceTest) -> float:
-    return test.t_lower if test.t_lower <= -test.t_upper else test.t_upper
+def equivalence(pair: Pair, criteria: Criteria) -> Comparison:
+    """Do x and y differ by less than so many percent of the mean of y? p of the weaker side."""
+    rival = mean_of(finite_pairs(pair.x, pair.y)[1])
+    bound = abs(rival) * criteria.equivalence_percent / 100.0
+    return pair.row("tost", "added", equivalence_tost(pair.x, pair.y, bound, criteria.alpha))
 
 
 def smaller_error(pair: Pair) -> Comparison:
     """In how many participants each method has the smaller error, with the exact sign test."""
-    x, y = pair.finite()
-    own, other = int(np.sum(x < y)), int(np.sum(y < x))
-    possible = own + other >= MINIMUM_FOR_WILCOXON
-    return Comparison(
-        pair.topic,
-        "sign",
-        "added",
-        OM,
-        pair.rival,
-        n=len(x),
-        p_value=float(stats.binomtest(own, own + other).pvalue) if possible else np.nan,
-        effect_size=own / len(x) if len(x) else np.nan,
-        effect_size_name="share of participants in whom OM has the smaller error",
-        count_a=own,
-        count_b=other,
-        reason=""
-        if possible
-        else (
-            f"The sign test needs {MINIMUM_FOR_WILCOXON} pairs that differ to reach p < 0.05, "
-            f"there are {own + other}."
+    name = "share of participants in whom OM has the smaller error"
+    return pair.row("sign", "added", sign_test(pair.x, pair.y), effect_size_name=name)
+
+
+# --- measured, OM and RM side by side: the published ANOVA of three groups, and the one for them --
+
+
+def methods_beside_each_other(
+    topic: Topic, table: NDArray[np.float64], methods: Sequence[str], alpha: float
+) -> Iterator[Comparison]:
+    """Both ANOVAs with their Bonferroni post hoc tests, over the participants with all methods.
+
+    The one-way takes the methods for groups of different people; that of repeated measures is
+    what the design asks for.
+
+    Parameters
+    ----------
+    table : shape (participants, methods), in the topic's unit.
+    """
+    table = table[np.isfinite(table).all(axis=1)]
+    of_each = [lilliefors_test(column) for column in table.T]
+    pairs = combinations(range(len(methods)), 2)
+    differences = {(i, j): lilliefors_test(table[:, i] - table[:, j]).p_value for i, j in pairs}
+    why = joined(*(test.reason for test in of_each))
+    normality = [test.p_value for test in of_each]
+    cases: tuple[tuple[str, str, Origin, Any, Sequence[float], str], ...] = (
+        ("one_way_anova", "t", "published", one_way_anova(list(table.T), alpha), normality, why),
+        (
+            "repeated_measures_anova",
+            "paired_t",
+            "added",
+            repeated_measures_anova(table, alpha),
+            list(differences.values()),
+            "",
         ),
     )
+    for name, after, origin, (test, post_hoc), normal, doubt in cases:
+        numbers = vars(test) | {
+            "n": len(table),
+            "lilliefors_p": min((p for p in normal if not isnan(p)), default=nan),
+            "reason": test.reason or doubt,
+        }
+        yield Comparison(topic, name, origin, " / ".join(methods), **numbers)
+        for (i, j), p in differences.items():
+            numbers = _pair_numbers(table[:, i], table[:, j], post_hoc, (i, j), test.reason)
+            pair = methods[i], methods[j]
+            yield Comparison(
+                topic, f"bonferroni_{after}", origin, *pair, **(numbers | {"lilliefors_p": p})
+            )
 
 
-# --------------------------------------------------------------------------------------------------
+def _pair_numbers(
+    x: Sample, y: Sample, post_hoc: PostHoc, place: tuple[int, int], reason: str
+) -> dict[str, Any]:
+    """Of a post hoc test; means also where it was not possible."""
+    means = described_pair(x, y)
+    found = post_hoc.get(place, means.with_(reason=reason))
+    kept = ("n", "mean_a", "sd_a", "mean_b", "sd_b")
+    return vars(found) | {name: getattr(means, name) for name in kept}
 
 
-DATA_SHARE = "_data_share"
-"""Ending of the variable that says how far the data decided a mass."""
-
-
-@dataclass(frozen=True)
-class Criteria:
-    """alpha : level of every test. equivalence_percent : of RM's mean, what counts as equal."""
-
-    alpha: float
-    equivalence_percent: float
+# --- which test belongs to which table ------------------------------------------------------------
 
 
 def tests_of(values: Iterable[Value], criteria: Criteria) -> Iterator[Comparison]:
@@ -240,23 +213,20 @@ def _segment_mass(
     topic: Topic, values: Sequence[Value], criteria: Criteria
 ) -> Iterator[Comparison]:
     if topic.variable.endswith(DATA_SHARE):
-        yield description(topic, OM, per_participant(values, (OM,))[:, 0])
+        yield description(topic, OM, values)
         return
     for pair in pairs_of(topic, values, "published"):
         yield from t_and_rank_tests(pair, criteria.alpha)
-        yield equivalence(pair, criteria.alpha, criteria.equivalence_percent)
+        yield equivalence(pair, criteria)
 
 
-def _errors(
-    topic: Topic, values: Sequence[Value], criteria: Criteria, origin: Origin
-) -> Iterator[Comparison]:
-    for pair in pairs_of(topic, values, origin):
-        yield from t_and_rank_tests(pair, criteria.alpha)
-        yield smaller_error(pair)
+def _errors(origin: Origin) -> Callable[[Topic, Sequence[Value], Criteria], Iterator[Comparison]]:
+    def tests(topic: Topic, values: Sequence[Value], criteria: Criteria) -> Iterator[Comparison]:
+        for pair in pairs_of(topic, values, origin):
+            yield from t_and_rank_tests(pair, criteria.alpha)
+            yield smaller_error(pair)
 
-
-def _cop_rmse(topic: Topic, values: Sequence[Value], criteria: Criteria) -> Iterator[Comparison]:
-    yield from _errors(topic, values, criteria, "published")
+    return tests
 
 
 def _posturography(
@@ -271,17 +241,11 @@ def _posturography(
             yield from t_and_rank_tests(pair, criteria.alpha)
 
 
-def _cross_validation(
-    topic: Topic, values: Sequence[Value], criteria: Criteria
-) -> Iterator[Comparison]:
-    yield from _errors(topic, values, criteria, "added")
-
-
 def _six_components(
     topic: Topic, values: Sequence[Value], criteria: Criteria
 ) -> Iterator[Comparison]:
     if topic.variable.endswith("_rmse"):
-        yield from _cross_validation(topic, values, criteria)
+        yield from _errors("added")(topic, values, criteria)
     else:
         yield from map(pair_description, pairs_of(topic, values, "published"))
 
@@ -290,7 +254,7 @@ def _table_or_identified(
     topic: Topic, values: Sequence[Value], criteria: Criteria
 ) -> Iterator[Comparison]:
     if all(value.method == DIFFERENCE for value in values):
-        yield description(topic, DIFFERENCE, per_participant(values, (DIFFERENCE,))[:, 0])
+        yield description(topic, DIFFERENCE, values)
         return
     for pair in pairs_of(topic, values, "added"):
         yield from t_and_rank_tests(pair, criteria.alpha)
@@ -298,9 +262,125 @@ def _table_or_identified(
 
 _TABLES: dict[str, Callable[[Topic, Sequence[Value], Criteria], Iterator[Comparison]]] = {
     "table1": _segment_mass,
-    "table2": _cop_rmse,
+    "table2": _errors("published"),
     "table3": _posturography,
-    "table4": _cross_validation,
+    "table4": _errors("added"),
     "table5": _six_components,
     "table6": _table_or_identified,
 }
+
+
+# --- does OM follow the measured signal better than RM? One test per participant, then counts -----
+
+
+@dataclass(frozen=True)
+class CorrelationRun:
+    """Correlations of one trial and component, and the independent samples they rest on."""
+
+    participant: str
+    trial: str
+    task: str
+    role: str
+    component: str
+    r_om: float
+    r_rm: float
+    r_om_rm: float
+    n_effective: float
+
+
+@dataclass(frozen=True)
+class PersonTest:
+    """Both tests of one participant, task and component; positive where OM correlates better."""
+
+    participant: str
+    topic: Topic
+    williams: TestResult
+    fisher: TestResult
+
+    def values(self) -> tuple[Value, ...]:
+        numbers = {
+            "williams_t": self.williams.statistic,
+            "williams_df": self.williams.df1,
+            "williams_p": self.williams.p_value,
+            "fisher_z": self.fisher.statistic,
+            "fisher_p": self.fisher.p_value,
+        }
+        about, component = self.topic, self.topic.variable.removesuffix("_r")
+        place = (self.participant, "", about.task, about.role, "", about.table)
+        return tuple(
+            Value(*place, f"{component}_{name}", PAIR, number, "1")
+            for name, number in numbers.items()
+        )
+
+
+def person_tests(table: str, runs: Iterable[CorrelationRun]) -> tuple[PersonTest, ...]:
+    """One test per participant, task and component.
+
+    Over several runs of a task the correlations are averaged and the samples added up: the mean
+    of correlation matrices is one again, and independent recordings add their samples.
+    """
+    groups: dict[tuple[str, Topic], list[CorrelationRun]] = defaultdict(list)
+    for run in runs:
+        topic = Topic(table, f"{run.component}_r", run.task, run.role, "1")
+        groups[run.participant, topic].append(run)
+    tests = []
+    for (participant, topic), group in groups.items():
+        known = [run for run in group if not isnan(run.r_om + run.r_rm + run.r_om_rm)]
+        r_om, r_rm, r_om_rm = (
+            float(np.mean([getattr(run, name) for run in known])) if known else nan
+            for name in ("r_om", "r_rm", "r_om_rm")
+        )
+        n = float(sum(run.n_effective for run in known)) if known else nan
+        williams, fisher = williams_t(r_om, r_rm, r_om_rm, n), fisher_z_difference(r_om, n, r_rm, n)
+        tests.append(PersonTest(participant, topic, williams, fisher))
+    return tuple(tests)
+
+
+class PersonTestCounts:
+    """What the participants' tests come to; keeps numbers of them, not the tests."""
+
+    def __init__(self) -> None:
+        self._results: dict[tuple[Topic, str, Origin], _Results] = defaultdict(_Results)
+
+    def add(self, tests: Iterable[PersonTest]) -> None:
+        for test in tests:
+            self._results[test.topic, "williams_t", "added"].add(test.williams)
+            self._results[test.topic, "fisher_z", "published"].add(test.fisher)
+
+    def comparisons(self, alpha: float) -> tuple[Comparison, ...]:
+        """Median t and p of each topic, and in how many participants OM or RM is better."""
+        results = self._results.items()
+        return tuple(Comparison(*key, OM, RM, **found.numbers(alpha)) for key, found in results)
+
+
+@dataclass
+class _Results:
+    """Statistic and p of one test in every participant, and why it is missing in some."""
+
+    statistics: array[float] = field(default_factory=lambda: array("d"))
+    p_values: array[float] = field(default_factory=lambda: array("d"))
+    reasons: set[str] = field(default_factory=set)
+
+    def add(self, test: TestResult) -> None:
+        self.statistics.append(test.statistic)
+        self.p_values.append(test.p_value)
+        if test.reason:
+            self.reasons.add(test.reason)
+
+    def numbers(self, alpha: float) -> dict[str, Any]:
+        t, p = np.array(self.statistics), np.array(self.p_values)
+        t, p = t[~np.isnan(p)], p[~np.isnan(p)]
+        better, worse = (int(np.sum((sign * t > 0.0) & (p < alpha))) for sign in (1.0, -1.0))
+        total = len(self.p_values)
+        like = ", for instance" if len(self.reasons) > 1 else ""
+        concerned = f"in {total - len(p)} of {total} participants{like}"
+        return {
+            "n": len(p),
+            "statistic": float(np.median(t)) if len(p) else nan,
+            "p_value": float(np.median(p)) if len(p) else nan,
+            "effect_size": (better + worse) / len(p) if len(p) else nan,
+            "effect_size_name": "share of participants whose correlations differ",
+            "count_a": better,
+            "count_b": worse,
+            "reason": f"{concerned}: {min(self.reasons)}" if self.reasons else "",
+        }

@@ -12,18 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bsip_cli.statistics.methods import OM, RM
-from bsip_cli.statistics.samples import adjusted_p_values
+from bsip_cli.statistics.samples import TestResult, adjusted_p_values
 
 # --- one line of the cohort's results: a test, or a description, with all its numbers -------------
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """A test of method_a against method_b over n participants; differences are a - b.
+class Comparison(TestResult):
+    """A test of method_a against method_b.
 
-    What cannot be computed is nan, and `reason` says why. `p_holm` corrects for all rows of the
-    same test with the same method_b in the same table. `count_a` and `count_b` are the participants
-    in whom the one or the other method is better, for tests that count.
+    `p_holm` corrects for all rows of the same test with the same method_b in the same table.
     """
 
     topic: Topic
@@ -31,27 +29,8 @@ class Comparison:
     origin: Literal["published", "added"]
     method_a: str
     method_b: str = ""
-    n: int = 0
-    mean_a: float = nan
-    sd_a: float = nan
-    mean_b: float = nan
-    sd_b: float = nan
-    difference: float = nan
-    ci_low: float = nan
-    ci_high: float = nan
-    bound: float = nan
-    statistic: float = nan
-    df1: float = nan
-    df2: float = nan
-    p_value: float = nan
     p_holm: float = nan
-    effect_size: float = nan
-    effect_size_name: str = ""
-    epsilon: float = nan
     lilliefors_p: float = nan
-    count_a: float = nan
-    count_b: float = nan
-    reason: str = ""
 
     def as_row(self) -> dict[str, str | float]:
         """The fields by name, the topic's among them."""

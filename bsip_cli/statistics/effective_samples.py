@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-from bsip_cli.statistics.samples import is_constant
-from bsip_cli.statistics.stretches import Stretches, finite_stretches, joined
+from bsip_cli.statistics.samples import Stretches, finite_stretches, is_constant, joined
 
 MINIMUM_SAMPLES = 4
 """Below this no autocorrelation can be estimated and the answer is nan."""

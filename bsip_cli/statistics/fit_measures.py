@@ -1,16 +1,19 @@
-"""How well a computed signal follows a measured one (Hansen 2014, section 2.4)."""
+"""Of a trial's signals: how well one follows another (Hansen 2014, section 2.4), and sway."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, hypot, nan, pi
+from math import atan2, hypot, nan, pi, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import chi2
 
-from bsip_cli.statistics.effective_samples import MINIMUM_SAMPLES, effective_samples_of_pair
-from bsip_cli.statistics.samples import is_constant
-from bsip_cli.statistics.stretches import Stretches, finite_stretches, joined
+from bsip_cli.statistics.effective_samples import effective_samples_of_pair
+from bsip_cli.statistics.samples import Stretches, finite_stretches, is_constant, joined
+
+ELLIPSE_SHARE = 0.95
+MM_PER_M = 1e3
 
 
 @dataclass(frozen=True)
@@ -20,8 +23,7 @@ class FitMeasures:
     rmse is in the unit of the signals, rmse_percent_bw in percent of the body weight (nan
     without one), all others without unit. schwer_p lies in 0 .. 1, schwer_m in -1 .. infinity:
     both are 0 for equal signals. n counts the samples compared, n_effective the independent
-    pairs they are worth for the correlation. `reason` says in sentences why numbers are nan; it
-    is empty when none had to be left out.
+    pairs they are worth for the correlation.
     """
 
     rmse: float = nan
@@ -32,7 +34,6 @@ class FitMeasures:
     schwer_c: float = nan
     n: int = 0
     n_effective: float = nan
-    reason: str = ""
 
 
 def fit_measures(
@@ -64,45 +65,125 @@ def fit_measures(
     parts = finite_stretches(stretches, measured, computed)
     m, c = joined(measured, parts), joined(computed, parts)
     if len(m) == 0:
-        return FitMeasures(reason="There is no sample with both signals.")
+        return FitMeasures()
     rmse = float(np.sqrt(np.mean((c - m) ** 2)))
     percent = 100.0 * rmse / body_weight_N if body_weight_N else nan
-    r, why_no_r = _pearson(m, c)
-    magnitude, phase, why_no_metric = _magnitude_and_phase(m, c)
-    few = f"Under {MINIMUM_SAMPLES} samples there is no effective number."
-    why_no_number = few if len(m) < MINIMUM_SAMPLES else ""
+    magnitude, phase = _magnitude_and_phase(m, c)
     return FitMeasures(
         rmse=rmse,
         rmse_percent_bw=percent,
-        pearson_r=r,
+        pearson_r=_pearson(m, c),
         schwer_m=magnitude,
         schwer_p=phase,
         schwer_c=hypot(magnitude, phase),
         n=len(m),
         n_effective=effective_samples_of_pair(measured, computed, parts),
-        reason=" ".join(filter(None, [why_no_r, why_no_metric, why_no_number])),
     )
 
 
-def _pearson(m: NDArray[np.float64], c: NDArray[np.float64]) -> tuple[float, str]:
-    if len(m) < 2:
-        return nan, "One sample has no correlation."
-    constant = [name for name, s in (("measured", m), ("computed", c)) if is_constant(s)]
-    if constant:
-        verb = "signals are" if len(constant) > 1 else "signal is"
-        return nan, f"The {' and the '.join(constant)} {verb} constant: no correlation."
-    return float(np.clip(np.corrcoef(m, c)[0, 1], -1.0, 1.0)), ""
+def correlation(x: ArrayLike, y: ArrayLike, stretches: Stretches | None = None) -> float:
+    """Pearson's r of two signals, as in `fit_measures`."""
+    first, second = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    parts = finite_stretches(stretches, first, second)
+    return _pearson(joined(first, parts), joined(second, parts))
 
 
-def _magnitude_and_phase(
-    m: NDArray[np.float64], c: NDArray[np.float64]
-) -> tuple[float, float, str]:
+def _pearson(m: NDArray[np.float64], c: NDArray[np.float64]) -> float:
+    if len(m) < 2 or is_constant(m) or is_constant(c):
+        return nan
+    return float(np.clip(np.corrcoef(m, c)[0, 1], -1.0, 1.0))
+
+
+def _magnitude_and_phase(m: NDArray[np.float64], c: NDArray[np.float64]) -> tuple[float, float]:
+    """No magnitude and no phase error of a measured signal that is zero, no phase of a computed."""
     size_m, size_c = float(np.linalg.norm(m)), float(np.linalg.norm(c))
-    if size_m == 0.0:
-        return nan, nan, "The measured signal is zero: no magnitude and no phase error."
-    if size_c == 0.0:
-        return -1.0, nan, "The computed signal is zero: no phase error."
+    if size_m == 0.0 or size_c == 0.0:
+        return nan if size_m == 0.0 else -1.0, nan
     u, v = m / size_m, c / size_c
     # the arccos of Schwer's P, in the form that keeps its digits near 0 and pi (Kahan 2006)
     angle = 2.0 * atan2(float(np.linalg.norm(u - v)), float(np.linalg.norm(u + v)))
-    return size_c / size_m - 1.0, angle / pi, ""
+    return size_c / size_m - 1.0, angle / pi
+
+
+# --- sway of the centre of pressure (Hansen 2017, table 3, with units and means corrected) --------
+
+
+@dataclass(frozen=True)
+class Posturography:
+    """Sway measures of one signal; what cannot be computed is nan.
+
+    rms_*_mm : root mean square about the mean, the usual definition of sway.
+    rms_*_origin_m : about the origin of the coordinates, which only tells where the person
+        stood; it is here because the printed values of Hansen 2017 fit it.
+    duration_s : time between first and last sample, summed over the stretches.
+    """
+
+    rms_ap_mm: float = nan
+    rms_ml_mm: float = nan
+    rms_ap_origin_m: float = nan
+    rms_ml_origin_m: float = nan
+    mean_velocity_mm_s: float = nan
+    sway_length_mm: float = nan
+    ellipse_area_mm2: float = nan
+    duration_s: float = nan
+    n: int = 0
+
+
+def posturography(
+    cop_ap_m: ArrayLike,
+    cop_ml_m: ArrayLike,
+    rate_hz: float,
+    stretches: Stretches | None = None,
+) -> Posturography:
+    """RMS, mean velocity, path length and 95 % ellipse area of a centre of pressure.
+
+    Path and time are summed within contiguous stretches only: no step across a gap. Mean
+    velocity = path / time. The ellipse is the prediction ellipse, within which 95 % of a normal
+    distribution of points lies: pi chi2_{2, 0.95} sqrt(det S), S the covariance with n - 1
+    (Schubert and Kirchner 2014, Ellipse area calculations and their applicability in
+    posturography, Gait & Posture 39; exact for long recordings, Duarte 2015, ibid. 41). It is
+    not the confidence ellipse of the mean, which shrinks as the recording gets longer.
+
+    Parameters
+    ----------
+    cop_ap_m, cop_ml_m : shape (n,), in m. Samples in which either is not finite are gaps.
+    rate_hz : samples per second.
+    stretches : half-open index pairs of the samples to use, None for all.
+
+    Raises
+    ------
+    ValueError
+        if rate_hz is not positive, the shapes differ or the stretches do not fit them.
+    """
+    if not rate_hz > 0.0:
+        raise ValueError(f"rate_hz must be positive, not {rate_hz}")
+    ap, ml = np.asarray(cop_ap_m, dtype=float), np.asarray(cop_ml_m, dtype=float)
+    parts = finite_stretches(stretches, ap, ml)
+    path = np.stack([joined(ap, parts), joined(ml, parts)])
+    n = path.shape[1]
+    if n == 0:
+        return Posturography()
+    rms_ap_mm, rms_ml_mm = path.std(axis=1) * MM_PER_M
+    rms_ap_origin_m, rms_ml_origin_m = np.sqrt(np.mean(path**2, axis=1))
+    length_m = sum(
+        float(np.hypot(np.diff(ap[start:stop]), np.diff(ml[start:stop])).sum())
+        for start, stop in parts
+    )
+    duration_s = sum(stop - start - 1 for start, stop in parts) / rate_hz
+    return Posturography(
+        rms_ap_mm=float(rms_ap_mm),
+        rms_ml_mm=float(rms_ml_mm),
+        rms_ap_origin_m=float(rms_ap_origin_m),
+        rms_ml_origin_m=float(rms_ml_origin_m),
+        mean_velocity_mm_s=length_m * MM_PER_M / duration_s if duration_s else nan,
+        sway_length_mm=length_m * MM_PER_M if duration_s else nan,
+        ellipse_area_mm2=_ellipse_area(path * MM_PER_M) if n >= 3 else nan,
+        duration_s=duration_s,
+        n=n,
+    )
+
+
+def _ellipse_area(points: np.ndarray) -> float:
+    """Area of the prediction ellipse of points (2, n), in their unit squared."""
+    determinant = max(float(np.linalg.det(np.cov(points))), 0.0)  # rounding may dip below 0
+    return float(pi * chi2.ppf(ELLIPSE_SHARE, df=2) * sqrt(determinant))

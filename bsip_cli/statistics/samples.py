@@ -1,14 +1,52 @@
-"""What every test asks of its samples first: finite values, and values that vary."""
+"""What every test asks of its samples first: finite values, and values that vary; what it gives."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import nan
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+# --- what a test gives ----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class TestResult:
+    """A test of a against b over n participants; differences are a - b.
+
+    What cannot be computed is nan, and `reason` says why. `count_a` and `count_b` are the
+    participants in whom the one or the other is better, for tests that count.
+    """
+
+    __test__ = False  # it is none of pytest's
+
+    n: int = 0
+    mean_a: float = nan
+    sd_a: float = nan
+    mean_b: float = nan
+    sd_b: float = nan
+    difference: float = nan
+    ci_low: float = nan
+    ci_high: float = nan
+    bound: float = nan
+    statistic: float = nan
+    df1: float = nan
+    df2: float = nan
+    p_value: float = nan
+    effect_size: float = nan
+    effect_size_name: str = ""
+    epsilon: float = nan
+    count_a: float = nan
+    count_b: float = nan
+    reason: str = ""
+
+    def with_(self, **numbers: Any) -> TestResult:
+        return replace(self, **numbers)
+
 
 # --- the normal distribution ----------------------------------------------------------------------
 
@@ -65,21 +103,7 @@ MINIMUM_FOR_LILLIEFORS = 4
 """The simulated table of critical values starts here."""
 
 
-@dataclass(frozen=True)
-class NormalityTest:
-    """Lilliefors' test. `normal` is None where the test is not possible: `reason` says why.
-
-    `normal` means only that normality was not rejected; small samples rarely reject anything.
-    """
-
-    n: int
-    statistic: float = nan
-    p_value: float = nan
-    normal: bool | None = None
-    reason: str = ""
-
-
-def lilliefors_test(x: ArrayLike, alpha: float = 0.05) -> NormalityTest:
+def lilliefors_test(x: ArrayLike) -> TestResult:
     """Kolmogorov-Smirnov test of normality with estimated mean and variance.
 
     Lilliefors 1967 (J. Am. Stat. Assoc. 62), as in Hansen 2017 (Statistical analyses); p from
@@ -89,20 +113,19 @@ def lilliefors_test(x: ArrayLike, alpha: float = 0.05) -> NormalityTest:
     ----------
     x : shape (n,), any unit; for a paired t test the differences. Values that are not finite
         are dropped; n says how many are left.
-    alpha : level at which `normal` turns False.
     """
     values = finite_values(x)
     n = len(values)
     if n < MINIMUM_FOR_LILLIEFORS:
         reason = f"Lilliefors' test needs {MINIMUM_FOR_LILLIEFORS} values, there are {n}."
-        return NormalityTest(n, reason=reason)
+        return TestResult(n=n, reason=reason)
     if is_constant(values):
         reason = "All values are equal, so there is no distribution to test."
-        return NormalityTest(n, reason=reason)
+        return TestResult(n=n, reason=reason)
     from statsmodels.stats.diagnostic import lilliefors
 
     statistic, p_value = lilliefors(values, dist="norm", pvalmethod="table")
-    return NormalityTest(n, float(statistic), float(p_value), bool(p_value >= alpha))
+    return TestResult(n=n, statistic=float(statistic), p_value=float(p_value))
 
 
 # --------------------------------------------------------------------------------------------------
@@ -152,3 +175,62 @@ def standard_deviation(values: NDArray[np.float64]) -> float:
 def mean_of(values: NDArray[np.float64]) -> float:
     """Mean, nan for no values."""
     return float(np.mean(values)) if len(values) else float("nan")
+
+
+# --- contiguous stretches of a sampled signal: half-open index pairs (start, stop) into it --------
+
+
+Stretches = Sequence[tuple[int, int]]
+"""(start, stop) pairs, stop excluded, in samples. Time breaks between one and the next."""
+
+
+def stretches_of(valid: ArrayLike) -> list[tuple[int, int]]:
+    """The runs of True in a (n,) boolean array, in order."""
+    flags = np.asarray(valid, dtype=bool)
+    if flags.ndim != 1:
+        raise ValueError(f"valid must be one-dimensional, not of shape {flags.shape}")
+    edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
+    return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
+
+
+def finite_stretches(
+    stretches: Stretches | None, *signals: NDArray[np.float64]
+) -> list[tuple[int, int]]:
+    """The given stretches, split where any of the signals is not finite.
+
+    Parameters
+    ----------
+    stretches : half-open index pairs, or None for the whole signals.
+    signals : one or more arrays of the same shape (n,).
+
+    Raises
+    ------
+    ValueError
+        if the signals differ in shape, or the stretches overlap, run backwards or leave the
+        signals: a mistake of the caller, not of the data.
+    """
+    n = len(signals[0])
+    if any(signal.shape != (n,) for signal in signals):
+        raise ValueError(f"signals must share one shape (n,): {[s.shape for s in signals]}")
+    ordered = sorted((int(start), int(stop)) for start, stop in stretches or [(0, n)])
+    if stretches is not None and len(stretches) == 0:
+        return []
+    for start, stop in ordered:
+        if not 0 <= start <= stop <= n:
+            raise ValueError(f"stretch ({start}, {stop}) does not lie within 0..{n}")
+    for (_, stop), (start, _) in pairwise(ordered):
+        if start < stop:
+            raise ValueError(f"stretches overlap at sample {start}")
+    finite = np.logical_and.reduce([np.isfinite(signal) for signal in signals])
+    return [
+        (start + first, start + last)
+        for start, stop in ordered
+        for first, last in stretches_of(finite[start:stop])
+    ]
+
+
+def joined(signal: NDArray[np.float64], stretches: Stretches) -> NDArray[np.float64]:
+    """The samples of all stretches, one after the other."""
+    if not stretches:
+        return signal[:0]
+    return np.concatenate([signal[start:stop] for start, stop in stretches])

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from bsip_cli import __version__
-from bsip_cli.artifacts import write_atomically
+from bsip_cli.artifacts import write_bytes
 from bsip_cli.errors import UsageError
 from bsip_cli.files.folders import check_path, is_folder, lies_in
 from bsip_cli.files.regular import fault_of
@@ -89,7 +89,7 @@ def describe_dataset(out: Path, study: Path) -> str:
             return f"{path}: is not of bsip, and stays as it is"
         if found == text:
             return ""
-    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+    write_bytes(path, text.encode())
     return ""
 
 

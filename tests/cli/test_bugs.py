@@ -8,7 +8,7 @@ from bsip_cli.artifacts import read_header
 from bsip_cli.config import load_config
 from bsip_cli.pipeline import Stage
 from bsip_cli.running import session
-from bsip_cli.running.endings import EndedError
+from bsip_cli.running.processes import EndedError
 from bsip_cli.running.runner import Manner, run_stages
 from bsip_cli.study.study import load_study
 

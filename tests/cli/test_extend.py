@@ -22,7 +22,7 @@ from bsip_cli.schemas import SCHEMAS
 from bsip_cli.simulate.options import Asked, Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages.frames import person_from
-from bsip_cli.stages.reconstructed import parameters_of
+from bsip_cli.stages.reconstruct import parameters_of
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.statistics.methods import MEASURED, METHODS
 from bsip_cli.study.study import load_study

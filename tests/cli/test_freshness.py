@@ -20,7 +20,7 @@ import pytest
 
 from bsip_cli.files import fingerprints
 from bsip_cli.pipeline import STAGES
-from bsip_cli.running.provenance import imported_by
+from bsip_cli.running.unit import imported_by
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
 
@@ -36,7 +36,7 @@ OPTIONS = StudyOptions(
 )
 HASHES = """
 import json
-from bsip_cli.running.provenance import code_hash
+from bsip_cli.running.unit import code_hash
 from bsip_cli.pipeline import STAGES
 print(json.dumps({stage.label: code_hash(stage.module) for stage in STAGES}))
 """

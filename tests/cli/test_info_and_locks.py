@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bsip_cli.errors import UsageError
-from bsip_cli.running.lock import held_alone
+from bsip_cli.running.runner import held_alone
 
 
 @pytest.mark.parametrize("content", [None, b"no artifact"])

@@ -28,8 +28,7 @@ from bsip_cli.config import Config, load_config
 from bsip_cli.files import fingerprints
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.running.freshness import why_stale
-from bsip_cli.running.lock import held_alone
-from bsip_cli.running.runner import Outcome, perform
+from bsip_cli.running.runner import Outcome, held_alone, perform
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS, bsip_names
 from bsip_cli.simulate.options import Rates, StudyOptions

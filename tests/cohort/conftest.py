@@ -13,7 +13,7 @@ from bsip_cli.pipeline import STAGES
 from bsip_cli.running.runner import Outcome, perform
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names, share_name
-from bsip_cli.statistics.correlation_tests import fisher_z_difference, williams_t
+from bsip_cli.statistics.hypothesis_tests import fisher_z_difference, williams_t
 from bsip_cli.study.study import Study, Trial, load_study
 
 NOTES = {"made_by": {}, "messages": [], "facts": {}}
@@ -201,10 +201,10 @@ def correlation(rng, component: str) -> dict:
         "r_b": r[b],
         "r_ab": r_ab,
         "n_effective": n,
-        "williams_t": test.t,
-        "df": test.df,
-        "williams_p": test.p,
-        "fisher_z": fisher.z,
-        "fisher_p": fisher.p,
+        "williams_t": test.statistic,
+        "df": test.df1,
+        "williams_p": test.p_value,
+        "fisher_z": fisher.statistic,
+        "fisher_p": fisher.p_value,
         "reason": test.reason,
     }

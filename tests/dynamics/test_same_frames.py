@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bsip_cli.stages.reconstructed import over_the_same_frames
+from bsip_cli.stages.reconstruct import over_the_same_frames
 
 NONE = float("nan")
 

@@ -21,8 +21,8 @@ from bsip_cli.artifacts import empty_table, write_artifact
 from bsip_cli.commands.export import Request, export_session
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.running.provenance import file_hash
 from bsip_cli.running.session import run_session
+from bsip_cli.running.unit import file_hash
 from bsip_cli.simulate.inject import inject_study
 from bsip_cli.simulate.options import Asked, Laboratory, Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study

@@ -19,7 +19,7 @@ from bsip_cli.body.exports.formats import FORMATS
 from bsip_cli.body.exports.identified import IdentifiedPerson, plain_names, xml_comment
 from bsip_cli.cli import cli
 from bsip_cli.errors import BadDataError
-from bsip_cli.running.provenance import file_hash
+from bsip_cli.running.unit import file_hash
 from bsip_cli.schemas import column_names
 from bsip_cli.stages.frames import bsip_table
 from tests.exports.exported_person import identified_person

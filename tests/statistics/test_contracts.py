@@ -2,24 +2,54 @@
 
 import subprocess
 import sys
-from dataclasses import astuple
 
 import numpy as np
 import pytest
 
-from bsip_cli.statistics.cohort_groups import one_way_anova, repeated_measures_anova
-from bsip_cli.statistics.correlation_tests import fisher_z_difference, williams_t
-from bsip_cli.statistics.fit_measures import fit_measures
-from bsip_cli.statistics.paired_tests import equivalence_tost, paired_t, wilcoxon
-from bsip_cli.statistics.posturography import posturography
+from bsip_cli.statistics.fit_measures import fit_measures, posturography
+from bsip_cli.statistics.hypothesis_tests import (
+    equivalence_tost,
+    fisher_z_difference,
+    one_way_anova,
+    paired_t,
+    repeated_measures_anova,
+    wilcoxon,
+    williams_t,
+)
 from bsip_cli.statistics.samples import lilliefors_test
 
-MODULES = "cohort_groups correlation_tests fit_measures paired_tests posturography samples"
+MODULES = "fit_measures hypothesis_tests samples"
 VALUES = [0.0, 0.1, 1 / 3, 2.0, 3.5, -5.0, 1e-40, 1e8, 1e8 + 1e-7, 1e12, np.nan, np.inf]
 
 
-def has_nan(result) -> bool:
-    return any(isinstance(value, float) and np.isnan(value) for value in astuple(result))
+# What only some tests give.
+OWN = {
+    paired_t: "mean_a sd_a mean_b sd_b difference ci_low ci_high df1",
+    wilcoxon: "difference effect_size",
+    equivalence_tost: "difference ci_low ci_high bound df1",
+    one_way_anova: "df1 df2 effect_size",
+    repeated_measures_anova: "df1 df2 effect_size epsilon",
+    williams_t: "difference df1",
+    fisher_z_difference: "difference",
+    lilliefors_test: "",
+}
+
+
+def answer(test, *arguments):
+    """The reason and the numbers that a test should give."""
+    result = test(*arguments)
+    result = result[0] if isinstance(result, tuple) else result
+    names = ("statistic", "p_value", *OWN[test].split())
+    return result.reason, [getattr(result, name) for name in names]
+
+
+def assert_defined_where_it_can_be(x, y):
+    """Errors and paths exist wherever there are samples; they know no test and give no reason."""
+    there = int(np.isfinite(x + y).sum())
+    fit, sway = fit_measures(x, y, body_weight_N=700.0), posturography(x, y, 100.0)
+    assert fit.n == sway.n == there
+    assert np.isfinite([fit.rmse, fit.rmse_percent_bw, sway.rms_ap_mm]).all() == (there > 0)
+    assert np.isfinite(sway.ellipse_area_mm2) == (there > 2)
 
 
 @pytest.mark.parametrize("seed", range(150))
@@ -30,20 +60,23 @@ def test_any_data_gives_all_numbers_or_a_reason(seed):
     x, y, z = rng.choice(values, (3, rng.integers(0, 14)))
     if seed % 3 == 0:
         y = x * (1 + rng.choice([0, 1e-15, 1e-9])) + rng.choice([0, 0.1])
-    results = [
-        lilliefors_test(x),
-        paired_t(x, y),
-        wilcoxon(x, y),
-        equivalence_tost(x, y, 0.5),
-        one_way_anova([x, y, z]),
-        repeated_measures_anova(np.column_stack([x, y, z])),
-        fit_measures(x, y, body_weight_N=700.0),
-        posturography(x, y, 100.0),
-        williams_t(*rng.choice([-1, -0.9, 0, 0.9, 1 - 1e-13, 1, np.nan], 3), rng.choice([3, 9.5])),
-        fisher_z_difference(rng.choice([-1, 0.3, np.nan]), 9.5, 0.5, rng.choice([3, 12])),
+    assert_defined_where_it_can_be(x, y)
+    answers = [
+        answer(lilliefors_test, x),
+        answer(paired_t, x, y),
+        answer(wilcoxon, x, y),
+        answer(equivalence_tost, x, y, 0.5),
+        answer(one_way_anova, [x, y, z]),
+        answer(repeated_measures_anova, np.column_stack([x, y, z])),
+        answer(
+            williams_t,
+            *rng.choice([-1, -0.9, 0, 0.9, 1 - 1e-13, 1, np.nan], 3),
+            rng.choice([3, 9.5]),
+        ),
+        answer(fisher_z_difference, rng.choice([-1, 0.3, np.nan]), 9.5, 0.5, rng.choice([3, 12])),
     ]
-    for result in results:
-        assert bool(result.reason) or not has_nan(result), result
+    for reason, numbers in answers:
+        assert reason or not np.isnan(numbers).any(), numbers
 
 
 def test_statsmodels_is_imported_only_when_needed():

@@ -1,20 +1,20 @@
 import numpy as np
 import pytest
 
-from bsip_cli.statistics.correlation_tests import fisher_z_difference, williams_t
+from bsip_cli.statistics.hypothesis_tests import fisher_z_difference, williams_t
 
 
 def test_williams_of_steiger():
     """R's psych: r.test(n = 103, r12 = .4, r13 = .5, r23 = .1): t = -0.89, p < 0.37."""
     test = williams_t(0.4, 0.5, 0.1, 103)
-    assert test.t == pytest.approx(-0.89, abs=0.005)
-    assert test.p == pytest.approx(0.37, abs=0.006)
-    assert test.df == 100
+    assert test.statistic == pytest.approx(-0.89, abs=0.005)
+    assert test.p_value == pytest.approx(0.37, abs=0.006)
+    assert test.df1 == 100
 
 
 def test_williams_is_antisymmetric():
-    assert williams_t(0.5, 0.4, 0.1, 103).t == -williams_t(0.4, 0.5, 0.1, 103).t
-    assert williams_t(0.4, 0.4, 0.1, 103).p == pytest.approx(1.0)
+    assert williams_t(0.5, 0.4, 0.1, 103).statistic == -williams_t(0.4, 0.5, 0.1, 103).statistic
+    assert williams_t(0.4, 0.4, 0.1, 103).p_value == pytest.approx(1.0)
 
 
 def test_williams_holds_its_level_where_fisher_is_too_timid():
@@ -26,23 +26,23 @@ def test_williams_holds_its_level_where_fisher_is_too_timid():
         computed = [measured + shared + 0.5 * rng.normal(size=40) for _ in range(2)]
         (_, r1, r2), (_, _, r12), _ = np.corrcoef([measured, *computed])
         rejected[i] = [
-            williams_t(r1, r2, r12, 40).p < 0.05,
-            fisher_z_difference(r1, 40, r2, 40).p < 0.05,
+            williams_t(r1, r2, r12, 40).p_value < 0.05,
+            fisher_z_difference(r1, 40, r2, 40).p_value < 0.05,
         ]
     assert rejected[:, 0].mean() == pytest.approx(0.05, abs=0.02)
     assert rejected[:, 1].mean() < 0.01
 
 
 def test_effective_numbers_need_not_be_whole():
-    assert williams_t(0.99, 0.9, 0.92, 47.3).df == pytest.approx(44.3)
+    assert williams_t(0.99, 0.9, 0.92, 47.3).df1 == pytest.approx(44.3)
 
 
 def test_fisher_z():
     """Fisher's own kind of example: atanh 0.5 - atanh 0.3 = 0.2398, se = sqrt(2/47)."""
     test = fisher_z_difference(0.5, 50, 0.3, 50)
-    assert test.z_difference == pytest.approx(0.23979, abs=1e-5)
-    assert test.z == pytest.approx(1.1624, abs=1e-4)
-    assert test.p == pytest.approx(0.2451, abs=1e-4)
+    assert test.statistic * np.sqrt(2 / 47) == pytest.approx(0.23979, abs=1e-5)
+    assert test.statistic == pytest.approx(1.1624, abs=1e-4)
+    assert test.p_value == pytest.approx(0.2451, abs=1e-4)
 
 
 def test_fisher_scatters_as_a_standard_normal():
@@ -53,7 +53,9 @@ def test_fisher_scatters_as_a_standard_normal():
             rng.multivariate_normal([0, 0], [[1, 0.6], [0.6, 1]], n).T for n in (25, 40)
         )
         z.append(
-            fisher_z_difference(np.corrcoef(x1, y1)[0, 1], 25, np.corrcoef(x2, y2)[0, 1], 40).z
+            fisher_z_difference(
+                np.corrcoef(x1, y1)[0, 1], 25, np.corrcoef(x2, y2)[0, 1], 40
+            ).statistic
         )
     assert np.std(z) == pytest.approx(1.0, abs=0.07)
 
@@ -73,7 +75,7 @@ def test_fisher_scatters_as_a_standard_normal():
 def test_williams_not_possible(arguments, words):
     test = williams_t(*arguments)
     assert words in test.reason
-    assert np.isnan([test.t, test.df, test.p]).all()
+    assert np.isnan([test.statistic, test.df1, test.p_value]).all()
 
 
 @pytest.mark.parametrize(
@@ -89,4 +91,4 @@ def test_williams_not_possible(arguments, words):
 def test_fisher_not_possible(arguments, words):
     test = fisher_z_difference(*arguments)
     assert words in test.reason
-    assert np.isnan([test.z, test.p]).all()
+    assert np.isnan([test.statistic, test.p_value]).all()

@@ -13,7 +13,7 @@ def test_equal_signals():
     assert (fit.rmse, fit.rmse_percent_bw) == (0.0, 0.0)
     assert fit.pearson_r == pytest.approx(1.0)
     assert (fit.schwer_m, fit.schwer_p, fit.schwer_c) == (0.0, 0.0, 0.0)
-    assert (fit.n, fit.reason) == (1000, "")
+    assert fit.n == 1000
 
 
 def test_scaled_signal_is_an_error_of_magnitude_only():
@@ -56,24 +56,22 @@ def test_only_finite_samples_of_the_stretches_count():
 def test_empty():
     for fit in (fit_measures([], []), fit_measures(SINE, np.full(1000, np.nan))):
         assert fit.n == 0
-        assert "no sample" in fit.reason
         assert np.isnan(
             [fit.rmse, fit.pearson_r, fit.schwer_m, fit.schwer_c, fit.n_effective]
         ).all()
 
 
 @pytest.mark.parametrize(
-    ("measured", "computed", "words"),
+    ("measured", "computed"),
     [
-        (np.full(1000, 0.1), SINE, "The measured signal is constant"),
-        (SINE, np.full(1000, 0.1), "The computed signal is constant"),
-        (np.full(1000, 0.1), np.full(1000, 0.3), "The measured and the computed signals are"),
-        ([1.0], [2.0], "One sample"),
+        (np.full(1000, 0.1), SINE),
+        (SINE, np.full(1000, 0.1)),
+        (np.full(1000, 0.1), np.full(1000, 0.3)),
+        ([1.0], [2.0]),
     ],
 )
-def test_constant_signals_have_no_correlation_but_an_error(measured, computed, words):
+def test_constant_signals_have_no_correlation_but_an_error(measured, computed):
     fit = fit_measures(measured, computed)
-    assert words in fit.reason
     assert np.isnan([fit.pearson_r, fit.n_effective]).all()
     assert np.isfinite([fit.rmse, fit.schwer_m, fit.schwer_p, fit.schwer_c]).all()
 
@@ -81,7 +79,6 @@ def test_constant_signals_have_no_correlation_but_an_error(measured, computed, w
 def test_zero_signals_have_no_metric():
     zero = np.zeros(1000)
     fit = fit_measures(zero, SINE)
-    assert "measured signal is zero" in fit.reason
     assert np.isnan([fit.schwer_m, fit.schwer_p, fit.schwer_c]).all()
     fit = fit_measures(SINE, zero)
     assert fit.schwer_m == -1.0

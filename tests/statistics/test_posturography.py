@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.statistics.posturography import posturography
+from bsip_cli.statistics.fit_measures import posturography
 
 RATE_HZ = 100.0
 TURN = 2 * np.pi * np.arange(10_001) / 1000  # ten turns in 100 s
@@ -19,7 +19,6 @@ def test_circle():
     assert sway.mean_velocity_mm_s == pytest.approx(2 * np.pi * 2.0, rel=1e-4)
     # covariance r^2/2 on both axes; 5.991 is the 95 % quantile of chi-square with 2 df
     assert sway.ellipse_area_mm2 == pytest.approx(np.pi * 5.991465 * 20.0**2 / 2, rel=1e-3)
-    assert sway.reason == ""
 
 
 def test_ellipse_area_does_not_depend_on_the_heading():
@@ -63,11 +62,8 @@ def test_straight_line_and_standstill_have_no_area():
 def test_too_little_data():
     empty = posturography([], [], RATE_HZ)
     assert np.isnan([empty.rms_ap_mm, empty.ellipse_area_mm2, empty.duration_s]).all()
-    assert "no sample" in empty.reason
     apart = posturography([0.1, np.nan, 0.3], np.zeros(3), RATE_HZ)
     assert np.isnan([apart.mean_velocity_mm_s, apart.ellipse_area_mm2]).all()
     assert apart.rms_ap_mm == pytest.approx(100.0)
-    assert "No two samples" in apart.reason
-    assert "ellipse" in apart.reason
     with pytest.raises(ValueError, match="rate_hz"):
         posturography([0.0], [0.0], 0.0)

@@ -10,20 +10,19 @@ import pytest
 from scipy import stats
 
 from bsip_cli.errors import UsageError
-from bsip_cli.statistics.published.audit import audit, f_of_groups
+from bsip_cli.statistics.published.audit import audit, f_of_groups, unit_of_length
 from bsip_cli.statistics.published.paper import (
     Cell,
     Claim,
     Interval,
     PrintedTable,
     Row,
+    as_meant,
     image,
     load_paper,
     names,
     rounded_from,
 )
-from bsip_cli.statistics.published.readings import as_meant
-from bsip_cli.statistics.published.sway_audit import unit_of_length
 from tests.statistics.printed_study import (
     N,
     drawn_table,

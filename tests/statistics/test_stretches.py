@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from bsip_cli.statistics.stretches import finite_stretches, joined, stretches_of
+from bsip_cli.statistics.samples import finite_stretches, joined, stretches_of
 
 
 def test_runs_of_true():

@@ -10,9 +10,8 @@ from bsip_cli.report.tables.model import Cell, Column, Results, Row, Table
 from bsip_cli.statistics.cohort_values import Comparison, Topic
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 from bsip_cli.statistics.published import paper as published
-from bsip_cli.statistics.published.audit import audit
-from bsip_cli.statistics.published.readings import as_meant
-from bsip_cli.statistics.published.sway_audit import unit_of_length
+from bsip_cli.statistics.published.audit import audit, unit_of_length
+from bsip_cli.statistics.published.paper import as_meant
 
 COMPARED = "hansen2017"
 """The paper whose tables this study's tables 1 to 4 repeat."""

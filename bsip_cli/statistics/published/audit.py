@@ -5,32 +5,39 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import product
-from math import copysign, inf, sqrt
+from math import copysign, inf, pi, sqrt
 
 import numpy as np
 from scipy import stats
 from scipy.optimize import minimize_scalar
 
 from bsip_cli.statistics.published.paper import (
+    Cell,
     Claim,
     Interval,
     Paper,
     PrintedTable,
     Row,
     Slip,
-    image,
-    range_words,
-    slip,
-)
-from bsip_cli.statistics.published.readings import (
     agrees,
     as_meant,
     exchanged_cells,
+    image,
     mean_difference,
     middle_of,
     pairs_that_differ_by,
+    range_words,
+    slip,
 )
-from bsip_cli.statistics.published.sway_audit import sway_slips
+
+
+def _unlike(
+    table: PrintedTable, row: Row, test: str, computed: Interval, found: str
+) -> Iterator[Slip]:
+    """A test whose printed number is none that was computed."""
+    if not computed.meets(row.printed(test)):
+        yield slip(table, row.name, test, printed=row.tests[test], recomputed=found)
+
 
 # --- the ways in which papers compute Cohen's d of two methods in the same people -----------------
 
@@ -97,26 +104,22 @@ _DENOMINATORS: tuple[tuple[str, Callable[[PrintedTable, Row, Paper], Interval], 
 )
 
 
-def _signed() -> tuple[Definition, ...]:
-    found = []
-    for below, of, is_paired in _DENOMINATORS:
-        found += [
-            Definition(f"({{b}} - {{a}}) / {below}", of, is_paired),
-            Definition(f"({{a}} - {{b}}) / {below}", _turned(of), is_paired),
-            Definition(f"|{{b}} - {{a}}| / {below}", _unsigned(of), is_paired),
-        ]
-    return tuple(found)
+def _then(
+    of: Callable[..., Interval], form: Callable[[Interval], Interval]
+) -> Callable[..., Interval]:
+    return lambda *row: form(of(*row))
 
 
-def _turned(of: Callable[..., Interval]) -> Callable[..., Interval]:
-    return lambda *row: of(*row).negative()
-
-
-def _unsigned(of: Callable[..., Interval]) -> Callable[..., Interval]:
-    return lambda *row: of(*row).size()
-
-
-DEFINITIONS = _signed()
+_FORMS: dict[str, Callable[[Interval], Interval]] = {
+    "({b} - {a})": lambda d: d,
+    "({a} - {b})": Interval.negative,
+    "|{b} - {a}|": Interval.size,
+}
+DEFINITIONS = tuple(
+    Definition(f"{above} / {below}", _then(of, form), is_paired)
+    for below, of, is_paired in _DENOMINATORS
+    for above, form in _FORMS.items()
+)
 
 
 # --- tables that compare methods as if they were groups of people: F and p from M(SD) and n -------
@@ -127,30 +130,16 @@ DEFINITIONS = _signed()
 
 def group_slips(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
     """What in a table of groups contradicts the rest of it."""
-    for row in table.rows:
-        yield from _f_value(paper, table, row)
-        yield from _p_of_groups(paper, table, row)
-    yield from _marks(table)
-
-
-def _f_value(paper: Paper, table: PrintedTable, row: Row) -> Iterator[Slip]:
-    computed = f_of_groups(
-        [row.cells[method].mean for method in table.methods],
-        [row.cells[method].spread() for method in table.methods],
-        paper.participants,
-    )
-    if not computed.meets(row.printed("F")):
-        found = range_words(computed)
-        yield slip(table, row.name, "F", printed=row.tests["F"], recomputed=found)
-
-
-def _p_of_groups(paper: Paper, table: PrintedTable, row: Row) -> Iterator[Slip]:
     groups = len(table.methods)
     df = groups - 1, groups * (paper.participants - 1)
-    computed = image(lambda f: float(stats.f.sf(max(f, 0.0), *df)), row.printed("F"))
-    if not computed.meets(row.printed("p")):
-        found = range_words(computed, 3)
-        yield slip(table, row.name, "p", printed=row.tests["p"], recomputed=found)
+    for row in table.rows:
+        cells = [row.cells[method] for method in table.methods]
+        means, sds = [cell.mean for cell in cells], [cell.spread() for cell in cells]
+        f = f_of_groups(means, sds, paper.participants)
+        yield from _unlike(table, row, "F", f, range_words(f))
+        p = image(lambda f: float(stats.f.sf(max(f, 0.0), *df)), row.printed("F"))
+        yield from _unlike(table, row, "p", p, range_words(p, 3))
+    yield from _marks(table)
 
 
 def f_of_groups(means: list[Interval], sds: list[Interval], n: int) -> Interval:
@@ -211,7 +200,6 @@ def _wrong_signs(table: PrintedTable, method: str, marks: str) -> list[str]:
 # All that follows from M(SD), the 95 % interval of the mean difference and n; Student's paired t
 # test, and Cohen's d by whichever definition most rows of the table follow.
 
-
 _NARROW = 1e-9  # less than the arithmetic of rounding is good for
 
 
@@ -219,17 +207,17 @@ def paired_slips(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
     """What in a paired table contradicts the rest of it."""
     exchange = exchanged_cells(table)
     meant = table if exchange is None else exchange.undone(table)
+    df = paper.participants - 1
     for row in table.rows:
         yield from _difference(table, row, "" if exchange is None else exchange.sentence())
-        yield from _statistic(paper, table, row)
-        yield from _p_value(paper, table, row)
+        t = t_of_interval(row.ends(), df)
+        yield from _unlike(table, row, "t", t, f"{range_words(t)} from the interval")
+        p = image(lambda t: float(2 * stats.t.sf(t, df)), row.printed("t").size())
+        small = "below .001" if p.high < 0.001 else range_words(p, 3)
+        found = f"{small} for the printed t with {df} degrees of freedom"
+        yield from _unlike(table, row, "p", p, found)
         yield from _star(paper, table, row)
     yield from _effect_sizes(paper, table, meant)
-
-
-def is_below(p: Interval, alpha: float) -> bool | None:
-    """Whether a printed p is below alpha; None where it may be either."""
-    return True if p.high <= alpha else False if p.low >= alpha else None
 
 
 def _difference(table: PrintedTable, row: Row, exchange: str) -> Iterator[Slip]:
@@ -252,13 +240,6 @@ def _difference(table: PrintedTable, row: Row, exchange: str) -> Iterator[Slip]:
     )
 
 
-def _statistic(paper: Paper, table: PrintedTable, row: Row) -> Iterator[Slip]:
-    computed = t_of_interval(row.ends(), paper.participants - 1)
-    if not computed.meets(row.printed("t")):
-        found = f"{range_words(computed)} from the interval"
-        yield slip(table, row.name, "t", printed=row.tests["t"], recomputed=found)
-
-
 def t_of_interval(ends: tuple[Interval, Interval], df: int) -> Interval:
     """t = middle / (half width / t(0.975)) of a 95 % interval whose ends are rounded; without a
     bound where the width may be nothing."""
@@ -272,17 +253,8 @@ def t_of_interval(ends: tuple[Interval, Interval], df: int) -> Interval:
     return Interval(low, high)
 
 
-def _p_value(paper: Paper, table: PrintedTable, row: Row) -> Iterator[Slip]:
-    df = paper.participants - 1
-    computed = image(lambda t: float(2 * stats.t.sf(t, df)), row.printed("t").size())
-    if not computed.meets(row.printed("p")):
-        small = "below .001" if computed.high < 0.001 else range_words(computed, 3)
-        found = f"{small} for the printed t with {df} degrees of freedom"
-        yield slip(table, row.name, "p", printed=row.tests["p"], recomputed=found)
-
-
 def _star(paper: Paper, table: PrintedTable, row: Row) -> Iterator[Slip]:
-    is_small = is_below(row.printed("p"), paper.alpha)
+    is_small = row.printed("p").is_below(paper.alpha)
     if is_small is None:
         return
     should = is_small if table.star == "p < alpha" else not is_small
@@ -309,21 +281,143 @@ def _effect_sizes(paper: Paper, table: PrintedTable, meant: PrintedTable) -> Ite
             found = f"computed from the means as printed; {right} from those that were meant"
             yield slip(table, row.name, what, printed=row.tests["d"], recomputed=found)
     if not definition.is_paired:
-        yield _definition(paper, table, definition)
+        follow = f"{followers(paper, table, definition)} of {len(table.rows)} rows"
+        yield slip(
+            table,
+            "all rows",
+            "definition of Cohen's d",
+            printed=f"{definition.words(table)} in {follow}",
+            recomputed="not the d of the differences, t / sqrt(n), though the test is paired",
+            is_remark=True,
+        )
 
 
-def _definition(paper: Paper, table: PrintedTable, one: Definition) -> Slip:
-    return slip(
+# --- sway: what the measures of one path say of each other, and of its unit -----------------------
+
+# mean velocity = length / duration; area of the 95 % ellipse = pi chi2(0.95, 2) sd_ap sd_ml
+# sqrt(1 - r^2), at most that of r = 0. The root mean square of two paths' difference is at least
+# the difference of their root mean squares, in the mean over people too; it is at most their sum if
+# both are about the same place and no constant offset sets the paths apart.
+
+METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+STRAIGHT = 0.95  # correlation of the axes beyond which a path is a line
+# Of the least spread over people of the other measures of the same table: lengths, areas and the
+# other axis follow how much a person sways, so the root mean square should too.
+EVEN = 0.2
+_ELLIPSE = pi * float(stats.chi2.ppf(0.95, 2))
+VELOCITY, LENGTH, AREA, AP, ML = "mean_velocity", "sway_length", "ellipse_area", "rms_ap", "rms_ml"
+
+
+def sway_slips(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
+    """What in a table of sway measures contradicts the rest of it, or the errors of the same
+    paths in another table."""
+    rows = {row.key: row for row in table.rows}
+    if not {VELOCITY, LENGTH, AREA, AP, ML} <= set(rows):
+        return
+    if paper.sequence_s is not None:
+        yield from _duration(paper.sequence_s, table, rows)
+    if table.errors_in:
+        yield from _unit(paper, table)
+    yield from _about_an_origin(table, rows)
+
+
+def _duration(stated: Interval, table: PrintedTable, rows: dict[str, Row]) -> Iterator[Slip]:
+    found = [
+        image(
+            lambda a, b: a / b, rows[LENGTH].cells[method].mean, rows[VELOCITY].cells[method].mean
+        )
+        for method in table.methods
+    ]
+    if all(one.meets(stated) for one in found):
+        return
+    whole = Interval(min(one.low for one in found), max(one.high for one in found))
+    steps = (METRES[a] / METRES[b] for a in METRES for b in METRES)
+    fits = any(Interval(whole.low * k, whole.high * k).meets(stated) for k in steps)
+    yield slip(
         table,
-        "all rows",
-        "definition of Cohen's d",
-        printed=f"{one.words(table)} in {followers(paper, table, one)} of {len(table.rows)} rows",
-        recomputed="not the d of the differences, t / sqrt(n), though the test is paired",
-        is_remark=True,
+        f"{rows[LENGTH].name} / {rows[VELOCITY].name}",
+        "duration",
+        printed=f"the sequence lasts {stated.middle:g} s",
+        recomputed=f"{range_words(whole)} s",
+        reading="" if fits else "no choice of units makes it so",
     )
 
 
-# --------------------------------------------------------------------------------------------------
+def unit_of_length(paper: Paper, table: PrintedTable) -> str:
+    """The only unit in which no path contradicts its error; empty if none or several would do."""
+    if not table.errors_in:
+        return ""
+    fitting = [unit for unit in METRES if not list(_impossible(paper, table, unit))]
+    return fitting[0] if len(fitting) == 1 else ""
+
+
+def _unit(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
+    """Paths that cannot be as far apart as another table says, in the printed unit."""
+    unit = unit_of_length(paper, table)
+    linked = next(row for row in table.rows if row.error_of)
+    for row, method, error in _impossible(paper, table, linked.unit):
+        beside = f"{table.methods[0]} {row.cells[table.methods[0]].text}"
+        yield slip(
+            table,
+            f"{row.name} {method}",
+            "unit",
+            printed=f"{row.cells[method].text} beside {beside} {row.unit}",
+            recomputed=f"the two paths are {error.middle:.2f} mm apart (root mean square)",
+            reading=f"the unit is {unit}, unless an offset sets the paths apart" if unit else "",
+        )
+
+
+def _impossible(
+    paper: Paper, table: PrintedTable, unit: str
+) -> Iterator[tuple[Row, str, Interval]]:
+    """Rows and methods whose path can have no such error if root mean squares are in a unit."""
+    errors = as_meant(paper.table(table.errors_in))
+    for row in (one for one in table.rows if one.error_of):
+        reference = row.cells[table.methods[0]].mean
+        for method, cell in errors.row(row.error_of).cells.items():
+            scale = METRES[unit] / METRES["mm"]
+            path = row.cells[method].mean
+            most = scale * (path.high + reference.high)
+            least = scale * max(path.low - reference.high, reference.low - path.high, 0.0)
+            if cell.mean.low > most or cell.mean.high < least:
+                yield row, method, cell.mean
+
+
+def _about_an_origin(table: PrintedTable, rows: dict[str, Row]) -> Iterator[Slip]:
+    """A root mean square that hardly differs between people while all else does, and is far larger
+    than the area allows, is a distance from somewhere, no sway about the mean."""
+    method = table.methods[0]
+    for key, other in ((ML, AP), (AP, ML)):
+        row = rows[key]
+        rest = min(_evenness(one, method).low for name, one in rows.items() if name != key)
+        mine = _evenness(row, method).high
+        likely = image(
+            lambda area, side: area / (_ELLIPSE * side),
+            rows[AREA].cells[method].mean,
+            rows[other].cells[method].mean,
+        )
+        most = likely.high / sqrt(1 - STRAIGHT**2)
+        if mine < EVEN * rest and row.cells[method].mean.low > most:
+            yield slip(
+                table,
+                row.name,
+                "origin",
+                printed=f"{row.cells[method].text}, equal in all people within {100 * mine:.1g} %",
+                recomputed=f"about {likely.middle:.1g} from the area, if about the mean",
+                reading="the distance from an origin that all share, not about the mean",
+                is_remark=True,
+            )
+
+
+def _evenness(row: Row, method: str) -> Interval:
+    """Standard deviation over people as a part of the mean."""
+    cell = row.cells[method]
+    if cell.mean.low <= 0.0:
+        return Interval(0.0, inf)
+    return image(lambda sd, mean: sd / mean, cell.spread(), cell.mean)
+
+
+# --- all of it --------------------------------------------------------------------------------
 
 
 def audit(paper: Paper) -> tuple[Slip, ...]:
@@ -339,25 +433,23 @@ def _slips(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
         yield from sway_slips(paper, table)
     elif table.design == "summary":
         yield from _means_of_few(table)
-    if table.adds_up_to_body_mass:
-        yield from _sums(paper, table)
+    if table.adds_up_to_body_mass and paper.body_mass_kg is not None:
+        yield from _sums(paper.body_mass_kg, table)
     for claim in table.claims:
         yield from _claim(paper, table, claim)
 
 
-def _sums(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
+def _sums(body_mass_kg: Cell, table: PrintedTable) -> Iterator[Slip]:
     """Each method's segments beside the body's mass."""
-    if paper.body_mass_kg is None:
-        return
     for method in table.methods:
         parts = [row.cells[method].mean for row in table.rows]
         whole = Interval(sum(one.low for one in parts), sum(one.high for one in parts))
-        if not whole.meets(paper.body_mass_kg.mean):
+        if not whole.meets(body_mass_kg.mean):
             yield slip(
                 table,
                 "sum of all rows",
                 "body mass",
-                printed=f"people of {paper.body_mass_kg.text} kg",
+                printed=f"people of {body_mass_kg.text} kg",
                 recomputed=f"the segments of {method} add up to {range_words(whole)} kg",
             )
 
@@ -403,6 +495,6 @@ def _is_false(paper: Paper, table: PrintedTable, row: Row, claim: Claim) -> bool
         mine = row.cells[claim.method].mean
         rest = (cell.mean for method, cell in row.cells.items() if method != claim.method)
         return any(mine.low >= other.high for other in rest)
-    is_different = is_below(row.printed("p"), paper.alpha)
+    is_different = row.printed("p").is_below(paper.alpha)
     should = (claim.says == "different") != (row.name in claim.but)
     return is_different is not None and is_different != should

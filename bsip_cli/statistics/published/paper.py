@@ -1,4 +1,4 @@
-"""The papers' tables as data: one file per paper beside this one."""
+"""The papers' tables as data, one file per paper beside this one, and what was likely meant."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
-from itertools import product
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any, Literal
 
@@ -73,6 +73,10 @@ class Interval:
     def meets(self, other: Interval) -> bool:
         """Whether some number lies in both."""
         return self.low <= other.high and other.low <= self.high
+
+    def is_below(self, border: float) -> bool | None:
+        """None where the number may be on either side."""
+        return True if self.high <= border else False if self.low >= border else None
 
     def size(self) -> Interval:
         """Of the numbers without their sign."""
@@ -271,84 +275,124 @@ def load_paper(name: str) -> Paper:
     """
     if name not in names():
         raise UsageError(f"there is no paper {name!r}", expected=", ".join(names()))
-    text = (Path(__file__).parent / f"{name}.toml").read_text(encoding="utf-8")
-    data = tomllib.loads(text)
-    mass, duration = data.get("body_mass_kg"), data.get("sequence_s")
+    data = tomllib.loads((Path(__file__).parent / f"{name}.toml").read_text(encoding="utf-8"))
+    mass, duration = data.pop("body_mass_kg", ""), data.pop("sequence_s", "")
     return Paper(
-        data["key"],
-        data["name"],
-        data["citation"],
-        data["url"],
-        tuple(_table(data["key"], one) for one in data["tables"]),
-        data.get("participants", 0),
-        data.get("alpha", 0.05),
-        mass and Cell.of(mass),
-        duration and rounded_from(duration),
+        tables=tuple(_table(data["key"], **one) for one in data.pop("tables")),
+        body_mass_kg=Cell.of(mass) if mass else None,
+        sequence_s=rounded_from(duration) if duration else None,
+        **data,
     )
 
 
-_TABLE_KEYS = {
-    "number",
-    "about",
-    "design",
-    "unit",
-    "methods",
-    "star",
-    "adds_up_to_body_mass",
-    "claims",
-    "marks",
-    "values",
-    "errors_in",
-    "rows",
-}
-_ROW_KEYS = {"name", "key", "compare", "unit", "error_of", "ci", "t", "p", "d", "F"}
-
-
-def _table(paper: str, data: dict[str, Any]) -> PrintedTable:
-    _refuse_unknown(data, _TABLE_KEYS, f"{paper}, table {data['number']}")
-    methods, unit = tuple(data["methods"]), data.get("unit", "")
-    rows = tuple(_row(one, methods, unit) for one in data["rows"])
-    claims = tuple(_claim(one) for one in data.get("claims", ()))
-    named = {row.name for row in rows}
-    unknown = [name for claim in claims for name in claim.but if name not in named]
+def _table(
+    paper: str,
+    *,
+    rows: list[dict],
+    methods: list[str],
+    unit: str = "",
+    claims: list[dict] | None = None,
+    marks: dict[str, list[str]] | None = None,
+    **plain: Any,
+) -> PrintedTable:
+    """A table of the file; ``plain``: what stands in it as it is."""
+    printed = tuple(_row(methods, **{"unit": unit} | one) for one in rows)
+    said = tuple(Claim(**one | {"but": tuple(one.get("but", ()))}) for one in claims or ())
+    unknown = {name for claim in said for name in claim.but} - {row.name for row in printed}
     if unknown:
-        raise ValueError(f"{paper}, table {data['number']}: no rows {', '.join(unknown)}")
-    return PrintedTable(
-        paper=paper,
-        number=data["number"],
-        about=data["about"],
-        design=data["design"],
-        methods=methods,
-        rows=rows,
-        star=data.get("star", ""),
-        adds_up_to_body_mass=data.get("adds_up_to_body_mass", False),
-        marks={sign: tuple(pair) for sign, pair in data.get("marks", {}).items()},
-        claims=claims,
-        values=data.get("values", 0),
-        errors_in=data.get("errors_in", 0),
-    )
+        raise ValueError(f"{paper}, table {plain['number']}: no rows {', '.join(unknown)}")
+    signs = {sign: tuple(pair) for sign, pair in (marks or {}).items()}
+    named = tuple(methods)
+    return PrintedTable(paper, methods=named, rows=printed, claims=said, marks=signs, **plain)
 
 
-def _claim(data: dict[str, Any]) -> Claim:
-    _refuse_unknown(data, {"where", "says", "but", "method"}, "a claim")
-    return Claim(data["where"], data["says"], tuple(data.get("but", ())), data.get("method", ""))
+def _row(
+    methods: list[str], *, name: str, unit: str, key: str = "", ci: str = "", **printed: str
+) -> Row:
+    compare, error_of = printed.pop("compare", key), printed.pop("error_of", "")
+    cells = {method: Cell.of(printed.pop(method)) for method in methods if method in printed}
+    if unknown := set(printed) - {"t", "p", "d", "F"}:
+        raise ValueError(f"row {name}: unknown {', '.join(sorted(unknown))}")
+    return Row(name, key, unit, cells, printed, compare, ci, error_of)
 
 
-def _row(data: dict[str, str], methods: tuple[str, ...], unit: str) -> Row:
-    _refuse_unknown(data, _ROW_KEYS | set(methods), f"row {data['name']}")
-    return Row(
-        name=data["name"],
-        key=data.get("key", ""),
-        unit=data.get("unit", unit),
-        cells={method: Cell.of(data[method]) for method in methods if method in data},
-        tests={name: data[name] for name in ("t", "p", "d", "F") if name in data},
-        compare=data.get("compare", data.get("key", "")),
-        ci_text=data.get("ci", ""),
-        error_of=data.get("error_of", ""),
-    )
+# --- what was likely meant: the one change of a table after which its numbers agree ---------------
 
 
-def _refuse_unknown(data: dict[str, Any], known: set[str], where: str) -> None:
-    unknown = sorted(set(data) - known)
-    if unknown:
-        raise ValueError(f"{where}: unknown {', '.join(unknown)}")
+@dataclass(frozen=True)
+class Place:
+    """A cell of a table."""
+
+    row: str
+    method: str
+    cell: Cell
+
+    def words(self) -> str:
+        return f"{self.row} {self.method} ({self.cell.text})"
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """Two cells that stand in each other's place."""
+
+    first: Place
+    second: Place
+
+    def undone(self, table: PrintedTable) -> PrintedTable:
+        """The table with both cells where they belong."""
+        return replace(table, rows=tuple(self._undone(row) for row in table.rows))
+
+    def _undone(self, row: Row) -> Row:
+        for here, there in ((self.first, self.second), (self.second, self.first)):
+            if row.name == here.row:
+                row = row.with_cell(here.method, there.cell)
+        return row
+
+    def sentence(self) -> str:
+        return f"{self.first.words()} and {self.second.words()} are exchanged"
+
+
+def exchanged_cells(table: PrintedTable) -> Exchange | None:
+    """The only exchange of two cells after which the means of all rows agree with their
+    intervals; None if they agree as printed, or if no or several exchanges would do."""
+    if _agree(table):
+        return None
+    exchanges = (Exchange(a, b) for a, b in combinations(_places(table), 2))
+    found = [one for one in exchanges if _agree(one.undone(table))]
+    return found[0] if len(found) == 1 else None
+
+
+def pairs_that_differ_by(table: PrintedTable, difference: Interval) -> list[tuple[Place, Place]]:
+    """All two cells of a table whose means differ by so much."""
+    places = _places(table)
+    return [(a, b) for a in places for b in places if (a.cell.mean - b.cell.mean).meets(difference)]
+
+
+def as_meant(table: PrintedTable) -> PrintedTable:
+    """The table with exchanged cells where they belong; as it is where none are."""
+    exchange = exchanged_cells(table) if table.design == "paired" else None
+    return table if exchange is None else exchange.undone(table)
+
+
+def middle_of(row: Row) -> Interval:
+    """Of the printed interval."""
+    return image(lambda low, high: 0.5 * (low + high), *row.ends())
+
+
+def mean_difference(table: PrintedTable, row: Row) -> Interval:
+    """Of the first method's mean less the second's."""
+    first, second = (row.cells[method] for method in table.methods)
+    return first.mean - second.mean
+
+
+def agrees(table: PrintedTable, row: Row) -> bool:
+    """Whether the difference of a row's means is the middle of its interval."""
+    return mean_difference(table, row).meets(middle_of(row))
+
+
+def _agree(table: PrintedTable) -> bool:
+    return all(agrees(table, row) for row in table.rows)
+
+
+def _places(table: PrintedTable) -> list[Place]:
+    return [Place(row.name, m, cell) for row in table.rows for m, cell in row.cells.items()]

@@ -6,15 +6,16 @@ from dataclasses import asdict, fields
 
 import pandas as pd
 
-from bsip_cli.recordings.frame_change import FrameChange
-from bsip_cli.recordings.opened import Opened
-from bsip_cli.recordings.plate_reading import PlateReading
+from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
+from bsip_cli.recordings.plate_source import Opened
 from bsip_cli.recordings.read import open_recording
 from bsip_cli.recordings.settle import SessionReading, Verdict
 from bsip_cli.recordings.under_the_feet import Evidence
 from bsip_cli.running.unit import Unit
 from bsip_cli.study.study import Trial
 
+_CENTRE = ("centre_x_m", "centre_y_m", "centre_z_m")
+_HALF = ("half_size_x_m", "half_size_y_m")
 _EVIDENCE = tuple(field.name for field in fields(Evidence))
 
 
@@ -33,54 +34,39 @@ def rows_of(session: str, reading: SessionReading) -> list[dict]:
 
 def _row(verdict: Verdict) -> dict:
     reading = asdict(verdict.reading)
-    nothing = float("nan")
-    x, y, z = reading.pop("centre_m") or [nothing] * 3
-    half_x, half_y = reading.pop("half_size_m") or [nothing] * 2
+    centre = reading.pop("centre_m") or [float("nan")] * 3
+    half = reading.pop("half_size_m") or [float("nan")] * 2
     row = reading | {
         "reversed_round": reading.pop("mirrored"),
-        "centre_x_m": x,
-        "centre_y_m": y,
-        "centre_z_m": z,
-        "half_size_x_m": half_x,
-        "half_size_y_m": half_y,
+        **dict(zip(_CENTRE, centre, strict=True)),
+        **dict(zip(_HALF, half, strict=True)),
         "refusal": verdict.refusal,
         "rivals": "|".join(verdict.rivals),
         "doubted": verdict.doubted,
         "repeats": " ".join(verdict.repeats),
     }
-    unknown = Evidence(*[nothing] * len(_EVIDENCE))
+    unknown = Evidence(*[float("nan")] * len(_EVIDENCE))
     for when, found in (("before", verdict.before), ("after", verdict.after)):
         row |= {f"{when}_{name}": value for name, value in asdict(found or unknown).items()}
     return row
 
 
 def _verdict(row: dict) -> Verdict:
-    centre = (row["centre_x_m"], row["centre_y_m"], row["centre_z_m"])
-    half = (row["half_size_x_m"], row["half_size_y_m"])
+    centre, half = (tuple(row[name] for name in names) for names in (_CENTRE, _HALF))
+    as_written = ("moment_scale", "point_scale", "about", "place_of", "reversed_channel")
     reading = PlateReading(
-        moment_scale=row["moment_scale"],
-        point_scale=row["point_scale"],
-        about=row["about"],
+        **{name: row[name] for name in as_written},
         centre_m=None if pd.isna(centre[0]) else centre,
         turn=int(row["turn"]),
         mirrored=bool(row["reversed_round"]),
         sign=int(row["sign"]),
-        place_of=row["place_of"],
-        reversed_channel=row["reversed_channel"],
         half_size_m=None if pd.isna(half[0]) else half,
     )
     before, after = (
         Evidence(*(row[f"{when}_{name}"] for name in _EVIDENCE)) for when in ("before", "after")
     )
-    return Verdict(
-        reading,
-        before,
-        after,
-        refusal=row["refusal"],
-        rivals=tuple(filter(None, row["rivals"].split("|"))),
-        doubted=row["doubted"],
-        repeats=tuple(row["repeats"].split()),
-    )
+    rivals, repeats = tuple(filter(None, row["rivals"].split("|"))), tuple(row["repeats"].split())
+    return Verdict(reading, before, after, row["refusal"], rivals, row["doubted"], repeats)
 
 
 def reading_of(unit: Unit, trial: Trial) -> SessionReading:

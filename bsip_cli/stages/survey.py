@@ -7,9 +7,9 @@ from dataclasses import fields
 import pandas as pd
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.assemble import findings_about
-from bsip_cli.recordings.gate_limits import GateLimits
-from bsip_cli.recordings.person_size import no_person
+from bsip_cli.recordings.body_motion import GateLimits
+from bsip_cli.recordings.read import findings_about
+from bsip_cli.recordings.scene import no_person
 from bsip_cli.recordings.settle import settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.running.unit import Unit

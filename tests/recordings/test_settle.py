@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from bsip_cli.config import load_config
-from bsip_cli.recordings.assemble import assemble, findings_about
-from bsip_cli.recordings.frame_change import FrameChange
-from bsip_cli.recordings.gate_limits import USUAL
-from bsip_cli.recordings.handedness import handedness
-from bsip_cli.recordings.plate_reading import PlateReading
+from bsip_cli.recordings.body_motion import USUAL
+from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
 from bsip_cli.recordings.plate_source import ForceOnPoint
+from bsip_cli.recordings.read import assemble, findings_about
+from bsip_cli.recordings.scene import handedness
 from bsip_cli.recordings.settle import SessionReading, settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import Feet

@@ -66,10 +66,13 @@ class PlateReading:
             + MIRRORED * self.mirrored
         )
 
-    def channel_signs(self) -> np.ndarray:
-        """Of forces and of moments, (2, 3)."""
-        signs = [-1.0 if name == self.reversed_channel else 1.0 for name in CHANNELS]
-        return np.array(signs).reshape(2, 3)
+    def force_signs(self) -> np.ndarray:
+        """Of Fx, Fy, Fz, (3,)."""
+        return np.array([-1.0 if name == self.reversed_channel else 1.0 for name in CHANNELS[:3]])
+
+    def moment_signs(self) -> np.ndarray:
+        """Of Mx, My, Mz, (3,)."""
+        return np.array([-1.0 if name == self.reversed_channel else 1.0 for name in CHANNELS[3:]])
 
     def words(self) -> str:
         """What was done about units, reference and axes, as one clause; empty if nothing."""

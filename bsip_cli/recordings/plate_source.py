@@ -137,11 +137,11 @@ class C3dPlate:
         """Without the maker's correction of the centre of pressure, which is no linear one."""
         description = self.read_description(reading)
         axes = self.rotation_world_lab @ description.rotation_lab_plate()
-        force = reading.sign * axes * reading.channel_signs()[0]
+        force = reading.sign * axes * reading.force_signs()
         to_surface = axes @ crossing(self._surface_m(reading)) @ axes.T
         at_centre = crossing(self.rotation_world_lab @ description.centre_m()) - to_surface
         scale = reading.sign * reading.moment_scale
-        moment = np.hstack([at_centre @ force, scale * axes * reading.channel_signs()[1]])
+        moment = np.hstack([at_centre @ force, scale * axes * reading.moment_signs()])
         return np.vstack([np.hstack([force, np.zeros((3, 3))]), moment])
 
     def at(self, samples: np.ndarray) -> C3dPlate:
@@ -240,8 +240,8 @@ class C3dPlate:
     def _at_surface(self, reading: PlateReading) -> LocalWrench:
         """Before the sign of a reading."""
         wrench = LocalWrench(
-            self.wrench.force_N * reading.channel_signs()[0],
-            self.wrench.moment_Nm * reading.channel_signs()[1] * reading.moment_scale,
+            self.wrench.force_N * reading.force_signs(),
+            self.wrench.moment_Nm * reading.moment_signs() * reading.moment_scale,
         )
         return wrench.at_surface(self._surface_m(reading))
 
@@ -379,14 +379,14 @@ class ForceOnPoint:
     # From the parts, lab frame, (3, 12) each.
 
     def _force(self, reading: PlateReading) -> np.ndarray:
-        return np.hstack([np.diag(reading.channel_signs()[0]), np.zeros((3, 9))])
+        return np.hstack([np.diag(reading.force_signs()), np.zeros((3, 9))])
 
     def _scaled_moment(self, reading: PlateReading) -> np.ndarray:
         return np.hstack([_NONE, reading.moment_scale * np.eye(3), _NONE, _NONE])
 
     def _at_origin(self, reading: PlateReading) -> np.ndarray:
         """Moment of the force at its point about the lab's origin."""
-        signs = reading.channel_signs()[0][[2, 1, 0, 2, 1, 0]]
+        signs = reading.force_signs()[[2, 1, 0, 2, 1, 0]]
         return np.hstack([_NONE, _NONE, reading.point_scale * _CROSS_PRODUCT * signs])
 
     def _left(self, reading: PlateReading) -> np.ndarray:

@@ -31,8 +31,8 @@ from bsip_cli.instruments.c3d_file import rewrite_c3d
 from bsip_cli.instruments.readings import Instruments
 from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot
 from bsip_cli.pipeline import Stage
-from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.plate_reading import PlateReading
+from bsip_cli.recordings.plate_source import Opened
 from bsip_cli.recordings.settle import SessionReading, Verdict
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import OpenedStudy, follow
@@ -290,7 +290,7 @@ class _Correction:
 def _opened(unit: Unit) -> tuple[Opened, SessionReading]:
     assert unit.trial is not None
     session = reading_of(unit.read("readings"), unit.trial)
-    return session.frame.of(opened(unit, unit.trial)), session
+    return opened(unit, unit.trial).in_frame(session.frame), session
 
 
 def _alike(cause: Cause, told: pd.DataFrame) -> list[tuple[str, str]]:

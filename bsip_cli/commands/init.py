@@ -19,9 +19,8 @@ from bsip_cli.commands.init_files import NO_RECORDING, Source, Unused, list_file
 from bsip_cli.errors import BadDataError, UsageError, not_writable, printable
 from bsip_cli.files.folders import check_path, is_folder
 from bsip_cli.recordings.c3d_person import together
-from bsip_cli.recordings.marker_guess import told_from
+from bsip_cli.recordings.marker_guess import starter_toml, told_from
 from bsip_cli.recordings.model import StatedPerson
-from bsip_cli.recordings.starter_set import starter_toml
 from bsip_cli.study.new_study import Named, check_participant, counted, is_sequence, name_all, plain
 from bsip_cli.study.participants import UNKNOWN, PeopleTable, Row, participant_of, read_people
 from bsip_cli.study.trials import listed

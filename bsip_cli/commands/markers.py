@@ -17,11 +17,16 @@ from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.config import load_config
 from bsip_cli.errors import UsageError, printable
 from bsip_cli.recordings.labels import LabelMatch, match_labels
-from bsip_cli.recordings.lateral_medial import with_pairs_named
-from bsip_cli.recordings.marker_guess import Guess, SetFit, fits, told_from
+from bsip_cli.recordings.marker_guess import (
+    Guess,
+    SetFit,
+    fits,
+    starter_toml,
+    told_from,
+    with_pairs_named,
+)
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.recordings.starter_set import starter_toml
 
 _RIVALS = 3
 

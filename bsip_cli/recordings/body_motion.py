@@ -17,7 +17,6 @@ from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.names import without_side
-from bsip_cli.recordings.gate_limits import GateLimits
 from bsip_cli.recordings.momentum_mass import NEIGHBOUR, shares_of_seen
 
 SMOOTH_S = 0.04
@@ -39,6 +38,21 @@ _KINDS = {"force": [0, 1], "level": [3, 4], "vertical": [5]}  # columns of a wre
 _TO_NEIGHBOUR = dict.fromkeys(("thigh", "shank", "upper_arm", "forearm"), 0.5) | {
     "upper_torso": 0.3
 }
+
+
+@dataclass(frozen=True)
+class GateLimits:
+    """Options of `ingest`; their reasons are in configs/default.toml, whose values these are."""
+
+    believed_percent: float = 85.0
+    corrected_percent: float = 95.0
+    balance_median_m: float = 0.024
+    complete_percent: float = 15.0
+    marker_noise_m: float = 0.001
+    independent_numbers: float = 12.0
+
+
+USUAL = GateLimits()
 
 
 @dataclass(frozen=True, eq=False)

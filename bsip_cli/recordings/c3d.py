@@ -2,86 +2,156 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from bsip_cli.recordings import world
-from bsip_cli.recordings.analog import check_samples, sample_findings
+from bsip_cli.recordings import scene
 from bsip_cli.recordings.c3d_content import Content, read_content
-from bsip_cli.recordings.c3d_parameters import texts
+from bsip_cli.recordings.c3d_format import Group, texts
 from bsip_cli.recordings.c3d_person import stated_person
-from bsip_cli.recordings.c3d_plates import PlateChannels, plate_surfaces, read_plates
-from bsip_cli.recordings.c3d_points import Points, read_points
-from bsip_cli.recordings.model import Finding, Recording
-from bsip_cli.recordings.opened import Opened
-from bsip_cli.recordings.plate_source import C3dPlate
-from bsip_cli.recordings.plates import local_wrench
-from bsip_cli.recordings.zero import without_baseline
+from bsip_cli.recordings.c3d_plates import plate_surfaces, read_plates
+from bsip_cli.recordings.labels import is_unlabelled
+from bsip_cli.recordings.model import Finding, Recording, refusal
+from bsip_cli.recordings.plate_source import Opened
+
+_OUTPUT_GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
+_OUTPUT_NAMES = re.compile(
+    r"^(centreofmass.*|centerofmass.*|.*(angles?|forces?|moments?|power))$", re.IGNORECASE
+)
+_AXIS_ENDINGS = "OALP"  # Plug-in Gait draws a segment by four points, PELO PELA PELL PELP
 
 
 def open_c3d(path: Path) -> Opened:
     """Markers of a C3D file, SI, Z-up world frame, and its plates as it describes them."""
     content = read_content(path)
-    points = read_points(content, path)
-    plates, plate_findings = read_plates(content, points.unit_m)
-    up = _up(content, points, plate_surfaces(content.group("FORCE_PLATFORM"), points.unit_m))
-    rate_hz = content.rate_hz * content.samples_per_frame
-    rotation = world.rotation_to_z_up(up)
-    opened = [_source(plate, rotation, rate_hz) for plate in plates]
-    turned = world.finding_about(up)
+    labels, positions_m, unit_m, about_points = _read_points(content, path)
+    surfaces = plate_surfaces(content.group("FORCE_PLATFORM"), unit_m)
+    up = _up(content, labels, positions_m, surfaces)
+    rotation = scene.rotation_to_z_up(up)
+    plates, about_plates, about_samples = read_plates(content, unit_m, rotation)
     stated, about_person = stated_person(content.parameters)
+    about = (*content.findings, *about_points, *about_plates, *scene.findings_about(up))
     recording = Recording(
         path=path,
         marker_rate_hz=content.rate_hz,
-        labels=points.labels,
-        markers_m=points.positions_m @ rotation.T,
-        analog_rate_hz=rate_hz,
+        labels=labels,
+        markers_m=positions_m @ rotation.T,
+        analog_rate_hz=content.rate_hz * content.samples_per_frame,
         plates=(),
-        findings=(
-            *content.findings,
-            *points.findings,
-            *plate_findings,
-            *([turned] if turned else []),
-            *about_person,
-            *(finding for _, found in opened for finding in found),
-        ),
+        findings=(*about, *about_person, *about_samples),
         rotation_world_lab=rotation,
         forces_note="",
         time0_s=content.first_frame / content.rate_hz,
         stated=stated,
     )
-    return Opened(recording, tuple(source for source, _ in opened))
+    return Opened(recording, tuple(plates))
 
 
-def _up(content: Content, points: Points, surfaces: Sequence[np.ndarray]) -> world.Up:
+def _up(
+    content: Content,
+    labels: Sequence[str],
+    positions_m: np.ndarray,
+    surfaces: Sequence[np.ndarray],
+) -> scene.Up:
     """From the plates and the markers above them, else the labels, else what the file says."""
     surface = None
     if surfaces:
         normals = np.array([np.cross(c[0] - c[1], c[0] - c[3]) for c in surfaces])
         centres = np.array([c.mean(axis=0) for c in surfaces])
-        surface = world.up_from_surface(normals, centres, points.positions_m)
+        surface = scene.up_from_surface(normals, centres, positions_m)
     screen = texts(content.group("POINT"), "Y_SCREEN")
     return (
         surface
-        or world.up_from_labels(points.labels, points.positions_m)
-        or (world.up_from_name(screen[0]) if len(screen) else None)
-        or world.Up(2, 1, "nothing says otherwise")
+        or scene.up_from_labels(labels, positions_m)
+        or (scene.up_from_name(screen[0]) if screen else None)
+        or scene.Up(2, 1, "nothing says otherwise")
     )
 
 
-def _source(
-    plate: PlateChannels, rotation_world_lab: np.ndarray, analog_rate_hz: float
-) -> tuple[C3dPlate, list[Finding]]:
-    """The plate with its baseline subtracted and its faulty samples marked."""
-    description = plate.plate
-    wrench = local_wrench(description.kind, plate.channels, description)
-    samples = check_samples(plate.channels, plate.counts, wrench.force_N[:, 2], analog_rate_hz)
-    down = (rotation_world_lab @ description.rotation_lab_plate()[:, 2])[2]
-    usable = samples.usable()
-    wrench, found = without_baseline(
-        wrench, description.name, float(np.sign(down)), usable, plate.baseline
+# --- the points -----------------------------------------------------------------------------------
+
+
+def _read_points(
+    content: Content, path: Path
+) -> tuple[tuple[str, ...], np.ndarray, float, list[Finding]]:
+    """Labels and positions (n_frames, n_markers, 3) of the real markers [m], lab frame, NaN =
+    missing, without model outputs and unlabelled points; the size of the file's unit of length."""
+    group = content.group("POINT")
+    labels, findings = _labels(group, content.positions.shape[1])
+    outputs = _model_outputs(group, labels)
+    kept = [i for i, label in enumerate(labels) if i not in outputs and not is_unlabelled(label)]
+    if len(kept) < len(labels):
+        n_unlabelled = max(len(labels) - len(kept) - len(outputs), 0)
+        found = f"{len(outputs)} model outputs and {n_unlabelled} unlabelled points"
+        action = f"kept {len(kept)} of {len(labels)} points"
+        findings.append(Finding("points", "", found, "markers", action, "info"))
+    every, is_valid = content.positions, content.is_valid
+    is_written = np.isfinite(every).all(axis=-1) & (every != 0).any(axis=-1)  # three zeros are none
+    every = np.where(is_written[..., None], every, np.nan)
+    positions = every[:, kept]
+    is_ignored = not is_valid[:, kept].any() and bool(np.isfinite(positions).any())
+    if not is_ignored:
+        positions[~is_valid[:, kept]] = np.nan
+    findings += scene.without_sentinels(positions)
+    stated = "".join(texts(group, "UNITS")[:1])
+    shown = positions if kept else np.where(is_valid[..., None], every, np.nan)
+    names = [labels[i] for i in kept]
+    unit_m, about_unit = scene.settle_unit(shown, names or labels, stated, "POINT:UNITS")
+    positions *= unit_m
+    findings += [*scene.without_absurd(positions), *about_unit]
+    if is_ignored:
+        findings.append(_about_invalid(positions, content.rate_hz, path))
+    return tuple(names), positions, unit_m, findings
+
+
+def _about_invalid(positions_m: np.ndarray, rate_hz: float, path: Path) -> Finding:
+    """All points are marked as not seen: what is said if they move as markers do, else refused."""
+    found = f"all {positions_m.shape[1]} points are marked invalid (residual -1) in every frame"
+    if not scene.move_like_markers(positions_m, rate_hz):
+        found += ", and what is written there does not move as markers do"
+        remedy = "reconstruct the trial and export it again"
+        raise refusal(path, found, "points that the cameras saw", remedy)
+    found += ", and they move as the markers of a person do"
+    expected = "a residual of 0 or more where a point was seen"
+    return Finding("points", "", found, expected, "read them all the same", "warning")
+
+
+def _labels(group: Group, n_points: int) -> tuple[list[str], list[Finding]]:
+    """POINT:LABELS with its continuations; duplicates by POINT:DESCRIPTIONS if these tell."""
+    labels, descriptions = (
+        (texts(group, name) + [""] * n_points)[:n_points] for name in ("LABELS", "DESCRIPTIONS")
     )
-    source = C3dPlate(description, wrench, usable, rotation_world_lab)
-    return source, [*sample_findings(description.name, samples), *found]
+    counts = Counter(labels)
+    twice = [i for i, label in enumerate(labels) if counts[label] > 1 and not is_unlabelled(label)]
+    renamed = [descriptions[i] if i in twice else label for i, label in enumerate(labels)]
+    resolved = len({renamed[i] for i in twice}) == len(twice) and all(
+        renamed[i] and renamed[i] not in counts.keys() - {labels[i]} for i in twice
+    )
+    if not twice or not resolved:  # what nobody asks for need not be told apart
+        return labels, []
+    shared = sorted({labels[i] for i in twice})
+    found = f"{len(twice)} points share {len(shared)} labels"
+    expected, action = "one point per label", "named them by POINT:DESCRIPTIONS"
+    return renamed, [Finding("labels", ", ".join(shared), found, expected, action, "corrected")]
+
+
+def _model_outputs(group: Group, labels: Sequence[str]) -> set[int]:
+    """Indices of angles, forces, moments, powers, modelled points and drawn segment axes.
+
+    POINT:TYPE_GROUPS lists pairs of plural and singular; the plural names the list.
+    """
+    keys = {*(name.upper() for name in texts(group, "TYPE_GROUPS")[::2]), *_OUTPUT_GROUPS}
+    listed = {name for key in keys for name in texts(group, key)}
+    bare = [label.split(":")[-1] for label in labels]
+    stems = {label[:-1] for label in bare if label[-1:] == "O" and len(label) >= 3}
+    drawn = [{stem + ending for ending in _AXIS_ENDINGS} for stem in stems]
+    axes = {name for axes in drawn if axes <= set(bare) for name in axes}
+    return {
+        i
+        for i, label in enumerate(labels)
+        if label and (label in listed or bare[i] in axes or _OUTPUT_NAMES.match(bare[i]))
+    }

@@ -1,4 +1,4 @@
-"""Reads a C3D file from its standard input with ezc3d; c3d_guard runs it under limits.
+"""Reads a C3D file from its standard input with ezc3d; c3d_content runs it under limits.
 
     python c3d_child.py MEMORY_BYTES CPU_SECONDS < file.c3d > arrays.npz
 

@@ -1,11 +1,18 @@
 """What a C3D file holds: ezc3d reads it, after a check of its counts against its length.
 
 Own parsing goes as far as that check needs: header, records of parameters, counts, rates. Where
-ezc3d would misread or refuse a sound file (c3d_mend says which), it reads a copy written anew.
+ezc3d would misread or refuse a sound file (c3d_mend says which), it reads a copy written anew. It
+runs in a process of its own: a damaged file may crash it, hang it or fill the memory.
 """
 
 from __future__ import annotations
 
+import io
+import os
+import signal
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,33 +20,63 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.c3d_agreement import settle_rate, settle_scale
-from bsip_cli.recordings.c3d_guard import Samples, read_by_ezc3d
-from bsip_cli.recordings.c3d_header import BLOCK, Header, read_header
-from bsip_cli.recordings.c3d_layout import Layout, settle_layout
+from bsip_cli.recordings.c3d_child import REFUSED
+from bsip_cli.recordings.c3d_format import (
+    BLOCK,
+    Group,
+    Header,
+    Parameters,
+    Value,
+    floats,
+    integers,
+    parameters_of,
+    read_header,
+    read_records,
+)
+from bsip_cli.recordings.c3d_layout import (
+    Layout,
+    says_unsigned,
+    scaling_of,
+    settle_layout,
+    settle_rate,
+    settle_scale,
+)
 from bsip_cli.recordings.c3d_mend import mended, needs_mending, pieces
-from bsip_cli.recordings.c3d_numbers import floats, integers
-from bsip_cli.recordings.c3d_parameters import Group, Parameters
-from bsip_cli.recordings.c3d_records import parameters_of, read_records
-from bsip_cli.recordings.c3d_scaling import says_unsigned, scaling_of
-from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.model import Finding, refusal
 
 _LARGEST_FILE = 2**31  # bytes
+_CHILD = Path(__file__).with_name("c3d_child.py")
+# Measured on files of 0.01 to 5 MB: 100 MB of address space and 8 MB for each MB of the file,
+# 0.4 s for each MB.
+_MEMORY_BYTES, _MEMORY_PER_BYTE = 1_000_000_000, 40
+_CPU_S, _CPU_S_PER_MB = 10, 5
+_WALL_PER_CPU = 6  # other processes may want the same cores
 
 
 @dataclass(frozen=True, eq=False)
-class Content:
-    """What a C3D file holds, in its own units and lab frame."""
+class Samples:
+    """What ezc3d read, in the file's units and lab frame."""
 
     parameters: Parameters
+    positions: np.ndarray  # (n_frames, n_points, 3); NaN where invalid, unless all points are
+    residuals: np.ndarray  # (n_frames, n_points), negative where no camera saw the point
+    analog: np.ndarray  # (n_channels, n_frames * samples_per_frame)
+
+
+@dataclass(frozen=True, eq=False)
+class Content(Samples):
+    """What a C3D file holds."""
+
     rate_hz: float
     first_frame: int  # counted from 0
-    positions: np.ndarray  # (n_frames, n_points, 3); NaN where invalid, unless all points are
-    is_valid: np.ndarray  # (n_frames, n_points) bool: no camera lost the point
-    analog: np.ndarray  # (n_channels, n_frames * samples_per_frame)
     analog_scales: np.ndarray  # (n_channels,), size of one converter count
     samples_per_frame: int
     findings: tuple[Finding, ...]
+
+    @property
+    def is_valid(self) -> np.ndarray:
+        """No camera lost the point, (n_frames, n_points) bool."""
+        return self.residuals >= 0
 
     def group(self, name: str) -> Group:
         return self.parameters.get(name, {})
@@ -64,21 +101,32 @@ def read_content(path: Path) -> Content:
     else:
         samples = _read_piece(path, raw, layout)
     if header.is_full:
-        samples = _without_padding(samples, layout)
+        samples = _of_length(samples, layout, _filled_frames(samples, layout))
     positions = samples.positions
     if not (samples.residuals >= 0).any():
         positions = _written(raw, header, layout, abs(point_scale))[: len(positions)]
     return Content(
-        parameters=samples.parameters,
-        rate_hz=rate_hz,
+        samples.parameters,
+        positions,
+        samples.residuals,
+        samples.analog,
+        rate_hz,
         first_frame=max(header.first_frame, 1) - 1,
-        positions=positions,
-        is_valid=samples.residuals >= 0,
-        analog=samples.analog,
         analog_scales=scaling.scales,
         samples_per_frame=layout.samples_per_frame,
         findings=(*findings, *about_rate, *about_scale),
     )
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        size = path.stat().st_size
+        if size > _LARGEST_FILE:
+            found, most = f"a file of {size / 1e9:.1f} GB", f"at most {_LARGEST_FILE / 1e9:.1f} GB"
+            raise refusal(path, found, most, "cut the trial into shorter ones")
+        return path.read_bytes()
+    except OSError as error:
+        raise BadDataError(f"cannot be opened ({error.strerror})", file=path) from error
 
 
 def _written(raw: bytes, header: Header, layout: Layout, scale: float) -> np.ndarray:
@@ -89,26 +137,15 @@ def _written(raw: bytes, header: Header, layout: Layout, scale: float) -> np.nda
     return np.array(points.reshape(len(points), layout.n_points, 4)[..., :3])
 
 
-def _bytes(path: Path) -> bytes:
-    try:
-        size = path.stat().st_size
-        if size > _LARGEST_FILE:
-            raise BadDataError(
-                f"a file of {size / 1e9:.1f} GB",
-                expected=f"at most {_LARGEST_FILE / 1e9:.1f} GB",
-                remedy="cut the trial into shorter ones",
-                file=path,
-            )
-        return path.read_bytes()
-    except OSError as error:
-        raise BadDataError(f"cannot be opened ({error.strerror})", file=path) from error
-
-
 def _read_pieces(path: Path, layout: Layout, written: Callable[[Layout], bytes]) -> Samples:
-    """What ezc3d reads of a file that is written anew in one or several pieces."""
+    """What ezc3d reads of a file that is written anew in one or several pieces.
+
+    The empty frames at the end of a piece, which ezc3d drops, are put back before the next one.
+    """
     parts = pieces(layout)
     read = [_read_piece(path, written(part), part) for part in parts]
-    whole = [*map(_padded, read[:-1], parts), read[-1]]
+    ends = [part.n_frames for part in parts[:-1]] + [len(read[-1].positions)]
+    whole = [_of_length(r, layout, n) for r, n in zip(read, ends, strict=True)]
     return replace(
         read[0],
         positions=np.concatenate([one.positions for one in whole]),
@@ -117,40 +154,30 @@ def _read_pieces(path: Path, layout: Layout, written: Callable[[Layout], bytes])
     )
 
 
-def _read_piece(path: Path, content: bytes, layout: Layout) -> Samples:
-    samples = read_by_ezc3d(content, path)
-    _check_counts(path, samples, layout)
-    return samples
-
-
-def _padded(samples: Samples, layout: Layout) -> Samples:
-    """With the empty frames at the end, which ezc3d drops."""
-    missing = layout.n_frames - len(samples.positions)
+def _of_length(samples: Samples, layout: Layout, n_frames: int) -> Samples:
+    """So many frames; those that are missing at the end are empty."""
+    missing = max(n_frames - len(samples.positions), 0)
+    n_samples, n_more = n_frames * layout.samples_per_frame, missing * layout.samples_per_frame
+    residuals = np.pad(samples.residuals, ((0, missing), (0, 0)), constant_values=-1)
     return replace(
         samples,
-        positions=np.pad(samples.positions, ((0, missing), (0, 0), (0, 0))),
-        residuals=np.pad(samples.residuals, ((0, missing), (0, 0)), constant_values=-1),
-        analog=np.pad(samples.analog, ((0, 0), (0, missing * layout.samples_per_frame))),
+        positions=np.pad(samples.positions, ((0, missing), (0, 0), (0, 0)))[:n_frames],
+        residuals=residuals[:n_frames],
+        analog=np.pad(samples.analog, ((0, 0), (0, n_more)))[:, :n_samples],
     )
 
 
-def _without_padding(samples: Samples, layout: Layout) -> Samples:
-    """Without the frames of zeros that only fill the last block of the file."""
-    most = min(BLOCK // layout.bytes_per_frame, len(samples.positions) - 1)
+def _filled_frames(samples: Samples, layout: Layout) -> int:
+    """The number of frames without those of zeros that only fill the last block of the file."""
     n = len(samples.positions)
-    stop = n
-    while stop > n - most and not samples.positions[stop - 1].any():
-        stop -= 1
-    return replace(
-        samples,
-        positions=samples.positions[:stop],
-        residuals=samples.residuals[:stop],
-        analog=samples.analog[:, : stop * layout.samples_per_frame],
-    )
+    most = min(BLOCK // layout.bytes_per_frame, n - 1)
+    filled = np.flatnonzero(samples.positions[n - most :].any(axis=(1, 2)))
+    return n - most + (int(filled[-1]) + 1 if len(filled) else 0)
 
 
-def _check_counts(path: Path, samples: Samples, layout: Layout) -> None:
+def _read_piece(path: Path, content: bytes, layout: Layout) -> Samples:
     """Refuse what ezc3d reads with other counts; it may drop empty frames at the end."""
+    samples = read_by_ezc3d(content, path)
     n_frames, n_points, _ = samples.positions.shape
     n_channels, n_samples = samples.analog.shape
     if (
@@ -158,10 +185,66 @@ def _check_counts(path: Path, samples: Samples, layout: Layout) -> None:
         and 0 < n_frames <= layout.n_frames
         and (n_channels == 0 or n_samples == n_frames * layout.samples_per_frame)
     ):
-        return
-    raise BadDataError(
-        f"ezc3d reads {n_points} points and {n_channels} channels in {n_frames} frames",
-        expected=layout.describe(),
-        remedy="export the trial again",
-        file=path,
-    )
+        return samples
+    found = f"ezc3d reads {n_points} points and {n_channels} channels in {n_frames} frames"
+    raise refusal(path, found, layout.describe())
+
+
+# --- ezc3d in a process of its own ----------------------------------------------------------------
+
+
+def read_by_ezc3d(content: bytes, named: Path) -> Samples:
+    """Parameters, points and analogs of a C3D file by ezc3d; faults name the file ``named``.
+
+    ezc3d does not notice when reading fails half way: it gets a copy of what was read already.
+    """
+    memory_bytes = _MEMORY_BYTES + _MEMORY_PER_BYTE * len(content)
+    cpu_s = _CPU_S + int(_CPU_S_PER_MB * len(content) / 1e6)
+    wall_s = _WALL_PER_CPU * cpu_s
+    command = [sys.executable, "-P", str(_CHILD), str(memory_bytes), str(cpu_s)]
+    one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    expected = "a standard C3D file"
+    try:
+        with tempfile.TemporaryFile() as copy:
+            copy.write(content)
+            copy.seek(0)
+            ran = subprocess.run(
+                command,
+                stdin=copy,
+                capture_output=True,
+                check=False,
+                env={**os.environ, **one_thread},
+                timeout=wall_s,
+            )
+    except subprocess.TimeoutExpired as error:
+        raise refusal(named, f"ezc3d did not finish within {wall_s} s", expected) from error
+    if ran.returncode == 0:
+        return _samples(ran.stdout)
+    words = ran.stderr.decode("utf-8", "replace").strip().rstrip(".")
+    if ran.returncode == REFUSED:
+        raise refusal(named, f"ezc3d cannot read it: {words}", expected)
+    ending = f"exit code {ran.returncode}: {words.splitlines()[-1] if words else 'no word'}"
+    if ran.returncode < 0:
+        ending = signal.Signals(-ran.returncode).name
+    raise refusal(named, f"ezc3d ended in its middle ({ending})", expected)
+
+
+def _samples(archive: bytes) -> Samples:
+    parameters: dict[str, dict[str, Value]] = {}
+    with np.load(io.BytesIO(archive), allow_pickle=False) as arrays:
+        for k, (group, name) in enumerate(arrays["names"]):
+            value = arrays[f"parameter_{k}"]
+            own = tuple(map(_cleaned, value)) if value.dtype.kind == "U" else value
+            parameters.setdefault(str(group).strip().upper(), {})[str(name).strip().upper()] = own
+        read = [arrays[name] for name in ("positions", "residuals", "analog")]
+    return Samples(parameters, *read)
+
+
+def _cleaned(text: str) -> str:
+    """Without filling blanks; bytes that are no UTF-8 come as surrogates and are Latin-1."""
+    raw = str(text).encode("utf-8", "surrogateescape")
+    try:
+        known = raw.decode("utf-8")
+    except UnicodeDecodeError:
+        known = raw.decode("latin-1")
+    return known.replace("\0", " ").strip()

@@ -1,16 +1,32 @@
-"""How a C3D file's data lie in it: header and parameters must agree, the file's size judges."""
+"""What header and parameters of a C3D file both state: counts, rates, scales. The file's size
+judges between them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.c3d_header import BLOCK, Header
-from bsip_cli.recordings.c3d_parameters import Parameters, number
-from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.c3d_format import (
+    BLOCK,
+    FULL,
+    TEXT,
+    Group,
+    Header,
+    Parameters,
+    Record,
+    group_names,
+    number,
+    numbers,
+)
+from bsip_cli.recordings.model import Finding, refusal
+from bsip_cli.recordings.timebase import MOST_HZ
+
+_SAME = 1e-3
+_WORD = 0x10000
 
 
 @dataclass(frozen=True)
@@ -40,6 +56,10 @@ class Layout:
         """Bytes from the first frame to the end of the file."""
         return max(file_size - self.start, 0)
 
+    def fits(self, file_size: int) -> bool:
+        """The file holds it, but for a last partial block."""
+        return self.n_frames > 0 and 0 < self.n_bytes <= self.room(file_size) + BLOCK
+
     def ends_with(self, file_size: int) -> bool:
         """The file ends with the data or fills its last block behind them."""
         rest = file_size - self.start - self.n_bytes
@@ -65,43 +85,39 @@ def settle_layout(
     other = _by_parameters(stated, parameters)
     if stated.n_frames < 1 or stated.words_per_frame < 1 or stated.start < BLOCK:
         stated = other
-    fitting = [layout for layout in dict.fromkeys((stated, other)) if _fits(layout, file_size)]
+    both = f"the header counts {stated.describe()}, the parameters {other.describe()}"
+    fitting = [layout for layout in dict.fromkeys((stated, other)) if layout.fits(file_size)]
+    fitting = [layout for layout in fitting if layout.ends_with(file_size)] or fitting
     if not fitting:
-        raise _refusal(path, stated, file_size)
-    exact = [layout for layout in fitting if layout.ends_with(file_size)]
-    fitting = exact or fitting
+        raise _too_large(path, stated, file_size)
     if len(fitting) == 2:
-        raise _undecided(path, stated, other)
-    chosen = _cut(fitting[0], file_size)
-    findings = [] if stated == other else [_disagreement(stated, other, chosen)]
-    return chosen, findings + _missing_end(fitting[0], chosen) + _odd_length(chosen, file_size)
+        raise refusal(path, f"{both}, and the file's length fits both", "one count of each")
+    wanted = fitting[0]
+    in_file = wanted.room(file_size) // wanted.bytes_per_frame
+    chosen = replace(wanted, n_frames=min(wanted.n_frames, in_file))
+    said = []
+    if stated != other:
+        said.append((both, "one count of each", f"read {chosen.describe()}"))
+    if missing := wanted.n_frames - chosen.n_frames:
+        found = f"the file ends {missing} frames early"
+        said.append((found, f"{wanted.n_frames} frames", f"read {chosen.n_frames}"))
+    if not chosen.ends_with(file_size):  # bytes came in or went
+        rest = file_size - chosen.start - chosen.n_bytes
+        found = f"{rest} bytes follow the data that the header counts"
+        expected = f"none, or as many as fill the last {BLOCK} bytes"
+        said.append((found, expected, "read the data where the header says"))
+    return chosen, [Finding("layout", "", *words, "warning") for words in said]
 
 
-def _refusal(path: Path, stated: Layout, file_size: int) -> BadDataError:
+def _too_large(path: Path, stated: Layout, file_size: int) -> BadDataError:
     if stated.words_per_frame < 1:
-        return BadDataError(
-            "it holds no points and no analog samples",
-            expected="markers",
-            remedy="export the trial with its markers",
-            file=path,
-        )
-    return BadDataError(
+        found = "it holds no points and no analog samples"
+        return refusal(path, found, "markers", "export the trial with its markers")
+    found = (
         f"the header promises {stated.n_bytes} bytes of data ({stated.n_points} points, "
-        f"{stated.n_frames} frames) and the file holds {stated.room(file_size)}",
-        expected="a complete file",
-        remedy="copy or export the trial again",
-        file=path,
+        f"{stated.n_frames} frames) and the file holds {stated.room(file_size)}"
     )
-
-
-def _undecided(path: Path, stated: Layout, other: Layout) -> BadDataError:
-    return BadDataError(
-        f"the header counts {stated.describe()}, the parameters {other.describe()}, and the "
-        "file's length fits both",
-        expected="one count of each",
-        remedy="export the trial again",
-        file=path,
-    )
+    return refusal(path, found, "a complete file", "copy or export the trial again")
 
 
 def _by_header(header: Header, parameters: Parameters, file_size: int) -> Layout:
@@ -123,22 +139,19 @@ def _by_header(header: Header, parameters: Parameters, file_size: int) -> Layout
 def _many_frames(parameters: Parameters) -> int:
     """The count of frames that does not fit the header, 0 if nothing tells it.
 
-    TRIAL's fields of two words each, or a float.
+    TRIAL's fields of two words each, the low word first, or a float.
     """
-    trial, point = parameters.get("TRIAL", {}), parameters.get("POINT", {})
-    first, last = (_long(trial, f"ACTUAL_{end}_FIELD") for end in ("START", "END"))
-    for count in (last - first + 1, number(point, "LONG_FRAMES"), number(point, "FRAMES")):
+    trial, point, ends = parameters.get("TRIAL", {}), parameters.get("POINT", {}), []
+    for name in ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD"):
+        words = trial.get(name)
+        if isinstance(words, np.ndarray) and words.size == 2:
+            low, high = np.ravel(words).astype(int) & 0xFFFF
+            ends.append(float(low + 65536 * high))
+    span = [ends[1] - ends[0] + 1] if len(ends) == 2 else []
+    for count in (*span, number(point, "LONG_FRAMES"), number(point, "FRAMES")):
         if np.isfinite(count) and count > 0:
             return int(min(count, 2**40))
     return 0
-
-
-def _long(group, name: str) -> float:
-    """Two 16-bit words as one number, the low word first."""
-    if name not in group or not isinstance(group[name], np.ndarray) or group[name].size != 2:
-        return float("nan")
-    low, high = np.ravel(group[name]).astype(int) & 0xFFFF
-    return float(low + 65536 * high)
 
 
 def _by_parameters(stated: Layout, parameters: Parameters) -> Layout:
@@ -146,7 +159,7 @@ def _by_parameters(stated: Layout, parameters: Parameters) -> Layout:
     point, analog = parameters.get("POINT", {}), parameters.get("ANALOG", {})
     n_points, n_frames = _count(point, "USED"), _count(point, "FRAMES")
     n_channels, block = _count(analog, "USED"), _count(point, "DATA_START")
-    if n_frames == 0xFFFF or (n_frames is not None and n_frames == stated.n_frames & 0xFFFF):
+    if n_frames == FULL or (n_frames is not None and n_frames == stated.n_frames & FULL):
         n_frames = None  # the count that does not fit
     return replace(
         stated,
@@ -157,7 +170,7 @@ def _by_parameters(stated: Layout, parameters: Parameters) -> Layout:
     )
 
 
-def _count(group, name: str) -> int | None:
+def _count(group: Group, name: str) -> int | None:
     """A count, stored as an integer without sign or as a float."""
     value = number(group, name)
     if not np.isfinite(value) or abs(value) > 1e9:
@@ -165,55 +178,88 @@ def _count(group, name: str) -> int | None:
     return int(value) & 0xFFFF if value < 0 else int(value)
 
 
-def _fits(layout: Layout, file_size: int) -> bool:
-    whole = layout.n_frames > 0 and layout.words_per_frame > 0
-    return whole and 0 < layout.n_bytes <= layout.room(file_size) + BLOCK
+# --- rates and scales -----------------------------------------------------------------------------
 
 
-def _cut(layout: Layout, file_size: int) -> Layout:
-    in_file = layout.room(file_size) // layout.bytes_per_frame
-    return replace(layout, n_frames=min(layout.n_frames, in_file))
-
-
-def _missing_end(wanted: Layout, chosen: Layout) -> list[Finding]:
-    missing = wanted.n_frames - chosen.n_frames
-    if missing <= 0:
-        return []
-    return [
-        Finding(
-            check="layout",
-            subject="",
-            found=f"the file ends {missing} frames early",
-            expected=f"{wanted.n_frames} frames",
-            action=f"read {chosen.n_frames}",
-            level="warning",
+def settle_rate(
+    path: Path, header: Header, parameters: Parameters, layout: Layout
+) -> tuple[float, list[Finding]]:
+    """Frames per second, and findings where the file's statements of rates differ."""
+    stated = number(parameters.get("POINT", {}), "RATE")
+    usable = [rate for rate in (stated, header.rate_hz) if np.isfinite(rate) and 0 < rate < MOST_HZ]
+    if not usable:
+        found, remedy = f"POINT:RATE is {stated:g} Hz", "export the trial with its rate"
+        raise refusal(path, found, "a rate above 0 Hz", remedy)
+    rate_hz, findings = usable[0], []
+    if len(usable) < 2 or abs(usable[1] / rate_hz - 1) > _SAME:
+        found = f"POINT:RATE says {stated:g} Hz, the header {header.rate_hz:g} Hz"
+        action = f"read {rate_hz:g} Hz"
+        findings.append(Finding("rate", "points", found, "one rate", action, "warning"))
+    analog_hz = number(parameters.get("ANALOG", {}), "RATE")
+    real_hz = rate_hz * layout.samples_per_frame
+    if layout.n_channels and not abs(analog_hz / real_hz - 1) <= _SAME:
+        found = (
+            f"ANALOG:RATE says {analog_hz:g} Hz, and each frame of the markers at "
+            f"{rate_hz:g} Hz has {layout.samples_per_frame} samples"
         )
+        expected = f"{real_hz:g} Hz"
+        findings.append(Finding("rate", "analog", found, expected, f"read {expected}", "corrected"))
+    return rate_hz, findings
+
+
+def settle_scale(header: Header, parameters: Parameters) -> tuple[float, list[Finding]]:
+    """Size of one count of the coordinates, negative where they are floats, as ezc3d wants it."""
+    stated = number(parameters.get("POINT", {}), "SCALE")
+    if not np.isfinite(stated) or stated == 0:
+        stated = header.scale if np.isfinite(header.scale) and header.scale else 1.0
+    size = abs(stated)
+    if header.scale < 0:
+        return -size, []
+    if abs(size - header.scale) <= _SAME * size:
+        return size, []
+    found = f"POINT:SCALE is {stated:g}, the header says {header.scale:g}"
+    return size, [Finding("scale", "points", found, "one scale", f"used {size:g}", "warning")]
+
+
+@dataclass(frozen=True, eq=False)
+class Scaling:
+    """Of the analog channels: (count - offset) x scale, each (n_channels,)."""
+
+    scales: np.ndarray
+    offsets: np.ndarray
+    is_unsigned: bool
+
+    def applied(self, counts: np.ndarray, is_float: bool) -> np.ndarray:
+        """Counts of the converter (n_channels, n) as the file scales them."""
+        if self.is_unsigned and not is_float:
+            counts = np.where(counts < 0, counts + _WORD, counts)
+        with np.errstate(invalid="ignore", over="ignore"):
+            return (counts - self.offsets[:, None]) * self.scales[:, None]
+
+
+def scaling_of(group: Group, n_channels: int, is_unsigned: bool) -> Scaling:
+    """GEN_SCALE times SCALE, one where the file says nothing; OFFSET, zero likewise.
+
+    What the file says may be no number, or zero: a plate of such channels is left out.
+    """
+    general = number(group, "GEN_SCALE") if np.size(group.get("GEN_SCALE", ())) else 1.0
+    scales, offsets = np.ones(n_channels), np.zeros(n_channels)
+    for values, name in ((scales, "SCALE"), (offsets, "OFFSET")):
+        given = np.ravel(numbers(group, name))[:n_channels]
+        values[: len(given)] = given
+    with np.errstate(invalid="ignore", over="ignore"):
+        scales *= general
+    if is_unsigned:
+        offsets = np.where(offsets < 0, offsets + _WORD, offsets)
+    return Scaling(scales, offsets, is_unsigned)
+
+
+def says_unsigned(records: Sequence[Record]) -> bool:
+    """ANALOG:FORMAT: whether integer samples and offsets have no sign."""
+    names = group_names(records)
+    formats = [
+        record.value
+        for record in records
+        if record.kind == TEXT and (names.get(record.group), record.name) == ("ANALOG", "FORMAT")
     ]
-
-
-def _odd_length(layout: Layout, file_size: int) -> list[Finding]:
-    """Where a file does not end with its data, bytes came in or went."""
-    if layout.ends_with(file_size):
-        return []
-    rest = file_size - layout.start - layout.n_bytes
-    return [
-        Finding(
-            check="layout",
-            subject="",
-            found=f"{rest} bytes follow the data that the header counts",
-            expected=f"none, or as many as fill the last {BLOCK} bytes",
-            action="read the data where the header says",
-            level="warning",
-        )
-    ]
-
-
-def _disagreement(stated: Layout, other: Layout, chosen: Layout) -> Finding:
-    return Finding(
-        check="layout",
-        subject="",
-        found=f"the header counts {stated.describe()}, the parameters {other.describe()}",
-        expected="one count of each",
-        action=f"read {chosen.describe()}",
-        level="warning",
-    )
+    return bool(formats) and formats[-1].strip().startswith(b"UNSIGNED")

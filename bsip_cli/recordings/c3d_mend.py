@@ -18,21 +18,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from bsip_cli.recordings.c3d_header import BLOCK, C3D_KEY, Header
-from bsip_cli.recordings.c3d_layout import Layout
-from bsip_cli.recordings.c3d_numbers import PC, floats, integers
-from bsip_cli.recordings.c3d_parameters import Group, number, numbers
-from bsip_cli.recordings.c3d_records import (
+from bsip_cli.recordings.c3d_format import (
+    BLOCK,
+    C3D_KEY,
     FLOAT,
+    FULL,
     INTEGER,
     LONGEST_DESCRIPTION,
+    PC,
+    Header,
     Record,
+    floats,
     group_names,
+    integers,
+    number,
+    numbers,
     parameters_of,
 )
-from bsip_cli.recordings.c3d_scaling import says_unsigned
+from bsip_cli.recordings.c3d_layout import Layout, says_unsigned
 
-_FULL = 0xFFFF
 _MOST_FRAMES = 60_000
 _MOST = 255  # entries of one dimension; more continue in NAME2, NAME3, ...
 _CEILING = 1 + 1e-6  # ezc3d truncates the quotient of two rates
@@ -45,31 +49,24 @@ def needs_mending(
     parameters = parameters_of(records, header.processor)
     point, analog = parameters.get("POINT", {}), parameters.get("ANALOG", {})
     per_frame = layout.samples_per_frame * layout.n_channels
-    return not (
-        all(record.is_plain for record in records)
-        and (header.n_points, header.n_analog_per_frame) == (layout.n_points, per_frame)
-        and header.n_frames == layout.n_frames == _whole(number(point, "FRAMES")) & _FULL
-        and (header.data_start_block - 1) * BLOCK == layout.start
-        and number(point, "USED") == layout.n_points
-        and abs(number(point, "RATE") - rate_hz) < 1e-9
-        and (number(point, "SCALE") < 0) == layout.is_float
-        and (layout.n_channels == 0 or _reads_analog(records, header, layout, analog, rate_hz))
-    )
-
-
-def _reads_analog(
-    records: Sequence[Record], header: Header, layout: Layout, analog: Group, rate_hz: float
-) -> bool:
-    """Whether ezc3d scales the channels as the file says."""
     offsets = np.ravel(numbers(analog, "OFFSET"))
-    is_unsigned = says_unsigned(records)
-    return (
+    reads_analog = layout.n_channels == 0 or (
         number(analog, "USED") == layout.n_channels
         and _whole(number(analog, "RATE") / rate_hz) == layout.samples_per_frame
         and np.isfinite(number(analog, "GEN_SCALE"))
         and min(len(offsets), np.ravel(numbers(analog, "SCALE")).size) >= layout.n_channels
         and all(record.kind == INTEGER for record in records if record.name == "OFFSET")
-        and (layout.is_float if is_unsigned else not (offsets < 0).any())
+        and (layout.is_float if says_unsigned(records) else not (offsets < 0).any())
+    )
+    return not (
+        reads_analog
+        and all(record.is_plain for record in records)
+        and (header.n_points, header.n_analog_per_frame) == (layout.n_points, per_frame)
+        and header.n_frames == layout.n_frames == _whole(number(point, "FRAMES")) & FULL
+        and (header.data_start_block - 1) * BLOCK == layout.start
+        and number(point, "USED") == layout.n_points
+        and abs(number(point, "RATE") - rate_hz) < 1e-9
+        and (number(point, "SCALE") < 0) == layout.is_float
     )
 
 
@@ -99,27 +96,30 @@ def mended(
     scale: float,
 ) -> bytes:
     """The same points and analog counts in PC numbers; scales of channels are 1, offsets 0."""
-    own = [_as_pc(record, header.processor) for record in records]
+    own = [
+        replace(
+            record,
+            value=_as_pc(record.value, record.kind, header.processor),
+            description=record.description[:LONGEST_DESCRIPTION],
+        )
+        for record in records
+    ]
     start = 2 + len(_section(_replaced(own, layout, rate_hz, scale))) // BLOCK
     section = _section(_replaced(own, layout, rate_hz, scale, start))
-    data = _data_as_pc(content[layout.start : layout.start + layout.n_bytes], header, layout)
-    return _head(layout, start, rate_hz, scale) + section + data + bytes(-len(data) % BLOCK)
+    data = content[layout.start : layout.start + layout.n_bytes]
+    data = _as_pc(data, FLOAT if layout.is_float else INTEGER, header.processor)
+    # The first block with the settled counts, without events.
+    per_frame = layout.n_channels * layout.samples_per_frame
+    head = struct.pack("<2B4H", 2, C3D_KEY, layout.n_points, per_frame, 1, layout.n_frames)
+    head += struct.pack("<HfHHf", 0, scale, start, layout.samples_per_frame, rate_hz)
+    return head + bytes(BLOCK - len(head)) + section + data + bytes(-len(data) % BLOCK)
 
 
-def _as_pc(record: Record, processor: int) -> Record:
-    """The record with numbers as a PC stores them."""
-    value = record.value
-    if record.kind == INTEGER:
-        value = integers(value).astype("<i2").tobytes()
-    if record.kind == FLOAT:
-        value = floats(value, processor).astype("<f4").tobytes()
-    return replace(record, value=value, description=record.description[:LONGEST_DESCRIPTION])
-
-
-def _data_as_pc(data: bytes, header: Header, layout: Layout) -> bytes:
-    if layout.is_float:
-        return floats(data, header.processor).astype("<f4").tobytes()
-    return integers(data).astype("<i2").tobytes()
+def _as_pc(value: bytes, kind: int, processor: int) -> bytes:
+    """Numbers as a PC stores them."""
+    if kind == INTEGER:
+        return integers(value).astype("<i2").tobytes()
+    return floats(value, processor).astype("<f4").tobytes() if kind == FLOAT else value
 
 
 def _replaced(
@@ -127,8 +127,10 @@ def _replaced(
 ) -> list[Record]:
     """All records, but those that count and scale as the layout wants them."""
     names = group_names(records)
-    point, analog = _number_of(names, "POINT"), _number_of(names, "ANALOG")
+    point, analog = (_number_of(names, name, k) for k, name in enumerate(("POINT", "ANALOG")))
     n = layout.n_channels
+    counts = [min(_MOST, n - k) for k in range(0, n, _MOST)]
+    parts = [(f"{k + 1}" if k else "", count) for k, count in enumerate(counts)]
     settled = [
         _words(point, "USED", [layout.n_points]),
         _words(point, "FRAMES", [layout.n_frames]),
@@ -138,8 +140,8 @@ def _replaced(
         _words(analog, "USED", [n]),
         _reals(analog, "RATE", [rate_hz * layout.samples_per_frame * _CEILING]),
         _reals(analog, "GEN_SCALE", [1.0]),
-        *(_reals(analog, name, [1.0] * k) for name, k in _continuations("SCALE", n)),
-        *(_words(analog, name, [0] * k) for name, k in _continuations("OFFSET", n)),
+        *(_reals(analog, f"SCALE{part}", [1.0] * k) for part, k in parts),
+        *(_words(analog, f"OFFSET{part}", [0] * k) for part, k in parts),
     ]
     groups = [
         Record(-number, name, b"", True)
@@ -150,17 +152,10 @@ def _replaced(
     return [*groups, *settled, *others]
 
 
-def _number_of(names: Mapping[int, str], wanted: str) -> int:
+def _number_of(names: Mapping[int, str], wanted: str, place: int) -> int:
     """The number of a group; a free one if the file lacks it."""
     found = [number for number, name in names.items() if name == wanted]
-    free = max(names, default=0) + (1 if wanted == "POINT" else 2)
-    return found[-1] if found else free
-
-
-def _continuations(name: str, n: int) -> list[tuple[str, int]]:
-    """Names and lengths of the parameters that hold n entries."""
-    counts = [min(_MOST, n - k) for k in range(0, n, _MOST)]
-    return [(name if k == 0 else f"{name}{k + 1}", count) for k, count in enumerate(counts)]
+    return found[-1] if found else max(names, default=0) + 1 + place
 
 
 def _words(group: int, name: str, values: list[int]) -> Record:
@@ -175,26 +170,15 @@ def _reals(group: int, name: str, values: list[float]) -> Record:
 
 def _section(records: Sequence[Record]) -> bytes:
     """The parameter section: its four bytes, the records, zeros to the end of the block."""
-    chain = b"".join(map(_bytes, records)) + bytes(2)
-    n_blocks = -(-(4 + len(chain)) // BLOCK)
+    chain = b""
+    for record in records:
+        body = bytes([len(record.description)]) + record.description
+        if record.group > 0:
+            shape = bytes([len(record.shape), *record.shape])
+            body = struct.pack("<b", record.kind) + shape + record.value + body
+        name = record.name.encode("ascii")
+        chain += struct.pack("<bb", len(name), record.group) + name
+        chain += struct.pack("<H", len(body) + 2) + body
+    n_blocks = -(-(4 + len(chain) + 2) // BLOCK)
     section = bytes([1, C3D_KEY, min(n_blocks, _MOST), PC]) + chain
     return section + bytes(n_blocks * BLOCK - len(section))
-
-
-def _bytes(record: Record) -> bytes:
-    body = bytes([len(record.description)]) + record.description
-    if record.group > 0:
-        shape = bytes([len(record.shape), *record.shape])
-        body = struct.pack("<b", record.kind) + shape + record.value + body
-    name = record.name.encode("ascii")
-    return (
-        struct.pack("<bb", len(name), record.group) + name + struct.pack("<H", len(body) + 2) + body
-    )
-
-
-def _head(layout: Layout, start: int, rate_hz: float, scale: float) -> bytes:
-    """The first block with the settled counts, without events."""
-    per_frame = layout.n_channels * layout.samples_per_frame
-    head = struct.pack("<2B4H", 2, C3D_KEY, layout.n_points, per_frame, 1, layout.n_frames)
-    head += struct.pack("<HfHHf", 0, scale, start, layout.samples_per_frame, rate_hz)
-    return head + bytes(BLOCK - len(head))

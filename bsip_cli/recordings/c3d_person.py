@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from bsip_cli.recordings.c3d_parameters import Group, Parameters, texts
+from bsip_cli.recordings.c3d_format import Group, Parameters, texts
 from bsip_cli.recordings.model import Finding, StatedPerson
 from bsip_cli.stated.quantities import HEIGHT, MASS, Quantity, Reading, is_usual_pair, readings_of
 from bsip_cli.stated.sex_words import COLUMN_NAMES, sex_of
@@ -23,10 +23,15 @@ def stated_person(parameters: Parameters) -> tuple[StatedPerson, tuple[Finding, 
     itself, belongs to several people or may be either unit is not used, and that is said.
     """
     findings: list[Finding] = []
-    said = {q.column: list(_stated(parameters, q)) for q in (MASS, HEIGHT)}
-    masses, heights = (_one(said[q.column], q, findings) for q in (MASS, HEIGHT))
+    masses, heights = (_readings(parameters, q, findings) for q in (MASS, HEIGHT))
     mass, height = _pair(masses, heights, findings)
-    person = StatedPerson(mass, height, _sex(parameters, findings), _name(parameters))
+    said = _texts(parameters, COLUMN_NAMES)
+    sexes = {one for one in (sex_of(value, {}) for value in said) if one is not None}
+    if len(sexes) > 1:
+        findings.append(_unused(f"sexes {', '.join(sorted(said))}", "one"))
+    names = _texts(parameters, "name names")
+    sex, name = ("".join(some) if len(some) == 1 else "" for some in (sexes, names))
+    person = StatedPerson(mass, height, sex, name)
     if words := person.words():
         action = "used where participants.tsv says n/a"
         findings.append(Finding("stated_person", "", words, "", action, "info"))
@@ -77,35 +82,37 @@ def against_table(
 # --- one value ------------------------------------------------------------------------------------
 
 
-def _groups(parameters: Parameters) -> Iterator[tuple[str, Group]]:
+def _named(parameters: Parameters, names: str) -> Iterator[tuple[str, Group, str]]:
+    """Parameters of the subject's groups that are so named: group, what it holds, own name."""
     for name, group in parameters.items():
         if name.strip().upper().startswith(_GROUPS):
-            yield name, group
+            for parameter in group:
+                if parameter.casefold().replace("_", "").replace(" ", "") in names.split():
+                    yield name, group, parameter
 
 
-def _named(group: Group, names: str) -> Iterator[str]:
-    for parameter in group:
-        if parameter.casefold().replace("_", "").replace(" ", "") in names.split():
-            yield parameter
+def _texts(parameters: Parameters, names: str) -> set[str]:
+    values = (text.strip() for _, g, p in _named(parameters, names) for text in texts(g, p))
+    return set(filter(None, values))
 
 
-def _stated(
-    parameters: Parameters, quantity: Quantity
-) -> Iterator[tuple[str, tuple[Reading, ...]]]:
-    """Where a quantity is stated, and what each value may be."""
-    for name, group in _groups(parameters):
-        for parameter in _named(group, quantity.names):
-            beside = [p for p in group if p.casefold() in _units_of(parameter)]
-            spelt = [quantity.unit_spelt(text) for p in beside for text in texts(group, p)]
-            unit = next(filter(None, spelt), "")
-            for value in _values(group[parameter]):
-                if readings := readings_of(value, quantity, unit):
-                    yield f"{name}:{parameter} = {value}", readings
-
-
-def _units_of(parameter: str) -> tuple[str, ...]:
-    """The names of the parameters that may state its unit."""
-    return tuple(f"{parameter.casefold()}{ending}" for ending in ("_units", "_unit"))
+def _readings(
+    parameters: Parameters, quantity: Quantity, findings: list[Finding]
+) -> tuple[Reading, ...]:
+    """What the value may be that all places state; nothing where they contradict each other."""
+    said: list[tuple[str, tuple[Reading, ...]]] = []
+    for name, group, parameter in _named(parameters, quantity.names):
+        of_units = tuple(f"{parameter.casefold()}{ending}" for ending in ("_units", "_unit"))
+        beside = [p for p in group if p.casefold() in of_units]
+        spelt = [quantity.unit_spelt(text) for p in beside for text in texts(group, p)]
+        for value in _values(group[parameter]):
+            if readings := readings_of(value, quantity, next(filter(None, spelt), "")):
+                said.append((f"{name}:{parameter} = {value}", readings))
+    if said and _differ(readings[0].value for _, readings in said):
+        places = ", ".join(place for place, _ in said)
+        findings.append(_unused(places, f"one {quantity.column}"))
+        return ()
+    return said[0][1] if said else ()
 
 
 def _values(value: tuple[str, ...] | np.ndarray) -> list[str]:
@@ -115,36 +122,19 @@ def _values(value: tuple[str, ...] | np.ndarray) -> list[str]:
     return [f"{one:.6g}" for one in np.ravel(value).astype(float) if np.isfinite(one) and one]
 
 
-def _one(
-    said: list[tuple[str, tuple[Reading, ...]]], quantity: Quantity, findings: list[Finding]
-) -> tuple[Reading, ...]:
-    """The readings that all places share; nothing where they contradict each other."""
-    if not said:
-        return ()
-    if _differ(readings[0].value for _, readings in said):
-        found = ", ".join(place for place, _ in said)
-        findings.append(_unused(found, f"one {quantity.column}"))
-        return ()
-    return said[0][1]
-
-
 def _pair(
     masses: tuple[Reading, ...], heights: tuple[Reading, ...], findings: list[Finding]
 ) -> tuple[float | None, float | None]:
     """Mass and height in the units with which they make a person; None for what stays open."""
     if masses and heights:
-        every = _all_units(masses, MASS)
-        pairs = _of_people(masses, heights) or _of_people(every, heights)
+        pairs = _of_people(masses, heights) or _of_people(_all_units(masses, MASS), heights)
         heights = tuple(dict.fromkeys(h for _, h in pairs)) or heights
         if len(masses) > 1:
             masses = tuple(dict.fromkeys(m for m, _ in pairs)) or masses
-        if len(masses) == len(heights) == 1 and not is_usual_pair(
-            masses[0].value, heights[0].value
-        ):
+        mass, height = masses[0].value, heights[0].value
+        if len(masses) == len(heights) == 1 and not is_usual_pair(mass, height):
             may_be = " or ".join(f"{m.value:.1f} kg ({m.unit})" for m, _ in pairs)
-            found = (
-                f"a mass of {masses[0].value:.4g} kg beside a height of {heights[0].value:.3g} m"
-            )
+            found = f"a mass of {mass:.4g} kg beside a height of {height:.3g} m"
             expected = f"a mass of people: {may_be}" if may_be else "a mass of people"
             findings.append(_unused(found, expected))
             masses = ()
@@ -152,8 +142,8 @@ def _pair(
         if len(readings) > 1:
             may_be = " or ".join(f"{r.value:.4g} {quantity.unit} ({r.unit})" for r in readings)
             findings.append(_unused(f"{quantity.column} that may be {may_be}", "a unit"))
-    mass, height = (r[0].value if len(r) == 1 else None for r in (masses, heights))
-    return mass, height
+    kg, m = (r[0].value if len(r) == 1 else None for r in (masses, heights))
+    return kg, m
 
 
 def _of_people(
@@ -166,39 +156,11 @@ def _all_units(masses: tuple[Reading, ...], quantity: Quantity) -> list[Reading]
     """A mass in the unit it was taken for, and in those it may be in."""
     if len(masses) > 1:
         return list(masses)
-    number = masses[0].value / quantity.units[masses[0].unit]
+    (stated,) = masses
+    number = stated.value / quantity.units[stated.unit]
     values = {unit: number * quantity.units[unit] for unit in quantity.guessed}
-    return [
-        Reading(value, unit, unit == masses[0].unit)
-        for unit, value in values.items()
-        if quantity.holds(value)
-    ]
-
-
-def _sex(parameters: Parameters, findings: list[Finding]) -> str:
-    said = {
-        value
-        for _, group in _groups(parameters)
-        for parameter in _named(group, COLUMN_NAMES)
-        for value in texts(group, parameter)
-        if value.strip()
-    }
-    sexes = {sex for value in said if (sex := sex_of(value, {})) is not None}
-    if len(sexes) > 1:
-        findings.append(_unused(f"sexes {', '.join(sorted(said))}", "one"))
-    return sexes.pop() if len(sexes) == 1 else ""
-
-
-def _name(parameters: Parameters) -> str:
-    """The subject's, where the file names one alone."""
-    said = {
-        text.strip()
-        for _, group in _groups(parameters)
-        for parameter in _named(group, "name names")
-        for text in texts(group, parameter)
-        if text.strip()
-    }
-    return said.pop() if len(said) == 1 else ""
+    known = {unit: value for unit, value in values.items() if quantity.holds(value)}
+    return [Reading(value, unit, unit == stated.unit) for unit, value in known.items()]
 
 
 def _differ(values: Iterable[float]) -> bool:

@@ -1,4 +1,5 @@
-"""When everything that touches the person is measured by a plate."""
+"""When everything that touches the person is measured by a plate: by where the feet are, and by
+whether the plates' vertical force carries the motion of the trunk."""
 
 from __future__ import annotations
 
@@ -6,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import butter, sosfiltfilt
 
+from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.recordings.analog import long_runs, runs
-from bsip_cli.recordings.force_balance import ContactLimits, force_mismatch
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.plates import cop_at_height
 from bsip_cli.recordings.resample import FrameWrench
@@ -18,6 +20,20 @@ NO_MASS = (
     "mass nor this trial's plates tell what the person weighs"
 )
 _SIDES = {"l": "left", "r": "right"}
+_TOUCH_HEIGHT_M = 0.035  # above a marker's own standing height
+SOLE_HEIGHT_M = 0.06  # markers this low belong to the footprint
+_TOUCH_SPEED_M_S = 0.6
+_ROLL_HEIGHT_M = 0.09  # of the lowest marker while only the toes touch
+_ROLL_SPEED_M_S = 1.2
+_ROLL_S = 0.2  # a step is pushed off within this time
+_OUTLINE_TOLERANCE_M = 0.03
+TOUCHED_N = 20.0
+_COP_DISTANCE_M = 0.35
+_MISMATCH_SHARE = 0.35  # of body weight, and of the force's own departure from it
+_MISMATCH_S = 0.1
+_BLINK_S = 0.06  # shorter touches without load are no touch
+_LEAST_WINDOW_S = 0.1
+_TRUNK_CUTOFF_HZ = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +54,6 @@ class ContactWindows:
     on_plate: dict[str, np.ndarray]  # side -> (n_frames,) bool: touches, and is measured
     reasons: tuple[Finding, ...]
 
-    def windows(self, rate_hz: float) -> list[tuple[float, float]]:
-        """Valid stretches [s from the first frame]."""
-        return [(a / rate_hz, b / rate_hz) for a, b in runs(self.valid)]
-
 
 def plate_loads(recording: Recording, wrench: FrameWrench) -> tuple[PlateLoad, ...]:
     """The plates of a recording as `contact_windows` wants them."""
@@ -51,7 +63,7 @@ def plate_loads(recording: Recording, wrench: FrameWrench) -> tuple[PlateLoad, .
     ):
         height = 0.0 if plate.corners_m is None else float(plate.corners_m[:, 2].mean())
         cop = cop_at_height(rows[:, :3], rows[:, 3:], height)
-        cop[rows[:, 2] < ContactLimits.loaded_N] = np.nan
+        cop[rows[:, 2] < TOUCHED_N] = np.nan
         loads.append(PlateLoad(plate.name, plate.corners_m, rows[:, 2], cop, usable))
     return tuple(loads)
 
@@ -76,33 +88,31 @@ class FootContacts:
 
 def foot_contacts(
     foot_markers_m: Mapping[str, np.ndarray],
-    foot_height0_m: Mapping[str, np.ndarray | None],
     rate_hz: float,
     plates: Sequence[PlateLoad],
     n_frames: int,
-    limits: ContactLimits | None = None,
 ) -> FootContacts:
     """Frames in which no foot stands beside the plates.
 
-    ``foot_markers_m`` per side "l"/"r" (n_frames, k, 3); ``foot_height0_m`` per side the
-    standing height of each marker (k,), or None: then the 2nd percentile of its heights.
+    ``foot_markers_m`` per side "l"/"r" (n_frames, k, 3).
     """
-    limits = limits or ContactLimits()
-    nothing = np.zeros(n_frames, bool)
+    beside = nothing = np.zeros(n_frames, bool)
     if not plates:
         reason = _finding("", "no force plate", "no frame is compared")
         return FootContacts(nothing, {}, {}, nothing, nothing, np.zeros(n_frames), (reason,))
     usable = np.logical_and.reduce([plate.usable for plate in plates])
     total = np.sum([plate.force_z_N for plate in plates], axis=0)
-    on_ground, on_plate, reasons = {}, {}, []
-    measured, beside = usable.copy(), nothing
+    on_ground, on_plate, reasons, measured = {}, {}, [], usable.copy()
     for side, markers in foot_markers_m.items():
-        foot = _Foot.of(markers, foot_height0_m.get(side), rate_hz)
-        on_ground[side], on_plate[side] = _touches(foot, plates, rate_hz, limits)
-        off = on_ground[side] & ~on_plate[side]
+        foot = _Foot.of(markers, rate_hz)
+        on_ground[side], on_plate[side] = _touches(foot, plates, rate_hz)
+        off, name = on_ground[side] & ~on_plate[side], _SIDES.get(side, side) + " foot"
         measured &= ~off & foot.seen
         beside = beside | off
-        reasons += _foot_findings(side, off, ~foot.seen, rate_hz)
+        said = ((off, "on the floor beside the plates"), (~foot.seen, "no foot marker seen"))
+        for mask, words in said:
+            if mask.any():
+                reasons.append(_finding(name, f"{words}: {_times(mask, rate_hz)}"))
     if not usable.all():
         reasons.append(_finding("", f"force samples unusable: {_times(~usable, rate_hz)}"))
     return FootContacts(measured, on_ground, on_plate, beside, usable, total, tuple(reasons))
@@ -113,28 +123,31 @@ def contact_windows(
     trunk_markers_m: np.ndarray,
     mass_kg: float | None,
     rate_hz: float,
-    limits: ContactLimits | None = None,
 ) -> ContactWindows:
     """Frames in which the plates measure all that touches the person.
 
     ``trunk_markers_m`` (n_frames, k, 3) stand for the centre of mass of ``mass_kg``. Where that is
     None, no frame can be shown to be free of other contacts, and none is valid.
     """
-    limits = limits or ContactLimits()
+    reasons = feet.reasons
     if not feet.usable.any() or mass_kg is None:
-        reasons = feet.reasons
         if feet.usable.any():
             reasons += (_finding("", NO_MASS),)
         nothing = np.zeros(len(feet.measured), bool)
         return ContactWindows(nothing, feet.on_ground, feet.on_plate, reasons)
-    mismatch = force_mismatch(feet.total_N, trunk_markers_m, mass_kg, rate_hz, limits)
-    valid = feet.measured & ~mismatch
-    unexplained = _runs_apart_from(mismatch, feet.beside)
-    loaded = feet.measured & (feet.total_N > limits.loaded_N)
-    throughout = bool(loaded.any()) and mismatch[loaded].mean() > 0.5
-    findings = _force_findings(unexplained, feet.total_N, mass_kg, throughout, rate_hz)
-    reasons = (*feet.reasons, *findings)
-    valid = long_runs(valid, round(limits.least_window_s * rate_hz))
+    mismatch = _force_mismatch(feet.total_N, trunk_markers_m, mass_kg, rate_hz)
+    unexplained = np.zeros_like(mismatch)
+    for start, stop in runs(mismatch):  # but for those that a foot beside the plates explains
+        unexplained[start:stop] = feet.beside[start:stop].mean() < 0.5
+    if unexplained.any():
+        loaded = feet.measured & (feet.total_N > TOUCHED_N)
+        cause = "a contact they do not measure (seat, box, hands)"
+        if loaded.any() and mismatch[loaded].mean() > 0.5:
+            cause = f"the mass of {mass_kg:.1f} kg is wrong, or something bears the person all the "
+            cause += "time"
+        force = f"the plates' {np.mean(feet.total_N[unexplained]):.0f} N do not carry the motion"
+        reasons += (_finding("", f"{force}: {cause} {_times(unexplained, rate_hz)}"),)
+    valid = long_runs(feet.measured & ~mismatch, round(_LEAST_WINDOW_S * rate_hz))
     return ContactWindows(valid, feet.on_ground, feet.on_plate, reasons)
 
 
@@ -146,93 +159,62 @@ class _Foot:
     seen: np.ndarray  # (n_frames,) bool
 
     @classmethod
-    def of(cls, markers_m: np.ndarray, height0_m: np.ndarray | None, rate_hz: float) -> _Foot:
+    def of(cls, markers_m: np.ndarray, rate_hz: float) -> _Foot:
+        """A marker's standing height is the 2nd percentile of its heights."""
         known = np.isfinite(markers_m).all(axis=-1)
-        if height0_m is None:
-            height0_m = _low_percentile(markers_m[..., 2], known)
+        columns = zip(markers_m[..., 2].T, known.T, strict=True)
+        height0_m = np.array([np.percentile(z[k], 2) if k.any() else 0.0 for z, k in columns])
         height = np.where(known, np.nan_to_num(markers_m[..., 2]) - height0_m, np.inf)
-        speed = np.linalg.norm(_central_difference(markers_m, rate_hz), axis=-1)
-        lowest = height.argmin(axis=1)
-        frames = np.arange(len(markers_m))
-        return cls(
-            position_m=markers_m[..., :2],
-            height_m=height,
-            speed_m_s=np.nan_to_num(speed[frames, lowest], nan=0.0),
-            seen=known.any(axis=1),
-        )
-
-
-def _low_percentile(height_m: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """2nd percentile of each marker's heights over time, zero if never seen, (k,)."""
-    columns = zip(height_m.T, known.T, strict=True)
-    return np.array([np.percentile(z[k], 2) if k.any() else 0.0 for z, k in columns])
-
-
-def _central_difference(markers_m: np.ndarray, rate_hz: float) -> np.ndarray:
-    """Velocity over about 40 ms, (n_frames, k, 3)."""
-    reach = max(1, round(0.02 * rate_hz))
-    frames = np.arange(len(markers_m))
-    after = np.minimum(frames + reach, len(frames) - 1)
-    before = np.maximum(frames - reach, 0)
-    span = np.maximum(after - before, 1)[:, None, None]
-    return (markers_m[after] - markers_m[before]) / span * rate_hz
+        frames, reach = np.arange(len(markers_m)), max(1, round(0.02 * rate_hz))
+        after, before = np.minimum(frames + reach, frames[-1:]), np.maximum(frames - reach, 0)
+        span = np.maximum(after - before, 1)[:, None, None]  # about 40 ms
+        velocity = (markers_m[after] - markers_m[before]) / span * rate_hz
+        speed = np.linalg.norm(velocity, axis=-1)[frames, height.argmin(axis=1)]
+        return cls(markers_m[..., :2], height, np.nan_to_num(speed, nan=0.0), known.any(axis=1))
 
 
 def _touches(
-    foot: _Foot, plates: Sequence[PlateLoad], rate_hz: float, limits: ContactLimits
+    foot: _Foot, plates: Sequence[PlateLoad], rate_hz: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Whether the foot touches, and whether a plate measures it, (n_frames,) bool each.
 
     A foot on a moving belt is not slow: the load under it tells.
     """
-    near_load = _near_load(foot, plates, limits)
-    low = foot.height_m.min(axis=1) < limits.touch_height_m
-    touching = low & ((foot.speed_m_s < limits.touch_speed_m_s) | near_load)
+    near_load = np.zeros(len(foot.seen), bool)  # a marker is near the load of a plate
+    for plate in plates:
+        gap = np.linalg.norm(foot.position_m - plate.cop_m[:, None], axis=-1)
+        is_close = (np.nan_to_num(gap, nan=np.inf) < _COP_DISTANCE_M).any(axis=1)
+        near_load |= (plate.force_z_N > TOUCHED_N) & is_close
+    low = foot.height_m.min(axis=1) < _TOUCH_HEIGHT_M
+    touching = low & ((foot.speed_m_s < _TOUCH_SPEED_M_S) | near_load)
     outlines = [plate.corners_m for plate in plates if plate.corners_m is not None]
-    inside = _inside_outlines(foot, outlines, limits) if outlines else np.zeros_like(low)
-    without_outline = any(plate.corners_m is None for plate in plates)
-    measured = inside | near_load if without_outline else inside
-    off = long_runs(touching & ~measured, max(1, round(limits.blink_s * rate_hz)))
-    flat = (foot.height_m < limits.sole_height_m).all(axis=1)
-    off = _until_toe_off(off, flat & measured, foot, rate_hz, limits)
+    sole = foot.height_m < SOLE_HEIGHT_M
+    inside = np.zeros(sole.shape, bool)
+    for corners in outlines:
+        inside |= inside_outline(foot.position_m, corners[:, :2], _OUTLINE_TOLERANCE_M)
+    # Every low marker of the foot lies on one plate or another.
+    measured = np.all(inside | ~sole, axis=1) if outlines else np.zeros_like(low)
+    if len(outlines) < len(plates):
+        measured = measured | near_load
+    off = long_runs(touching & ~measured, max(1, round(_BLINK_S * rate_hz)))
+    off = _until_toe_off(off, sole.all(axis=1) & measured, foot, rate_hz)
     on_ground = (touching & measured) | off
     return on_ground, on_ground & ~off
 
 
 def _until_toe_off(
-    off: np.ndarray, standing: np.ndarray, foot: _Foot, rate_hz: float, limits: ContactLimits
+    off: np.ndarray, standing: np.ndarray, foot: _Foot, rate_hz: float
 ) -> np.ndarray:
     """Contacts beside the plates (n_frames,) until the toes have left the floor, or the whole foot
     is standing (n_frames,) on a plate: its markers rise well before the toes do."""
-    rolling = foot.height_m.min(axis=1) < limits.roll_height_m
-    rolling &= (foot.speed_m_s < limits.roll_speed_m_s) & ~standing
-    longest = round(limits.roll_s * rate_hz)
+    rolling = foot.height_m.min(axis=1) < _ROLL_HEIGHT_M
+    rolling &= (foot.speed_m_s < _ROLL_SPEED_M_S) & ~standing
+    longest = round(_ROLL_S * rate_hz)
     lasting = off.copy()
     for _, stop in runs(off):
         has_left = ~rolling[stop : stop + longest]
         lasting[stop : stop + (has_left.argmax() if has_left.any() else len(has_left))] = True
     return lasting
-
-
-def _near_load(foot: _Foot, plates: Sequence[PlateLoad], limits: ContactLimits) -> np.ndarray:
-    """A foot marker lies close to the centre of pressure of a loaded plate, (n_frames,)."""
-    near = np.zeros(len(foot.seen), bool)
-    for plate in plates:
-        gap = np.linalg.norm(foot.position_m - plate.cop_m[:, None], axis=-1)
-        is_close = (np.nan_to_num(gap, nan=np.inf) < limits.cop_distance_m).any(axis=1)
-        near |= (plate.force_z_N > limits.loaded_N) & is_close
-    return near
-
-
-def _inside_outlines(
-    foot: _Foot, outlines: Sequence[np.ndarray], limits: ContactLimits
-) -> np.ndarray:
-    """Every low marker of the foot lies on one plate or another, (n_frames,)."""
-    sole = foot.height_m < limits.sole_height_m
-    inside = np.zeros(sole.shape, bool)
-    for corners in outlines:
-        inside |= inside_outline(foot.position_m, corners[:, :2], limits.outline_tolerance_m)
-    return np.asarray((inside | ~sole).all(axis=1))
 
 
 def inside_outline(points_m: np.ndarray, corners_m: np.ndarray, tolerance_m: float) -> np.ndarray:
@@ -247,38 +229,6 @@ def inside_outline(points_m: np.ndarray, corners_m: np.ndarray, tolerance_m: flo
     return inside
 
 
-def _foot_findings(side: str, off: np.ndarray, unseen: np.ndarray, rate_hz: float) -> list[Finding]:
-    name = _SIDES.get(side, side) + " foot"
-    findings = []
-    if off.any():
-        findings.append(_finding(name, f"on the floor beside the plates: {_times(off, rate_hz)}"))
-    if unseen.any():
-        findings.append(_finding(name, f"no foot marker seen: {_times(unseen, rate_hz)}"))
-    return findings
-
-
-def _runs_apart_from(mask: np.ndarray, explained: np.ndarray) -> np.ndarray:
-    """The runs of ``mask`` of which less than half is explained."""
-    apart = np.zeros_like(mask)
-    for start, stop in runs(mask):
-        apart[start:stop] = explained[start:stop].mean() < 0.5
-    return apart
-
-
-def _force_findings(
-    mismatch: np.ndarray, total_N: np.ndarray, mass_kg: float, throughout: bool, rate_hz: float
-) -> list[Finding]:
-    """``throughout``: most of the loaded frames do not fit, so that the mass may be wrong."""
-    if not mismatch.any():
-        return []
-    force = f"the plates' {np.mean(total_N[mismatch]):.0f} N do not carry the motion"
-    if throughout:
-        cause = f"the mass of {mass_kg:.1f} kg is wrong, or something bears the person all the time"
-    else:
-        cause = "a contact they do not measure (seat, box, hands)"
-    return [_finding("", f"{force}: {cause} {_times(mismatch, rate_hz)}")]
-
-
 def _finding(subject: str, found: str, action: str = "left these frames out") -> Finding:
     return Finding("contacts", subject, found, "every contact on a plate", action, "excluded")
 
@@ -289,3 +239,81 @@ def _times(mask: np.ndarray, rate_hz: float, most: int = 6) -> str:
     words = [f"{a / rate_hz:.2f} to {b / rate_hz:.2f} s" for a, b in stretches[:most]]
     more = f" and {len(stretches) - most} more" if len(stretches) > most else ""
     return ", ".join(words) + more
+
+
+# --- the balance of vertical forces ---------------------------------------------------------------
+
+
+def _force_mismatch(
+    total_force_z_N: np.ndarray,
+    trunk_markers_m: np.ndarray,
+    mass_kg: float,
+    rate_hz: float,
+) -> np.ndarray:
+    """Frames in which the trunk's motion needs another vertical force than measured."""
+    reach = _reach_m_s2(trunk_markers_m, rate_hz)
+    if reach is None:
+        return np.zeros(len(trunk_markers_m), bool)
+    needed, weight = mass_kg * reach, mass_kg * GRAVITY_M_S2
+    measured = low_pass(total_force_z_N, rate_hz)
+    allowed = _MISMATCH_SHARE * (weight + np.abs(needed - weight))
+    different = np.abs(measured - needed) > allowed
+    return long_runs(different, max(2, round(_MISMATCH_S * rate_hz)))
+
+
+def agreeing_mass(
+    total_force_z_N: np.ndarray,
+    trunk_markers_m: np.ndarray,
+    frames: np.ndarray,
+    rate_hz: float,
+) -> float | None:
+    """The largest mass [kg] with which the force goes with the trunk's motion in many of the
+    ``frames`` (n_frames,) bool: in half as many as with any other.
+
+    Only good enough to find frames in which something else bears the person; the largest, because
+    what bears a person takes weight off the plates. None without load or trunk markers.
+    """
+    reach = _reach_m_s2(trunk_markers_m, rate_hz)
+    if reach is None:
+        return None
+    measured = low_pass(total_force_z_N, rate_hz)
+    loaded = frames & (measured > 5 * TOUCHED_N) & (reach > GRAVITY_M_S2 / 2)
+    if not loaded.any():
+        return None
+    masses = np.sort(measured[loaded] / reach[loaded])
+    near = 1.0 + _MISMATCH_SHARE / 2
+    above = np.searchsorted(masses, masses * near, side="right")
+    count = above - np.searchsorted(masses, masses / near)
+    return float(masses[count >= count.max() / 2].max()) / np.sqrt(near)
+
+
+def _reach_m_s2(trunk_markers_m: np.ndarray, rate_hz: float) -> np.ndarray | None:
+    """Gravity and the vertical acceleration of the markers' mean (n_frames, k, 3), low-passed,
+    (n_frames,)."""
+    height = mean_path(trunk_markers_m[..., 2])
+    if height is None:
+        return None
+    velocity = np.gradient(low_pass(height, rate_hz)) * rate_hz
+    return GRAVITY_M_S2 + np.gradient(velocity) * rate_hz
+
+
+def mean_path(height: np.ndarray) -> np.ndarray | None:
+    """Mean of one coordinate (n_frames, k) of the markers seen nearly always, gaps interpolated,
+    (n_frames,); None without such a marker."""
+    known = np.isfinite(height)
+    if not height.size or len(height) < 10:
+        return None
+    often = np.flatnonzero(known.mean(axis=0) > 0.9)
+    if not len(often):
+        return None
+    frames = np.arange(len(height))
+    filled = [np.interp(frames, frames[known[:, i]], height[known[:, i], i]) for i in often]
+    return np.mean(filled, axis=0)
+
+
+def low_pass(signal: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Zero phase, order 4."""
+    cutoff = min(_TRUNK_CUTOFF_HZ, 0.45 * rate_hz)
+    sections = butter(2, cutoff, fs=rate_hz, output="sos")
+    pad = min(len(signal) - 1, round(rate_hz))
+    return sosfiltfilt(sections, np.asarray(signal), padlen=pad)

@@ -9,15 +9,14 @@ from itertools import combinations
 
 import numpy as np
 
-from bsip_cli.recordings.body_motion import Balance, Body, turn_of_forces
-from bsip_cli.recordings.frame_change import FrameChange
-from bsip_cli.recordings.gate_limits import GateLimits
+from bsip_cli.recordings.body_motion import Balance, Body, GateLimits, turn_of_forces
 from bsip_cli.recordings.plate_fit import PlateFit, plate_fits
 from bsip_cli.recordings.plate_reading import (
     AS_STATED,
     EXCHANGED,
     ONE_ALONE,
     REVERSED,
+    FrameChange,
     PlateReading,
 )
 from bsip_cli.recordings.plates import cop_at_height

@@ -14,7 +14,7 @@ from itertools import accumulate, chain, pairwise
 from bsip_cli.body.landmarks import LANDMARKS
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.config import shipped
-from bsip_cli.recordings.affixes import affixes, owner, split
+from bsip_cli.recordings.labels import affixes, owner, split
 
 _COMMON = "common"
 _CLUSTER = 3  # labels that differ by a number only: a cluster, none of which marks a bone
@@ -67,7 +67,7 @@ class _Language:
         """Whether labels may be of this language."""
         if not self.telltales:
             return True
-        spelt = ["".join(_pieces(label)) for label in labels]
+        spelt = list(map(_spelt, labels))
         return any(telltale in one for telltale in self.telltales for one in spelt)
 
 
@@ -131,8 +131,7 @@ def _read_all(labels: Sequence[str], language: _Language) -> dict[str, tuple[Mea
 
     A body has two sides: a reading whose other side is no label of the person's costs more.
     """
-    spelt = {_spelt(label) for label in labels}
-    found = {}
+    spelt, found = set(map(_spelt, labels)), {}
     for label in labels:
         costs = [
             (meaning, cost + _ALONE * (bool(twins) and not twins & spelt))
@@ -190,18 +189,19 @@ def _ways(
     label: str, language: _Language
 ) -> tuple[tuple[Meaning | None, float, frozenset[str]], ...]:
     """What a label may mean: meaning, cost, and how the same on the other side would be spelt."""
-    grammar, spelt = _grammar(), _spelt(label)
-    return tuple(
-        (meaning, reading.cost + cost, _twins(spelt, reading, language))
-        for reading in _readings(label, language)
-        for meaning, cost in _means(reading, grammar)
-    )
-
-
-def _twins(spelt: str, reading: _Reading, language: _Language) -> frozenset[str]:
-    begin, end = reading.side_at
-    others = (word for word, side in language.sides.items() if reading.side not in ("", side))
-    return frozenset(spelt[:begin] + other + spelt[end:] for other in others)
+    grammar, spelling = _grammar(), _spelling(label)
+    ways = []
+    for reading in _cuts(spelling, 0, language, _MOST_WORDS):
+        if reading.side and len(spelling.text) < _SHORTEST:
+            continue
+        begin, end = reading.side_at
+        before, after = spelling.text[:begin], spelling.text[end:]
+        others = (word for word, side in language.sides.items() if reading.side not in ("", side))
+        twins = frozenset(before + other + after for other in others)
+        nouns_at = sum(k for k, c in enumerate(reading.concepts) if c in grammar.segments)
+        for meaning, cost in _means(reading, grammar):
+            ways.append((meaning, reading.cost + _NOUN_FIRST * nouns_at + cost, twins))
+    return tuple(ways)
 
 
 def _spelt(label: str) -> str:
@@ -228,24 +228,11 @@ class _Spelling:
 def _spelling(label: str) -> _Spelling:
     parts = [_pieces(part) for part in re.split(r"[\s._-]+", label)]
     lengths = [[len(piece) for piece in part] for part in parts]
-    separators = {0, *accumulate(map(sum, lengths))}
     return _Spelling(
         "".join(map("".join, parts)),
         frozenset({0, *accumulate(chain.from_iterable(lengths))}),
-        frozenset(separators),
+        frozenset({0, *accumulate(map(sum, lengths))}),
     )
-
-
-def _readings(label: str, language: _Language) -> list[_Reading]:
-    """All ways to cut a label into words with at most one side."""
-    nouns, spelling = _grammar().segments, _spelling(label)
-    return [
-        replace(
-            r, cost=r.cost + _NOUN_FIRST * sum(k for k, c in enumerate(r.concepts) if c in nouns)
-        )
-        for r in _cuts(spelling, 0, language, _MOST_WORDS)
-        if len(spelling.text) >= _SHORTEST or not r.side
-    ]
 
 
 def _cuts(
@@ -276,27 +263,20 @@ def _words_at(
     at which it is not set apart.
     """
     text, seams = spelling.text, spelling.seams
-    number = re.match(r"\d+", text[start:])
-    if number:
+    if number := re.match(r"\d+", text[start:]):
         yield start + number.end(), (str(int(number[0])),), "", 1.0
     for end in range(start + 1, min(len(text), start + language.longest) + 1):
-        word = text[start:end]
-        cost = 1.0 + _reach(spelling, start, end)
+        word, cost = text[start:end], 1.0
+        inside = sorted(place for place in spelling.separators if start < place < end)
+        if inside:
+            takes_letter = any(b - a == 1 for a, b in pairwise([start, *inside, end]))
+            cost += _LETTER_ACROSS if takes_letter else _ACROSS
         if len(word) == 1:
             cost += 0.5 * ((start not in seams) + (end not in seams))
         for concepts in language.words.get(word, ()):
             yield end, concepts, "", cost
         if word in language.sides:
             yield end, (), language.sides[word], cost
-
-
-def _reach(spelling: _Spelling, start: int, end: int) -> float:
-    """The cost of a word's reach across separators."""
-    inside = sorted(place for place in spelling.separators if start < place < end)
-    if not inside:
-        return 0.0
-    takes_letter = any(b - a == 1 for a, b in pairwise([start, *inside, end]))
-    return _LETTER_ACROSS if takes_letter else _ACROSS
 
 
 def _means(reading: _Reading, grammar: _Grammar) -> Iterator[tuple[Meaning | None, float]]:
@@ -309,8 +289,10 @@ def _means(reading: _Reading, grammar: _Grammar) -> Iterator[tuple[Meaning | Non
     if grammar.never & words:
         yield None, 0.0
         return
-    if words & grammar.numbered and not _is_vertebra(reading, grammar):
-        return
+    if words & grammar.numbered:  # a vertebra: its number behind it and nothing else
+        spoken = [c for c in reading.concepts if c not in grammar.fillers]
+        if reading.side or len(spoken) != 2 or not spoken[1].isdigit():
+            return
     weight = min((grammar.weights.get(word, 1.0) for word in words), default=1.0)
     tracking = _TRACKS
     for known, cost in ((concepts, 0.0), (words, _NUMBER_LEFT)):
@@ -322,12 +304,6 @@ def _means(reading: _Reading, grammar: _Grammar) -> Iterator[tuple[Meaning | Non
     segments = {grammar.segments[word] for word in words if word in grammar.segments}
     if len(segments) == 1 and (full := _sided(segments.pop(), reading.side, SEGMENTS)):
         yield Meaning(full, "", weight), tracking
-
-
-def _is_vertebra(reading: _Reading, grammar: _Grammar) -> bool:
-    """A numbered noun with its number behind it and nothing else."""
-    spoken = [c for c in reading.concepts if c not in grammar.fillers]
-    return not reading.side and len(spoken) == 2 and spoken[1].isdigit()
 
 
 def _sided(name: str, side: str, known: Sequence[str] | frozenset[str]) -> str:
@@ -364,22 +340,21 @@ def _grammar() -> _Grammar:
 @cache
 def _languages() -> tuple[_Language, ...]:
     """Each with the common words and those of the language it extends; keypoints without."""
-    data = _vocabulary()["languages"]
-    return tuple(_language(name, data) for name in data if name != _COMMON)
-
-
-def _language(name: str, data: Mapping) -> _Language:
-    words: dict[str, set[tuple[str, ...]]] = {}
-    sides: dict[str, str] = {}
-    for part in (data[name].get("instead_of_common", _COMMON), data[name].get("extends", ""), name):
-        table = data.get(part, {})
-        for side, spelt in table.get("sides", {}).items():
-            sides |= dict.fromkeys(spelt.split(), side[0])
-        for concepts, spelt in table.get("words", {}).items():
-            for word in spelt.split():
-                words.setdefault(word, set()).add(tuple(concepts.split()))
-    longest = max(map(len, [*words, *sides]))
-    known = {word: frozenset(ways) for word, ways in words.items()}
-    telltales = tuple(data[name].get("telltales", ()))
-    part = _SPECIAL if "extends" in data[name] else 1.0
-    return _Language(name, known, sides, longest, telltales, part)
+    data, found = _vocabulary()["languages"], []
+    for name, own in data.items():
+        if name == _COMMON:
+            continue
+        words: dict[str, set[tuple[str, ...]]] = {}
+        sides: dict[str, str] = {}
+        for part in (own.get("instead_of_common", _COMMON), own.get("extends", ""), name):
+            table = data.get(part, {})
+            for side, spelt in table.get("sides", {}).items():
+                sides |= dict.fromkeys(spelt.split(), side[0])
+            for concepts, spelt in table.get("words", {}).items():
+                for word in spelt.split():
+                    words.setdefault(word, set()).add(tuple(concepts.split()))
+        longest = max(map(len, [*words, *sides]))
+        known = {word: frozenset(ways) for word, ways in words.items()}
+        telltales, part = tuple(own.get("telltales", ())), _SPECIAL if "extends" in own else 1.0
+        found.append(_Language(name, known, sides, longest, telltales, part))
+    return tuple(found)

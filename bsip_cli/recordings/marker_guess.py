@@ -1,18 +1,30 @@
-"""Which marker set a recording uses: a shipped one, or one made from what its labels say."""
+"""Which marker set a recording uses: a shipped one, or one made from what its labels say, and as
+TOML to be corrected. Which of two markers of a joint under one label is the lateral one."""
 
 from __future__ import annotations
 
+import json
+import re
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from bsip_cli.body.landmarks import JOINT_CENTRES
+import numpy as np
+
+from bsip_cli.body.landmarks import JOINT_CENTRES, LANDMARKS
 from bsip_cli.body.markersets import Marker, MarkerSet, load_marker_set, shipped_names
-from bsip_cli.body.names import in_words
+from bsip_cli.body.names import SEGMENTS, TRUNK, in_words
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.affixes import affixes, owner
-from bsip_cli.recordings.label_words import Meaning, bones, meanings
-from bsip_cli.recordings.labels import columns_of, count_of, found_among, person_of
+from bsip_cli.recordings.label_words import bones, meanings
+from bsip_cli.recordings.labels import (
+    affixes,
+    columns_of,
+    count_of,
+    found_among,
+    owner,
+    person_of,
+    spelling_of,
+)
 from bsip_cli.recordings.model import Finding
 
 _ENOUGH = 0.5  # of a set's markers, its optional ones aside
@@ -23,7 +35,7 @@ _NEEDED = {  # and what would do
     **{f"shank_{side}": "the lateral malleolus, a cluster" for side in "lr"},
     **{f"foot_{side}": "the heel and a metatarsal" for side in "lr"},
 }
-_NAME = "words"
+_OUTER = 0.8  # of the frames in which both are seen
 
 
 @dataclass(frozen=True)
@@ -104,49 +116,29 @@ class Guess:
         tracking = sum(not m.landmark for m in markers)
         near = f"; {self.base.marker_set.name} fits partly" if self.base else ""
         unknown = f"; not understood: {', '.join(self.unknown)}" if self.unknown else ""
-        made = Finding(
-            "labels",
-            "",
-            f"no shipped set fits well{near}",
-            "one of " + ", ".join(shipped_names()),
-            f"made one from the labels: {', '.join(bony)}; {tracking} more only track{unknown}",
-            "warning",
-        )
-        return (made, *self._about_centres())
-
-    def _about_centres(self) -> tuple[Finding, ...]:
+        expected = "one of " + ", ".join(shipped_names())
+        action = f"made one from the labels: {', '.join(bony)}; {tracking} more only track{unknown}"
+        made = Finding("labels", "", f"no shipped set fits well{near}", expected, action, "warning")
         if not self.centres:
-            return ()
-        found = Finding(
-            "labels",
-            ", ".join(self.centres),
-            "keypoints of a markerless system: centres of joints",
-            "markers on bony landmarks",
-            "took them for the joints; the pelvis' and limbs' axes are estimated from them",
-            "warning",
-        )
-        return (found,)
+            return (made,)
+        of, found = ", ".join(self.centres), "keypoints of a markerless system: centres of joints"
+        action = "took them for the joints; the pelvis' and limbs' axes are estimated from them"
+        expected = "markers on bony landmarks"
+        return made, Finding("labels", of, found, expected, action, "warning")
 
 
 def fits(labels: Sequence[str]) -> tuple[SetFit, ...]:
     """All shipped sets, best first; what all labels of a person begin or end with is taken off."""
-    return tuple(
-        sorted(
-            (_fit(load_marker_set(name), labels) for name in shipped_names()),
-            key=lambda fit: -fit.score,
-        )
-    )
-
-
-def _fit(marker_set: MarkerSet, labels: Sequence[str]) -> SetFit:
+    found = []
     named = [label.strip() for label in labels]
-    known = affixes(named, count_of(marker_set.wanted()))
-    bare = {affix.off(label) for label in named if (affix := owner(label, known)) is not None}
-    found = found_among(sorted(bare), marker_set.wanted())
-    required = [marker.label for marker in marker_set.markers if not marker.optional]
-    return SetFit(
-        marker_set, len(found), sum(name in found for name in required), len(required), len(bare)
-    )
+    for marker_set in map(load_marker_set, shipped_names()):
+        known = affixes(named, count_of(marker_set.wanted()))
+        bare = {affix.off(label) for label in named if (affix := owner(label, known)) is not None}
+        there = found_among(sorted(bare), marker_set.wanted())
+        required = [marker.label for marker in marker_set.markers if not marker.optional]
+        n_found = sum(name in there for name in required)
+        found.append(SetFit(marker_set, len(there), n_found, len(required), len(bare)))
+    return tuple(sorted(found, key=lambda fit: -fit.score))
 
 
 def guess_marker_set(labels: Sequence[str], prefix: str = "", source: str = "FILE") -> Guess:
@@ -161,9 +153,18 @@ def guess_marker_set(labels: Sequence[str], prefix: str = "", source: str = "FIL
         No shipped set fits, and the labels leave segments bare that no skeleton can do without.
     """
     guess = told_from(labels, prefix)
-    if guess.base is None and (lacking := guess.lacking()):
-        raise _no_set(guess, lacking, labels, source)
-    return guess
+    if guess.base is not None or not (lacking := guess.lacking()):
+        return guess
+    best = fits(labels)[0]
+    shown = ", ".join(sorted(labels)[:12]) + (" ..." if len(labels) > 12 else "")
+    raise BadDataError(
+        f"no known marker set fits ({best.marker_set.name} comes nearest with {best.share:.0%} of "
+        f"its markers); of {best.labels} labels the words tell {len(guess.marker_set.markers)}, "
+        f"none on {', '.join(lacking)}; labels are {shown}",
+        expected="one of " + ", ".join(shipped_names()) + ", or labels that say these places",
+        remedy=f"write a marker set (`bsip markers {source}` makes a first one of this file's "
+        'labels) and name it in study.toml: marker_set = "my_set.toml"',
+    )
 
 
 def told_from(labels: Sequence[str], prefix: str = "") -> Guess:
@@ -181,59 +182,162 @@ def told_from(labels: Sequence[str], prefix: str = "") -> Guess:
     names = [name for name, n in times.items() if n == 1]  # of twins nobody knows which is which
     understood = meanings(names)
     has_centres = any(meaning.landmark in JOINT_CENTRES for meaning in understood.values())
-    return _made(names, understood, best if best.fits and not has_centres else None)
-
-
-def _made(names: Sequence[str], understood: Mapping[str, Meaning], base: SetFit | None) -> Guess:
-    """Where the words add nothing to the shipped set, it is that one."""
-    columns = columns_of(names, base.marker_set.wanted() if base else {})
-    shipped = _as_shipped(base, columns, names)
+    base = best if best.fits and not has_centres else None
+    columns: dict[str, int] = {}
+    shipped: tuple[Marker, ...] = ()
+    if base:
+        columns = columns_of({name: k for k, name in enumerate(names)}, base.marker_set.wanted())
+        # The set's markers that are there, with the file's spelling among the aliases.
+        there = (m for m in base.marker_set.markers if m.label in columns)
+        shipped = tuple(m.also(names[columns[m.label]]) for m in there)
+    taken, known = {m.landmark for m in shipped}, {m.label for m in shipped}
     rest = [name for k, name in enumerate(names) if k not in set(columns.values())]
-    more = _by_words({name: understood[name] for name in rest if name in understood}, shipped)
-    if base and not more:
+    more = []
+    for name in rest:
+        if name in understood and name not in known:
+            meant = understood[name]
+            landmark = "" if meant.landmark in taken else meant.landmark
+            more.append(Marker(name, meant.segment, landmark, meant.weight, False, ()))
+    if base and not more:  # the words add nothing
         return Guess(base.marker_set, base)
     unknown = tuple(name for name in rest if name not in understood)
-    name = f"{base.marker_set.name}+{_NAME}" if base else _NAME
+    name = f"{base.marker_set.name}+words" if base else "words"
     of = f"{base.marker_set.description}, completed from" if base else "made from"
     return Guess(MarkerSet(name, f"{of} the words of the labels", (*shipped, *more)), base, unknown)
 
 
-def _as_shipped(
-    base: SetFit | None, columns: Mapping[str, int], names: Sequence[str]
-) -> tuple[Marker, ...]:
-    """The set's markers that are there, with the file's spelling among the aliases."""
-    markers = base.marker_set.markers if base else ()
-    return tuple(m.also(names[columns[m.label]]) for m in markers if m.label in columns)
+# --- two markers under one label ------------------------------------------------------------------
 
 
-def _by_words(understood: Mapping[str, Meaning], known: Collection[Marker]) -> tuple[Marker, ...]:
-    taken = {marker.landmark for marker in known}
-    labels = {marker.label for marker in known}
-    return tuple(
-        Marker(
-            label,
-            meaning.segment,
-            "" if meaning.landmark in taken else meaning.landmark,
-            meaning.weight,
-            optional=False,
-            aliases=(),
-        )
-        for label, meaning in understood.items()
-        if label not in labels
+def with_pairs_named(
+    labels: Sequence[str], markers_m: np.ndarray, marker_set: MarkerSet, prefix: str = ""
+) -> tuple[tuple[str, ...], list[Finding]]:
+    """Labels in which the lateral and the medial marker of a joint have names of their own, where
+    two columns share the one that both are spelt as: the lateral one is further out, as left and
+    right of the trunk are. ``markers_m`` (n_frames, n_markers, 3), NaN = missing."""
+    there = np.isfinite(markers_m).all(axis=2).any(axis=0).tolist()
+    names = person_of(labels, count_of(marker_set.wanted()), prefix, there).names
+    names = {column: name for column, name in names.items() if there[column]}
+    spelling = spelling_of(list(names.values()))
+    spelt = [(m, {spelling(one) for one in (m.label, *m.aliases)}) for m in marker_set.markers]
+    meant = {name: [m for m, of in spelt if spelling(name) in of] for name in names.values()}
+    to_right = _to_right(markers_m, {c: meant[one] for c, one in names.items()})
+    named, outer_ones, inner_ones = list(labels), {}, []
+    for name, count in Counter(names.values()).items():
+        lateral = next((m for m in meant[name] if "_lateral_" in m.landmark), None)
+        if lateral is None or len(meant[name]) != 2 or count != 2:
+            continue
+        inner = lateral.landmark.replace("_lateral_", "_medial_")
+        medial = next((m for m in meant[name] if m.landmark == inner), None)
+        two = [column for column, one in names.items() if one == name]
+        apart = (markers_m[:, two[0]] - markers_m[:, two[1]]) * to_right
+        ahead = apart.sum(axis=1) * (1 if lateral.segment.endswith("_r") else -1)
+        first = float(np.mean(ahead[np.isfinite(ahead)] > 0)) if np.isfinite(ahead).any() else 0.5
+        if medial is None or 1 - _OUTER < first < _OUTER:
+            continue
+        outer = 0 if first >= _OUTER else 1
+        named[two[outer]] = labels[two[outer]].replace(name, lateral.label)
+        named[two[1 - outer]] = labels[two[1 - outer]].replace(name, medial.label)
+        outer_ones[name] = lateral.label
+        inner_ones.append(medial.label)
+    if not outer_ones:
+        return tuple(labels), []
+    found, expected = "a label that two columns share", "one column per marker"
+    action = f"took the outer ones for {', '.join(outer_ones.values())}, the inner ones for "
+    action += ", ".join(inner_ones)
+    subject = ", ".join(outer_ones)
+    return tuple(named), [Finding("labels", subject, found, expected, action, "corrected")]
+
+
+def _to_right(markers_m: np.ndarray, meant: Mapping[int, Sequence[Marker]]) -> np.ndarray:
+    """From left to right of the trunk, (n_frames, 3); NaN where that is not seen."""
+    sure = {column: markers[0] for column, markers in meant.items() if len(markers) == 1}
+    trunk = {column: marker.landmark for column, marker in sure.items() if marker.segment in TRUNK}
+    right, left = ([c for c, name in trunk.items() if name.endswith(side)] for side in ("_r", "_l"))
+    if not right or not left:
+        return np.full((len(markers_m), 3), np.nan)
+    return np.asarray(markers_m[:, right].mean(axis=1) - markers_m[:, left].mean(axis=1))
+
+
+# --- as TOML to be corrected ----------------------------------------------------------------------
+
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+_EMPTY = '{ LABEL = "landmark" }'
+_HEAD = """\
+# A marker set, made from the labels of {source}.
+# It was guessed from the labels alone: check it, and correct it before you trust a number.
+# One line per segment: LABEL = "landmark"; an empty landmark only tracks its segment.
+# Then name this file in study.toml: marker_set = "{name}"
+#
+# Landmarks (with _l or _r where it has a side):
+{landmarks}
+description = {description}
+
+[segments]
+"""
+_TAIL = """
+# Other names of a marker, in other files.
+[aliases]
+{aliases}
+# Markers that a recording may lack without a warning: those of the static trial only.
+[optional]
+markers = {optional}
+
+# How far a marker is trusted, 1 if it is not named; less where skin or shoulder girdle slides.
+[weights]
+{weights}"""
+
+
+def starter_toml(marker_set: MarkerSet, unknown: Sequence[str], source: str, name: str) -> str:
+    """TOML of a marker set, and labels that were not understood as a comment.
+
+    What is not printable is left out; ``source`` names the recording, ``name`` the file to be
+    written. A segment without markers is a comment that shows how to fill it in.
+    """
+    markers = [m for m in marker_set.markers if m.label and m.label.isprintable()]
+    lines = []
+    for segment in SEGMENTS:
+        own = [m for m in markers if m.segment == segment]
+        members = ", ".join(f"{_key(m.label)} = {_quoted(m.landmark)}" for m in own)
+        lines.append(f"{segment} = {{ {members} }}" if own else f"# {segment} = {_EMPTY}")
+    unknown = [label for label in dict.fromkeys(unknown) if label and label.isprintable()]
+    if unknown:
+        lines += ["", "# Not understood: add them to the segment they sit on, or leave them out."]
+        lines += _wrapped(unknown)
+    head = _HEAD.format(
+        source=source,
+        name=name,
+        landmarks="\n".join(_wrapped(sorted({re.sub(r"_[lr]$", "", one) for one in LANDMARKS}))),
+        description=_quoted(f"Made from the labels of {source}"),
     )
-
-
-def _no_set(
-    guess: Guess, lacking: Sequence[str], labels: Sequence[str], source: str
-) -> BadDataError:
-    best = fits(labels)[0]
-    shown = ", ".join(sorted(labels)[:12]) + (" ..." if len(labels) > 12 else "")
-    n_known = len(guess.marker_set.markers)
-    return BadDataError(
-        f"no known marker set fits ({best.marker_set.name} comes nearest with {best.share:.0%} of "
-        f"its markers); of {best.labels} labels the words tell {n_known}, none on "
-        f"{', '.join(lacking)}; labels are {shown}",
-        expected="one of " + ", ".join(shipped_names()) + ", or labels that say these places",
-        remedy=f"write a marker set (`bsip markers {source}` makes a first one of this file's "
-        'labels) and name it in study.toml: marker_set = "my_set.toml"',
+    aliases = [(m.label, [a for a in m.aliases if a.isprintable()]) for m in markers if m.aliases]
+    tail = _TAIL.format(
+        aliases="".join(f"{_key(label)} = {_listed(names)}\n" for label, names in aliases),
+        optional=_listed([m.label for m in markers if m.optional]),
+        weights="".join(f"{_key(m.label)} = {m.weight:g}\n" for m in markers if m.weight != 1.0),
     )
+    return head + "\n".join(lines) + "\n" + tail
+
+
+def _listed(labels: Sequence[str]) -> str:
+    return f"[{', '.join(map(_quoted, labels))}]"
+
+
+def _key(label: str) -> str:
+    return label if _BARE_KEY.fullmatch(label) else _quoted(label)
+
+
+def _quoted(text: str) -> str:
+    """As a TOML string; printable text differs from JSON's in nothing."""
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _wrapped(words: Sequence[str], width: int = 96) -> list[str]:
+    """The words as comment lines."""
+    lines, line = [], "#"
+    for word in words:
+        if len(line) + len(word) + 2 > width:
+            lines.append(line)
+            line = "#"
+        line += f" {word}"
+    return [*lines, line]

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.plates import cop_at_height
-
-LEVELS = ("info", "corrected", "warning", "excluded")
 
 
 @dataclass(frozen=True)
@@ -24,13 +23,20 @@ class Finding:
     found: str
     expected: str
     action: str
-    level: str  # one of LEVELS
+    level: str  # info, corrected, warning or excluded
 
     def sentence(self) -> str:
         """As people read it."""
         subject = f" {self.subject}" if self.subject else ""
         expected = f" (expected {self.expected})" if self.expected else ""
         return f"{self.check.replace('_', ' ')}{subject}: {self.found}{expected}; {self.action}"
+
+
+def refusal(
+    path: Path, found: str, expected: str, remedy: str = "export the trial again"
+) -> BadDataError:
+    """Why a file cannot be used."""
+    return BadDataError(found, expected=expected, remedy=remedy, file=path)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from bsip_cli.body.anthropometry import load_table
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.names import SEGMENTS, without_side
 from bsip_cli.recordings.analog import runs
-from bsip_cli.recordings.force_balance import low_pass, mean_path
+from bsip_cli.recordings.contacts import low_pass, mean_path
 
 # A segment's share of the body's mass against the table: published regressions err by 10 to 25 %
 # of a segment's mass (configs/default.toml, [prior]), the large segments by less.
@@ -130,9 +130,11 @@ def segment_motion(markers_m: Mapping[str, np.ndarray], rate_hz: float) -> Segme
     spread = np.sqrt(weight @ (speeds - centre) ** 2 / weight.sum())
     common = np.zeros((len(centre), 2 * len(_KINDS)))
     for name, own, velocity in zip(seen, weight / weight.sum(), speeds, strict=True):
-        k = _KINDS.index(without_side(name))
+        kind = without_side(name)
+        k = _KINDS.index(kind)
         common[:, k] += MASS_SHARE_SD * own * (velocity - centre)
-        near = _neighbour_velocity(name, seen, centre)
+        carrier = _carrier(NEIGHBOUR[kind], name[len(kind) :], set(seen) - {name})
+        near = seen.get(carrier, centre)
         common[:, len(_KINDS) + k] += PLACE_SD * own * (velocity - near)
     acceleration = np.gradient(centre) * rate_hz
     hidden = (1.0 - weight.sum()) * float(spread.max())
@@ -142,18 +144,14 @@ def segment_motion(markers_m: Mapping[str, np.ndarray], rate_hz: float) -> Segme
     return SegmentMotion(centre, common, own_sd, acceleration)
 
 
-def _neighbour_velocity(
-    name: str, seen: Mapping[str, np.ndarray], centre: np.ndarray
-) -> np.ndarray:
-    """Of the nearest seen segment towards the trunk."""
-    side = name[len(without_side(name)) :]
-    kind = without_side(name)
+def _carrier(kind: str, side: str, names: Collection[str]) -> str:
+    """The nearest seen segment from a kind on towards the trunk; empty if there is none."""
     for _ in _KINDS:
-        kind = NEIGHBOUR[kind]
         for found in (kind + side, kind):
-            if found in seen and found != name:
-                return seen[found]
-    return centre
+            if found in names:
+                return found
+        kind = NEIGHBOUR[kind]
+    return ""
 
 
 def shares_of_seen(names: Collection[str]) -> dict[str, float]:
@@ -162,22 +160,18 @@ def shares_of_seen(names: Collection[str]) -> dict[str, float]:
     found: dict[str, float] = {}
     for segment in SEGMENTS:
         kind = without_side(segment)
-        side, share = segment[len(kind) :], shares[kind]
-        for _ in _KINDS:
-            carrier = next((one for one in (kind + side, kind) if one in names), "")
-            if carrier:
-                found[carrier] = found.get(carrier, 0.0) + share
-                break
-            kind = NEIGHBOUR[kind]
+        if carrier := _carrier(kind, segment[len(kind) :], names):
+            found[carrier] = found.get(carrier, 0.0) + shares[kind]
     return found
 
 
 def _shares() -> dict[str, float]:
     """Share of the body's mass per kind of segment, mean of both sexes."""
     table = load_table("dumas2007")
+    rows = {kind: _ROWS.get(kind, kind) for kind in _KINDS}
     return {
         kind: (table["M", row].mass_fraction + table["F", row].mass_fraction) / 2
-        for kind, row in ((kind, _ROWS.get(kind, kind)) for kind in _KINDS)
+        for kind, row in rows.items()
     }
 
 
@@ -192,27 +186,22 @@ def stretches_of(
     ``markers_m`` (n, k, 3) per segment; ``force_z_N`` (n,) is the sum of all plates. A stretch
     counts where the person is upright for a part of it.
     """
-    found = []
-    inner = measured.copy()
-    edge = round(EDGE_S * rate_hz)
+    found, inner = [], measured.copy()
+    edge, margin = round(EDGE_S * rate_hz), round(MARGIN_S * rate_hz)
     inner[:edge] = inner[len(inner) - edge :] = False
     for start, stop in runs(inner):
-        if (stop - 1 - start) / rate_hz < SHORTEST_S:
-            continue
-        margin = round(MARGIN_S * rate_hz)
+        seconds = (stop - 1 - start) / rate_hz
         part = slice(max(0, start - margin), stop + margin)
         near = {name: each[part] for name, each in markers_m.items()}
-        motion = segment_motion(near, rate_hz)
-        if motion is None:
+        if seconds < SHORTEST_S or (motion := segment_motion(near, rate_hz)) is None:
             continue
         upright = upright_frames(near)
-        pieces = max(1, int(np.ceil((stop - 1 - start) / rate_hz / LONGEST_S)))
+        pieces = max(1, int(np.ceil(seconds / LONGEST_S)))
         edges = np.round(np.linspace(start, stop - 1, pieces + 1)).astype(int) - part.start
         for first, last in itertools.pairwise(edges.tolist()):
             if upright[first : last + 1].mean() < UPRIGHT_SHARE:
                 continue
-            one = _stretch(force_z_N[part], motion, first, last, rate_hz)
-            if one is not None:
+            if (one := _stretch(force_z_N[part], motion, first, last, rate_hz)) is not None:
                 found.append(replace(one, start_s=one.start_s + part.start / rate_hz))
     return tuple(found)
 
@@ -265,25 +254,13 @@ def upright_frames(markers_m: Mapping[str, np.ndarray]) -> np.ndarray:
 
     Without markers on both, nothing is known to be upright.
     """
-    n_frames = len(next(iter(markers_m.values())))
-    pelvis = _mean_point(markers_m, ("lower_torso",))
-    shanks = _mean_point(markers_m, ("shank_l", "shank_r"))
-    if pelvis is None or shanks is None:
-        return np.zeros(n_frames, bool)
-    up = pelvis - shanks
-    return np.asarray(up[:, 2] > UPRIGHT_COS * np.maximum(np.linalg.norm(up, axis=1), 1e-6))
-
-
-def _mean_point(
-    markers_m: Mapping[str, np.ndarray], segments: tuple[str, ...]
-) -> np.ndarray | None:
-    """Mean of the segments' own means (n, 3); None if one is not seen."""
-    points = []
-    for name in segments:
+    middles = {}
+    for name in ("lower_torso", "shank_l", "shank_r"):
         seen = markers_m.get(name, np.empty((0, 0, 3)))
         axes = [mean_path(seen[..., axis]) for axis in range(3)]
         known = [axis for axis in axes if axis is not None]
         if len(known) < 3:
-            return None
-        points.append(np.stack(known, axis=1))
-    return np.mean(points, axis=0)
+            return np.zeros(len(next(iter(markers_m.values()))), bool)
+        middles[name] = np.stack(known, axis=1)
+    up = middles["lower_torso"] - np.mean([middles["shank_l"], middles["shank_r"]], axis=0)
+    return np.asarray(up[:, 2] > UPRIGHT_COS * np.maximum(np.linalg.norm(up, axis=1), 1e-6))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from array import array
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
@@ -12,28 +13,31 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError, printable
-from bsip_cli.recordings.force_columns import PlateColumns, by_plate, meaning_of
-from bsip_cli.recordings.model import Finding
-from bsip_cli.recordings.text_cells import (
+from bsip_cli.recordings.model import Finding, refusal
+from bsip_cli.recordings.text_tables import (
+    ROWS_LOOKED_AT,
     Dialect,
     LastDigit,
     agreeing,
+    check_names,
     dialect_of,
+    head_of,
     is_missing,
     number,
     parted,
+    row_counts,
     separator_of,
+    text_lines,
     without_end,
 )
-from bsip_cli.recordings.text_lines import check_names, head_of, row_counts, text_lines
 from bsip_cli.recordings.timebase import Stamps
 from bsip_cli.recordings.units import force_in_N
 
 _ROWS = re.compile(r"^(?:nrows\s*=|datarows)\s*(\d{1,12})$", re.IGNORECASE)
 _TIME = re.compile(r"^times?\b|^t$", re.IGNORECASE)
+_AGAIN = "export the forces again"
 _MOST_FORCES = 64  # as many plates are read of a C3D file
 _NAMES_TOLD = 12
-_ROWS_LOOKED_AT = 20  # to see how the table is written
 _NO_FORCE = 1e-9  # of the trial's largest force: where its point lies says nothing
 
 
@@ -65,6 +69,14 @@ class _Table:
     is_cut: bool
     dialect: Dialect
 
+    def unit(self, column: int) -> str:
+        """In brackets behind the column's name, else in the row of units."""
+        if (meaning := meaning_of(self.names[column])) is not None and meaning.unit:
+            return meaning.unit
+        if column == 0 and (bracket := re.search(r"[\[(_]([^\[\]()]+)[\])]?$", self.names[0])):
+            return bracket[1]
+        return self.units[column].strip("[]() ")
+
 
 def read_mot(path: Path) -> Mot:
     """Read the ground forces of a MOT (or STO) file.
@@ -77,22 +89,15 @@ def read_mot(path: Path) -> Mot:
     if end is None or not first:
         raise _no_table(path)
     table = _read_table(lines, first, path)
-    findings = row_counts("rows of forces", _stated_rows(header), len(table.values))
+    stated = next((float(m[1]) for line in header if (m := _ROWS.match(line.strip()))), np.nan)
+    findings = row_counts("rows of forces", stated, len(table.values))
     if table.is_cut:
-        findings.append(
-            Finding(
-                "layout",
-                "",
-                "the last row of forces is cut",
-                "a complete file",
-                "left that row out",
-                "warning",
-            )
-        )
+        found, action = "the last row of forces is cut", "left that row out"
+        findings.append(Finding("layout", "", found, "a complete file", action, "warning"))
     findings += table.dialect.about_commas()
     times = table.values[:, 0]
     forces, about_columns = _forces(table, path)
-    stamps = Stamps(times, table.time_digits.sizes(times), _unit(table, 0))
+    stamps = Stamps(times, table.time_digits.sizes(times), table.unit(0))
     return Mot(stamps, forces, (*findings, *about_columns))
 
 
@@ -103,41 +108,24 @@ def _names(line: str) -> bool:
 
 
 def _no_table(path: Path) -> BadDataError:
-    return BadDataError(
-        "no table after 'endheader'",
-        expected="a MOT file",
-        remedy="export the forces again",
-        file=path,
-    )
-
-
-def _stated_rows(header: list[str]) -> float:
-    """nRows=... or datarows ...; NaN if the header says nothing."""
-    for line in header:
-        if match := _ROWS.match(line.strip()):
-            return float(match[1])
-    return float("nan")
+    return refusal(path, "no table after 'endheader'", "a MOT file", _AGAIN)
 
 
 def _read_table(lines: Iterator[str], first: str, path: Path) -> _Table:
     """The table below the line of names, which may be parted otherwise than its rows."""
-    check_names(parted(first, separator_of(first)), "columns", path)
+    mark = separator_of(first)
+    check_names(parted(first, mark), "columns", path)
     rows = (line for line in lines if line.strip())
-    top, units = list(islice(rows, _ROWS_LOOKED_AT)), ""
+    top, units = list(islice(rows, ROWS_LOOKED_AT)), ""
     if top and not any(np.isfinite(number(word)) for word in re.split(r"[\s;,]+", top[0])):
         units, *top = top
     if not top:
         raise _no_table(path)
-    mark = separator_of(first)
     alone = without_end(parted(first, mark)), dialect_of(mark, top)
     names, dialect = next(agreeing(first, top), alone)
     if not names or not _TIME.match(names[0]):
-        raise BadDataError(
-            f"first column '{printable(names[0][:40]) if names else ''}'",
-            expected="time",
-            remedy="export the forces again",
-            file=path,
-        )
+        found = f"first column '{printable(names[0][:40]) if names else ''}'"
+        raise refusal(path, found, "time", _AGAIN)
     said = parted(units, separator_of(units))
     values, digits, is_cut = _values(chain(top, rows), len(names), dialect, path)
     units_of = said if len(said) == len(names) else [""] * len(names)
@@ -148,10 +136,10 @@ def _values(
     rows: Iterator[str], n_columns: int, dialect: Dialect, path: Path
 ) -> tuple[np.ndarray, LastDigit, bool]:
     """(n_rows, n_columns), eight bytes for each cell and no more; whether the last row is cut."""
-    values, digits, short = array("d"), LastDigit(), 0
+    values, digits, short, goes_on = array("d"), LastDigit(), 0, False
     for row in rows:
-        if short:
-            raise _misfit(short, n_columns, path)
+        if goes_on := short > 0:
+            break
         cells = dialect.cells(row)
         while len(cells) > n_columns and not cells[-1]:
             cells.pop()
@@ -160,21 +148,13 @@ def _values(
             continue
         digits.add(cells[0])
         values.extend(_numbers(cells, path))
-    is_cut = 0 < short < n_columns and len(values) > 0
+    is_cut = 0 < short < n_columns and len(values) > 0 and not goes_on
     if short and not is_cut:
-        raise _misfit(short, n_columns, path)
+        expected = f"{n_columns}, as many as there are columns"
+        raise refusal(path, f"a row of {short} cells", expected, _AGAIN)
     table = np.array(values).reshape(-1, n_columns)
     table[~np.isfinite(table)] = np.nan
     return table, digits, is_cut
-
-
-def _misfit(n_cells: int, n_columns: int, path: Path) -> BadDataError:
-    return BadDataError(
-        f"a row of {n_cells} cells",
-        expected=f"{n_columns}, as many as there are columns",
-        remedy="export the forces again",
-        file=path,
-    )
 
 
 def _numbers(cells: list[str], path: Path) -> list[float]:
@@ -183,122 +163,146 @@ def _numbers(cells: list[str], path: Path) -> list[float]:
     except ValueError:
         word = next((c for c in cells if not is_missing(c) and np.isnan(number(c))), "")
     if word:
-        raise BadDataError(
-            f"its table cannot be read: '{printable(word[:40])}' is no number",
-            expected="numbers, and empty cells or nan where one is missing",
-            remedy="export the forces again",
-            file=path,
-        )
+        found = f"its table cannot be read: '{printable(word[:40])}' is no number"
+        raise refusal(path, found, "numbers, and empty cells or nan where one is missing", _AGAIN)
     return list(map(number, cells))
 
 
+# --- what the columns mean ------------------------------------------------------------------------
+
+# Words, then an axis with or without the letter of its quantity (vx, Fx, px, x), then what is left.
+_WORDS = {
+    **dict.fromkeys(("force", "forces", "grf", "grfs"), "force"),
+    **dict.fromkeys(("cop", "pressure", "point", "position"), "point"),
+    **dict.fromkeys(("moment", "moments", "grm"), "moment"),
+    **dict.fromkeys(("torque", "torques"), "torque"),
+    **dict.fromkeys(("left", "right"), "side"),
+    **dict.fromkeys(("ground", "reaction", "plate", "platform", "external", "free"), ""),
+    **dict.fromkeys(("centre", "center", "application", "applied"), ""),
+}
+_LETTERS = {"v": "force", "f": "force", "p": "point", "c": "point", "m": "moment", "t": "torque"}
+_KNOWN = "|".join(sorted(_WORDS, key=len, reverse=True))
+_AXIS = r"[vfpcmt]?[xyz](?=[lr]?(?![a-z]))"
+_TOKEN = re.compile(
+    rf"(?P<word>{_KNOWN}|fp(?![a-z]))|(?:(?<![a-z])of(?![a-z]))|(?P<number>\d+)|(?P<axis>{_AXIS})"
+    rf"|(?P<other>[lr](?={_AXIS})|[a-z]+?(?={_KNOWN}|{_AXIS}|[^a-z]|$))"
+)
+_JOINT_REACTION = re.compile(r"_on_.+_in_")  # OpenSim's: body_on_body_in_frame
+_UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What one column holds."""
+
+    plate: str  # "" where the name says none
+    quantity: str  # force, point, moment, torque
+    axis: str  # x, y, z
+    unit: str  # in brackets behind the name, "" without
+
+
+def meaning_of(name: str) -> Meaning | None:
+    """A column's meaning: '1_ground_force_px' is x of the point of plate '1'.
+
+    None for a name with no axis, with two, or with no word or letter for a quantity, and for the
+    force between two bodies.
+    """
+    unit = _UNIT.search(name)
+    tokens = list(_TOKEN.finditer(_UNIT.sub("", name).lower()))
+    axes = [token["axis"] for token in tokens if token["axis"]]
+    if len(axes) != 1 or _JOINT_REACTION.search(name.lower()):
+        return None
+    words = [token["word"] for token in tokens if token["word"]]
+    said = [quantity for word in words if (quantity := _WORDS.get(word, "")) not in ("", "side")]
+    plate = [name for token in tokens if (name := token["number"] or token["other"])]
+    plate += [word[0] for word in words if _WORDS.get(word) == "side"]
+    letter = axes[0][:-1]
+    if letter == "v" and "force" not in said and not {"ground", "fp"} & set(words):
+        return None  # a velocity
+    quantity = _LETTERS[letter] if letter else said[-1] if said else ""
+    if not quantity and (alone := next((part for part in plate if part in _LETTERS), "")):
+        plate.remove(alone)  # F1_x
+        quantity = _LETTERS[alone]
+    if not quantity:
+        return None
+    return Meaning("".join(plate), quantity, axes[0][-1], unit[1].strip() if unit else "")
+
+
 def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Finding]]:
-    plates, twice = by_plate(table.names)
-    if twice:
-        one, other = twice[0]
-        raise BadDataError(
-            f"columns '{one}' and '{other}', which say the same of one plate",
-            expected="a column for each axis of each plate",
-            remedy="rename one of them",
-            file=path,
-        )
+    """The forces of each plate that has some, and the columns that are not understood."""
+    plates: dict[str, dict[str, dict[str, int]]] = defaultdict(lambda: defaultdict(dict))
+    for i, name in enumerate(table.names):
+        if (meaning := meaning_of(name)) is None:
+            continue
+        first = plates[meaning.plate][meaning.quantity].setdefault(meaning.axis, i)
+        if first != i:
+            found = f"columns '{table.names[first]}' and '{name}', which say the same of one plate"
+            expected = "a column for each axis of each plate"
+            raise refusal(path, found, expected, "rename one of them")
+    plates = {name: columns for name, columns in plates.items() if "force" in columns}
     if len(plates) > _MOST_FORCES:
-        raise BadDataError(
-            f"{len(plates)} ground forces",
-            expected=f"at most {_MOST_FORCES}",
-            remedy="export the forces again",
-            file=path,
-        )
+        found = f"{len(plates)} ground forces"
+        raise refusal(path, found, f"at most {_MOST_FORCES}", _AGAIN)
     if not plates:
-        raise BadDataError(
-            "no ground force among the columns " + ", ".join(table.names[:8]),
-            expected="columns like ground_force_1_vx",
-            remedy="rename the columns or export the forces again",
-            file=path,
-        )
+        found = "no ground force among the columns " + ", ".join(table.names[:8])
+        remedy = f"rename the columns or {_AGAIN}"
+        raise refusal(path, found, "columns like ground_force_1_vx", remedy)
     used = {0}
-    read = [_force(str(k + 1), plate, table, used, path) for k, plate in enumerate(plates)]
-    largest = max(np.abs(f.force_N[np.isfinite(f.force_N)]).max(initial=0) for f in read)
-    forces = tuple(_without_idle(force, _NO_FORCE * largest) for force in read)
-    return forces, _about_columns([n for i, n in enumerate(table.names) if i not in used])
+    forces = tuple(
+        _force(str(k + 1), plate, columns, table, used, path)
+        for k, (plate, columns) in enumerate(plates.items())
+    )
+    largest = max(np.abs(f.force_N[np.isfinite(f.force_N)]).max(initial=0) for f in forces)
+    for force in forces:  # a missing point or moment of no force is zero
+        idle = (np.abs(force.force_N) <= _NO_FORCE * largest).all(axis=1)
+        for values in (force.point, force.moment):
+            if values is not None:
+                values[idle & ~np.isfinite(values).all(axis=1)] = 0.0
+    unknown = [name for i, name in enumerate(table.names) if i not in used]
+    told = ", ".join(printable(name[:40]) for name in unknown[:_NAMES_TOLD])
+    more = f" and {len(unknown) - _NAMES_TOLD} more" if len(unknown) > _NAMES_TOLD else ""
+    found = f"{len(unknown)} columns of the forces that are not understood: {told}{more}"
+    expected = "force, point and moment of each plate, by axis"
+    about = Finding("columns", "", found, expected, "left them out", "info")
+    return forces, [about] if unknown else []
 
 
 def _force(
-    name: str, plate: PlateColumns, table: _Table, used: set[int], path: Path
+    name: str,
+    plate: str,
+    columns: dict[str, dict[str, int]],
+    table: _Table,
+    used: set[int],
+    path: Path,
 ) -> GroundForce:
-    """One plate's columns; marks them in ``used``."""
-    found: dict[str, list[int] | None] = {}
-    for quantity, columns in plate.columns.items():
-        found[quantity] = plate.of(quantity)
-        if found[quantity] is None:
-            axes = " and ".join(sorted(columns))
-            raise BadDataError(
-                f"only {axes} of the {quantity} of plate '{printable(plate.plate) or name}' "
-                f"(column '{printable(table.names[next(iter(columns.values()))])}')",
-                expected="columns for x, y and z",
-                remedy="export all three, or add a column of zeros where it is zero by definition "
-                "(the height of a point on the floor, a torque about a level axis)",
-                file=path,
+    """One plate's columns, by quantity and axis; marks them in ``used``."""
+    for quantity, axes in columns.items():
+        if len(axes) < 3:
+            column = printable(table.names[next(iter(axes.values()))])
+            found = (
+                f"only {' and '.join(sorted(axes))} of the {quantity} of plate "
+                f"'{printable(plate) or name}' (column '{column}')"
             )
-    force, point = found["force"], found.get("point")
-    one, other = found.get("torque"), found.get("moment")
+            remedy = (
+                "export all three, or add a column of zeros where it is zero by definition "
+                "(the height of a point on the floor, a torque about a level axis)"
+            )
+            raise refusal(path, found, "columns for x, y and z", remedy)
+    by_quantity = {quantity: [axes[axis] for axis in "xyz"] for quantity, axes in columns.items()}
+    force, point = by_quantity["force"], by_quantity.get("point")
+    one, other = by_quantity.get("torque"), by_quantity.get("moment")
     moment = one or other if point else other or one
-    for chosen in (force, point, moment):
-        used.update(chosen or ())
-    assert force is not None
-    return GroundForce(
-        name,
-        table.values[:, force] * _newtons(table, force, path),
-        table.values[:, point] if point else None,
-        table.values[:, moment] if moment else None,
-        _unit(table, point[0]) if point else "",
-        _unit(table, moment[0]) if moment else "",
-    )
-
-
-def _newtons(table: _Table, columns: Sequence[int], path: Path) -> float:
-    unit = _unit(table, columns[0])
+    used.update(force, point or (), moment or ())
+    unit = table.unit(force[0])
     size = force_in_N(unit) if unit else 1.0
     if size is None:
-        raise BadDataError(
-            f"forces in '{printable(unit[:20])}'",
-            expected="N or kN",
-            remedy="export the forces in N",
-            file=path,
-        )
-    return size
-
-
-def _unit(table: _Table, column: int) -> str:
-    """In brackets behind the column's name, else in the row of units."""
-    if (meaning := meaning_of(table.names[column])) is not None and meaning.unit:
-        return meaning.unit
-    if column == 0 and (bracket := re.search(r"[\[(_]([^\[\]()]+)[\])]?$", table.names[0])):
-        return bracket[1]
-    return table.units[column].strip("[]() ")
-
-
-def _without_idle(force: GroundForce, least_N: float) -> GroundForce:
-    """With zero for a missing point or moment where the force is zero."""
-    idle = (np.abs(force.force_N) <= least_N).all(axis=1)
-    for values in (force.point, force.moment):
-        if values is not None:
-            values[idle & ~np.isfinite(values).all(axis=1)] = 0.0
-    return force
-
-
-def _about_columns(unknown: list[str]) -> list[Finding]:
-    if not unknown:
-        return []
-    told = ", ".join(printable(name[:40]) for name in unknown[:_NAMES_TOLD])
-    more = f" and {len(unknown) - _NAMES_TOLD} more" if len(unknown) > _NAMES_TOLD else ""
-    return [
-        Finding(
-            check="columns",
-            subject="",
-            found=f"{len(unknown)} columns of the forces that are not understood: {told}{more}",
-            expected="force, point and moment of each plate, by axis",
-            action="left them out",
-            level="info",
-        )
-    ]
+        found, remedy = f"forces in '{printable(unit[:20])}'", "export the forces in N"
+        raise refusal(path, found, "N or kN", remedy)
+    return GroundForce(
+        name,
+        table.values[:, force] * size,
+        table.values[:, point] if point else None,
+        table.values[:, moment] if moment else None,
+        table.unit(point[0]) if point else "",
+        table.unit(moment[0]) if moment else "",
+    )

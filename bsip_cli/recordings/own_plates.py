@@ -9,8 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from bsip_cli.recordings.analog import runs
-from bsip_cli.recordings.contacts import inside_outline
-from bsip_cli.recordings.force_balance import ContactLimits
+from bsip_cli.recordings.contacts import SOLE_HEIGHT_M, TOUCHED_N, inside_outline
 from bsip_cli.recordings.plates import cop_at_height
 from bsip_cli.recordings.under_the_feet import BESIDE_M
 
@@ -57,7 +56,6 @@ def foot_forces(
     on_ground: Mapping[str, np.ndarray],
     on_plate: Mapping[str, np.ndarray],
     rate_hz: float,
-    limits: ContactLimits | None = None,
 ) -> FootForces:
     """Give every plate's wrench to the one foot that stands on it.
 
@@ -71,9 +69,8 @@ def foot_forces(
     feet_m : by side "l", "r", points (N, k, 3) of the foot, k at least 2, world.
     on_ground, on_plate : by side, (N,) the foot touches; its contact is measured.
     """
-    limits = limits or ContactLimits()
     count = len(feet_m["l"])
-    owners = np.array([_owner(p, feet_m, on_ground, rate_hz, limits) for p in plates])
+    owners = np.array([_owner(p, feet_m, on_ground, rate_hz) for p in plates])
     owners = owners.reshape(len(plates), count)
     readings = np.array([p.wrench for p in plates]).reshape(len(plates), count, 6)
     broken = ~np.isfinite(readings).all(axis=(0, 2))
@@ -98,7 +95,7 @@ def plate_noise(plate: Reading, at_m: np.ndarray) -> np.ndarray:
     Third differences leave little of movement; the median of their size is not moved by impacts.
     Their variance is 20 times that of the noise.
     """
-    loaded = np.nan_to_num(plate.wrench[:, 2]) > ContactLimits.loaded_N
+    loaded = np.nan_to_num(plate.wrench[:, 2]) > TOUCHED_N
     moved = plate.wrench.copy()
     moved[:, 3:] -= np.cross(at_m, plate.wrench[:, :3])
     whole = loaded[3:] & loaded[2:-1] & loaded[1:-2] & loaded[:-3]
@@ -114,27 +111,31 @@ def _owner(
     feet_m: Mapping[str, np.ndarray],
     on_ground: Mapping[str, np.ndarray],
     rate_hz: float,
-    limits: ContactLimits,
 ) -> np.ndarray:
-    """(N,) whose load the plate bears."""
-    loaded = np.nan_to_num(plate.wrench[:, 2]) > limits.loaded_N
-    on = np.array([_on(plate, feet_m[side], on_ground[side], limits) for side in SIDES])
-    by_outline = np.select(
-        [on.all(axis=0), on[0], on[1]], [_SHARED, _LEFT, _RIGHT], default=_NOBODY
-    )
-    by_load = _by_load(plate, feet_m, on_ground, loaded & (by_outline == _NOBODY))
-    owner = np.where(by_outline == _NOBODY, by_load, by_outline)
-    return _filled(np.where(loaded, owner, _NOBODY), loaded, round(_AROUND_S * rate_hz))
+    """(N,) whose load the plate bears: by low points on its outline, else by its load.
 
-
-def _on(
-    plate: Reading, foot_m: np.ndarray, on_ground: np.ndarray, limits: ContactLimits
-) -> np.ndarray:
-    """(N,) a low point of a foot on the ground lies on the plate."""
-    if plate.corners_m is None:
-        return np.zeros(len(foot_m), bool)
-    low = foot_m[..., 2] - np.percentile(foot_m[..., 2], 2, axis=0) < limits.sole_height_m
-    return on_ground & (low & inside_outline(foot_m[..., :2], plate.corners_m[:, :2], 0.0)).any(1)
+    The owner of a load owns what the plate reads shortly before and after it.
+    """
+    loaded = np.nan_to_num(plate.wrench[:, 2]) > TOUCHED_N
+    on = np.zeros((2, len(loaded)), bool)
+    for k, side in enumerate(SIDES if plate.corners_m is not None else ()):
+        assert plate.corners_m is not None
+        foot = feet_m[side]
+        low = foot[..., 2] - np.percentile(foot[..., 2], 2, axis=0) < SOLE_HEIGHT_M
+        inside = inside_outline(foot[..., :2], plate.corners_m[:, :2], 0.0)
+        on[k] = on_ground[side] & (low & inside).any(1)
+    owner = np.select([on.all(axis=0), on[0], on[1]], [_SHARED, _LEFT, _RIGHT], default=_NOBODY)
+    asked = loaded & (owner == _NOBODY)
+    owner[asked] = _by_load(plate, feet_m, on_ground, asked)[asked]
+    owner[~loaded] = _NOBODY
+    filled, reach = owner.copy(), round(_AROUND_S * rate_hz)
+    for start, stop in runs(loaded):
+        for part, own in (
+            (slice(max(0, start - reach), start), owner[start]),
+            (slice(stop, stop + reach), owner[stop - 1]),
+        ):
+            filled[part] = np.where(loaded[part], filled[part], own)
+    return filled
 
 
 def _by_load(
@@ -144,21 +145,18 @@ def _by_load(
     asked: np.ndarray,
 ) -> np.ndarray:
     """(N,) whose ground the centre of pressure lies on, in the frames asked for."""
-    cop = plate.cop_m()
+    cop, both = plate.cop_m(), on_ground["l"] & on_ground["r"]
     gaps = np.array([_distance(cop, feet_m[side][..., :2]) for side in SIDES])
-    nearest, both = gaps.argmin(axis=0), on_ground["l"] & on_ground["r"]
-    clear = (gaps.min(axis=0) < BESIDE_M) & (
-        (gaps.min(axis=0) < _NEARER * gaps.max(axis=0)) | ~both
-    )
-    owner = np.where(clear, nearest, _UNCLEAR)
+    least, most = gaps.min(axis=0), gaps.max(axis=0)
+    clear = (least < BESIDE_M) & ((least < _NEARER * most) | ~both)
+    owner = np.where(clear, gaps.argmin(axis=0), _UNCLEAR)
     for start, stop in runs(asked):
         frames = np.arange(start, stop)[both[start:stop]]
-        kinds, counts = np.unique(owner[frames], return_counts=True)
-        if len(frames) and counts.max() < _AGREE * len(frames):
-            owner[frames] = _UNCLEAR
-        elif len(frames):
-            owner[frames] = kinds[counts.argmax()]
-    return np.where(asked, owner, _NOBODY)
+        if len(frames):
+            kinds, counts = np.unique(owner[frames], return_counts=True)
+            is_one = counts.max() >= _AGREE * len(frames)
+            owner[frames] = kinds[counts.argmax()] if is_one else _UNCLEAR
+    return owner
 
 
 def _distance(places_m: np.ndarray, foot_m: np.ndarray) -> np.ndarray:
@@ -169,15 +167,3 @@ def _distance(places_m: np.ndarray, foot_m: np.ndarray) -> np.ndarray:
         share = np.einsum("nc,nc->n", away, along) / np.maximum((along**2).sum(axis=1), 1e-9)
         gaps.append(np.linalg.norm(away - np.clip(share, 0, 1)[:, None] * along, axis=1))
     return np.min(gaps, axis=0)
-
-
-def _filled(owner: np.ndarray, loaded: np.ndarray, reach: int) -> np.ndarray:
-    """The owner of a load owns what the plate reads shortly before and after it."""
-    found = owner.copy()
-    for start, stop in runs(loaded):
-        for part, own in (
-            (slice(max(0, start - reach), start), owner[start]),
-            (slice(stop, stop + reach), owner[stop - 1]),
-        ):
-            found[part] = np.where(loaded[part], found[part], own)
-    return found

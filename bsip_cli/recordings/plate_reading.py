@@ -1,4 +1,5 @@
-"""How the numbers of one plate are understood: as the file says, or as proves true."""
+"""How a file is understood, as it says or as proves true: the numbers of one plate, and the
+laboratory's axes against those of the person."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ import numpy as np
 
 CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 Reference = Literal["stated", "reversed", "centred", "origin", "fixed"]
+Moved = Literal["", "all", "markers", "forces"]
 
 # Natural logarithms of how often a laboratory's files need a repair, beside being as they say. Only
 # their order of magnitude counts: one in thirty for units, which exporters confuse most, one in a
@@ -19,6 +21,9 @@ _MOMENTS_REVERSED = -6.2  # without the forces, or these without the moments, or
 REVERSED = -2.3  # the action on the plate: one in ten
 EXCHANGED = -5.3  # two plates
 ONE_ALONE = -0.7  # one plate of several: what goes wrong, goes wrong for all more often
+
+_ODD = -2.3  # of ten frames that are turned one is so by no multiple of 90 degrees
+_IN_PART = -2.3  # markers or forces alone are mirrored more rarely than both: one in ten
 
 
 @dataclass(frozen=True)
@@ -105,3 +110,73 @@ _ABOUT = {
     "origin": "took the moments about the laboratory's origin, the points for centres of pressure",
     "fixed": "took the moments about one point of the plate, the points for centres of pressure",
 }
+
+
+# --- axes -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class FrameChange:
+    """What of a session is written in other axes than it should be, and how these are changed: a
+    horizontal ``axis`` reversed or, where ``turned_deg`` is not 0, a turn about the vertical, of
+    which the standard deviation is ``turned_sd_deg``; by it a centre of pressure may be off by
+    ``unsure_m``, in 19 of 20.
+
+    corners_only : of a C3D the channels were not mirrored with the plates' corners.
+    """
+
+    moved: Moved = ""
+    axis: int = 0
+    turned_deg: float = 0.0
+    turned_sd_deg: float = 0.0
+    unsure_m: float = 0.0
+    corners_only: bool = False
+
+    @property
+    def moves_markers(self) -> bool:
+        return self.moved in ("all", "markers")
+
+    @property
+    def moves_forces(self) -> bool:
+        return self.moved in ("all", "forces")
+
+    def matrix(self) -> np.ndarray:
+        """From the axes as written to those of the person, (3, 3)."""
+        if self.turned_deg:
+            c, s = np.cos(np.deg2rad(self.turned_deg)), np.sin(np.deg2rad(self.turned_deg))
+            return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return np.diag([-1.0 if k == self.axis else 1.0 for k in range(3)])
+
+    def of_markers(self) -> tuple[bool, int]:
+        """What is done to the markers."""
+        return self.moves_markers, self.axis * self.moves_markers
+
+    def log_prior(self) -> float:
+        if self.moved == "forces":
+            turned = TURNED + _ODD * (self.turned_sd_deg > 0)
+            return turned if self.turned_deg else MIRRORED
+        return _IN_PART if self.moved == "markers" else 0.0
+
+    def words(self) -> str:
+        """What is done, as a clause; empty if nothing."""
+        if not self.moved:
+            return ""
+        what = {"all": "markers and forces", "markers": "the markers", "forces": "the forces"}
+        if self.turned_deg:
+            sd = f" +- {self.turned_sd_deg:.2g}" if self.turned_sd_deg else ""
+            return (
+                f"turned {what[self.moved]} by {self.turned_deg:.4g}{sd} degrees about the vertical"
+            )
+        return f"reversed the {'XY'[self.axis]} axis of {what[self.moved]}"
+
+
+MIRRORS = (
+    FrameChange("all"),
+    FrameChange("all", corners_only=True),
+    FrameChange("markers", 0),
+    FrameChange("markers", 1),
+)
+FORCES_MOVED = (
+    *(FrameChange("forces", axis) for axis in (0, 1)),
+    *(FrameChange("forces", turned_deg=turn) for turn in (90.0, 180.0, 270.0)),
+)

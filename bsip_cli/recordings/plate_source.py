@@ -2,28 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import chain, combinations, product
 from typing import Protocol
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from bsip_cli.recordings.cop_polynomial import correct_cop
-from bsip_cli.recordings.model import Finding, Plate
-from bsip_cli.recordings.plate_reading import AS_STATED, CHANNELS, PlateReading, Reference
+from bsip_cli.recordings.model import Finding, Plate, Recording
+from bsip_cli.recordings.plate_reading import (
+    AS_STATED,
+    CHANNELS,
+    FrameChange,
+    PlateReading,
+    Reference,
+)
 from bsip_cli.recordings.plates import (
+    LOADED_N,
     LocalWrench,
     PlateDescription,
+    cop_shift_m,
     crossing,
-    surface_offset_m,
-    to_world,
 )
 
 _THICK_M = 0.3  # no plate's sensors lie so deep under its surface
 _Z = np.array([1.0, 1.0, -1.0])
 _HARDLY = 0.05  # of a bell: less of it has points
+# Of the force: what makers state for a plate's linearity and cross talk. A copy or a sum is the
+# same reading and differs by rounding; the loads of two feet differ by tens of per cent mostly.
+_SAME, _MOSTLY = 0.01, 0.9
+_BEARS = 0.05
+_MOST_TERMS = 4  # of a sum
 _STILL_M = 1e-6  # points that stay where they are, are no centres of pressure
 
 
@@ -83,6 +93,30 @@ def lift_N(source: PlateSource) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
+class Opened:
+    """A recording as its file has it, before it is decided how its plates' numbers are understood:
+    ``recording`` is without its plates."""
+
+    recording: Recording
+    sources: tuple[PlateSource, ...]
+
+    def with_plates(self, numbers: Collection[int]) -> Opened:
+        """Only plates of these numbers; without any, all."""
+        names = set(map(str, numbers))
+        chosen = (source for source in self.sources if not names or source.name in names)
+        return replace(self, sources=tuple(chosen))
+
+    def in_frame(self, change: FrameChange) -> Opened:
+        """In other axes."""
+        recording, sources, matrix = self.recording, self.sources, change.matrix()
+        if change.moves_markers:
+            recording = replace(recording, markers_m=recording.markers_m @ matrix.T)
+        if change.moves_forces:
+            sources = tuple(one.moved(matrix, change.corners_only) for one in sources)
+        return Opened(recording, sources)
+
+
+@dataclass(frozen=True, eq=False)
 class C3dPlate:
     """A plate of a C3D file: its wrench at the sensor's origin, plate frame."""
 
@@ -121,8 +155,13 @@ class C3dPlate:
 
     def plate(self, reading: PlateReading) -> Plate:
         description = self.read_description(reading)
-        surface, _ = correct_cop(self._at_surface(reading), description)
-        force, moment = to_world(surface, description, self.rotation_world_lab)
+        surface, shift_m = self._at_surface(reading), self._shift_m(reading)
+        if shift_m is not None:
+            moment = surface.moment_Nm.copy()
+            moment[:, 0] -= shift_m[:, 1] * surface.force_N[:, 2]
+            moment[:, 1] += shift_m[:, 0] * surface.force_N[:, 2]
+            surface = replace(surface, moment_Nm=moment)
+        force, moment = surface.to_world(description, self.rotation_world_lab)
         corners = description.corners_m @ self.rotation_world_lab.T
         return Plate(self.name, reading.sign * force, reading.sign * moment, corners, self.usable)
 
@@ -161,7 +200,14 @@ class C3dPlate:
             yield PlateReading(reversed_channel=channel)
 
     def findings(self, reading: PlateReading) -> list[Finding]:
-        return list(correct_cop(self._at_surface(reading), self.read_description(reading))[1])
+        """The maker's correction of the centre of pressure; force and vertical moment stay."""
+        if (shift_m := self._shift_m(reading)) is None:
+            return []
+        under_load = shift_m[np.abs(self._at_surface(reading).force_N[:, 2]) > LOADED_N]
+        largest_mm = 1e3 * np.max(np.linalg.norm(under_load, axis=1), initial=0.0)
+        found = "FPCOPPOLY holds the maker's correction of the centre of pressure"
+        action = f"applied it: shifts of up to {largest_mm:.1f} mm under load"
+        return [Finding("plate_cop", self.name, found, "", action, "info")]
 
     def read_description(self, reading: PlateReading) -> PlateDescription:
         """Corners in the order, and the outline in the size, of a reading."""
@@ -178,12 +224,19 @@ class C3dPlate:
     def _surface_m(self, reading: PlateReading) -> np.ndarray:
         """From the sensor's origin to the surface, plate frame, (3,): it lies under the surface,
         whichever way the order of the corners turns the plate's z."""
-        offset = surface_offset_m(self.description)
+        offset = self.description.surface_offset_m()
         if reading.about != "stated":
             offset = offset * (np.array([-1, -1, 1]) if reading.about == "reversed" else [0, 0, 1])
             offset[2] *= abs(offset[2]) < _THICK_M
         axes = self.rotation_world_lab @ self.read_description(reading).rotation_lab_plate()
         return offset * _Z if axes[2, 2] > 0 else offset
+
+    def _shift_m(self, reading: PlateReading) -> np.ndarray | None:
+        """Of the centre of pressure on the surface, (n, 2); None without a maker's polynomial."""
+        description = self.read_description(reading)
+        if description.cop_polynomial is None:
+            return None
+        return cop_shift_m(self._at_surface(reading), description)
 
     def _at_surface(self, reading: PlateReading) -> LocalWrench:
         """Before the sign of a reading."""
@@ -270,7 +323,7 @@ class ForceOnPoint:
 
     def in_place_of(self, other: PlateSource) -> ForceOnPoint:
         assert isinstance(other, ForceOnPoint)
-        return other.with_force(self)
+        return replace(other, name=self.name, force_N=self.force_N, moment=self.moment)
 
     def floor_m(self, reading: PlateReading = AS_STATED) -> float:
         return self.point_height * reading.point_scale
@@ -324,10 +377,6 @@ class ForceOnPoint:
         x, y, z = (turn.T @ centre).tolist()
         return replace(reading, centre_m=(x, y, z))
 
-    def with_force(self, other: ForceOnPoint) -> ForceOnPoint:
-        """These points with another force and its moment."""
-        return replace(self, name=other.name, force_N=other.force_N, moment=other.moment)
-
     # From the parts, lab frame, (3, 12) each.
 
     def _force(self, reading: PlateReading) -> np.ndarray:
@@ -373,3 +422,44 @@ def points_that_move(point: np.ndarray, loaded: np.ndarray) -> bool:
     """Whether points of force (n, 3) under load (n,) are more than one place."""
     some = point[loaded & np.isfinite(point).all(axis=1)]
     return bool(len(some) and np.ptp(some, axis=0).max() > _STILL_M * max(1.0, np.abs(some).max()))
+
+
+# --- plates that are copies or sums of others, as treadmills and virtual plates export them -------
+
+
+def repeated_plates(trials: Sequence[Mapping[str, PlateSource]]) -> dict[str, tuple[str, ...]]:
+    """Names of plates whose force is that of another, or the sum of others, in every trial.
+
+    Fewer terms are tried first, so that each is needed; of two copies the later one repeats. Forces
+    are vertical ones, whichever way the plate lies and its signs are.
+    """
+    repeated: dict[str, tuple[str, ...]] = {}
+    forces = [
+        {name: np.where(s.usable, np.abs(lift_N(s)), np.nan) for name, s in trial.items()}
+        for trial in trials
+    ]
+    names = list(dict.fromkeys(n for trial in trials for n in trial))
+    for name in reversed(names):
+        others = [n for n in names if n != name and n not in repeated]
+        earlier = [n for n in others if names.index(n) < names.index(name)]
+        sums = (combinations(others, n) for n in range(2, min(len(others), _MOST_TERMS) + 1))
+        possible = chain(combinations(earlier, 1), *sums)
+        terms = next((some for some in possible if _is_sum(forces, name, some)), None)
+        if terms is not None:
+            repeated[name] = terms
+    return repeated
+
+
+def _is_sum(trials: Sequence[Mapping[str, np.ndarray]], name: str, terms: Sequence[str]) -> bool:
+    """In every trial that has them all."""
+    common = [trial for trial in trials if name in trial and all(t in trial for t in terms)]
+    if not common:
+        return False
+    forces = np.stack([np.concatenate([t[n] for t in common]) for n in (name, *terms)])
+    forces = forces[:, np.isfinite(forces).all(axis=0)]
+    if not forces[0].any():
+        return False
+    # Plates that bear nothing are alike; a few samples may be damaged on one of them.
+    loaded = forces.max(axis=0) > _BEARS * forces.max()
+    gap = np.abs(forces[0] - forces[1:].sum(axis=0))[loaded]
+    return bool(np.mean(gap < _SAME * forces[0, loaded]) > _MOSTLY)

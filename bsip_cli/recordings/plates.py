@@ -9,7 +9,6 @@ when one is described badly.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 N_CHANNELS = {1: 6, 2: 6, 3: 8, 4: 6}
 LOADED_N = 100.0  # a foot stands on the plate
 _LEAST_FORCE_N = 1e-6
+_MM = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class PlateDescription:
     kind: int  # FORCE_PLATFORM:TYPE, 1 to 4
     corners_m: np.ndarray  # (4, 3)
     origin_m: np.ndarray  # (3,), see `LocalWrench.at_surface`; type 3: sensor distances a, b, az0
-    cop_polynomial: np.ndarray | None = None  # (2, 6), see `correct_cop`
+    cop_polynomial: np.ndarray | None = None  # (2, 6), see `cop_shift_m`
 
     def centre_m(self) -> np.ndarray:
         return self.corners_m.mean(axis=0)
@@ -44,6 +44,17 @@ class PlateDescription:
         z = crossing(x) @ y
         axes = np.array([x, crossing(z) @ x, z]).T
         return axes / np.linalg.norm(axes, axis=0)
+
+    def surface_offset_m(self) -> np.ndarray:
+        """From the sensor's origin to the centre of the surface, plate frame, (3,).
+
+        The format wants z < 0. Many exporters write the opposite vector: reversed here.
+        """
+        if self.kind == 1:
+            return np.zeros(3)
+        if self.kind == 3:  # the first two are sensor distances and no offset
+            return np.array([0.0, 0.0, -abs(self.origin_m[2])])
+        return -self.origin_m if self.origin_m[2] > 0 else self.origin_m
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +75,15 @@ class LocalWrench:
         """Centre of pressure on the surface, plate frame, (n, 2); NaN without load."""
         return cop_at_height(self.force_N, self.moment_Nm, 0.0)
 
+    def to_world(
+        self, plate: PlateDescription, rotation_world_lab: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Of a wrench at the surface force and moment about the world origin, (n, 3) each."""
+        rotation = rotation_world_lab @ plate.rotation_lab_plate()
+        force = self.force_N @ rotation.T
+        centre = rotation_world_lab @ plate.centre_m()
+        return force, self.moment_Nm @ rotation.T + np.cross(centre, force)
+
 
 def crossing(vector: np.ndarray) -> np.ndarray:
     """The matrix (3, 3) whose product with another vector is the cross product."""
@@ -82,38 +102,16 @@ def cop_at_height(
     return np.stack([x, y], axis=-1)
 
 
-def local_wrench(kind: int, channels: np.ndarray, plate: PlateDescription) -> LocalWrench:
+def local_wrench(channels: np.ndarray, plate: PlateDescription) -> LocalWrench:
     """Channels (n, 6 or 8) in N, N m (type 1: m) to the wrench at the sensor's origin."""
-    return _BY_TYPE[kind](channels, plate)
-
-
-def surface_offset_m(plate: PlateDescription) -> np.ndarray:
-    """From the sensor's origin to the centre of the surface, plate frame, (3,).
-
-    The format wants z < 0. Many exporters write the opposite vector: reversed here.
-    """
-    if plate.kind == 1:
-        return np.zeros(3)
-    if plate.kind == 3:  # the first two are sensor distances and no offset
-        return np.array([0.0, 0.0, -abs(plate.origin_m[2])])
-    return -plate.origin_m if plate.origin_m[2] > 0 else plate.origin_m
-
-
-def _type_1(channels: np.ndarray, _plate: PlateDescription) -> LocalWrench:
-    """Fx, Fy, Fz, COP x, COP y, free moment."""
-    force = channels[:, :3]
-    n = len(channels)
-    point = np.column_stack([channels[:, 3:5], np.zeros(n)])
-    free = np.column_stack([np.zeros((n, 2)), channels[:, 5]])
-    return LocalWrench(force, np.cross(point, force) + free)
-
-
-def _six_components(channels: np.ndarray, _plate: PlateDescription) -> LocalWrench:
-    return LocalWrench(channels[:, :3], channels[:, 3:6])
-
-
-def _type_3(channels: np.ndarray, plate: PlateDescription) -> LocalWrench:
-    """Kistler: Fx12, Fx34, Fy14, Fy23, Fz1 to Fz4 at the distances a, b from the centre."""
+    if plate.kind == 1:  # Fx, Fy, Fz, COP x, COP y, free moment
+        force, n = channels[:, :3], len(channels)
+        point = np.column_stack([channels[:, 3:5], np.zeros(n)])
+        free = np.column_stack([np.zeros((n, 2)), channels[:, 5]])
+        return LocalWrench(force, np.cross(point, force) + free)
+    if plate.kind != 3:
+        return LocalWrench(channels[:, :3], channels[:, 3:6])
+    # Kistler: Fx12, Fx34, Fy14, Fy23, Fz1 to Fz4 at the distances a, b from the centre.
     a, b = np.abs(plate.origin_m[:2])
     fx12, fx34, fy14, fy23, fz1, fz2, fz3, fz4 = channels[:, :8].T
     force = np.column_stack([fx12 + fx34, fy14 + fy23, fz1 + fz2 + fz3 + fz4])
@@ -127,29 +125,33 @@ def _type_3(channels: np.ndarray, plate: PlateDescription) -> LocalWrench:
     return LocalWrench(force, moment)
 
 
-_BY_TYPE: dict[int, Callable[[np.ndarray, PlateDescription], LocalWrench]] = {
-    1: _type_1,
-    2: _six_components,
-    3: _type_3,
-    4: _six_components,
-}
+def cop_shift_m(wrench: LocalWrench, plate: PlateDescription) -> np.ndarray:
+    """By how much the maker's polynomial moves the centre of pressure of a surface wrench, (n, 2).
+
+    Kistler, manual of the force plate type 9287C, section 8.4.3: x is lessened by
+    (P1 y^4 + P2 y^2 + P3) x^3 + (P4 y^4 + P5 y^2 + P6) x, y likewise with x and y exchanged;
+    coefficients per mm. Outside the outline, where nothing was fitted, the shift of the
+    nearest point of the rim counts.
+    """
+    assert plate.cop_polynomial is not None
+    limits, shifts = plate.half_size_m(), []
+    x, y = np.clip(np.nan_to_num(wrench.cop()), -limits, limits).T * _MM
+    for p, along, across in zip(plate.cop_polynomial, (x, y), (y, x), strict=True):
+        cubic, linear = (p[k] * across**4 + p[k + 1] * across**2 + p[k + 2] for k in (0, 3))
+        shifts.append(cubic * along**3 + linear * along)
+    return np.column_stack(shifts) / _MM
 
 
-def to_world(
-    wrench: LocalWrench, plate: PlateDescription, rotation_world_lab: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Surface wrench in the plate frame to force and moment about the world origin, (n, 3) each."""
-    rotation = rotation_world_lab @ plate.rotation_lab_plate()
-    force = wrench.force_N @ rotation.T
-    centre = rotation_world_lab @ plate.centre_m()
-    return force, wrench.moment_Nm @ rotation.T + np.cross(centre, force)
+def side_lengths(corners_m: np.ndarray) -> np.ndarray:
+    """Of corners (4, 3), (4,)."""
+    return np.linalg.norm(np.roll(corners_m, -1, axis=0) - corners_m, axis=1)
 
 
 def corners_are_plausible(corners_m: np.ndarray) -> bool:
     """A flat, roughly rectangular quadrilateral of 0.1 to 5 m, not too far away."""
     if not np.isfinite(corners_m).all() or np.abs(corners_m).max() > 100.0:
         return False
-    sides = np.linalg.norm(np.roll(corners_m, -1, axis=0) - corners_m, axis=1)
+    sides = side_lengths(corners_m)
     if sides.min() < 0.1 or sides.max() > 5.0:
         return False
     diagonals = np.linalg.norm(corners_m[2:] - corners_m[:2], axis=1)

@@ -1,25 +1,49 @@
-"""The one door to recordings: a path in, a recording out."""
+"""The one door to recordings: a path in, a recording out, with the forces of the plates whose
+numbers are understood, or the reason for none."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.files.regular import check_regular
-from bsip_cli.recordings.assemble import assemble
-from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.opened import Opened
-from bsip_cli.recordings.settle import SessionReading, settle_session
+from bsip_cli.recordings.hypothesis import ALIKE_M
+from bsip_cli.recordings.model import Finding, Plate, Recording
+from bsip_cli.recordings.plate_reading import FrameChange
+from bsip_cli.recordings.plate_source import Opened
+from bsip_cli.recordings.plates import LOADED_N
+from bsip_cli.recordings.scene import handedness
+from bsip_cli.recordings.settle import SessionReading, Verdict, settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
+from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
+
+_ABSURD_N = 15_000.0
+_LIGHTLY_LOADED_N = 20.0
+_PULL_SHARE = 0.2  # of the push's impulse
+_WINDOW_S = 0.1
+_QUIET_SHARE = 0.05  # of the mean load: more is movement, in which both feet press at once
+_LEAST_CHANGE_N = 1.0
+_TOGETHER = 0.8  # correlation
+_UNLOADED = Verdict()
+_WITHOUT_PLACE = (
+    "this recording lacks the plate with which it was exchanged in the others",
+    "left the plate out",
+    "excluded",
+)
 
 
-def read_recording(path: Path, session: SessionReading | None = None) -> Recording:
+def read_recording(path: Path) -> Recording:
     """Read a ``.c3d``, or a ``.trc`` with the file of ground forces beside it.
 
-    ``session`` says how its numbers are to be understood; without it this trial alone decides.
+    This trial alone decides how its numbers are to be understood.
     """
     opened = open_recording(path)
-    return assemble(opened, session or settle_session([TrialSamples.of(opened)]))
+    return assemble(opened, settle_session([TrialSamples.of(opened)]))
 
 
 def open_recording(path: Path) -> Opened:
@@ -41,3 +65,206 @@ def open_recording(path: Path) -> Opened:
         remedy="export it as C3D",
         file=path,
     )
+
+
+def assemble(opened: Opened, session: SessionReading) -> Recording:
+    """The recording with its plates, understood as all trials of the session say."""
+    opened = opened.in_frame(session.frame)
+    recording = opened.recording
+    findings = [*findings_about(session), *_about_sides(recording)]
+    if recording.forces_note:
+        return replace(recording, findings=(*recording.findings, *findings))
+    plates: list[Plate] = []
+    reversed_names = []
+    by_name = {source.name: source for source in opened.sources}
+    for source in opened.sources:
+        verdict = session.plates.get(source.name, _UNLOADED)
+        if verdict.refusal or verdict.repeats:
+            continue
+        if other := verdict.reading.place_of:
+            if other not in by_name:
+                findings.append(_about(source.name, *_WITHOUT_PLACE))
+                continue
+            source = source.in_place_of(by_name[other])
+        plate = source.plate(verdict.reading)
+        if fault := _no_person(plate):
+            findings.append(fault)
+            continue
+        findings += source.findings(verdict.reading)
+        plates.append(plate)
+        if verdict.reading.sign < 0:
+            findings.append(_reversed(plate))
+            reversed_names.append(plate.name)
+    findings += sign_doubts(plates, reversed_names, recording.analog_rate_hz)
+    note = why_no_forces(plates, bool(opened.sources))
+    return replace(
+        recording,
+        plates=() if note else tuple(plates),
+        findings=(*recording.findings, *findings),
+        forces_note=note,
+    )
+
+
+def findings_about(session: SessionReading) -> list[Finding]:
+    """What was decided for all trials of a session alike."""
+    plates = (_about_plate(name, verdict) for name, verdict in session.plates.items())
+    return [*_about_frame(session.frame), *(finding for found in plates for finding in found)]
+
+
+def _about_frame(frame: FrameChange) -> list[Finding]:
+    if not frame.moved:
+        return []
+    if frame.moved == "forces":
+        check, expected = "frame", "markers and forces in one frame"
+        found = "the forces lie under the feet and go with the motion in another frame only"
+        action = f"{frame.words()}, in all trials"
+        if frame.unsure_m > ALIKE_M:
+            action += f": centres of pressure may be off by {1e3 * frame.unsure_m:.0f} mm; if you "
+            action += "know how the plates lie, correct their corners"
+            return [Finding(check, "", found, expected, action, "warning")]
+    else:
+        check, expected = "mirrored", "a right-handed frame"
+        found = "left and right are exchanged all over the body: a left-handed laboratory frame"
+        action = f"{frame.words()}, in all trials; if instead left and right labels are exchanged, "
+        action += "rename them"
+    return [Finding(check, "", found, expected, action, "corrected")]
+
+
+def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
+    if verdict.repeats:
+        whose = " and ".join(verdict.repeats)
+        found = f"its force is that of plate {whose}"
+        found += " together" if len(verdict.repeats) > 1 else ""
+        action = "left it out, so that no force counts twice"
+        expected = "plates that measure different feet"
+        return [Finding("plate_repeated", name, found, expected, action, "corrected")]
+    if verdict.refusal:
+        action = "left the plate out: no other unit, point or order of corners explains it"
+        if verdict.rivals:
+            action = (
+                f"left the plate out: {' or '.join(verdict.rivals)}: these trials cannot tell; one "
+                "with more movement might"
+            )
+        return [_about(name, verdict.refusal, action, "excluded")]
+    reading, findings = verdict.reading, []
+    if verdict.doubted:
+        is_moment = verdict.doubted == "vertical moment"
+        found = f"its {verdict.doubted}: {' or '.join(verdict.rivals)}: these trials cannot tell"
+        expected = "one that moves the body as the markers do"
+        action = "took it as it stands; a movement that "
+        action += f"{'turns the body' if is_moment else 'pushes the body more'} would tell"
+        check = "plate_moment" if is_moment else "plate_force"
+        findings.append(Finding(check, name, found, expected, action, "warning"))
+    if words := reading.words():
+        assert verdict.before is not None and verdict.after is not None
+        before, after = _words(verdict.before), _words(verdict.after)
+        action = f"{words}: {after}" if after else f"{words}, as of the other plates"
+        findings.append(_about(name, before or "never loaded", action, "corrected"))
+    if reading.half_size_m is not None:
+        sides = " x ".join(f"{2 * half:.2f}" for half in reading.half_size_m)
+        found = "its load lies beside its outline and under a foot"
+        findings.append(_about(name, found, f"widened the outline to {sides} m", "corrected"))
+    return findings
+
+
+def _about_sides(recording: Recording) -> list[Finding]:
+    """Parts of the body that have left and right exchanged."""
+    found = "left and right markers are on the wrong sides, and not all over the body"
+    action = "left them as they are; correct the labels"
+    return [
+        Finding("labels", part, found, "left on the left", action, "warning")
+        for part in handedness(recording.labels, recording.markers_m).exchanged()
+    ]
+
+
+def why_no_forces(plates: Sequence[Plate], had_some: bool = True) -> str:
+    """Empty, or why these plates give no forces."""
+    if not had_some:
+        return "the file has no usable force plates"
+    if not plates:
+        return "every force plate was left out"
+    if not any(plate.usable.any() for plate in plates):
+        return "the force plates have no usable sample"
+    total = np.sum([np.where(p.usable, p.force_N[:, 2], 0.0) for p in plates], axis=0)
+    largest = np.max(total, initial=0.0)
+    if largest < LOADED_N:
+        return f"the force plates were never loaded (at most {largest:.0f} N)"
+    return ""
+
+
+def _no_person(plate: Plate) -> Finding | None:
+    """Why a plate's forces in this trial are no person's."""
+    lift = plate.force_N[plate.usable, 2]
+    if not len(lift):
+        return None
+    largest = np.percentile(np.abs(lift), 99.5)
+    pull = -lift[lift < -_LIGHTLY_LOADED_N].sum()
+    push = lift[lift > _LIGHTLY_LOADED_N].sum()
+    if largest >= _ABSURD_N:
+        check, found = "plate_force", f"vertical forces up to {largest / 1000:.1f} kN"
+        expected = f"less than {_ABSURD_N / 1000:.0f} kN"
+    elif pull > _PULL_SHARE * push and lift.min() < -LOADED_N:
+        found = f"pushes up to {lift.max():.0f} N and pulls up to {-lift.min():.0f} N"
+        check, expected = "plate_sign", "pushes only"
+    else:
+        return None
+    return Finding(check, plate.name, found, expected, "left the plate out", "excluded")
+
+
+def _reversed(plate: Plate) -> Finding:
+    lift = plate.force_N[plate.usable, 2]
+    loaded = lift[np.abs(lift) > _LIGHTLY_LOADED_N]
+    found = "a pull: the action on the plate"
+    if len(loaded):
+        found = f"median vertical force on the body {-np.median(loaded):.0f} N"
+    action = "reversed all six components"
+    return Finding("plate_sign", plate.name, found, "a push (positive)", action, "corrected")
+
+
+def sign_doubts(
+    plates: Sequence[Plate], reversed_names: Collection[str], rate_hz: float
+) -> list[Finding]:
+    """A warning for each reversed plate whose load changes together with the others' load.
+
+    In quiet standing the weight is constant, so the loads change in opposite directions. If
+    they would without the reversal, the plate's zero is wrong rather than its sign.
+    """
+    findings, width = [], max(1, round(_WINDOW_S * rate_hz))
+    for plate in plates:
+        others = [other for other in plates if other is not plate]
+        good = np.logical_and.reduce([p.usable for p in plates])
+        if plate.name not in reversed_names or not others or good.sum() < rate_hz:
+            continue
+        own = uniform_filter1d(plate.force_N[good, 2], width)
+        rest = uniform_filter1d(np.sum([p.force_N[good, 2] for p in others], axis=0), width)
+        if not all(
+            load.mean() > LOADED_N and _LEAST_CHANGE_N < load.std() < _QUIET_SHARE * load.mean()
+            for load in (own, rest)
+        ):
+            continue
+        if (correlation := float(np.corrcoef(own, rest)[0, 1])) < _TOGETHER:
+            continue
+        found = (
+            f"reversed, its load changes together with the other plates' (r = {correlation:.2f}, "
+            f"the sum by {(own + rest).std():.1f} N; as recorded by {(own - rest).std():.1f} N)"
+        )
+        expected = "opposite changes in quiet standing"
+        action = "kept it reversed; if its zero is lost instead, its load and the sum are wrong"
+        findings.append(Finding("plate_sign", plate.name, found, expected, action, "warning"))
+    return findings
+
+
+def _about(name: str, found: str, action: str, level: str) -> Finding:
+    expected = f"under the foot that stands on it, to {BESIDE_M:g} m"
+    return Finding("plate_cop", name, found, expected, action, level)
+
+
+def _words(evidence: Evidence) -> str:
+    """Where a reading puts the force; empty if there is none."""
+    if np.isfinite(evidence.distance_m):
+        place = f"{evidence.distance_m:.2f} m beside the feet on the ground"
+    elif np.isfinite(evidence.outside_m):
+        place = f"{evidence.outside_m:.2f} m outside the plate"
+    else:
+        return ""
+    return f"centre of pressure {place}, moving by {1e3 * evidence.sway_m:.3g} mm"

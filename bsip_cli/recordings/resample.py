@@ -21,7 +21,6 @@ _BLOCK_FRAMES = 1000
 class FrameWrench:
     """Wrench on the body at the marker times, world frame, about the world origin."""
 
-    time_s: np.ndarray  # (n_frames,)
     names: tuple[str, ...]
     per_plate: np.ndarray  # (n_plates, n_frames, 6): fx, fy, fz [N], mx, my, mz [N m]
     plate_usable: np.ndarray  # (n_plates, n_frames) bool
@@ -45,17 +44,12 @@ def wrench_at_marker_rate(recording: Recording) -> FrameWrench:
     """
     n_frames = recording.n_frames
     per_plate = np.zeros((len(recording.plates), n_frames, 6))
-    usable = np.zeros((len(recording.plates), n_frames), bool)
+    usable = np.zeros(per_plate.shape[:2], bool)
     for i, plate in enumerate(recording.plates):
-        per_plate[i], usable[i] = sample_at_frames(
-            plate.wrench(),
-            plate.usable,
-            recording.analog_rate_hz,
-            recording.marker_rate_hz,
-            n_frames,
-        )
+        rates = recording.analog_rate_hz, recording.marker_rate_hz
+        per_plate[i], usable[i] = sample_at_frames(plate.wrench(), plate.usable, *rates, n_frames)
     names = tuple(plate.name for plate in recording.plates)
-    return FrameWrench(recording.time_s(), names, per_plate, usable)
+    return FrameWrench(names, per_plate, usable)
 
 
 def sample_at_frames(
@@ -72,7 +66,10 @@ def sample_at_frames(
     """
     clean = np.where(usable[:, None], signal, 0.0)
     if np.isclose(signal_rate_hz, frame_rate_hz, rtol=1e-9):
-        return _same_rate(clean, usable, n_frames)
+        values, good = np.zeros((n_frames, clean.shape[1])), np.zeros(n_frames, bool)
+        n = min(n_frames, len(clean))
+        values[:n], good[:n] = clean[:n], usable[:n]
+        return values, good
     ratio = signal_rate_hz / frame_rate_hz
     if ratio > 1 and abs(ratio - round(ratio)) < 1e-9 * ratio:
         return _decimated(clean, usable, round(ratio), n_frames)
@@ -82,26 +79,22 @@ def sample_at_frames(
 def _decimated(
     clean: np.ndarray, usable: np.ndarray, ratio: int, n_frames: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A whole number of samples per frame: one filter for all frames."""
+    """A whole number of samples per frame: one symmetric filter for all frames."""
     half = _HALF_LENGTH * ratio
     distance = np.arange(-half, half + 1) / ratio
     kernel = np.sinc(2 * _CUTOFF * distance) * _kaiser(distance / (_HALF_LENGTH + 1))
     kernel /= kernel.sum()
 
-    inside = _every(ratio, np.abs(kernel), np.ones(len(usable)), n_frames)
-    lost = _every(ratio, np.abs(kernel), (~usable).astype(float), n_frames)
-    norm = _every(ratio, kernel, usable.astype(float), n_frames)
-    weighted = _every(ratio, kernel, clean, n_frames)
-    return _judged(weighted, norm, lost / np.maximum(inside, 1e-12))
+    def every(taps: np.ndarray, signal: np.ndarray) -> np.ndarray:
+        """Its output at every ratio-th sample from the first on, (n_frames, ...)."""
+        n_zeros = max(half + ratio, n_frames * ratio + half - len(signal))
+        padded = np.concatenate([signal, np.zeros((n_zeros, *signal.shape[1:]))])
+        filtered = upfirdn(taps, padded, up=1, down=ratio, axis=0)
+        return filtered[_HALF_LENGTH : _HALF_LENGTH + n_frames]
 
-
-def _every(ratio: int, taps: np.ndarray, signal: np.ndarray, n_frames: int) -> np.ndarray:
-    """The symmetric filter's output at every ratio-th sample from the first on, (n_frames, ...)."""
-    half = len(taps) // 2
-    n_zeros = max(half + ratio, n_frames * ratio + half - len(signal))
-    padded = np.concatenate([signal, np.zeros((n_zeros, *signal.shape[1:]))])
-    delay = half // ratio  # of a filter of _HALF_LENGTH frames: whole
-    return upfirdn(taps, padded, up=1, down=ratio, axis=0)[delay : delay + n_frames]
+    inside = every(np.abs(kernel), np.ones(len(usable)))
+    lost = every(np.abs(kernel), (~usable).astype(float)) / np.maximum(inside, 1e-12)
+    return _judged(every(kernel, clean), every(kernel, usable.astype(float)), lost)
 
 
 def _judged(
@@ -121,42 +114,24 @@ def _interpolated(
     n_frames: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Any ratio: the filter is evaluated anew around each frame's time."""
-    values = np.zeros((n_frames, clean.shape[1]))
-    good = np.zeros(n_frames, bool)
+    slower_hz = min(signal_rate_hz, frame_rate_hz)
+    half = int(np.ceil(_HALF_LENGTH * signal_rate_hz / slower_hz))
+    values, good = np.zeros((n_frames, clean.shape[1])), np.zeros(n_frames, bool)
     for start in range(0, n_frames, _BLOCK_FRAMES):
         frames = np.arange(start, min(start + _BLOCK_FRAMES, n_frames))
-        index, weights = _weights(frames, len(clean), signal_rate_hz, frame_rate_hz)
+        centre = frames / frame_rate_hz * signal_rate_hz
+        index = np.rint(centre).astype(int)[:, None] + np.arange(-half, half + 1)
+        distance = (index - centre[:, None]) / signal_rate_hz * slower_hz  # in slower periods
+        weights = np.sinc(2 * _CUTOFF * distance) * _kaiser(distance / (_HALF_LENGTH + 1))
+        weights[(index < 0) | (index >= len(clean))] = 0.0
+        index = np.clip(index, 0, len(clean) - 1)
+        total = weights.sum(axis=1, keepdims=True)
+        weights = weights / np.where(total > 0, total, 1.0)
         heard = weights * usable[index]
         lost = np.abs(weights - heard).sum(axis=1) / np.abs(weights).sum(axis=1)
         weighted = np.einsum("fj,fjk->fk", heard, clean[index])
         values[frames], good[frames] = _judged(weighted, heard.sum(axis=1), lost)
     return values, good
-
-
-def _same_rate(
-    clean: np.ndarray, usable: np.ndarray, n_frames: int
-) -> tuple[np.ndarray, np.ndarray]:
-    n = min(n_frames, len(clean))
-    values = np.zeros((n_frames, clean.shape[1]))
-    good = np.zeros(n_frames, bool)
-    values[:n], good[:n] = clean[:n], usable[:n]
-    return values, good
-
-
-def _weights(
-    frames: np.ndarray, n_samples: int, signal_rate_hz: float, frame_rate_hz: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Sample indices and filter weights of each frame, (n, taps) each, summing to one."""
-    slower_hz = min(signal_rate_hz, frame_rate_hz)
-    half = int(np.ceil(_HALF_LENGTH * signal_rate_hz / slower_hz))
-    centre = frames / frame_rate_hz * signal_rate_hz
-    index = np.rint(centre).astype(int)[:, None] + np.arange(-half, half + 1)
-    distance = (index - centre[:, None]) / signal_rate_hz * slower_hz  # in slower periods
-    weights = np.sinc(2 * _CUTOFF * distance) * _kaiser(distance / (_HALF_LENGTH + 1))
-    weights[(index < 0) | (index >= n_samples)] = 0.0
-    index = np.clip(index, 0, n_samples - 1)
-    total = weights.sum(axis=1, keepdims=True)
-    return index, weights / np.where(total > 0, total, 1.0)
 
 
 def _kaiser(position: np.ndarray) -> np.ndarray:

@@ -16,13 +16,12 @@ from typing import Literal
 import numpy as np
 from scipy.special import logsumexp
 
-from bsip_cli.recordings.frame_change import FORCES_MOVED, MIRRORS, FrameChange
-from bsip_cli.recordings.gate_limits import USUAL, GateLimits
-from bsip_cli.recordings.handedness import Handedness
+from bsip_cli.recordings.body_motion import USUAL, GateLimits
 from bsip_cli.recordings.hypothesis import AS_IT_IS, Hypothesis
 from bsip_cli.recordings.plate_fit import PlateFit
-from bsip_cli.recordings.plate_reading import PlateReading
-from bsip_cli.recordings.repeated_plates import repeated_plates
+from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange, PlateReading
+from bsip_cli.recordings.plate_source import repeated_plates
+from bsip_cli.recordings.scene import Handedness
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence, outline
 

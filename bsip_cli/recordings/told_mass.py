@@ -1,13 +1,17 @@
-"""One mass from the stretches of all trials of a person, or why there is none."""
+"""One mass from the stretches of all trials of a person, or why there is none, and a stated mass
+against it: agreement, a small difference, or a gross one."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.stats import chi2, norm
 
+from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.momentum_mass import COMES_AND_GOES, Stretch
 from bsip_cli.stated.quantities import BMI_KG_M2
 
@@ -20,6 +24,17 @@ LOWER_Z = 3.0
 LEAST_SHARE = 0.5  # of a trial's time, that must agree
 LEAST_KG, MOST_KG = 10.0, 400.0  # as in participants.tsv
 _PERCENT = 100.0
+# What a mass in kg was taken for or from: the stated number over the mass in kg.
+_UNITS = (
+    ("pounds", 2.20462),
+    ("stones", 1 / 6.35029),
+    ("newton", 9.80665),
+    ("grams", 1000.0),
+    ("kilograms that were divided by 2.2046 once too often", 1 / 2.20462),
+    ("kilograms that were divided by 9.81", 1 / 9.80665),
+)
+_CM_PER_M = 100.0
+_NEAR_CM = 3.0
 
 
 @dataclass(frozen=True)
@@ -119,8 +134,7 @@ def _too_little(stretches: Sequence[Stretch], agreeing: Sequence[Stretch]) -> st
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Whole:
+class _Whole(NamedTuple):
     """Masses combined by their covariance: mass [kg], relative sd, probability of so much
     disagreement, and each one's own relative sd."""
 
@@ -135,31 +149,24 @@ def _combined(trials: Collection[Sequence[Stretch]]) -> _Whole:
     mass = np.array([one.mass_kg for one in each])
     common = np.array([one.common for one in each])
     covariance = np.diag([one.own_sd**2 for one in each]) + common @ common.T
-    start = 0
-    for trial in trials:
-        part = slice(start, start + len(trial))
-        errors = np.array([one.of_trial for one in trial])
-        covariance[part, part] += errors @ errors.T
-        start = part.stop
+    covariance += block_diag(
+        *(x @ x.T for x in (np.array([s.of_trial for s in t]) for t in trials))
+    )
     solved = np.linalg.solve(covariance, np.ones(len(each)))
     best = float(solved @ mass / solved.sum())
     away = mass / best - 1.0
-    chi = float(away @ np.linalg.solve(covariance, away))
-    free = len(each) - 1
-    p = float(chi2.sf(chi, free)) if free else 1.0
-    widened = max(1.0, chi / free) if free else 1.0
-    sd = float(np.sqrt(widened / solved.sum()))
-    return _Whole(best, sd, p, np.sqrt(np.diag(covariance)))
+    chi, free = float(away @ np.linalg.solve(covariance, away)), len(each) - 1
+    p, widened = (float(chi2.sf(chi, free)), max(1.0, chi / free)) if free else (1.0, 1.0)
+    return _Whole(best, float(np.sqrt(widened / solved.sum())), p, np.sqrt(np.diag(covariance)))
 
 
 def _disagree(trials: Collection[Sequence[Stretch]]) -> bool:
     """Whether the trials, each as a whole, differ by more than their errors."""
-    wholes = [_combined([trial]) for trial in trials]
-    mass = np.array([one.mass for one in wholes])
-    variance = np.array([one.sd for one in wholes]) ** 2 + GAIN_SD**2
-    best = float((mass / variance).sum() / (1.0 / variance).sum())
-    chi = float((((mass / best) - 1.0) ** 2 / variance).sum())
-    return bool(len(wholes) > 1 and chi2.sf(chi, len(wholes) - 1) < AGREE_P)
+    mass, sd = np.array([_combined([trial])[:2] for trial in trials]).T
+    weight = 1.0 / (sd**2 + GAIN_SD**2)
+    best = float((mass * weight).sum() / weight.sum())
+    chi = float((((mass / best) - 1.0) ** 2 * weight).sum())
+    return bool(len(mass) > 1 and chi2.sf(chi, len(mass) - 1) < AGREE_P)
 
 
 def _judged(
@@ -181,3 +188,82 @@ def _judged(
             f"the plates tell {told.mass_kg:.1f} kg, a person{stature} has {low:.0f} to {high:.0f}"
         )
     return told
+
+
+# --- a stated mass --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The stated mass, and known loads with it, beside what the plates tell of both."""
+
+    stated_kg: float
+    load_kg: float
+    told: ToldMass
+    tolerance_percent: float
+    gross_percent: float
+    height_m: float | None
+
+    @property
+    def difference_percent(self) -> float:
+        return _PERCENT * (self.told.mass_kg / self.total_kg - 1.0)
+
+    @property
+    def total_kg(self) -> float:
+        return self.stated_kg + self.load_kg
+
+    @property
+    def is_small(self) -> bool:
+        """Within tolerance and interval; nothing is to be said."""
+        return abs(self.difference_percent) <= self.tolerance_percent + self.told.half_width_percent
+
+    @property
+    def is_gross(self) -> bool:
+        """More than clothes, shoes and months make."""
+        ratio = self.told.mass_kg / self.total_kg
+        apart = _PERCENT * (max(ratio, 1.0 / ratio) - 1.0)
+        return apart > self.gross_percent + self.told.half_width_percent
+
+    def likely(self) -> str:
+        """What the stated number is likely to be; empty if it is none of the known mistakes."""
+        for name, factor in _UNITS:
+            if self._meets(self.stated_kg / factor):
+                return f"{self.stated_kg:g} is likely to be in {name}"
+        height = self.height_m
+        if height is not None and abs(self.stated_kg - _CM_PER_M * height) < _NEAR_CM:
+            return f"{self.stated_kg:g} is likely to be the height in cm"
+        whole = str(int(self.stated_kg))
+        turned = float(whole[::-1]) + self.stated_kg - int(self.stated_kg)  # 75.3 for 57.3
+        if len(whole) == 2 and whole[0] != whole[1] and self._meets(turned):
+            return f"{self.stated_kg:g} is likely to be {turned:g} with two digits exchanged"
+        return ""
+
+    def _meets(self, mass_kg: float) -> bool:
+        allowed = self.tolerance_percent + self.told.half_width_percent
+        return abs(_PERCENT * ((mass_kg + self.load_kg) / self.told.mass_kg - 1.0)) <= allowed
+
+    def sentence(self, where: str) -> str:
+        """Of a gross difference: both numbers, what is likely, what to do."""
+        likely = self.likely() or (
+            "a typing mistake, another person's row, a second person or a load on the plates"
+        )
+        return (
+            f"the stated mass and the plates do not agree: {where} says {self.stated_kg:g} kg, "
+            f"the plates tell {self.told.words()}; {likely}"
+        )
+
+
+def mass_finding(told: ToldMass, comparison: Comparison | None, where: str) -> Finding:
+    """The line for the quality table of a trial."""
+    if not told.is_known:
+        expected, action = "a mass that the plates tell for sure", "nothing compared"
+        return Finding("plate_mass", "", f"not known: {told.reason}", expected, action, "info")
+    if comparison is None:
+        return Finding("plate_mass", "", told.words(), "no mass is stated", "", "info")
+    expected = f"the stated {comparison.total_kg:.2f} kg within {comparison.tolerance_percent:g} %"
+    if comparison.is_gross:
+        action = "contacts found with the plates' mass"
+        return Finding("mass", "", comparison.sentence(where), "", action, "warning")
+    level = "info" if comparison.is_small else "warning"
+    action = f"left both as they are ({comparison.difference_percent:+.1f} %)"
+    return Finding("plate_mass", "", told.words(), expected, action, level)

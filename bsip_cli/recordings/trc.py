@@ -12,24 +12,26 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError, printable
-from bsip_cli.recordings.missing_points import without_sentinels
-from bsip_cli.recordings.model import Finding
-from bsip_cli.recordings.scene_size import settle_unit, without_absurd
-from bsip_cli.recordings.text_cells import (
+from bsip_cli.recordings.model import Finding, refusal
+from bsip_cli.recordings.scene import settle_unit, without_absurd, without_sentinels
+from bsip_cli.recordings.text_tables import (
+    ROWS_LOOKED_AT,
     Dialect,
     LastDigit,
+    check_names,
     dialect_of,
+    head_of,
     is_missing,
     number,
     parted,
+    row_counts,
     separator_of,
+    text_lines,
     without_end,
 )
-from bsip_cli.recordings.text_lines import check_names, head_of, row_counts, text_lines
 from bsip_cli.recordings.timebase import Stamps
 
 _HEADER = re.compile(r"^\s*frame\s*#", re.IGNORECASE)
-_ROWS_LOOKED_AT = 20  # to see how the table is written
 _SOON = 100_000  # rows, a quarter of an hour at 100 Hz: the last marker is seen in one of them
 _RATES = ("datarate", "camerarate", "origdatarate")
 
@@ -51,42 +53,35 @@ def read_trc(path: Path) -> Trc:
     lines = text_lines(path)
     above, heading = head_of(lines, _HEADER.match)
     if heading is None or not above:
-        raise BadDataError(
-            "no line that begins with 'Frame#'",
-            expected="a TRC file",
-            remedy="export the trial again",
-            file=path,
-        )
+        raise refusal(path, "no line that begins with 'Frame#'", "a TRC file")
     fields = _header_fields(above)
     mark = separator_of(heading)
     names, are_apart = _names(heading, mark)
     check_names([name for name in names if name], "labels", path)
     axes = next(lines, "").split()  # X1, Y1, Z1, X2, ...
-    first = list(islice((line for line in lines if line.strip()), _ROWS_LOOKED_AT))
+    first = list(islice((line for line in lines if line.strip()), ROWS_LOOKED_AT))
     are_counted = are_apart and len(axes) == 3 * len(names)
-    rows = _Rows(_Heading(names, are_apart, are_counted), dialect_of(mark, first), path)
+    rows = _Rows(names, are_apart, are_counted, dialect_of(mark, first), path)
     rows.read(chain(first, lines))
     labels, positions = rows.labelled()
     about_points = without_sentinels(positions)
     unit = fields.get("units", "")
     size, about_unit = settle_unit(positions, labels, unit, "Units")
     positions *= size
+    times, rates = np.array(rows.times), [_number(fields.get(name, "")) for name in _RATES]
+    n_stated, n_frames = (_number(fields.get(name, "")) for name in ("nummarkers", "numframes"))
+    n_markers = {len(labels), rows.n_trajectories()}
     findings = (
-        *_about_counts(fields, {len(labels), rows.n_trajectories()}, len(rows.times)),
+        *(row_counts("markers", n_stated, min(n_markers)) if n_stated not in n_markers else []),
+        *row_counts("frames", n_frames, len(times)),
         *rows.findings(len(labels)),
         *about_points,
         *about_unit,
         *without_absurd(positions),
     )
-    times = np.array(rows.times)
-    return Trc(
-        labels,
-        Stamps(times, rows.time_digits.sizes(times)),
-        positions,
-        tuple(_number(fields.get(name, "")) for name in _RATES),
-        rows.are_numbered and _number(fields.get("numframes", "")) == len(times),
-        findings,
-    )
+    stamps = Stamps(times, rows.time_digits.sizes(times))
+    counts_frames = rows.are_numbered and n_frames == len(times)
+    return Trc(labels, stamps, positions, tuple(rates), counts_frames, findings)
 
 
 def _names(line: str, mark: str | None) -> tuple[list[str], bool]:
@@ -121,29 +116,18 @@ def _number(text: str) -> float:
     return number(text.replace(",", "."))
 
 
-def _about_counts(fields: dict[str, str], n_markers: set[int], n_frames: int) -> list[Finding]:
-    stated = _number(fields.get("nummarkers", ""))
-    return [
-        *(row_counts("markers", stated, min(n_markers)) if stated not in n_markers else []),
-        *row_counts("frames", _number(fields.get("numframes", "")), n_frames),
-    ]
-
-
-@dataclass(frozen=True)
-class _Heading:
-    """The line of names. names : of each place, '' for an empty one."""
-
-    names: list[str]
-    are_apart: bool  # by one number of places, so that an empty place is a trajectory
-    are_counted: bool  # the line below, X1, Y1, ..., has three for each place
-
-
 class _Rows:
     """What has been read of the table; eight bytes for each cell and no more."""
 
-    def __init__(self, heading: _Heading, dialect: Dialect, path: Path) -> None:
-        self.heading, self.dialect, self.path = heading, dialect, path
-        self.n_labels = sum(map(bool, heading.names))
+    def __init__(
+        self, names: list[str], are_apart: bool, are_counted: bool, dialect: Dialect, path: Path
+    ) -> None:
+        """names : of each place of the heading, '' for an empty one. are_apart : by one number of
+        places, so that an empty place is a trajectory. are_counted : the line below, X1, Y1, ...,
+        has three for each place."""
+        self.names, self.are_apart, self.are_counted = names, are_apart, are_counted
+        self.dialect, self.path = dialect, path
+        self.n_labels = sum(map(bool, names))
         self.times, self.positions, self.widths = array("d"), array("d"), array("L")
         self.time_digits = LastDigit()
         self.widest = 0
@@ -160,24 +144,17 @@ class _Rows:
                 self.add(last)
             last, n_of_last = cells, n_written
         if not last or not self.n_labels:
-            raise BadDataError(
-                "no marker data",
-                expected="a TRC file with markers",
-                remedy="export the trial again",
-                file=self.path,
-            )
+            raise refusal(self.path, "no marker data", "a TRC file with markers")
         self.is_cut = len(self.times) > 0 and n_of_last < 2 + 3 * self.n_labels
         if not self.is_cut:
             self.add(last)
-        if not self._fit():
-            raise self.refusal(self.widest)
+        # As many trajectories as labels, or as places in the heading, or more behind them.
+        n, enough = self.n_trajectories(), self.n_labels if self.are_counted else len(self.names)
+        if n != self.n_labels and not (n >= enough and self.are_apart):
+            raise self.misfit(self.widest)
         if not np.isfinite(self.times).all():
-            raise BadDataError(
-                "a row without a time",
-                expected="times in column 2, numbers of one kind",
-                remedy="export the trial again",
-                file=self.path,
-            )
+            expected = "times in column 2, numbers of one kind"
+            raise refusal(self.path, "a row without a time", expected)
 
     def _table(self, lines: Iterable[str]) -> Iterator[tuple[int, list[str]]]:
         """Of each row that is not blank the number of its cells, and those with something in them.
@@ -196,7 +173,7 @@ class _Rows:
     def add(self, cells: list[str]) -> None:
         """Editors cut empty cells at the end, whole markers of them; else cells are shifted."""
         if len(cells) < 2 or (len(cells) - 2) % 3:
-            raise self.refusal(len(cells))
+            raise self.misfit(len(cells))
         self.widest = max(self.widest, len(cells))
         row, words = _numbers(cells)
         self.are_numbered &= not self.times or row[0] == self._frame + 1
@@ -209,20 +186,11 @@ class _Rows:
             self.n_words += len(words)
             self.a_word = self.a_word or words[0]
         if self.n_trajectories() < self.n_labels and len(self.times) > _SOON:
-            raise self.refusal(self.widest)
+            raise self.misfit(self.widest)
         if len(self.times) * (self.widest - 2) > self._most_cells:
-            raise BadDataError(
-                f"{self.n_trajectories()} trajectories over rows that are all but empty",
-                expected="positions under the labels",
-                remedy="export the trial with the markers that were seen",
-                file=self.path,
-            )
-
-    def _fit(self) -> bool:
-        """As many trajectories as labels, or as places in the heading, or more behind them."""
-        n = self.n_trajectories()
-        enough = self.n_labels if self.heading.are_counted else len(self.heading.names)
-        return n == self.n_labels or (n >= enough and self.heading.are_apart)
+            found = f"{self.n_trajectories()} trajectories over rows that are all but empty"
+            remedy = "export the trial with the markers that were seen"
+            raise refusal(self.path, found, "positions under the labels", remedy)
 
     def n_trajectories(self) -> int:
         return (self.widest - 2) // 3
@@ -240,9 +208,9 @@ class _Rows:
             whole[np.arange(n_columns) < widths[:, None]] = values
             values = whole
         positions = values.reshape(len(widths), -1, 3)
-        names = self.heading.names
+        names = self.names
         n_empty = max(len(names) - self.n_trajectories(), 0)
-        if n_empty and self.heading.are_counted:
+        if n_empty and self.are_counted:
             positions = np.pad(positions, ((0, 0), (0, n_empty), (0, 0)), constant_values=np.nan)
         elif n_empty:
             names = [name for name in names if name]
@@ -252,37 +220,25 @@ class _Rows:
         positions[~np.isfinite(positions).all(axis=-1) | (positions == 0).all(axis=-1)] = np.nan
         return tuple(names[k] for k in kept), positions
 
-    def refusal(self, width: int) -> BadDataError:
-        return BadDataError(
-            f"a row of {width} cells under {self.n_labels} labels",
-            expected=f"{2 + 3 * self.n_labels} cells: frame, time and three for each label",
-            remedy="export the trial again",
-            file=self.path,
-        )
+    def misfit(self, width: int) -> BadDataError:
+        found = f"a row of {width} cells under {self.n_labels} labels"
+        expected = f"{2 + 3 * self.n_labels} cells: frame, time and three for each label"
+        return refusal(self.path, found, expected)
 
     def findings(self, n_labels: int) -> list[Finding]:
-        found = []
+        unnamed, found = self.n_trajectories() - n_labels, []
         if self.is_cut:
-            found.append(_finding("the last row is cut", "a complete file", "left that row out"))
-        if unnamed := self.n_trajectories() - n_labels:
-            found.append(
-                _finding(
-                    f"{unnamed} trajectories without a label",
-                    "a label for each",
-                    f"left them out and read {n_labels}",
-                    "info",
-                )
-            )
-        found += self.dialect.about_commas()
+            found.append(("the last row is cut", "a complete file", "left that row out", "warning"))
+        if unnamed:
+            action = f"left them out and read {n_labels}"
+            words = f"{unnamed} trajectories without a label"
+            found.append((words, "a label for each", action, "info"))
+        about = [Finding("layout", "", *words) for words in found] + self.dialect.about_commas()
         if self.n_words:
-            found.append(
-                _finding(
-                    f"{self.n_words} cells that are no numbers, as '{printable(self.a_word[:20])}'",
-                    "numbers, or empty cells where a marker is missing",
-                    "took them as missing",
-                )
-            )
-        return found
+            words = f"{self.n_words} cells that are no numbers, as '{printable(self.a_word[:20])}'"
+            expected = "numbers, or empty cells where a marker is missing"
+            about.append(Finding("layout", "", words, expected, "took them as missing", "warning"))
+        return about
 
 
 def _whole(cells: list[str]) -> list[str]:
@@ -299,7 +255,3 @@ def _numbers(cells: list[str]) -> tuple[list[float], list[str]]:
         row = list(map(number, cells))
     positions = zip(cells[2:], row[2:], strict=True)
     return row, [cell for cell, x in positions if np.isnan(x) and not is_missing(cell)]
-
-
-def _finding(found: str, expected: str, action: str, level: str = "warning") -> Finding:
-    return Finding("layout", "", found, expected, action, level)

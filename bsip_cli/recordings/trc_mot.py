@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from bsip_cli.errors import BadDataError
 from bsip_cli.files.force_files import forces_beside
-from bsip_cli.recordings import world
+from bsip_cli.recordings import scene
 from bsip_cli.recordings.analog import spike_samples
-from bsip_cli.recordings.force_times import UNEVEN, MarkerTimes, settle_force_times
-from bsip_cli.recordings.model import Finding, Recording
+from bsip_cli.recordings.model import Finding, Recording, refusal
 from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
-from bsip_cli.recordings.opened import Opened
 from bsip_cli.recordings.plate_reading import PlateReading
-from bsip_cli.recordings.plate_source import ForceOnPoint, points_that_move
+from bsip_cli.recordings.plate_source import ForceOnPoint, Opened, points_that_move
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.timebase import (
     FRAMES,
     MOST_HZ,
+    UNITS_S,
     Grid,
+    Stamps,
+    about_unit,
     counted,
     even_grid,
     in_seconds,
@@ -31,8 +30,14 @@ from bsip_cli.recordings.timebase import (
 from bsip_cli.recordings.trc import Trc, read_trc
 from bsip_cli.recordings.units import length_in_m, moment_in_Nm
 
-_VALUES_PER_BYTE = 5  # of both files: a grid of forces may need as much memory as c3d_guard allows
+_VALUES_PER_BYTE = (
+    5  # of both files: a grid of forces may need as much memory as c3d_content allows
+)
 _MM = 1e-3
+_UNEVEN = "the times of the .mot do not increase evenly"
+_WHAT = "times of the forces"
+_UNIT_NAMES = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "milliseconds": 1e-3}
+_UNIT_NAMES |= {"us": 1e-6, "\N{MICRO SIGN}s": 1e-6, "microseconds": 1e-6}
 
 
 def open_trc_mot(path: Path) -> Opened:
@@ -43,9 +48,8 @@ def open_trc_mot(path: Path) -> Opened:
     mot = read_mot(mot_path) if mot_path else None
     most = _VALUES_PER_BYTE * sum(file.stat().st_size for file in (path, mot_path) if file)
     up = _up(trc, mot)
-    rotation = world.rotation_to_z_up(up)
+    rotation = scene.rotation_to_z_up(up)
     analog_rate_hz, sources, note, found = _forces(mot, rotation, times, most)
-    turned = world.finding_about(up)
     recording = Recording(
         path=path,
         marker_rate_hz=times.rate_hz,
@@ -53,7 +57,7 @@ def open_trc_mot(path: Path) -> Opened:
         markers_m=positions @ rotation.T,
         analog_rate_hz=analog_rate_hz,
         plates=(),
-        findings=(*trc.findings, *findings, *([turned] if turned else []), *found),
+        findings=(*trc.findings, *findings, *scene.findings_about(up), *found),
         rotation_world_lab=rotation,
         forces_note=note,
         time0_s=times.first_s,
@@ -61,45 +65,29 @@ def open_trc_mot(path: Path) -> Opened:
     return Opened(recording, sources)
 
 
-def _even_markers(trc: Trc, path: Path) -> tuple[MarkerTimes, np.ndarray, tuple[Finding, ...]]:
+def _even_markers(trc: Trc, path: Path) -> tuple[_MarkerTimes, np.ndarray, tuple[Finding, ...]]:
     """Times, positions (n, n_markers, 3) at these even times, and what was done."""
     if len(trc.stamps.values) < 2:
-        raise BadDataError(
-            f"{len(trc.stamps.values)} frame",
-            expected="at least 2 frames with times",
-            remedy="export the whole trial",
-            file=path,
-        )
+        found, expected = f"{len(trc.stamps.values)} frame", "at least 2 frames with times"
+        raise refusal(path, found, expected, "export the whole trial")
     stamps, findings = in_seconds(trc.stamps, trc.rates_hz)
     if stamps is not None and trc.counts_frames:
         stamps, about = counted(stamps, trc.rates_hz)
         findings += about
     if stamps is None:
-        raise BadDataError(
-            "times that count frames, and no DataRate",
-            expected="times in s, or the rate in the header",
-            remedy="export the trial with its rate",
-            file=path,
-        )
+        found, remedy = "times that count frames, and no DataRate", "export the trial with its rate"
+        raise refusal(path, found, "times in s, or the rate in the header", remedy)
     grid = even_grid(stamps, trc.rates_hz)
     if grid is None:
-        raise BadDataError(
-            "times that do not increase evenly",
-            expected=f"increasing times of one rate, below {MOST_HZ:,.0f} Hz",
-            remedy="export the trial again",
-            file=path,
-        )
+        expected = f"increasing times of one rate, below {MOST_HZ:,.0f} Hz"
+        raise refusal(path, "times that do not increase evenly", expected)
     unsure_s = float(np.ptp(stamps.values[grid.samples] - grid.samples_s))
-    times = MarkerTimes(
-        first_s=float(grid.time_s[0]),
-        rate_hz=grid.rate_hz,
-        n=len(grid.time_s),
-        unsure_s=np.inf if stamps.unit == FRAMES else unsure_s,
-    )
+    first_s, unsure_s = float(grid.time_s[0]), np.inf if stamps.unit == FRAMES else unsure_s
+    times = _MarkerTimes(first_s, grid.rate_hz, len(grid.time_s), unsure_s)
     return times, onto_grid(grid, trc.positions_m), (*findings, *grid.findings)
 
 
-def _up(trc: Trc, mot: Mot | None) -> world.Up:
+def _up(trc: Trc, mot: Mot | None) -> scene.Up:
     """From the direction of the forces, the markers telling its sign; else labels; else Y."""
     surface = None
     if mot is not None:
@@ -109,49 +97,40 @@ def _up(trc: Trc, mot: Mot | None) -> world.Up:
         on_floor = np.concatenate(points)[loaded] * _MM  # at least: what is low is low in any unit
         if loaded.any():
             mean = np.abs(force[loaded]).mean(axis=0)
-            surface = world.up_from_surface(mean[None], on_floor, trc.positions_m)
+            surface = scene.up_from_surface(mean[None], on_floor, trc.positions_m)
     return (
         surface
-        or world.up_from_labels(trc.labels, trc.positions_m)
-        or world.Up(1, 1, "the convention of TRC files")
+        or scene.up_from_labels(trc.labels, trc.positions_m)
+        or scene.Up(1, 1, "the convention of TRC files")
     )
 
 
 def _forces(
-    mot: Mot | None,
-    rotation: np.ndarray,
-    markers: MarkerTimes,
-    most_values: int,
+    mot: Mot | None, rotation: np.ndarray, markers: _MarkerTimes, most_values: int
 ) -> tuple[float, tuple[ForceOnPoint, ...], str, tuple[Finding, ...]]:
     """Analog rate, forces as written, the reason for none, findings."""
     if mot is None:
         return markers.rate_hz, (), "no .mot file of the same name beside the .trc", ()
     if note := _unplaced(mot):
         return markers.rate_hz, (), note, mot.findings
-    settled = settle_force_times(mot.stamps, markers)
+    settled, grid = _settle_force_times(mot.stamps, markers), None
     findings = [*mot.findings, *settled.findings]
-    grid = None
     if settled.stamps is not None:
         grid = even_grid(settled.stamps, settled.rates_hz, markers.rate_hz)
         if grid is not None and settled.is_simultaneous:
             torn_off_s = grid.time_s[0] - settled.stamps.values[0] if grid.samples.start else 0.0
             grid = grid.from_time(markers.first_s + torn_off_s)
     if grid is None:
-        note = settled.note or UNEVEN
-        return markers.rate_hz, (), note, tuple(findings)
+        return markers.rate_hz, (), settled.note or _UNEVEN, tuple(findings)
     last = markers.lasts_s() * grid.rate_hz
     if 6 * last * len(mot.forces) > most_values:
         rows = len(mot.stamps.values)
         note = f"the .mot has {rows} rows and {last:.3g} would be needed beside the .trc"
         return markers.rate_hz, (), note, tuple(findings)
     samples_s = markers.first_s + np.arange(round(last) + 1) / grid.rate_hz
-    findings += [*grid.findings, *_about_missing(mot)]
-    sources = []
-    for force in mot.forces:
-        source, found = _source(force, grid, samples_s, rotation, markers)
-        sources.append(source)
-        findings += found
-    return grid.rate_hz, tuple(sources), "", tuple(findings)
+    read = [_source(force, grid, samples_s, rotation, markers) for force in mot.forces]
+    findings += [*grid.findings, *_about_missing(mot), *(one for _, found in read for one in found)]
+    return grid.rate_hz, tuple(source for source, _ in read), "", tuple(findings)
 
 
 def _source(
@@ -159,11 +138,15 @@ def _source(
     grid: Grid,
     samples_s: np.ndarray,
     rotation: np.ndarray,
-    markers: MarkerTimes,
+    markers: _MarkerTimes,
 ) -> tuple[ForceOnPoint, list[Finding]]:
-    """One force on the markers' time, as written, with its faulty samples marked."""
-    point = _in_si(force.point, length_in_m, force.point_unit)
-    moment = _in_si(force.moment, moment_in_Nm, force.moment_unit)
+    """One force on the markers' time, with its faulty samples marked; points and moments in the
+    unit that the file names, as written where it names none that is known."""
+    point, moment = force.point, force.moment
+    if point is not None:
+        point = point * (length_in_m(force.point_unit) or 1.0)
+    if moment is not None:
+        moment = moment * (moment_in_Nm(force.moment_unit) or 1.0)
     loaded = np.linalg.norm(np.nan_to_num(force.force_N), axis=1) > LOADED_N
     parts = [x for x in (force.force_N, point, moment) if x is not None]
     rows = onto_grid(grid, np.hstack(parts), samples_s)
@@ -182,15 +165,18 @@ def _source(
     )
     wrench = source.plate(PlateReading()).wrench()  # points alone leap where the load begins
     spikes = spike_samples(wrench, np.abs(wrench[:, :3]).max(axis=1)) & ~missing
-    source = replace(source, usable=~missing & ~spikes)
-    return source, _coverage(force.name, missing, spikes, grid, markers)
-
-
-def _in_si(
-    values: np.ndarray | None, size: Callable[[str], float | None], unit: str
-) -> np.ndarray | None:
-    """In the unit that the file names; as written where it names none that is known."""
-    return None if values is None else values * (size(unit) or 1.0)
+    expected = (
+        f"forces as long as the markers, {markers.span()} s (the file "
+        f"has {grid.samples_s[0]:.4g} to {grid.samples_s[-1]:.4g} s)"
+    )
+    none = f"no force for {missing.sum()} of {len(rows)} samples of the markers' time"
+    leaps = f"{spikes.sum()} of {len(rows)} samples leave their neighbours and come back at once"
+    said = ((missing, "nan", none, expected), (spikes, "spike", leaps, "none"))
+    return replace(source, usable=~missing & ~spikes), [
+        Finding(f"analog_{kind}", force.name, found, expected, "marked them unusable", "warning")
+        for mask, kind, found, expected in said
+        if mask.any()
+    ]
 
 
 def _unplaced(mot: Mot) -> str:
@@ -220,22 +206,110 @@ def _about_missing(mot: Mot) -> list[Finding]:
     return findings
 
 
-def _coverage(
-    name: str, missing: np.ndarray, spikes: np.ndarray, grid: Grid, markers: MarkerTimes
-) -> list[Finding]:
-    findings, n = [], len(missing)
-    if missing.any():
-        found = f"no force for {missing.sum()} of {n} samples of the markers' time"
-        expected = (
-            f"forces as long as the markers, {markers.span()} s (the file "
-            f"has {grid.samples_s[0]:.4g} to {grid.samples_s[-1]:.4g} s)"
-        )
-        findings.append(_lost("nan", name, found, expected))
-    if spikes.any():
-        found = f"{spikes.sum()} of {n} samples leave their neighbours and come back at once"
-        findings.append(_lost("spike", name, found, "none"))
-    return findings
+# --- the times of the forces against those of the markers -----------------------------------------
 
 
-def _lost(kind: str, name: str, found: str, expected: str) -> Finding:
-    return Finding(f"analog_{kind}", name, found, expected, "marked them unusable", "warning")
+@dataclass(frozen=True)
+class _MarkerTimes:
+    """When the markers were seen."""
+
+    first_s: float
+    rate_hz: float
+    n: int
+    unsure_s: float = 0.0  # by how much the first may be off: the last digit that is printed
+
+    def lasts_s(self) -> float:
+        return (self.n - 1) / self.rate_hz
+
+    def span(self) -> str:
+        return _span(self.first_s, self.first_s + self.lasts_s())
+
+
+@dataclass(frozen=True, eq=False)
+class _ForceTimes:
+    """Stamps in seconds of the markers' clock, or why there are none."""
+
+    stamps: Stamps | None
+    findings: tuple[Finding, ...] = ()
+    note: str = ""
+    rates_hz: tuple[float, ...] = ()  # known otherwise than by the stamps
+    is_simultaneous: bool = False  # they begin with the markers, whatever the stamps say
+
+
+def _settle_force_times(stamps: Stamps, markers: _MarkerTimes) -> _ForceTimes:
+    """Unit and zero of the forces' times.
+
+    Of seconds, ms and microseconds that one by which forces and markers last alike; stamps that
+    count rows have the rate that makes a whole number of rows per frame. Forces that lie outside
+    the markers' time but last as long were counted from another zero.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        increase = np.isfinite(stamps.values).all() and stamps.step() > 0
+    if len(stamps.values) < 2 or not increase:
+        return _ForceTimes(None, (), _UNEVEN)
+    settled = _in_seconds(stamps, markers)
+    if settled.stamps is None or settled.is_simultaneous:
+        return settled
+    return _from_one_zero(settled, markers)
+
+
+def _in_seconds(stamps: Stamps, markers: _MarkerTimes) -> _ForceTimes:
+    step, n, near_s = stamps.step(), len(stamps.values), 1 / markers.rate_hz
+    stated_s = _UNIT_NAMES.get(stamps.unit.strip().lower())
+    if stated_s is not None and stated_s != 1.0:
+        found = f"in {stamps.unit.strip()}"
+        return _ForceTimes(stamps.times(stated_s), (about_unit(found, "read them so", _WHAT),))
+    if stamps.count():
+        ratio = round(n / markers.n)
+        if ratio >= 1 and abs(n - ratio * markers.n) <= ratio:
+            rate_hz = ratio * markers.rate_hz
+            action = f"took the first as the first frame's and {rate_hz:g} Hz"
+            own = replace(stamps.times(1 / rate_hz, float(stamps.values[0])), digits=(0.0, 0.0))
+            said = about_unit("that count rows", action, _WHAT)
+            return _ForceTimes(own, (said,), rates_hz=(rate_hz,), is_simultaneous=True)
+        if stamps.values[0] < 2 or abs(stamps.values[0] / 1e3 - markers.first_s) > near_s:
+            note = f"the times of the .mot count {n} rows, and none of its rates has as many in "
+            return _ForceTimes(None, (), f"{note}the {markers.n} frames of the markers")
+    lasts = abs(float(stamps.values[-1] - stamps.values[0]))
+    sizes = {"s": 1.0, **UNITS_S}
+    possible = {name: size for name, size in sizes.items() if step * size * MOST_HZ >= 1}
+    if not possible:
+        return _ForceTimes(None, (), _UNEVEN)
+    name = min(possible, key=lambda unit: abs(np.log(lasts * possible[unit] / markers.lasts_s())))
+    if name == "s":
+        return _ForceTimes(stamps)
+    said = about_unit(f"in {name}: {step:.4g} from row to row", f"read them in {name}", _WHAT)
+    return _ForceTimes(stamps.times(possible[name]), (said,))
+
+
+def _from_one_zero(settled: _ForceTimes, markers: _MarkerTimes) -> _ForceTimes:
+    """Both clocks zeroed alike where nothing else can be; a note where they share no time."""
+    assert settled.stamps is not None
+    times = settled.stamps.values
+    first, last = float(times.min()), float(times.max())
+    near = 1 / markers.rate_hz + settled.stamps.step()
+    is_as_long = abs((last - first) - markers.lasts_s()) <= near + settled.stamps.digits[1]
+    apart_s = abs(first - markers.first_s)
+    overlap_s = min(last, markers.first_s + markers.lasts_s()) - max(first, markers.first_s)
+    is_together = overlap_s > min(near, 0.5 * (last - first))
+    found = f"forces at {_span(first, last)} s and markers at {markers.span()} s"
+    is_simultaneous = is_as_long and (not is_together or apart_s <= markers.unsure_s)
+    action, level = "took their first samples as simultaneous", "corrected"
+    if is_simultaneous:
+        if apart_s <= near or (is_together and np.isfinite(markers.unsure_s)):
+            return replace(settled, is_simultaneous=True)  # within what is printed
+        found += f": as long, and {'those count frames' if is_together else 'never at once'}"
+    elif not is_together:
+        return replace(settled, stamps=None, note=found)
+    elif apart_s > near and (is_as_long or not np.isfinite(markers.unsure_s)):
+        found, level = f"{found}: perhaps from another zero", "warning"
+        action = "took both as written; if they were cut alike, give them the same first time"
+    else:
+        return settled
+    said = Finding("time", "", found, "one clock", action, level)
+    findings = (*settled.findings, said)
+    return replace(settled, is_simultaneous=is_simultaneous, findings=findings)
+
+
+def _span(first_s: float, last_s: float) -> str:
+    return f"{first_s:.4g} to {last_s:.4g}" if last_s < 1e4 else f"{first_s:.6f} to {last_s:.6f}"

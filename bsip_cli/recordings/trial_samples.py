@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bsip_cli.recordings.body_motion import SMOOTH_S, Body
-from bsip_cli.recordings.frame_change import FrameChange
-from bsip_cli.recordings.handedness import Handedness, handedness
 from bsip_cli.recordings.label_words import meanings
-from bsip_cli.recordings.opened import Opened
-from bsip_cli.recordings.person_size import by_segment, height_m
-from bsip_cli.recordings.plate_source import PlateSource, lift_N
+from bsip_cli.recordings.plate_reading import FrameChange
+from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N
 from bsip_cli.recordings.plates import LOADED_N
+from bsip_cli.recordings.scene import Handedness, by_segment, handedness, height_m
 from bsip_cli.recordings.under_the_feet import Feet
 
 _FEW = 100  # samples that each plate of a trial is seen by

@@ -5,22 +5,21 @@ from __future__ import annotations
 import re
 
 _LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-_LENGTH_WORDS = {  # how the words begin: meter, metre, millimeters, inches, feet; C3D cuts them
-    "mete": "m",
-    "metr": "m",
-    "deci": "dm",
-    "centi": "cm",
-    "milli": "mm",
-    "inch": "in",
-    "foot": "ft",
-    "feet": "ft",
-}
-_LENGTH_SIGNS = {'"': "in", "''": "in", "\N{DOUBLE PRIME}": "in", "'": "ft", "\N{PRIME}": "ft"}
+# How the words begin: meter, metre, millimeters, inches, feet; C3D cuts them.
+_WORDS = {"mete": "m", "metr": "m", "deci": "dm", "centi": "cm", "milli": "mm"}
+_WORDS |= {"inch": "in", "foot": "ft", "feet": "ft"}
+_SIGNS = {'"': "in", "''": "in", "\N{DOUBLE PRIME}": "in", "'": "ft", "\N{PRIME}": "ft"}
 
 
 def length_in_m(unit: str) -> float | None:
     """Size of a length unit in metres; None if the spelling is unknown."""
-    return _LENGTHS.get(_length_name(unit))
+    word = unit.strip().lower().strip("[](). ")
+    word = _SIGNS.get(word, word)
+    if word.endswith("s") and word[:-1] in _LENGTHS:  # mms, ins
+        word = word[:-1]
+    return _LENGTHS.get(
+        next((name for start, name in _WORDS.items() if word.startswith(start)), word)
+    )
 
 
 def force_in_N(unit: str) -> float | None:
@@ -34,26 +33,14 @@ def force_in_N(unit: str) -> float | None:
 def moment_in_Nm(unit: str) -> float | None:
     """Size of a moment unit in N m; accepts Nm, N.mm, ntmm, Newton-meters."""
     word = re.sub(r"[\W_]", "", unit.lower())
-    size = 1000.0 if word.startswith("kn") else 1.0
-    for force in ("newtons", "newton", "nt", "n"):
-        if word.removeprefix("k").startswith(force):
-            length_m = length_in_m(word.removeprefix("k")[len(force) :])
-            return None if length_m is None else size * length_m
-    return None
+    of_force = re.match("(k?)(?:newtons|newton|nt|n)", word)
+    length_m = length_in_m(word[of_force.end() :]) if of_force else None
+    if of_force is None or length_m is None:
+        return None
+    return 1000.0 * length_m if word.startswith("kn") else length_m
 
 
 def length_name(size_m: float) -> str:
     """The name of a unit of this size."""
     name = next(name for name, size in _LENGTHS.items() if size == size_m)
     return {"in": "inches", "ft": "feet"}.get(name, name)
-
-
-def _length_name(unit: str) -> str:
-    word = unit.strip().lower().strip("[](). ")
-    word = _LENGTH_SIGNS.get(word, word)
-    if word[:-1] in _LENGTHS and word.endswith("s"):  # mms, ins
-        word = word[:-1]
-    for start, name in _LENGTH_WORDS.items():
-        if word.startswith(start):
-            return name
-    return word

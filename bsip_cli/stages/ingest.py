@@ -11,28 +11,24 @@ import pandas as pd
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.body.names import SEGMENTS, TRUNK
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.assemble import assemble, findings_about
 from bsip_cli.recordings.c3d_person import against_table
 from bsip_cli.recordings.contacts import (
     ContactWindows,
     FootContacts,
+    agreeing_mass,
     contact_windows,
     foot_contacts,
     plate_loads,
 )
-from bsip_cli.recordings.force_balance import agreeing_mass
-from bsip_cli.recordings.free_plates import nobody_near
-from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps
+from bsip_cli.recordings.gaps import FilledMarkers, fill_gaps, without_repeats
 from bsip_cli.recordings.labels import match_labels
-from bsip_cli.recordings.lateral_medial import with_pairs_named
-from bsip_cli.recordings.marker_guess import guess_marker_set
+from bsip_cli.recordings.marker_guess import guess_marker_set, with_pairs_named
 from bsip_cli.recordings.model import Finding, Recording
 from bsip_cli.recordings.momentum_mass import Stretch, stretches_of, upright_frames
-from bsip_cli.recordings.repeated_frames import without_repeats
+from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
-from bsip_cli.recordings.stated_mass import mass_finding
-from bsip_cli.recordings.told_mass import told_mass
-from bsip_cli.recordings.zero import plate_zero, subtract_zero
+from bsip_cli.recordings.told_mass import mass_finding, told_mass
+from bsip_cli.recordings.zero import nobody_near, plate_zero, subtract_zero
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH
 from bsip_cli.stages.person_mass import VAGUE_PERCENT, StatedMass, compared, stated_mass
@@ -185,7 +181,7 @@ def _foot_contacts(
     feet = {side: markers for side, markers in feet.items() if markers.shape[1]}
     loads = plate_loads(recording, wrench)
     rate_hz = recording.marker_rate_hz
-    return foot_contacts(feet, dict.fromkeys(feet), rate_hz, loads, recording.n_frames)
+    return foot_contacts(feet, rate_hz, loads, recording.n_frames)
 
 
 def _mass_on_plates(

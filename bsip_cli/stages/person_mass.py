@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsip_cli.recordings.momentum_mass import Stretch
-from bsip_cli.recordings.stated_mass import Comparison
-from bsip_cli.recordings.told_mass import ToldMass, told_mass
+from bsip_cli.recordings.told_mass import Comparison, ToldMass, told_mass
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import load_words
 from bsip_cli.study.study import Trial

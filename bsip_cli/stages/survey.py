@@ -10,13 +10,11 @@ from dataclasses import asdict, fields
 import pandas as pd
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.assemble import findings_about
-from bsip_cli.recordings.frame_change import FrameChange
-from bsip_cli.recordings.gate_limits import GateLimits
-from bsip_cli.recordings.opened import Opened
-from bsip_cli.recordings.person_size import no_person
-from bsip_cli.recordings.plate_reading import PlateReading
-from bsip_cli.recordings.read import open_recording
+from bsip_cli.recordings.body_motion import GateLimits
+from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
+from bsip_cli.recordings.plate_source import Opened
+from bsip_cli.recordings.read import findings_about, open_recording
+from bsip_cli.recordings.scene import no_person
 from bsip_cli.recordings.settle import SessionReading, Verdict, settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import Evidence

@@ -48,7 +48,7 @@ ALLOWED = {
 FOREIGN_TO_SCIENCE = {"pandas", "pyarrow", "click", "tqdm", "logging", "subprocess", "matplotlib"}
 
 # ezc3d runs in a process of its own: a damaged file may crash it.
-MAY_ALSO = {"recordings.c3d_guard": {"subprocess"}}
+MAY_ALSO = {"recordings.c3d_content": {"subprocess"}}
 
 # Single modules of a part that may be imported, where the part as a whole may not.
 ONLY = {

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bsip_cli.recordings.stated_mass import Comparison, mass_finding
-from bsip_cli.recordings.told_mass import ToldMass, unknown
+from bsip_cli.recordings.told_mass import Comparison, ToldMass, mass_finding, unknown
 
 
 def compared(stated_kg: float, plates_kg: float, load_kg: float = 0.0, height_m=1.74):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bsip_cli.recordings import repeated_plates as copies
+from bsip_cli.recordings import plate_source as copies
 from bsip_cli.recordings.analog import check_samples, lost_samples
 
 RATE_HZ = 1000.0

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.recordings.body_motion import Balance, Body, turn_of_forces
-from bsip_cli.recordings.gate_limits import USUAL
+from bsip_cli.recordings.body_motion import USUAL, Balance, Body, turn_of_forces
 
 RATE_HZ, N, MASS_KG = 100.0, 300, 70.0
 FRAMES = np.arange(N)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings import c3d_content, c3d_guard
-from bsip_cli.recordings.c3d_guard import read_by_ezc3d
-from bsip_cli.recordings.c3d_parameters import numbers, texts
+from bsip_cli.recordings import c3d_content
+from bsip_cli.recordings.c3d_content import read_by_ezc3d
+from bsip_cli.recordings.c3d_format import numbers, texts
 from bsip_cli.recordings.read import read_recording
 from tests.recordings.recording_writers import (
     PlateSpec,
@@ -59,9 +59,9 @@ def test_labels_that_are_no_utf8(path):
 def test_a_child_that_dies_or_hangs_is_one_sentence(path, tmp_path, monkeypatch, child, words):
     script = tmp_path / "child.py"
     script.write_text(child)
-    monkeypatch.setattr(c3d_guard, "_CHILD", script)
-    monkeypatch.setattr(c3d_guard, "_CPU_S", 1)
-    monkeypatch.setattr(c3d_guard, "_WALL_PER_CPU", 3)
+    monkeypatch.setattr(c3d_content, "_CHILD", script)
+    monkeypatch.setattr(c3d_content, "_CPU_S", 1)
+    monkeypatch.setattr(c3d_content, "_WALL_PER_CPU", 3)
     with pytest.raises(BadDataError, match=words) as caught:
         read_recording(path)
     assert str(path) in str(caught.value) and caught.value.remedy
@@ -69,7 +69,7 @@ def test_a_child_that_dies_or_hangs_is_one_sentence(path, tmp_path, monkeypatch,
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems do not keep the limit")
 def test_the_child_has_a_limit_of_memory(path, monkeypatch):
-    monkeypatch.setattr(c3d_guard, "_MEMORY_BYTES", 60_000_000)
+    monkeypatch.setattr(c3d_content, "_MEMORY_BYTES", 60_000_000)
     with pytest.raises(BadDataError, match="ezc3d"):
         read_by_ezc3d(path.read_bytes(), path)
 
@@ -80,7 +80,7 @@ def test_other_counts_than_the_files_are_refused(path, monkeypatch):
     monkeypatch.setattr(
         c3d_content,
         "read_by_ezc3d",
-        lambda *_: c3d_guard.Samples(
+        lambda *_: c3d_content.Samples(
             shorter.parameters, shorter.positions[:, 1:], shorter.residuals, shorter.analog
         ),
     )
@@ -90,9 +90,9 @@ def test_other_counts_than_the_files_are_refused(path, monkeypatch):
 
 def test_one_child_for_a_recording(path, monkeypatch):
     seen = []
-    original = c3d_guard.subprocess.run
+    original = c3d_content.subprocess.run
     monkeypatch.setattr(
-        c3d_guard.subprocess, "run", lambda *a, **k: seen.append(a) or original(*a, **k)
+        c3d_content.subprocess, "run", lambda *a, **k: seen.append(a) or original(*a, **k)
     )
     read_recording(path)
     assert len(seen) == 1

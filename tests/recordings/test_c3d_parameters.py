@@ -8,9 +8,17 @@ import numpy as np
 import pytest
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.c3d_numbers import DEC, PC, floats, integers
-from bsip_cli.recordings.c3d_parameters import number, numbers, texts
-from bsip_cli.recordings.c3d_records import parameters_of, read_records
+from bsip_cli.recordings.c3d_format import (
+    DEC,
+    PC,
+    floats,
+    integers,
+    number,
+    numbers,
+    parameters_of,
+    read_records,
+    texts,
+)
 from bsip_cli.recordings.read import read_recording
 from tests.recordings.recording_writers import standing_markers, write_c3d
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.force_columns import meaning_of
-from bsip_cli.recordings.mot import read_mot
+from bsip_cli.recordings.mot import meaning_of, read_mot
 from bsip_cli.recordings.read import read_recording
 from tests.recordings.recording_writers import (
     Y_UP_FROM_Z_UP,

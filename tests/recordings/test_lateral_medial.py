@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.body.markersets import load_marker_set
-from bsip_cli.recordings.lateral_medial import with_pairs_named
+from bsip_cli.recordings.marker_guess import with_pairs_named
 
 SET = load_marker_set("hansen2017")
 # Y to the left: the lateral markers lie outside.

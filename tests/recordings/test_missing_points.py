@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.recordings.held_markers import held_markers
-from bsip_cli.recordings.missing_points import without_sentinels
+from bsip_cli.recordings.gaps import held_markers, without_repeats
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.recordings.repeated_frames import without_repeats
+from bsip_cli.recordings.scene import without_sentinels
 from tests.recordings.recording_writers import standing_markers, write_c3d, write_trc
 
 N, K = 240, 12

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bsip_cli.recordings.analog import lost_samples, spike_samples
-from bsip_cli.recordings.cop_polynomial import correct_cop
-from bsip_cli.recordings.free_plates import nobody_near
 from bsip_cli.recordings.model import Plate, Recording
+from bsip_cli.recordings.plate_reading import AS_STATED
+from bsip_cli.recordings.plate_source import C3dPlate
 from bsip_cli.recordings.plates import LocalWrench, PlateDescription
-from bsip_cli.recordings.read import read_recording
-from bsip_cli.recordings.weight_shift import sign_doubts
-from bsip_cli.recordings.zero import plate_zero
+from bsip_cli.recordings.read import read_recording, sign_doubts
+from bsip_cli.recordings.zero import nobody_near, plate_zero
 from tests.circumstances.sound import sound_session
 from tests.recordings.recording_writers import (
     CORNERS_M,
@@ -204,13 +205,21 @@ def test_flight_on_a_plate_set_to_zero_is_not_lost():
 def test_kistlers_polynomial_moves_the_centre_of_pressure():
     polynomial = np.zeros((2, 6))
     polynomial[0, 5], polynomial[1, 2] = 0.1, 1e-6
-    plate = PlateDescription("1", 3, CORNERS_M, np.array([0.1, 0.2, -0.05]), polynomial)
+    stated = PlateDescription("1", 3, CORNERS_M, np.array([0.1, 0.2, 0.0]), polynomial)
     force = np.array([[5.0, 3.0, -500.0]])
     x, y = 0.05, 0.10
     moment = np.array([[y * -500.0, -x * -500.0, 2.0]])
-    corrected, (finding,) = correct_cop(LocalWrench(force, moment), plate)
-    np.testing.assert_allclose(corrected.cop(), [[0.9 * x, y - 1e-3]])
-    np.testing.assert_allclose(corrected.moment_Nm[:, 2], 2.0)
+    wrench = LocalWrench(force, moment)
+    source = C3dPlate(stated, wrench, np.ones(1, bool), np.eye(3))
+    bare = replace(source, description=replace(stated, cop_polynomial=None))
+    (finding,) = source.findings(AS_STATED)
+    corrected, as_written = source.plate(AS_STATED), bare.plate(AS_STATED)
+    height_m = float(CORNERS_M[0, 2])
+    moved = corrected.cop_m(height_m) - as_written.cop_m(height_m)
+    axes = stated.rotation_lab_plate()
+    np.testing.assert_allclose(moved @ axes[:2, :2], [[-0.1 * x, -1e-3]], atol=1e-12)
+    np.testing.assert_allclose(corrected.force_N, as_written.force_N)
+    assert not bare.findings(AS_STATED)
     assert finding.level == "info" and "5.1 mm" in finding.action
 
 

@@ -36,10 +36,3 @@ def test_a_plate_that_is_never_unloaded_keeps_its_zero():
     assert not zero.is_known()
     same, finding = subtract_zero(plate, zero)
     assert same is plate and finding.level == "info"
-
-
-def test_samples_with_a_foot_on_the_plate_do_not_count():
-    plate = _plate(np.zeros(3000))
-    foot = np.zeros(3000, bool)
-    foot[:2000] = True
-    assert plate_zero(plate, RATE_HZ, may_be_loaded=foot).n_samples == 1000

@@ -35,7 +35,7 @@ def _windows(path: Path, names: tuple[str, str, str], mass_kg: float) -> Contact
     left, right, trunk = (recording.markers_m[:, _columns(recording, name)] for name in names)
     loads = plate_loads(recording, wrench_at_marker_rate(recording))
     rate_hz = recording.marker_rate_hz
-    feet = foot_contacts({"l": left, "r": right}, {}, rate_hz, loads, recording.n_frames)
+    feet = foot_contacts({"l": left, "r": right}, rate_hz, loads, recording.n_frames)
     return contact_windows(feet, trunk, mass_kg, rate_hz)
 
 

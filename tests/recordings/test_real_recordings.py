@@ -11,11 +11,10 @@ import pytest
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings import c3d_content
-from bsip_cli.recordings.assemble import findings_about
 from bsip_cli.recordings.c3d_content import read_content
-from bsip_cli.recordings.c3d_parameters import numbers, texts
+from bsip_cli.recordings.c3d_format import numbers, texts
 from bsip_cli.recordings.model import Recording
-from bsip_cli.recordings.read import open_recording, read_recording
+from bsip_cli.recordings.read import findings_about, open_recording, read_recording
 from bsip_cli.recordings.resample import wrench_at_marker_rate
 from bsip_cli.recordings.settle import settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bsip_cli.recordings.gaps import fill_gaps
+from bsip_cli.recordings.gaps import fill_gaps, repeated_frames, without_repeats
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.recordings.repeated_frames import repeated_frames, without_repeats
 from bsip_cli.simulate.effects import drawn
 from bsip_cli.simulate.inject import inject_recording
 from bsip_cli.simulate.options import Asked

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from bsip_cli.config import load_config
-from bsip_cli.recordings.assemble import assemble, findings_about
-from bsip_cli.recordings.frame_change import FrameChange
-from bsip_cli.recordings.gate_limits import USUAL
-from bsip_cli.recordings.handedness import handedness
-from bsip_cli.recordings.plate_reading import PlateReading
+from bsip_cli.recordings.body_motion import USUAL
+from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
 from bsip_cli.recordings.plate_source import ForceOnPoint
+from bsip_cli.recordings.read import assemble, findings_about
+from bsip_cli.recordings.scene import handedness
 from bsip_cli.recordings.settle import SessionReading, settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import Feet
@@ -131,7 +130,7 @@ def test_forces_that_no_reading_brings_under_the_feet_are_refused():
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_mirrored_laboratory_is_turned_back(axis):
-    mirrored = FrameChange("all", axis).of(opened(of_table()))
+    mirrored = opened(of_table()).in_frame(FrameChange("all", axis))
     markers = mirrored.recording.markers_m
     mirrored = replace(mirrored, recording=replace(mirrored.recording, markers_m=markers))
     session = settle_session([TrialSamples.of(mirrored)])
@@ -143,14 +142,14 @@ def test_a_mirrored_laboratory_is_turned_back(axis):
 
 
 def test_mirrored_markers_alone_leave_the_forces():
-    trial = FrameChange("markers", 1).of(opened(of_table()))
+    trial = opened(of_table()).in_frame(FrameChange("markers", 1))
     session = settle_session([TrialSamples.of(trial)])
     assert session.frame == FrameChange("markers", 1)
     np.testing.assert_allclose(assemble(trial, session).markers_m, motion()[0])
 
 
 def test_mirrored_forces_alone_leave_the_markers():
-    trial = FrameChange("forces", 0).of(opened(of_table()))
+    trial = opened(of_table()).in_frame(FrameChange("forces", 0))
     session = settle_session([TrialSamples.of(trial)])
     assert session.frame == FrameChange("forces", 0)
     np.testing.assert_allclose(
@@ -160,7 +159,7 @@ def test_mirrored_forces_alone_leave_the_markers():
 
 @pytest.mark.parametrize("turns", [1, 2, 3])
 def test_forces_in_turned_axes_are_turned_back(turns):
-    trial = FrameChange("forces", turned_deg=90.0 * turns).of(opened(of_table()))
+    trial = opened(of_table()).in_frame(FrameChange("forces", turned_deg=90.0 * turns))
     session = settle_session([TrialSamples.of(trial)])
     assert session.frame == FrameChange("forces", turned_deg=360 - 90.0 * turns)
     np.testing.assert_allclose(
@@ -201,7 +200,7 @@ def test_what_an_odd_turn_leaves_unsure_is_a_warning():
 @pytest.mark.parametrize("moved", ["", "all", "forces"])
 def test_a_reading_is_a_matrix(make, moved):
     """Every reading's wrench is linear in the source's parts, also in other axes."""
-    for source in FrameChange(moved, 1).of(opened(make())).sources:
+    for source in opened(make()).in_frame(FrameChange(moved, 1)).sources:
         for reading in source.alternatives():
             if reading.about == "fixed":
                 reading = ForceOnPoint.with_centre([source], reading)
@@ -216,11 +215,11 @@ def test_a_mirrored_c3d_mirrors_its_channels_or_its_corners(corners_only):
     """Mirrored twice is nothing: also the sensor's depth."""
     sources = opened(of_c3d())
     scene = FrameChange("all", 1, corners_only=corners_only)
-    twice = scene.of(scene.of(sources))
+    twice = sources.in_frame(scene).in_frame(scene)
     sound = [source.plate(PlateReading()).wrench() for source in sources.sources]
     again = [source.plate(PlateReading()).wrench() for source in twice.sources]
     np.testing.assert_allclose(again, sound, atol=1e-9)
-    once = [source.plate(PlateReading()) for source in scene.of(sources).sources]
+    once = [source.plate(PlateReading()) for source in sources.in_frame(scene).sources]
     mirrored_force = np.array(sound)[..., :3] * [1.0, -1.0, 1.0]
     if not corners_only:
         np.testing.assert_allclose([p.force_N for p in once], mirrored_force, atol=1e-9)

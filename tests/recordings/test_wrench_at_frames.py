@@ -68,4 +68,4 @@ def test_plates_are_summed():
     recording = Recording(Path("a"), 100.0, ("A",), markers, 1000.0, plates, (), np.eye(3), "", 0.5)
     wrench = wrench_at_marker_rate(recording)
     np.testing.assert_allclose(wrench.total, np.tile([3.0] * 3 + [-3.0] * 3, (100, 1)))
-    assert wrench.usable.all() and wrench.time_s[0] == 0.5
+    assert wrench.usable.all()

@@ -1,19 +1,91 @@
-"""The cells of text tables: how they are parted, how their numbers are spelt."""
+"""What TRC and MOT files share: lines read within limits, cells, and how numbers are spelt."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from math import isfinite, nan
+from pathlib import Path
 
 import numpy as np
 
-from bsip_cli.recordings.model import Finding
+from bsip_cli.files.regular import check_regular
+from bsip_cli.recordings.model import Finding, refusal
 
+# A C3D file counts its points in 16 bits and names them with at most 255 letters.
+MOST_NAMES, _LONGEST_NAME = 0xFFFF, 255
+ROWS_LOOKED_AT = 20  # to see how the table is written
+_LARGEST_TEXT = 2**30  # bytes
+_LONGEST_NUMBER = 25  # characters, with what parts it from the next: -1.2345678901234567e-100
+_LONGEST_LINE = _LONGEST_NUMBER * (2 + 3 * MOST_NAMES)
+_MOST_HEADER_LINES = 1000  # a TRC file has 3, MOT files with notes some 20
+_LONGEST_FACT = 1000  # characters of a header's line that are kept
 _MISSING = re.compile(r"[-+]?(?:nan\b.*|#?n/?a|none|null|1\.#.*|inf|infinity|-|\.)?", re.IGNORECASE)
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
 _SEPARATORS = ("\t", ";", ",", None)  # None: blanks
+
+
+def text_lines(path: Path) -> Iterator[str]:
+    """A text file's lines one after the other.
+
+    Raises
+    ------
+    BadDataError
+        It cannot be opened or read, is empty, too large, or no text.
+    """
+    check_regular(path)
+    try:
+        size = path.stat().st_size
+        if size > _LARGEST_TEXT:
+            found, most = f"a text of {size / 1e9:.1f} GB", f"at most {_LARGEST_TEXT / 1e9:.1f} GB"
+            raise refusal(path, found, most, "cut the trial into shorter ones")
+        if not size:
+            remedy = "copy or export the trial again"
+            raise refusal(path, "the file is empty", "a text file", remedy)
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            while line := file.readline(_LONGEST_LINE + 1):
+                if "\0" in line:
+                    remedy = "save it as text in UTF-8, not in UTF-16"
+                    raise refusal(path, "bytes that are no text", "lines of text", remedy)
+                if len(line) > _LONGEST_LINE:
+                    found = f"a line of more than {_LONGEST_LINE / 1e6:.1f} million characters"
+                    raise refusal(path, found, "lines of text")
+                yield line
+    except OSError as error:
+        found = f"cannot be read ({error.strerror or error})"
+        raise refusal(path, found, "a readable text file", "check the file") from error
+
+
+def head_of(lines: Iterator[str], is_end: Callable[[str], object]) -> tuple[list[str], str | None]:
+    """The header's lines, and the one that ends it; None where no line does."""
+    above: list[str] = []
+    for line in islice(lines, _MOST_HEADER_LINES):
+        if is_end(line):
+            return above, line
+        above.append(line[:_LONGEST_FACT])
+    return above, None
+
+
+def check_names(names: Sequence[str], what: str, path: Path) -> None:
+    """Refuse more names, or longer ones, than a C3D file could hold."""
+    longest = max(map(len, names), default=0)
+    if len(names) > MOST_NAMES:
+        raise refusal(path, f"{len(names)} {what}", f"at most {MOST_NAMES}")
+    if longest > _LONGEST_NAME:
+        raise refusal(path, f"one of the {what} has {longest} letters", f"at most {_LONGEST_NAME}")
+
+
+def row_counts(what: str, stated: float, found: int) -> list[Finding]:
+    """A warning where a header counts other rows or columns than the file has."""
+    if not np.isfinite(stated) or stated == found:
+        return []
+    counts = f"the header counts {stated:g} {what}, the file has {found}"
+    return [Finding("layout", "", counts, "one count", f"read {found}", "warning")]
+
+
+# --- cells ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -102,8 +174,7 @@ class LastDigit:
 
     def sizes(self, values: np.ndarray) -> tuple[float, float]:
         """In the column's unit; numbers that all have single precision are no finer than that."""
-        printed = 10.0 ** -min(self._printed, 300)
-        used = 10.0 ** -min(self._used, 300)
+        printed, used = (10.0 ** -min(digits, 300) for digits in (self._printed, self._used))
         with np.errstate(over="ignore", invalid="ignore"):
             single = values.astype(np.float32)
             if (np.abs(single - values) <= 0.5 * printed).all():

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Generator
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.transform import Rotation
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import is_made_from
@@ -22,7 +23,10 @@ from bsip_cli.diagnosis.corrected_wrench import (
     is_of_the_forces,
 )
 from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.gravity_tilt import GravityTilt, Turned
 from bsip_cli.effects.marker_swap import MarkerSwap
+from bsip_cli.effects.plate_frame import ALL
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
 from bsip_cli.files.fingerprints import file_hash
@@ -58,6 +62,7 @@ _READER = Stage(
     ),
     writes=(),
     options=("skeleton", "ingest"),
+    reads_if_there=("laboratory",),
 )
 _SAME_M = 1e-5  # a trajectory of the file and of the artifact
 _EXACT = 1e-3  # of the largest change of a plate's wrench, that its channels must reproduce
@@ -149,17 +154,22 @@ class _Correction:
         self.causes: dict[Cause, str] = {}  # and what else it may be
         told = unit.read("overall-diagnosis")
         known = set[tuple[str, str]]()
-        for cause in (one for one in causes_of(unit) if unit.name in one.trials):
+        for cause in causes_here(unit, [*self._plates]):
             words, alike = f"{cause.effect.name} {cause.target}".strip(), _alike(cause, told)
             known |= {(cause.effect.name, cause.target), *alike}
             others = " or ".join(f"{effect} {target}".strip() for effect, target in alike)
             if isinstance(cause.effect, MarkerSwap):
                 first, second = cause.target.split("+")
                 self._swaps.append((first, second, *cause.values[1:3].tolist()))
-            elif not is_of_the_forces(cause):
-                self.left.append(f"{words}: no fault of the plates, the clocks or the labels")
-            elif not all(
-                effect in EFFECTS and is_fault_of_forces(EFFECTS[effect]) for effect, _ in alike
+            elif not is_corrected(cause):
+                self.left.append(
+                    f"{words}: no fault of the plates, the clocks, the axes or the labels"
+                )
+            elif isinstance(cause.effect, Turned) and not (self._plates and self._scene.plates):
+                self.left.append(f"{words}: no plate shows where the axes are")
+            elif alike and not all(
+                effect in EFFECTS and is_fault_of_forces(EFFECTS[effect])
+                for effect, _ in (*alike, (cause.effect.name, ""))
             ):
                 self.left.append(f"{words}: it cannot be distinguished from {others} here")
             else:
@@ -209,7 +219,7 @@ class _Correction:
     def _kept(self) -> slice:
         """Frames whose forces, which a clock may have recorded late, are in the file."""
         recording = self._opened.recording
-        if all(cause.effect.of_the_plates for cause in self.causes):
+        if not any(isinstance(cause.effect, Delay) for cause in self.causes):
             return slice(0, recording.n_frames)
         scene = self._scene
         begin = recording.time_s() + np.interp(
@@ -254,6 +264,7 @@ class _Correction:
         times = recording.time0_s + samples / recording.analog_rate_hz
         frames = np.searchsorted(table["time_s"], times - 0.5 / recording.marker_rate_hz)
         valid = table["valid"].to_numpy()[np.clip(frames, 0, len(table) - 1)]
+        valid = valid if valid.any() else ~valid  # none in which the diagnosis saw all contacts
         skeleton = load_skeleton(unit.config.skeleton)
         person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
         none = np.empty((len(times), 0))
@@ -265,27 +276,93 @@ class _Correction:
         for name, reading in self._plates.items():
             now, k = self._wrench(name, _stated(reading)), int(name) - 1
             wanted = corrected.get(name, self._wrench(name, reading))
+            for about, back in self._turns(markers=False):
+                force = wanted[:, :3] @ back.T
+                moment = (wanted[:, 3:] - np.cross(about, wanted[:, :3])) @ back.T
+                wanted = np.hstack([force, moment + np.cross(about, force)])
             change = np.nan_to_num(wanted - now)
             if change.any():
                 readings[k] += _in_reading(readings[k], now, change, self.unit)
         return readings
 
-    # --- labels -------------------------------------------------------------------------------
+    # --- axes and labels ------------------------------------------------------------------------
+
+    def _turns(self, *, markers: bool) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Point (3,) and matrix (3, 3) of the turns that bring markers, or plates, into true axes.
+
+        Where the vertical is tilted both are turned, about the middle of the plates, lest the
+        surfaces, whose places in the file stay, come to lie under or over what stands on them.
+        """
+        for cause in self.causes:
+            tilted = isinstance(cause.effect, GravityTilt)
+            if tilted or (markers and isinstance(cause.effect, Turned)):
+                middle = np.mean([plate.centre_m() for plate in self._scene.plates], axis=0)
+                back = Rotation.from_rotvec([*-cause.values, 0.0]).as_matrix()
+                yield middle if tilted else np.zeros(3), back
 
     def _points(self, before: Instruments) -> np.ndarray:
-        if not self._swaps:
-            return before.points_m
-        times, labels, places = markers_from(self.unit.read("markers"))
-        recording = self._opened.recording
-        seen = before.points_m @ recording.rotation_world_lab.T
+        to_world = self._opened.recording.rotation_world_lab
         if self._session.frame.moves_markers:
-            seen = seen @ self._session.frame.matrix().T
+            to_world = self._session.frame.matrix() @ to_world
         points = before.points_m.copy()
-        for *pair, start, end in self._swaps:
-            columns = [_column(seen, places[:, labels.index(name)], name) for name in pair]
-            frames = np.flatnonzero((times >= start) & (times <= end))[:, None]
-            points[frames, columns] = points[frames, columns[::-1]]
+        if self._swaps:
+            times, labels, places = markers_from(self.unit.read("markers"))
+            seen = before.points_m @ to_world.T
+            for *pair, start, end in self._swaps:
+                columns = [_column(seen, places[:, labels.index(name)], name) for name in pair]
+                frames = np.flatnonzero((times >= start) & (times <= end))[:, None]
+                points[frames, columns] = points[frames, columns[::-1]]
+        for about, back in self._turns(markers=True):
+            world = points @ to_world.T - about
+            points = (world @ back.T + about) @ to_world
         return points
+
+
+def is_corrected(cause: Cause) -> bool:
+    """Of the plates, the clocks, or the axes of laboratory and cameras."""
+    return is_of_the_forces(cause) or isinstance(cause.effect, Turned)
+
+
+def causes_here(unit: Unit, plates: Sequence[str]) -> list[Cause]:
+    """What the diagnosis names in a recording, on the plates that it has.
+
+    Where it did not look at it: what it names of the instruments in all others of the session, at
+    least two, and what the laboratory of the person is known to have.
+    """
+    assert unit.participant is not None and unit.trial is not None
+    looked_at, causes = unit.facts("overall-diagnosis")["trials"], causes_of(unit)
+    here = [one for one in causes if unit.name in one.trials]
+    if unit.name in looked_at:
+        return here
+    session = {t.stem for t in unit.participant.trials if t.session == unit.trial.session}
+    others = session & set(looked_at)
+    shared = [
+        one
+        for one in causes
+        if one.effect.of_the_lab and is_corrected(one) and others <= set(one.trials)
+    ]
+    shared = shared if len(others) > 1 else []
+    known = {(one.effect.name, one.target) for one in shared}
+    shared += [
+        one for one in _of_the_laboratory(unit) if (one.effect.name, one.target) not in known
+    ]
+    there = ("", ALL, *plates)
+    return [*here, *(one for one in shared if one.target.split(" ")[0] in there)]
+
+
+def _of_the_laboratory(unit: Unit) -> Iterator[Cause]:
+    """What is named of the laboratory in which a person was recorded, and only in that one."""
+    assert unit.participant is not None
+    if not unit.has("laboratory"):
+        return
+    persons = unit.facts("laboratory")["persons"].items()
+    mine = [number for number, them in persons if unit.participant.id in them]
+    if len(mine) != 1:
+        return
+    rows = unit.read("laboratory", laboratory=mine, scope=["laboratory"], verdict=["named"])
+    for (effect, target), sizes in rows.groupby(["effect", "target"], sort=False):
+        values = sizes["estimate"].to_numpy()
+        yield Cause(EFFECTS[str(effect)], str(target), (unit.name,), values, values[None])
 
 
 def _opened(unit: Unit) -> tuple[Opened, SessionReading]:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
 from bsip_cli import __version__
@@ -65,6 +66,7 @@ _READER = Stage(
     reads_if_there=("laboratory",),
 )
 _SAME_M = 1e-5  # a trajectory of the file and of the artifact
+_AT_ONCE_S = 1e-9
 _EXACT = 1e-3  # of the largest change of a plate's wrench, that its channels must reproduce
 
 
@@ -213,7 +215,29 @@ class _Correction:
         after = replace(before, points_m=self._points(before))
         if before.plates and self._plates:
             after = replace(after, readings=self._readings(before))
-        return after.frames(self._kept.start, self._kept.stop)
+        kept, stamps = self._kept, self._stamps(before)
+        if stamps is not None:
+            times = self._opened.recording.time_s()
+            first = np.searchsorted(stamps, times[kept.start] - _AT_ONCE_S) if kept.start else 0
+            cut = kept.stop < len(times)
+            last = np.searchsorted(stamps, times[kept.stop - 1]) if cut else len(stamps)
+            kept = slice(int(first), int(last))
+        return after.frames(kept.start, kept.stop)
+
+    def _stamps(self, before: Instruments) -> np.ndarray | None:
+        """(n,) times of the file's frames where they are uneven: bsip reads them evenly."""
+        if before.stamps_s is None:
+            return None
+        times = self._opened.recording.time_s()
+        stamps = times[0] + before.stamps_s
+        if stamps[-1] - times[-1] > 2 / self._opened.recording.marker_rate_hz:
+            raise BadDataError(
+                f"{stamps[-1] - times[0]:.4g} s, of which bsip uses {np.ptp(times):.4g} s",
+                expected="times without a gap",
+                file=self.unit.name,
+                remedy="export the part that is used",
+            )
+        return stamps
 
     @cached_property
     def _kept(self) -> slice:
@@ -272,7 +296,8 @@ class _Correction:
 
     def _readings(self, before: Instruments) -> np.ndarray:
         corrected = corrected_plates(self._scene, [*self.causes])
-        readings = before.readings.copy()
+        readings, times = before.readings.copy(), self._scene.times_s
+        stamps = self._stamps(before)
         for name, reading in self._plates.items():
             now, k = self._wrench(name, _stated(reading)), int(name) - 1
             wanted = corrected.get(name, self._wrench(name, reading))
@@ -282,7 +307,9 @@ class _Correction:
                 wanted = np.hstack([force, moment + np.cross(about, force)])
             change = np.nan_to_num(wanted - now)
             if change.any():
-                readings[k] += _in_reading(readings[k], now, change, self.unit)
+                seen = readings[k] if stamps is None else _at(times, stamps, readings[k])
+                found = _in_reading(seen, now, change, self.unit)
+                readings[k] += found if stamps is None else _at(stamps, times, found)
         return readings
 
     # --- axes and labels ------------------------------------------------------------------------
@@ -307,7 +334,9 @@ class _Correction:
         points = before.points_m.copy()
         if self._swaps:
             times, labels, places = markers_from(self.unit.read("markers"))
-            seen = before.points_m @ to_world.T
+            seen, stamps = before.points_m @ to_world.T, self._stamps(before)
+            if stamps is not None:
+                seen, times = _at(times, stamps, seen), stamps
             for *pair, start, end in self._swaps:
                 columns = [_column(seen, places[:, labels.index(name)], name) for name in pair]
                 frames = np.flatnonzero((times >= start) & (times <= end))[:, None]
@@ -437,6 +466,14 @@ def _in_reading(
             expected="a plate of TYPE 2 to 4, or force, point and moment",
         )
     return np.pad(found, ((0, rest), (0, 0)), mode="edge")
+
+
+def _at(times_s: np.ndarray, known_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """(N, ...) values (n, ...) of times (n,) at others (N,), on lines between them."""
+    ends = (values[0], values[-1])
+    return np.asarray(
+        interp1d(known_s, values, axis=0, bounds_error=False, fill_value=ends)(times_s)
+    )
 
 
 def _column(seen: np.ndarray, place: np.ndarray, name: str) -> int:

@@ -36,11 +36,10 @@ from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.found_causes import body_beside, causes_of
 from bsip_cli.stages.frames import WRENCH, acceleration_noise, coordinates_from, person_from
-from bsip_cli.stages.joint_peaks import peaks_of
 from bsip_cli.stages.known_loads import load_phi, loads_record
 from bsip_cli.stages.reconstructed import parameters_of
 from bsip_cli.stages.trial_scene import outline, plate_names, scene_of
-from bsip_cli.statistics.methods import OM, RM
+from bsip_cli.statistics.methods import OM, RM, is_extended
 
 _POSES = 40  # in which the response to accelerations is computed; between them it is interpolated
 _WEAK_PRIOR = 200.0  # rad/m, as in smoothing: an angle that errs by more is held by the prior
@@ -439,7 +438,8 @@ def _table(
     }
     # from frames, joints, axes, methods to rows: all frames of an axis, all axes of a joint, ...
     columns = {name: x.transpose(3, 1, 2, 0).ravel() for name, x in numbers.items()}
-    return pd.DataFrame({"time_s": np.tile(trial.times_s, len(keys))} | words | columns)
+    times = {"time_s": np.tile(trial.times_s, len(keys))}
+    return pd.DataFrame(times | words | columns, copy=False)
 
 
 def _lowpassed(trial: _Trial, courses: np.ndarray, ok: np.ndarray) -> np.ndarray:
@@ -453,3 +453,54 @@ def _lowpassed(trial: _Trial, courses: np.ndarray, ok: np.ndarray) -> np.ndarray
         operator, frames = lowpass_operator(pattern, trial.rate_hz, trial.cutoff_hz)
         found[np.ix_(frames, mine)] = operator @ np.where(pattern[:, None], flat[:, mine], 0.0)
     return found.reshape(courses.shape)
+
+
+def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str]) -> pd.DataFrame:
+    """``joint-peaks`` of ``joint-moments``: a row per method, joint and axis, how large, how sure,
+    and what the method changes; ``left_out`` in words, by joint."""
+    names = ["method", "joint", "axis"]
+    number = moments.groupby(names, sort=False, observed=True).ngroup().to_numpy()
+    order = np.argsort(number, kind="stable").reshape(number.max() + 1, -1)
+    time_s, moment, sd = (
+        moments[c].to_numpy()[order] for c in ("time_s", "moment_Nm", "moment_sd_Nm")
+    )
+    keys = list(moments.loc[order[:, 0], names].astype(str).itertuples(index=False, name=None))
+    known = np.isfinite(moment)
+    at = np.where(known, np.abs(moment), -1.0).argmax(axis=1)[:, None]
+    time_s, peak, sd = (
+        np.where(known.any(axis=1), np.take_along_axis(x, at, axis=1)[:, 0], np.nan)
+        for x in (time_s, moment, sd)
+    )
+    methods = list(dict.fromkeys(method for method, *_ in keys))
+    rows = []
+    for k, (method, joint, axis) in enumerate(keys):
+        other = _compared_with(method, methods)
+        change = np.empty(0)
+        if other:
+            change = moment[k] - moment[keys.index((other, joint, axis))]
+            change = change[np.isfinite(change)]
+            alike = [n for n, key in enumerate(keys) if key[:2] == (other, joint)]
+            largest = np.abs(peak[alike]).max(initial=0.0, where=np.isfinite(peak[alike]))
+        most = change[np.abs(change).argmax()] if len(change) else np.nan
+        rows.append(
+            {"method": method, "joint": joint, "axis": axis}
+            | {"peak_Nm": peak[k], "peak_sd_Nm": sd[k], "peak_Nm_kg": peak[k] / mass_kg}
+            | {"peak_at_s": time_s[k], "frames": int(known[k].sum()), "compared_with": other}
+            | {
+                "change_Nm": most,
+                "change_rms_Nm": np.sqrt((change**2).mean()) if len(change) else np.nan,
+            }
+            | {"change_percent": 100 * abs(most) / largest if len(change) else np.nan}
+            | {"left_out": left_out[joint]}
+        )
+    return pd.DataFrame(rows)
+
+
+def _compared_with(method: str, methods: list[str]) -> str:
+    """RM; of an extended model the one with a cause less."""
+    if method == RM:
+        return ""
+    if not is_extended(method):
+        return RM
+    before = [m for m in methods[: methods.index(method)] if is_extended(m)]
+    return before[-1] if before else OM

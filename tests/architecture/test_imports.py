@@ -145,7 +145,6 @@ def test_stages_do_not_know_each_other():
         "stages.frames",
         "stages.gain_rows",
         "stages.identification_problem",
-        "stages.joint_peaks",
         "stages.known_laboratory",
         "stages.known_loads",
         "stages.diagnosed_trials",

@@ -15,7 +15,7 @@ from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
 from bsip_cli import __version__
-from bsip_cli.artifacts import is_made_from
+from bsip_cli.artifacts import empty_table, is_made_from
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.cause import Cause, delay_by
 from bsip_cli.diagnosis.corrected_wrench import (
@@ -23,11 +23,12 @@ from bsip_cli.diagnosis.corrected_wrench import (
     is_fault_of_forces,
     is_of_the_forces,
 )
+from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.delayed import Delay
 from bsip_cli.effects.gravity_tilt import GravityTilt, Turned
 from bsip_cli.effects.marker_swap import MarkerSwap
-from bsip_cli.effects.plate_frame import ALL
+from bsip_cli.effects.plate_frame import ALL, loaded_plates
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
 from bsip_cli.files.fingerprints import file_hash
@@ -181,6 +182,17 @@ class _Correction:
             for effect, target in _told_of(unit.name, told)
             if (effect, target) not in known
         ]
+        self.left += [
+            f"{sentence}: nothing tells its course exactly"
+            for sentence in _nameless(unit.name, told)
+        ]
+        self.left += dict.fromkeys(
+            f"{one.sentence}: no size of it is known for this recording"
+            for one in _of_the_laboratory(unit, "named", "ambiguous").itertuples()
+            if self._plates
+            and (one.effect, one.target) not in known
+            and one.target.split(" ")[0] in ("", ALL, *loaded_plates(self._scene))
+        )
         kept = [
             self._session.frame.words(),
             *(f"plate {n}: {w}" for n, r in self._plates.items() if (w := _stated(r).words())),
@@ -372,26 +384,26 @@ def causes_here(unit: Unit, plates: Sequence[str]) -> list[Cause]:
     ]
     shared = shared if len(others) > 1 else []
     known = {(one.effect.name, one.target) for one in shared}
-    shared += [
-        one for one in _of_the_laboratory(unit) if (one.effect.name, one.target) not in known
-    ]
+    named = _of_the_laboratory(unit, "named")
+    named = named[named["scope"] == "laboratory"]
+    for key, sizes in named.groupby(["effect", "target"], sort=False):
+        if key not in known:
+            values = sizes["estimate"].to_numpy()
+            shared.append(Cause(EFFECTS[key[0]], key[1], (unit.name,), values, values[None]))
     there = ("", ALL, *plates)
     return [*here, *(one for one in shared if one.target.split(" ")[0] in there)]
 
 
-def _of_the_laboratory(unit: Unit) -> Iterator[Cause]:
-    """What is named of the laboratory in which a person was recorded, and only in that one."""
-    assert unit.participant is not None
-    if not unit.has("laboratory"):
-        return
-    persons = unit.facts("laboratory")["persons"].items()
-    mine = [number for number, them in persons if unit.participant.id in them]
+def _of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
+    """Rows about the laboratory of a person who was in one only, or about this session in it."""
+    assert unit.participant is not None and unit.trial is not None
+    of_all = unit.facts("laboratory")["persons"].items() if unit.has("laboratory") else ()
+    mine = [number for number, persons in of_all if unit.participant.id in persons]
     if len(mine) != 1:
-        return
-    rows = unit.read("laboratory", laboratory=mine, scope=["laboratory"], verdict=["named"])
-    for (effect, target), sizes in rows.groupby(["effect", "target"], sort=False):
-        values = sizes["estimate"].to_numpy()
-        yield Cause(EFFECTS[str(effect)], str(target), (unit.name,), values, values[None])
+        return empty_table("laboratory")
+    rows = unit.read("laboratory", laboratory=mine, verdict=verdicts)
+    session = "_ses-".join(filter(None, (unit.participant.id, unit.trial.session)))
+    return rows[(rows["scope"] == "laboratory") | (rows["who"] == session)]
 
 
 def _opened(unit: Unit) -> tuple[Opened, SessionReading]:
@@ -409,11 +421,20 @@ def _alike(cause: Cause, told: pd.DataFrame) -> list[tuple[str, str]]:
     return list(dict.fromkeys(zip(others["effect"], others["target"], strict=True)))
 
 
-def _told_of(trial: str, told: pd.DataFrame) -> list[tuple[str, str]]:
-    """Effects and targets that the diagnosis names, alone or in a group, in a trial."""
+def _said_of(trial: str, told: pd.DataFrame, effects: Sequence[str]) -> pd.DataFrame:
+    """Rows of these effects that the diagnosis names, alone or in a group, in a trial."""
     here = np.array([trial in names.split(", ") for names in told["trials"]], dtype=bool)
-    rows = told[here & told["effect"].isin(list(EFFECTS)) & (told["verdict"] != "rejected")]
+    return told[here & told["effect"].isin(effects) & (told["verdict"] != "rejected")]
+
+
+def _told_of(trial: str, told: pd.DataFrame) -> list[tuple[str, str]]:
+    rows = _said_of(trial, told, list(EFFECTS))
     return list(dict.fromkeys(zip(rows["effect"], rows["target"], strict=True)))
+
+
+def _nameless(trial: str, told: pd.DataFrame) -> list[str]:
+    """What is there and has no name, or acts like a fault but not evenly, in words."""
+    return list(dict.fromkeys(_said_of(trial, told, [UNEXPLAINED])["sentence"]))
 
 
 def _exchanged(events: pd.DataFrame) -> list[tuple[str, str, float, float]]:

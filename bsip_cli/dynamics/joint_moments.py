@@ -76,11 +76,6 @@ class JointLoads:
     def power_W(self) -> np.ndarray:
         return self.moment_Nm * self.rate_rad_s[..., None]
 
-    @property
-    def power_sd_W(self) -> np.ndarray:
-        """Of the moment alone: what the rates of the angles err by is not in it."""
-        return self.moment_sd_Nm * np.abs(self.rate_rad_s)[..., None]
-
 
 @dataclass(frozen=True, eq=False)
 class Ground:
@@ -137,7 +132,7 @@ def joint_loads(
     shape = (len(q), len(joints), 3)
     value, variance = np.zeros((2, 2, *shape, k))
     rates = np.empty(shape)
-    beyond = [segments_beyond(skeleton, i) for i in range(1, len(joints) + 1)]
+    beyond = [skeleton.beyond(i) for i in range(1, len(joints) + 1)]
     for start in range(0, len(q), block):
         now = slice(start, start + block)
         motion = segment_motion(model, q[now], v[now], a[now])
@@ -185,15 +180,6 @@ def _between(some: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
     if len(some) == count:
         return values
     return np.stack([np.interp(np.arange(count), some, x) for x in values.T], axis=1)
-
-
-def segments_beyond(skeleton: Skeleton, i: int) -> list[int]:
-    """A segment and all that hang on it."""
-    found = [i]
-    for n in range(i + 1, len(skeleton.segments)):
-        if skeleton.parents[n] in found:
-            found.append(n)
-    return found
 
 
 def _axes(skeleton: Skeleton, motion: SegmentMotion, i: int) -> tuple[np.ndarray, np.ndarray]:

@@ -241,12 +241,8 @@ def _with_reading(
     return np.hstack([force, point, moment - np.cross(point, force)])
 
 
-def _first(before: Instruments, after: Instruments) -> int:
-    return round((after.start_s - before.start_s) * before.marker_hz)
-
-
 def _new_trc(table: Table, before: Instruments, after: Instruments, scale: float) -> str:
-    first, frames = _first(before, after), len(after.points_m)
+    first, frames = before.first_frame_of(after), len(after.points_m)
     values = table.values[first : first + frames].copy()
     count = after.points_m.shape[1]
     values[:, 2 : 2 + 3 * count] = after.points_m.reshape(frames, -1) / scale
@@ -266,7 +262,7 @@ def _new_mot(
     after: Instruments,
     said: Sequence[str],
 ) -> str:
-    first = _first(before, after) * before.per_frame
+    first = before.first_frame_of(after) * before.per_frame
     values = table.values[first : first + after.readings.shape[1]].copy()
     for each, plate, reading in zip(sets, after.plates, after.readings, strict=True):
         values[:, [*each.force, *each.point, *each.torque]] = _with_reading(

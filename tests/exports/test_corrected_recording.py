@@ -247,7 +247,11 @@ def test_what_the_laboratory_has_is_corrected_in_a_recording_that_nobody_looked_
             | dict.fromkeys(("ci_low", "ci_high", "probability", "limit"), 0.99)
             | {"persons": 5, "trials": 9, "verdict": verdict, "scope": scope, "laboratory": "1"}
             | named
-            | {"target": target}
+            | {
+                "target": target,
+                "who": "sub-01" * (scope == "session"),
+                "sentence": f"{target} {scope}",
+            }
             for target, verdict, scope in (
                 ("1 fz", "named", "laboratory"),
                 ("2 fz", "ambiguous", "laboratory"),
@@ -264,7 +268,10 @@ def test_what_the_laboratory_has_is_corrected_in_a_recording_that_nobody_looked_
     assert np.abs(wrenches(after) - wrenches(before)).max() < 0.05
     said = capsys.readouterr().err
     assert f"{STEM}: corrected: plate_gain 1 fz: gain 0.06 1 taken off" in said
-    assert f"{STATIC}: nothing to correct" in said and "2 fz" not in said
+    assert "corrected: plate_gain 2 fz" not in said
+    for scope in ("laboratory", "session"):
+        left = f"not corrected: 2 fz {scope}: no size of it is known for this recording"
+        assert f"{STEM}: {left}" in said
 
 
 def test_plates_that_tell_points_read_what_they_would_have_read(hide, capsys):
@@ -391,6 +398,13 @@ def test_what_the_diagnosis_did_not_size_is_said(hide, capsys):
     study.diagnosed_as(alike=[("plate_gain", "all fz")])
     study.exported()
     assert "not corrected: plate_gain all fz: of unknown size" in capsys.readouterr().err
+
+
+def test_what_has_no_name_is_said(hide, capsys):
+    study = hide(GAIN[0])
+    study.diagnosed_as(alike=[("unexplained", "")])
+    study.exported()
+    assert ": nothing tells its course exactly" in capsys.readouterr().err
 
 
 def test_of_faults_of_the_plates_that_look_alike_one_is_taken_off(hide, capsys):

@@ -186,12 +186,12 @@ class _Correction:
             f"{sentence}: nothing tells its course exactly"
             for sentence in _nameless(unit.name, told)
         ]
+        about = _of_the_laboratory(unit, "named", "ambiguous") if self._plates else told[:0]
         self.left += dict.fromkeys(
-            f"{one.sentence}: no size of it is known for this recording"
-            for one in _of_the_laboratory(unit, "named", "ambiguous").itertuples()
-            if self._plates
-            and (one.effect, one.target) not in known
-            and one.target.split(" ")[0] in ("", ALL, *loaded_plates(self._scene))
+            f"{sentence}: no size of it is known for this recording"
+            for effect, target, sentence in about[["effect", "target", "sentence"]].to_numpy()
+            if (effect, target) not in known
+            and target.split(" ")[0] in ("", ALL, *loaded_plates(self._scene))
         )
         kept = [
             self._session.frame.words(),
@@ -386,10 +386,11 @@ def causes_here(unit: Unit, plates: Sequence[str]) -> list[Cause]:
     known = {(one.effect.name, one.target) for one in shared}
     named = _of_the_laboratory(unit, "named")
     named = named[named["scope"] == "laboratory"]
-    for key, sizes in named.groupby(["effect", "target"], sort=False):
-        if key not in known:
+    for (effect, target), sizes in named.groupby(["effect", "target"], sort=False):
+        if (effect, target) not in known:
             values = sizes["estimate"].to_numpy()
-            shared.append(Cause(EFFECTS[key[0]], key[1], (unit.name,), values, values[None]))
+            cause = Cause(EFFECTS[str(effect)], str(target), (unit.name,), values, values[None])
+            shared.append(cause)
     there = ("", ALL, *plates)
     return [*here, *(one for one in shared if one.target.split(" ")[0] in there)]
 

@@ -9,6 +9,7 @@ import numpy as np
 from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot
 
 COUNT, PLACE = 20, np.array([0.9, 0.0, 0.4])
+MORE = np.array([0.0, 20.0, 0.0, 1.0, 0.0, 2.0])
 
 
 def test_a_place_that_is_no_centre_of_pressure_stays(tmp_path):
@@ -27,12 +28,12 @@ def test_a_place_that_is_no_centre_of_pressure_stays(tmp_path):
     (tmp_path / "in.trc").write_text(head + "\n".join([*body, ""]))
 
     def heavier(before):
-        return replace(before, readings=[*before.readings, 0.0, 20.0, 0.0, 1.0, 0.0, 2.0])
+        return replace(before, readings=before.readings + MORE)
 
     copy = tmp_path / "new" / "in.trc"
     copy.parent.mkdir()
     rewrite_trc_mot(tmp_path / "in.trc", copy, heavier)
     found = np.loadtxt(copy.with_suffix(".mot"), skiprows=5)
-    assert np.allclose(found[:, 1:4], [*force, 0.0, 20.0, 0.0], atol=1e-5)
+    assert np.allclose(found[:, 1:4], force + MORE[:3], atol=1e-5)
     assert np.allclose(found[:, 4:7], PLACE)
-    assert np.allclose(found[:, 7:], [*torque, 1.0, 0.0, 2.0], atol=1e-5)
+    assert np.allclose(found[:, 7:], torque + MORE[3:], atol=1e-5)

@@ -27,18 +27,19 @@ import sys
 from pathlib import Path
 from bsip_cli.running.session import run_session
 study, out = map(Path, sys.argv[1:])
-stages = ("ingest", "scale", "ik", "regress", "identify", "reconstruct", "diagnose")
+stages = "ingest scale ik regress identify reconstruct laboratory diagnose".split()
 print(max(run_session(stage, study, out, (), None, jobs=1, force=False) for stage in stages))
 """
 BAD_DATA = 3  # some trial was refused, the rest is done
 SEEDS = (5101, 5102)
 TASKS = ("static", "sequence", "squat", "hops")
-OPENCAP, FIGAROH = "opencap_subject4", "figaroh_human"
+OPENCAP, FIGAROH, ZOO = "opencap_subject4", "figaroh_human", "zoo_children"
+CHILDREN = ("HC002D", "HC030A", "HC031A", "HC032A", "HC033A", "HC038A", "HC039A")
 
 
 @dataclass(frozen=True)
 class Case:
-    """A fault as ``bsip inject`` wants it, in a simulated person (a seed) or a real recording."""
+    """A fault as ``bsip inject`` wants it, in a simulated person (a seed) or real recordings."""
 
     source: int | str
     effect: str
@@ -60,14 +61,20 @@ CASES = (
     Case(SEEDS[1], "clock_drift", 0.001, "-"),
     Case(SEEDS[1], "marker_swap", 2.0, "RELB+RUA"),
     Case(OPENCAP, "sync_offset", 0.010, "-"),
+    Case(OPENCAP, "sync_offset", 0.015, "-"),
     Case(OPENCAP, "plate_translation", 0.020, "x,plate=1"),
     Case(FIGAROH, "plate_rotation", 0.05236, "yaw,plate=1"),
+    Case(FIGAROH, "plate_translation", 0.020, "x,plate=1"),
+    Case(FIGAROH, "plate_crosstalk", 0.02, "fz:fx,plate=1"),
+    Case(FIGAROH, "plate_drift", 0.3, "fz,plate=1"),
+    Case(ZOO, "sync_offset", 0.010, "-"),
+    Case(ZOO, "plate_translation", 0.030, "x,plate=1"),
 )
 
 
 @dataclass(frozen=True)
 class Result:
-    """Effects and targets: named before, corrected, and not rejected afterwards."""
+    """Effects and targets of all persons: named before, corrected, and not rejected afterwards."""
 
     before: frozenset[tuple[str, str]]
     corrected: frozenset[tuple[str, str]]
@@ -108,6 +115,9 @@ def run_case(case: Case, data: Path, scratch: Path) -> Result | None:
         simulated = ["--preset", "diagnosis", "--sequence-s", "20", "--plate-per-foot"]
         simulated += [part for task in TASKS for part in ("--task", task)]
         bsip("simulate", study, *simulated, "--seed", case.source)
+    elif case.source == ZOO:
+        if not make_children(study, data / ZOO):
+            return None
     else:
         subject = next(one for one in SUBJECTS if one.source.name == case.source)
         if not make_study(study, data, subject.source):
@@ -118,6 +128,23 @@ def run_case(case: Case, data: Path, scratch: Path) -> Result | None:
     said = bsip("export", hidden, "--out", scratch / "out", "--what", "recording", "--to", fixed)
     after = diagnosed(fixed, scratch / "again")
     return Result(before, corrected_in(said), after)
+
+
+def make_children(study: Path, data: Path) -> bool:
+    """Write the study of seven children; False if a recording is missing."""
+    rows = ["participant_id\tsex\tmass_kg\theight_m"]
+    for number, child in enumerate(CHILDREN, start=1):
+        person = f"sub-{number:02d}"
+        rows.append(f"{person}\tother\tn/a\tn/a")
+        (study / person).mkdir(parents=True)
+        for task in ("static", "straight", "turn"):
+            recording = data / f"{child}-{task}.c3d"
+            if not recording.exists():
+                return False
+            copy = study / person / f"{person}_task-{task}.c3d"
+            copy.write_bytes(recording.read_bytes())
+    (study / "participants.tsv").write_text("\n".join([*rows, ""]))
+    return True
 
 
 def corrected_in(said: str) -> frozenset[tuple[str, str]]:
@@ -139,10 +166,10 @@ def diagnosed(study: Path, out: Path) -> frozenset[tuple[str, str]]:
     done = run_child([sys.executable, "-c", _STAGES, str(study), str(out)], folder=ROOT)
     if done.stdout.strip().splitlines()[-1] not in ("0", str(BAD_DATA)):
         raise RuntimeError(done.stderr)
-    table = pd.read_parquet(out / "sub-01" / "sub-01_diagnosis.parquet")
+    table = pd.concat(map(pd.read_parquet, sorted(out.glob("sub-*/sub-??_diagnosis.parquet"))))
     found = table[table["verdict"] != "rejected"]
     events = pd.concat(
-        pd.read_parquet(path) for path in sorted(out.glob("sub-01/*_marker-events.parquet"))
+        pd.read_parquet(path) for path in sorted(out.glob("sub-*/*_marker-events.parquet"))
     )
     swaps = events[events["put_right"].astype(bool)]
     pairs = {("marker_swap", f"{m}+{p}") for m, p in zip(swaps.marker, swaps.partner, strict=True)}

@@ -73,6 +73,14 @@ class Skeleton:
     def index(self, segment: str) -> int:
         return self.segments.index(segment)
 
+    def beyond(self, i: int) -> list[int]:
+        """A segment and all that hang on it."""
+        found = [i]
+        for n in range(i + 1, len(self.segments)):
+            if self.parents[n] in found:
+                found.append(n)
+        return found
+
     def side(self, segment: str) -> str:
         """``l``, ``r`` or an empty string."""
         return segment[-1] if segment.endswith(("_l", "_r")) else ""

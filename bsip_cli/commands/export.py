@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli import __version__
-from bsip_cli.artifacts import is_made_from, remove, write_atomically
+from bsip_cli.artifacts import is_made_from, remove
 from bsip_cli.body.exports.body_map import (
     BodyMap,
     check_segments,
@@ -31,7 +31,7 @@ from bsip_cli.body.exports.osim_given import (
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.commands.export_recording import export_recordings
-from bsip_cli.commands.export_trials import Tables, export_trials, folder_of
+from bsip_cli.commands.export_trials import Tables, export_trials, folder_of, write_text
 from bsip_cli.errors import BadDataError, BsipError, UsageError
 from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.files.regular import check_regular
@@ -210,7 +210,7 @@ def _export(
                     remove(path)  # an older one would pass for this method's
                     errors.append(error)
                     continue
-                write_atomically(path, partial(_write, text))
+                write_text(path, text)
                 written.append(path.name)
                 notes += [note] if note else []
     except BsipError as error:
@@ -227,10 +227,6 @@ def _outcome(
     sentences += dict.fromkeys(map(str, errors))
     code = max((error.exit_code for error in errors), default=0)
     return Outcome("export", unit.name, "refused" if errors else "done", tuple(sentences), code)
-
-
-def _write(text: str, path: Path) -> None:
-    path.write_bytes(text.encode())
 
 
 def _chosen(unit: Unit) -> tuple[str, str]:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Generator
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.interpolate import interp1d
+from scipy.spatial.transform import Rotation
 
 from bsip_cli import __version__
-from bsip_cli.artifacts import is_made_from
+from bsip_cli.artifacts import empty_table, is_made_from
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.cause import Cause, delay_by
 from bsip_cli.diagnosis.corrected_wrench import (
@@ -21,8 +23,12 @@ from bsip_cli.diagnosis.corrected_wrench import (
     is_fault_of_forces,
     is_of_the_forces,
 )
+from bsip_cli.diagnosis.pattern import UNEXPLAINED
 from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.gravity_tilt import GravityTilt, Turned
 from bsip_cli.effects.marker_swap import MarkerSwap
+from bsip_cli.effects.plate_frame import ALL, loaded_plates
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
 from bsip_cli.files.fingerprints import file_hash
@@ -57,8 +63,10 @@ _READER = Stage(
     ),
     writes=(),
     options=("skeleton", "ingest"),
+    reads_if_there=("laboratory",),
 )
 _SAME_M = 1e-5  # a trajectory of the file and of the artifact
+_AT_ONCE_S = 1e-9
 _EXACT = 1e-3  # of the largest change of a plate's wrench, that its channels must reproduce
 
 
@@ -148,17 +156,22 @@ class _Correction:
         self.causes: dict[Cause, str] = {}  # and what else it may be
         told = unit.read("overall-diagnosis")
         known = set[tuple[str, str]]()
-        for cause in (one for one in causes_of(unit) if unit.name in one.trials):
+        for cause in causes_here(unit, [*self._plates]):
             words, alike = f"{cause.effect.name} {cause.target}".strip(), _alike(cause, told)
             known |= {(cause.effect.name, cause.target), *alike}
             others = " or ".join(f"{effect} {target}".strip() for effect, target in alike)
             if isinstance(cause.effect, MarkerSwap):
                 first, second = cause.target.split("+")
                 self._swaps.append((first, second, *cause.values[1:3].tolist()))
-            elif not is_of_the_forces(cause):
-                self.left.append(f"{words}: no fault of the plates, the clocks or the labels")
-            elif not all(
-                effect in EFFECTS and is_fault_of_forces(EFFECTS[effect]) for effect, _ in alike
+            elif not is_corrected(cause):
+                self.left.append(
+                    f"{words}: no fault of the plates, the clocks, the axes or the labels"
+                )
+            elif isinstance(cause.effect, Turned) and not (self._plates and self._scene.plates):
+                self.left.append(f"{words}: no plate shows where the axes are")
+            elif alike and not all(
+                effect in EFFECTS and is_fault_of_forces(EFFECTS[effect])
+                for effect, _ in (*alike, (cause.effect.name, ""))
             ):
                 self.left.append(f"{words}: it cannot be distinguished from {others} here")
             else:
@@ -168,6 +181,17 @@ class _Correction:
             for effect, target in _told_of(unit.name, told)
             if (effect, target) not in known
         ]
+        self.left += [
+            f"{sentence}: nothing tells its course exactly"
+            for sentence in _nameless(unit.name, told)
+        ]
+        about = _of_the_laboratory(unit, "named", "ambiguous") if self._plates else told[:0]
+        self.left += dict.fromkeys(
+            f"{sentence}: no size of it is known for this recording"
+            for effect, target, sentence in about[["effect", "target", "sentence"]].to_numpy()
+            if (effect, target) not in known
+            and target.split(" ")[0] in ("", ALL, *loaded_plates(self._scene))
+        )
         kept = [
             self._session.frame.words(),
             *(f"plate {n}: {w}" for n, r in self._plates.items() if (w := _stated(r).words())),
@@ -202,13 +226,35 @@ class _Correction:
         after = replace(before, points_m=self._points(before))
         if before.plates and self._plates:
             after = replace(after, readings=self._readings(before))
-        return after.frames(self._kept.start, self._kept.stop)
+        kept, stamps = self._kept, self._stamps(before)
+        if stamps is not None:
+            times = self._opened.recording.time_s()
+            first = np.searchsorted(stamps, times[kept.start] - _AT_ONCE_S) if kept.start else 0
+            cut = kept.stop < len(times)
+            last = np.searchsorted(stamps, times[kept.stop - 1]) if cut else len(stamps)
+            kept = slice(int(first), int(last))
+        return after.frames(kept.start, kept.stop)
+
+    def _stamps(self, before: Instruments) -> np.ndarray | None:
+        """(n,) times of the file's frames where they are uneven: bsip reads them evenly."""
+        if before.stamps_s is None:
+            return None
+        times = self._opened.recording.time_s()
+        stamps = times[0] + before.stamps_s
+        if stamps[-1] - times[-1] > 2 / self._opened.recording.marker_rate_hz:
+            raise BadDataError(
+                f"{stamps[-1] - times[0]:.4g} s, of which bsip uses {np.ptp(times):.4g} s",
+                expected="times without a gap",
+                file=self.unit.name,
+                remedy="export the part that is used",
+            )
+        return stamps
 
     @cached_property
     def _kept(self) -> slice:
         """Frames whose forces, which a clock may have recorded late, are in the file."""
         recording = self._opened.recording
-        if all(cause.effect.of_the_plates for cause in self.causes):
+        if not any(isinstance(cause.effect, Delay) for cause in self.causes):
             return slice(0, recording.n_frames)
         scene = self._scene
         begin = recording.time_s() + np.interp(
@@ -253,6 +299,7 @@ class _Correction:
         times = recording.time0_s + samples / recording.analog_rate_hz
         frames = np.searchsorted(table["time_s"], times - 0.5 / recording.marker_rate_hz)
         valid = table["valid"].to_numpy()[np.clip(frames, 0, len(table) - 1)]
+        valid = valid if valid.any() else ~valid  # none in which the diagnosis saw all contacts
         skeleton = load_skeleton(unit.config.skeleton)
         person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
         none = np.empty((len(times), 0))
@@ -260,31 +307,103 @@ class _Correction:
 
     def _readings(self, before: Instruments) -> np.ndarray:
         corrected = corrected_plates(self._scene, [*self.causes])
-        readings = before.readings.copy()
+        readings, times = before.readings.copy(), self._scene.times_s
+        stamps = self._stamps(before)
         for name, reading in self._plates.items():
             now, k = self._wrench(name, _stated(reading)), int(name) - 1
             wanted = corrected.get(name, self._wrench(name, reading))
+            for about, back in self._turns(markers=False):
+                force = wanted[:, :3] @ back.T
+                moment = (wanted[:, 3:] - np.cross(about, wanted[:, :3])) @ back.T
+                wanted = np.hstack([force, moment + np.cross(about, force)])
             change = np.nan_to_num(wanted - now)
             if change.any():
-                readings[k] += _in_reading(readings[k], now, change, self.unit)
+                seen = readings[k] if stamps is None else _at(times, stamps, readings[k])
+                found = _in_reading(seen, now, change, self.unit)
+                readings[k] += found if stamps is None else _at(stamps, times, found)
         return readings
 
-    # --- labels -------------------------------------------------------------------------------
+    # --- axes and labels ------------------------------------------------------------------------
+
+    def _turns(self, *, markers: bool) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Point (3,) and matrix (3, 3) of the turns that bring markers, or plates, into true axes.
+
+        Where the vertical is tilted both are turned, about the middle of the plates, lest the
+        surfaces, whose places in the file stay, come to lie under or over what stands on them.
+        """
+        for cause in self.causes:
+            tilted = isinstance(cause.effect, GravityTilt)
+            if tilted or (markers and isinstance(cause.effect, Turned)):
+                middle = np.mean([plate.centre_m() for plate in self._scene.plates], axis=0)
+                back = Rotation.from_rotvec([*-cause.values, 0.0]).as_matrix()
+                yield middle if tilted else np.zeros(3), back
 
     def _points(self, before: Instruments) -> np.ndarray:
-        if not self._swaps:
-            return before.points_m
-        times, labels, places = markers_from(self.unit.read("markers"))
-        recording = self._opened.recording
-        seen = before.points_m @ recording.rotation_world_lab.T
+        to_world = self._opened.recording.rotation_world_lab
         if self._session.frame.moves_markers:
-            seen = seen @ self._session.frame.matrix().T
+            to_world = self._session.frame.matrix() @ to_world
         points = before.points_m.copy()
-        for *pair, start, end in self._swaps:
-            columns = [_column(seen, places[:, labels.index(name)], name) for name in pair]
-            frames = np.flatnonzero((times >= start) & (times <= end))[:, None]
-            points[frames, columns] = points[frames, columns[::-1]]
+        if self._swaps:
+            times, labels, places = markers_from(self.unit.read("markers"))
+            seen, stamps = before.points_m @ to_world.T, self._stamps(before)
+            if stamps is not None:
+                seen, times = _at(times, stamps, seen), stamps
+            for *pair, start, end in self._swaps:
+                columns = [_column(seen, places[:, labels.index(name)], name) for name in pair]
+                frames = np.flatnonzero((times >= start) & (times <= end))[:, None]
+                points[frames, columns] = points[frames, columns[::-1]]
+        for about, back in self._turns(markers=True):
+            world = points @ to_world.T - about
+            points = (world @ back.T + about) @ to_world
         return points
+
+
+def is_corrected(cause: Cause) -> bool:
+    """Of the plates, the clocks, or the axes of laboratory and cameras."""
+    return is_of_the_forces(cause) or isinstance(cause.effect, Turned)
+
+
+def causes_here(unit: Unit, plates: Sequence[str]) -> list[Cause]:
+    """What the diagnosis names in a recording, on the plates that it has.
+
+    Where it did not look at it: what it names of the instruments in all others of the session, at
+    least two, and what the laboratory of the person is known to have.
+    """
+    assert unit.participant is not None and unit.trial is not None
+    looked_at, causes = unit.facts("overall-diagnosis")["trials"], causes_of(unit)
+    here = [one for one in causes if unit.name in one.trials]
+    if unit.name in looked_at:
+        return here
+    session = {t.stem for t in unit.participant.trials if t.session == unit.trial.session}
+    others = session & set(looked_at)
+    shared = [
+        one
+        for one in causes
+        if one.effect.of_the_lab and is_corrected(one) and others <= set(one.trials)
+    ]
+    shared = shared if len(others) > 1 else []
+    known = {(one.effect.name, one.target) for one in shared}
+    named = _of_the_laboratory(unit, "named")
+    named = named[named["scope"] == "laboratory"]
+    for (effect, target), sizes in named.groupby(["effect", "target"], sort=False):
+        if (effect, target) not in known:
+            values = sizes["estimate"].to_numpy()
+            cause = Cause(EFFECTS[str(effect)], str(target), (unit.name,), values, values[None])
+            shared.append(cause)
+    there = ("", ALL, *plates)
+    return [*here, *(one for one in shared if one.target.split(" ")[0] in there)]
+
+
+def _of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
+    """Rows about the laboratory of a person who was in one only, or about this session in it."""
+    assert unit.participant is not None and unit.trial is not None
+    of_all = unit.facts("laboratory")["persons"].items() if unit.has("laboratory") else ()
+    mine = [number for number, persons in of_all if unit.participant.id in persons]
+    if len(mine) != 1:
+        return empty_table("laboratory")
+    rows = unit.read("laboratory", laboratory=mine, verdict=verdicts)
+    session = "_ses-".join(filter(None, (unit.participant.id, unit.trial.session)))
+    return rows[(rows["scope"] == "laboratory") | (rows["who"] == session)]
 
 
 def _opened(unit: Unit) -> tuple[Opened, SessionReading]:
@@ -302,11 +421,20 @@ def _alike(cause: Cause, told: pd.DataFrame) -> list[tuple[str, str]]:
     return list(dict.fromkeys(zip(others["effect"], others["target"], strict=True)))
 
 
-def _told_of(trial: str, told: pd.DataFrame) -> list[tuple[str, str]]:
-    """Effects and targets that the diagnosis names, alone or in a group, in a trial."""
+def _said_of(trial: str, told: pd.DataFrame, effects: Sequence[str]) -> pd.DataFrame:
+    """Rows of these effects that the diagnosis names, alone or in a group, in a trial."""
     here = np.array([trial in names.split(", ") for names in told["trials"]], dtype=bool)
-    rows = told[here & told["effect"].isin(list(EFFECTS)) & (told["verdict"] != "rejected")]
+    return told[here & told["effect"].isin(effects) & (told["verdict"] != "rejected")]
+
+
+def _told_of(trial: str, told: pd.DataFrame) -> list[tuple[str, str]]:
+    rows = _said_of(trial, told, list(EFFECTS))
     return list(dict.fromkeys(zip(rows["effect"], rows["target"], strict=True)))
+
+
+def _nameless(trial: str, told: pd.DataFrame) -> list[str]:
+    """What is there and has no name, or acts like a fault but not evenly, in words."""
+    return list(dict.fromkeys(_said_of(trial, told, [UNEXPLAINED])["sentence"]))
 
 
 def _exchanged(events: pd.DataFrame) -> list[tuple[str, str, float, float]]:
@@ -359,6 +487,14 @@ def _in_reading(
             expected="a plate of TYPE 2 to 4, or force, point and moment",
         )
     return np.pad(found, ((0, rest), (0, 0)), mode="edge")
+
+
+def _at(times_s: np.ndarray, known_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """(N, ...) values (n, ...) of times (n,) at others (N,), on lines between them."""
+    ends = (values[0], values[-1])
+    return np.asarray(
+        interp1d(known_s, values, axis=0, bounds_error=False, fill_value=ends)(times_s)
+    )
 
 
 def _column(seen: np.ndarray, place: np.ndarray, name: str) -> int:

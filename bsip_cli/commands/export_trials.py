@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +81,7 @@ def _export(unit: Unit, asked: Tables) -> Outcome:
         with held_alone(unit.out / unit.participant.id):
             texts, note = _WRITERS[asked.what](unit, asked)
             for name, text in texts.items():
-                write_atomically(folder / name, partial(_write, text))
+                write_text(folder / name, text)
     except BsipError as error:
         return Outcome("export", unit.name, "refused", (str(error),), error.exit_code)
     said = (f"{unit.name}: {note}",) if note else ()
@@ -96,8 +95,9 @@ def folder_of(unit: Unit, to: Path | None) -> Path:
     return unit.out / unit.participant.id / "export" if to is None else to / unit.participant.id
 
 
-def _write(text: str, path: Path) -> None:
-    path.write_bytes(text.encode())
+def write_text(path: Path, text: str) -> None:
+    """All of it, or nothing."""
+    write_atomically(path, lambda partial: partial.write_bytes(text.encode()))
 
 
 def _joints(unit: Unit, _: Tables) -> Texts:

@@ -21,12 +21,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from bsip_cli.body.names import without_side
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
-from bsip_cli.dynamics.pinocchio_model import bodies_of, pinocchio_model
+from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import skew
 from bsip_cli.dynamics.segment_motion import SegmentMotion, segment_motion
 
@@ -76,11 +75,6 @@ class JointLoads:
     @property
     def power_W(self) -> np.ndarray:
         return self.moment_Nm * self.rate_rad_s[..., None]
-
-    @property
-    def power_sd_W(self) -> np.ndarray:
-        """Of the moment alone: what the rates of the angles err by is not in it."""
-        return self.moment_sd_Nm * np.abs(self.rate_rad_s)[..., None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,79 +130,49 @@ def joint_loads(
     skeleton, model = person.skeleton, pinocchio_model(person)
     joints, k = skeleton.joints[1:], phi.shape[1]
     shape = (len(q), len(joints), 3)
-    value, variance = np.empty((2, 2, *shape, k))
+    value, variance = np.zeros((2, 2, *shape, k))
     rates = np.empty(shape)
-    parts = [_Part.of(skeleton, model, i, phi, ground, spread) for i in range(1, len(joints) + 1)]
+    beyond = [skeleton.beyond(i) for i in range(1, len(joints) + 1)]
     for start in range(0, len(q), block):
         now = slice(start, start + block)
         motion = segment_motion(model, q[now], v[now], a[now])
-        rows = np.concatenate([motion.wrenches(i) for i in skeleton.bodies], axis=2)
-        for j, part in enumerate(parts):
+        rows = np.stack([motion.wrenches(i) for i in skeleton.bodies], axis=1)
+        some = np.unique(np.append(np.arange(0, len(rows), every), len(rows) - 1))
+        needs = rows @ phi.reshape(1, -1, 10, k)
+        for j, segments in enumerate(beyond):
             axes, rates[now, j] = _axes(skeleton, motion, j + 1)
-            onto = _projection(axes, motion.position_m[:, j + 1])
-            found, squared = part.loads(onto, rows, now, every)
-            value[:, now, j] = np.moveaxis(found.reshape(-1, 2, 3, k), 1, 0)
-            variance[:, now, j] = np.moveaxis(squared.reshape(-1, 2, 3, k), 1, 0)
-            force, moment = part.whole(rows, now, motion.position_m[:, j + 1])
-            across = [
-                np.maximum((x**2).sum(axis=1, keepdims=True) - value[n, now, j] ** 2, 0.0)
-                for n, x in enumerate((force, moment))
-            ]
+            centre = motion.position_m[:, j + 1]
+            onto = _projection(axes, centre)
+            bodies = [b for b, i in enumerate(skeleton.bodies) if i in segments]
+            touching = [ground[s] for n in segments if (s := skeleton.segments[n]) in ground]
+            wrench = needs[:, bodies].sum(axis=1)
+            for one in touching:
+                wrench -= one.wrench[now, :, None]
+                about = np.eye(6)
+                about[3:, :3] = skew(one.noise_at_m[None])[0]
+                squared = (onto @ about) ** 2 @ (one.noise[now, :, None] ** 2)
+                variance[:, now, j] += _halves(squared)
+            value[:, now, j] = found = _halves(onto @ wrench)
+            own = onto[some] @ rows[some][:, bodies].swapaxes(1, 2).reshape(len(some), 6, -1)
+            columns = (10 * np.array(bodies)[:, None] + np.arange(10)).ravel()
+            for m, covariance in enumerate(spread.covariances):
+                if covariance is not None:
+                    part = covariance[np.ix_(columns, columns)]
+                    of_each = np.einsum("nij,nij->ni", own @ part, own)
+                    at_all = _between(some, of_each, len(rows))
+                    variance[:, now, j, :, m] += _halves(at_all[..., None])[..., 0]
+            force, moment = wrench[:, :3], wrench[:, 3:] - skew(centre) @ wrench[:, :3]
+            whole = (np.stack([force, moment]) ** 2).sum(axis=2, keepdims=True)
+            across = np.maximum(whole - found**2, 0.0)
             variance[1, now, j] += spread.centre_m**2 * across[0]
-            variance[:, now, j] += spread.axes_rad**2 * np.stack(across)
+            variance[:, now, j] += spread.axes_rad**2 * across
     sd = np.sqrt(variance)
     return JointLoads(joints, value[0], value[1], rates, sd[0], sd[1])
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """What lies beyond a joint: columns of its bodies, their parameters, the ground's wrenches."""
-
-    columns: np.ndarray
-    phi: np.ndarray
-    covariances: tuple[np.ndarray | None, ...]
-    ground: tuple[Ground, ...]
-
-    @classmethod
-    def of(cls, skeleton: Skeleton, model: pin.Model, i: int, phi, ground, spread) -> _Part:
-        beyond = segments_beyond(skeleton, i)
-        bodies = [b for b, joint in enumerate(bodies_of(model)) if joint - 1 in beyond]
-        columns = (10 * np.array(bodies)[:, None] + np.arange(10)).ravel()
-        covariances = tuple(
-            None if one is None else one[np.ix_(columns, columns)] for one in spread.covariances
-        )
-        touching = (ground[s] for n in beyond if (s := skeleton.segments[n]) in ground)
-        return cls(columns, phi[columns], covariances, tuple(touching))
-
-    def loads(
-        self, onto: np.ndarray, rows: np.ndarray, now: slice, every: int
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 6, k) forces, then moments, and their variances by parameters and plates."""
-        own = onto @ rows[:, :, self.columns]
-        found = own @ self.phi
-        squared = np.zeros_like(found)
-        some = np.unique(np.append(np.arange(0, len(own), every), len(own) - 1))
-        flat = own[some].reshape(-1, own.shape[2])
-        for k, covariance in enumerate(self.covariances):
-            if covariance is not None:
-                of_each = np.einsum("ij,ij->i", flat @ covariance, flat).reshape(-1, 6)
-                squared[..., k] = _between(some, of_each, len(own))
-        for one in self.ground:
-            found -= (onto @ one.wrench[now, :, None])[..., :1]
-            about = np.eye(6)
-            about[3:, :3] = skew(one.noise_at_m[None])[0]
-            squared += (onto @ about) ** 2 @ (one.noise[now, :, None] ** 2)
-        return found, squared
-
-    def whole(
-        self, rows: np.ndarray, now: slice, centre_m: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 3, k) force of the joint and moment about its centre (n, 3), world."""
-        wrench = rows[:, :, self.columns] @ self.phi
-        for one in self.ground:
-            wrench -= one.wrench[now, :, None]
-        force, moment = np.split(wrench, 2, axis=1)
-        return force, moment - skew(centre_m) @ force
+def _halves(wrench: np.ndarray) -> np.ndarray:
+    """(2, n, 3, k) of (n, 6, k): forces, then moments."""
+    return np.stack([wrench[:, :3], wrench[:, 3:]])
 
 
 def _between(some: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
@@ -216,15 +180,6 @@ def _between(some: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
     if len(some) == count:
         return values
     return np.stack([np.interp(np.arange(count), some, x) for x in values.T], axis=1)
-
-
-def segments_beyond(skeleton: Skeleton, i: int) -> list[int]:
-    """A segment and all that hang on it."""
-    found = [i]
-    for n in range(i + 1, len(skeleton.segments)):
-        if skeleton.parents[n] in found:
-            found.append(n)
-    return found
 
 
 def _axes(skeleton: Skeleton, motion: SegmentMotion, i: int) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import SYMMETRIC
-from bsip_cli.dynamics.regressor import rotations_of
+from bsip_cli.dynamics.regressor import rotations_of, skew
 
 UP = np.array([0.0, 0.0, 1.0])
 _FREE = 7  # entries in q of a joint that also shifts
@@ -59,20 +59,27 @@ class SegmentMotion:
         R, w = self.rotation[:, segment], self.turning_rad_s[:, segment]
         dw = self.turning_acceleration_rad_s2[:, segment]
         fall = self.acceleration_m_s2[:, segment] + GRAVITY_M_S2 * UP
-        force, moment = np.zeros((2, len(R), 3, 10))
+        rows = np.zeros((len(R), 6, 10))
+        force, moment = rows[:, :3], rows[:, 3:]
         force[:, :, 0] = fall
-        for k in range(3):
-            arm = R[:, :, k]
-            force[:, :, 1 + k] = np.cross(dw, arm) + np.cross(w, np.cross(w, arm))
-            moment[:, :, 1 + k] = np.cross(arm, fall)
-        for k, (i, j) in enumerate(SYMMETRIC):
-            unit = np.zeros((3, 3))
-            unit[i, j] = unit[j, i] = 1.0
-            tensor = R @ unit @ R.swapaxes(1, 2)
-            spin = (tensor @ w[..., None])[..., 0]
-            moment[:, :, 4 + k] = (tensor @ dw[..., None])[..., 0] + np.cross(w, spin)
-        moment += np.cross(self.position_m[:, segment, :, None], force, axis=1)
-        return np.concatenate([force, moment], axis=1)
+        spin = skew(w)
+        force[:, :, 1:4] = (skew(dw) + spin @ spin) @ R
+        moment[:, :, 1:4] = -skew(fall) @ R
+        own = R.swapaxes(1, 2)
+        moment[:, :, 4:] = R @ _of_tensor(own, dw) + spin @ R @ _of_tensor(own, w)
+        moment += skew(self.position_m[:, segment]) @ force
+        return rows
+
+
+def _of_tensor(own: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """(N, 3, 6) derivative of tensor @ vector by the tensor's entries, in the axes ``own``
+    (N, 3, 3) of world vectors (N, 3)."""
+    local = (own @ vectors[..., None])[..., 0]
+    found = np.zeros((len(local), 3, 6))
+    for k, (i, j) in enumerate(SYMMETRIC):
+        found[:, i, k] = local[:, j]
+        found[:, j, k] = local[:, i]
+    return found
 
 
 def segment_motion(model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> SegmentMotion:

@@ -40,6 +40,7 @@ class Implement(Effect):
     of_the_lab = False
     of_the_person = True
     while_moving = True
+    on_its_segment = True
     looks = "moments that go with the swing of the hands, far larger than their forces"
     remedy = "weigh what is held and find the point at which it balances; record once without it"
 

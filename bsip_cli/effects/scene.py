@@ -265,11 +265,7 @@ class Scene:
 
     def beyond(self, segment: int) -> list[int]:
         """A segment and all that hang on it."""
-        found = [segment]
-        for i, parent in enumerate(self.person.skeleton.parents):
-            if parent in found:
-                found.append(i)
-        return found
+        return self.person.skeleton.beyond(segment)
 
     def mass_beyond(self, segment: int) -> tuple[float, Point]:
         """Mass [kg] of a segment and all that hang on it, and their common centre of mass."""

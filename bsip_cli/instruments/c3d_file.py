@@ -41,7 +41,7 @@ def rewrite_c3d(
     before = _instruments(c3d, columns, wired, source)
     after = change(before)
     _cut(c3d, before, after)
-    first = _first_frame(before, after)
+    first = before.first_frame_of(after)
     kept = before.frames(first, first + len(after.points_m))
     _put_points(c3d, columns, kept, after)
     _put_forces(c3d, wired, kept, after)
@@ -121,13 +121,9 @@ def _up(points_m: np.ndarray, wired: list[WiredPlate]) -> np.ndarray:
     return np.sign(above) * np.eye(3)[axis]
 
 
-def _first_frame(before: Instruments, after: Instruments) -> int:
-    return round((after.start_s - before.start_s) * before.marker_hz)
-
-
 def _cut(c3d: Any, before: Instruments, after: Instruments) -> None:
     """Keep only the frames that are left."""
-    first, frames = _first_frame(before, after), len(after.points_m)
+    first, frames = before.first_frame_of(after), len(after.points_m)
     kept, ratio = slice(first, first + frames), before.per_frame
     data, header = c3d["data"], c3d["header"]["points"]
     data["points"] = data["points"][:, :, kept]

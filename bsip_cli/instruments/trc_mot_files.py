@@ -16,6 +16,7 @@ from bsip_cli.instruments.readings import Instruments, SensingPlate
 
 METRES = {"m": 1.0, "mm": 1e-3}
 LOADED_N = 20.0
+STILL_M = 1e-6
 UNEVEN_SHARE = 0.02  # of a frame's length, by which a stamp may be off
 
 
@@ -223,10 +224,14 @@ def _with_reading(
 ) -> np.ndarray:
     """Nine columns (N, 9) for a reading (N, 6): the point moves in its plane.
 
-    The torque keeps its horizontal parts; below LOADED_N the point stays where it was.
+    The torque keeps its horizontal parts; below LOADED_N the point stays where it was. Points that
+    all are one place are no centres of pressure, and stay it.
     """
     force, moment = plate.lab_wrench(reading, np.zeros(3))
     point, torque = _points_m(values, each, plate), np.nan_to_num(values[:, each.torque])
+    under_load = point[np.abs(values[:, each.force] @ up) > LOADED_N]
+    if len(under_load) and np.ptp(under_load, axis=0).max() < STILL_M:
+        return np.hstack([force, point, moment - np.cross(point, force)])
     level = np.eye(3) - np.outer(up, up)
     upward = force @ up
     rest = moment - np.cross(point, force) - torque @ level
@@ -236,12 +241,8 @@ def _with_reading(
     return np.hstack([force, point, moment - np.cross(point, force)])
 
 
-def _first(before: Instruments, after: Instruments) -> int:
-    return round((after.start_s - before.start_s) * before.marker_hz)
-
-
 def _new_trc(table: Table, before: Instruments, after: Instruments, scale: float) -> str:
-    first, frames = _first(before, after), len(after.points_m)
+    first, frames = before.first_frame_of(after), len(after.points_m)
     values = table.values[first : first + frames].copy()
     count = after.points_m.shape[1]
     values[:, 2 : 2 + 3 * count] = after.points_m.reshape(frames, -1) / scale
@@ -261,7 +262,7 @@ def _new_mot(
     after: Instruments,
     said: Sequence[str],
 ) -> str:
-    first = _first(before, after) * before.per_frame
+    first = before.first_frame_of(after) * before.per_frame
     values = table.values[first : first + after.readings.shape[1]].copy()
     for each, plate, reading in zip(sets, after.plates, after.readings, strict=True):
         values[:, [*each.force, *each.point, *each.torque]] = _with_reading(

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 from scipy.interpolate import interp1d
+from scipy.spatial.transform import Rotation
 
-from bsip_cli.body.names import SEGMENTS, in_words
+from bsip_cli.body.names import in_words
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.cause import Cause, method_of
@@ -25,6 +26,7 @@ from bsip_cli.dynamics.joint_moments import (
 from bsip_cli.dynamics.lowpass import lowpass_operator, noise_left, stride_to
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.segment_motion import SegmentMotion, segment_motion
+from bsip_cli.effects.gravity_tilt import GravityTilt, Turned
 from bsip_cli.effects.scene import Scene
 from bsip_cli.effects.segment_inertia import SegmentInertia
 from bsip_cli.effects.unmeasured_contact import UnmeasuredContact
@@ -40,15 +42,15 @@ from bsip_cli.stages.frames import (
     loads_record,
     person_from,
 )
-from bsip_cli.stages.joint_peaks import peaks_of
 from bsip_cli.stages.reconstruct import parameters_of
 from bsip_cli.stages.trial_scene import body_beside, causes_of, outline, plate_names, scene_of
-from bsip_cli.statistics.methods import OM, RM
+from bsip_cli.statistics.methods import OM, RM, is_extended
 
 _POSES = 40  # in which the response to accelerations is computed; between them it is interpolated
 _WEAK_PRIOR = 200.0  # rad/m, as in smoothing: an angle that errs by more is held by the prior
 _HELD = "something that no plate measures may bear the person"
 Reasons = dict[str, np.ndarray]  # in words: (N, J) frames and joints that it leaves out
+_SHARED = "nothing tells what each of two hands bears of one load"
 _NO_POSE = "the markers do not determine the pose"
 
 
@@ -306,10 +308,10 @@ def _extended(
 ) -> Iterator[tuple[str, JointLoads, np.ndarray]]:
     """Method, loads and valid frames (N, J) of the extended models of this trial.
 
-    Forces freed of the errors of plates and clock; parameters as ``extend`` found them; what a
-    segment carries besides, as a ball in a hand, loads the joints on its way to the pelvis. OM's
-    covariance stands for theirs: they come from the same data. Causes that move joints or markers
-    would need another motion: no model with one of them is computed.
+    Forces freed of the errors of plates and clock, axes of their tilts; parameters as ``extend``
+    found them; what a segment carries besides, as a ball in a hand, loads the joints on its way to
+    the pelvis. OM's covariance stands for theirs: they come from the same data. Causes that move
+    joints or single markers would need another motion: no model with one of them is computed.
     """
     assert unit.trial is not None
     causes, extended = causes_of(unit), unit.read("extended-bsip")
@@ -326,23 +328,60 @@ def _extended(
         if not all(_is_carried(cause) for cause in among):
             unit.warn(
                 f"{unit.name}: no joint moments of {method_of(among)}: what moves joints or "
-                "markers, tilts the vertical or is held in both hands is not carried to the joints"
+                "markers would need another motion"
             )
             return
         ground = trial.ground(_corrected(trial, scene, among))
-        touched = _besides(scene, ground.on_feet, among)
+        q, on_feet = in_true_axes(trial.q, ground.on_feet, among)
+        touched = besides(replace(scene, q=q), on_feet, among)
         body = phi[:, names.index(method_of(causes[: k + 1]))] + known
-        loads = trial.loads(body[:, None], touched, of_om)
-        yield method_of(among), loads, trial.valid(_reasons(unit, trial, ground.feet))
+        loads = replace(trial, q=q).loads(body[:, None], touched, of_om)
+        reasons = _reasons(unit, trial, ground.feet)
+        reasons[_SHARED] = np.tile(sharing(person, among), (len(trial.q), 1))
+        if reasons[_SHARED].any():
+            unit.warn(f"{unit.name}: {method_of(among)}: joint moments are left out: {_SHARED}")
+        yield method_of(among), loads, trial.valid(reasons)
 
 
 def _is_carried(cause: Cause) -> bool:
     effect = cause.effect
-    at_one_segment = effect.on_its_segment and cause.target in SEGMENTS
-    return is_of_the_forces(cause) or at_one_segment or isinstance(effect, SegmentInertia)
+    of_a_body = effect.on_its_segment or isinstance(effect, (SegmentInertia, Turned))
+    return is_of_the_forces(cause) or of_a_body
 
 
-def _besides(
+def sharing(person: Person, causes: Sequence[Cause]) -> np.ndarray:
+    """(J,) joints on the way of one only of the segments that share a load: where the ways have met
+    their sum counts, and that is known."""
+    out = np.zeros(len(person.skeleton.joints), bool)
+    for cause in causes:
+        if cause.effect.on_its_segment:
+            ways = [_way(person, segment) for segment in cause.target.split("+")]
+            out[list(set().union(*ways).difference(set(ways[0]).intersection(*ways)))] = True
+    return out[1:]
+
+
+def in_true_axes(
+    q: np.ndarray, on_feet: Mapping[str, Ground], causes: Sequence[Cause]
+) -> tuple[np.ndarray, Mapping[str, Ground]]:
+    """The motion (N, nq), and where the vertical is tilted the ground's wrenches too, turned about
+    the world's origin until the axes are upright."""
+    for cause in (one for one in causes if isinstance(one.effect, Turned)):
+        back = Rotation.from_rotvec([*-cause.values, 0.0])
+        base = (back * Rotation.from_quat(q[:, 3:7])).as_quat()
+        q = np.hstack([back.apply(q[:, :3]), base, q[:, 7:]])
+        if isinstance(cause.effect, GravityTilt):
+            on_feet = {
+                foot: Ground(
+                    np.hstack([back.apply(x) for x in np.hsplit(one.wrench, 2)]),
+                    one.noise,
+                    back.apply(one.noise_at_m),
+                )
+                for foot, one in on_feet.items()
+            }
+    return q, on_feet
+
+
+def besides(
     scene: Scene, on_feet: Mapping[str, Ground], causes: Sequence[Cause]
 ) -> dict[str, Ground]:
     """What acts on each segment: the ground, less what the causes at a segment need."""
@@ -352,9 +391,11 @@ def _besides(
     )
     for cause in causes:
         if cause.effect.on_its_segment:
-            there = found.get(cause.target, nothing)
-            needs = cause.effect.change(scene, cause.target, cause.values)
-            found[cause.target] = replace(there, wrench=there.wrench - needs)
+            held_by = cause.target.split("+")
+            needs = cause.effect.change(scene, cause.target, cause.values) / len(held_by)
+            for segment in held_by:
+                there = found.get(segment, nothing)
+                found[segment] = replace(there, wrench=there.wrench - needs)
     return found
 
 
@@ -402,7 +443,8 @@ def _table(
     }
     # from frames, joints, axes, methods to rows: all frames of an axis, all axes of a joint, ...
     columns = {name: x.transpose(3, 1, 2, 0).ravel() for name, x in numbers.items()}
-    return pd.DataFrame({"time_s": np.tile(trial.times_s, len(keys))} | words | columns)
+    times = {"time_s": np.tile(trial.times_s, len(keys))}
+    return pd.DataFrame(times | words | columns, copy=False)
 
 
 def _lowpassed(trial: _Trial, courses: np.ndarray, ok: np.ndarray) -> np.ndarray:
@@ -416,3 +458,54 @@ def _lowpassed(trial: _Trial, courses: np.ndarray, ok: np.ndarray) -> np.ndarray
         operator, frames = lowpass_operator(pattern, trial.rate_hz, trial.cutoff_hz)
         found[np.ix_(frames, mine)] = operator @ np.where(pattern[:, None], flat[:, mine], 0.0)
     return found.reshape(courses.shape)
+
+
+def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str]) -> pd.DataFrame:
+    """``joint-peaks`` of ``joint-moments``: a row per method, joint and axis, how large, how sure,
+    and what the method changes; ``left_out`` in words, by joint."""
+    names = ["method", "joint", "axis"]
+    number = moments.groupby(names, sort=False, observed=True).ngroup().to_numpy()
+    order = np.argsort(number, kind="stable").reshape(number.max() + 1, -1)
+    time_s, moment, sd = (
+        moments[c].to_numpy()[order] for c in ("time_s", "moment_Nm", "moment_sd_Nm")
+    )
+    keys = list(moments.loc[order[:, 0], names].astype(str).itertuples(index=False, name=None))
+    known = np.isfinite(moment)
+    at = np.where(known, np.abs(moment), -1.0).argmax(axis=1)[:, None]
+    time_s, peak, sd = (
+        np.where(known.any(axis=1), np.take_along_axis(x, at, axis=1)[:, 0], np.nan)
+        for x in (time_s, moment, sd)
+    )
+    methods = list(dict.fromkeys(method for method, *_ in keys))
+    rows = []
+    for k, (method, joint, axis) in enumerate(keys):
+        other = _compared_with(method, methods)
+        change = np.empty(0)
+        if other:
+            change = moment[k] - moment[keys.index((other, joint, axis))]
+            change = change[np.isfinite(change)]
+            alike = [n for n, key in enumerate(keys) if key[:2] == (other, joint)]
+            largest = np.abs(peak[alike]).max(initial=0.0, where=np.isfinite(peak[alike]))
+        most = change[np.abs(change).argmax()] if len(change) else np.nan
+        rows.append(
+            {"method": method, "joint": joint, "axis": axis}
+            | {"peak_Nm": peak[k], "peak_sd_Nm": sd[k], "peak_Nm_kg": peak[k] / mass_kg}
+            | {"peak_at_s": time_s[k], "frames": int(known[k].sum()), "compared_with": other}
+            | {
+                "change_Nm": most,
+                "change_rms_Nm": np.sqrt((change**2).mean()) if len(change) else np.nan,
+            }
+            | {"change_percent": 100 * abs(most) / largest if len(change) else np.nan}
+            | {"left_out": left_out[joint]}
+        )
+    return pd.DataFrame(rows)
+
+
+def _compared_with(method: str, methods: list[str]) -> str:
+    """RM; of an extended model the one with a cause less."""
+    if method == RM:
+        return ""
+    if not is_extended(method):
+        return RM
+    before = [m for m in methods[: methods.index(method)] if is_extended(m)]
+    return before[-1] if before else OM

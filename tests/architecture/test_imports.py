@@ -141,7 +141,6 @@ def test_stages_do_not_know_each_other():
         "stages.error_budget",
         "stages.frames",
         "stages.identification_problem",
-        "stages.joint_peaks",
         "stages.known_laboratory",
         "stages.diagnosed_trials",
         "stages.person_mass",

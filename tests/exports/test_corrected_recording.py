@@ -9,6 +9,7 @@ import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import ezc3d
 import numpy as np
@@ -19,6 +20,8 @@ from scipy.ndimage import uniform_filter1d
 from bsip_cli import __version__
 from bsip_cli.artifacts import empty_table, write_artifact
 from bsip_cli.commands.export import Request, export_session
+from bsip_cli.commands.export_recording import causes_here
+from bsip_cli.instruments.c3d_plates import wired_plates
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.running.session import run_session
@@ -29,7 +32,7 @@ from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages.diagnosis_rows import nothing
 from tests.exports.test_export_command import NOTES, Results, write_person
 
-STEM = "sub-01_task-squat_run-1"
+STEM, STATIC = "sub-01_task-squat_run-1", "sub-01_task-static"
 OPTIONS = StudyOptions(
     participants=1,
     seed=8,
@@ -56,6 +59,8 @@ TURNED = fault("plate_rotation", 0.08, "yaw,plate=1", "1", 0.0, 0.0, 0.08)
 ASIDE = fault("plate_translation", 0.03, "x,plate=2", "2", 0.03, 0.0, 0.0)
 LATE = fault("sync_offset", 0.03, "-", "", 0.03)
 SLOW = fault("clock_drift", 0.002, "-", "", 0.002)
+TILTED = fault("gravity_tilt", 0.02, "y", "", 0.0, 0.02)
+TURNED_CAMERAS = fault("camera_frame", 0.02, "x", "", 0.02, 0.0)
 LEVER_NM = 1.2  # 4 % of what is on plate 2, at the depth of its sensor under its surface
 
 
@@ -66,7 +71,13 @@ class Study:
     plain: Path
     made: Results
 
-    def diagnosed_as(self, *causes: tuple[str, str, list[float]], alike: Sequence = ()) -> None:
+    def diagnosed_as(
+        self,
+        *causes: tuple[str, str, list[float]],
+        alike: Sequence = (),
+        looked_at: Sequence[str] = (STEM, STATIC),
+        concerned: Sequence[str] = (STEM,),
+    ) -> None:
         """``alike``: effect and target of what cannot be told from the causes."""
         verdict = "ambiguous" if alike else "named"
         group = [*((effect, target) for effect, target, _ in causes), *alike]
@@ -79,7 +90,7 @@ class Study:
             {
                 "effect": effect,
                 "target": target,
-                "trials": [STEM],
+                "trials": [*concerned],
                 "verdict": verdict,
                 "values": values,
                 "folds": [values] * 5,
@@ -88,7 +99,7 @@ class Study:
         ]
         wrenches = (self.made.out / "sub-01").glob("*_wrench.parquet")
         made_by = {"inputs": {path.name: file_hash(path) for path in wrenches}}
-        notes = NOTES | {"made_by": made_by, "facts": {"causes": facts}}
+        notes = NOTES | {"made_by": made_by, "facts": {"causes": facts, "trials": [*looked_at]}}
         path = self.made.artifact("diagnosis")
         write_artifact(path, "overall-diagnosis", table, notes)
 
@@ -182,6 +193,123 @@ def test_forces_are_back_at_their_time(hide, faults, capsys):
     assert "frames at the end left out: their forces were not recorded" in said
 
 
+@pytest.mark.parametrize("turned", [TILTED, TURNED_CAMERAS])
+def test_markers_and_forces_are_turned_into_true_axes(hide, turned):
+    study = hide(turned[0])
+    study.diagnosed_as(turned[1])
+    path = study.exported()
+    before, after = both(study, path)
+    spoilt = read_recording(study.made.study / "sub-01" / path.name)
+    assert np.nanmax(np.abs(spoilt.markers_m - before.markers_m)) > 0.01
+    shift = np.nanmedian(after.markers_m - before.markers_m, axis=(0, 1))  # the file's pivot is not
+    if turned is TURNED_CAMERAS:  # that of who hid it
+        assert np.abs(shift).max() < 1e-6
+    assert np.nanmax(np.abs(after.markers_m - before.markers_m - shift)) < 1e-4
+    now, then = wrenches(after), wrenches(before)
+    then[..., 3:] += np.cross(shift, then[..., :3])
+    assert np.abs(now - then).max() < 0.1
+
+
+@pytest.mark.parametrize(
+    ("concerned", "looked_at", "session", "found"),
+    [
+        ("AB", "AB", "", 1),  # all others of the session have it
+        ("A", "A", "", 0),  # one trial does not tell that the session has it
+        ("A", "AB", "", 0),  # another one has it not
+        ("AB", "ABC", "", 0),  # and this one neither
+        ("AB", "AB", "2", 0),  # it was recorded at another time
+    ],
+)
+def test_a_recording_that_nobody_looked_at_has_what_its_session_shares(
+    concerned, looked_at, session, found
+):
+    trials = [SimpleNamespace(stem=stem, session=session if stem == "C" else "") for stem in "ABC"]
+    cause = {"effect": "plate_gain", "target": "1 fz", "trials": [*concerned], "verdict": "named"}
+    facts = {"causes": [cause | {"values": [0.06], "folds": [[0.06]]}], "trials": [*looked_at]}
+    unit = SimpleNamespace(
+        name="C",
+        trial=trials[2],
+        participant=SimpleNamespace(id="sub-01", trials=trials),
+        facts=lambda kind: facts,
+        has=lambda kind: False,
+    )
+    assert len(causes_here(unit, ["1"])) == found
+    assert not causes_here(unit, ["2"])
+
+
+def test_what_the_laboratory_has_is_corrected_in_a_recording_that_nobody_looked_at(hide, capsys):
+    study = hide(GAIN[0])
+    study.diagnosed_as(looked_at=(STATIC,))
+    named = {"effect": "plate_gain", "target": "1 fz", "parameter": "gain", "estimate": 0.06}
+    rows = pd.DataFrame(
+        [
+            dict.fromkeys(empty_table("laboratory").columns, "")
+            | dict.fromkeys(("ci_low", "ci_high", "probability", "limit"), 0.99)
+            | {"persons": 5, "trials": 9, "verdict": verdict, "scope": scope, "laboratory": "1"}
+            | named
+            | {
+                "target": target,
+                "who": "sub-01" * (scope == "session"),
+                "sentence": f"{target} {scope}",
+            }
+            for target, verdict, scope in (
+                ("1 fz", "named", "laboratory"),
+                ("2 fz", "ambiguous", "laboratory"),
+                ("2 fz", "named", "session"),
+            )
+        ]
+    )
+    path = study.made.out / "group" / "group_laboratory.parquet"
+    path.parent.mkdir()
+    facts = {"persons": {"1": {"sub-01": "sub-01", "sub-02": "sub-02"}}, "answer": {}}
+    write_artifact(path, "laboratory", rows, NOTES | {"facts": facts})
+    exported = study.exported()
+    before, after = both(study, exported)
+    assert np.abs(wrenches(after) - wrenches(before)).max() < 0.05
+    said = capsys.readouterr().err
+    assert f"{STEM}: corrected: plate_gain 1 fz: gain 0.06 1 taken off" in said
+    assert "corrected: plate_gain 2 fz" not in said
+    for scope in ("laboratory", "session"):
+        left = f"not corrected: 2 fz {scope}: no size of it is known for this recording"
+        assert f"{STEM}: {left}" in said
+
+
+def test_plates_that_tell_points_read_what_they_would_have_read(hide, capsys):
+    """Force and centre of pressure as channels (TYPE 1)."""
+    study = hide(ZERO[0], TURNED[0], change=into_points)
+    study.diagnosed_as(ZERO[1], TURNED[1])
+    path = study.exported()
+    assert "corrected: plate_zero" in capsys.readouterr().err
+    before, after = both(study, path)
+    assert ezc3d.c3d(str(path))["parameters"]["FORCE_PLATFORM"]["TYPE"]["value"][0] == 1
+    apart = np.abs(wrenches(after) - wrenches(before)).max(axis=(0, 1))
+    assert (apart[:3] < 0.05).all() and (apart[3:] < 0.1).all()
+
+
+def into_points(path: Path) -> None:
+    """Write the plates of a file as force, point [mm] and moment [N mm] at its point."""
+    c3d = ezc3d.c3d(str(path), extract_forceplat_data=True)
+    analogs, plates = c3d["data"]["analogs"].copy(), c3d["parameters"]["FORCE_PLATFORM"]
+    for wired in wired_plates(c3d, path):
+        force, moment = wired.plate.lab_wrench(wired.reading(analogs[0]), wired.plate.centre_m)
+        force, moment = force @ wired.plate.axes, moment @ wired.plate.axes
+        point = np.stack([-moment[:, 1], moment[:, 0], 0 * force[:, 0]], axis=1) / force[:, 2:]
+        free = moment - np.cross(point, force)
+        sign = np.sign(wired.matrix[0, 0])
+        rows = [*(sign * force.T), *(1e3 * point[:, :2].T), sign * 1e3 * free[:, 2]]
+        analogs[0, wired.channels] = rows
+    c3d["data"]["analogs"] = analogs
+    count = len(plates["TYPE"]["value"])
+    plates["TYPE"]["value"] = np.ones(count, dtype=int)
+    plates["ORIGIN"]["value"] = np.zeros((3, count))
+    units = c3d["parameters"]["ANALOG"]["UNITS"]["value"]
+    channels = np.asarray(plates["CHANNEL"]["value"]).astype(int)[3:5].ravel() - 1
+    c3d["parameters"]["ANALOG"]["UNITS"]["value"] = [
+        "mm" if k in channels else unit for k, unit in enumerate(units)
+    ]
+    c3d.write(str(path))
+
+
 def test_labels_are_exchanged_back_and_the_file_says_so(hide, capsys):
     study = hide(
         *(
@@ -250,7 +378,7 @@ def test_what_is_no_fault_of_the_recording_stays_and_is_said(hide, capsys):
     path = study.exported()
     said = capsys.readouterr().err
     assert path.read_bytes() == (study.made.study / "sub-01" / path.name).read_bytes()
-    why = "added_mass hand_r: no fault of the plates, the clocks or the labels"
+    why = "added_mass hand_r: no fault of the plates, the clocks, the axes or the labels"
     assert f"{STEM}: not corrected: {why}" in said
     assert "sub-01_task-static: nothing to correct" in said
     assert (path.parents[1] / "participants.tsv").exists()
@@ -270,6 +398,13 @@ def test_what_the_diagnosis_did_not_size_is_said(hide, capsys):
     study.diagnosed_as(alike=[("plate_gain", "all fz")])
     study.exported()
     assert "not corrected: plate_gain all fz: of unknown size" in capsys.readouterr().err
+
+
+def test_what_has_no_name_is_said(hide, capsys):
+    study = hide(GAIN[0])
+    study.diagnosed_as(alike=[("unexplained", "")])
+    study.exported()
+    assert ": nothing tells its course exactly" in capsys.readouterr().err
 
 
 def test_of_faults_of_the_plates_that_look_alike_one_is_taken_off(hide, capsys):

@@ -12,7 +12,7 @@ import pandas as pd
 from bsip_cli.artifacts import write_artifact
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.schemas import SCHEMAS, bsip_names, share_name
-from bsip_cli.stages.joint_peaks import peaks_of
+from bsip_cli.stages.joints import peaks_of
 from bsip_cli.statistics.methods import MEASURED, METHODS, OM, RM, RM_MASS
 from bsip_cli.study.study import Participant, Study, Trial
 

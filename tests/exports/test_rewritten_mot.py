@@ -1,0 +1,39 @@
+"""A MOT whose forces are given about one place: that place stays, the torque changes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot
+
+COUNT, PLACE = 20, np.array([0.9, 0.0, 0.4])
+MORE = np.array([0.0, 20.0, 0.0, 1.0, 0.0, 2.0])
+
+
+def test_a_place_that_is_no_centre_of_pressure_stays(tmp_path):
+    times, rng = np.arange(COUNT) / 100, np.random.default_rng(3)
+    force = rng.normal([5.0, 700.0, -3.0], 2.0, (COUNT, 3))
+    torque = rng.normal(0.0, 30.0, (COUNT, 3))
+    names = "\t".join(f"ground_force_{k}" for k in ("vx", "vy", "vz", "px", "py", "pz"))
+    names += "\t" + "\t".join(f"ground_torque_{a}" for a in "xyz")
+    rows = np.column_stack([times, force, np.tile(PLACE, (COUNT, 1)), torque])
+    lines = ["m", f"nRows={COUNT}", "nColumns=10", "endheader", f"time\t{names}"]
+    lines += ["\t".join(f"{x:.9g}" for x in row) for row in rows]
+    (tmp_path / "in.mot").write_text("\n".join([*lines, ""]))
+    head = "PathFileType\t4\t(X/Y/Z)\tin.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n"
+    head += f"100\t100\t{COUNT}\t1\tm\nFrame#\tTime\tA\t\t\n\t\tX1\tY1\tZ1\n\n"
+    body = [f"{k + 1}\t{t:.5f}\t0.1\t1.0\t0.2" for k, t in enumerate(times)]
+    (tmp_path / "in.trc").write_text(head + "\n".join([*body, ""]))
+
+    def heavier(before):
+        return replace(before, readings=before.readings + MORE)
+
+    copy = tmp_path / "new" / "in.trc"
+    copy.parent.mkdir()
+    rewrite_trc_mot(tmp_path / "in.trc", copy, heavier)
+    found = np.loadtxt(copy.with_suffix(".mot"), skiprows=5)
+    assert np.allclose(found[:, 1:4], force + MORE[:3], atol=1e-5)
+    assert np.allclose(found[:, 4:7], PLACE)
+    assert np.allclose(found[:, 7:], torque + MORE[3:], atol=1e-5)

@@ -140,7 +140,11 @@ class ReadableParameters:
 
 
 def readable(estimate: Estimate, prior: Prior) -> ReadableParameters:
-    """Linearised about the estimate for the sd, about the prior for the share."""
+    """Linearised about the estimate for the sd, about the prior for the share.
+
+    The forces tell where a centre of mass lies from the model's origin; how far that lies from the
+    anatomical one is left, whatever they tell.
+    """
     n = len(prior.inertias)
     values, sd, share = (np.empty((n, 10)) for _ in range(3))
     for i in range(n):
@@ -155,6 +159,7 @@ def readable(estimate: Estimate, prior: Prior) -> ReadableParameters:
             before = _sd(at_table, estimate.prior_covariance[block, block])
         left = _sd(at_table, covariance) / before
         share[i] = np.clip(1.0 - left**2, 0.0, 1.0)
+        sd[i, 1:4] = np.hypot(sd[i, 1:4], prior.origin_sd_m)
     return ReadableParameters(values, sd, share)
 
 

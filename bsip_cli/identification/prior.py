@@ -146,8 +146,8 @@ def _has_side(name: str) -> bool:
 def _together(
     pairs: tuple[tuple[int, ...], ...], correlation: float, alike: np.ndarray
 ) -> np.ndarray:
-    """(10 n, 10 n) root of the correlation of all parameters: a twin's is the mirrored one's, in the
-    parts ``alike`` (10 n,) of their standard deviations that both sides share."""
+    """(10 n, 10 n) root of the correlation of all parameters: a twin's is the mirrored one's,
+    in the parts ``alike`` (10 n,) of their standard deviations that both sides share."""
     root = np.eye(len(alike))
     for first, second in (pair for pair in pairs if len(pair) == 2):
         rows = np.arange(10)

@@ -106,7 +106,7 @@ def throwing(
 
 
 def postures(person: Person, rng: np.random.Generator, duration_s: float, _ball: float) -> Plan:
-    """Arms ahead and aside, a bow, and each leg raised with a bent and a straight knee: all held."""
+    """A bow, arms ahead and aside, each leg raised with a bent and a straight knee: all held."""
     sketch = sketch_for(person, duration_s)
     starts = np.linspace(0.0, duration_s, 8)
     for number, (start, end) in enumerate(pairwise(starts)):

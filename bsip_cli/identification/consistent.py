@@ -19,8 +19,8 @@ from scipy.linalg import cho_factor, cho_solve
 
 from bsip_cli.errors import NumericalError
 from bsip_cli.identification import pseudo_inertia
+from bsip_cli.identification.equations import INSTRUMENT_GROUPS
 from bsip_cli.identification.estimator import Estimate, Problem
-from bsip_cli.identification.instruments import GROUPS
 from bsip_cli.identification.prior import Prior
 
 # --- the convex problem behind ``consistent``, and a damped Newton method for it ------------------
@@ -230,7 +230,7 @@ def _spreads(prior: Prior) -> tuple[np.ndarray, ...]:
 
 def _of_instruments(size: int, beyond: int) -> Iterator[np.ndarray]:
     """Precision of where the plates are and of when they read, behind ``size`` parameters."""
-    for part in GROUPS if beyond else ():
+    for part in INSTRUMENT_GROUPS if beyond else ():
         on = np.zeros(size + beyond)
         on[size:][part] = 1.0
         yield np.diag(on)

@@ -12,8 +12,43 @@ from scipy import sparse
 from bsip_cli.dynamics.lowpass import lowpass_operator, stride_to
 from bsip_cli.dynamics.pinocchio_model import bodies_of
 from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
-from bsip_cli.identification import instruments
-from bsip_cli.identification.instruments import Instruments
+
+# --- what the instruments may do wrong, beside the body -------------------------------------------
+
+# A plate some millimetres aside looks like a lopsided trunk, and forces some milliseconds late like
+# heavier limbs. Both are unknowns of the same equations: their spread is an option of [identify],
+# and follows from the data as that of the body's parameters does (``weights``).
+
+INSTRUMENT_GROUPS = (
+    slice(0, 2),
+    slice(2, 3),
+)  # of the columns: where the plates are, when they read
+INSTRUMENT_COUNT = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Instruments:
+    """How far they err, as standard deviations, and the table's parameters phi (P,), whose wrench
+    they read in the wrong place and late."""
+
+    place_sd_m: float
+    delay_sd_s: float
+    phi: np.ndarray
+
+    def columns(self, regressor: np.ndarray, rate_hz: float) -> np.ndarray:
+        """(n, 6, 3) change of the measured wrench, of unit variance each: all plates moved along
+        world X and Y, and all forces late. regressor (n, 6, P) of neighbouring frames."""
+        wrench = regressor @ self.phi
+        out = np.zeros((*wrench.shape, INSTRUMENT_COUNT))
+        for axis in range(2):
+            out[:, 3:, axis] = self.place_sd_m * np.cross(np.eye(3)[axis], wrench[:, :3])
+        if len(wrench) > 1:
+            out[..., 2] = -self.delay_sd_s * rate_hz * np.gradient(wrench, axis=0)
+        return out
+
+
+# --------------------------------------------------------------------------------------------------
+
 
 _ROWS = 100  # outputs per block: some 15 MB of regressor
 _OVERSAMPLING = 2.5  # samples kept per period of the cut-off
@@ -126,7 +161,7 @@ def accumulate(
     ``weights_at`` turns noise levels (n,) into weights (n, 6). Memory does not grow with the length
     of the trials.
     """
-    size = 10 * len(bodies_of(model)) + (instruments.COUNT if beside else 0)
+    size = 10 * len(bodies_of(model)) + (INSTRUMENT_COUNT if beside else 0)
     information, right = np.zeros((6, size, size)), np.zeros((6, size))
     squares, samples, duration = np.zeros(6), 0, 0.0
     for recording in recordings:

@@ -13,6 +13,7 @@ from bsip_cli.body.person import Person
 # How the readable parameters of a left segment go with the right one's: Z points to the right on
 # both sides of the body.
 _MIRROR = np.array([1.0, 1, 1, -1, 1, 1, 1, 1, -1, -1])
+_CENTRE = slice(1, 4)
 _SIDEWAYS = 3  # the coordinate that points to the side
 # What the table itself may miss: the trunk of 2007 has its centre 19 mm further back than that of
 # 2015 (Dumas 2015), and its long axis tilted by 40 degrees more, which is a product of inertia.
@@ -30,7 +31,8 @@ class Spread:
         of known mass.
     com_sd_percent : scalar or (n, 3), segment axes: of the length of the rod that has the
         segment's mass and mean moment of inertia.
-    midline_sd_m, left_right_correlation, total_mass_sd_percent : as in configs/default.toml.
+    midline_sd_m, left_right_correlation, total_mass_sd_percent, origin_sd_m : as in
+        configs/default.toml.
     """
 
     mass_sd_percent: float | np.ndarray
@@ -39,6 +41,7 @@ class Spread:
     inertia_sd_percent: float | np.ndarray
     left_right_correlation: float
     total_mass_sd_percent: float
+    origin_sd_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +60,8 @@ class Prior:
     pairs : the segments whose parameters go together: both sides, or one of the midline.
     fixed : (n,) segments that keep the table's values, as those do whose motion no markers show;
         the scale tells about the others.
+    origin_sd_m : how far the segments' origins lie off the anatomical ones, in each direction: part
+        of ``root``, since the model's body is seen from there, and of what people read.
     """
 
     inertias: tuple[Inertia, ...]
@@ -68,6 +73,7 @@ class Prior:
     pairs: tuple[tuple[int, ...], ...]
     total_mass_sd_kg: float
     fixed: np.ndarray
+    origin_sd_m: float = 0.0
 
     def fixed_parameters(self) -> np.ndarray:
         """(10 n,) which parameters keep the table's values."""
@@ -90,14 +96,16 @@ def prior_of(
     fixed = person.without_data()[bodies] if fixed is None else fixed
     phi = np.concatenate([i.moved(-o).phi() for i, o in zip(inertias, origins, strict=True)])
     pairs = _pairs(names, fixed)
-    own = _own_spread(inertias, spread, names)
+    own, alike = _own_spread(inertias, spread, names)
     readable = block_diag(*(readable_jacobian(part) for part in phi.reshape(-1, 10)))
-    spread_root = np.linalg.solve(readable, own @ _together(pairs, spread.left_right_correlation))
+    together = _together(pairs, spread.left_right_correlation, alike)
+    spread_root = np.linalg.solve(readable, own @ together)
     total_mass_sd_kg = spread.total_mass_sd_percent / 100 * float(phi[::10].sum())
     root = _with_total_mass(spread_root, total_mass_sd_kg, ~fixed)
     readable_sd = np.linalg.norm(readable @ root, axis=1).reshape(-1, 10)
     white = np.linalg.inv(spread_root)
-    return Prior(inertias, origins, phi, root, readable_sd, white, pairs, total_mass_sd_kg, fixed)
+    known = (total_mass_sd_kg, fixed, spread.origin_sd_m)
+    return Prior(inertias, origins, phi, root, readable_sd, white, pairs, *known)
 
 
 def likeliest(prior: Prior, information: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -135,22 +143,27 @@ def _has_side(name: str) -> bool:
     return name.endswith(("_l", "_r"))
 
 
-def _together(pairs: tuple[tuple[int, ...], ...], correlation: float) -> np.ndarray:
-    """(10 n, 10 n) root of the correlation of all parameters: a twin's is the mirrored one's."""
-    root = np.eye(10 * sum(map(len, pairs)))
+def _together(
+    pairs: tuple[tuple[int, ...], ...], correlation: float, alike: np.ndarray
+) -> np.ndarray:
+    """(10 n, 10 n) root of the correlation of all parameters: a twin's is the mirrored one's,
+    in the parts ``alike`` (10 n,) of their standard deviations that both sides share."""
+    root = np.eye(len(alike))
     for first, second in (pair for pair in pairs if len(pair) == 2):
         rows = np.arange(10)
-        root[10 * second + rows, 10 * first + rows] = correlation * _MIRROR
-        root[10 * second + rows, 10 * second + rows] = np.sqrt(1 - correlation**2)
+        own = correlation * alike[10 * first + rows] * alike[10 * second + rows]
+        root[10 * second + rows, 10 * first + rows] = own * _MIRROR
+        root[10 * second + rows, 10 * second + rows] = np.sqrt(1 - own**2)
     return root
 
 
 def _own_spread(
     inertias: tuple[Inertia, ...], spread: Spread, names: tuple[str, ...]
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray]:
     """(10 n, 10 n) readable parameters of independent changes: a heavier segment has the heavier
-    tensor too."""
-    blocks = []
+    tensor too. And the part (10 n,) of each standard deviation that both sides of a body share:
+    people's, not that of the two origins."""
+    blocks, alike = [], []
     mass = np.broadcast_to(spread.mass_sd_percent, len(names)) / 100
     com = np.broadcast_to(spread.com_sd_percent, (len(names), 3)) / 100
     moments = np.broadcast_to(spread.inertia_sd_percent, len(names)) / 100
@@ -161,10 +174,13 @@ def _own_spread(
         if name in _EDITIONS_APART_M:
             sd[_FORWARDS] = np.hypot(sd[_FORWARDS], _EDITIONS_APART_M[name])
             sd[_TILT] = np.hypot(sd[_TILT], inertia.readable()[_TILT])
+        people = sd.copy()
+        sd[_CENTRE] = np.hypot(sd[_CENTRE], spread.origin_sd_m)
+        alike.append(people / sd)
         block = np.diag(sd)
         block[4:, 0] = mass[i] * inertia.readable()[4:]
         blocks.append(block)
-    return block_diag(*blocks)
+    return block_diag(*blocks), np.concatenate(alike)
 
 
 def _readable_sd(inertia: Inertia, mass: float, com: np.ndarray, part: float) -> np.ndarray:

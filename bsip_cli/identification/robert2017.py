@@ -19,7 +19,7 @@ from scipy import sparse
 
 from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.estimator import Estimate, Problem
-from bsip_cli.identification.positive_masses import smallest
+from bsip_cli.identification.hansen2017 import smallest
 
 _SMALLEST_MASS = 0.05  # of the table's
 

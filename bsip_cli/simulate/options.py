@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from bsip_cli.errors import UsageError
 
 ALL_TASKS = ("static", "sequence", "throwing", "basketball", "squat", "steps", "walking", "running")
-MORE_TASKS = ("hops", "stepon")
+MORE_TASKS = ("hops", "stepon", "postures")
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study.study import Trial
 
 STATIC = "static"
+_ORIGINS = {"origin_sd_m": 0.0}  # joint centres are a term of their own beside the body
 # Of the spreads an offset is judged against: 17 mm for a marker that is trusted to 5.
 _FAR_OFF = 3.5
 _READ_TO_PERCENT = 0.3  # standard deviation of what the same plates read in another trial
@@ -115,7 +116,8 @@ def weighed(unit: Unit, person: Person) -> Weighed:
 def prior_of_shares(unit: Unit, person: Person) -> Prior:
     """How the stated mass is shared out, whatever it is."""
     none = np.zeros(len(person.skeleton.bodies), dtype=bool)
-    return prior_from(unit, unit.read("regression"), person, none, total_mass_sd_percent=0.0)
+    known = {**_ORIGINS, "total_mass_sd_percent": 0.0}
+    return prior_from(unit, unit.read("regression"), person, none, **known)
 
 
 def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:
@@ -129,7 +131,7 @@ def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:
     table = unit.read("regression").copy()
     table[[name for name in bsip_names() if not name.startswith("com")]] *= 1 + (share or 0.0)
     none = np.zeros(len(person.skeleton.bodies), dtype=bool)
-    return prior_from(unit, table, person, none, **known)
+    return prior_from(unit, table, person, none, **_ORIGINS, **known)
 
 
 def stated_sd(unit: Unit) -> float:

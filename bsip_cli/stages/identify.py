@@ -21,8 +21,16 @@ from bsip_cli.identification.base import base_parameters
 from bsip_cli.identification.equations import Recording
 from bsip_cli.identification.estimator import Estimate, Problem
 from bsip_cli.identification.movement_gain import advice
-from bsip_cli.identification.rarity import RARE, Rarity, rarity_of
-from bsip_cli.identification.uncertainty import Excitation, excitation, in_words, readable, root_of
+from bsip_cli.identification.uncertainty import (
+    RARE,
+    Excitation,
+    Rarity,
+    excitation,
+    in_words,
+    rarity_of,
+    readable,
+    root_of,
+)
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import spread_names
 from bsip_cli.stages.frames import WRENCH, bsip_table, load_words, loads_record, person_from

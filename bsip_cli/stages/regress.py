@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from bsip_cli.body.anthropometry import regress
+from bsip_cli.body.anthropometry import regress, strays_of
 from bsip_cli.body.inertia import Inertia, rod_length_m
 from bsip_cli.body.skeleton import Skeleton
-from bsip_cli.body.strays import strays_of
 from bsip_cli.errors import BadDataError
 from bsip_cli.identification.prior import prior_of
 from bsip_cli.running.unit import Unit

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bsip_cli.body.strays import strays_of
+from bsip_cli.body.anthropometry import strays_of
 
 ROWS = ("pelvis", "torso", "head", "arm", "forearm", "hand", "thigh", "shank", "foot")
 AVERAGE = 24.1  # body-mass index of the sample

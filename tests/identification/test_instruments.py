@@ -7,11 +7,9 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from bsip_cli.dynamics.regressor import predicted_wrench
-from bsip_cli.identification import instruments
 from bsip_cli.identification.consistent import estimate, fit_with_weights, terms_of
-from bsip_cli.identification.equations import accumulate
+from bsip_cli.identification.equations import INSTRUMENT_COUNT, Instruments, accumulate
 from bsip_cli.identification.estimator import Problem
-from bsip_cli.identification.instruments import Instruments
 from bsip_cli.identification.noise import even_noise
 from tests.identification.synthetic_identification import RATE_HZ, recording, regressor, world
 
@@ -23,7 +21,7 @@ def test_columns_are_what_a_moved_and_a_late_plate_would_read():
     rows = regressor(stride=1)[:200]
     wrench = rows @ ERRING.phi
     place, late = ERRING.columns(rows, RATE_HZ)[..., :2], ERRING.columns(rows, RATE_HZ)[..., 2]
-    assert place.shape[-1] + 1 == instruments.COUNT
+    assert place.shape[-1] + 1 == INSTRUMENT_COUNT
     for axis in range(2):
         moved = wrench.copy()  # the same force through a point further along
         moved[:, 3:] += np.cross(0.005 * np.eye(3)[axis], wrench[:, :3])
@@ -91,4 +89,4 @@ def test_decided_parameters_are_those_of_the_body():
     )
     assert fit.decided == pytest.approx(len(before) - kept, abs=0.01)
     whole = np.trace(np.linalg.solve(fit.prior_covariance, fit.optimum.covariance))
-    assert 1 < len(fit.prior_covariance) - whole - fit.decided < instruments.COUNT
+    assert 1 < len(fit.prior_covariance) - whole - fit.decided < INSTRUMENT_COUNT

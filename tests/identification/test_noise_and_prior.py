@@ -172,3 +172,28 @@ def test_no_data_no_share_and_all_data_all_share():
     for i, inertia in enumerate(prior.inertias):
         np.testing.assert_allclose(same.values[i], inertia.readable(), atol=1e-12)
     assert same.values.shape == same.sd.shape == (15, len(PARAMETERS))
+
+
+def test_an_origin_off_its_anatomy_widens_centres_alone_and_each_side_for_itself():
+    alike = replace(SPREAD, left_right_correlation=0.93)
+    sure = prior_of(world().prior.inertias, world().person, alike)
+    off = prior_of(world().prior.inertias, world().person, replace(alike, origin_sd_m=0.008))
+    centres = np.hypot(sure.readable_sd[:, 1:4], 0.008)
+    np.testing.assert_allclose(off.readable_sd[:, 1:4], centres, rtol=1e-6)
+    np.testing.assert_allclose(off.readable_sd[:, 0], sure.readable_sd[:, 0], rtol=1e-6)
+    np.testing.assert_allclose(off.readable_sd[:, 4:], sure.readable_sd[:, 4:], rtol=1e-6)
+    left, right = (10 * world().person.skeleton.index(f"forearm_{side}") for side in "lr")
+    covariance = off.root @ off.root.T
+    jacobians = [readable_jacobian(off.phi[k : k + 10])[1:4] for k in (left, right)]
+    both = jacobians[0] @ covariance[left : left + 10, right : right + 10] @ jacobians[1].T
+    sides = [sure.readable_sd[k // 10, 1:4] for k in (left, right)]
+    people = 0.93 * sides[0] * sides[1] * np.array([1, 1, -1])
+    np.testing.assert_allclose(np.diag(both), people, rtol=1e-3)
+
+
+def test_forces_tell_nothing_of_an_origin_off_its_anatomy():
+    prior = replace(world().prior, origin_sd_m=0.008)
+    covariance = prior.root @ prior.root.T
+    sure = readable(Estimate(prior.phi, 0 * covariance, ""), prior)
+    np.testing.assert_allclose(sure.sd[:, 1:4], 0.008)
+    np.testing.assert_allclose(np.delete(sure.sd, (1, 2, 3), axis=1), 0.0, atol=1e-12)

@@ -12,7 +12,7 @@ import numpy as np
 from bsip_cli.simulate.movements.gait import running, walking
 from bsip_cli.simulate.movements.jumps import basketball, hops
 from bsip_cli.simulate.movements.sequence import sequence
-from bsip_cli.simulate.movements.standing import squat, static, throwing
+from bsip_cli.simulate.movements.standing import postures, squat, static, throwing
 from bsip_cli.simulate.movements.stepping import stepon, steps
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan
@@ -29,6 +29,7 @@ _TABLE: dict[str, tuple[Movement, float]] = {
     "running": (running, 0.8),
     "hops": (hops, 5.0),
     "stepon": (stepon, 9.0),
+    "postures": (postures, 35.0),
 }
 MOVEMENTS = {task: movement for task, (movement, _) in _TABLE.items()}
 DEFAULT_DURATION_S = {task: duration_s for task, (_, duration_s) in _TABLE.items()}

@@ -1,4 +1,4 @@
-"""Both feet on the plate: quiet stance, squats, and an overarm throw."""
+"""On the plate: quiet stance, squats, an overarm throw, and postures that are held."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from bsip_cli.simulate.numerics import soft_polyline, step, window
 from bsip_cli.simulate.people import SIDES, Person
 from bsip_cli.simulate.plan import Plan
 from bsip_cli.simulate.sketch import (
+    Sketch,
     add_breath_of_motion,
     add_squat,
     add_sway,
@@ -102,3 +103,38 @@ def throwing(
         ball=ball,
         notes={"throwing_side": side},
     )
+
+
+def postures(person: Person, rng: np.random.Generator, duration_s: float, _ball: float) -> Plan:
+    """A bow, arms ahead and aside, each leg raised with a bent and a straight knee: all held."""
+    sketch = sketch_for(person, duration_s)
+    starts = np.linspace(0.0, duration_s, 8)
+    for number, (start, end) in enumerate(pairwise(starts)):
+        shift = 0.3 * (end - start)
+        held = window(sketch.t_s, start, end, shift) * rng.uniform(0.85, 1.0)
+        if number == 0:
+            sketch.angles["waist"][:, 0] -= np.deg2rad(35.0) * held
+        elif number < 3:
+            for side in SIDES:
+                sketch.angles[f"shoulder_{side}"][:, number - 1] += np.deg2rad(80.0) * held
+        else:
+            _raise_leg(sketch, SIDES[number % 2], number < 5, (start, end, shift), held)
+    add_breath_of_motion(sketch, rng, np.deg2rad(0.2))
+    add_sway(sketch, rng)
+    return sketch.plan(plate_centre_m=plate_under(sketch, rng), sway_share=0.3)
+
+
+def _raise_leg(
+    sketch: Sketch, side: str, bent: bool, times_s: tuple[float, float, float], held: np.ndarray
+) -> None:
+    """Stand on the other leg for the middle of (start, end), and hold the foot ahead and up."""
+    start, end, shift = times_s
+    other, foot, stature = SIDES[side == "l"], sketch.feet[side], sketch.person.stature_m
+    part = 0.5 * window(sketch.t_s, start, end, 0.5 * shift)
+    sketch.feet[side].share -= part
+    sketch.feet[other].share += part
+    lifted = held * window(sketch.t_s, start + 0.5 * shift, end - 0.5 * shift, 0.8 * shift)
+    ahead, up, tilt_deg = (0.14, 0.22, 0.0) if bent else (0.30, 0.16, 35.0)
+    foot.raised_m[:, 0] += ahead * stature * lifted
+    foot.raised_m[:, 1] += up * stature * lifted
+    foot.tilt_rad[:, 0] += np.deg2rad(tilt_deg) * lifted

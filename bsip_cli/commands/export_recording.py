@@ -22,7 +22,7 @@ from bsip_cli.diagnosis.corrected_wrench import (
     is_of_the_forces,
 )
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.marker_swap import MarkerSwap
+from bsip_cli.effects.markers import MarkerSwap
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
 from bsip_cli.files.fingerprints import file_hash

@@ -8,9 +8,8 @@ from scipy.signal import find_peaks
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.pattern import UNEXPLAINED, Pattern, course_of, in_channel
-from bsip_cli.effects.channel_words import OF_THE_LAB, unit_of
 from bsip_cli.effects.effect import Parameter
-from bsip_cli.effects.plate_frame import CHANNELS
+from bsip_cli.effects.plates import CHANNELS, OF_THE_LAB, unit_of
 from bsip_cli.effects.scene import Scene
 
 # By the component's unit.

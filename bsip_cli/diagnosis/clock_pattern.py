@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bsip_cli.diagnosis.pattern import Pattern
-from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.clocks import Delay
 from bsip_cli.effects.effect import Parameter
 from bsip_cli.effects.scene import Scene
 

@@ -18,10 +18,10 @@ from bsip_cli.diagnosis.smoothing_bias import smoothing_bias
 from bsip_cli.diagnosis.wander import wander
 from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
 from bsip_cli.effects.catalogue import CATALOGUE
-from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.clocks import Delay
 from bsip_cli.effects.effect import Effect
-from bsip_cli.effects.gravity_tilt import GravityTilt
-from bsip_cli.effects.joint_centre import JointCentre
+from bsip_cli.effects.frames import GravityTilt
+from bsip_cli.effects.joints import JointCentre
 from bsip_cli.effects.scene import Scene, standing_place_m
 
 INERTIA, JOINTS, MARKERS = "inertial_parameters", "joint_centres", "marker_places"

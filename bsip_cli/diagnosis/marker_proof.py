@@ -29,7 +29,7 @@ from bsip_cli.diagnosis.hypothesis import Candidate, Hypothesis
 from bsip_cli.dynamics.lowpass import stride_to
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect
-from bsip_cli.effects.marker_slide import LEAST_S, ramp, ramp_of
+from bsip_cli.effects.markers import LEAST_S, ramp, ramp_of
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH
 from bsip_cli.statistics.effective_samples import effective_samples

@@ -12,7 +12,7 @@ import numpy as np
 
 from bsip_cli.dynamics.regressor import move_moments
 from bsip_cli.effects.effect import Effect
-from bsip_cli.effects.plate_frame import CHANNELS
+from bsip_cli.effects.plates import CHANNELS
 from bsip_cli.effects.scene import Scene, standing_place_m
 
 UNEXPLAINED = "unexplained"

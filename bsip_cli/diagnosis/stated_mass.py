@@ -14,9 +14,8 @@ import numpy as np
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.findings import Finding, Number
 from bsip_cli.diagnosis.scale_mass import is_noticed, p_of
-from bsip_cli.effects.added_mass import AddedMass
-from bsip_cli.effects.plate_gain import PlateGain
-from bsip_cli.effects.plate_zero import PlateZero
+from bsip_cli.effects.loads import AddedMass
+from bsip_cli.effects.plates import PlateGain, PlateZero
 from bsip_cli.effects.scene import Scene
 from bsip_cli.statistics.samples import Z95
 

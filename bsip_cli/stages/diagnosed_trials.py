@@ -23,7 +23,7 @@ from bsip_cli.diagnosis.scale_mass import agreed_share, is_noticed, weight_share
 from bsip_cli.diagnosis.stated_mass import loaded_plate, stated_mass_findings
 from bsip_cli.diagnosis.support import HANDS, LIGHTER, Support
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.marker_shift import BEFORE_S
+from bsip_cli.effects.markers import BEFORE_S
 from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.prior import Prior
 from bsip_cli.running.unit import Unit

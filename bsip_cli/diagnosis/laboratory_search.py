@@ -12,8 +12,8 @@ from string import ascii_uppercase
 import numpy as np
 from scipy.special import expit, logit, logsumexp
 
-from bsip_cli.diagnosis.detection import named_size
 from bsip_cli.diagnosis.fault_model import SIZES
+from bsip_cli.diagnosis.fault_scores import named_size
 from bsip_cli.diagnosis.findings import SCALE_ERROR
 from bsip_cli.diagnosis.laboratory import (
     Offset,

@@ -15,8 +15,8 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import binary_erosion
 
-from bsip_cli.diagnosis.error_model import Term, TrialErrors
-from bsip_cli.diagnosis.error_terms import FAULT, INERTIA, as_simulated, is_of_instruments
+from bsip_cli.diagnosis.error_model import TrialErrors
+from bsip_cli.diagnosis.error_terms import FAULT, INERTIA, Term, as_simulated, is_of_instruments
 from bsip_cli.diagnosis.fault_model import FaultTrial, Fitted, fitted, session_of, summed
 from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.body import StatedMass

@@ -83,7 +83,8 @@ class SegmentInertia(Effect):
         measured, before = scene.measured, scene.predicted
         after = before + self.change(scene, target, values)
         wrench = _share(measured, before, after, scene.valid)
-        cop = _share(*(_cop(scene, one) for one in (measured, before, after)), scene.valid)
+        seen, was, now = (_cop(scene, one) for one in (measured, before, after))
+        cop = _share(seen, was, now, scene.valid)
         return (("share", "1", wrench), ("cop_share", "1", cop))
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:

@@ -42,7 +42,7 @@ LEAST_FORCE_N = 50.0
 
 
 class SegmentInertia(Effect):
-    """A segment heavier, with another centre of mass or tensor than simulated with."""
+    """A segment whose mass, centre of mass and inertia are not those of the table."""
 
     name = "segment_inertia"
     of_the_person = True
@@ -149,7 +149,9 @@ MASS_KG, LIMB_MASS_KG, FREQUENCY_HZ, DAMPING_RATIO = 0.5, 0.8, 0.05, 0.02
 
 
 class WobblingMass(Effect):
-    """A mass on a spring and a damper at the segment's centre of mass.
+    """A part of a segment's mass that swings against the bone.
+
+    A mass on a spring and a damper at the segment's centre of mass.
 
     Looked for only where an impact sets it swinging: in slow movement it is a heavier segment. It
     need not swing to the sides as it does up and down: how much of it seems to is a number of its
@@ -243,8 +245,10 @@ PACE_HZ = 3e-4  # to which a pace is known: nobody breathes like a clock
 
 
 class Breathing(Effect):
-    """The chest that moves with every breath while the model's trunk stands still: moved mass times
-    amplitude, a sine ahead and up in the upper torso."""
+    """The chest that moves with every breath while the model's trunk stands still.
+
+    Moved mass times amplitude, a sine ahead and up in the upper torso.
+    """
 
     name = "breathing"
     on_its_segment = True

@@ -31,6 +31,8 @@ class Delay(Effect):
 
 
 class SyncOffset(Delay):
+    """The forces come late against the markers."""
+
     name = "sync_offset"
     numbers = (Parameter("delay", "s", -0.5, 0.5, 0.01, known_to=KNOWN_TO_S),)
     looks = (
@@ -48,8 +50,10 @@ class SyncOffset(Delay):
 
 
 class ClockDrift(Delay):
-    """The plates' clock runs at another rate: the delay is zero where the trial begins and grows
-    evenly."""
+    """The plates' clock runs at another rate than the cameras'.
+
+    The delay is zero where the trial begins and grows evenly.
+    """
 
     name = "clock_drift"
     numbers = (Parameter("rate_error", "1", -MOST_DRIFT, MOST_DRIFT, 3e-4),)

@@ -25,7 +25,9 @@ class Turned(Effect):
 
 
 class GravityTilt(Turned):
-    """The lab's axes are turned against the world by the angles about x and y (rotation vector).
+    """A lab whose Z axis is not the vertical.
+
+    The lab's axes are turned against the world by the angles about x and y (rotation vector).
 
     Markers and plates are turned together, so only gravity does not point down the lab's Z.
     """
@@ -49,7 +51,9 @@ class GravityTilt(Turned):
 
 
 class CameraFrame(Turned):
-    """All markers are turned about the origin by the angles about x and y (rotation vector).
+    """Cameras whose axes are turned against plates and gravity.
+
+    All markers are turned about the origin by the angles about x and y (rotation vector).
 
     A turn about the vertical is one of all plates the other way: ``plate_rotation``.
     """

@@ -33,7 +33,9 @@ MOST_M = 0.05
 
 
 class JointCentre(Effect):
-    """The true centre is the model's plus the shift, in the parent's axes.
+    """A joint that truly lies elsewhere in the parent segment than the model has it.
+
+    The true centre is the model's plus the shift, in the parent's axes.
 
     In the static trial the limb lies where its markers are, whichever centre the model has. When
     the joint turns, true and modelled limb come apart by (R_parent - R_child) shift: the limb's
@@ -130,11 +132,11 @@ def _second_joint(person: Person, i: int) -> np.ndarray:
 
 
 class MissingJoint(Effect):
-    """A trunk that bends a second time between waist and neck: a part of the waist's turn happens
-    at T12/L1 instead.
+    """A trunk that bends a second time between waist and neck.
 
-    The parameters are that part, per axis. What lies above is turned as the model has it, but
-    shifted; the part below turns less. The markers above follow and drag the pose along.
+    A part of the waist's turn happens at T12/L1 instead; the parameters are that part, per axis.
+    What lies above is turned as the model has it, but shifted; the part below turns less. The
+    markers above follow and drag the pose along.
     """
 
     name = "missing_joint"

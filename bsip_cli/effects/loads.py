@@ -29,7 +29,9 @@ MOST_KG = 20.0
 
 
 class AddedMass(Effect):
-    """A point mass fixed to a segment.
+    """A mass that the person wears or carries and the model does not know.
+
+    A point mass fixed to a segment.
 
     Its position enters as first moment about the segment's centre of mass, segment axes, in which
     the wrench is linear but for the small inertia of the mass about that centre, left out here. A
@@ -122,7 +124,7 @@ class Held(Effect):
 
 
 class ReleasedObject(Held):
-    """A point mass at the hand's centre until the moment of release."""
+    """An object that the person holds at first and lets go."""
 
     name = "released_object"
     looks = "the weight falls at one moment, and until then forces go with a hand that speeds up"
@@ -146,7 +148,7 @@ class ReleasedObject(Held):
 
 
 class ObjectHandled(Held):
-    """A point mass at the hand's centre from picking up to putting down."""
+    """An object that the person picks up and puts down again."""
 
     name = "object_handled"
     looks = "the weight rises at one moment and falls at another"
@@ -211,7 +213,9 @@ ELEVATIONS_RAD = tuple(APART_RAD * k for k in (-2, -1, 0, 1, 2))
 
 
 class Implement(Effect):
-    """A thin body fixed in a hand, its axis through the hand's centre of mass.
+    """A club, racket, bat or stick in the hand, whose mass lies far from it.
+
+    A thin body fixed in a hand, its axis through the hand's centre of mass.
 
     What it does to the plates goes with its first moment and with the second one over the first
     (``arm``); its mass, and so its centre, hardly show. Its direction in the hand's axes: azimuth
@@ -356,8 +360,11 @@ def missing_wrenches(scene: Scene, target: str) -> np.ndarray:
 
 
 class ExternalForce(Effect):
-    """A constant force on a segment's centre of mass, world axes, as of a harness, a rail or a
-    support; the plates carry as much less."""
+    """A force on the body that no plate measures, the same throughout: a harness, a rail, a
+    support.
+
+    On a segment's centre of mass, world axes; the plates carry as much less.
+    """
 
     name = "external_force"
     of_the_person = True
@@ -396,9 +403,11 @@ STEADY_N = 1.0  # to which a mean force is known: nobody leans steadily
 
 
 class UnmeasuredContact(Effect):
-    """A force on the segment's centre of mass during a window, in which it grows and fades, as of a
-    hand on a rail, a chair, a foot beside the plate; the plates carry as much less. The point where
-    it truly acts is not estimated."""
+    """A contact that no plate measures: a hand on a rail, a chair, a foot beside the plate.
+
+    A force on the segment's centre of mass during a window, in which it grows and fades; the plates
+    carry as much less. The point where it truly acts is not estimated.
+    """
 
     name = "unmeasured_contact"
     on_its_segment = True

@@ -48,7 +48,9 @@ def during(course: np.ndarray, parts: np.ndarray) -> np.ndarray:
 
 
 class MarkerShift(Effect):
-    """A marker sits elsewhere on its segment from a moment on, in the segment's axes.
+    """A marker that slips on the skin and stays there.
+
+    A marker sits elsewhere on its segment from a moment on, in the segment's axes.
 
     The pose follows it in part, which bends the simulated wrench; the rest stays as residual. A
     moment before the trial means throughout. Scaling that used the trial has put the model's marker
@@ -158,7 +160,9 @@ EDGE_S = 0.5  # to which its beginning and its end are known
 
 
 class MarkerSlide(MarkerShift):
-    """A marker leaves its place over a window and stays there, in the segment's axes.
+    """A marker that slides slowly along the skin.
+
+    A marker leaves its place over a window and stays there, in the segment's axes.
 
     As in ``marker_shift``, but for the ramp: its middle and length.
     """
@@ -231,7 +235,9 @@ SWAPPED_S = 0.05  # at least
 
 
 class MarkerSwap(Effect):
-    """The labels of two markers are exchanged between two moments; ``share`` is 1 if they are.
+    """Two markers that bear each other's labels for a while.
+
+    The labels of two markers are exchanged between two moments; ``share`` is 1 if they are.
 
     Only pairs that can be mistaken (one segment, or a left and a right one) and that for a while
     lie at least twice as near to the other's place in the model as to their own.
@@ -340,7 +346,9 @@ CORNER = (np.sqrt(2.0) - 1.0) ** -0.25
 
 
 class OverSmoothing(Effect):
-    """The markers went through a zero-phase Butterworth of order four, and the pose with them.
+    """Markers that were low-passed before they were delivered.
+
+    The markers went through a zero-phase Butterworth of order four, and the pose with them.
 
     ``share`` is 1 where the cut-off is right.
     """

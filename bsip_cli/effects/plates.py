@@ -121,7 +121,7 @@ class OwnCourse(OfPlates):
 
 
 class PlateZero(OwnCourse):
-    """A constant offset."""
+    """A force plate's channel with a constant offset."""
 
     name = "plate_zero"
     looks = "a constant difference in one channel, with and without load"
@@ -138,7 +138,10 @@ class PlateZero(OwnCourse):
 
 
 class PlateDrift(OwnCourse):
-    """Linear, zero where the trial begins."""
+    """A force plate's channel that drifts through the trial.
+
+    Linear, zero where the trial begins.
+    """
 
     name = "plate_drift"
     of_the_lab = False
@@ -159,7 +162,10 @@ class PlateDrift(OwnCourse):
 
 
 class PlateGain(OfPlates):
-    """One force channel, in the own axes of a plate or of all, shows 1 + gain times the truth."""
+    """Force plates whose forces are scaled wrongly.
+
+    One force channel, in the own axes of a plate or of all, shows 1 + gain times the truth.
+    """
 
     name = "plate_gain"
     # A quarter of 0.04 is not told: plates of one lab differ by some tenths of a percent.
@@ -185,8 +191,11 @@ class PlateGain(OfPlates):
 
 
 class PlateCrosstalk(OfPlates):
-    """A force channel also shows a part of another one, in one plate or, with the same amplifiers
-    and no calibration, in all."""
+    """A channel of a force plate that leaks into another.
+
+    A force channel also shows a part of another one, in one plate or, with the same amplifiers
+    and no calibration, in all.
+    """
 
     name = "plate_crosstalk"
     # Makers state 1 to 3 %; what leaks more than 8 is no crosstalk.
@@ -211,8 +220,11 @@ class PlateCrosstalk(OfPlates):
 
 
 class PlateRotation(OfPlates):
-    """The plate is truly turned about its centre, or all plates about the middle of their centres:
-    measured are the true vectors turned back."""
+    """Force plates that are turned against what the file says.
+
+    The plate is truly turned about its centre, or all plates about the middle of their centres:
+    measured are the true vectors turned back.
+    """
 
     name = "plate_rotation"
     numbers = tuple(Parameter(n, "rad", -0.5, 0.5, 0.02) for n in ("tilt_x", "tilt_y", "yaw"))
@@ -244,7 +256,9 @@ class PlateRotation(OfPlates):
 
 
 class PlateTranslation(OfPlates):
-    """The plate, or every plate, truly lies at its stated place plus the shift: the measured moment
+    """Force plates that lie elsewhere than the file says.
+
+    The plate, or every plate, truly lies at its stated place plus the shift: the measured moment
     lacks shift x force.
 
     Feet deform where they press, and a body whose mass lies ahead of the model's looks alike; the

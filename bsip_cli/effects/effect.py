@@ -161,9 +161,12 @@ def explained_share(residual_m: np.ndarray, change_m: np.ndarray) -> float:
     return 1 - after / max(before, 1e-12)
 
 
-def along_xyz(name: str, *described: object, **more: object) -> tuple[Parameter, ...]:
+def along_xyz(
+    name: str, unit: str, least: float, most: float, typical: float, known_to: float = 0.0
+) -> tuple[Parameter, ...]:
     """Parameters ``name_x``, ``name_y`` and ``name_z`` that are described alike."""
-    return tuple(Parameter(f"{name}_{axis}", *described, **more) for axis in "xyz")  # type: ignore[arg-type]
+    described = (unit, least, most, typical, (), known_to)
+    return tuple(Parameter(f"{name}_{axis}", *described) for axis in "xyz")
 
 
 def parts_xyz(name: str, unit: str, values: Iterable[float]) -> Reported:

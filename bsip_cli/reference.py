@@ -154,7 +154,7 @@ def faults_page() -> str:
 
 
 def _what_it_is(effect: Effect) -> str:
-    return (sys.modules[type(effect).__module__].__doc__ or "").split("\n\n")[0].strip()
+    return " ".join((type(effect).__doc__ or "").split("\n\n")[0].split())
 
 
 def _found(effect: str) -> str:

@@ -23,12 +23,12 @@ from bsip_cli.diagnosis.corrected_wrench import (
     is_fault_of_forces,
     is_of_the_forces,
 )
-from bsip_cli.diagnosis.pattern import UNEXPLAINED
+from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.delayed import Delay
-from bsip_cli.effects.gravity_tilt import GravityTilt, Turned
-from bsip_cli.effects.marker_swap import MarkerSwap
-from bsip_cli.effects.plate_frame import ALL, loaded_plates
+from bsip_cli.effects.clocks import Delay
+from bsip_cli.effects.frames import GravityTilt, Turned
+from bsip_cli.effects.markers import MarkerSwap
+from bsip_cli.effects.plates import ALL, loaded_plates
 from bsip_cli.effects.scene import Scene
 from bsip_cli.errors import BadDataError, BsipError, UsageError, not_writable
 from bsip_cli.files.fingerprints import file_hash

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.effects.clocks import Sized, joint_change, joint_delay_s
 from bsip_cli.effects.effect import Effect
-from bsip_cli.effects.joint_change import Sized, joint_change, joint_delay_s
 from bsip_cli.effects.scene import Scene
 from bsip_cli.statistics.methods import OM
 

@@ -9,10 +9,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from bsip_cli.diagnosis.cause import Cause, change_by, delay_by
-from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.clocks import Delay
 from bsip_cli.effects.effect import Effect
-from bsip_cli.effects.plate_frame import ALL, loaded_plates, plate_of
-from bsip_cli.effects.plate_rotation import PlateRotation
+from bsip_cli.effects.plates import ALL, PlateRotation, loaded_plates, plate_of
 from bsip_cli.effects.scene import Plate, Scene
 
 _ROUNDS = 2  # a clock's rate is wrong by 0.3 % at most: each round leaves as much of the error

@@ -6,14 +6,20 @@ square; with noise and unknown, which share what no term explains, the shares ad
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import permutations
 
 import numpy as np
+from scipy.stats import chi2
 
 from bsip_cli.diagnosis.error_gain import ErrorGain, block_errors, error_gain, pooled
-from bsip_cli.diagnosis.error_model import ErrorModel, Part, Term
+from bsip_cli.diagnosis.error_model import ErrorModel, Part
+from bsip_cli.diagnosis.findings import Finding, Number, interval_words
+from bsip_cli.diagnosis.patterns import UNEXPLAINED
+from bsip_cli.effects.plates import OF_THE_LAB
+from bsip_cli.statistics.effective_samples import effective_samples
 from bsip_cli.statistics.samples import Z95
 
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
@@ -101,118 +107,100 @@ class _Budget:
     trials: tuple[int, ...]
     rng: np.random.Generator
 
+    @cached_property
+    def residual(self) -> dict[int, np.ndarray]:
+        """By trial (n, 8)."""
+        return {t: self.grounds[t].seen(self.model.trials[t].residual) for t in self.trials}
+
+    @cached_property
+    def squares(self) -> np.ndarray:
+        """(8,) of the residual."""
+        return _sum(x**2 for x in self.residual.values())
+
+    @cached_property
+    def count(self) -> np.ndarray:
+        """(8,) samples."""
+        return sum(np.isfinite(x).sum(axis=0) for x in self.residual.values())
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """(8, K) what each coefficient adds to the shares."""
+        weights = np.zeros((len(COMPONENTS), len(self.model.mean)))
+        for t in self.trials:
+            weights[:, self.model.used[t]] += self._projected(t, self.model.columns[t])
+        return weights / self.squares[:, None]
+
+    def _projected(self, trial: int, columns: np.ndarray) -> np.ndarray:
+        """(8, k) of a trial's columns (n, 6, k) on the residual."""
+        seen = np.nan_to_num(self.grounds[trial].components * self.residual[trial][:, :, None])
+        return np.tensordot(seen, columns, axes=([0, 2], [0, 1]))
+
     def lines(self) -> Iterator[Line]:
-        model = self.model
-        here = tuple(p for p in model.parts if p.trial in (-1, *self.trials))
-        residual = {t: self.grounds[t].seen(model.trials[t].residual) for t in self.trials}
-        squares = _sum(x**2 for x in residual.values())
-        count = sum(np.isfinite(x).sum(axis=0) for x in residual.values())
-        weights = self._weights(residual) / squares[:, None]
+        here = tuple(p for p in self.model.parts if p.trial in (-1, *self.trials))
         terms = list(dict.fromkeys(p.term for p in here))
-        alike = self._alike(weights, here, terms)
+        alike = self._alike(here, terms)
         for term in terms:
             whole = tuple(p for p in here if p.term == term)
             targets = dict.fromkeys(p.target for p in whole)
-            yield from self._inside(term, whole, residual, squares, count)
+            yield from self._inside(term, tuple(p for p in whole if p in self.model.mixed))
             for target in ("", *(t for t in targets if t and len(targets) > 1)):
                 parts = tuple(p for p in whole if not target or p.target == target)
-                lines = self._of(parts, residual, squares, count, weights)
-                for one in lines:
-                    like = alike.get((term, one.component), ())
-                    yield replace(one, term=term, target=target, alike=like)
-        yield from self._rest(residual, squares, count, weights)
-        gains = self._gains(here, residual)
+                for one in self._of(term, target, parts):
+                    yield replace(one, alike=alike.get((term, one.component), ()))
+        yield from self._rest()
+        gains, rms = self._gains(here), np.sqrt(self.squares / self.count)
         for k, name in enumerate(COMPONENTS):
-            rms = float(np.sqrt(squares[k] / count[k]))
-            yield Line(TOTAL, "", name, rms, 1.0, 1.0, 1.0, gains[k], np.nan)
+            yield Line(TOTAL, "", name, float(rms[k]), 1.0, 1.0, 1.0, gains[k], np.nan)
 
-    def _weights(self, residual: dict[int, np.ndarray]) -> np.ndarray:
-        """(8, K) what each coefficient adds to the projections on the residual."""
-        weights = np.zeros((len(COMPONENTS), len(self.model.mean)))
-        for t, one in residual.items():
-            seen = np.nan_to_num(self.grounds[t].components * one[:, :, None])
-            used, columns = self.model.used[t], self.model.columns[t]
-            weights[:, used] += np.tensordot(seen, columns, axes=([0, 2], [0, 1]))
-        return weights
+    def _of(self, term: str, target: str, parts: tuple[Part, ...]) -> Iterator[Line]:
+        changes = {t: self.grounds[t].seen(self._change(parts, t)) for t in self.trials}
+        rms = np.sqrt(_sum(x**2 for x in changes.values()) / self.count)
+        share = _sum(changes[t] * self.residual[t] for t in self.trials) / self.squares
+        half = Z95 * self._spread(parts)
+        return _lines(term, target, rms, share, half, self._gains(parts), self._scale(parts))
 
-    def _of(
-        self,
-        parts: tuple[Part, ...],
-        residual: dict[int, np.ndarray],
-        squares: np.ndarray,
-        count: np.ndarray,
-        weights: np.ndarray,
-    ) -> Iterator[Line]:
-        changes = {t: self.grounds[t].seen(self._change(parts, t)) for t in residual}
-        rms = np.sqrt(_sum(x**2 for x in changes.values()) / count)
-        share = _sum(changes[t] * residual[t] for t in residual) / squares
-        half = Z95 * self._spread(parts, weights)
-        gains = self._gains(parts, residual)
-        scale = float(np.mean([self.model.scales[p.scale] for p in parts]))
-        for k, name in enumerate(COMPONENTS):
-            low, high = share[k] - half[k], share[k] + half[k]
-            yield Line("", "", name, rms[k], share[k], low, high, gains[k], scale)
+    def _scale(self, parts: tuple[Part, ...]) -> float:
+        return float(np.mean([self.model.scales[p.scale] for p in parts]))
 
-    def _inside(
-        self,
-        term: str,
-        parts: tuple[Part, ...],
-        residual: dict[int, np.ndarray],
-        squares: np.ndarray,
-        count: np.ndarray,
-    ) -> Iterator[Line]:
+    def _inside(self, term: str, parts: tuple[Part, ...]) -> Iterator[Line]:
         """The targets of terms whose coefficients are several targets' at once."""
-        parts = tuple(p for p in parts if p in self.model.mixed)
         if not parts:
             return
-        mine = np.concatenate([np.arange(p.start, p.stop) for p in parts])
-        mixed = np.concatenate([self.model.mixed[p] for p in parts], axis=1)
-        mean, inside = self.model.mean[mine], self.model.covariance[np.ix_(mine, mine)]
-        scale = float(np.mean([self.model.scales[p.scale] for p in parts]))
-        bare = {t: self._bare(parts[0], t) for t in residual}
+        model, mine = self.model, _coefficients(parts)
+        mixed = np.concatenate([model.mixed[p] for p in parts], axis=1)
+        mean, inside = model.mean[mine], model.covariance[np.ix_(mine, mine)]
+        bare = {
+            t: next(x for x in model.trials[t].terms if x.scale == parts[0].scale)
+            for t in self.trials
+        }
         targets = next(iter(bare.values())).targets
         wide = len(mixed) // len(targets)
         for k, target in enumerate(targets):
             at = slice(wide * k, wide * (k + 1))
             changes, weights = [], np.zeros((len(COMPONENTS), wide))
-            for t, one in residual.items():
-                ground, columns = self.grounds[t], bare[t].columns[..., at]
-                changes.append(ground.seen(columns @ (mixed[at] @ mean)))
-                seen = np.nan_to_num(ground.components * one[:, :, None])
-                weights += np.tensordot(seen, columns, axes=([0, 2], [0, 1]))
-            rms = np.sqrt(_sum(x**2 for x in changes) / count)
-            weights = weights @ mixed[at] / squares[:, None]
-            share = weights @ mean
+            for t in self.trials:
+                columns = bare[t].columns[..., at]
+                changes.append(self.grounds[t].seen(columns @ (mixed[at] @ mean)))
+                weights += self._projected(t, columns)
+            rms = np.sqrt(_sum(x**2 for x in changes) / self.count)
+            weights = weights @ mixed[at] / self.squares[:, None]
             half = Z95 * np.sqrt(np.einsum("ik,kl,il->i", weights, inside, weights))
-            for c, name in enumerate(COMPONENTS):
-                low, high = share[c] - half[c], share[c] + half[c]
-                yield Line(term, target, name, rms[c], share[c], low, high, _NO_GAIN, scale)
+            yield from _lines(term, target, rms, weights @ mean, half, None, self._scale(parts))
 
-    def _bare(self, part: Part, trial: int) -> Term:
-        return next(x for x in self.model.trials[trial].terms if x.scale == part.scale)
-
-    def _rest(
-        self,
-        residual: dict[int, np.ndarray],
-        squares: np.ndarray,
-        count: np.ndarray,
-        weights: np.ndarray,
-    ) -> Iterator[Line]:
+    def _rest(self) -> Iterator[Line]:
         """What no term explains: as much of it as the instruments' noise makes, and the unknown."""
-        left = {t: self.grounds[t].seen(self.model.left[t]) for t in residual}
-        share = _sum(left[t] * residual[t] for t in residual) / squares
+        left = {t: self.grounds[t].seen(self.model.left[t]) for t in self.trials}
+        share = _sum(left[t] * self.residual[t] for t in self.trials) / self.squares
         noisy = _sum(
             self.grounds[t].components ** 2 @ self.model.trials[t].noise ** 2 for t in left
         )
-        noise = np.clip(noisy / squares, 0.0, np.maximum(share, 0.0))
-        unknown = np.sqrt(np.maximum(_sum(x**2 for x in left.values()) - noisy, 0.0) / count)
-        half = Z95 * self._spread(self.model.parts, weights)
-        for k, name in enumerate(COMPONENTS):
-            rest = share[k] - noise[k]
-            low, high = rest - half[k], rest + half[k]
-            yield Line(UNKNOWN, "", name, unknown[k], rest, low, high, _NO_GAIN, np.nan)
-            rms = np.sqrt(noisy[k] / count[k])
-            yield Line(NOISE, "", name, rms, noise[k], noise[k], noise[k], _NO_GAIN, np.nan)
+        noise = np.clip(noisy / self.squares, 0.0, np.maximum(share, 0.0))
+        unknown = np.sqrt(np.maximum(_sum(x**2 for x in left.values()) - noisy, 0.0) / self.count)
+        half = Z95 * self._spread(self.model.parts)
+        of_unknown = _lines(UNKNOWN, "", unknown, share - noise, half, None, np.nan)
+        of_noise = _lines(NOISE, "", np.sqrt(noisy / self.count), noise, 0 * half, None, np.nan)
+        for pair in zip(of_unknown, of_noise, strict=True):
+            yield from pair
 
     def _change(
         self, parts: Sequence[Part], trial: int, mean: np.ndarray | None = None
@@ -220,24 +208,24 @@ class _Budget:
         none = np.zeros_like(self.model.trials[trial].residual)
         return sum((self.model.of(part, trial, mean) for part in parts), none)
 
-    def _spread(self, parts: Sequence[Part], weights: np.ndarray) -> np.ndarray:
+    def _spread(self, parts: Sequence[Part]) -> np.ndarray:
         """(8,) standard deviation of a share: it is linear in the coefficients."""
-        mine = np.concatenate([np.arange(p.start, p.stop) for p in parts])
-        inside = self.model.covariance[np.ix_(mine, mine)]
-        return np.sqrt(np.einsum("ik,kl,il->i", weights[:, mine], inside, weights[:, mine]))
+        mine = _coefficients(parts)
+        weights, inside = self.weights[:, mine], self.model.covariance[np.ix_(mine, mine)]
+        return np.sqrt(np.einsum("ik,kl,il->i", weights, inside, weights))
 
-    def _gains(self, parts: Sequence[Part], residual: dict[int, np.ndarray]) -> list[ErrorGain]:
+    def _gains(self, parts: Sequence[Part]) -> list[ErrorGain]:
         """Per component, from coefficients that rest on the other folds; none of what is a trial's
         own where the trial is held out as a whole."""
         folds = [(f, x) for f, x in zip(self.model.folds, self.model.without, strict=True)]
-        folds = [(f, x) for f, x in folds if f.trial in residual]
+        folds = [(f, x) for f, x in folds if f.trial in self.trials]
         if len(self.model.folds) < 2 or not any(
             p.trial == -1 or sum(f.trial == p.trial for f, _ in folds) > 1 for p in parts
         ):
             return [_NO_GAIN] * len(COMPONENTS)
         errors = []
         for fold, mean in folds:
-            ground, before = self.grounds[fold.trial], residual[fold.trial][fold.rows]
+            ground, before = self.grounds[fold.trial], self.residual[fold.trial][fold.rows]
             change = ground.seen(self._change(parts, fold.trial, mean))[fold.rows]
             blocks = ground.blocks[fold.rows]
             errors.append([(x, x - c, blocks) for x, c in zip(before.T, change.T, strict=True)])
@@ -247,21 +235,144 @@ class _Budget:
         ]
 
     def _alike(
-        self, weights: np.ndarray, here: Sequence[Part], terms: Sequence[str]
+        self, here: Sequence[Part], terms: Sequence[str]
     ) -> dict[tuple[str, str], tuple[str, ...]]:
         """By term and component, the terms with which its sum is surer than either alone: they
         stand in for each other."""
         of = {term: [p for p in here if p.term == term] for term in terms}
-        spread = {term: self._spread(parts, weights) for term, parts in of.items()}
+        spread = {term: self._spread(parts) for term, parts in of.items()}
         found: dict[tuple[str, str], tuple[str, ...]] = {}
         for a, b in permutations(terms, 2):
-            both = self._spread([*of[a], *of[b]], weights)
+            both = self._spread([*of[a], *of[b]])
             surer = both < _SURER * np.minimum(spread[a], spread[b])
             for component in np.array(COMPONENTS)[surer].tolist():
                 found[a, component] = (*found.get((a, component), ()), b)
         return found
 
 
+def _lines(
+    term: str,
+    target: str,
+    rms: np.ndarray,
+    share: np.ndarray,
+    half: np.ndarray,
+    gains: list[ErrorGain] | None,
+    scale: float,
+) -> Iterator[Line]:
+    """Of all components; ``half`` (8,) of the shares' intervals."""
+    for k, name in enumerate(COMPONENTS):
+        bounds, gain = (share[k] - half[k], share[k] + half[k]), gains[k] if gains else _NO_GAIN
+        yield Line(term, target, name, rms[k], share[k], *bounds, gain, scale)
+
+
+def _coefficients(parts: Sequence[Part]) -> np.ndarray:
+    return np.concatenate([np.arange(p.start, p.stop) for p in parts])
+
+
 def _sum(parts: Iterable[np.ndarray]) -> np.ndarray:
     """Over samples and trials, where they are known."""
     return np.sum([np.nansum(one, axis=0) for one in parts], axis=0)
+
+
+# --- errors that are too large to be passed over --------------------------------------------------
+# Asked is what named faults and ordinary errors of ordinary size leave: were their size free, soft
+# tissue or a body could swallow a plate that is turned round.
+
+_LOUD = 0.5  # of the yardstick, by which a component varies at least for its course to count
+_WORDS = {
+    **{name: words.replace("horizontal force", "force") for name, words in OF_THE_LAB.items()},
+    "cop_ap": "the centre of pressure, forwards,",
+    "cop_ml": "the centre of pressure, sideways,",
+}
+
+
+@dataclass(frozen=True)
+class Yardsticks:
+    """What no good laboratory has: error of the centre of pressure [m]; of a force, part of body
+    weight [N]; and the correlation below which a course does not follow the measured one."""
+
+    cop_m: float
+    force: float
+    correlation: float
+    weight_N: float
+
+    def of(self, component: str) -> float:
+        """Of a component [N, N m, m]: moments are body weight at the centre of pressure's arm."""
+        if component.startswith("cop"):
+            return self.cop_m
+        return self.weight_N * (self.cop_m if component.startswith("m") else self.force)
+
+
+@dataclass(frozen=True)
+class _Large:
+    """An error of a component in a trial: its size [N, N m, m] with standard error, as a part of
+    the yardstick; correlation of what is simulated with what is measured; chance of noise."""
+
+    trial: str
+    component: str
+    error: float
+    standard_error: float
+    part: float
+    correlation: float
+    chance: float
+
+
+def large_errors(
+    usual: ErrorModel,
+    grounds: Sequence[Ground],
+    trials: Sequence[int],
+    yardsticks: Yardsticks,
+    along: Callable[[Sequence[str], str], str],
+) -> tuple[Finding, ...]:
+    """One finding for all trials with such errors, by the largest of them.
+
+    usual : the model with everything as large as usual. along : what an error of some trials and a
+    component goes along with, in words.
+    """
+    found = [one for t in trials for one in _of_trial(usual, grounds[t], t, yardsticks)]
+    return (_finding(found, yardsticks, along),) if found else ()
+
+
+def _of_trial(
+    usual: ErrorModel, ground: Ground, trial: int, yardsticks: Yardsticks
+) -> Iterator[_Large]:
+    one = usual.trials[trial]
+    left, course = ground.seen(usual.left[trial]), ground.measured
+    noise = np.sqrt(np.nanmean(ground.components**2 @ one.noise**2, axis=0))
+    for k, name in enumerate(COMPONENTS):
+        known = np.isfinite(left[:, k])
+        if not known.any():
+            continue
+        error, seen, yardstick = left[known, k], course[known, k], yardsticks.of(name)
+        size = float(np.sqrt((error**2).mean()))
+        correlation = np.nan
+        if seen.std() > _LOUD * yardstick and (seen - error).std() > 0:
+            correlation = float(np.corrcoef(seen, seen - error)[0, 1])
+        if size > yardstick or correlation < yardsticks.correlation:
+            samples = max(effective_samples(error), 1.0)
+            chance = float(chi2.sf(samples * (size / noise[k]) ** 2, samples))
+            spread = size / np.sqrt(2 * samples)
+            yield _Large(one.name, name, size, spread, size / yardstick, correlation, chance)
+
+
+def _finding(
+    found: Sequence[_Large], yardsticks: Yardsticks, along: Callable[[Sequence[str], str], str]
+) -> Finding:
+    worst = max(found, key=lambda one: one.part)
+    unit = "m" if worst.component.startswith("cop") else "N m" if worst.component[0] == "m" else "N"
+    half = Z95 * worst.standard_error
+    number = Number("error", unit, worst.error, max(worst.error - half, 0.0), worst.error + half)
+    factor, read = (1000.0, "mm") if unit == "m" else (1.0, unit)
+    trials = tuple(dict.fromkeys(one.trial for one in found))
+    follows = (
+        f", and what is simulated follows it with a correlation of {worst.correlation:.2f}"
+        if worst.correlation < yardsticks.correlation
+        else ""
+    )
+    sentence = (
+        f"large error, cause unknown: beside all that is named, and ordinary errors of ordinary "
+        f"size, {_WORDS[worst.component]} errs by {factor * worst.error:.3g} {read}{follows}; "
+        f"no good recording has more than {factor * yardsticks.of(worst.component):.3g} {read}; "
+        f"{along(trials, worst.component)}{interval_words((number,))}"
+    )
+    return Finding(UNEXPLAINED, "", trials, (number,), sentence, worst.chance, 1 - worst.chance)

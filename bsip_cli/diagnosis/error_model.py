@@ -16,9 +16,8 @@ import numpy as np
 from scipy.linalg import cho_factor
 from scipy.linalg.lapack import dpotri, dtrtri
 
-from bsip_cli.diagnosis.error_terms import FAULT
-from bsip_cli.diagnosis.filtering import Filter
-from bsip_cli.diagnosis.whitening import FLOOR, innovations, recursion_of, white_columns
+from bsip_cli.diagnosis.error_terms import FAULT, Term
+from bsip_cli.diagnosis.filtering import FLOOR, Filter, recursion_of
 
 # How many observations a hyperprior counts for. With one, a fault has the wide tails of Cauchy: it
 # is hardly there or of any size. With four, ordinary errors are rarely three times the usual.
@@ -26,28 +25,6 @@ WEIGHT, WEIGHT_OF_FAULTS = 4.0, 1.0
 _STEPS = 25  # of expectation and maximisation
 _ROUNDS = 3  # of what is left
 _NEGLIGIBLE = 0.5  # that a direction may add to the squared residual, whose noise is one
-
-
-@dataclass(frozen=True, eq=False)
-class Term:
-    """Columns (n, 6, k) that have passed a trial's filter, as :class:`error_terms.Columns`.
-
-    known : (n, 6) what it adds at the values about which the columns are, of a named fault.
-    """
-
-    term: str
-    target: str
-    scale: str
-    own: bool
-    columns: np.ndarray
-    known: np.ndarray | None = None
-    mixing: np.ndarray | None = None
-    targets: tuple[str, ...] = ()
-
-    @property
-    def of_unit_variance(self) -> np.ndarray:
-        """(n, 6, m)."""
-        return self.columns if self.mixing is None else self.columns @ self.mixing
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,95 +62,28 @@ class Fold:
 
 
 @dataclass(frozen=True, eq=False)
-class ErrorModel:
-    """The posterior of all coefficients.
+class Laid:
+    """The terms of all trials, laid out.
 
-    Attributes
-    ----------
     used : per trial which coefficients (K',) the last axis of its ``columns`` (n, 6, K') is about.
     known : (n, 6) what a named fault adds to a trial at its size.
     mixed : (P, m) of a part, from whose coefficients it turns to those of a term's own columns.
-    mean (K,), covariance (K, K) : of the coefficients.
-    scales : how many times as large as usual.
-    left : per trial (n, 6) what no term explains.
     """
 
-    trials: tuple[TrialErrors, ...]
     parts: tuple[Part, ...]
     used: tuple[np.ndarray, ...]
     columns: tuple[np.ndarray, ...]
     known: dict[tuple[Part, int], np.ndarray]
     mixed: dict[Part, np.ndarray]
-    mean: np.ndarray
-    covariance: np.ndarray
-    scales: dict[str, float]
-    left: tuple[np.ndarray, ...]
-    folds: tuple[Fold, ...]
-    adapt: bool
 
-    def of(self, part: Part, trial: int, mean: np.ndarray | None = None) -> np.ndarray:
-        """(n, 6) what a part adds to a trial's simulated wrench, with coefficients (K,)."""
-        used = self.used[trial]
-        here = np.flatnonzero((used >= part.start) & (used < part.stop))
-        x = (self.mean if mean is None else mean)[used[here]]
-        return self.columns[trial][..., here] @ x + self.known.get((part, trial), 0.0)
-
-    @cached_property
-    def without(self) -> tuple[np.ndarray, ...]:
-        """Per fold the coefficients (K,), and their scales, of all other folds."""
-        count = len(self.mean)
-        return tuple(
-            _settled([one for one in self.folds if one is not out], self.parts, count, self.adapt)[
-                0
-            ]
-            for out in self.folds
-        )
-
-
-def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = True) -> ErrorModel:
-    """Fit coefficients, scales and what is left.
-
-    stretches : into so many each trial is cut, of which each is held out in turn.
-    adapt : scales from the data; else everything is as large as usual.
-    """
-    parts, used, columns, known, mixed = laid_out(trials)
-    count = max(part.stop for part in parts)
-    off = [sum((x for (_, t), x in known.items() if t == k), 0.0) for k in range(len(trials))]
-    residual = [one.residual - x for one, x in zip(trials, off, strict=True)]
-    courses = residual
-    for _ in range(_ROUNDS):
-        equations = zip(trials, residual, columns, used, courses, strict=True)
-        folds = tuple(f for t, one in enumerate(equations) for f in _folds(t, *one, stretches))
-        mean, covariance, scales = _settled(folds, parts, count, adapt)
-        told = zip(residual, columns, used, strict=True)
-        left, courses = zip(*(left_by(*one, mean, covariance) for one in told), strict=True)
-    return ErrorModel(
-        tuple(trials),
-        parts,
-        used,
-        columns,
-        known,
-        mixed,
-        mean,
-        covariance,
-        scales,
-        left,
-        folds,
-        adapt,
-    )
-
-
-Laid = tuple[
-    tuple[Part, ...],
-    tuple[np.ndarray, ...],
-    tuple[np.ndarray, ...],
-    dict[tuple[Part, int], np.ndarray],
-    dict[Part, np.ndarray],
-]
+    @property
+    def count(self) -> int:
+        """Of coefficients."""
+        return max(part.stop for part in self.parts)
 
 
 def laid_out(trials: Sequence[TrialErrors]) -> Laid:
-    """Parts; per trial the coefficients that its columns are about, and these; known and mixed."""
+    """Columns that matter beside the noise; of unit variance before the data."""
     groups: dict[tuple[str, str, str, int], dict[int, Term]] = {}
     for t, one in enumerate(trials):
         for term in one.terms:
@@ -197,7 +107,65 @@ def laid_out(trials: Sequence[TrialErrors]) -> Laid:
                 mixed[part] = term.mixing @ turn
     used = tuple(np.concatenate([u for u, _ in one]) for one in blocks)
     together = tuple(np.concatenate([a for _, a in one], axis=2) for one in blocks)
-    return tuple(parts), used, together, known, mixed
+    return Laid(tuple(parts), used, together, known, mixed)
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorModel(Laid):
+    """The posterior of all coefficients.
+
+    mean (K,), covariance (K, K) : of the coefficients. scales : how many times as large as usual.
+    left : per trial (n, 6) what no term explains. adapt : whether scales follow from the data.
+    """
+
+    trials: tuple[TrialErrors, ...]
+    mean: np.ndarray
+    covariance: np.ndarray
+    scales: dict[str, float]
+    left: tuple[np.ndarray, ...]
+    folds: tuple[Fold, ...]
+    adapt: bool
+
+    def of(self, part: Part, trial: int, mean: np.ndarray | None = None) -> np.ndarray:
+        """(n, 6) what a part adds to a trial's simulated wrench, with coefficients (K,)."""
+        used = self.used[trial]
+        here = np.flatnonzero((used >= part.start) & (used < part.stop))
+        x = (self.mean if mean is None else mean)[used[here]]
+        return self.columns[trial][..., here] @ x + self.known.get((part, trial), 0.0)
+
+    @cached_property
+    def without(self) -> tuple[np.ndarray, ...]:
+        """Per fold the coefficients (K,), and their scales, of all other folds."""
+        others = ([one for one in self.folds if one is not out] for out in self.folds)
+        return tuple(_settled(rest, self, self.adapt)[0] for rest in others)
+
+
+def error_model(trials: Sequence[TrialErrors], stretches: int, adapt: bool = True) -> ErrorModel:
+    """Fit coefficients, scales and what is left.
+
+    stretches : into so many each trial is cut, of which each is held out in turn.
+    adapt : scales from the data; else everything is as large as usual.
+    """
+    laid = laid_out(trials)
+    off = [sum((x for (_, t), x in laid.known.items() if t == k), 0.0) for k in range(len(trials))]
+    residual = [one.residual - x for one, x in zip(trials, off, strict=True)]
+    courses = residual
+    for _ in range(_ROUNDS):
+        equations = zip(trials, residual, laid.columns, laid.used, courses, strict=True)
+        folds = tuple(f for t, one in enumerate(equations) for f in _folds(t, *one, stretches))
+        settled = _settled(folds, laid, adapt)
+        told = zip(residual, laid.columns, laid.used, strict=True)
+        left, courses = zip(*(left_by(*one, *settled[:2]) for one in told), strict=True)
+    return ErrorModel(
+        **vars(laid),
+        trials=tuple(trials),
+        mean=settled[0],
+        covariance=settled[1],
+        scales=settled[2],
+        left=left,
+        folds=folds,
+        adapt=adapt,
+    )
 
 
 def _squeezing(columns: Sequence[np.ndarray], noises: Sequence[np.ndarray]) -> np.ndarray:
@@ -219,8 +187,8 @@ def _folds(
 ) -> Iterator[Fold]:
     """White equations of a trial; ``course`` (n, 6) is what may be left of it."""
     size, recursion = white_noise_of(one, course)
-    rows = white_columns(columns, size, recursion, one.filter)
-    right = white_columns(residual[..., None], size, recursion, one.filter)[:, 0]
+    rows = one.filter.innovations(columns / size[:, None], recursion)
+    right = one.filter.innovations((residual / size)[..., None], recursion)[:, 0]
     for part in np.array_split(np.arange(len(course)), min(stretches, len(course))):
         at = (6 * part[:, None] + np.arange(6)).ravel()
         yield Fold(trial, part, used, rows[at].T @ rows[at], rows[at].T @ right[at])
@@ -237,7 +205,7 @@ def white_noise_of(one: TrialErrors, course: np.ndarray) -> tuple[np.ndarray, np
             for x, s in zip((course / spread).T, share, strict=True)
         ]
     )
-    white = innovations((course / spread)[..., None], recursion, one.filter).reshape(-1, 6)
+    white = one.filter.innovations((course / spread)[..., None], recursion).reshape(-1, 6)
     return spread * np.maximum(white.std(axis=0), share), recursion
 
 
@@ -256,9 +224,10 @@ def left_by(
 
 
 def _settled(
-    folds: Sequence[Fold], parts: Sequence[Part], count: int, adapt: bool
+    folds: Sequence[Fold], laid: Laid, adapt: bool
 ) -> tuple[np.ndarray, np.ndarray, dict[str, float]]:
     """Coefficients (K,), their covariance (K, K), and the scales of the largest evidence."""
+    count = laid.count
     gram, right = np.zeros((count, count)), np.zeros(count)
     for one in folds:
         gram[np.ix_(one.used, one.used)] += one.gram
@@ -268,7 +237,7 @@ def _settled(
     gram, right = gram[np.ix_(told, told)], right[told]
     place = np.cumsum(told) - 1
     at: dict[str, np.ndarray] = {}
-    for part in parts:
+    for part in laid.parts:
         mine = np.arange(part.start, part.stop)
         mine = place[mine[told[mine]]]
         at[part.scale] = np.concatenate([at.get(part.scale, mine[:0]), mine])

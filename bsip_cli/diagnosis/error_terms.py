@@ -10,18 +10,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pinocchio as pin
+from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.hypothesis import candidates_of
-from bsip_cli.diagnosis.skin import SKIN_HZ, marker_rms_m, nearby_angles, skin_inertia
-from bsip_cli.diagnosis.smoothing_bias import smoothing_bias
-from bsip_cli.diagnosis.wander import wander
 from bsip_cli.dynamics.regressor import move_moments, wrench_regressor
 from bsip_cli.effects.catalogue import CATALOGUE
-from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.clocks import Delay
 from bsip_cli.effects.effect import Effect
-from bsip_cli.effects.gravity_tilt import GravityTilt
-from bsip_cli.effects.joint_centre import JointCentre
+from bsip_cli.effects.frames import GravityTilt
+from bsip_cli.effects.joints import JointCentre
 from bsip_cli.effects.scene import Scene, standing_place_m
 
 INERTIA, JOINTS, MARKERS = "inertial_parameters", "joint_centres", "marker_places"
@@ -46,14 +45,26 @@ SHARE = 0.02
 # Noise that no lab goes below: parts of body weight, and arms of it (half a millimetre) [m].
 LEAST = np.array([0.0003, 0.0003, 0.0005, 0.0005, 0.0005, 0.0001])
 _HEAVIER = 0.01  # usual error of the whole mass, part of it: a scale's, clothes and shoes
+SKIN_HZ = 8.0  # at which skin swings by itself
+_UNKNOWN_RMS_M = 0.004  # of a marker whose residuals are not known
+WANDER_M = 0.001  # standard deviation of the centre of mass, in each horizontal direction
+_SLOWER_HZ = 0.3
+_CUTOFFS_HZ = (3.0, 6.0, 10.0)
+_GROUPS = (
+    ("root", "hip", "knee", "ankle"),
+    ("waist", "neck"),
+    ("sternoclavicular", "shoulder", "elbow", "wrist"),
+)
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
-    """Columns (N, 6, k) of a term at one target, about the world's origin [N, N m].
+class Term:
+    """Columns (N, 6, k) of a term at one target, about the world's origin [N, N m]; or (n, 6, k)
+    that have passed a trial's filter.
 
     own : whether the trial has coefficients of its own; else the person's trials share them.
     scale : columns of the same scale are as many times larger than usual as each other.
+    known : (n, 6) what it adds at the values about which the columns are, of a named fault.
     mixing : (k, m) where the columns are not of unit variance, columns @ mixing are; ``targets``
         have as many of the columns each.
     """
@@ -62,14 +73,20 @@ class Columns:
     target: str
     scale: str
     own: bool
-    wrench: np.ndarray
+    columns: np.ndarray
+    known: np.ndarray | None = None
     mixing: np.ndarray | None = None
     targets: tuple[str, ...] = ()
+
+    @property
+    def of_unit_variance(self) -> np.ndarray:
+        """(n, 6, m)."""
+        return self.columns if self.mixing is None else self.columns @ self.mixing
 
 
 def error_terms(
     scene: Scene, root: np.ndarray, landmark_sd_m: float, skin_factor: float
-) -> Iterator[Columns]:
+) -> Iterator[Term]:
     """All terms of one trial.
 
     root : (10 n, 10 n) of the covariance of the inertial parameters. landmark_sd_m : of the places
@@ -78,37 +95,31 @@ def error_terms(
     """
     skeleton, model = scene.person.skeleton, scene.model
     regressor = wrench_regressor(model, model.createData(), scene.q, scene.v, scene.a, np.zeros(3))
-    yield Columns(INERTIA, "", INERTIA, False, regressor, root, skeleton.body_names)
+    segments = skeleton.body_names
+    yield Term(INERTIA, "", INERTIA, False, regressor, None, root, segments)
     heavier = _HEAVIER * scene.phi[:, None]
-    yield Columns(INERTIA, "", f"{INERTIA} in all", False, regressor, heavier, skeleton.body_names)
+    yield Term(INERTIA, "", f"{INERTIA} in all", False, regressor, None, heavier, segments)
     joints = joint_errors(scene)
     for k, joint in enumerate(JointCentre().targets(scene)):
         term = TRUNK if joint.startswith(_BENDING) else JOINTS
-        yield Columns(term, joint, term, False, joints[..., 3 * k : 3 * k + 3])
-    swinging = skin_inertia(scene)
+        yield Term(term, joint, term, False, joints[..., 3 * k : 3 * k + 3])
+    swinging = _skin_inertia(scene)
     of_markers = _of_markers(scene, landmark_sd_m, skin_factor)
     for k, (segment, places, skin) in enumerate(of_markers):
         name = skeleton.segments[segment]
-        yield Columns(MARKERS, name, MARKERS, False, places)
-        yield Columns(SKIN, name, f"{SKIN} {name}", True, skin)
-        yield Columns(SKIN, name, f"{SKIN} swings", False, swinging[..., k : k + 1])
-    yield Columns(SKIN, "", f"{SKIN} of the whole body", False, _swinging_body(scene))
-    yield Columns(SKIN, "", f"{SKIN} wanders", True, wander(scene))
-    yield Columns(SMOOTHING, "", SMOOTHING, True, smoothing_bias(scene))
+        yield Term(MARKERS, name, MARKERS, False, places)
+        yield Term(SKIN, name, f"{SKIN} {name}", True, skin)
+        yield Term(SKIN, name, f"{SKIN} swings", False, swinging[..., k : k + 1])
+    yield Term(SKIN, "", f"{SKIN} of the whole body", False, _swinging_body(scene))
+    yield Term(SKIN, "", f"{SKIN} wanders", True, wander(scene))
+    yield Term(SMOOTHING, "", SMOOTHING, True, smoothing_bias(scene))
     source = as_simulated(scene)
-    for effect in CATALOGUE:
-        if is_of_instruments(effect):
-            yield from _of_instruments(effect, scene, source)
-
-
-def _of_instruments(effect: Effect, scene: Scene, source: Scene) -> Iterator[Columns]:
-    """Each place of a fault, as far as every laboratory has it; a constant one is the session's.
-    ``source``: the trial whose plates read what is simulated."""
-    for one in candidates_of(effect, scene):
-        if not one.scanned:
-            wrench = SHARE * one.signature(source)
-            scale = f"{FAULT}{effect.name} {one.target}"
-            yield Columns(FAULT + effect.name, one.target, scale, not effect.of_the_lab, wrench)
+    for effect in filter(is_of_instruments, CATALOGUE):
+        for one in candidates_of(effect, scene):
+            if not one.scanned:  # each place, as far as every laboratory has it
+                wrench, name = SHARE * one.signature(source), FAULT + effect.name
+                own = not effect.of_the_lab  # a constant fault is the session's
+                yield Term(name, one.target, f"{name} {one.target}", own, wrench)
 
 
 def is_of_instruments(effect: Effect) -> bool:
@@ -130,17 +141,17 @@ def joint_errors(scene: Scene) -> np.ndarray:
 def as_simulated(scene: Scene) -> Scene:
     """The plates read what is simulated: of what they measured, a gain or a delay would explain a
     part of any residual by itself. Each plate bears its part of the vertical force."""
-    return scene.once("as simulated", lambda: _reading_what_is_simulated(scene))
 
+    def reading() -> Scene:
+        off, total = scene.measured - scene.predicted, scene.measured[:, 2:3]
+        loaded = total > 0
+        plates = []
+        for one in scene.plates:
+            part = np.where(loaded, one.wrench[:, 2:3], 0.0) / np.where(loaded, total, 1.0)
+            plates.append(replace(one, wrench=one.wrench - part * off))
+        return scene.reading(tuple(plates), scene.predicted)
 
-def _reading_what_is_simulated(scene: Scene) -> Scene:
-    off, total = scene.measured - scene.predicted, scene.measured[:, 2:3]
-    loaded = total > 0
-    plates = []
-    for one in scene.plates:
-        part = np.where(loaded, one.wrench[:, 2:3], 0.0) / np.where(loaded, total, 1.0)
-        plates.append(replace(one, wrench=one.wrench - part * off))
-    return scene.reading(tuple(plates), scene.predicted)
+    return scene.once("as simulated", reading)
 
 
 def _of_markers(
@@ -148,12 +159,13 @@ def _of_markers(
 ) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
     """Per segment with markers: what markers elsewhere on it do, and what skin that follows the
     angles of the joints beside it does, each marker as far as its residuals show."""
-    rms, angles = marker_rms_m(scene), nearby_angles(scene)
+    rms = _marker_rms_m(scene)
     for segment in np.unique(scene.person.marker_segments).tolist():
         (mine,) = np.nonzero(scene.person.marker_segments == segment)
         turn = scene.motion.rotation[:, segment][:, None]
-        rate = np.gradient(angles[mine[0]], 1 / scene.rate_hz, axis=0)
-        courses = (angles[mine[0]], rate, np.gradient(rate, 1 / scene.rate_hz, axis=0))
+        angles = _nearby_angles(scene, segment)
+        rate = np.gradient(angles, 1 / scene.rate_hz, axis=0)
+        courses = (angles, rate, np.gradient(rate, 1 / scene.rate_hz, axis=0))
         parts = [scene.response.parts(scene.pose_response.of(turn, [m])) for m in mine.tolist()]
         places = sd_m * np.concatenate([one[0] for one in parts], axis=2)
         together = skin_factor * np.sqrt((rms[mine] ** 2).mean()) * np.sum(parts, axis=0)
@@ -162,10 +174,89 @@ def _of_markers(
         yield segment, places, np.concatenate(skin, axis=2)
 
 
+def _marker_rms_m(scene: Scene) -> np.ndarray:
+    """(m,) root mean square of each marker's residuals, per direction."""
+    if scene.residual_m is None:
+        return np.full(len(scene.person.markers), _UNKNOWN_RMS_M)
+    known = np.isfinite(scene.residual_m)
+    squares = np.where(known, scene.residual_m, 0.0) ** 2
+    count = known.sum(axis=(0, 2))
+    rms = np.sqrt(squares.sum(axis=(0, 2)) / np.maximum(count, 1))
+    return np.where(count > 0, rms, _UNKNOWN_RMS_M)
+
+
+def _nearby_angles(scene: Scene, segment: int) -> np.ndarray:
+    """(N, j) from the neutral pose, of the joints at a segment, its own and those of its children;
+    of variance 1 together."""
+    skeleton = scene.person.skeleton
+    angles = []
+    for i in range(1, len(skeleton.parents)):
+        if segment in (i, skeleton.parents[i]):
+            at = skeleton.q_starts[i]
+            if skeleton.joint_types[i] == "spherical":
+                x = scene.q[:, at : at + 4]
+                x = x * np.sign(x[:, 3:] + 1e-300)
+                angles.append(2 * x[:, :3])
+            else:
+                angles.append(scene.q[:, at : at + 1])
+    nearby = np.concatenate(angles, axis=1)
+    return nearby / max(np.sqrt((nearby**2).sum(axis=1).mean()), 1e-9)
+
+
 def _following(parts: np.ndarray, courses: Sequence[np.ndarray]) -> np.ndarray:
     """(N, 6, 3 j) of parts (3, N, 6, 3) for courses s, s' and s'' (N, j) of each angle."""
     both = sum(p[..., None] * s[:, None, None, :] for p, s in zip(parts, courses, strict=True))
     return np.asarray(both).reshape(*parts.shape[1:3], -1)
+
+
+def _skin_inertia(scene: Scene) -> np.ndarray:
+    """(N, 6, s) changes of the wrench if the skin of each segment swings on, one by one.
+
+    Skin is held elastically: where its bone is accelerated by a it stays behind by -a / w^2, with
+    w the pace at which it swings by itself. So markers overshoot slightly wherever they turn back.
+    """
+    give, columns = (2 * np.pi * SKIN_HZ) ** -2, []
+    for segment in np.unique(scene.person.marker_segments).tolist():
+        markers = np.flatnonzero(scene.person.marker_segments == segment).tolist()
+        behind = -give * scene.motion.acceleration_m_s2[:, segment]
+        errors = np.broadcast_to(behind[:, None, :, None], (len(behind), len(markers), 3, 1))
+        columns.append(scene.pose_response.of(errors, markers))
+    return scene.response.of(np.concatenate(columns, axis=2))
+
+
+def wander(scene: Scene) -> np.ndarray:
+    """(N, 6, 2 k) changes of the wrench if the body stood elsewhere, of unit variance together.
+
+    Slow wandering of the skin moves the whole model to and fro over the plates. It goes along with
+    no joint, and is too slow to be noise of which a trial has many cycles.
+    """
+    length_s = scene.times_s[-1] - scene.times_s[0]
+    halves = np.arange(1, max(1, int(2 * length_s * _SLOWER_HZ)) + 1)  # periods, two of them one
+    course = np.cos(np.pi * np.outer(scene.times_s - scene.times_s[0], halves) / length_s)
+    course *= WANDER_M * np.sqrt(2 / len(halves))
+    force = np.nan_to_num(scene.predicted[:, :3])
+    columns = np.zeros((len(course), 6, 2, len(halves)))
+    for axis in range(2):
+        columns[:, 3:, axis] = np.cross(np.eye(3)[axis], force)[..., None] * course[:, None]
+    return columns.reshape(len(course), 6, -1)
+
+
+def smoothing_bias(scene: Scene) -> np.ndarray:
+    """(N, 6, 9) change of the wrench if each group of joints had lost its motion above each
+    cut-off.
+
+    A smoothed motion lacks a part of its fast changes. To first order the lack looks like what a
+    second smoothing would take away: pose minus low-passed pose.
+    """
+    groups = [[float(n.startswith(g)) for n in scene.person.skeleton.v_names] for g in _GROUPS]
+    parts = []
+    for cutoff in _CUTOFFS_HZ:
+        corner = min(cutoff, 0.45 * scene.rate_hz)
+        slow = sosfiltfilt(butter(2, corner, fs=scene.rate_hz, output="sos"), scene.q, axis=0)
+        pairs = zip(slow, scene.q, strict=True)
+        tangent = [pin.difference(scene.model, pin.normalize(scene.model, s), q) for s, q in pairs]
+        parts += [np.array(tangent) * group for group in groups]
+    return scene.response.of(np.stack(parts, axis=-1))
 
 
 def _swinging_body(scene: Scene) -> np.ndarray:

@@ -14,14 +14,14 @@ from scipy.special import logsumexp
 
 from bsip_cli.diagnosis.fault_model import Fitted
 from bsip_cli.diagnosis.held_out import own_blocks
-from bsip_cli.diagnosis.pattern import UNEXPLAINED, Pattern
-from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.diagnosis.patterns import UNEXPLAINED, Nameless
+from bsip_cli.effects.effect import Effect, Parameter, Reported
 from bsip_cli.effects.scene import Scene
 
 _SHARES = np.geomspace(0.3, 1.0, 3)  # of itself, by which an uneven fault differs
 
 
-class Uneven(Pattern):
+class Uneven(Nameless):
     """Like another effect, but of another size in every stretch of time."""
 
     of_the_lab = False
@@ -44,13 +44,8 @@ class Uneven(Pattern):
     def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         return self.effect.tangent(scene, target, values)
 
-    def reported(
-        self, scene: Scene, target: str, values: np.ndarray
-    ) -> tuple[tuple[str, str, float], ...]:
+    def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
         return self.effect.reported(scene, target, values)
-
-    def goes_along_with(self, target: str, values: np.ndarray) -> str:
-        raise NotImplementedError  # its sentence is another one
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         told = self.effect.sentence(scene, target, values)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import minimize
 
 from bsip_cli.diagnosis.error_model import (
     WEIGHT,
@@ -19,7 +20,6 @@ from bsip_cli.diagnosis.error_model import (
     left_by,
     moments,
     posterior,
-    white_columns,
     white_noise_of,
 )
 from bsip_cli.diagnosis.error_terms import FAULT, as_simulated
@@ -34,6 +34,9 @@ _SETTLED = 0.3  # change of the logarithm of the evidence
 _DIFFERENCE = 0.05  # of the typical size: a moment in time moves by a part of a frame at least
 _CORRECTIONS = 3  # of the values about which the columns are
 _EXACT = 0.02  # of the typical size
+_SEARCH = 40  # evaluations for a moment, a frequency or a window
+_NEWTON_STEPS = 8  # of Gauss and Newton
+_HALVES = (1.0, 0.5, 0.25, 0.125)
 _GIVEN = 1e-9  # spread of what the data do not move [typical]
 
 
@@ -74,28 +77,20 @@ class Session:
 
 def session_of(trials: Sequence[FaultTrial]) -> Session:
     """Lay out the ordinary terms of all trials."""
-    parts, used, columns, _, _ = laid_out([one.errors for one in trials])
+    laid = laid_out([one.errors for one in trials])
     scales: dict[str, list[np.ndarray]] = {}
-    for part in parts:
+    for part in laid.parts:
         if not part.scale.startswith(FAULT):
             scales.setdefault(part.scale, []).append(np.arange(part.start, part.stop))
     adapts = (np.concatenate(x) for x in scales.values())
-    count = max(part.stop for part in parts)
-    return Session(tuple(trials), used, columns, count, tuple(a for a in adapts if len(a)))
+    adapting = tuple(a for a in adapts if len(a))
+    return Session(tuple(trials), laid.used, laid.columns, laid.count, adapting)
 
 
-@dataclass(frozen=True, eq=False)
-class FaultColumns:
-    """Change (n, 6) of a filtered trial by a fault at its values, and its slope (n, 6, k) by all
-    parameters [typical]; ``offset`` (n, 6) is the change less what the slope makes of the sizes."""
-
-    change: np.ndarray
-    slope: np.ndarray
-    offset: np.ndarray
-
-
-def columns_of(session: Session, one: Hypothesis, trial: int) -> FaultColumns:
-    """About the values of a fault; parameters with a scan count as deviations from theirs."""
+def columns_of(session: Session, one: Hypothesis, trial: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of a filtered trial about a fault's values: slope (n, 6, k) of its change by all parameters
+    [typical], those with a scan counting as deviations from theirs; and offset (n, 6), the change
+    less what the slope makes of the sizes."""
     scene, filter_ = session.trials[trial].simulated, session.trials[trial].errors.filter
     free, typical = one.is_free(session), one.typical(session)
     change = filter_.one(one.effect.change(scene, one.target, one.values))
@@ -108,8 +103,7 @@ def columns_of(session: Session, one: Hypothesis, trial: int) -> FaultColumns:
             one.effect.change(scene, one.target, one.values + sign * step) for sign in (1, -1)
         )
         slope[..., k] = filter_.one(ahead - behind) / (2 * _DIFFERENCE)
-    offset = change - slope[..., free] @ (one.values[free] / typical[free])
-    return FaultColumns(change, slope, offset)
+    return slope, change - slope[..., free] @ (one.values[free] / typical[free])
 
 
 def _prior_root(session: Session, one: Hypothesis) -> np.ndarray:
@@ -137,9 +131,13 @@ class Piece:
     gram: np.ndarray
     against: np.ndarray
 
+    def left(self, mean: np.ndarray) -> np.ndarray:
+        """(6 n,) white, what all terms leave of the trial with coefficients (K,)."""
+        return self.right - self.white @ mean[self.used]
+
     def log_likelihood(self, mean: np.ndarray) -> float:
         """Of the trial with coefficients (K,), less a constant."""
-        left = self.right - self.white @ mean[self.used]
+        left = self.left(mean)
         return -0.5 * float(left @ left) - self.log_volume
 
     @property
@@ -171,10 +169,8 @@ class Fitted:
 
     def whitened(self, trial: int, columns: np.ndarray) -> np.ndarray:
         """(6 n, k) of filtered columns (n, 6, k) of a trial."""
-        one = self.pieces[trial]
-        return white_columns(
-            columns, one.size, one.recursion, self.session.trials[trial].errors.filter
-        )
+        one, filter_ = self.pieces[trial], self.session.trials[trial].errors.filter
+        return filter_.innovations(columns / one.size[:, None], one.recursion)
 
     @cached_property
     def sums(self) -> tuple[np.ndarray, float]:
@@ -190,8 +186,11 @@ class Fitted:
 
     def left(self, trial: int) -> np.ndarray:
         """(6 n,) white, what all terms leave of a trial."""
-        one = self.pieces[trial]
-        return one.right - one.white @ self.mean[one.used]
+        return self.pieces[trial].left(self.mean)
+
+    def touching(self, trial: int) -> list[tuple[int, Hypothesis]]:
+        """Faults in a trial, with their first coefficients."""
+        return _touching(self.starts, self.faults, trial)
 
     def coefficients(self, number: int) -> slice:
         """Of a fault."""
@@ -237,6 +236,12 @@ def corrected(fit: Fitted) -> Fitted:
     return fit
 
 
+def _touching(
+    starts: Sequence[int], faults: Sequence[Hypothesis], trial: int
+) -> list[tuple[int, Hypothesis]]:
+    return [(first, x) for first, x in zip(starts, faults, strict=True) if trial in x.trials]
+
+
 class _Fitting:
     """Noise and coefficients in turn."""
 
@@ -252,56 +257,55 @@ class _Fitting:
             first + np.flatnonzero(one.is_free(session))
             for first, one in zip(self.starts, faults, strict=True)
         ]
-        trials = range(len(session.trials))
-        self.used, self.columns, self.residual = zip(*map(self._laid, trials), strict=True)
-        self.changed = [start is None or self._touching(t) != _touching(start, t) for t in trials]
-
-    def _touching(self, trial: int) -> list[tuple[int, Hypothesis]]:
-        pairs = zip(self.starts, self.faults, strict=True)
-        return [(first, one) for first, one in pairs if trial in one.trials]
+        self.laid = [self._laid(t) for t in range(len(session.trials))]
 
     def _laid(self, trial: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coefficients, columns and residual of a trial."""
-        mine = [(f, columns_of(self.session, one, trial)) for f, one in self._touching(trial)]
-        at = [first + np.arange(x.slope.shape[2]) for first, x in mine]
+        """Residual, columns and their coefficients, of a trial."""
+        touching = _touching(self.starts, self.faults, trial)
+        mine = [(first, *columns_of(self.session, one, trial)) for first, one in touching]
+        at = [first + np.arange(slope.shape[2]) for first, slope, _ in mine]
         used = np.concatenate([self.session.used[trial], *at])
-        columns = np.concatenate([self.session.columns[trial], *(x.slope for _, x in mine)], axis=2)
+        columns = np.concatenate([self.session.columns[trial], *(x for _, x, _ in mine)], axis=2)
         residual = self.session.trials[trial].errors.residual
-        return used, columns, residual - sum((x.offset for _, x in mine), np.zeros(()))
+        return residual - sum((x for _, _, x in mine), np.zeros(())), columns, used
 
     def run(self, whole: bool, rounds: int) -> Fitted:
-        trials = range(len(self.session.trials))
-        pieces = [self._first(t) for t in trials]
+        start, trials = self.start, range(len(self.session.trials))
+        changed = [
+            start is None or _touching(self.starts, self.faults, t) != start.touching(t)
+            for t in trials
+        ]
+        pieces = []
+        for t in trials:
+            if start is None:
+                pieces.append(self._piece(t, self.laid[t][0]))
+            else:
+                one = start.pieces[t]
+                pieces.append(self._white(t, one.size, one.recursion) if changed[t] else one)
         found = self._solved(pieces, whole)
         for _ in range(rounds):
             before = found
-            pieces = [
-                self._again(t, found) if whole or self.changed[t] else pieces[t] for t in trials
-            ]
+            for t in trials:
+                if whole or changed[t]:  # with the noise that the fit leaves
+                    course = left_by(*self.laid[t], found.mean, found.covariance)[1]
+                    pieces[t] = self._piece(t, course)
             found = self._solved(pieces, whole)
             if abs(found.log_evidence - before.log_evidence) < _SETTLED:
                 break
         return found
 
-    def _first(self, trial: int) -> Piece:
-        if self.start is None:
-            course = self.residual[trial]
-            return self._piece(trial, *white_noise_of(self.session.trials[trial].errors, course))
-        one = self.start.pieces[trial]
-        return self._piece(trial, one.size, one.recursion) if self.changed[trial] else one
+    def _piece(self, trial: int, course: np.ndarray) -> Piece:
+        """Beside what may be left of a trial (n, 6)."""
+        return self._white(trial, *white_noise_of(self.session.trials[trial].errors, course))
 
-    def _again(self, trial: int, found: Fitted) -> Piece:
-        """With the noise that a fit leaves."""
-        told = self.residual[trial], self.columns[trial], self.used[trial]
-        _, course = left_by(*told, found.mean, found.covariance)
-        return self._piece(trial, *white_noise_of(self.session.trials[trial].errors, course))
-
-    def _piece(self, trial: int, size: np.ndarray, recursion: np.ndarray) -> Piece:
-        filter_ = self.session.trials[trial].errors.filter
-        white = white_columns(self.columns[trial], size, recursion, filter_)
-        right = white_columns(self.residual[trial][..., None], size, recursion, filter_)[:, 0]
-        products = white.T @ white, white.T @ right
-        return Piece(size, recursion, self.used[trial], white, right, *products)
+    def _white(self, trial: int, size: np.ndarray, recursion: np.ndarray) -> Piece:
+        filter_, (residual, columns, used) = (
+            self.session.trials[trial].errors.filter,
+            self.laid[trial],
+        )
+        white = filter_.innovations(columns / size[:, None], recursion)
+        right = filter_.innovations((residual / size)[..., None], recursion)[:, 0]
+        return Piece(size, recursion, used, white, right, white.T @ white, white.T @ right)
 
     def _solved(self, pieces: Sequence[Piece], whole: bool) -> Fitted:
         """Coefficients and scales of the largest evidence beside given noise."""
@@ -327,12 +331,6 @@ class _Fitting:
         return Fitted(self.session, self.faults, self.starts, tuple(pieces), *told)
 
 
-def _touching(fit: Fitted, trial: int) -> list[tuple[int, Hypothesis]]:
-    """Faults in a trial, with their first coefficients."""
-    pairs = zip(fit.starts, fit.faults, strict=True)
-    return [(first, one) for first, one in pairs if trial in one.trials]
-
-
 def summed(pieces: Sequence[Piece], count: int) -> tuple[np.ndarray, np.ndarray]:
     """(K, K) and (K,) normal equations of some trials."""
     gram, against = np.zeros((count, count)), np.zeros(count)
@@ -340,3 +338,95 @@ def summed(pieces: Sequence[Piece], count: int) -> tuple[np.ndarray, np.ndarray]
         gram[np.ix_(one.used, one.used)] += one.gram
         against[one.used] += one.against
     return gram, against
+
+
+# --- the likeliest sizes of one more fault beside a fit -------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _Marginal:
+    """Given the ordinary terms, of a fault at its values: squares of what is left, and pull (k,)
+    and information (k, k) of its free parameters [typical]."""
+
+    squares: float
+    pull: np.ndarray
+    information: np.ndarray
+
+
+def _marginal(fit: Fitted, one: Hypothesis) -> _Marginal:
+    session = fit.session
+    free = one.is_free(session)
+    against, squares = fit.sums[0].copy(), fit.sums[1]
+    count = int(free.sum())
+    shared = np.zeros((len(fit.mean), count))
+    pull, gram = np.zeros(count), np.zeros((count, count))
+    for t in one.trials:
+        piece, trial = fit.pieces[t], session.trials[t]
+        change = one.effect.change(trial.simulated, one.target, one.values)[..., None]
+        slope = one.effect.tangent(trial.simulated, one.target, one.values)
+        slope = slope * one.typical(session)[free]
+        white = fit.whitened(t, trial.errors.filter(np.concatenate([change, slope], axis=2)))
+        products = piece.white.T @ white
+        left, mine = piece.right - white[:, 0], white[:, 1:]
+        pull += mine.T @ left
+        gram += mine.T @ mine
+        shared[piece.used] += products[:, 1:]
+        against[piece.used] -= products[:, 0]
+        squares += float(left @ left - piece.right @ piece.right)
+    mean = fit.covariance @ against
+    return _Marginal(
+        squares - float(against @ mean),
+        pull - shared.T @ mean,
+        gram - shared.T @ (fit.covariance @ shared),
+    )
+
+
+def sized(fit: Fitted, one: Hypothesis) -> Hypothesis:
+    """Free parameters by Gauss and Newton, within their bounds; a step that does not help is
+    halved."""
+    session = fit.session
+    free, now = one.is_free(session), _marginal(fit, one)
+    typical = one.typical(session)[free]
+    for _ in range(_NEWTON_STEPS):
+        sizes = one.values[free] / typical
+        weight = 1 / np.clip((sizes**2).mean(), SIZES[0] ** 2, SIZES[1] ** 2)
+        ridge = now.information + weight * np.eye(len(sizes))
+        step = np.linalg.solve(ridge, now.pull - weight * sizes)
+        tried = ((x, _marginal(fit, x)) for x in (one.moved(session, h * step) for h in _HALVES))
+        better = next(((x, m) for x, m in tried if m.squares < now.squares), None)
+        if better is None:
+            return one
+        before = now.squares
+        one, now = better
+        if before - now.squares < 0.1:  # of a squared residual whose noise is one
+            return one
+    return one
+
+
+def refined(fit: Fitted, one: Hypothesis) -> Hypothesis:
+    """Scanned parameters moved to where the fault explains most."""
+    session = fit.session
+    scanned = ~one.is_free(session)
+    if not scanned.any():
+        return one
+    scale = one.effect.spacing(one.scene(session), one.target, one.values)
+
+    def at(x: np.ndarray) -> Hypothesis:
+        values = np.where(scanned, one.values, 0.0)
+        values[scanned] += x * scale
+        return one.with_values(session, values)
+
+    def of(x: np.ndarray) -> tuple[np.ndarray, _Marginal]:
+        told = _marginal(fit, at(x))
+        ridge = told.information + np.eye(len(told.pull)) / SIZES[1] ** 2
+        return np.linalg.solve(ridge, told.pull), told
+
+    def left(x: np.ndarray) -> float:
+        size, told = of(x)
+        return -float(told.pull @ size)
+
+    start = np.zeros(int(scanned.sum()))
+    simplex = {"initial_simplex": np.vstack([start, np.eye(len(start))])}
+    options = {**simplex, "maxfev": _SEARCH, "xatol": 0.02, "fatol": 0.1}
+    found = minimize(left, start, method="Nelder-Mead", options=options)
+    return at(found.x).moved(session, of(found.x)[0])

@@ -17,16 +17,10 @@ import numpy as np
 from scipy.special import expit, logsumexp
 
 from bsip_cli.diagnosis.evenness import Uneven, can_be_uneven, plain, unevenness
-from bsip_cli.diagnosis.fault_model import (
-    Fitted,
-    Session,
-    corrected,
-    fitted,
-)
+from bsip_cli.diagnosis.fault_model import Fitted, Session, corrected, fitted, refined, sized
 from bsip_cli.diagnosis.fault_scores import Library, Place, Scores, scores_of
-from bsip_cli.diagnosis.fault_sizes import refined, sized
 from bsip_cli.diagnosis.hypothesis import Hypothesis
-from bsip_cli.diagnosis.pattern import UNEXPLAINED
+from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.effects.effect import Effect
 
 _TRIED = 8  # candidates of a round that are fitted in full

@@ -1,4 +1,4 @@
-"""One low-pass for everything that a trial's forces are compared in."""
+"""One low-pass for everything that a trial's forces are compared in; and what makes it white."""
 
 from __future__ import annotations
 
@@ -7,12 +7,17 @@ from itertools import pairwise
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import solve_toeplitz
+from scipy.ndimage import median_filter
 
 from bsip_cli.dynamics.lowpass import lowpass_operator, stride_to
 from bsip_cli.effects.scene import Scene, standing_place_m
 
 ENOUGH_HZ = 50.0
 _OVERSAMPLING = 2.5
+_ORDER = 4  # of the autoregression
+_SMOOTH_HZ = 0.75  # half-width of the median over the spectrum
+FLOOR = 1e-6  # of the noise's power, taken for white
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +41,31 @@ class Filter:
         """(n, 6) of one world wrench (N, 6)."""
         return self(wrench[..., None])[..., 0]
 
+    def innovations(self, columns: np.ndarray, recursion: np.ndarray) -> np.ndarray:
+        """(6 n, k) of filtered columns (n, 6, k), less what a recursion (6, p) makes of what was
+        before; a span's first samples stay as they are."""
+        out = columns.copy()
+        for start, stop in self.spans:
+            for lag in range(1, _ORDER + 1):
+                if stop - start > lag:
+                    earlier = columns[start : stop - lag]
+                    out[start + lag : stop] -= recursion[:, lag - 1, None] * earlier
+        return out.reshape(-1, columns.shape[2])
+
+
+def recursion_of(series: np.ndarray, rate_hz: float, floor: float) -> np.ndarray:
+    """(_ORDER,) autoregression by Yule and Walker, of the smooth part of the spectrum.
+
+    A running median over frequencies leaves out lines: an offset or a swing at one frequency is no
+    noise, and must not be whitened away.
+    """
+    power = np.abs(np.fft.rfft(series, 2 * len(series))) ** 2
+    width = 2 * max(1, round(_SMOOTH_HZ * len(series) / rate_hz)) + 1
+    smooth = median_filter(power, size=width, mode="reflect")
+    lags = np.fft.irfft(smooth)[: _ORDER + 1]
+    lags[0] *= 1 + floor
+    return solve_toeplitz(lags[:-1], lags[1:])
+
 
 def filter_of(scene: Scene, cutoff_hz: float) -> Filter:
     """Low-pass and decimation inside the valid stretches, moments about where the person stands."""
@@ -54,6 +84,11 @@ def at_full_rate(filter_: Filter, scene: Scene, cutoff_hz: float) -> Filter:
     return replace(filter_, operator=operator[np.searchsorted(frames, filter_.frames * stride)])
 
 
+def every(scene: Scene, enough_hz: float) -> Scene:
+    """The trial at the lowest rate that is enough."""
+    return scene.every(stride_to(scene.rate_hz, enough_hz))
+
+
 def slow(scene: Scene) -> Scene:
     """The trial at the rate at which nuisances and signatures, smooth as they are, are computed."""
-    return scene.once("slow", lambda: scene.every(stride_to(scene.rate_hz, ENOUGH_HZ)))
+    return scene.once("slow", lambda: every(scene, ENOUGH_HZ))

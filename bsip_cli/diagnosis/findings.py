@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from string import ascii_uppercase
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,15 +15,13 @@ from bsip_cli.diagnosis.fault_model import Fitted
 from bsip_cli.diagnosis.fault_search import Found, Verdict
 from bsip_cli.diagnosis.held_out import HeldOut
 from bsip_cli.diagnosis.hypothesis import Hypothesis
-from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.effect import Effect, Reported
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 
-Said = Literal["named", "ambiguous", "rejected"]
 DRAWS = 200
 SCALE_ERROR = 0.03  # of every size: the simulated motion is neither free of noise nor unsmoothed
 _MOMENTS = {"start", "end", "from_time", "release_time"}
 _LETTERS = ascii_uppercase.replace("W", "")  # W is the group of the stated mass
-_UNKNOWN = (np.nan, np.nan, np.nan)
 _ARM_M = 0.3  # at which a moment counts as much as a force, to find the component that changes most
 
 
@@ -34,8 +32,8 @@ class Number:
     name: str
     unit: str
     value: float
-    low: float
-    high: float
+    low: float = np.nan
+    high: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -51,14 +49,14 @@ class Finding:
     effect: str
     target: str
     trials: tuple[str, ...]
-    verdict: Said
-    class_id: str
-    p_value: float
-    gain: tuple[float, float, float]
     numbers: tuple[Number, ...]
     sentence: str
-    probability: float = np.nan
-    scope: str = ""
+    p_value: float
+    probability: float
+    verdict: Literal["named", "ambiguous", "rejected"] = "named"
+    class_id: str = ""
+    scope: str = "trial"
+    gain: tuple[float, float, float] = (np.nan, np.nan, np.nan)
     rms_change: float = np.nan
 
 
@@ -76,84 +74,63 @@ def findings_of(
     names = (a + b for a, b in product(("", *_LETTERS), _LETTERS))  # A, B, ... Z, AA, AB ...
     findings: list[Finding] = []
     for verdict in found.verdicts:
-        findings += _findings(found, held, verdict, named_from, names, rng)
+        if verdict.probability >= named_from:  # else it stands with those that are not said
+            class_id = "" if len(verdict.members) == 1 else next(names)
+            findings += _members(found, held, verdict, class_id, rng)
     return (*findings, *(_rejected(found.fit, *one) for one in found.rejected))
 
 
-def _findings(
-    found: Found,
-    held: HeldOut,
-    verdict: Verdict,
-    named_from: float,
-    names: Iterator[str],
-    rng: np.random.Generator,
+def _members(
+    found: Found, held: HeldOut, verdict: Verdict, class_id: str, rng: np.random.Generator
 ) -> Iterator[Finding]:
-    if verdict.probability < named_from:
-        return  # it stands with those that are not said
-    is_alone = len(verdict.members) == 1
-    class_id = "" if is_alone else next(names)
+    """One of a name of its own, or all of a group."""
     mine = found.fit.faults[verdict.number]
     mine = replace(mine, effect=plain(mine.effect))
     for tried, probability in verdict.members:
         plainly = replace(tried.fault, effect=plain(tried.fault.effect))
-        is_mine = (*plainly.key, plainly.trials) == (*mine.key, mine.trials)
-        fit = found.fit if is_mine else tried.fit
-        number = verdict.number if is_mine else len(fit.faults) - 1
+        more: dict[str, Any] = {}
+        fit, number = tried.fit, len(tried.fit.faults) - 1
+        if (*plainly.key, plainly.trials) == (*mine.key, mine.trials):
+            fit, number = found.fit, verdict.number
+            more["gain"] = held.gain(number).interval()
         numbers = _numbers(fit, number, found.scores.inflation, rng)
         one = replace(fit.faults[number], effect=tried.fault.effect)
         sentence = one.alike(fit.session)[0].sentence(fit.session) + interval_words(numbers)
-        if not is_alone:
+        if class_id:
             sentence += f"; other causes look alike here: to tell them apart, {mine.effect.remedy}"
-        yield Finding(
-            one.effect.name,
-            one.target,
-            _names(fit, one),
-            "named" if is_alone else "ambiguous",
-            class_id,
-            1 - (verdict.probability if is_alone else probability),
-            held.gain(number).interval() if is_mine else _UNKNOWN,
-            numbers,
-            sentence,
-            verdict.probability if is_alone else probability,
-            scope_of(one.effect),
-            _rms_change(fit, one),
-        )
-
-
-def _names(fit: Fitted, one: Hypothesis) -> tuple[str, ...]:
-    return tuple(fit.session.trials[t].name for t in one.trials)
+            more |= {"verdict": "ambiguous", "class_id": class_id}
+        else:
+            probability = verdict.probability
+        yield _finding(fit, one, numbers, sentence, probability, **more)
 
 
 def _rejected(fit: Fitted, one: Hypothesis, probability: float) -> Finding:
-    numbers = tuple(Number(n, u, x, np.nan, np.nan) for n, u, x in one.reported(fit.session))
+    numbers = tuple(Number(*x) for x in one.reported(fit.session))
     sentence = (
         f"{'not so' if probability < 0.5 else 'not sure'}: {one.sentence(fit.session)} "
         f"(probability {probability:.2g} given what is found)"
     )
-    return Finding(
-        one.effect.name,
-        one.target,
-        _names(fit, one),
-        "rejected",
-        "",
-        1 - probability,
-        _UNKNOWN,
-        numbers,
-        sentence,
-        probability,
-        scope_of(one.effect),
-        _rms_change(fit, one),
-    )
+    return _finding(fit, one, numbers, sentence, probability, verdict="rejected")
 
 
-def _rms_change(fit: Fitted, one: Hypothesis) -> float:
-    """In the component that changes most, in its trial of the largest change."""
-    trials = (fit.session.trials[t] for t in one.trials)
+def _finding(
+    fit: Fitted,
+    one: Hypothesis,
+    numbers: tuple[Number, ...],
+    sentence: str,
+    probability: float,
+    **more: Any,
+) -> Finding:
+    """With the change of the component that changes most, in its trial of the largest change."""
+    trials = [fit.session.trials[t] for t in one.trials]
     changes = [
         x.errors.filter.one(one.effect.change(x.simulated, one.target, one.values)) for x in trials
     ]
     rms = np.array([np.sqrt((x**2).mean(axis=0)) for x in changes])
-    return float(rms.flat[int(np.argmax(rms / np.repeat([1.0, _ARM_M], 3)))])
+    most = float(rms.flat[int(np.argmax(rms / np.repeat([1.0, _ARM_M], 3)))])
+    said = one.effect.name, one.target, tuple(x.name for x in trials), numbers, sentence
+    more |= {"scope": scope_of(one.effect), "rms_change": most}
+    return Finding(*said, 1 - probability, probability, **more)
 
 
 def _numbers(
@@ -180,9 +157,6 @@ def _numbers(
     return numbers_of(one.alike(session)[0].reported(session), alike)
 
 
-Reported = tuple[tuple[str, str, float], ...]
-
-
 def numbers_of(reported: Reported, drawn: Sequence[Reported]) -> tuple[Number, ...]:
     """What is reported, with the 95 % intervals of draws."""
     values = np.array([[x for *_, x in one] for one in drawn])
@@ -194,17 +168,14 @@ def numbers_of(reported: Reported, drawn: Sequence[Reported]) -> tuple[Number, .
 
 
 def interval_words(numbers: tuple[Number, ...]) -> str:
-    """Of the surest size, with the digits that its interval deserves."""
-    first = max(_sizes(numbers), key=lambda x: abs(x.value) / max(x.high - x.low, 1e-12))
+    """Of the surest size, with the digits that its interval deserves; a size is neither a moment
+    nor a part of another one, if anything else is told."""
+    names = {one.name for one in numbers}
+    parts = {f"{name}_{axis}" for name in names for axis in "xyz"}
+    sizes = [one for one in numbers if one.name not in _MOMENTS | parts] or numbers
+    first = max(sizes, key=lambda x: abs(x.value) / max(x.high - x.low, 1e-12))
     factor, unit = readable_unit(first.name, first.unit)
     low, high = factor * first.low, factor * first.high
     digits = digits_of(high - low if high > low else factor * first.value)
     interval = with_unit(f"{low:.{digits}f} to {high:.{digits}f}", unit)
     return f" ({first.name.replace('_', ' ')}: 95 % interval {interval})"
-
-
-def _sizes(numbers: tuple[Number, ...]) -> list[Number]:
-    """Those that are neither moments nor parts of another one; all where nothing else is told."""
-    names = {one.name for one in numbers}
-    parts = {f"{name}_{axis}" for name in names for axis in "xyz"}
-    return [one for one in numbers if one.name not in _MOMENTS | parts] or list(numbers)

@@ -84,7 +84,7 @@ class HeldOut:
         kept = _linear(fit)
         kept[fit.coefficients(number)] = False
         offsets = {
-            t: fit.whitened(t, columns_of(fit.session, one, t).offset[..., None])[:, 0]
+            t: fit.whitened(t, columns_of(fit.session, one, t)[1][..., None])[:, 0]
             for t in one.trials
         }
         without = _means(fit, self.blocks, kept, offsets)

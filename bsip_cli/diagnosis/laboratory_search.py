@@ -12,8 +12,8 @@ from string import ascii_uppercase
 import numpy as np
 from scipy.special import expit, logit, logsumexp
 
-from bsip_cli.diagnosis.detection import named_size
 from bsip_cli.diagnosis.fault_model import SIZES
+from bsip_cli.diagnosis.fault_scores import named_size
 from bsip_cli.diagnosis.findings import SCALE_ERROR
 from bsip_cli.diagnosis.laboratory import (
     Offset,
@@ -29,10 +29,7 @@ from bsip_cli.diagnosis.laboratory import (
 )
 from bsip_cli.diagnosis.shared_faults import OF_A_LABORATORY, Coordinate
 from bsip_cli.effects.effect import Parameter
-from bsip_cli.effects.plate_frame import ALL
-from bsip_cli.effects.plate_rotation import PlateRotation
-from bsip_cli.effects.plate_translation import PlateTranslation
-from bsip_cli.effects.plate_zero import PlateZero
+from bsip_cli.effects.plates import ALL, PlateRotation, PlateTranslation, PlateZero
 
 BEFORE = np.geomspace(*SIZES, 5)  # sizes before the data, evenly in the logarithm [typical]
 _TIMES = np.geomspace(0.3, 3.0, 5)  # deviations so many times as large as is likeliest

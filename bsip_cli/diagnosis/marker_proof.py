@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.special import logit
 from scipy.stats import chi2
 
 from bsip_cli.body.names import in_words
+from bsip_cli.diagnosis.filtering import every
 from bsip_cli.diagnosis.findings import (
     DRAWS,
     SCALE_ERROR,
@@ -26,10 +28,9 @@ from bsip_cli.diagnosis.findings import (
 )
 from bsip_cli.diagnosis.held_out import BLOCK_S, Gain
 from bsip_cli.diagnosis.hypothesis import Candidate, Hypothesis
-from bsip_cli.dynamics.lowpass import stride_to
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Effect
-from bsip_cli.effects.marker_slide import LEAST_S, ramp, ramp_of
+from bsip_cli.effects.markers import LEAST_S, ramp, ramp_of
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH
 from bsip_cli.statistics.effective_samples import effective_samples
@@ -37,7 +38,6 @@ from bsip_cli.statistics.effective_samples import effective_samples
 ENOUGH_HZ = 10.0  # for a course of many seconds
 BENT = 0.25  # of the markers' squared residuals, their means left out: less is skin that follows
 OWN = 0.5  # of a marker's own squared residual: else its skin slides more than it slips
-_UNKNOWN = (np.nan, np.nan, np.nan)
 SLIP, SLIDE = "marker_shift", "marker_slide"
 BEND, SOFT_TISSUE = "missing_joint", "soft_tissue"
 
@@ -75,27 +75,23 @@ class Proof:
     def finding(self, scene: Scene, trial: str, gain: Gain | None) -> Finding:
         """As the diagnosis prints it. gain : of the forces."""
         whose = "the marker's" if self.effect.name in (SLIP, SLIDE) else "all markers'"
-        is_shown = gain is not None and gain.is_real()
-        reported = self.effect.reported(scene, self.target, self.values)
-        drawn = [self.effect.reported(scene, self.target, one) for one in self.draws]
+        reported, *drawn = (
+            self.effect.reported(scene, self.target, x) for x in (self.values, *self.draws)
+        )
         numbers = numbers_of(reported, drawn)
         told = self.effect.sentence(scene, self.target, self.values) + interval_words(numbers)
         sentence = f"{told}; this is {100 * self.share:.0f} % of {whose} squared residual"
-        if not is_shown:
+        more: dict[str, Any] = {"scope": scope_of(self.effect)}
+        if gain is not None and gain.is_real():
+            more["gain"] = gain.interval()
+        else:
             sentence += ", and the forces do not show it"
-        return Finding(
-            self.effect.name,
-            self.target,
-            (trial,),
-            "named",
-            "",
-            self.p_value,
-            gain.interval() if gain is not None and is_shown else _UNKNOWN,
-            numbers,
-            sentence,
-            1 - self.p_value,
-            scope_of(self.effect),
-        )
+        said = self.effect.name, self.target, (trial,), numbers, sentence
+        return Finding(*said, self.p_value, 1 - self.p_value, **more)
+
+    def left(self, scene: Scene) -> np.ndarray:
+        """(N, m, 3) what it leaves of the markers."""
+        return _left(self.effect, scene, self.target, self.values)
 
 
 def slips_of(
@@ -103,7 +99,7 @@ def slips_of(
 ) -> tuple[Proof, ...]:
     """The slips that a trial's markers show, of those that were found in them; slides where these
     are likelier than ``named_from``."""
-    fewer = _slower(scene)
+    fewer = every(scene, ENOUGH_HZ)
     left, found = fewer.residual_m, []
     if left is None:
         return ()
@@ -112,10 +108,9 @@ def slips_of(
         effect, scanned = _manner(fewer, left, slip, named_from)
         one = _sized(fewer, left, effect, slip.marker, scanned, rng)
         one = replace(one, p_value=p_value, share=_own_share(fewer, left, one))
-        if one.share < OWN or np.linalg.norm(one.values[:3]) < slip.least_m:
-            continue
-        found.append(one)
-        left = left - _left(one.effect, fewer, one.target, one.values)
+        if one.share >= OWN and np.linalg.norm(one.values[:3]) >= slip.least_m:
+            found.append(one)
+            left = left - one.left(fewer)
     return tuple(found)
 
 
@@ -125,7 +120,7 @@ def _manner(
     """Whether a marker slips at a moment or slides, and when: by Schwarz's criterion, a slide
     having one number more, from as many samples of its residual as are independent."""
     at_once = EFFECTS[SLIP], (slip.start_s, 0.0)
-    own = residual_m[:, _number(scene, slip.marker)]
+    own = residual_m[:, scene.person.markers.index(slip.marker)]
     seen = np.isfinite(own).all(axis=1)
     times_s, own = scene.times_s[seen], own[seen]
     if _is_throughout(scene, slip.start_s) or np.ptp(times_s) < LEAST_S:
@@ -147,46 +142,32 @@ def alone_and_shaken(
 ) -> tuple[tuple[Proof, ...], tuple[Proof, ...]]:
     """Slips, and what several markers do within the same second: no tape gives way at six places
     at once, so that is soft tissue after a knock."""
-    moments = [one.values[3] for one in slips]
-    shaken = tuple(
-        one
-        for one, moment in zip(slips, moments, strict=True)
-        if not _is_throughout(scene, moment)
-        and sum(abs(moment - other) < BLOCK_S for other in moments) > 1
+    moments = np.array([one.values[3] for one in slips])
+    together = [
+        not _is_throughout(scene, moment) and (np.abs(moments - moment) < BLOCK_S).sum() > 1
+        for moment in moments
+    ]
+    alone, shaken = (
+        tuple(one for one, is_so in zip(slips, together, strict=True) if is_so == side)
+        for side in (False, True)
     )
-    return tuple(one for one in slips if one not in shaken), shaken
+    return alone, shaken
 
 
 def shaken_finding(scene: Scene, shaken: Sequence[Proof], trial: str) -> Finding:
     """Of markers that move on their segments together."""
     sizes = [1000 * float(np.linalg.norm(one.values[:3])) for one in shaken]
-    moments = [float(one.values[3]) for one in shaken]
-    segments = [int(scene.person.marker_segments[_number(scene, one.target)]) for one in shaken]
-    target = scene.person.skeleton.segments[max(segments, key=segments.count)]
-    names = ", ".join(one.target for one in shaken)
+    person = scene.person
+    on = [int(person.marker_segments[person.markers.index(one.target)]) for one in shaken]
+    target = person.skeleton.segments[max(on, key=on.count)]
     said = (
-        f"soft tissue moves {len(shaken)} markers ({names}) by {min(sizes):.0f} to "
-        f"{max(sizes):.0f} mm from {min(moments):.2f} s on"
+        f"soft tissue moves {len(shaken)} markers ({', '.join(one.target for one in shaken)}) by "
+        f"{min(sizes):.0f} to {max(sizes):.0f} mm from "
+        f"{min(float(one.values[3]) for one in shaken):.2f} s on"
     )
     p_value = max(one.p_value for one in shaken)
-    number = Number("size", "m", max(sizes) / 1000, np.nan, np.nan)
-    return Finding(
-        SOFT_TISSUE,
-        target,
-        (trial,),
-        "named",
-        "",
-        p_value,
-        _UNKNOWN,
-        (number,),
-        said,
-        1 - p_value,
-        "trial",
-    )
-
-
-def _number(scene: Scene, marker: str) -> int:
-    return scene.person.markers.index(marker)
+    size = Number("size", "m", max(sizes) / 1000)
+    return Finding(SOFT_TISSUE, target, (trial,), (size,), said, p_value, 1 - p_value)
 
 
 def bend_of(
@@ -194,12 +175,12 @@ def bend_of(
 ) -> tuple[Finding, ...]:
     """A second bend of the trunk or soft tissue that moves with it, which markers do not tell
     apart, where that is much of their residuals beside slips; nothing where it is little."""
-    fewer = _slower(scene)
+    fewer = every(scene, ENOUGH_HZ)
     left = fewer.residual_m
     if left is None:
         return ()
     for one in slips:
-        left = left - _left(one.effect, fewer, one.target, one.values)
+        left = left - one.left(fewer)
     effect = EFFECTS[BEND]
     sized = (_sized(fewer, left, effect, target, (), rng) for target in effect.targets(fewer))
     possible = (one for one in sized if effect.possible(fewer, one.target, one.values))
@@ -220,23 +201,18 @@ def bend_of(
     )
     markers = fewer.person.marker_segments == fewer.person.skeleton.index(bend.target)
     size = float(np.sqrt(np.nanmean((left[:, markers] ** 2).sum(axis=2))))
-    number = Number("size", "m", size, np.nan, np.nan)
     said = (
         f"soft tissue on the {in_words(bend.target)} moves with the trunk's posture: its markers "
         f"are {1000 * size:.0f} mm off; {alike}"
     )
-    return told, replace(told, effect=SOFT_TISSUE, numbers=(number,), sentence=said, scope="person")
-
-
-def _slower(scene: Scene) -> Scene:
-    return scene.every(stride_to(scene.rate_hz, ENOUGH_HZ))
+    numbers = (Number("size", "m", size),)
+    return told, replace(told, effect=SOFT_TISSUE, numbers=numbers, sentence=said, scope="person")
 
 
 def _own_share(scene: Scene, residual_m: np.ndarray, one: Proof) -> float:
     """Part of the squared residual of the marker that is off."""
-    m = _number(scene, one.target)
-    own = residual_m[:, m : m + 1]
-    change = _left(one.effect, scene, one.target, one.values)[:, m : m + 1]
+    m = scene.person.markers.index(one.target)
+    own, change = residual_m[:, m : m + 1], one.left(scene)[:, m : m + 1]
     rows = _in_rows(scene, change[..., None], own, with_means=_is_throughout(scene, one.values[3]))
     columns, course, _ = rows
     return 1 - float(((course - columns[:, 0]) ** 2).sum() / (course @ course))
@@ -266,27 +242,30 @@ def _sized(
     told = np.stack(shapes, axis=-1) * effect.is_told(scene, target)
     lasts = bool(scanned) and _is_throughout(scene, scanned[0])
     columns, course, block = _in_rows(scene, told, residual_m, with_means=lasts)
-    grams, rights = _sums(columns, course, block)
-    least = np.linalg.lstsq(grams.sum(axis=0), rights.sum(axis=0), rcond=None)[0]
+    mine = [block == number for number in np.unique(block)]
+    grams = np.stack([columns[rows].T @ columns[rows] for rows in mine])
+    rights = np.stack([columns[rows].T @ course[rows] for rows in mine])
+    gram, right = grams.sum(axis=0), rights.sum(axis=0)
+    least = np.linalg.lstsq(gram, right, rcond=None)[0]
     noise = float(((course - columns @ least) ** 2).mean()) * BLOCK_S * scene.rate_hz
     prior = noise * np.eye(len(typical))
-    size = np.linalg.solve(grams.sum(axis=0) + prior, rights.sum(axis=0))
+    size = np.linalg.solve(gram + prior, right)
     left = course - columns @ size
     known_to = np.array([p.known_to / p.typical for p in parameters])
     spread = np.hypot(known_to, SCALE_ERROR * size)
     misplaced = _misplaced(told, residual_m, rng) if lasts else np.zeros((DRAWS, len(size)))
-    draws = [
+    drawn = [
         candidate.values(scene, typical * (one + spread * rng.standard_normal(len(size))))
         for one in _bootstrap(grams, rights, prior, misplaced, rng)
     ]
-    return Proof(
-        effect,
-        target,
-        candidate.values(scene, typical * size),
-        _scattered(effect, scene, target, np.array(draws), rng),
-        1 - float(left @ left) / float(course @ course),
-        float(chi2.sf(size @ grams.sum(axis=0) @ size / noise, len(size))),
-    )
+    draws = np.array(drawn)
+    for k, parameter in enumerate(effect.parameters(scene, target)):
+        if parameter.scan:  # known as well as it can be
+            draws[:, k] += parameter.known_to * rng.standard_normal(len(draws))
+    values = candidate.values(scene, typical * size)
+    share = 1 - float(left @ left) / float(course @ course)
+    p_value = float(chi2.sf(size @ gram @ size / noise, len(size)))
+    return Proof(effect, target, values, draws, share, p_value)
 
 
 def _left(effect: Effect, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
@@ -312,32 +291,19 @@ def _misplaced(told: np.ndarray, residual_m: np.ndarray, rng: np.random.Generato
 
 
 def _in_rows(
-    scene: Scene, shapes_m: np.ndarray, residual_m: np.ndarray, with_means: bool = False
+    scene: Scene, shapes_m: np.ndarray, residual_m: np.ndarray, with_means: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Shapes (r, k), residual (r,) and number of the stretch (r,) where both are known, without
     the mean of each marker and direction or with it."""
     known = np.isfinite(residual_m).all(axis=2) & np.isfinite(shapes_m).all(axis=(2, 3))
     block = ((scene.times_s - scene.times_s[0]) / BLOCK_S).astype(int)
     blocks = np.repeat(np.broadcast_to(block[:, None], known.shape)[known], 3)
-    both = (shapes_m, residual_m[..., None])
-    columns, course = (x[known] if with_means else _centred(x, known)[known] for x in both)
+    both, weight = [shapes_m, residual_m[..., None]], known[..., None, None]
+    if not with_means:
+        counts = np.maximum(weight.sum(axis=0), 1)
+        both = [x - np.where(weight, x, 0.0).sum(axis=0) / counts for x in both]
+    columns, course = (x[known] for x in both)
     return columns.reshape(-1, shapes_m.shape[-1]), course.ravel(), blocks
-
-
-def _centred(x: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """(N, m, 3, k) less its mean over the known frames (N, m)."""
-    weight = known[..., None, None]
-    total = np.where(weight, x, 0.0).sum(axis=0)
-    return x - total / np.maximum(weight.sum(axis=0), 1)
-
-
-def _sums(
-    columns: np.ndarray, course: np.ndarray, block: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """(b, k, k) and (b, k) normal equations of each stretch."""
-    mine = [block == number for number in np.unique(block)]
-    grams = np.stack([columns[rows].T @ columns[rows] for rows in mine])
-    return grams, np.stack([columns[rows].T @ course[rows] for rows in mine])
 
 
 def _bootstrap(
@@ -357,13 +323,3 @@ def _bootstrap(
         np.linalg.solve(grams[one].sum(axis=0) + prior, rights[one].sum(axis=0) + more) + apart
         for one, more, apart in zip(drawn, misplaced, untold.T, strict=True)
     ]
-
-
-def _scattered(
-    effect: Effect, scene: Scene, target: str, draws: np.ndarray, rng: np.random.Generator
-) -> np.ndarray:
-    """Draws (n, K) whose scanned parameters are known as well as they can be."""
-    for k, parameter in enumerate(effect.parameters(scene, target)):
-        if parameter.scan:
-            draws[:, k] += parameter.known_to * rng.standard_normal(len(draws))
-    return draws

@@ -15,15 +15,15 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import binary_erosion
 
-from bsip_cli.diagnosis.error_model import Term, TrialErrors
-from bsip_cli.diagnosis.error_terms import FAULT, INERTIA, as_simulated, is_of_instruments
+from bsip_cli.diagnosis.error_model import TrialErrors
+from bsip_cli.diagnosis.error_terms import FAULT, INERTIA, Term, as_simulated, is_of_instruments
 from bsip_cli.diagnosis.fault_model import FaultTrial, Fitted, fitted, session_of, summed
 from bsip_cli.diagnosis.hypothesis import Hypothesis
+from bsip_cli.effects.body import StatedMass
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.effect import Effect, Parameter
-from bsip_cli.effects.plate_frame import ALL
+from bsip_cli.effects.plates import ALL
 from bsip_cli.effects.scene import Scene
-from bsip_cli.effects.stated_mass import StatedMass
 
 STATED_MASS = StatedMass()
 OF_A_LABORATORY: tuple[Effect, ...] = tuple(

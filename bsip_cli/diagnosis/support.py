@@ -19,8 +19,8 @@ from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.names import in_words
 from bsip_cli.diagnosis.findings import Finding, Number
 from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, Gain
+from bsip_cli.effects.loads import UnmeasuredContact
 from bsip_cli.effects.scene import Scene
-from bsip_cli.effects.unmeasured_contact import UnmeasuredContact
 from bsip_cli.statistics.effective_samples import effective_samples
 from bsip_cli.statistics.samples import Z95
 
@@ -57,31 +57,24 @@ class Support:
         """As the diagnosis prints it."""
         p_value = float(chi2.sf((np.divide(self.force_N, self.error_N) ** 2).sum(), 3))
         percent, low, high = self.gain_percent
+        size = float(np.linalg.norm(self.force_N))
+        error = float(np.linalg.norm(np.multiply(self.force_N, self.error_N))) / size
+        parts = zip("xyz", self.force_N, self.error_N, strict=True)
+        rows = [("force", size, error), *((f"force_{axis}", x, e) for axis, x, e in parts)]
+        times = (("start", self.start_s), ("end", self.end_s))
         return Finding(
             UnmeasuredContact.name,
             "+".join(self.hands),
             (trial,),
-            "named",
-            "",
-            p_value,
-            (percent, low, high),
-            self._numbers(),
+            (
+                *(Number(name, "s", at, at, at) for name, at in times),
+                *(Number(name, "N", x, x - Z95 * e, x + Z95 * e) for name, x, e in rows),
+            ),
             f"{self.words()}, and what else may be wrong in this trial is not asked",
+            p_value,
             1 - p_value,
-            "trial",
-            float(np.linalg.norm(self.force_N)),
-        )
-
-    def _numbers(self) -> tuple[Number, ...]:
-        size = float(np.linalg.norm(self.force_N))
-        error = float(np.linalg.norm(np.multiply(self.force_N, self.error_N))) / size
-        rows = [("force", size, error)]
-        parts = zip("xyz", self.force_N, self.error_N, strict=True)
-        rows += [(f"force_{axis}", x, e) for axis, x, e in parts]
-        times = (("start", self.start_s), ("end", self.end_s))
-        return (
-            *(Number(name, "s", at, at, at) for name, at in times),
-            *(Number(name, "N", x, x - Z95 * e, x + Z95 * e) for name, x, e in rows),
+            gain=(percent, low, high),
+            rms_change=size,
         )
 
     def words(self) -> str:

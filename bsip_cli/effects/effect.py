@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 from typing import ClassVar
@@ -42,6 +42,9 @@ class Parameter:
     is_given: bool = False
 
 
+Reported = tuple[tuple[str, str, float], ...]  # name, unit and value of what is printed
+
+
 class Effect(ABC):
     """A cause outside the inertial parameters that changes wrench or markers.
 
@@ -49,7 +52,8 @@ class Effect(ABC):
     """
 
     name: ClassVar[str]
-    of_the_lab: ClassVar[bool]  # the same in every trial of a recording session
+    numbers: ClassVar[tuple[Parameter, ...]] = ()  # its parameters, the same in every trial
+    of_the_lab: ClassVar[bool] = False  # the same in every trial of a recording session
     of_the_person: ClassVar[bool] = False  # the same in every trial of a person
     of_the_body: ClassVar[bool] = False  # of the person, and in one trial if in another
     while_moving: ClassVar[bool] = False  # not of who stands still to be calibrated
@@ -64,13 +68,13 @@ class Effect(ABC):
         """Whether trials can share it, with the same numbers."""
         return self.of_the_lab or self.of_the_person
 
-    @abstractmethod
     def targets(self, scene: Scene) -> tuple[str, ...]:
         """Segments, plates or markers it may sit at; one empty name where there is no choice."""
+        return ("",)
 
-    @abstractmethod
     def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
         """Its numbers, in the order in which ``change`` takes them."""
+        return self.numbers
 
     def scans(self, scene: Scene, target: str) -> Iterator[tuple[float, ...]]:
         """Values to try of the parameters that have a scan; by default every combination."""
@@ -95,10 +99,8 @@ class Effect(ABC):
         """
         return None
 
-    def reported(
-        self, scene: Scene, target: str, values: np.ndarray
-    ) -> tuple[tuple[str, str, float], ...]:
-        """Name, unit and value of what the diagnosis prints; by default the parameters."""
+    def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:
+        """What the diagnosis prints; by default the parameters."""
         parameters = self.parameters(scene, target)
         return tuple((p.name, p.unit, float(x)) for p, x in zip(parameters, values, strict=True))
 
@@ -132,9 +134,7 @@ class Effect(ABC):
         if scene.residual_m is None:
             return True
         change = self.marker_change(scene, target, values)
-        if change is None:
-            return True
-        return explained_share(scene.residual_m, change) > -DISAGREEMENT
+        return change is None or explained_share(scene.residual_m, change) > -DISAGREEMENT
 
     def tangent(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """(N, 6, k) derivative of ``change`` for the k parameters without a scan.
@@ -159,3 +159,16 @@ def explained_share(residual_m: np.ndarray, change_m: np.ndarray) -> float:
     before = float((residual_m[known] ** 2).sum())
     after = float(((residual_m - change_m)[known] ** 2).sum())
     return 1 - after / max(before, 1e-12)
+
+
+def along_xyz(
+    name: str, unit: str, least: float, most: float, typical: float, known_to: float = 0.0
+) -> tuple[Parameter, ...]:
+    """Parameters ``name_x``, ``name_y`` and ``name_z`` that are described alike."""
+    described = (unit, least, most, typical, (), known_to)
+    return tuple(Parameter(f"{name}_{axis}", *described) for axis in "xyz")
+
+
+def parts_xyz(name: str, unit: str, values: Iterable[float]) -> Reported:
+    """The first three values as ``name_x``, ``name_y`` and ``name_z``."""
+    return tuple((f"{name}_{axis}", unit, float(x)) for axis, x in zip("xyz", values, strict=False))

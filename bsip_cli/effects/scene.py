@@ -45,6 +45,10 @@ class Plate:
         """(3,) middle of the surface."""
         return self.corners_m.mean(axis=0)
 
+    def moments_about_m(self) -> np.ndarray:
+        """(3,) the point that its moments are about."""
+        return self.centre_m() if self.sensor_m is None else self.sensor_m
+
     def axes(self) -> np.ndarray:
         """(3, 3) rows: the plate's own x, along the plate across it, and its normal upwards.
 
@@ -107,18 +111,11 @@ class Scene:
             return self
         part = slice(None, None, stride)
         plates = tuple(replace(p, wrench=without_fast(p.wrench, stride)[part]) for p in self.plates)
-        residual = None if self.residual_m is None else self.residual_m[part]
-        return replace(
-            self,
-            times_s=self.times_s[part],
-            q=self.q[part],
-            v=self.v[part],
-            a=self.a[part],
-            plates=plates,
-            valid=self.valid[part],
-            residual_m=residual,
-            wrench=None if self.wrench is None else without_fast(self.wrench, stride)[part],
-        )
+        wrench = None if self.wrench is None else without_fast(self.wrench, stride)[part]
+        of_frames = ("times_s", "q", "v", "a", "valid", "residual_m")
+        known = {name: getattr(self, name) for name in of_frames}
+        fewer = {name: x[part] for name, x in known.items() if x is not None}
+        return replace(self, plates=plates, wrench=wrench, **fewer)
 
     def reading(self, plates: tuple[Plate, ...], wrench: np.ndarray) -> Scene:
         """The same motion over other readings: nothing of the motion is computed again."""

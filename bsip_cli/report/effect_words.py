@@ -9,7 +9,7 @@ from typing import Protocol
 
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.plate_frame import plates_called
+from bsip_cli.effects.plates import plates_called
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.report.words import listing, number, segment_label
 

@@ -15,16 +15,14 @@ from bsip_cli.diagnosis.fault_model import session_of
 from bsip_cli.diagnosis.fault_scores import Library, library_of
 from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
-from bsip_cli.diagnosis.held_out import FOLDS, HeldOut, held_out
+from bsip_cli.diagnosis.held_out import HeldOut, held_out
 from bsip_cli.diagnosis.marker_proof import BEND, bend_of, shaken_finding
-from bsip_cli.diagnosis.pattern import UNEXPLAINED
-from bsip_cli.diagnosis.patterns import PATTERNS
+from bsip_cli.diagnosis.patterns import PATTERNS, UNEXPLAINED
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.report.verdict import verdict_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnosed_trials import Diagnosed, diagnosed, weighed
-from bsip_cli.stages.diagnosis_facts import detection_rows, facts_of
-from bsip_cli.stages.diagnosis_rows import rows_of
+from bsip_cli.stages.diagnosis_rows import cause_record, detection_rows, facts_of, rows_of
 from bsip_cli.stages.error_budget import error_budget
 from bsip_cli.stages.frames import person_from
 from bsip_cli.stages.known_laboratory import Known, known_laboratory
@@ -123,15 +121,7 @@ def _proven(trials: Sequence[Diagnosed], found: Found, held: HeldOut) -> Iterato
     slips = [(one.trial.stem, slip) for one in trials for slip in one.slips]
     for number, (stem, slip) in enumerate(slips):
         if held.gain(number).is_real():
-            yield {
-                "effect": slip.effect.name,
-                "target": slip.target,
-                "trials": [stem],
-                "verdict": "named",
-                "values": slip.values.tolist(),
-                "folds": [slip.values.tolist()] * FOLDS,
-                "bounds": {},
-            }
+            yield cause_record(slip.effect.name, slip.target, (stem,), slip.values)
 
 
 def _beside(found: Sequence[Finding], large: Sequence[Finding]) -> Iterator[Finding]:

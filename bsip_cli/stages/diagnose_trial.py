@@ -7,7 +7,7 @@ import pandas as pd
 
 from bsip_cli.artifacts import empty_table
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.diagnosis_rows import nothing
+from bsip_cli.stages.diagnosis_rows import nothing, rows_of
 
 
 def run(unit: Unit) -> None:
@@ -32,7 +32,8 @@ def _write_diagnosis(unit: Unit) -> None:
     rows = overall[concerned & (overall["effect"] != "none").to_numpy()]
     if (rows["verdict"] == "rejected").all():
         p_value = float(rows["p_value"].min()) if len(rows) else np.nan
-        rows = pd.concat([pd.DataFrame([nothing(p_value, (stem,))]), rows], ignore_index=True)
+        none = rows_of((nothing(p_value, (stem,)),), (stem,))
+        rows = pd.concat([none, rows], ignore_index=True)
         order = [1, *(rows["rank"][1:] + 1)]
         rows["rank"] = order
     rows["rank"] = rows["rank"].rank(method="dense").astype(int)

@@ -13,17 +13,22 @@ import pandas as pd
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.person import Person
 from bsip_cli.diagnosis.error_budget import Ground, ground_of
-from bsip_cli.diagnosis.error_model import Term, TrialErrors
-from bsip_cli.diagnosis.error_terms import FAULT, error_terms, noise_of_instruments
+from bsip_cli.diagnosis.error_model import TrialErrors
+from bsip_cli.diagnosis.error_terms import FAULT, Term, error_terms, noise_of_instruments
 from bsip_cli.diagnosis.fault_model import FaultTrial
 from bsip_cli.diagnosis.filtering import Filter, at_full_rate, filter_of, slow
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.marker_proof import Proof, Slip, alone_and_shaken, slips_of
-from bsip_cli.diagnosis.scale_mass import agreed_share, is_noticed, weight_share
-from bsip_cli.diagnosis.stated_mass import loaded_plate, stated_mass_findings
+from bsip_cli.diagnosis.stated_mass import (
+    agreed_share,
+    is_noticed,
+    loaded_plate,
+    stated_mass_findings,
+    weight_share,
+)
 from bsip_cli.diagnosis.support import HANDS, LIGHTER, Support
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.marker_shift import BEFORE_S
+from bsip_cli.effects.markers import BEFORE_S
 from bsip_cli.effects.scene import Scene
 from bsip_cli.identification.prior import Prior
 from bsip_cli.running.unit import Unit
@@ -164,9 +169,7 @@ def diagnosed(
     )
     markers = alone_and_shaken(fewer, found)
     terms = [
-        Term(
-            x.term, x.target, x.scale, x.own, filter_(x.wrench), mixing=x.mixing, targets=x.targets
-        )
+        replace(x, columns=filter_(x.columns))
         for x in error_terms(fewer, prior.root, options.landmark_sd_m, options.skin_factor)
     ]
     if contact is not None:

@@ -10,11 +10,10 @@ import pandas as pd
 
 from bsip_cli.artifacts import empty_table
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.diagnosis.error_budget import Line, budget_of
+from bsip_cli.diagnosis.error_budget import Line, Yardsticks, budget_of, large_errors
 from bsip_cli.diagnosis.error_model import TrialErrors, error_model
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.held_out import FOLDS
-from bsip_cli.diagnosis.large_errors import Yardsticks, large_errors
 from bsip_cli.report.budget import term_words
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnosed_trials import Diagnosed

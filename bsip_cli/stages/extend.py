@@ -8,7 +8,7 @@ import pandas as pd
 from bsip_cli.artifacts import empty_table
 from bsip_cli.body.person import Person
 from bsip_cli.diagnosis.cause import Cause, change_by, method_of
-from bsip_cli.effects.missing_joint import AXES, MissingJoint, split_torso
+from bsip_cli.effects.joints import AXES, MissingJoint, split_torso
 from bsip_cli.identification.uncertainty import readable
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.verdict import change_sentence

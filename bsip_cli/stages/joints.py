@@ -26,10 +26,10 @@ from bsip_cli.dynamics.joint_moments import (
 from bsip_cli.dynamics.lowpass import lowpass_operator, noise_left, stride_to
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.segment_motion import SegmentMotion, segment_motion
-from bsip_cli.effects.gravity_tilt import GravityTilt, Turned
+from bsip_cli.effects.body import SegmentInertia
+from bsip_cli.effects.frames import GravityTilt, Turned
+from bsip_cli.effects.loads import UnmeasuredContact
 from bsip_cli.effects.scene import Scene
-from bsip_cli.effects.segment_inertia import SegmentInertia
-from bsip_cli.effects.unmeasured_contact import UnmeasuredContact
 from bsip_cli.motion.jacobian import coordinate_covariance
 from bsip_cli.recordings.own_plates import SIDES, FootForces, Reading, foot_forces, plate_noise
 from bsip_cli.report.words import listing

@@ -11,10 +11,10 @@ import pandas as pd
 
 from bsip_cli.diagnosis.fault_model import FaultTrial
 from bsip_cli.diagnosis.findings import Finding, Number, interval_words
-from bsip_cli.diagnosis.held_out import FOLDS
 from bsip_cli.diagnosis.shared_faults import OF_A_LABORATORY, Coordinate, with_known
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.running.unit import Unit
+from bsip_cli.stages.diagnosis_rows import cause_record
 from bsip_cli.stages.shared_faults import information_in, pooled_in
 
 _FAULTS = {one.name for one in OF_A_LABORATORY}
@@ -44,14 +44,11 @@ class Known:
                     cause.effect.name,
                     cause.target,
                     tuple(one.name for one in held),
-                    "named",
-                    "",
-                    1 - cause.probability,
-                    (np.nan, np.nan, np.nan),
                     cause.numbers,
                     words + interval_words(cause.numbers) + known,
+                    1 - cause.probability,
                     cause.probability,
-                    "laboratory",
+                    scope="laboratory",
                 )
 
     def causes(self, trials: Sequence[FaultTrial]) -> Iterator[dict]:
@@ -65,15 +62,7 @@ class Known:
                 * p.typical
                 for p, x in zip(parameters, found.numbers, strict=True)
             ]
-            yield {
-                "effect": found.effect,
-                "target": found.target,
-                "trials": list(found.trials),
-                "verdict": "named",
-                "values": mine,
-                "folds": [mine] * FOLDS,
-                "bounds": {},
-            }
+            yield cause_record(found.effect, found.target, found.trials, np.array(mine))
 
     def limits(self, own: pd.DataFrame) -> pd.DataFrame:
         """Of ``detection``, those of the laboratory where all persons would show less."""

@@ -199,10 +199,12 @@ def on_one_plate(session: Session, rng: np.random.Generator) -> Session:
     return replace(session, cases=tuple(cases))
 
 
-def long_suite(each: int, null_count: int, others: int, seed: int) -> list[Session]:
+def long_suite(
+    each: int, null_count: int, others: int, seed: int, effects: Sequence[str] = tuple(CATALOGUE)
+) -> list[Session]:
     """All of it: effects, nulls, doubles and what the catalogue lacks."""
     cases = [
-        *draws(CATALOGUE, each, seed, "single"),
+        *draws({name: CATALOGUE[name] for name in effects}, each, seed, "single"),
         *nulls(null_count),
         *doubles(others, seed),
         *draws(OUTSIDE, -(-others // len(OUTSIDE)), seed, "outside"),

@@ -16,7 +16,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from tests.blind.blind_batch import Batch, run_batch
-from tests.blind.blind_cases import Case, Session, long_suite
+from tests.blind.blind_cases import CATALOGUE, Case, Session, long_suite
 from tests.blind.blind_running import ROOT, STAGES, TABLES, write_atomically
 from tests.blind.blind_scoring import Score
 from tests.blind.blind_tables import lead, scores_frame, tables, write_csv
@@ -26,8 +26,9 @@ BATCH = 8  # people of one study; an interruption loses at most their work
 
 def main(arguments: Sequence[str] | None = None) -> None:
     options = parsed(arguments)
-    sessions = long_suite(options.draws, options.nulls, options.others, options.seed)
-    settings = {name: getattr(options, name) for name in ("draws", "nulls", "others", "seed")}
+    asked = ("draws", "nulls", "others", "seed", "effects")
+    settings = {name: getattr(options, name) for name in asked}
+    sessions = long_suite(*settings.values())
     keep_settings(options.results, settings)
     stages = STAGES if options.without_extend else (*STAGES, "reconstruct", "extend")
     if not options.only_tables:
@@ -44,6 +45,7 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--nulls", type=int, default=40, help="people with nothing hidden")
     add("--others", type=int, default=20, help="cases of two effects, and outside the catalogue")
     add("--seed", type=int, default=2027, help="draws effects, sizes, places and people")
+    add("--effects", nargs="+", choices=CATALOGUE, default=list(CATALOGUE), help="only these")
     add("--jobs", type=int, default=2, help="processes at once")
     add("--keep", action="store_true", help="keep recordings and artifacts")
     add("--without-extend", action="store_true", help="no gains on held-out data")
@@ -51,7 +53,7 @@ def parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def keep_settings(results: Path, settings: dict[str, int]) -> None:
+def keep_settings(results: Path, settings: dict) -> None:
     """Results of other settings belong to other cases of the same names."""
     path = results / "settings.json"
     if not path.exists():
@@ -97,7 +99,7 @@ def write_results(results: Path, sessions: Sequence[Session], done: Batch) -> No
         write_atomically(path_of(results, scores[0]), json.dumps(record, indent=1))
 
 
-def write_tables(results: Path, settings: dict[str, int], target: Path) -> None:
+def write_tables(results: Path, settings: dict, target: Path) -> None:
     """The tables of all results as data files; what they come to is printed."""
     records = [json.loads(path.read_text()) for path in sorted(results.glob("cases/*.json"))]
     if not records:

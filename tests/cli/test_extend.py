@@ -14,7 +14,7 @@ from bsip_cli.artifacts import read_artifact, read_header, write_artifact
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.commands.show import shown
 from bsip_cli.config import load_config
-from bsip_cli.effects.added_mass import AddedMass
+from bsip_cli.effects.loads import AddedMass
 from bsip_cli.pipeline import STAGES
 from bsip_cli.running.runner import Outcome, perform
 from bsip_cli.running.unit import Unit

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from bsip_cli.body.anthropometry import regress
-from bsip_cli.diagnosis.error_model import Term, TrialErrors
+from bsip_cli.diagnosis.error_model import TrialErrors
 from bsip_cli.diagnosis.error_terms import error_terms, noise_of_instruments
 from bsip_cli.diagnosis.fault_model import FaultTrial, Session, session_of
 from bsip_cli.diagnosis.filtering import filter_of, slow
@@ -69,9 +69,7 @@ def errors_of(scene: Scene, name: str = "a") -> TrialErrors:
     low = filter_of(fewer, CUTOFF_HZ)
     residual = low.one(fewer.measured - fewer.predicted)
     terms = tuple(
-        Term(
-            one.term, one.target, one.scale, one.own, low(one.wrench), None, one.mixing, one.targets
-        )
+        replace(one, columns=low(one.columns))
         for one in error_terms(fewer, prior_root(), 0.005, 2.0)
     )
     noise = noise_of_instruments(fewer, low.reference_m, MARKER_NOISE_M, scene.rate_hz, CUTOFF_HZ)

@@ -15,14 +15,11 @@ from bsip_cli.diagnosis.corrected_wrench import (
     corrected_wrench,
     is_of_the_forces,
 )
-from bsip_cli.effects.added_mass import AddedMass
-from bsip_cli.effects.clock_drift import ClockDrift
-from bsip_cli.effects.delayed import Delay
+from bsip_cli.effects.clocks import ClockDrift, Delay, SyncOffset
 from bsip_cli.effects.effect import Effect
-from bsip_cli.effects.plate_rotation import PlateRotation
-from bsip_cli.effects.plate_zero import PlateZero
+from bsip_cli.effects.loads import AddedMass
+from bsip_cli.effects.plates import PlateRotation, PlateZero
 from bsip_cli.effects.scene import Scene
-from bsip_cli.effects.sync_offset import SyncOffset
 from tests.effects.moving_scene import moving
 
 

@@ -7,10 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.diagnosis.error_budget import COMPONENTS, Ground, budget_of, ground_of
+from bsip_cli.diagnosis.error_budget import (
+    COMPONENTS,
+    Ground,
+    Yardsticks,
+    budget_of,
+    ground_of,
+    large_errors,
+)
 from bsip_cli.diagnosis.error_model import TrialErrors, error_model
 from bsip_cli.diagnosis.filtering import filter_of, slow
-from bsip_cli.diagnosis.large_errors import Yardsticks, large_errors
 from bsip_cli.effects.scene import Scene
 from tests.diagnosis.noisy_trial import (
     CUTOFF_HZ,

@@ -9,9 +9,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bsip_cli.diagnosis.detection import limits_of
 from bsip_cli.diagnosis.evenness import plain, unevenness
-from bsip_cli.diagnosis.fault_scores import library_of
+from bsip_cli.diagnosis.fault_scores import library_of, limits_of
 from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
 from bsip_cli.diagnosis.held_out import held_out
@@ -169,7 +168,7 @@ def least_delay(times: float) -> float:
     found = search(trials, library, NAMED_FROM)
     (limit,) = (
         one.size
-        for one in limits_of(trials, library, found, NAMED_FROM)
+        for one in limits_of(trials, library, found.scores, NAMED_FROM)
         if one.place.candidate.effect.name == "sync_offset" and len(one.place.trials) == 2
     )
     return limit

@@ -29,7 +29,7 @@ from bsip_cli.diagnosis.shared_faults import (
     Information,
     with_known,
 )
-from bsip_cli.effects.plate_rotation import PlateRotation
+from bsip_cli.effects.plates import PlateRotation
 from tests.diagnosis.noisy_trial import errors_of, late, noisy
 from tests.effects.moving_scene import moving
 

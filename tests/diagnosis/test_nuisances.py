@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from bsip_cli.diagnosis.smoothing_bias import smoothing_bias
-from bsip_cli.diagnosis.wander import WANDER_M, wander
+from bsip_cli.diagnosis.error_terms import WANDER_M, smoothing_bias, wander
 from tests.effects.moving_scene import moving
 
 

@@ -7,10 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.diagnosis.body_patterns import Band, Drag, Spring
-from bsip_cli.diagnosis.channel_patterns import Bow, Curve, Lag, Play, Warming
-from bsip_cli.diagnosis.pattern import course_of
-from bsip_cli.diagnosis.patterns import PATTERNS
+from bsip_cli.diagnosis.patterns import (
+    PATTERNS,
+    Band,
+    Bow,
+    Curve,
+    Drag,
+    Lag,
+    Play,
+    Spring,
+    Warming,
+    course_of,
+)
 from bsip_cli.effects.scene import Scene, standing_place_m
 from tests.diagnosis.noisy_trial import part_of_moving
 from tests.effects.every_effect import assert_tangent_is_the_derivative, some, values_of

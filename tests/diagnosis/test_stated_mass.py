@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.diagnosis.scale_mass import agreed_share, weight_share
 from bsip_cli.diagnosis.stated_mass import (
     CLASS,
+    agreed_share,
     loaded_plate,
     stated_mass_findings,
+    weight_share,
 )
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.scene import Scene

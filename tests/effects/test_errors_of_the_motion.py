@@ -19,12 +19,8 @@ from bsip_cli.body.inertia import Inertia, from_phi
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
-from bsip_cli.effects.joint_centre import JointCentre
-from bsip_cli.effects.marker_course import step
-from bsip_cli.effects.marker_shift import MarkerShift
-from bsip_cli.effects.marker_swap import MarkerSwap
-from bsip_cli.effects.missing_joint import BELOW, MissingJoint
-from bsip_cli.effects.over_smoothing import CORNER, OverSmoothing
+from bsip_cli.effects.joints import BELOW, JointCentre, MissingJoint
+from bsip_cli.effects.markers import CORNER, MarkerShift, MarkerSwap, OverSmoothing, step
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.inverse_kinematics import solve_trial
 from bsip_cli.motion.jacobian import marker_residuals

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bsip_cli.effects.body import WobblingMass
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.scene import Scene
-from bsip_cli.effects.wobbling_mass import WobblingMass
 from bsip_cli.motion.jacobian import marker_residuals
 from tests.body.standing_person import standing
 from tests.effects.every_effect import assert_tangent_is_the_derivative, some, values_of

@@ -9,10 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.inertia import Inertia
-from bsip_cli.effects.camera_frame import CameraFrame
-from bsip_cli.effects.external_force import ExternalForce
-from bsip_cli.effects.implement import REACH_M, Implement, centre_m
-from bsip_cli.effects.object_handled import ObjectHandled
+from bsip_cli.effects.frames import CameraFrame
+from bsip_cli.effects.loads import CENTRE_M, ExternalForce, Implement, ObjectHandled, centre_m
 from bsip_cli.effects.scene import Scene
 from tests.effects.moving_scene import moving, rms, standing_still
 
@@ -44,7 +42,7 @@ def test_the_plates_do_not_tell_an_implements_shape():
     others = Implement().alike(scene, "hand_l", CLUB)
     np.testing.assert_allclose(others[0], CLUB)
     centres = others[:, 1] / others[:, 4]
-    assert centres.min() == pytest.approx(0.5) and centres.max() == pytest.approx(REACH_M)
+    assert centres.min() == pytest.approx(0.5) and centres.max() == pytest.approx(CENTRE_M)
     place = scene.point("hand_l", scene.centre_of("hand_l"))
     for other in others:
         mass = other[0] / (other[1] / other[4]) - 1 / 3

@@ -11,12 +11,8 @@ from scipy.integrate import solve_ivp
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import Inertia, from_phi
 from bsip_cli.dynamics.joint_moments import Ground, Spread, joint_loads
-from bsip_cli.effects.added_mass import AddedMass
-from bsip_cli.effects.breathing import OUTWARD, Breathing
-from bsip_cli.effects.released_object import ReleasedObject
-from bsip_cli.effects.segment_inertia import SegmentInertia
-from bsip_cli.effects.unmeasured_contact import RAMP_S, UnmeasuredContact
-from bsip_cli.effects.wobbling_mass import WobblingMass
+from bsip_cli.effects.body import OUTWARD, Breathing, SegmentInertia, WobblingMass
+from bsip_cli.effects.loads import RAMP_S, AddedMass, ReleasedObject, UnmeasuredContact
 from tests.effects.moving_scene import RATE_HZ, moving, rms, standing_still
 
 G = 9.80665

@@ -13,17 +13,17 @@ from scipy.spatial.transform import Rotation
 from bsip_cli.dynamics.cop import centre_of_pressure
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
-from bsip_cli.effects.clock_drift import ClockDrift
-from bsip_cli.effects.gravity_tilt import GravityTilt
-from bsip_cli.effects.joint_change import joint_change
-from bsip_cli.effects.plate_crosstalk import PlateCrosstalk
-from bsip_cli.effects.plate_drift import PlateDrift
-from bsip_cli.effects.plate_gain import PlateGain
-from bsip_cli.effects.plate_rotation import PlateRotation
-from bsip_cli.effects.plate_translation import PlateTranslation
-from bsip_cli.effects.plate_zero import PlateZero
+from bsip_cli.effects.clocks import ClockDrift, SyncOffset, joint_change
+from bsip_cli.effects.frames import GravityTilt
+from bsip_cli.effects.plates import (
+    PlateCrosstalk,
+    PlateDrift,
+    PlateGain,
+    PlateRotation,
+    PlateTranslation,
+    PlateZero,
+)
 from bsip_cli.effects.scene import Plate, Scene
-from bsip_cli.effects.sync_offset import SyncOffset
 from tests.body.standing_person import Swing, standing
 from tests.effects.moving_scene import MASS_KG, RATE_HZ, moving, phi, rms, scene_of, standing_still
 

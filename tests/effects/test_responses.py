@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
-from bsip_cli.effects.marker_course import during, step
+from bsip_cli.effects.markers import during, step
 from bsip_cli.motion.inverse_kinematics import solve_trial
 from bsip_cli.motion.jacobian import marker_residuals
 from bsip_cli.motion.pose_response import marker_trust, pose_response, pose_responses

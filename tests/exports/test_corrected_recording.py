@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -29,7 +29,7 @@ from bsip_cli.running.unit import file_hash
 from bsip_cli.simulate.inject import inject_study
 from bsip_cli.simulate.options import Asked, Laboratory, Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
-from bsip_cli.stages.diagnosis_rows import nothing
+from bsip_cli.stages.diagnosis_rows import nothing, rows_of
 from tests.exports.test_export_command import NOTES, Results, write_person
 
 STEM, STATIC = "sub-01_task-squat_run-1", "sub-01_task-static"
@@ -81,11 +81,12 @@ class Study:
         """``alike``: effect and target of what cannot be told from the causes."""
         verdict = "ambiguous" if alike else "named"
         group = [*((effect, target) for effect, target, _ in causes), *alike]
-        rows = [
-            nothing(0.01, (STEM,)) | {"effect": effect, "target": target, "class_id": "A"}
+        none = nothing(0.01, (STEM,))
+        findings = (
+            replace(none, effect=effect, target=target, class_id="A")
             for effect, target in (group if alike else ())
-        ]
-        table = pd.DataFrame(rows) if rows else empty_table("overall-diagnosis")
+        )
+        table = rows_of(tuple(findings), ())
         facts = [
             {
                 "effect": effect,

@@ -1,0 +1,295 @@
+"""Force plates that show something else than what is on them.
+
+A channel, as the diagnosis names it ("1 fz"), is a component of the force or moment *on the body*
+about the plate's sensor, in the plate's own axes turned about x until z points up. So a person who
+stands reads a positive fz, and an offset of +10 N in fz makes everybody seem 1 kg heavier.
+"""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.scene import Plate, Scene
+
+CHANNELS = ("fx", "fy", "fz", "mx", "my", "mz")
+ALL = "all"  # every plate alike: one amplifier, or one lab whose origin is not where it is said
+
+
+def _words(x: str, y: str) -> dict[str, str]:
+    """The channels as people say them, along axes of these names."""
+    forces = (f"the horizontal force along {axis} axis" for axis in (x, y))
+    moments = (f"the moment about {axis} axis" for axis in (x, y))
+    words = (*forces, "the vertical force", *moments, "the moment about the vertical")
+    return dict(zip(CHANNELS, words, strict=True))
+
+
+OF_A_PLATE = _words("the plate's x", "the plate's y")
+OF_THE_LAB = _words("the lab's X", "the lab's Y")
+
+
+def unit_of(channel: str) -> str:
+    """``N`` of a force, ``N m`` of a moment."""
+    return "N" if channel.startswith("f") else "N m"
+
+
+def plate_of(scene: Scene, name: str) -> Plate:
+    return next(plate for plate in scene.plates if plate.name == name)
+
+
+def loaded_plates(scene: Scene, least_N: float = 50.0) -> tuple[str, ...]:
+    """Names of the plates that carry something in valid frames."""
+    return tuple(
+        plate.name
+        for plate in scene.plates
+        if scene.valid.any() and np.nanmax(plate.wrench[scene.valid, 2]) > least_N
+    )
+
+
+def plates_of(scene: Scene, name: str) -> tuple[Plate, ...]:
+    """The plate of a name; those that carry something for ``all``."""
+    names = loaded_plates(scene) if name == ALL else (name,)
+    return tuple(plate_of(scene, one) for one in names)
+
+
+def plates_called(name: str) -> str:
+    """``plate 1`` or ``all plates``."""
+    return "all plates" if name == ALL else f"plate {name}"
+
+
+def plates_that(name: str, does: str, do: str) -> str:
+    """``plate 1 does`` or ``all plates do``."""
+    return f"{plates_called(name)} {do if name == ALL else does}"
+
+
+def in_channel(plate: Plate, channel: int, course: np.ndarray | float) -> np.ndarray:
+    """(N, 6) wrench about the world's origin of a course (N,) that one channel shows."""
+    reading = np.zeros((len(plate.wrench), 6))
+    reading[:, channel] = course
+    axes = plate.axes()
+    force = reading[:, :3] @ axes
+    return np.hstack([force, reading[:, 3:] @ axes + np.cross(plate.moments_about_m(), force)])
+
+
+def shown(plate: Plate, channel: int) -> np.ndarray:
+    """(N,) what a channel shows, 0 where there is no reading."""
+    wrench, axes = np.nan_to_num(plate.wrench), plate.axes()
+    moment = wrench[:, 3:] - np.cross(plate.moments_about_m(), wrench[:, :3])
+    return np.hstack([wrench[:, :3] @ axes.T, moment @ axes.T])[:, channel]
+
+
+class OfPlates(Effect):
+    """Of one plate that carries something or, where they are several, of all of them together.
+
+    ``channels`` : in which channels of it; none where it is the plate's as a whole.
+    """
+
+    of_the_lab = True
+    of_the_plates = True
+    channels: tuple[str, ...] = ()
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        loaded = loaded_plates(scene)
+        plates = (*loaded, ALL) if len(loaded) > 1 else loaded
+        return tuple(f"{p} {c}".strip() for p in plates for c in self.channels or ("",))
+
+
+class OwnCourse(OfPlates):
+    """A channel of one plate shows a course too much, whatever it measures."""
+
+    channels = CHANNELS
+
+    def targets(self, scene: Scene) -> tuple[str, ...]:
+        return tuple(f"{p} {c}" for p in loaded_plates(scene) for c in self.channels)
+
+    def course(self, scene: Scene) -> np.ndarray:
+        """(N,) for a size of one."""
+        return np.ones(len(scene.times_s))
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        name, channel = target.rsplit(" ", 1)
+        course = values[0] * self.course(scene)
+        return in_channel(plate_of(scene, name), CHANNELS.index(channel), course)
+
+    def _reads(self, target: str) -> tuple[str, str]:
+        """Whose channel it is in words, and its unit."""
+        name, channel = target.rsplit(" ", 1)
+        return f"plate {name} reads {OF_A_PLATE[channel]}", unit_of(channel)
+
+
+class PlateZero(OwnCourse):
+    """A force plate's channel with a constant offset."""
+
+    name = "plate_zero"
+    looks = "a constant difference in one channel, with and without load"
+    remedy = "step off the plate for five seconds"
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        _, unit = self._reads(target)
+        bounds = (-200.0, 200.0, 10.0) if unit == "N" else (-100.0, 100.0, 5.0)
+        return (Parameter("offset", unit, *bounds),)
+
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+        reads, unit = self._reads(target)
+        return f"{reads} with a constant offset of {values[0]:+.1f} {unit}"
+
+
+class PlateDrift(OwnCourse):
+    """A force plate's channel that drifts through the trial.
+
+    Linear, zero where the trial begins.
+    """
+
+    name = "plate_drift"
+    of_the_lab = False
+    looks = "a difference in one channel that grows evenly with time"
+    remedy = "step off the plate at the beginning and at the end"
+
+    def parameters(self, scene: Scene, target: str) -> tuple[Parameter, ...]:
+        (_, unit), duration = self._reads(target), float(np.ptp(scene.times_s))
+        most, typical = (20.0, 15.0) if unit == "N" else (10.0, 7.0)
+        return (Parameter("drift", f"{unit}/s", -most, most, typical / duration),)
+
+    def course(self, scene: Scene) -> np.ndarray:
+        return scene.times_s - scene.times_s[0]
+
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+        reads, unit = self._reads(target)
+        return f"{reads} with a drift of {values[0]:+.2f} {unit} per second"
+
+
+class PlateGain(OfPlates):
+    """Force plates whose forces are scaled wrongly.
+
+    One force channel, in the own axes of a plate or of all, shows 1 + gain times the truth.
+    """
+
+    name = "plate_gain"
+    # A quarter of 0.04 is not told: plates of one lab differ by some tenths of a percent.
+    numbers = (Parameter("gain", "1", -0.15, 0.15, 0.04),)
+    channels = CHANNELS[:3]
+    looks = (
+        "forces of one plate or channel are too large or too small in proportion; in "
+        "stance the mass is off by the same part"
+    )
+    remedy = "weigh the person on a scale; lay a known weight on the plate"
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        name, channel = target.rsplit(" ", 1)
+        share, k = values[0] / (1 + values[0]), CHANNELS.index(channel)
+        parts = [in_channel(p, k, share * shown(p, k)) for p in plates_of(scene, name)]
+        return np.sum(parts, axis=0)
+
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+        name, channel = target.rsplit(" ", 1)
+        order = "large" if values[0] > 0 else "small"
+        reads = plates_that(name, "reads", "read")
+        return f"{reads} {OF_A_PLATE[channel]} {100 * abs(values[0]):.1f} % too {order}"
+
+
+class PlateCrosstalk(OfPlates):
+    """A channel of a force plate that leaks into another.
+
+    A force channel also shows a part of another one, in one plate or, with the same amplifiers
+    and no calibration, in all.
+    """
+
+    name = "plate_crosstalk"
+    # Makers state 1 to 3 %; what leaks more than 8 is no crosstalk.
+    numbers = (Parameter("coefficient", "1", -0.08, 0.08, 0.02),)
+    channels = tuple(f"{a}>{b}" for a, b in permutations(CHANNELS[:3], 2))
+    looks = (
+        "one channel repeats another one, smaller: a horizontal force or a moment with "
+        "the shape of the vertical force"
+    )
+    remedy = "load the plate with a weight at several places"
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        name, pair = target.rsplit(" ", 1)
+        source, sink = (CHANNELS.index(c) for c in pair.split(">"))
+        leaks = [in_channel(p, sink, shown(p, source)) for p in plates_of(scene, name)]
+        return values[0] * np.sum(leaks, axis=0)
+
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+        name, pair = target.rsplit(" ", 1)
+        source, sink = (OF_A_PLATE[c] for c in pair.split(">"))
+        return f"{100 * values[0]:+.1f} % of {source} of {plates_called(name)} leaks into {sink}"
+
+
+class PlateRotation(OfPlates):
+    """Force plates that are turned against what the file says.
+
+    The plate is truly turned about its centre, or all plates about the middle of their centres:
+    measured are the true vectors turned back.
+    """
+
+    name = "plate_rotation"
+    numbers = tuple(Parameter(n, "rad", -0.5, 0.5, 0.02) for n in ("tilt_x", "tilt_y", "yaw"))
+    looks = (
+        "horizontal forces that point aside in proportion to the force on the plate; with"
+        " a tilt, a horizontal force in quiet stance"
+    )
+    remedy = "stand on the plate, push forwards and sideways, then turn by 90 degrees and repeat"
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        plates = plates_of(scene, target)
+        wrench = np.sum([np.nan_to_num(plate.wrench) for plate in plates], axis=0)
+        centre = np.mean([plate.centre_m() for plate in plates], axis=0)
+        force = wrench[:, :3]
+        moment = wrench[:, 3:] - np.cross(centre, force)
+        true = Rotation.from_rotvec(values)
+        dforce, dmoment = force - true.apply(force), moment - true.apply(moment)
+        return np.hstack([dforce, dmoment + np.cross(centre, dforce)])
+
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+        x, y, yaw = np.degrees(values)
+        turned = f"turned by {yaw:+.1f} degrees about the vertical"
+        tilted = f"tilted by {np.hypot(x, y):.1f} degrees"
+        # A tenth of a degree is not worth a word.
+        said = (
+            [turned] if np.hypot(x, y) < 0.1 else [tilted] if abs(yaw) < 0.1 else [turned, tilted]
+        )
+        return f"{plates_that(target, 'is', 'are')} {' and '.join(said)}"
+
+
+class PlateTranslation(OfPlates):
+    """Force plates that lie elsewhere than the file says.
+
+    The plate, or every plate, truly lies at its stated place plus the shift: the measured moment
+    lacks shift x force.
+
+    Feet deform where they press, and a body whose mass lies ahead of the model's looks alike; the
+    height shows only where forces point sideways, and there arms heavier than the model's do. Far
+    away is a plate that was moved; its height is off by the depth of its sensors, if by anything.
+    """
+
+    name = "plate_translation"
+    numbers = (
+        Parameter("x", "m", -0.3, 0.3, 0.02, known_to=0.001),
+        Parameter("y", "m", -0.3, 0.3, 0.02, known_to=0.001),
+        Parameter("z", "m", -0.1, 0.1, 0.02, known_to=0.015),
+    )
+    looks = (
+        "the measured centre of pressure lies beside the simulated one by the same "
+        "distance wherever the person stands; forces agree"
+    )
+    remedy = "stand on the plate with both feet, then turn by 90 degrees and stand again"
+
+    def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
+        loads = [np.nan_to_num(plate.wrench[:, :3]) for plate in plates_of(scene, target)]
+        force = np.sum(loads, axis=0)
+        return np.hstack([np.zeros_like(force), -np.cross(values, force)])
+
+    def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
+        """The height if it is more than 20 mm, by which bodies of another table seem to be higher
+        or lower, and more than it is sideways; or three times as much."""
+        x, y, z = 1000 * values
+        sideways = np.hypot(x, y)
+        height = f", height {z:+.0f} mm" if abs(z) > min(60.0, max(20.0, sideways)) else ""
+        return (
+            f"{plates_that(target, 'lies', 'lie')} {sideways:.0f} mm sideways from where the "
+            f"file says (lab X {x:+.0f} mm, Y {y:+.0f} mm{height})"
+        )

@@ -51,6 +51,10 @@ _CONFIG = click.option(
 _JOBS = click.option(
     "--jobs", default=1, show_default=True, type=click.IntRange(1), help="Participants at once."
 )
+_VERBOSE = click.option(
+    "-v", "--verbose", is_flag=True, help="Also what each unit reads and how long it takes."
+)
+_QUIET = click.option("-q", "--quiet", is_flag=True, help="Only findings and errors.")
 
 
 def _stage_command(name: str, summary: str) -> click.Command:
@@ -66,6 +70,8 @@ def _stage_command(name: str, summary: str) -> click.Command:
         is_flag=True,
         help="Hash every file again, also those whose size and times have not changed.",
     )
+    @_VERBOSE
+    @_QUIET
     def command(study, out, chosen, config_file, **options):
         from bsip_cli.running.session import run_session
 
@@ -97,14 +103,16 @@ for _name in ("report", "run"):
 @_PARTICIPANT
 @_CONFIG
 @_JOBS
-def check(study, chosen, config_file, jobs):
+@_VERBOSE
+@_QUIET
+def check(study, chosen, config_file, jobs, **options):
     """Say what each recording of a study is taken for, and what fails; nothing is kept.
 
     Exit codes: those of `bsip ingest`.
     """
     from bsip_cli.commands.check import check_study
 
-    return check_study(study, chosen, config_file, jobs)
+    return check_study(study, chosen, config_file, jobs, **options)
 
 
 @cli.command()

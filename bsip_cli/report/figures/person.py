@@ -48,7 +48,10 @@ def stick_figure(pose: Pose, trial: str) -> Figure:
         arrow = {"color": GREEN, "lw": 2.2, "arrowstyle": "-|>", "mutation_scale": 12}
         axes.annotate("", tuple(tip), tuple(foot), arrowprops=arrow)
         label = axes.annotate(
-            f"{np.linalg.norm(pose.force_N):.0f} N", tuple(tip), (6, 2), textcoords="offset points"
+            f"ground force\n{np.linalg.norm(pose.force_N):.0f} N",
+            tuple(tip),
+            (6, -4),
+            textcoords="offset points",
         )
         label.set(color=GREEN, fontsize=8.5, bbox={"fc": "white", "ec": "none", "pad": 1.0})
         points += [foot[None], tip[None]]

@@ -36,7 +36,8 @@ GLOSSARY = (
 def participant_document(record: ParticipantRecord) -> Document:
     return Document(
         title=f"{record.id}: does the motion explain the ground forces?",
-        subtitle="Ground forces computed from the motion, compared with the force plates.",
+        subtitle="The force on the ground as computed from the markers' motion, beside what the force "
+        "plates measured.",
         front=front(record),
         sections=(
             diagnosis.section(record),

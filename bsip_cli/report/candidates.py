@@ -184,7 +184,6 @@ _EXAMPLES = (  # effects whose limits are told in the sentence
     ("sync_offset", "", "a delay of the forces"),
     ("plate_translation", "", "a plate shifted"),
     ("plate_gain", "fz", "vertical forces misread"),
-    ("added_mass", "hand_l", "a mass on the left hand"),
 )
 OF_THE_WEIGHT = "W"  # group of what quiet standing tells
 _BY = ("plate_translation", "plate_gain")  # shifted *by* less than, but a delay *under*

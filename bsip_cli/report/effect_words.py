@@ -28,7 +28,7 @@ class Number(Protocol):
 _FORCES = (
     "The measured forces are not the true ones, and everything identified from them inherits the "
     "error.",
-    "Correct it in the lab, or in copies of the files (bsip export --what recording), and run again.",
+    "Correct it in the lab, or let bsip write corrected files (bsip export), and run again.",
 )
 _CLOCKS = (
     "Forces and markers are not of the same moments, and everything identified from them inherits "
@@ -57,7 +57,7 @@ _PERSON = (
 _LOAD = (
     "A load that is not stated ends up in the masses of the body where its recording identifies "
     "them, and in the errors of the forces where it judges them.",
-    "State the load in study.toml ([[loads]]), or record without it, and run again.",
+    "If it belongs to the task, state its mass (tutorial: loads) and run again.",
 )
 WEIGHT = (
     "Either the stated mass is wrong or what the plates measure. Only if a scale confirms the stated "
@@ -70,7 +70,7 @@ _CONTACT = (
 )
 _UNNAMED = (
     "Neither the forces nor the identified parameters should be trusted further than the report says.",
-    "Look below at when the error comes and goes, and at the recording there.",
+    "See below, under errors, when it comes and goes, and look at the recording there.",
 )
 
 
@@ -117,6 +117,10 @@ EFFECT_WORDS = {
     "object_handled": EffectWords("object picked up and put down", *_LOAD),
     "unexplained": EffectWords("something without a name", *_UNNAMED),
 }
+
+
+OBJECTS = ("released_object", "implement", "object_handled")
+"""What a task may be about: found, and nothing wrong with the recordings."""
 
 
 def effect_title(effect: str) -> str:
@@ -289,8 +293,9 @@ def beside_usual(effect: str, size: Number) -> str:
     usual = USUAL.get(effect)
     if usual is None or size.name not in usual.parameters or size.unit != usual.unit:
         return ""
-    how = "smaller than usual" if abs(size.value) < usual.least else "a usual size"
-    how = "larger than usual" if abs(size.value) > usual.most else how
+    shown = float(f"{abs(size.value):.2g}")  # as it is read
+    how = "smaller than usual" if shown < usual.least else "a usual size"
+    how = "larger than usual" if shown > usual.most else how
     return f", {how} ({usual_words(effect)})"
 
 

@@ -24,6 +24,7 @@ from bsip_cli.report.candidates import (
     Candidate,
     candidates_of,
     causes_of,
+    is_large,
     limits_of,
     limits_sentence,
     looked_at,
@@ -31,8 +32,12 @@ from bsip_cli.report.candidates import (
 from bsip_cli.report.effect_words import separating_recording
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.sticks import Motion, Pose, poses_of
-from bsip_cli.report.verdict import cause_line, consequences, light_of
-from bsip_cli.report.words import capital, count, listing, number, signed
+from bsip_cli.report.verdict import (
+    cause_line,
+    consequences,
+    light_of,
+)
+from bsip_cli.report.words import capital, count, listing, number
 from bsip_cli.report.yardsticks import (
     COP_LIMIT_M,
     FORCE_LIMIT_PERCENT,
@@ -46,8 +51,21 @@ from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 
 _SEXES = {"M": "man", "F": "woman"}
-_MOST = 3  # causes, and things to do
+_MOST = 2  # causes, and things to do
+_PAIRS = ("om", "rm_mass", "om_rm_mass")
 _POSES = 8  # among which the one is chosen that is shown
+_COLOURS = {
+    "fine": "✓: no fault, no large error.",
+    "cause": "▲: faults, but no large error.",
+    "large": "■: an error is large, explained or not.",
+    "inconclusive": "?: nothing can be said.",
+}
+_USABLE = {
+    "fine": "The data may be used: nothing needs to be corrected.",
+    "cause": "The data may be used once what was found is corrected or stated.",
+    "large": "Do not use joint forces or parameters before the large error is understood.",
+    "inconclusive": "Whether the data may be used cannot be said.",
+}
 _WORDS = {
     OM: "OM, the segment parameters identified from this person's movement",
     RM_MASS: "RM+mass, the segment parameters of a table, all masses times one number",
@@ -63,11 +81,12 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         Terms((*who(record),)),
         Heading("Is anything wrong?"),
         light,
+        Paragraph(_COLOURS[light.state], "note"),
         *_causes(record),
         *budget_bar(record),
         Heading("How large are the errors?"),
         Scales(scales(record)),
-        Paragraph(SOURCES, "note"),
+        Paragraph(f"Root mean square, with {record.use()}. {SOURCES}", "note"),
         *_sure(record),
         Heading("Which parameters to use"),
         Paragraph(use_sentence(record)),
@@ -100,14 +119,15 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     mass, plates = float(facts["mass_kg"]), float(facts["plate_mass_kg"])
     person = f"{_SEXES.get(facts['sex'], 'sex not stated')}, {number(mass, 1)} kg ({facts['mass_source']}"
     if np.isfinite(plates) and facts["mass_source"] != "plates":
-        person += f"; the plates say {signed(100.0 * (plates / mass - 1.0), 1)} %"
+        person += f"; the plates say {number(plates, 1)} kg"
     yield "Person", f"{record.id}, {person}), {number(facts['height_m'], 2)} m"
-    tasks = list(dict.fromkeys(trial.task for trial in record.trials))
+    names = [trial.task for trial in record.trials]
+    tasks = [f"{names.count(name)} {name}" for name in dict.fromkeys(names)]
     dates = sorted(trial.file_date for trial in record.trials if trial.file_date)
     saved = f"; files of {' to '.join(dict.fromkeys((dates[0], dates[-1])))}" if dates else ""
-    yield "Recordings", f"{len(record.trials)}: {listing(tasks)}{saved}"
+    yield "Recordings", f"{listing(tasks)}{saved}"
     used = listing([trial.label for trial in record.identification_trials()])
-    yield "Identified from", used
+    yield "Parameters from", used
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
     yield "Software", f"bsip {', '.join(versions)}"
     if record.facts["mass_note"]:
@@ -160,7 +180,7 @@ def _causes(record: ParticipantRecord) -> Iterator[Block]:
     if lines:
         yield Numbered(lines[:_MOST])
     if len(lines) > _MOST:
-        yield Paragraph(f"{len(lines) - _MOST} more below.", "note")
+        yield Paragraph(f'{len(lines) - _MOST} more below, under "How sure is that?".', "note")
 
 
 def _sure(record: ParticipantRecord) -> Iterator[Block]:
@@ -168,9 +188,14 @@ def _sure(record: ParticipantRecord) -> Iterator[Block]:
     if record.diagnosis is None or record.detection is None:
         return
     limits = limits_sentence(limits_of(record.detection, record.diagnosis))
-    if limits:
-        yield Heading("How sure is this?")
-        yield Paragraph(limits)
+    causes = _found(record)
+    said = "Nothing was found that is more probable than not."
+    if causes and is_large(causes[0]):
+        said = "That the error is there is certain, its cause is not."
+    elif causes:
+        said = "The probabilities above allow for ordinary errors."
+    yield Heading("How sure is this?")
+    yield Paragraph(f"{said} {limits}".rstrip())
 
 
 def budget_bar(record: ParticipantRecord) -> tuple[Block, ...]:
@@ -181,8 +206,8 @@ def budget_bar(record: ParticipantRecord) -> tuple[Block, ...]:
         return ()
     return (
         Bar(
-            "Where the error comes from, with the masses of a table (RM)",
-            tuple((piece.label, piece.share) for piece in pieces),
+            "What makes the error, with a table's masses (RM)",
+            tuple((piece.label, piece.share) for piece in pieces if abs(piece.share) >= 0.5),
             "Shares of the squared error of vertical force and centre of pressure.",
         ),
     )
@@ -212,19 +237,19 @@ def use_sentence(record: ParticipantRecord) -> str:
         return f"Use {_WORDS[RM]}: nothing was compared."
     first = record.choice.iloc[0]
     said = f"Use {_WORDS[str(first['use'])]}"
-    rivals = {OM: ("om", "the table's (RM)"), RM_MASS: ("rm_mass", "the table's own (RM)")}
-    name, other = rivals.get(str(first["use"]), ("om", ""))
-    change = _change(float(first[f"ratio_{name}"]), float(first[f"log_error_{name}"]))
-    if first["use"] == RM:
-        said += f": identified ones (OM) err by {change}, which is no sure gain"
-    else:
-        said += f": they err by {change} than {other}"
+    compared = {
+        name: _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
+    }
+    said += f". OM errs {compared['om']} than RM, {compared['om_rm_mass']} than RM+mass"
+    if first["use"] == RM_MASS:
+        said += f", RM+mass {compared['rm_mass']} than RM"
     judging = count(int(first["trials"]), "recording")
     where = {
-        "whole_trials": f" in {judging} not used to identify them",
+        "whole_trials": f" in {judging} not used to identify it",
         "held_out": f" in seconds of {judging} that were kept apart",
     }
-    said += f"{where.get(str(first['data']), '')}."
+    unsure = "" if first["use"] == OM else ": no sure gain by OM"
+    said += f"{where.get(str(first['data']), '')}{unsure}."
     others = [
         f"{method} for {listing(list(rows['movement']))}"
         for method, rows in record.choice.iloc[1:].groupby("use")
@@ -253,24 +278,23 @@ def _change(ratio: float, log_error: float) -> str:
 
 
 def to_do(record: ParticipantRecord, light: Light) -> list[str]:
-    """At most three things, the most urgent first."""
+    """Whether the data may be used, and at most two things to do."""
     causes = _found(record)
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
     said += [
-        f"To distinguish those of {k}: {_first_step(cause)}."
+        f"To find out what is behind fault {k}: {_first_step(cause)}."
         for k, cause in enumerate(causes[:_MOST], start=1)
         if len(cause) > 1
     ][:1]
+    said = [_USABLE[light.state], *said]
     said += consequences(causes[:_MOST], only_actions=True)
     large = [one for one, value in measured_of(record) if one.words(value) == "large"]
     if light.state == "inconclusive" and not large:
         said.append(
             "Record a movement in which every foot that touches the ground stands on a plate."
         )
-    if light.state == "fine":
-        said.append("Nothing needs to be corrected: use forces and parameters as they are.")
     said += [text for one in large[:1] if (text := _where_large(record, one))]
-    return [*said[:_MOST]] if len(said) > 1 else [*said, *advice(record)][:_MOST]
+    return said[: _MOST + 1] if len(said) > 1 else [*said, *advice(record)]
 
 
 def _first_step(cause: Sequence[Candidate]) -> str:
@@ -301,4 +325,4 @@ def advice(record: ParticipantRecord) -> list[str]:
     rows = table[table["quantity"] == "next"]
     if rows.empty:
         return []
-    return [f"To know the parameters better, record: {rows['text'].iloc[0]}."]
+    return [f"Optional, to know the parameters better, record: {rows['text'].iloc[0]}."]

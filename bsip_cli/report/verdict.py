@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.report.blocks import Light, State
-from bsip_cli.report.budget import budget_sentences, fault_share
+from bsip_cli.report.blocks import Light
+from bsip_cli.report.budget import REST, UNKNOWN, budget_sentences, fault_share, overall_pieces
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
     UNNAMED,
@@ -22,7 +23,14 @@ from bsip_cli.report.candidates import (
     limits_sentence,
     looked_at,
 )
-from bsip_cli.report.effect_words import EFFECT_WORDS, WEIGHT, beside_usual, separating_recording
+from bsip_cli.report.effect_words import (
+    EFFECT_WORDS,
+    OBJECTS,
+    WEIGHT,
+    beside_usual,
+    effect_title,
+    separating_recording,
+)
 from bsip_cli.report.words import (
     capital,
     component_label,
@@ -45,8 +53,9 @@ _OF_THE_LAB = (
     "It is a matter of the laboratory: whoever else was recorded there has it too, if it is there."
 )
 _NOTHING = "Nothing is wrong above the noise."
-_BESIDE = "beside all that is named, and ordinary errors of ordinary size, "
-_LARGE = "Large error, cause unknown"
+_UNEXPLAINED = (
+    "large error, cause unknown: beside all that is named, and ordinary errors of ordinary size, "
+)
 NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 
 
@@ -141,43 +150,57 @@ def light_of(
         return Light("inconclusive", "Inconclusive", f"{capital(unsure[0].what())}.")
     looked = count(len(looked_at(detection, diagnosis)), "recording")
     how_large = f"Large: {listing(large)}." if large else ""
+    found = f"{count(len(causes), 'fault')} found" if causes else ""
+    if large or any(is_large(cause) for cause in causes):
+        nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
+        title = "; ".join(filter(None, (f"Large error, {mostly(budget)}", found)))
+        return Light("large", title, " ".join(filter(None, (how_large, "" if causes else nothing))))
     if not causes:
         nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
-        if large:
-            return Light("large", _LARGE, f"{how_large} {nothing}")
-        return Light("fine", "Fine: nothing is wrong above the noise", nothing)
-    unexplained = [c for c in causes if is_large(c)]
-    state: State = "large" if unexplained else "cause"
-    title = headline(diagnosis).removesuffix(".")
-    if unexplained:
-        others = len(causes) - len(unexplained)
-        beside = f"; {count(others, 'other fault')} found beside it" if others else ""
-        title = f"{_LARGE}{beside}"
+        return Light("fine", "Fine: no fault found, errors of ordinary size", nothing)
     share = np.nan if budget is None else fault_share(budget)
     size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
-    named = "" if np.isnan(share) else f"Faults with a name make {size} of the simulation's error."
-    said = (named or f"Searched: {looked}.", how_large)
-    return Light(state, title, " ".join(filter(None, said)))
+    named = "" if np.isnan(share) else f"What was found makes {size} of the simulation's error."
+    title = headline(diagnosis).removesuffix(".")
+    effects = [one.effect for cause in causes for one in cause]
+    if set(effects) <= set(OBJECTS):
+        title = f"Explained by: {listing([effect_title(e) for e in dict.fromkeys(effects)])}"
+    return Light("cause", title, named or f"Searched: {looked}.")
+
+
+def mostly(budget: pd.DataFrame | None) -> str:
+    """Of a large error, what makes the largest part of it: ``mostly soft tissue (56 %)``."""
+    parts = () if budget is None or budget.empty else overall_pieces(budget)
+    most = max(parts, key=lambda one: one.share, default=None)
+    if most is None or most.label in (UNKNOWN, REST):
+        return "cause unknown"
+    return f"mostly {most.label} ({number(most.share, 0)} %)"
 
 
 def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     """What, how large beside what laboratories meet, where and how sure, as short as possible."""
     sure = probability_words(probability_of(cause))
-    sure = f"; probability {sure}" if sure else ""
     if len(cause) > 1:
         others = len(cause) - _MOST_MEMBERS
-        shown = [one.label for one in cause[:_MOST_MEMBERS]] + [f"{others} more"] * (others > 0)
-        members = " or ".join(shown)
-        return f"One of {len(cause)} that cannot be distinguished here: {members}{sure}."
+        shown = [_short(one) for one in cause[:_MOST_MEMBERS]]
+        members = "; or ".join([*shown, *([f"{others} more"] if others > 0 else [])])
+        return f"One of {len(cause)} that cannot be distinguished: {members} ({sure} that one is)."
     (one,) = cause
     main = one.main_number()
     usual = beside_usual(one.effect, main) if main else ""
     some = _MOST_NAMED < len(one.trials) < len(everywhere)
     where = where_seen(one.trials, everywhere)
     where = f"in {len(one.trials)} of {len(everywhere)} recordings" if some else where
-    what = one.what().partition("; ")[0] if is_large(cause) else one.told(remarks=False)
-    what = what.replace(_BESIDE, "")
-    return f"{capital(what)}, {where}{usual}{sure}."
+    if is_large(cause):
+        error = one.what().partition("; ")[0].removeprefix(_UNEXPLAINED)
+        return f"Left unexplained: {error} (root mean square), {where}."
+    sure = f"; probability {sure}" if sure else ""
+    return f"{capital(one.told(remarks=False))}, {where}{usual}{sure}."
+
+
+def _short(one: Candidate) -> str:
+    """The beginning of its sentence."""
+    return re.split(r"[,:;] | \(", one.what())[0]
 
 
 def _seen_in(everywhere: Sequence[str]) -> tuple[str, ...]:

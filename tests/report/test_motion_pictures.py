@@ -33,8 +33,9 @@ def test_the_figure_shows_markers_force_and_when(pose):
     (markers,) = axes.lines
     assert len(markers.get_xdata()) == 4
     texts = [text.get_text() for text in axes.texts]
-    assert "ground force\n700 N" in texts
-    assert r"squat \$1\$, 0.25 s" in texts
+    said = texts[-1]
+    assert "measured ground force, 700 N" in said
+    assert said.startswith(r"squat \$1\$, 0.25 s")
     unmeasured = replace(pose, force_N=np.full(3, np.nan))
     (without,) = stick_figure(unmeasured, "squat").axes
     assert not [text for text in without.texts if "ground force" in text.get_text()]

@@ -126,18 +126,18 @@ def test_second_run_gives_the_same_bytes(reports):
 
 
 def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
-    assert f"sub-01, man, {MASS_KG} kg (participants.tsv; the plates say +0.5 %), 1.63 m" in first
+    assert f"sub-01, man, {MASS_KG} kg (participants.tsv; the plates say 63.1 kg), 1.63 m" in first
     assert "Something is wrong: 1 fault named and 1 narrowed down to several" in first
     assert (
         "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
         "both recordings, a usual size (1 to 4°); probability 99.5 %." in first
     )
-    assert "One of 2 that cannot be distinguished here" in first
+    assert "One of 2 that cannot be distinguished: " in first
     assert "the table's segment parameters 70 %" in first
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm , good" in first
     assert "Use OM, the segment parameters identified from this person's movement" in first
-    assert "they err by 34 to 46 % less than the table's (RM) in 2 recordings not used to" in first
+    assert "OM errs 34 to 46 % less than RM," in first
     assert "But RM for basketball." in first
     assert "Correct it in the lab, or in copies of the files" in first
 
@@ -166,9 +166,10 @@ def test_the_light_has_four_states(record):
     )
     assert light(record, large).state == "large"
     beside = pd.concat([large, found[found["rank"] > 1]])
-    assert (
-        light(record, beside).title == "Large error, cause unknown; 1 other fault found beside it"
+    assert light(record, beside).title == (
+        "Large error, mostly the table's segment parameters (70 %); 2 faults found"
     )
+    assert light_of(beside, record.detection).title == "Large error, cause unknown; 2 faults found"
     small = large.assign(target="1 fz", parameter="amplitude")
     assert light(record, small).state == "cause"  # a regularity without a name is no large error
     unsure = large.assign(effect="inconclusive", parameter="", sentence="too short")
@@ -188,24 +189,29 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
     )
     large = replace(record, diagnosis=nothing, trials=trials)
     (light,) = (block for block in front(large) if isinstance(block, Light))
-    assert (light.state, light.title) == ("large", "Large error, cause unknown")
+    assert (light.state, light.title) == (
+        "large",
+        "Large error, mostly the table's segment parameters (70 %)",
+    )
     assert light.text.startswith("Large: vertical force error 5.5 % of body weight. None of the")
     *_, to_do = front(large)
-    assert not any("Nothing needs to be corrected" in item for item in to_do.items)
+    assert not any("nothing needs to be corrected" in item for item in to_do.items)
 
 
 def test_what_is_fine_is_to_be_used_as_it_is(record):
     nothing = record.diagnosis[record.diagnosis["verdict"] == "rejected"]
     *_, to_do = front(replace(record, diagnosis=nothing, refusals=()))
-    assert to_do.items[0].startswith("Nothing needs to be corrected")
-    assert to_do.items[1] == "To know the parameters better, record: swing the left shank."
+    assert to_do.items[0].startswith("The data may be used: nothing")
+    assert (
+        to_do.items[1] == "Optional, to know the parameters better, record: swing the left shank."
+    )
 
 
 def test_rm_is_used_where_nothing_is_sure(record):
     choice = record.choice.assign(use="RM", ratio_om=1.05)
     said = use_sentence(replace(record, choice=choice))
     assert said.startswith("Use RM, the segment parameters of an anthropometric table")
-    assert "err by 5 % less to 16 % more, which is no sure gain" in said
+    assert "OM errs 5 % less to 16 % more than RM," in said
     rare = record.identification.assign(rare=True)
     assert "Never use OM" in use_sentence(replace(record, identification=rare))
 

@@ -67,9 +67,11 @@ def test_the_answer_is_that_of_the_first_page(reports, tmp_path):
     assert "sub-01: Fine" in "\n".join(shown(tmp_path))  # no report, no yardstick
     replace(reports, out=tmp_path).run("report", person)
     said = " ".join("\n".join(shown(tmp_path)).split())
-    assert said.startswith("sub-01: Large error, cause unknown. Large: vertical force error 9.0")
+    assert said.startswith(
+        "sub-01: Large error, mostly the table's segment parameters (70 %). Large:"
+    )
     page = replace(reports, out=tmp_path).html("sub-01")
-    assert "<strong>Large error, cause unknown</strong>" in page
+    assert "<strong>Large error, mostly the table&#39;s segment parameters (70 %)</strong>" in page
 
 
 def test_of_several_people_each_has_a_line(reports):

@@ -36,8 +36,7 @@ GLOSSARY = (
 def participant_document(record: ParticipantRecord) -> Document:
     return Document(
         title=f"{record.id}: does the motion explain the ground forces?",
-        subtitle="The force on the ground as computed from the markers' motion, beside what the force "
-        "plates measured.",
+        subtitle="Ground force computed from the markers' motion, beside the force plates'.",
         front=front(record),
         sections=(
             diagnosis.section(record),

@@ -127,7 +127,7 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     saved = f"; files of {' to '.join(dict.fromkeys((dates[0], dates[-1])))}" if dates else ""
     yield "Recordings", f"{listing(tasks)}{saved}"
     used = listing([trial.label for trial in record.identification_trials()])
-    yield "Parameters from", used
+    yield "Based on", used
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
     yield "Software", f"bsip {', '.join(versions)}"
     if record.facts["mass_note"]:

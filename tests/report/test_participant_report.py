@@ -139,7 +139,7 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "Use OM, the segment parameters identified from this person's movement" in first
     assert "OM errs 34 to 46 % less than RM," in first
     assert "But RM for basketball." in first
-    assert "Correct it in the lab, or in copies of the files" in first
+    assert "Correct it in the lab, or let bsip write corrected files" in first
 
 
 def test_yardsticks_are_those_of_data_that_identified_nothing(record, first):

@@ -55,10 +55,10 @@ _MOST = 2  # causes, and things to do
 _PAIRS = ("om", "rm_mass", "om_rm_mass")
 _POSES = 8  # among which the one is chosen that is shown
 _COLOURS = {
-    "fine": "✓: no fault, no large error.",
-    "cause": "▲: faults, but no large error.",
-    "large": "■: an error is large, explained or not.",
-    "inconclusive": "?: nothing can be said.",
+    "fine": "✓ no fault, no large error.",
+    "cause": "▲ faults, but no large error.",
+    "large": "■ a large error, explained or not.",
+    "inconclusive": "? nothing can be said.",
 }
 _USABLE = {
     "fine": "The data may be used: nothing needs to be corrected.",
@@ -86,7 +86,7 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         *budget_bar(record),
         Heading("How large are the errors?"),
         Scales(scales(record)),
-        Paragraph(f"Root mean square, with {record.use()}. {SOURCES}", "note"),
+        Paragraph(f"Root mean square (RMS), with {record.use()}. {SOURCES}", "note"),
         *_sure(record),
         Heading("Which parameters to use"),
         Paragraph(use_sentence(record)),
@@ -103,7 +103,7 @@ def light_for(record: ParticipantRecord) -> Light:
 def large_errors(record: ParticipantRecord) -> list[str]:
     """The yardsticks beyond which the errors are."""
     return [
-        f"{_within_sentence(one.title)} {number(value)} {one.unit}"
+        f"{_within_sentence(one.title).removesuffix(' error')} {number(value)} {one.unit}"
         for one, value in measured_of(record)
         if one.words(value) == "large"
     ]
@@ -206,9 +206,9 @@ def budget_bar(record: ParticipantRecord) -> tuple[Block, ...]:
         return ()
     return (
         Bar(
-            "What makes the error, with a table's masses (RM)",
+            "What makes the squared error, with a table's masses (RM)",
             tuple((piece.label, piece.share) for piece in pieces if abs(piece.share) >= 0.5),
-            "Shares of the squared error of vertical force and centre of pressure.",
+            "Vertical force and centre of pressure together.",
         ),
     )
 
@@ -240,7 +240,9 @@ def use_sentence(record: ParticipantRecord) -> str:
     compared = {
         name: _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
     }
-    said += f". OM errs {compared['om']} than RM, {compared['om_rm_mass']} than RM+mass"
+    said += f". OM errs {compared['om']} than RM"
+    same = compared["om"] == compared["om_rm_mass"]
+    said += " and RM+mass" if same else f", {compared['om_rm_mass']} than RM+mass"
     if first["use"] == RM_MASS:
         said += f", RM+mass {compared['rm_mass']} than RM"
     judging = count(int(first["trials"]), "recording")
@@ -282,7 +284,7 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
     causes = _found(record)
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
     said += [
-        f"To find out what is behind fault {k}: {_first_step(cause)}."
+        f"What is behind fault {k}: {_first_step(cause)}."
         for k, cause in enumerate(causes[:_MOST], start=1)
         if len(cause) > 1
     ][:1]

@@ -47,6 +47,7 @@ _MOST_GAINS = 3
 _MOST_NAMED = 2  # recordings, in a line
 _MOST_MEMBERS = 2  # of a group, in a line
 _MOST_CHANGES = 2
+_MOST_STEPS = 3
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
 _NO_TRIAL = "Inconclusive: no recording has motion with every contact on a plate."
 _OF_THE_LAB = (
@@ -184,7 +185,7 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
         others = len(cause) - _MOST_MEMBERS
         shown = [_short(one) for one in cause[:_MOST_MEMBERS]]
         members = "; or ".join([*shown, *([f"{others} more"] if others > 0 else [])])
-        return f"One of {len(cause)} that cannot be distinguished: {members} ({sure} that one is)."
+        return f"One of {len(cause)}, not to be distinguished: {members} ({sure})."
     (one,) = cause
     main = one.main_number()
     usual = beside_usual(one.effect, main) if main else ""
@@ -193,7 +194,7 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     where = f"in {len(one.trials)} of {len(everywhere)} recordings" if some else where
     if is_large(cause):
         error = one.what().partition("; ")[0].removeprefix(_UNEXPLAINED)
-        return f"Left unexplained: {error} (root mean square), {where}."
+        return f"Left unexplained: {error} (RMS), {where}."
     sure = f"; probability {sure}" if sure else ""
     return f"{capital(one.told(remarks=False))}, {where}{usual}{sure}."
 
@@ -222,7 +223,7 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
         f"({_letter(k)}) {one.told()}{place}{_probability(one)}"
         for k, (one, place) in enumerate(zip(cause, own, strict=True))
     )
-    apart = separating_recording([(one.effect, one.target) for one in cause])
+    apart = separating_recording([(one.effect, one.target) for one in cause], _MOST_STEPS)
     if first.class_id == OF_THE_WEIGHT:
         apart = f"weigh the person as recorded; {apart}"
     return (

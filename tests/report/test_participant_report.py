@@ -132,7 +132,7 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
         "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
         "both recordings, a usual size (1 to 4°); probability 99.5 %." in first
     )
-    assert "One of 2 that cannot be distinguished: " in first
+    assert "One of 2, not to be distinguished: " in first
     assert "the table's segment parameters 70 %" in first
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm , good" in first
@@ -193,7 +193,7 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
         "large",
         "Large error, mostly the table's segment parameters (70 %)",
     )
-    assert light.text.startswith("Large: vertical force error 5.5 % of body weight. None of the")
+    assert light.text.startswith("Large: vertical force 5.5 % of body weight. None of the")
     *_, to_do = front(large)
     assert not any("nothing needs to be corrected" in item for item in to_do.items)
 

@@ -180,7 +180,7 @@ def _causes(record: ParticipantRecord) -> Iterator[Block]:
     if lines:
         yield Numbered(lines[:_MOST])
     if len(lines) > _MOST:
-        yield Paragraph(f'{len(lines) - _MOST} more below, under "How sure is that?".', "note")
+        yield Paragraph(f"{len(lines) - _MOST} more below.", "note")
 
 
 def _sure(record: ParticipantRecord) -> Iterator[Block]:

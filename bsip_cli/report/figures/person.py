@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -56,7 +58,7 @@ def stick_figure(pose: Pose, trial: str) -> Figure:
     force = np.linalg.norm(pose.force_N)
     lines = [plain(trial) + f", {pose.time_s:.2f} s", "black: right limbs; grey: left"]
     lines += [f"green: measured ground force, {force:.0f} N"] if np.isfinite(force) else []
-    said = {
+    said: dict[str, Any] = {
         "transform": axes.transAxes,
         "fontsize": 7.5,
         "color": SOFT,

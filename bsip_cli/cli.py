@@ -27,13 +27,14 @@ _OPTIONS = tomllib.loads(shipped("commands.toml").read_text(encoding="utf-8"))
 _PATH = click.Path(path_type=Path)
 _TYPES = {"path": _PATH, "int": click.INT, "float": click.FLOAT}
 _OF_STUDY = ("--participant", "--config", "--jobs")
+_VOICE = ("--verbose", "--quiet")
 _EFFECTS = ("--effect", "--size", "--target", "--effect-tasks")  # matched in the order given
 
 
 def _option(key: str) -> Any:
     """An option of the table, by its name; behind that of its command where others differ."""
     said = dict(_OPTIONS[key])
-    names = [key.split()[-1], *([said.pop("name")] if "name" in said else [])]
+    names = [key.split()[-1], *(said.pop(more) for more in ("short", "name") if more in said)]
     if "type" in said:
         said["type"] = _TYPES[said["type"]]
     if "choices" in said:
@@ -74,7 +75,7 @@ def _stage_command(name: str, summary: str) -> click.Command:
 
     @click.command(name, help=summary)
     @_study
-    @_with("--out", *_OF_STUDY, "--force", "--verify", *own.get(name, ()))
+    @_with("--out", *_OF_STUDY, "--force", "--verify", *_VOICE, *own.get(name, ()))
     def command(study, out, chosen, config_file, **options):
         from bsip_cli.running.session import run_session
 
@@ -90,15 +91,15 @@ cli.add_command(_stage_command("run", "All stages, from recordings to the report
 
 @cli.command()
 @_study
-@_with(*_OF_STUDY)
-def check(study, chosen, config_file, jobs):
+@_with(*_OF_STUDY, *_VOICE)
+def check(study, chosen, config_file, jobs, **options):
     """Say what each recording of a study is taken for, and what fails; nothing is kept.
 
     Exit codes: those of `bsip ingest`.
     """
     from bsip_cli.commands.check import check_study
 
-    return check_study(study, chosen, config_file, jobs)
+    return check_study(study, chosen, config_file, jobs, **options)
 
 
 @cli.command()

@@ -206,6 +206,10 @@ STAGES = (
 )
 
 
+FINDINGS = ("choose", "diagnose", "laboratory", "extend")
+"""Stages whose sentences are results; those of the others are remarks on the way."""
+
+
 def stages_named(name: str) -> tuple[Stage, ...]:
     """The stages behind one command, in order; ``run`` is all of them."""
     return STAGES if name == "run" else tuple(s for s in STAGES if s.name == name)

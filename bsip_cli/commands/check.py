@@ -17,15 +17,20 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.study.study import Participant, Trial
 
 
-def check_study(study: Path, chosen: tuple[str, ...], config_file: Path | None, jobs: int) -> int:
-    """Read a study's recordings, say what is wrong and what each is; the exit code of `ingest`."""
+def check_study(
+    study: Path, chosen: tuple[str, ...], config_file: Path | None, jobs: int, **voice: bool
+) -> int:
+    """Read a study's recordings, say what is wrong and what each is; the exit code of `ingest`.
+
+    ``voice`` as `follow` takes it.
+    """
     stages = stages_named("ingest")
     with TemporaryDirectory(prefix="bsip-check-") as folder:
         out = Path(folder) / "results"
         opened = open_study(study, out, chosen, config_file)
         running = run_stages(stages, opened.study, out, opened.config, Manner(jobs=jobs))
         total = sum(1 + len(person.trials) for person in opened.study.participants)
-        code = follow("check", opened.refusals, running, total, None)
+        code = follow("check", opened.refusals, running, total, None, **voice)
         for person in opened.study.participants:
             unit = Unit(producer("markers"), opened.study, out, opened.config, person)
             for line in _about(unit, person):

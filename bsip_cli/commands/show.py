@@ -12,6 +12,7 @@ import pandas as pd
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
 from bsip_cli.body.names import in_words
 from bsip_cli.errors import BadDataError, UsageError, printable
+from bsip_cli.report.blocks import Light
 from bsip_cli.report.budget import overall_pieces
 from bsip_cli.report.candidates import candidates_of, causes_of, looked_at
 from bsip_cli.report.cohort.laboratory import named_sentences, unnamed_sentences
@@ -155,7 +156,7 @@ def _findings(folder: Path, diagnosis: pd.DataFrame, detection: pd.DataFrame) ->
     error, which parameters to use, what is changed at the joints."""
     width = _width(get_terminal_size().columns)
     budget, choice = (_table(folder, kind) for kind in ("overall-error-budget", "choice"))
-    light = light_of(diagnosis, detection, budget)
+    light = _light(folder) or light_of(diagnosis, detection, budget)
     use = "" if choice is None else f" Use {choice['use'].iloc[0]}."
     yield _wrapped(f"{folder.name}: {light.title}. {light.text}{use}", width)
     causes = causes_of(candidates_of(diagnosis))
@@ -172,6 +173,14 @@ def _findings(folder: Path, diagnosis: pd.DataFrame, detection: pd.DataFrame) ->
         yield _wrapped(f"{said}.", width, "  - ")
     for said in largest_changes(_peaks(folder)):
         yield _wrapped(f"{said}.", width, "  - ")
+
+
+def _light(folder: Path) -> Light | None:
+    """The answer on the report's first page; None where there is no report of this diagnosis."""
+    page = _path(folder, "report-files")
+    if not page.exists() or not is_made_from(page, _path(folder, "overall-diagnosis")):
+        return None
+    return Light(**read_header(page, "report-files")["provenance"]["facts"]["light"])
 
 
 def _peaks(folder: Path) -> pd.DataFrame:

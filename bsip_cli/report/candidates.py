@@ -21,7 +21,7 @@ from bsip_cli.report.effect_words import (
     size_words,
     unnamed_label,
 )
-from bsip_cli.report.words import listing, number, trial_label
+from bsip_cli.report.words import number
 
 NOTHING = "none"
 UNNAMED = "unexplained"
@@ -128,10 +128,6 @@ class Candidate:
             return "not tested"
         return f"{number(gain)} ({number(low)} to {number(high)})"
 
-    def where(self) -> str:
-        """``hops (run 1) and squat (run 1)``."""
-        return listing([trial_label(stem) for stem in self.trials])
-
 
 def candidates_of(diagnosis: pd.DataFrame) -> tuple[Candidate, ...]:
     """The candidates of a ``diagnosis`` table in their order; the row ``none`` is none."""
@@ -163,20 +159,31 @@ def _candidate(rows: pd.DataFrame) -> Candidate:
 
 
 def causes_of(candidates: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], ...]:
-    """What was found: a single candidate each, or all candidates of a group."""
+    """What was found: a single candidate each, or all candidates of a group; errors that nothing
+    explains first, then what changes the forces most."""
     groups: dict[str, list[Candidate]] = {}
     for k, one in enumerate(candidates):
         if one.verdict != "rejected":
             groups.setdefault(one.class_id or f"#{k}", []).append(one)
-    return tuple(tuple(group) for group in groups.values())
+    return tuple(sorted(map(tuple, groups.values()), key=_importance))
+
+
+def _importance(cause: tuple[Candidate, ...]) -> tuple[bool, float]:
+    changes = np.nan_to_num([one.rms_change for one in cause])
+    return not is_large(cause), -float(changes.max())
+
+
+def is_large(cause: Sequence[Candidate]) -> bool:
+    """An error beyond the yardsticks that nothing explains, as ``large_errors`` finds it."""
+    first = cause[0]
+    named = {one.name for one in first.numbers}
+    return first.effect == UNNAMED and not first.target and named == {"error"}
 
 
 _EXAMPLES = (  # effects whose limits are told in the sentence
-    ("sync_offset", "", "a delay between forces and markers"),
+    ("sync_offset", "", "a delay of the forces"),
     ("plate_translation", "", "a plate shifted"),
-    ("plate_gain", "fz", "a vertical gain wrong"),
-    ("added_mass", "hand_l", "a mass on the left hand"),
-    ("added_mass", "upper_torso", "a mass on the upper torso"),
+    ("plate_gain", "fz", "vertical forces misread"),
 )
 OF_THE_WEIGHT = "W"  # group of what quiet standing tells
 _BY = ("plate_translation", "plate_gain")  # shifted *by* less than, but a delay *under*
@@ -240,7 +247,7 @@ def limits_sentence(limits: Sequence[Limit]) -> str:
     if not parts:
         return ""
     text = " or ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
-    return f"{text[0].upper()}{text[1:]} might have gone unseen in these recordings."
+    return f"{text[0].upper()}{text[1:]} might have gone unseen."
 
 
 def _under(limit: Limit) -> str:

@@ -27,86 +27,100 @@ class Number(Protocol):
 
 _FORCES = (
     "The measured forces are not the true ones, and everything identified from them inherits the "
-    "error: correct it in the lab or in the file, and run again."
+    "error.",
+    "Correct it in the lab, or let bsip write corrected files (bsip export), and run again.",
 )
 _CLOCKS = (
     "Forces and markers are not of the same moments, and everything identified from them inherits "
-    "the error: correct it in the lab or in the file, and run again. A filter that only the "
-    "forces have gone through delays them too."
+    "the error. A filter that only the forces have gone through delays them too.",
+    _FORCES[1],
 )
 _MOTION = (
-    "The motion is not the true one, and the simulated forces with it: correct the markers, and "
-    "run again."
+    "The motion is not the true one, and the simulated forces with it.",
+    "Correct the markers, and run again.",
 )
 _FRAME = (
     "Motion and forces do not share their axes, and everything identified from them inherits the "
-    "error: calibrate the cameras again, or turn the markers back, and run again."
+    "error.",
+    "Calibrate the cameras again, or turn the markers back, and run again.",
 )
 _SKIN = (
     "The pose of the trunk, and the simulated forces with it, is only as good as markers on soft "
-    "tissue can be: put markers over bone, and run again."
+    "tissue can be.",
+    "Put markers over bone, and record again.",
 )
 _PERSON = (
     "The recordings need not be wrong: the model lacks something that this person has, and "
-    "squeezes it into the inertial parameters of some segment."
+    "squeezes it into the inertial parameters of some segment.",
+    "Use the forces as they are, and do not read the parameters near that place as this person's.",
 )
 _LOAD = (
     "A load that is not stated ends up in the masses of the body where its recording identifies "
-    "them, and in the errors of the forces where it judges them: state it in study.toml ([[loads]]) "
-    "or leave it out of the recording, and run again."
+    "them, and in the errors of the forces where it judges them.",
+    "If it belongs to the task, state its mass (tutorial: loads) and run again.",
 )
 WEIGHT = (
-    "Either the stated mass is wrong or what the plates measure: weigh the person first. Only if a "
-    "scale confirms the stated mass are the plates at fault, or something that is carried."
+    "Either the stated mass is wrong or what the plates measure. Only if a scale confirms the stated "
+    "mass are the plates at fault, or something that is carried.",
+    "Weigh the person on a scale first.",
 )
 _CONTACT = (
-    "The plates do not carry all of the ground force: leave these frames out, or record without "
-    "anything in reach."
+    "The plates do not carry all of the ground force.",
+    "Leave these frames out, or record without anything in reach.",
+)
+_UNNAMED = (
+    "Neither the forces nor the identified parameters should be trusted further than the report says.",
+    "See below, under errors, when it comes and goes, and look at the recording there.",
 )
 
 
 @dataclass(frozen=True)
 class EffectWords:
-    """``title``: the cause in general; ``consequence``: what it means for the results, and what to
+    """``title``: the cause in general; ``meaning``: what it does to the results; ``action``: what to
     do."""
 
     title: str
-    consequence: str
+    meaning: str
+    action: str
+
+    @property
+    def consequence(self) -> str:
+        return f"{self.meaning} {self.action}"
 
 
 EFFECT_WORDS = {
-    "sync_offset": EffectWords("forces and markers out of step", _CLOCKS),
-    "clock_drift": EffectWords("clocks of forces and markers run apart", _CLOCKS),
-    "plate_translation": EffectWords("force plate not where the file says", _FORCES),
-    "plate_rotation": EffectWords("force plate turned or tilted", _FORCES),
-    "plate_gain": EffectWords("wrong gain of a plate's channel", _FORCES),
-    "plate_crosstalk": EffectWords("one channel of a plate leaks into another", _FORCES),
-    "plate_zero": EffectWords("constant offset of a plate's channel", _FORCES),
-    "plate_drift": EffectWords("drift of a plate's channel", _FORCES),
-    "gravity_tilt": EffectWords("the lab's vertical is not vertical", _FORCES),
-    "added_mass": EffectWords("mass that the model does not know", _LOAD),
-    "released_object": EffectWords("object held and let go", _LOAD),
-    "wobbling_mass": EffectWords("soft tissue that swings", _PERSON),
-    "breathing": EffectWords("breathing", _PERSON),
-    "unmeasured_contact": EffectWords("contact beside the plates", _CONTACT),
-    "joint_centre": EffectWords("joint centre in the wrong place", _PERSON),
-    "missing_joint": EffectWords("trunk bends where the model is stiff", _PERSON),
-    "soft_tissue": EffectWords("soft tissue that moves with the trunk's posture", _SKIN),
-    "marker_shift": EffectWords("marker not in its place", _MOTION),
-    "marker_slide": EffectWords("marker that slides", _MOTION),
-    "marker_swap": EffectWords("two markers exchanged", _MOTION),
-    "over_smoothing": EffectWords("markers smoothed too much", _MOTION),
-    "segment_inertia": EffectWords("other inertial parameters of a segment", _PERSON),
-    "implement": EffectWords("club, racket or stick in the hand", _LOAD),
-    "camera_frame": EffectWords("cameras turned against plates and gravity", _FRAME),
-    "external_force": EffectWords("constant force beside the plates", _CONTACT),
-    "object_handled": EffectWords("object picked up and put down", _LOAD),
-    "unexplained": EffectWords(
-        "something without a name",
-        "Neither the forces nor the identified parameters should be trusted further than the "
-        "report says: look there at when the difference comes and goes.",
-    ),
+    "sync_offset": EffectWords("forces and markers out of step", *_CLOCKS),
+    "clock_drift": EffectWords("clocks of forces and markers run apart", *_CLOCKS),
+    "plate_translation": EffectWords("force plate not where the file says", *_FORCES),
+    "plate_rotation": EffectWords("force plate turned or tilted", *_FORCES),
+    "plate_gain": EffectWords("wrong gain of a plate's channel", *_FORCES),
+    "plate_crosstalk": EffectWords("one channel of a plate leaks into another", *_FORCES),
+    "plate_zero": EffectWords("constant offset of a plate's channel", *_FORCES),
+    "plate_drift": EffectWords("drift of a plate's channel", *_FORCES),
+    "gravity_tilt": EffectWords("the lab's vertical is not vertical", *_FORCES),
+    "added_mass": EffectWords("mass that the model does not know", *_LOAD),
+    "released_object": EffectWords("object held and let go", *_LOAD),
+    "wobbling_mass": EffectWords("soft tissue that swings", *_PERSON),
+    "breathing": EffectWords("breathing", *_PERSON),
+    "unmeasured_contact": EffectWords("contact beside the plates", *_CONTACT),
+    "joint_centre": EffectWords("joint centre in the wrong place", *_PERSON),
+    "missing_joint": EffectWords("trunk bends where the model is stiff", *_PERSON),
+    "soft_tissue": EffectWords("soft tissue that moves with the trunk's posture", *_SKIN),
+    "marker_shift": EffectWords("marker not in its place", *_MOTION),
+    "marker_slide": EffectWords("marker that slides", *_MOTION),
+    "marker_swap": EffectWords("two markers exchanged", *_MOTION),
+    "over_smoothing": EffectWords("markers smoothed too much", *_MOTION),
+    "segment_inertia": EffectWords("other inertial parameters of a segment", *_PERSON),
+    "implement": EffectWords("club, racket or stick in the hand", *_LOAD),
+    "camera_frame": EffectWords("cameras turned against plates and gravity", *_FRAME),
+    "external_force": EffectWords("constant force beside the plates", *_CONTACT),
+    "object_handled": EffectWords("object picked up and put down", *_LOAD),
+    "unexplained": EffectWords("something without a name", *_UNNAMED),
 }
+
+
+OBJECTS = ("released_object", "implement", "object_handled")
+"""What a task may be about: found, and nothing wrong with the recordings."""
 
 
 def effect_title(effect: str) -> str:
@@ -149,7 +163,7 @@ def _plate_label(target: str) -> str:
     return f"{where}, {words}" if words else where
 
 
-_UNNAMED = {  # first number of a regularity without a name: what it is
+_REGULARITIES = {  # first number of a regularity without a name: what it is
     "amplitude": "swing",
     "curvature": "square of the load",
     "error": "play or friction",
@@ -161,7 +175,7 @@ _UNNAMED = {  # first number of a regularity without a name: what it is
 
 def unnamed_label(number_name: str, where: str) -> str:
     """``swing, force x``; of a pull, ``y by z`` is the force's axis and the place's."""
-    kind = _UNNAMED.get(number_name)
+    kind = _REGULARITIES.get(number_name)
     if kind is None:
         return where
     force, by, place = where.partition(" by ")
@@ -275,13 +289,14 @@ def usual_words(effect: str) -> str:
 
 
 def beside_usual(effect: str, size: Number) -> str:
-    """``, as large as laboratories meet (5 to 20 ms)``; empty where nothing usual is known."""
+    """``, a usual size (5 to 20 ms)``; empty where nothing usual is known."""
     usual = USUAL.get(effect)
     if usual is None or size.name not in usual.parameters or size.unit != usual.unit:
         return ""
-    how = "smaller than" if abs(size.value) < usual.least else "as large as"
-    how = "larger than" if abs(size.value) > usual.most else how
-    return f", {how} laboratories meet ({usual_words(effect)})"
+    shown = float(f"{abs(size.value):.2g}")  # as it is read
+    how = "smaller than usual" if shown < usual.least else "a usual size"
+    how = "larger than usual" if shown > usual.most else how
+    return f", {how} ({usual_words(effect)})"
 
 
 # --- recordings that separate causes --------------------------------------------------------------
@@ -332,14 +347,17 @@ _APART: dict[frozenset[str], str] = {
 _UNKNOWN = "look at plates, cables and everything that touches the person, and record again"
 
 
-def separating_recording(rivals: Sequence[tuple[str, str]]) -> str:
-    """What to record, without a final stop, for rivals as (effect, target)."""
+def separating_recording(rivals: Sequence[tuple[str, str]], most: int | None = None) -> str:
+    """What to record, without a final stop, for rivals as (effect, target); at most so many steps."""
     effects = list(dict.fromkeys(effect for effect, _ in rivals))
     advice = [_places(effect, rivals) for effect in effects if _count(effect, rivals) > 1]
     for pair in combinations(effects, 2):
         known = _APART.get(frozenset(pair))
         advice += [known] if known else [_own(effect) for effect in pair]
-    return "; ".join(_without_beginnings(advice)) or _UNKNOWN
+    steps = _without_beginnings(advice)
+    if most is not None:
+        steps = [step for step in steps if step != _UNKNOWN][:most]
+    return "; ".join(steps) or _UNKNOWN
 
 
 def _without_beginnings(advice: list[str]) -> list[str]:

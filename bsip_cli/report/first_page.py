@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -19,13 +19,25 @@ from bsip_cli.report.blocks import (
     Scales,
     Terms,
 )
-from bsip_cli.report.budget import FIRST, LEAST_TOLD_SIZE, overall_pieces, size_of
-from bsip_cli.report.candidates import Candidate, candidates_of, causes_of, looked_at
+from bsip_cli.report.budget import overall_pieces
+from bsip_cli.report.candidates import (
+    Candidate,
+    candidates_of,
+    causes_of,
+    is_large,
+    limits_of,
+    limits_sentence,
+    looked_at,
+)
 from bsip_cli.report.effect_words import separating_recording
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.sticks import Motion, Pose, poses_of
-from bsip_cli.report.verdict import cause_line, consequences, light_of
-from bsip_cli.report.words import capital, count, listing, number, signed
+from bsip_cli.report.verdict import (
+    cause_line,
+    consequences,
+    light_of,
+)
+from bsip_cli.report.words import capital, count, listing, number
 from bsip_cli.report.yardsticks import (
     COP_LIMIT_M,
     FORCE_LIMIT_PERCENT,
@@ -39,12 +51,25 @@ from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 
 _SEXES = {"M": "man", "F": "woman"}
-_MOST = 3  # causes, and things to do
+_MOST = 2  # causes, and things to do
+_PAIRS = ("om", "rm_mass", "om_rm_mass")
 _POSES = 8  # among which the one is chosen that is shown
+_COLOURS = {
+    "fine": "✓ no fault, no large error.",
+    "cause": "▲ faults, but no large error.",
+    "large": "■ a large error, explained or not.",
+    "inconclusive": "? nothing can be said.",
+}
+_USABLE = {
+    "fine": "The data may be used: nothing needs to be corrected.",
+    "cause": "The data may be used once what was found is corrected or stated.",
+    "large": "Do not use joint forces or parameters before the large error is understood.",
+    "inconclusive": "Whether the data may be used cannot be said.",
+}
 _WORDS = {
-    OM: "OM, the parameters identified from this person's movement",
-    RM_MASS: "RM+mass, the parameters of an anthropometric table, all masses times one number",
-    RM: "RM, the parameters of an anthropometric table (regression)",
+    OM: "OM, the segment parameters identified from this person's movement",
+    RM_MASS: "RM+mass, the segment parameters of a table, all masses times one number",
+    RM: "RM, the segment parameters of an anthropometric table",
 }
 
 
@@ -54,12 +79,15 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
     return (
         *portrait(record),
         Terms((*who(record),)),
+        Heading("Is anything wrong?"),
         light,
+        Paragraph(_COLOURS[light.state], "note"),
         *_causes(record),
         *budget_bar(record),
         Heading("How large are the errors?"),
         Scales(scales(record)),
-        Paragraph(SOURCES, "note"),
+        Paragraph(f"Root mean square (RMS), with {record.use()}. {SOURCES}", "note"),
+        *_sure(record),
         Heading("Which parameters to use"),
         Paragraph(use_sentence(record)),
         Heading("What to do next"),
@@ -68,14 +96,21 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
 
 
 def light_for(record: ParticipantRecord) -> Light:
-    """That of the diagnosis; where no fault was found and an error is large all the same, that."""
-    light = light_of(record.diagnosis, record.detection, record.budget)
-    large = [y.title.lower() for y, value in measured_of(record) if y.words(value) == "large"]
-    if light.state != "fine" or not large:
-        return light
-    title = "No fault found, but an error is large"
-    text = f"Large: {listing(large)}; no fault of the catalogue explains it. {light.text}"
-    return Light("inconclusive", title, text)
+    """The answer, as `bsip show` prints it too."""
+    return light_of(record.diagnosis, record.detection, record.budget, large_errors(record))
+
+
+def large_errors(record: ParticipantRecord) -> list[str]:
+    """The yardsticks beyond which the errors are."""
+    return [
+        f"{_within_sentence(one.title).removesuffix(' error')} {number(value)} {one.unit}"
+        for one, value in measured_of(record)
+        if one.words(value) == "large"
+    ]
+
+
+def _within_sentence(title: str) -> str:
+    return f"{title[:1].lower()}{title[1:]}"
 
 
 def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
@@ -84,14 +119,15 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     mass, plates = float(facts["mass_kg"]), float(facts["plate_mass_kg"])
     person = f"{_SEXES.get(facts['sex'], 'sex not stated')}, {number(mass, 1)} kg ({facts['mass_source']}"
     if np.isfinite(plates) and facts["mass_source"] != "plates":
-        person += f"; the plates say {signed(100.0 * (plates / mass - 1.0), 1)} %"
+        person += f"; the plates say {number(plates, 1)} kg"
     yield "Person", f"{record.id}, {person}), {number(facts['height_m'], 2)} m"
-    tasks = list(dict.fromkeys(trial.task for trial in record.trials))
+    names = [trial.task for trial in record.trials]
+    tasks = [f"{names.count(name)} {name}" for name in dict.fromkeys(names)]
     dates = sorted(trial.file_date for trial in record.trials if trial.file_date)
     saved = f"; files of {' to '.join(dict.fromkeys((dates[0], dates[-1])))}" if dates else ""
-    yield "Recordings", f"{len(record.trials)}: {listing(tasks)}{saved}"
+    yield "Recordings", f"{listing(tasks)}{saved}"
     used = listing([trial.label for trial in record.identification_trials()])
-    yield "Identified from", used
+    yield "Based on", used
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
     yield "Software", f"bsip {', '.join(versions)}"
     if record.facts["mass_note"]:
@@ -147,20 +183,32 @@ def _causes(record: ParticipantRecord) -> Iterator[Block]:
         yield Paragraph(f"{len(lines) - _MOST} more below.", "note")
 
 
+def _sure(record: ParticipantRecord) -> Iterator[Block]:
+    """What might have been missed; nothing where no search was made."""
+    if record.diagnosis is None or record.detection is None:
+        return
+    limits = limits_sentence(limits_of(record.detection, record.diagnosis))
+    causes = _found(record)
+    said = "Nothing was found that is more probable than not."
+    if causes and is_large(causes[0]):
+        said = "That the error is there is certain, its cause is not."
+    elif causes:
+        said = "The probabilities above allow for ordinary errors."
+    yield Heading("How sure is this?")
+    yield Paragraph(f"{said} {limits}".rstrip())
+
+
 def budget_bar(record: ParticipantRecord) -> tuple[Block, ...]:
     """What makes the error of the table's parameters, as one bar."""
     budget = record.budget
     pieces = () if budget is None or budget.empty else overall_pieces(budget)
     if budget is None or not pieces:
         return ()
-    sizes = [(name, *size_of(budget, "", name)) for name in FIRST]
-    names = {"fz": "vertical force", "cop_ap": "COP forward", "cop_ml": "COP sideways"}
-    told = [f"{names[c]} {number(x)} {unit}" for c, x, unit in sizes if x >= LEAST_TOLD_SIZE]
     return (
         Bar(
-            "What makes the error of the table's parameters",
-            tuple((piece.label, piece.share) for piece in pieces),
-            f"Shares of the squared error ({listing(told)}). COP: centre of pressure.",
+            "What makes the squared error, with a table's masses (RM)",
+            tuple((piece.label, piece.share) for piece in pieces if abs(piece.share) >= 0.5),
+            "Vertical force and centre of pressure together.",
         ),
     )
 
@@ -189,19 +237,21 @@ def use_sentence(record: ParticipantRecord) -> str:
         return f"Use {_WORDS[RM]}: nothing was compared."
     first = record.choice.iloc[0]
     said = f"Use {_WORDS[str(first['use'])]}"
-    rivals = {OM: ("om", "the table's (RM)"), RM_MASS: ("rm_mass", "the table's own (RM)")}
-    name, other = rivals.get(str(first["use"]), ("om", "identified ones (OM)"))
-    change = _change(float(first[f"ratio_{name}"]), float(first[f"log_error_{name}"]))
-    if first["use"] == RM:
-        said += f": {other} change its error by {change}, which is no sure gain"
-    else:
-        said += f": against {other} the error changes by {change}"
+    compared = {
+        name: _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
+    }
+    said += f". OM errs {compared['om']} than RM"
+    same = compared["om"] == compared["om_rm_mass"]
+    said += " and RM+mass" if same else f", {compared['om_rm_mass']} than RM+mass"
+    if first["use"] == RM_MASS:
+        said += f", RM+mass {compared['rm_mass']} than RM"
     judging = count(int(first["trials"]), "recording")
     where = {
-        "whole_trials": f" in {judging} that identified nothing",
-        "held_out": f" in held-out seconds of {judging}",
+        "whole_trials": f" in {judging} not used to identify it",
+        "held_out": f" in seconds of {judging} that were kept apart",
     }
-    said += f"{where.get(str(first['data']), '')}."
+    unsure = "" if first["use"] == OM else ": no sure gain by OM"
+    said += f"{where.get(str(first['data']), '')}{unsure}."
     others = [
         f"{method} for {listing(list(rows['movement']))}"
         for method, rows in record.choice.iloc[1:].groupby("use")
@@ -215,36 +265,60 @@ def use_sentence(record: ParticipantRecord) -> str:
 
 
 def _change(ratio: float, log_error: float) -> str:
-    """``−45 to −31 %``: one standard error to either side."""
-    low, high = Difference.of_ratio(ratio, log_error).interval()
-    if not np.isfinite(low + high):
-        return f"{signed(100 * (ratio - 1))} %"
-    return f"{signed(100 * (low - 1))} to {signed(100 * (high - 1))} %"
+    """``31 to 45 % less`` or ``5 % less to 16 % more``: one standard error to either side."""
+    ends = [100 * (end - 1) for end in Difference.of_ratio(ratio, log_error).interval()]
+    if not np.isfinite(ends).all():
+        ends = [100 * (ratio - 1)] * 2
+    words = ["less" if end < 0 else "more" for end in ends]
+    low, high = (number(abs(end), 0) for end in ends)
+    if words[0] != words[1]:
+        return f"{low} % less to {high} % more"
+    return f"{' to '.join(dict.fromkeys(sorted((low, high), key=int)))} % {words[0]}"
 
 
 # --- what to do ---------------------------------------------------------------------------------
 
 
 def to_do(record: ParticipantRecord, light: Light) -> list[str]:
-    """At most three things, the most urgent first."""
+    """Whether the data may be used, and at most two things to do."""
     causes = _found(record)
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
     said += [
-        f"To tell them apart: {separating_recording([(one.effect, one.target) for one in cause])}."
-        for cause in causes
+        f"What is behind fault {k}: {_first_step(cause)}."
+        for k, cause in enumerate(causes[:_MOST], start=1)
         if len(cause) > 1
     ][:1]
-    said += consequences(causes)
-    large = [y.title for y, value in measured_of(record) if y.words(value) == "large"]
+    said = [_USABLE[light.state], *said]
+    said += consequences(causes[:_MOST], only_actions=True)
+    large = [one for one, value in measured_of(record) if one.words(value) == "large"]
     if light.state == "inconclusive" and not large:
         said.append(
             "Record a movement in which every foot that touches the ground stands on a plate."
         )
-    if light.state == "fine":
-        said.append("Nothing needs to be corrected: use forces and parameters as they are.")
-    if large and light.state != "large":
-        said.append("Look at where and when the error is large, below, and at the recording there.")
-    return [*said[:_MOST]] if len(said) > 1 else [*said, *advice(record)][:_MOST]
+    said += [text for one in large[:1] if (text := _where_large(record, one))]
+    return said[: _MOST + 1] if len(said) > 1 else [*said, *advice(record)]
+
+
+def _first_step(cause: Sequence[Candidate]) -> str:
+    return separating_recording([(one.effect, one.target) for one in cause], most=1)
+
+
+def _where_large(record: ParticipantRecord, yardstick: Yardstick) -> str:
+    """Where to look for what makes an error large; empty where no recording has it."""
+    if yardstick.name == MARKERS:
+        return (
+            "Check that marker set and labels are right: the markers do not fit the body (below)."
+        )
+    fits = {t.label: t.fit for t in record.moving_trials() if t.fit is not None}
+    sizes = {label: errors_of([fit], record.use())[yardstick.name] for label, fit in fits.items()}
+    known = {label: size for label, size in sizes.items() if np.isfinite(size)}
+    if not known:
+        return ""
+    worst = max(known, key=known.__getitem__)
+    return (
+        f"Look at {worst}, where the {_within_sentence(yardstick.title)} is largest: does a foot miss "
+        "the plate, does something touch the person, are plates and markers in their places?"
+    )
 
 
 def advice(record: ParticipantRecord) -> list[str]:
@@ -253,4 +327,4 @@ def advice(record: ParticipantRecord) -> list[str]:
     rows = table[table["quantity"] == "next"]
     if rows.empty:
         return []
-    return [f"To know the parameters better, record: {rows['text'].iloc[0]}."]
+    return [f"Optional, to know the parameters better, record: {rows['text'].iloc[0]}."]

@@ -12,7 +12,7 @@ from bsip_cli.report.records import Message, Origin, messages_of
 from bsip_cli.report.words import labelled
 
 _HASH_DIGITS = 12
-_MOST_WARNINGS = 8
+_MOST_WARNINGS = 6
 
 
 @dataclass(frozen=True)

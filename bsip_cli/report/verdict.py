@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
-from bsip_cli.report.blocks import Light, State
-from bsip_cli.report.budget import budget_sentences, fault_share
+from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.report.blocks import Light
+from bsip_cli.report.budget import REST, UNKNOWN, budget_sentences, fault_share, overall_pieces
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
     UNNAMED,
     Candidate,
     candidates_of,
     causes_of,
+    is_large,
     limits_of,
     limits_sentence,
     looked_at,
 )
-from bsip_cli.report.effect_words import EFFECT_WORDS, WEIGHT, beside_usual, separating_recording
+from bsip_cli.report.effect_words import (
+    EFFECT_WORDS,
+    OBJECTS,
+    WEIGHT,
+    beside_usual,
+    effect_title,
+    separating_recording,
+)
 from bsip_cli.report.words import (
     capital,
     component_label,
@@ -34,14 +44,19 @@ from bsip_cli.report.words import (
 
 _UNTOLD = 1e-3  # probabilities this near to 0 or 1 are not told in digits
 _MOST_GAINS = 3
+_MOST_NAMED = 2  # recordings, in a line
+_MOST_MEMBERS = 2  # of a group, in a line
 _MOST_CHANGES = 2
+_MOST_STEPS = 3
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
 _NO_TRIAL = "Inconclusive: no recording has motion with every contact on a plate."
 _OF_THE_LAB = (
     "It is a matter of the laboratory: whoever else was recorded there has it too, if it is there."
 )
 _NOTHING = "Nothing is wrong above the noise."
-_LARGE = "Large error, cause unknown"
+_UNEXPLAINED = (
+    "large error, cause unknown: beside all that is named, and ordinary errors of ordinary size, "
+)
 NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 
 
@@ -108,13 +123,13 @@ def headline(diagnosis: pd.DataFrame) -> str:
     classes = sum(len(c) > 1 for c in causes)
     named = len(causes) - unnamed - classes
     if unnamed == len(causes):
-        return "Something is wrong that has no name in the catalogue of causes."
-    parts = [f"{count(named, 'cause')} named"] if named else []
+        return "Something is wrong that has no name in the catalogue of faults."
+    parts = [f"{count(named, 'fault')} named"] if named else []
     if classes:
-        how_many = str(classes) if named else count(classes, "cause")
+        how_many = str(classes) if named else count(classes, "fault")
         parts.append(f"{how_many} narrowed down to several")
     if unnamed:
-        parts.append(f"{unnamed if parts else count(unnamed, 'cause')} without a name")
+        parts.append(f"{unnamed if parts else count(unnamed, 'fault')} without a name")
     return f"Something is wrong: {listing(parts)}."
 
 
@@ -122,9 +137,10 @@ def light_of(
     diagnosis: pd.DataFrame | None,
     detection: pd.DataFrame | None,
     budget: pd.DataFrame | None = None,
+    large: Sequence[str] = (),
 ) -> Light:
-    """Whether anything is wrong, for the first page: fine, a cause named, a large error that nothing
-    explains, or inconclusive."""
+    """Whether anything is wrong with a person's recordings: fine, a cause named, a large error that
+    nothing explains, or inconclusive. ``large``: the yardsticks beyond which the errors are."""
     if diagnosis is None or detection is None:
         return Light("inconclusive", "Not examined", NOT_RUN)
     if diagnosis.empty:
@@ -133,43 +149,59 @@ def light_of(
     unsure = [c[0] for c in causes if c[0].effect == "inconclusive"]
     if unsure:
         return Light("inconclusive", "Inconclusive", f"{capital(unsure[0].what())}.")
-    if not causes:
-        limits = limits_sentence(limits_of(detection, diagnosis))
-        return Light("fine", "Fine: nothing is wrong above the noise", limits)
-    large = [c for c in causes if is_large(c)]
-    state: State = "large" if large else "cause"
-    title = headline(diagnosis).removesuffix(".")
-    if large:
-        others = len(causes) - len(large)
-        beside = f"; {count(others, 'other cause')} found beside it" if others else ""
-        title = f"{_LARGE}{beside}"
     looked = count(len(looked_at(detection, diagnosis)), "recording")
+    how_large = f"Large: {listing(large)}." if large else ""
+    found = f"{count(len(causes), 'fault')} found" if causes else ""
+    if large or any(is_large(cause) for cause in causes):
+        nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
+        title = "; ".join(filter(None, (f"Large error, {mostly(budget)}", found)))
+        return Light("large", title, " ".join(filter(None, (how_large, "" if causes else nothing))))
+    if not causes:
+        nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
+        return Light("fine", "Fine: no fault found, errors of ordinary size", nothing)
     share = np.nan if budget is None else fault_share(budget)
     size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
-    how_large = "" if np.isnan(share) else f" What has a name makes {size} of the error."
-    return Light(state, title, f"Searched: {looked}.{how_large}")
+    named = "" if np.isnan(share) else f"What was found makes {size} of the simulation's error."
+    title = headline(diagnosis).removesuffix(".")
+    effects = [one.effect for cause in causes for one in cause]
+    if set(effects) <= set(OBJECTS):
+        title = f"Explained by: {listing([effect_title(e) for e in dict.fromkeys(effects)])}"
+    return Light("cause", title, named or f"Searched: {looked}.")
 
 
-def is_large(cause: Sequence[Candidate]) -> bool:
-    """An error beyond the yardsticks that nothing explains, as ``large_errors`` finds it."""
-    first = cause[0]
-    named = {one.name for one in first.numbers}
-    return first.effect == UNNAMED and not first.target and named == {"error"}
+def mostly(budget: pd.DataFrame | None) -> str:
+    """Of a large error, what makes the largest part of it: ``mostly soft tissue (56 %)``."""
+    parts = () if budget is None or budget.empty else overall_pieces(budget)
+    most = max(parts, key=lambda one: one.share, default=None)
+    if most is None or most.label in (UNKNOWN, REST):
+        return "cause unknown"
+    return f"mostly {most.label} ({number(most.share, 0)} %)"
 
 
 def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     """What, how large beside what laboratories meet, where and how sure, as short as possible."""
     sure = probability_words(probability_of(cause))
-    sure = f"; probability {sure}" if sure else ""
     if len(cause) > 1:
-        members = " or ".join(one.label for one in cause)
-        return f"One of {len(cause)} that cannot be told apart here: {members}{sure}."
+        others = len(cause) - _MOST_MEMBERS
+        shown = [_short(one) for one in cause[:_MOST_MEMBERS]]
+        members = "; or ".join([*shown, *([f"{others} more"] if others > 0 else [])])
+        return f"One of {len(cause)}, not to be distinguished: {members} ({sure})."
     (one,) = cause
     main = one.main_number()
     usual = beside_usual(one.effect, main) if main else ""
+    some = _MOST_NAMED < len(one.trials) < len(everywhere)
     where = where_seen(one.trials, everywhere)
-    what = one.what().partition("; ")[0] if is_large(cause) else one.told(remarks=False)
-    return f"{capital(what)}, {where}{usual}{sure}."
+    where = f"in {len(one.trials)} of {len(everywhere)} recordings" if some else where
+    if is_large(cause):
+        error = one.what().partition("; ")[0].removeprefix(_UNEXPLAINED)
+        return f"Left unexplained: {error} (RMS), {where}."
+    sure = f"; probability {sure}" if sure else ""
+    return f"{capital(one.told(remarks=False))}, {where}{usual}{sure}."
+
+
+def _short(one: Candidate) -> str:
+    """The beginning of its sentence."""
+    return re.split(r"[,:;] | \(", one.what())[0]
 
 
 def _seen_in(everywhere: Sequence[str]) -> tuple[str, ...]:
@@ -191,12 +223,12 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
         f"({_letter(k)}) {one.told()}{place}{_probability(one)}"
         for k, (one, place) in enumerate(zip(cause, own, strict=True))
     )
-    apart = separating_recording([(one.effect, one.target) for one in cause])
+    apart = separating_recording([(one.effect, one.target) for one in cause], _MOST_STEPS)
     if first.class_id == OF_THE_WEIGHT:
         apart = f"weigh the person as recorded; {apart}"
     return (
-        f"One of these, which these recordings cannot tell apart{common}: {members}. "
-        f"{sure}{' ' if sure else ''}To tell them apart: {apart}."
+        f"One of these, which these recordings cannot distinguish{common}: {members}. "
+        f"{sure}{' ' if sure else ''}To distinguish them: {apart}."
     )
 
 
@@ -342,29 +374,36 @@ def put_right_sentence(events: Sequence[tuple[str, pd.DataFrame]]) -> tuple[str,
         for stem, table in events
         for text in table.loc[table["put_right"].astype(bool), "sentence"]
     ]
-    return (f"Corrected already, before the search for causes: {'; '.join(said)}.",) if said else ()
+    return (f"Corrected already, before the search for faults: {'; '.join(said)}.",) if said else ()
 
 
-def consequences(causes: Sequence[Sequence[Candidate]]) -> tuple[str, ...]:
-    """What the causes mean for the reader, each once and with the numbers of its causes."""
+def consequences(
+    causes: Sequence[Sequence[Candidate]], only_actions: bool = False
+) -> tuple[str, ...]:
+    """What the causes mean for the reader and what is to be done, or the latter only; each once and
+    with the numbers of its causes."""
     numbers: dict[str, list[int]] = {}
     for k, cause in enumerate(causes, start=1):
-        for text in _consequences_of(cause):
+        if only_actions and is_large(cause):
+            continue  # what to do then is said of the recording where the error is largest
+        for meaning, action in _consequences_of(cause):
+            text = action if only_actions else f"{meaning} {action}".rstrip()
             numbers.setdefault(text, []).append(k)
     if len(causes) == 1:
-        return tuple(numbers)
+        return tuple(filter(None, numbers))
     return tuple(
-        f"{'Cause' if len(of) == 1 else 'Causes'} {listing([str(k) for k in of])}: {text}"
+        f"{'Fault' if len(of) == 1 else 'Faults'} {listing([str(k) for k in of])}: {text}"
         for text, of in numbers.items()
+        if text
     )
 
 
-def _consequences_of(cause: Sequence[Candidate]) -> tuple[str, ...]:
+def _consequences_of(cause: Sequence[Candidate]) -> tuple[tuple[str, str], ...]:
     if cause[0].class_id == OF_THE_WEIGHT:
         return (WEIGHT,)
     known = (EFFECT_WORDS[one.effect] for one in cause if one.effect in EFFECT_WORDS)
-    lab = (_OF_THE_LAB,) if all(one.scope == "laboratory" for one in cause) else ()
-    return (*dict.fromkeys(words.consequence for words in known), *lab)
+    lab = ((_OF_THE_LAB, ""),) if all(one.scope == "laboratory" for one in cause) else ()
+    return (*dict.fromkeys((words.meaning, words.action) for words in known), *lab)
 
 
 def _named_twice(causes: Sequence[Sequence[Candidate]]) -> str:
@@ -375,5 +414,5 @@ def _named_twice(causes: Sequence[Sequence[Candidate]]) -> str:
         return ""
     return (
         f"Named more than once: {listing(list(twice))}. Its parts add up, and their single sizes "
-        "and intervals, and causes named between them, should not be trusted."
+        "and intervals, and faults named between them, should not be trusted."
     )

@@ -18,10 +18,7 @@ COP, FORCE, MARKERS = "cop_mm", "vertical_force_percent_bw", "markers_mm"
 COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_percent"
 """Options of the diagnosis: errors that are called large."""
 
-SOURCES = (
-    "Published: Hansen 2017, table 4. Large: Hicks 2015. Markers: OpenSim's checklist, for standing "
-    "and moving."
-)
+SOURCES = "Sources: Hansen 2017, table 4 (good), Hicks 2015 (large), OpenSim (markers)."
 _MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
 """RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,
 Best Practices)."""
@@ -37,15 +34,13 @@ class Yardstick:
     unit: str
     good: float
     limit: float
-    good_words: str
-    limit_words: str
 
     def words(self, value: float) -> str:
         if not np.isfinite(value):
             return "not known"
         if value > self.limit:
             return "large"
-        return "as good as published" if value <= self.good else "ordinary"
+        return "good" if value <= self.good else "ordinary"
 
     def scale(self, value: float) -> Scale:
         """The number on its way from nothing to a quarter beyond the limit, or beyond itself."""
@@ -57,33 +52,19 @@ class Yardstick:
             value / end if np.isfinite(value) else 0.0,
             self.good / end,
             self.limit / end,
-            f"{self.good_words} {number(self.good)} {self.unit}",
-            f"{self.limit_words} {number(self.limit, 0)} {self.unit}",
+            f"good to {number(self.good)} {self.unit.partition(' ')[0]}",
+            f"large from {number(self.limit, 0)} {self.unit.partition(' ')[0]}",
         )
 
 
 def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstick, ...]:
     """Of the centre of pressure, the vertical force and the markers."""
-    words = ("published", "large from")
-    cop = ("Centre of pressure (COP) error", "mm", _published("cop_error"), 1e3 * cop_limit_m)
-    force = (
-        "Vertical force error",
-        "% of body weight",
-        _published("grf_vertical"),
-        force_limit_percent,
-    )
+    cop = _published("cop_error"), 1e3 * cop_limit_m
+    force = _published("grf_vertical"), force_limit_percent
     return (
-        Yardstick(COP, *cop, *words),
-        Yardstick(FORCE, *force, *words),
-        Yardstick(
-            MARKERS,
-            "Markers from model",
-            "mm",
-            _MARKER_GOOD_MM,
-            _MARKER_LIMIT_MM,
-            "standing",
-            "moving",
-        ),
+        Yardstick(COP, "Centre of pressure (COP) error", "mm", *cop),
+        Yardstick(FORCE, "Vertical force error", "% of body weight", *force),
+        Yardstick(MARKERS, "Markers from model", "mm", _MARKER_GOOD_MM, _MARKER_LIMIT_MM),
     )
 
 

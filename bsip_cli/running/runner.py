@@ -45,13 +45,16 @@ State = Literal["done", "fresh", "waiting", "refused", "unwritten", "bug", "note
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one unit."""
+    """What became of one unit; ``reads``: kinds of artifacts and recordings, of one that was done,
+    in so many ``seconds``."""
 
     stage: str
     unit: str
     state: State
     sentences: tuple[str, ...] = ()
     exit_code: int = 0
+    seconds: float = 0.0
+    reads: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -264,7 +267,7 @@ def _forget_gone_recordings(folder: Path, participant: Participant) -> None:
 def perform(unit: Unit, force: bool = False) -> Outcome:
     """Do one unit unless it is fresh or lacks its inputs; its bug is written down, too."""
     end_if_asked()
-    stage = unit.stage
+    stage, start = unit.stage, time.perf_counter()
     try:
         waiting = lacking(unit)
         if waiting is not None:
@@ -283,7 +286,8 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
         bug = _bug(stage.name, unit.name, error)
         _write_refusal(unit, "bug", bug.sentences[0].splitlines()[0])
         return bug
-    return Outcome(stage.name, unit.name, "done", (*said, *unit.messages))
+    seconds, reads = time.perf_counter() - start, tuple(unit.kinds_read())
+    return Outcome(stage.name, unit.name, "done", (*said, *unit.messages), 0, seconds, reads)
 
 
 def _refused(unit: Unit, error: BsipError) -> Outcome:

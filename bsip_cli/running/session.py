@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import difflib
+import re
 import sys
 from collections import Counter
 from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import click
@@ -17,13 +18,14 @@ from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, Load, load_config, with_estimators
 from bsip_cli.errors import BadDataError, UsageError, printable
-from bsip_cli.pipeline import Stage, by_level, stages_named
+from bsip_cli.pipeline import FINDINGS, Stage, by_level, stages_named
 from bsip_cli.running.runner import Manner, Outcome, refusal_sentence, run_stages
 from bsip_cli.study.dataset import describe_dataset, make_out
 from bsip_cli.study.study import Study, load_study
 from bsip_cli.study.trials import listed
 
 _LOADS = "correct [[loads]] in study.toml"
+_NAME = r"sub-[A-Za-z0-9]+(_[a-z]+-[A-Za-z0-9]+)*"  # of a person or a recording
 _SEVERITY = (0, 3, 4, 2, 1)  # of several exit codes the gravest counts
 
 
@@ -39,11 +41,14 @@ def run_session(
     verify: bool = False,
     estimators: tuple[str, ...] = (),
     group: bool = False,
+    verbose: bool = False,
+    quiet: bool = False,
 ) -> int:
     """Run a command's stages on a study and return the exit code.
 
     ``estimators`` stand for the configured ones, unless empty; ``group`` leaves out what is
     about one participant; ``verify`` hashes every file, also where its times have not changed.
+    ``verbose`` and ``quiet`` as `follow` takes them.
     """
     stages = _stages(command, chosen, group)
     if any(stage.level == "cohort" for stage in stages):
@@ -62,7 +67,7 @@ def run_session(
         else sum(len(p.trials) if s.level == "trial" else 1 for p in participants)
         for s in stages
     )
-    return follow(command, refusals, running, total, out)
+    return follow(command, refusals, running, total, out, verbose=verbose, quiet=quiet)
 
 
 def _stages(command: str, chosen: tuple[str, ...], group: bool) -> tuple[Stage, ...]:
@@ -141,22 +146,64 @@ def follow(
     running: Generator[Outcome, None, None],
     total: int,
     out: Path | None,
+    *,
+    verbose: bool = False,
+    quiet: bool = False,
 ) -> int:
     """Tell the user what becomes of the units, with a bar of ``total`` steps; the exit code.
 
-    ``out``: the results' folder, None if they are not kept.
+    ``out``: the results' folder, None if they are not kept. ``verbose``: of each unit what it read
+    and how long it took. ``quiet``: findings and errors only.
     """
-    outcomes = list(refusals)
+    outcomes, voice = list(refusals), _Voice(verbose, quiet)
     for outcome in outcomes:
-        _tell(outcome)
-    bar = tqdm(total=total, desc=command, unit="unit", disable=None)
+        voice.tell(outcome)
+    bar = tqdm(total=total, desc=command, unit="unit", disable=True if quiet else None)
     with bar as progress, closing(running):  # whatever happens here, no process goes on
         for outcome in running:
             outcomes.append(outcome)
             progress.update(outcome.state != "noted")
-            _tell(outcome)
-    _summary(command, outcomes, out)
+            voice.tell(outcome)
+    voice.tell_of_the_others()
+    if not quiet:
+        _summary(command, outcomes, out)
     return _exit_code(outcomes)
+
+
+@dataclass
+class _Voice:
+    """What the user hears; a remark that many recordings get is made once, and at the end it is
+    said of which others it is true."""
+
+    verbose: bool
+    quiet: bool
+    told: dict[tuple[str, str], list[str]] = field(default_factory=dict)
+
+    def tell(self, outcome: Outcome) -> None:
+        is_finding = outcome.exit_code != 0 or outcome.stage in FINDINGS
+        for sentence in outcome.sentences if is_finding or not self.quiet else ():
+            alike = self.told.setdefault((outcome.stage, re.sub(_NAME, "", sentence)), [])
+            if is_finding or not alike:
+                _say(outcome, sentence)
+            alike += [] if is_finding else [outcome.unit]
+        if self.verbose and outcome.state == "done":
+            what = f"{outcome.seconds:.1f} s; read {', '.join(outcome.reads)}"
+            _say(outcome, f"{outcome.unit}: {what}")
+
+    def tell_of_the_others(self) -> None:
+        for (stage, sentence), units in self.told.items():
+            if len(units) > 1:
+                others = f"the same of {listed(units[1:])}: {sentence.lstrip(': ')}"
+                _write(stage, others)
+
+
+def _say(outcome: Outcome, sentence: str) -> None:
+    lines = sentence.split("\n") if outcome.state == "bug" else [sentence]  # with its trace
+    _write(outcome.stage, "\n".join(map(printable, lines)))
+
+
+def _write(stage: str, text: str) -> None:
+    tqdm.write(f"{stage}: {text}", file=sys.stderr)
 
 
 def _config(root: Path, config_file: Path | None) -> Config:
@@ -178,12 +225,6 @@ def _own_file(root: Path, name: str) -> str:
     """A user's own TOML file lies in the study, or where the command was given."""
     in_study = root / name
     return str(in_study) if name.endswith(".toml") and in_study.is_file() else name
-
-
-def _tell(outcome: Outcome) -> None:
-    for sentence in outcome.sentences:
-        lines = sentence.split("\n") if outcome.state == "bug" else [sentence]  # with its trace
-        tqdm.write(f"{outcome.stage}: " + "\n".join(map(printable, lines)), file=sys.stderr)
 
 
 def _summary(command: str, outcomes: Iterable[Outcome], out: Path | None) -> None:

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from importlib.metadata import version
@@ -173,10 +173,20 @@ class Unit:
     def inputs(self) -> dict[str, Path]:
         """Name and path of every file that a unit of a participant reads, but for refused ones."""
         files = self._files_of(self.participant)
-        if self.stage.reads_recordings and self.participant is not None:
-            trials = (self.trial,) if self.trial else self.participant.trials
-            files |= {path.name: path for trial in trials for path in trial.files}
+        files |= {path.name: path for path in self._recordings()}
         return files | self._files_of_options()
+
+    def _recordings(self) -> list[Path]:
+        """Files of its recordings, of a stage that reads these."""
+        if not self.stage.reads_recordings or self.participant is None:
+            return []
+        trials = (self.trial,) if self.trial else self.participant.trials
+        return [path for trial in trials for path in trial.files]
+
+    def kinds_read(self) -> Iterator[str]:
+        """The kinds of artifacts that it reads and that are there, and the names of recordings."""
+        yield from (kind for kind in self.stage.inputs if self._has(kind))
+        yield from (path.name for path in self._recordings())
 
     def _files_of(self, participant: Participant | None) -> dict[str, Path]:
         """What the unit reads of a participant, or of the group: artifacts, refusals."""

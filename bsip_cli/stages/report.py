@@ -8,6 +8,7 @@ Writes report-files.
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from datetime import date
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from bsip_cli.artifacts import (
     write_bytes,
 )
 from bsip_cli.report.blocks import Document, Grid, Picture
+from bsip_cli.report.first_page import light_for
 from bsip_cli.report.page import FILES, render
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import (
@@ -57,8 +59,9 @@ _FOUND = {  # field of a participant's record: kind that is there only if its st
 
 def run(unit: Unit) -> None:
     assert unit.participant is not None
-    document = participant_document(record_of(unit))
-    unit.write("report-files", file_rows(unit.out, write_page(unit, document)))
+    record = record_of(unit)
+    rows = file_rows(unit.out, write_page(unit, participant_document(record)))
+    unit.write("report-files", rows, facts={"light": asdict(light_for(record))})
 
 
 def write_page(unit: Unit, document: Document) -> list[Path]:

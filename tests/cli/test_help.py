@@ -81,6 +81,7 @@ def test_every_stage_takes_the_same_arguments(name):
     assert arguments == ["study"]
     own = {"identify": [["--estimator"]], "report": [["--group"]], "run": [["--group"]]}
     common = [["--out"], ["--participant"], ["--config"], ["--jobs"], ["--force"], ["--verify"]]
+    common += [["-v", "--verbose"], ["-q", "--quiet"]]
     assert options == [*common, *own.get(name, [])]
 
 

@@ -111,7 +111,7 @@ def test_a_reader_is_led_to_those_who_lie_far_out():
     usual = np.array([10.0, 11.0, 12.0, 13.0, 14.0, np.nan])
     assert not is_far(usual, 5.0, 30.0).any()
     assert list(is_far(np.append(usual, 25.0), 5.0, 30.0)).index(True) == 6
-    assert not is_far(np.append(usual, 25.0), 26.0, 30.0).any()  # as good as published
+    assert not is_far(np.append(usual, 25.0), 26.0, 30.0).any()  # good
     assert is_far(np.array([31.0]), 5.0, 30.0).all()
 
 

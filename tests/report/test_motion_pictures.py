@@ -33,11 +33,12 @@ def test_the_figure_shows_markers_force_and_when(pose):
     (markers,) = axes.lines
     assert len(markers.get_xdata()) == 4
     texts = [text.get_text() for text in axes.texts]
-    assert "700 N" in texts
-    assert r"squat \$1\$, 0.25 s" in texts
+    said = texts[-1]
+    assert "measured ground force, 700 N" in said
+    assert said.startswith(r"squat \$1\$, 0.25 s")
     unmeasured = replace(pose, force_N=np.full(3, np.nan))
     (without,) = stick_figure(unmeasured, "squat").axes
-    assert not [text for text in without.texts if "N" in text.get_text()]
+    assert not [text for text in without.texts if "ground force" in text.get_text()]
 
 
 def test_one_body_weight_is_half_as_long_as_the_person_is_tall(pose):

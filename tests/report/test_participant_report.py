@@ -126,20 +126,20 @@ def test_second_run_gives_the_same_bytes(reports):
 
 
 def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
-    assert f"sub-01, man, {MASS_KG} kg (participants.tsv; the plates say +0.5 %), 1.63 m" in first
-    assert "Something is wrong: 1 cause named and 1 narrowed down to several" in first
+    assert f"sub-01, man, {MASS_KG} kg (participants.tsv; the plates say 63.1 kg), 1.63 m" in first
+    assert "Something is wrong: 1 fault named and 1 narrowed down to several" in first
     assert (
         "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
-        "both recordings, as large as laboratories meet (1 to 4°); probability 99.5 %." in first
+        "both recordings, a usual size (1 to 4°); probability 99.5 %." in first
     )
-    assert "One of 2 that cannot be told apart here" in first
+    assert "One of 2, not to be distinguished: " in first
     assert "the table's segment parameters 70 %" in first
     assert "unknown 20 %" in first
-    assert "Markers from model: 6.7 mm as good as published" in first
-    assert "Use OM, the parameters identified from this person's movement" in first
-    assert "the error changes by −46 to −34 % in 2 recordings that identified nothing." in first
+    assert "Markers from model: 6.7 mm , good" in first
+    assert "Use OM, the segment parameters identified from this person's movement" in first
+    assert "OM errs 34 to 46 % less than RM," in first
     assert "But RM for basketball." in first
-    assert "correct it in the lab or in the file" in first
+    assert "Correct it in the lab, or let bsip write corrected files" in first
 
 
 def test_yardsticks_are_those_of_data_that_identified_nothing(record, first):
@@ -160,15 +160,16 @@ def test_the_light_has_four_states(record):
     assert light(record, found).state == "cause"
     fine = light(record, rejected)
     assert fine.state == "fine"
-    assert "A delay between forces and markers under 2.5 ms" in fine.text
+    assert re.fullmatch(r"None of the \d+ faults that bsip knows was found in 2 .*", fine.text)
     large = found[found["rank"] == 1].assign(
         effect="unexplained", target="", parameter="error", sentence="large error, cause unknown"
     )
     assert light(record, large).state == "large"
     beside = pd.concat([large, found[found["rank"] > 1]])
-    assert (
-        light(record, beside).title == "Large error, cause unknown; 1 other cause found beside it"
+    assert light(record, beside).title == (
+        "Large error, mostly the table's segment parameters (70 %); 2 faults found"
     )
+    assert light_of(beside, record.detection).title == "Large error, cause unknown; 2 faults found"
     small = large.assign(target="1 fz", parameter="amplitude")
     assert light(record, small).state == "cause"  # a regularity without a name is no large error
     unsure = large.assign(effect="inconclusive", parameter="", sentence="too short")
@@ -188,24 +189,29 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
     )
     large = replace(record, diagnosis=nothing, trials=trials)
     (light,) = (block for block in front(large) if isinstance(block, Light))
-    assert (light.state, light.title) == ("inconclusive", "No fault found, but an error is large")
-    assert "Large: vertical force error" in light.text
+    assert (light.state, light.title) == (
+        "large",
+        "Large error, mostly the table's segment parameters (70 %)",
+    )
+    assert light.text.startswith("Large: vertical force 5.5 % of body weight. None of the")
     *_, to_do = front(large)
-    assert not any("Nothing needs to be corrected" in item for item in to_do.items)
+    assert not any("nothing needs to be corrected" in item for item in to_do.items)
 
 
 def test_what_is_fine_is_to_be_used_as_it_is(record):
     nothing = record.diagnosis[record.diagnosis["verdict"] == "rejected"]
     *_, to_do = front(replace(record, diagnosis=nothing, refusals=()))
-    assert to_do.items[0].startswith("Nothing needs to be corrected")
-    assert to_do.items[1] == "To know the parameters better, record: swing the left shank."
+    assert to_do.items[0].startswith("The data may be used: nothing")
+    assert (
+        to_do.items[1] == "Optional, to know the parameters better, record: swing the left shank."
+    )
 
 
 def test_rm_is_used_where_nothing_is_sure(record):
     choice = record.choice.assign(use="RM", ratio_om=1.05)
     said = use_sentence(replace(record, choice=choice))
-    assert said.startswith("Use RM, the parameters of an anthropometric table (regression)")
-    assert "change its error by −5 to +16 %, which is no sure gain" in said
+    assert said.startswith("Use RM, the segment parameters of an anthropometric table")
+    assert "OM errs 5 % less to 16 % more than RM," in said
     rare = record.identification.assign(rare=True)
     assert "Never use OM" in use_sentence(replace(record, identification=rare))
 

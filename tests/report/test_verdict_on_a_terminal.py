@@ -1,5 +1,7 @@
 """What ``bsip show`` prints of a diagnosis: lines that fit, and nothing that a file could hide."""
 
+from dataclasses import replace
+
 import pandas as pd
 
 from bsip_cli.commands.show import shown, verdict_text
@@ -18,15 +20,15 @@ def test_causes_are_numbered_and_lines_fit():
         text = text_of(diagnosis(TRIALS), columns)
         assert max(map(len, text.splitlines())) <= min(columns, 100)
     assert "\n 1. Plate 1 is turned by +2.0 degrees" in text
-    assert "\n 2. One of these, which these recordings cannot tell apart" in text
-    assert text.startswith("\n## Is anything wrong: sub-01\nSomething is wrong: 1 cause named")
+    assert "\n 2. One of these, which these recordings cannot distinguish" in text
+    assert text.startswith("\n## Is anything wrong: sub-01\nSomething is wrong: 1 fault named")
 
 
 def test_what_was_put_right_is_told_too():
     events = marker_events().assign(put_right=True, sentence="A and B bear labels; corrected")
     right = put_right_sentence([(TRIALS[0], events)])
     assert right == (
-        "Corrected already, before the search for causes: in sequence (run 1) A and B bear labels.",
+        "Corrected already, before the search for faults: in sequence (run 1) A and B bear labels.",
     )
     assert "Corrected already" in text_of(diagnosis(TRIALS), right=right)
     assert put_right_sentence([(TRIALS[0], marker_events())]) == ()
@@ -44,13 +46,32 @@ def test_a_person_fits_on_a_screen_the_most_important_first(reports, tmp_path):
     Artifacts(tmp_path, person).write_all()
     text = "\n".join(shown(tmp_path))
     assert len(text.splitlines()) <= 24 and max(map(len, text.splitlines())) <= 100
-    assert text.startswith("sub-01: Something is wrong: 1 cause named and 1 narrowed down")
+    assert text.startswith("sub-01: Something is wrong: 1 fault named and 1 narrowed down")
     flat = " ".join(text.split())
     assert " 1. Plate 1 is turned by +2.0 degrees" in flat
     assert "Use OM: it errs less." in flat
     assert "Identification (OM against RM) changes" in flat
     full = "\n".join(shown(tmp_path, full=True))
     assert "## Is anything wrong: sub-01" in full and len(full) > len(text)
+
+
+def test_the_answer_is_that_of_the_first_page(reports, tmp_path):
+    """Nothing is found and an error is large: the diagnosis alone would say that all is fine."""
+    person = reports.study.participants[0]
+    artifacts = Artifacts(tmp_path, person)
+    artifacts.write_all()
+    nothing = diagnosis(TRIALS).query("verdict == 'rejected'")
+    artifacts.write("overall-diagnosis", nothing)
+    for trial in person.trials[1:]:
+        artifacts.write("fit", artifacts.fit(trial).assign(rmse_percent_bw=9.0), trial)
+    assert "sub-01: Fine" in "\n".join(shown(tmp_path))  # no report, no yardstick
+    replace(reports, out=tmp_path).run("report", person)
+    said = " ".join("\n".join(shown(tmp_path)).split())
+    assert said.startswith(
+        "sub-01: Large error, mostly the table's segment parameters (70 %). Large:"
+    )
+    page = replace(reports, out=tmp_path).html("sub-01")
+    assert "<strong>Large error, mostly the table&#39;s segment parameters (70 %)</strong>" in page
 
 
 def test_of_several_people_each_has_a_line(reports):

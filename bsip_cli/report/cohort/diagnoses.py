@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Light, Paragraph, Section
+from bsip_cli.report.candidates import is_large
 from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.shared import SHARED, Cause, Searched, named_people, shared_causes
-from bsip_cli.report.verdict import is_large, probability_of, probability_words
+from bsip_cli.report.verdict import probability_of, probability_words
 from bsip_cli.report.words import MISSING, capital, count, labelled, listing
 
 _NOT_RUN = "Nobody's recordings were searched for errors: run `bsip diagnose`."

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -47,18 +49,23 @@ def stick_figure(pose: Pose, trial: str) -> Figure:
         foot, tip = projected(pose.force_at_m, centre), projected(pose.tip_m(), centre)
         arrow = {"color": GREEN, "lw": 2.2, "arrowstyle": "-|>", "mutation_scale": 12}
         axes.annotate("", tuple(tip), tuple(foot), arrowprops=arrow)
-        label = axes.annotate(
-            f"{np.linalg.norm(pose.force_N):.0f} N", tuple(tip), (6, 2), textcoords="offset points"
-        )
-        label.set(color=GREEN, fontsize=8.5, bbox={"fc": "white", "ec": "none", "pad": 1.0})
         points += [foot[None], tip[None]]
     everything = np.concatenate(points)
     low, high = everything.min(axis=0) - _MARGIN_M, everything.max(axis=0) + _MARGIN_M
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
-    when = plain(trial) + f", {pose.time_s:.2f} s"
-    axes.text(0.5, 0.0, when, transform=axes.transAxes, fontsize=7.5, color=SOFT, ha="center")
+    force = np.linalg.norm(pose.force_N)
+    lines = [plain(trial) + f", {pose.time_s:.2f} s", "black: right limbs; grey: left"]
+    lines += [f"green: measured ground force, {force:.0f} N"] if np.isfinite(force) else []
+    said: dict[str, Any] = {
+        "transform": axes.transAxes,
+        "fontsize": 7.5,
+        "color": SOFT,
+        "ha": "center",
+        "va": "top",
+    }
+    axes.text(0.5, -0.01, "\n".join(lines), **said)
     axes.set_axis_off()
     return figure
 

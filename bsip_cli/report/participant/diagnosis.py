@@ -7,7 +7,7 @@ from math import inf, isfinite
 
 import pandas as pd
 
-from bsip_cli.report.blocks import Block, Cell, Grid, Heading, Mark, Numbered, Paragraph, Section
+from bsip_cli.report.blocks import Block, Cell, Grid, Heading, Numbered, Paragraph, Section
 from bsip_cli.report.candidates import Candidate, Limit, candidates_of, limits_of
 from bsip_cli.report.effect_words import (
     USUAL,
@@ -42,7 +42,7 @@ def section(record: ParticipantRecord) -> Section:
     blocks = (
         *([Numbered(said.causes)] if said.causes else [Paragraph(said.headline)]),
         *(Paragraph(text) for text in (*put_right_sentence(events), *said.results)),
-        *ranking(candidates_of(record.diagnosis)),
+        *nearest(candidates_of(record.diagnosis)),
         Heading("What might have gone unseen"),
         *limit_blocks(record.detection, record.diagnosis),
         Heading("How this was decided"),
@@ -60,37 +60,23 @@ def section(record: ParticipantRecord) -> Section:
 # --- causes -------------------------------------------------------------------------------------
 
 
-def ranking(candidates: Sequence[Candidate]) -> tuple[Block, ...]:
-    """The causes that were found, and the nearest of those that were not."""
-    if not candidates:
-        return (Paragraph("No fault of the catalogue came near."),)
-    rejected = [one for one in candidates if one.verdict == "rejected"]
-    left_out = rejected[_NEAREST:]
-    rows = tuple(_row(k, one) for k, one in enumerate(candidates, start=1) if one not in left_out)
-    head = ("cause", "verdict", "recordings", "probability", "changes [N or N m]", "explains [%]")
+def nearest(candidates: Sequence[Candidate]) -> tuple[Block, ...]:
+    """The causes that came nearest to being found."""
+    rejected = [one for one in candidates if one.verdict == "rejected"][:_NEAREST]
+    if not rejected:
+        return (Paragraph("No other fault of the catalogue came near."),)
+    rows = tuple(_row(one) for one in rejected)
+    head = ("not found, but near", "probability", "changes [N or N m]", "explains [%]")
     caption = (
-        "Faults that were found or came nearest. Changes: root mean square in the force or moment "
-        "that changes most. Explains: of the squared difference in seconds that did not size it, "
-        "with 95 % interval."
+        "Changes: root mean square in the force or moment that changes most. Explains: of the "
+        "squared difference in seconds that did not size it, with 95 % interval."
     )
-    return (Grid(head, rows, caption, words=3),)
+    return (Grid(head, rows, caption),)
 
 
-def _row(k: int, one: Candidate) -> tuple[str | Cell, ...]:
-    marks: dict[str, Mark] = {"named": "group", "ambiguous": "warning"}
-    answers = {
-        "ambiguous": f"one of group {one.class_id}",
-        "unnamed": "found, without a name",
-        "rejected": "not sure" if one.probability >= 0.5 else "not so",
-    }
-    return (
-        f"{k}. {f'({one.class_id}) ' if one.class_id else ''}{one.label}",
-        Cell(answers.get(one.answer, one.answer), marks.get(one.verdict, "")),
-        one.where() if one.verdict != "rejected" else MISSING,
-        probability_words(one.probability) or MISSING,
-        number(one.rms_change, 1),
-        one.removes(),
-    )
+def _row(one: Candidate) -> tuple[str | Cell, ...]:
+    probability = probability_words(one.probability) or MISSING
+    return (one.label, probability, number(one.rms_change, 1), one.removes())
 
 
 # --- limits -------------------------------------------------------------------------------------

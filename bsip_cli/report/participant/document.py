@@ -36,7 +36,7 @@ GLOSSARY = (
 def participant_document(record: ParticipantRecord) -> Document:
     return Document(
         title=f"{record.id}: does the motion explain the ground forces?",
-        subtitle="Ground forces computed from the motion, compared with the force plates.",
+        subtitle="Ground force computed from the markers' motion, beside the force plates'.",
         front=front(record),
         sections=(
             diagnosis.section(record),

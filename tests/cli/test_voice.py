@@ -1,0 +1,36 @@
+"""How much a run says: findings and errors only, or what each unit reads and how long it takes."""
+
+from bsip_cli.running.runner import Outcome
+from bsip_cli.running.session import follow
+
+REMARK = "markers: no markers on the head"
+
+
+def said(capsys, **voice: bool) -> str:
+    outcomes = [
+        Outcome("ingest", f"sub-{k}", "done", (f"sub-{k}: {REMARK}",), 0, 1.25, ("markers",))
+        for k in (1, 2, 3)
+    ]
+    outcomes.append(Outcome("diagnose", "sub-1", "done", ("sub-1: something is wrong",)))
+    outcomes.append(Outcome("ik", "sub-2", "refused", ("sub-2: too short",), 3))
+    assert follow("run", [], (one for one in outcomes), len(outcomes), None, **voice) == 3
+    return capsys.readouterr().err
+
+
+def test_a_remark_is_made_once_for_the_study(capsys):
+    text = said(capsys)
+    assert text.count(REMARK) == 2
+    assert f"ingest: sub-1: {REMARK}" in text
+    assert f"ingest: the same of sub-2, sub-3: {REMARK}" in text
+    assert "1.2 s" not in text and "bsip run: 4 done, 1 refused" in text
+
+
+def test_quiet_says_findings_and_errors_only(capsys):
+    assert said(capsys, quiet=True).splitlines() == [
+        "diagnose: sub-1: something is wrong",
+        "ik: sub-2: too short",
+    ]
+
+
+def test_verbose_says_what_is_read_and_how_long_it_takes(capsys):
+    assert "ingest: sub-2: 1.2 s; read markers" in said(capsys, verbose=True)

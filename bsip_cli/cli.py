@@ -86,6 +86,13 @@ cli.commands["identify"].params.append(
     )
 )
 cli.add_command(_stage_command("run", "All stages, from recordings to the report."))
+cli.commands["run"].params.append(
+    click.Option(
+        ["--until"],
+        type=click.Choice(list(dict.fromkeys(stage.name for stage in STAGES))),
+        help="Only the stages up to this one.",
+    )
+)
 for _name in ("report", "run"):
     cli.commands[_name].params.append(
         click.Option(["--group"], is_flag=True, help="Only what is about all participants.")

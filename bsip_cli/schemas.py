@@ -881,11 +881,13 @@ SCHEMAS = {
         Schema(
             "laboratory-information",
             "participant",
-            1,
+            2,
             "what a person's sessions tell of the faults of plates, clock and vertical",
             (
                 _text("session", "label of the session; empty if there are none"),
-                *_FAULT,
+                *_FAULT[:3],
+                Column("standing", "bool", "1", "as trials tell it in which a person stands still"),
+                _FAULT[3],
                 Column("typical", "float", "as unit", "size that laboratories meet"),
                 Column("most", "float", "as unit", "no fault is larger"),
                 Column("known_to", "float", "as unit", "spread that no recording betters"),
@@ -924,11 +926,12 @@ SCHEMAS = {
         Schema(
             "laboratory-sums",
             "cohort",
-            1,
+            2,
             "what all persons together tell of each laboratory, for the diagnosis of each",
             (
                 _text("laboratory", "as in laboratory"),
                 *_FAULT[:3],
+                Column("standing", "bool", "1", "as in laboratory-information"),
                 Column("spread", "float", "1", "standard deviation between persons [typical]"),
                 Column("pull", "float", "1", "precision times likeliest sizes [typical]"),
                 Column("precision_*", "float", "1", "with the number of this row [per typical^2]"),

@@ -30,8 +30,8 @@ class Known:
     root: np.ndarray
     rows: pd.DataFrame
 
-    def beside(self, trial: FaultTrial) -> FaultTrial:
-        return with_known(trial, self.coordinates, self.mean, self.root)
+    def beside(self, trial: FaultTrial, standing: bool) -> FaultTrial:
+        return with_known(trial, standing, self.coordinates, self.mean, self.root)
 
     def findings(self, trials: Sequence[FaultTrial]) -> Iterator[Finding]:
         """What the laboratory was found to have, in the trials on whose plates it is."""

@@ -10,7 +10,7 @@ from bsip_cli.diagnosis.laboratory import Pooled
 from bsip_cli.diagnosis.shared_faults import Coordinate, Information
 from bsip_cli.effects.effect import Parameter
 
-_KEY = ("effect", "target", "parameter")
+_KEY = ("effect", "target", "parameter", "standing")
 
 
 def coordinates_in(rows: pd.DataFrame) -> tuple[Coordinate, ...]:
@@ -49,6 +49,7 @@ def pooled_rows(laboratory: str, pooled: Pooled) -> Iterable[dict]:
             "effect": one.effect,
             "target": one.target,
             "parameter": one.parameter,
+            "standing": one.standing,
             "spread": pooled.spread[k],
             "pull": pooled.pull[k],
             **{f"precision_{j}": x for j, x in enumerate(pooled.precision[k])},

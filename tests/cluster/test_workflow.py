@@ -143,14 +143,18 @@ def test_everybody_is_asked_at_each_call(place):
 def test_the_laboratory_is_summed_once_all_have_told_of_it(place):
     assert place.snakemake().returncode == 0
     place.calls()
-    assert sorted(place.told) == [[*call, "--until", "laboratory"] for call in asked("sub-01", "sub-02")]
+    assert sorted(place.told) == [
+        [*call, "--until", "laboratory"] for call in asked("sub-01", "sub-02")
+    ]
 
 
 def test_one_failure_stops_nobody_and_fails_the_whole(place):
     """What they tell of the laboratory is asked twice."""
     assert place.snakemake(FAILS="sub-01").returncode != 0
     assert place.calls() == asked("sub-01", "sub-02")
-    assert sorted(place.told) == [[*call, "--until", "laboratory"] for call in asked("sub-01", "sub-01", "sub-02")]
+    assert sorted(place.told) == [
+        [*call, "--until", "laboratory"] for call in asked("sub-01", "sub-01", "sub-02")
+    ]
     assert place.snakemake().returncode == 0
 
 

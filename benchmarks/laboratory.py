@@ -5,8 +5,8 @@
 POOL: results of `bsip laboratory` for simulated persons of one sound laboratory, whose forces come
 by the simulator's own route. Persons are drawn from them with replacement, and one fault is added
 to what they tell: J theta to the pull; to what they tell in motion alone, where trials of who
-stands still are clean. In a second kind persons only know as much as those of the pool, and what they tell
-is drawn as the model has it, deviations and all. Printed are the errors beside the Cramer-Rao bound
+stands still are clean. In another kind persons only know as much as those of the pool, and what
+they tell is drawn as the model has it, deviations and all. Printed are the errors beside the Cramer-Rao bound
 (the persons' deviations and every other number known to be as usual), how often 95 % intervals
 hold, names that are false in laboratories without a fault, and time and memory of many persons.
 """
@@ -31,7 +31,7 @@ from bsip_cli.diagnosis.laboratory import Lag, persons_of, sums_of
 from bsip_cli.diagnosis.laboratory_deviations import deviations_of
 from bsip_cli.diagnosis.laboratory_search import Laboratory, causes_of, laboratory_of, verdicts_of
 from bsip_cli.diagnosis.shared_faults import STATED_MASS, Coordinate, Information
-from bsip_cli.stages.shared_faults import information_in
+from bsip_cli.stages.known_laboratory import information_in
 
 KIND = "laboratory-information"
 FAULTS = (  # of the first plate, [typical sizes]: 10 ms, 20 mm, 1 degree, 4 %

@@ -34,7 +34,7 @@ from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.effects.scene import Scene
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
-from bsip_cli.stages.shared_faults import information_in, pooled_rows
+from bsip_cli.stages.known_laboratory import information_in, pooled_rows
 
 _SAME_PLACE_M = (
     0.02  # of every corner: what laboratories meet of a plate that is not where it is said

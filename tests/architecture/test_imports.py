@@ -154,7 +154,6 @@ def test_stages_do_not_know_each_other():
         "stages.reconstructed",
         "stages.session_reading",
         "stages.report",
-        "stages.shared_faults",
         "stages.trial_scene",
     }
     pairs = {

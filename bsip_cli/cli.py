@@ -25,6 +25,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 _OPTIONS = tomllib.loads(shipped("commands.toml").read_text(encoding="utf-8"))
 _PATH = click.Path(path_type=Path)
+_STAGES = list(dict.fromkeys(stage.name for stage in STAGES))
 _TYPES = {"path": _PATH, "int": click.INT, "float": click.FLOAT}
 _OF_STUDY = ("--participant", "--config", "--jobs")
 _VOICE = ("--verbose", "--quiet")
@@ -38,7 +39,8 @@ def _option(key: str) -> Any:
     if "type" in said:
         said["type"] = _TYPES[said["type"]]
     if "choices" in said:
-        said["type"] = click.Choice(said.pop("choices"))
+        choices = said.pop("choices")
+        said["type"] = click.Choice(_STAGES if choices == "stages" else choices)
     if "range" in said:
         kind = click.FloatRange if said.get("type") is click.FLOAT else click.IntRange
         said["type"] = kind(*said.pop("range"))
@@ -71,7 +73,7 @@ def cli() -> None:
 
 
 def _stage_command(name: str, summary: str) -> click.Command:
-    own = {"identify": ("--estimator",), "report": ("--group",), "run": ("--group",)}
+    own = {"identify": ("--estimator",), "report": ("--group",), "run": ("--group", "--until")}
 
     @click.command(name, help=summary)
     @_study

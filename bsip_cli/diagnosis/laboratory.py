@@ -4,8 +4,11 @@ Each person's recordings tell something of the shared faults (``shared_faults``)
 theta the laboratory's sizes and d the person's own deviation, since nobody's body and skin are just
 as the model has them. How large deviations are follows from the data, by kind of number (a random
 effect, its variance by expectation and maximisation: Dempster 1977, J R Stat Soc B 39; Laird and
-Ware 1982, Biometrics 38). With J and h a person's precision and pull and T^2 the variance of d, the
-person adds J - J V J and h - J V h to what is known of theta, V = (J + T^-2)^-1.
+Ware 1982, Biometrics 38). What is told in motion and by who stands still are coordinates of their
+own, E d what a person deviates in both. With J and h a person's precision and pull and T^2 the
+variance of d, the person adds J - J E V E' J and h - J E V E' h to what is known of the
+coordinates, V = (E' J E + T^-2)^-1. These are E theta, and for who stands still a difference more
+in all persons alike, whose size follows from the data too: plates may be moved before they walk.
 """
 
 from __future__ import annotations
@@ -29,33 +32,63 @@ _STEADY = 0.01  # change of every scale
 
 @dataclass(frozen=True, eq=False)
 class Persons:
-    """What M persons tell of C coordinates [typical sizes].
+    """What M persons tell of C coordinates [typical sizes], which are K numbers in motion and, some
+    of them, of who stands still too.
 
     precision (M, C, C), pull (M, C) : of each alone; 0 where nothing is told.
-    usual (M, C) : standard deviation of the deviations before the data. groups (C,) : whose
-    deviations have one scale. ordinary (C,) : what every laboratory has of a fault.
-    alike (C, K) : root of the covariance of what persons' bodies do alike.
+    numbers (C,) : which number a coordinate is; the first K are those in motion.
+    usual (M, K) : standard deviation of the deviations before the data. groups (K,) : whose
+    deviations have one scale; behind them as many groups of differences of who stands still.
+    ordinary (K,) : what every laboratory has of a fault.
+    alike (C, L) : root of the covariance of what persons' bodies do alike.
     """
 
     coordinates: tuple[Coordinate, ...]
     parameters: tuple[Parameter, ...]
     precision: np.ndarray
     pull: np.ndarray
+    numbers: np.ndarray
     usual: np.ndarray
     groups: np.ndarray
     ordinary: np.ndarray
     alike: np.ndarray
 
     @property
+    def both(self) -> np.ndarray:
+        """(C, K) what makes coordinates of the numbers."""
+        return np.eye(len(self.groups))[self.numbers]
+
+    @property
+    def standing(self) -> np.ndarray:
+        """Coordinates that may differ from their number, being of who stands still."""
+        return np.flatnonzero([one.standing for one in self.coordinates])
+
+    @property
+    def count(self) -> int:
+        """Of scales."""
+        return 2 * (int(self.groups.max()) + 1)
+
+    @property
+    def of_differences(self) -> np.ndarray:
+        """(S,) scale of each difference of who stands still."""
+        return self.count // 2 + self.groups[self.numbers[self.standing]]
+
     def told(self) -> np.ndarray:
-        """(M, C) True where a person tells something of a coordinate."""
-        return np.diagonal(self.precision, axis1=1, axis2=2) > 0
+        """(M, K) True where a person tells something of a number."""
+        return (np.diagonal(self.precision, axis1=1, axis2=2) > 0) @ self.both > 0
 
     def only(self, numbers: Sequence[int]) -> Persons:
         """Some of them."""
         mine = list(numbers)
         precision, pull, usual = self.precision[mine], self.pull[mine], self.usual[mine]
         return replace(self, precision=precision, pull=pull, usual=usual)
+
+    def differences(self, scale: np.ndarray) -> np.ndarray:
+        """(C, S) root of the covariance of the differences of who stands still: usually as large as
+        persons deviate, since a body's model errs otherwise in motion."""
+        mine = self.standing
+        sizes = self.usual[0, self.numbers[mine]] * scale[self.of_differences]
+        return np.eye(len(self.coordinates))[:, mine] * sizes
 
 
 @dataclass(frozen=True)
@@ -77,6 +110,8 @@ class Lag:
         mean_s, sd_s = self.moments_s
         root = np.zeros((len(coordinates), 2))
         for k, one in enumerate(coordinates):
+            if one.standing:
+                continue  # nothing in who stands still tells of time
             if one.effect == SyncOffset.name:
                 root[k] = np.array([1.0, -mean_s / sd_s]) * self.size_s / known[one].typical
             elif one.effect == ClockDrift.name:
@@ -101,17 +136,20 @@ def persons_of(
     known = {
         x: p for one in informations for x, p in zip(one.coordinates, one.parameters, strict=True)
     }
-    coordinates = tuple(sorted(known))
-    is_mass = np.array([one.effect == STATED_MASS.name for one in coordinates])
+    known |= {replace(x, standing=False): p for x, p in known.items()}  # none may tell it in motion
+    coordinates = tuple(sorted(known, key=lambda one: (one.standing, one)))
+    moving = [one for one in coordinates if not one.standing]
+    is_mass = np.array([one.effect == STATED_MASS.name for one in moving])
     masses = np.array(mass_sd) / STATED_MASS.parameter.typical
-    kinds = [(one.effect, *one.target.split(" ")[1:], one.parameter) for one in coordinates]
-    numbers = {kind: k for k, kind in enumerate(dict.fromkeys(kinds))}
+    kinds = [(one.effect, *one.target.split(" ")[1:], one.parameter) for one in moving]
+    groups = {kind: k for k, kind in enumerate(dict.fromkeys(kinds))}
     return Persons(
         coordinates,
         tuple(known[one] for one in coordinates),
         *_laid(coordinates, informations),
+        np.array([moving.index(replace(one, standing=False)) for one in coordinates]),
         np.where(is_mass, masses[:, None], deviation),
-        np.array([numbers[kind] for kind in kinds]),
+        np.array([groups[kind] for kind in kinds]),
         np.where(is_mass, np.median(masses), SHARE),  # one scale weighs all: it may err too
         lag.root(coordinates, known),
     )
@@ -153,20 +191,27 @@ def sums_of(persons: Persons, scale: np.ndarray, who: Iterable[int] | None = Non
     mine = slice(None) if who is None else list(who)
     precision, pull = persons.precision[mine], persons.pull[mine]
     spread = persons.usual[mine] * scale[persons.groups]
-    variance, volume = _deviations(precision, spread)
-    across = precision @ variance
-    along = np.einsum("mij,mj->mi", variance, pull)
+    return _sums(precision, pull, spread, persons.both)
+
+
+def _sums(precision: np.ndarray, pull: np.ndarray, spread: np.ndarray, both: np.ndarray) -> Sums:
+    variance, volume = _deviations(precision, spread, both)
+    across, against = precision @ both, pull @ both
+    along = np.einsum("mij,mj->mi", variance, against)
     return Sums(
-        (precision - across @ precision).sum(axis=0),
-        (pull - np.einsum("mij,mj->mi", precision, along)).sum(axis=0),
-        0.5 * float((pull * along).sum()) - 0.5 * float(volume.sum()),
+        (precision - across @ variance @ across.swapaxes(1, 2)).sum(axis=0),
+        (pull - np.einsum("mij,mj->mi", across, along)).sum(axis=0),
+        0.5 * float((against * along).sum()) - 0.5 * float(volume.sum()),
     )
 
 
-def _deviations(precision: np.ndarray, spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(M, C, C) covariance of each person's deviations (M, C) given the laboratory's sizes, and
+def _deviations(
+    precision: np.ndarray, spread: np.ndarray, both: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(M, K, K) covariance of each person's deviations (M, K) given the laboratory's sizes, and
     (M,) logarithm of how much less volume than before the data."""
-    inner = spread[:, :, None] * precision * spread[:, None] + np.eye(spread.shape[1])
+    told = both.T @ precision @ both
+    inner = spread[:, :, None] * told * spread[:, None] + np.eye(spread.shape[1])
     variance = spread[:, :, None] * np.linalg.inv(inner) * spread[:, None]
     return variance, np.linalg.slogdet(inner)[1]
 
@@ -206,11 +251,13 @@ def _log_within(mean: np.ndarray, spread: np.ndarray, most: np.ndarray) -> np.nd
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Of sizes: mean (C,), covariance (C, C), and the logarithm of the evidence."""
+    """Of sizes: mean (C,), covariance (C, C), and the logarithm of the evidence; squares (K,) that
+    are expected of the coefficients of what they were before the data."""
 
     mean: np.ndarray
     covariance: np.ndarray
     log_evidence: float
+    squares: np.ndarray
 
     def offset(self, sums: Sums, directions: np.ndarray) -> Offset:
         """What is told of sizes along ``directions`` (C, k) that some persons have on top of this.
@@ -229,40 +276,48 @@ def posterior_of(sums: Sums, root: np.ndarray) -> Posterior:
     inverse = np.linalg.inv(inner)
     along = inverse @ against
     log = 0.5 * float(against @ along) - 0.5 * float(np.linalg.slogdet(inner)[1]) + sums.log_factor
-    return Posterior(root @ along, root @ inverse @ root.T, log)
+    squares = along**2 + np.diag(inverse)
+    return Posterior(root @ along, root @ inverse @ root.T, log, squares)
 
 
-def anything(persons: Persons) -> np.ndarray:
-    """(C, C) root of the covariance if every fault may be there, and large."""
-    is_mass = [one.effect == STATED_MASS.name for one in persons.coordinates]
-    return np.diag(np.where(is_mass, persons.ordinary, SIZES[1]))
+def anything(persons: Persons, scale: np.ndarray) -> np.ndarray:
+    """(C, K + S) root of the covariance if every fault may be there, and large."""
+    moving = persons.coordinates[: len(persons.groups)]
+    is_mass = [one.effect == STATED_MASS.name for one in moving]
+    sizes = np.where(is_mass, persons.ordinary, SIZES[1])
+    return np.hstack([persons.both * sizes, persons.differences(scale)])
 
 
 def scales_of(*parts: Persons) -> np.ndarray:
-    """(G,) of the deviations, of the largest evidence beside any faults of the laboratory; of
-    other sizes in each part of its persons."""
-    groups = parts[0].groups
-    counts, scale = np.zeros(groups.max() + 1), np.ones(groups.max() + 1)
-    np.add.at(counts, groups, sum(one.told.sum(axis=0) for one in parts))
+    """(G,) of the deviations and of who stands still, of the largest evidence beside any faults of
+    the laboratory; of other sizes in each part of its persons."""
+    first = parts[0]
+    counts, scale = np.zeros(first.count), np.ones(first.count)
+    np.add.at(counts, first.groups, sum(one.told().sum(axis=0) for one in parts))
+    np.add.at(counts, first.of_differences, len(parts))
     for _ in range(_STEPS):
         before, sums = scale, np.zeros(len(scale))
         for one in parts:
-            np.add.at(sums, groups, (squares_of(one, scale) * one.told).sum(axis=0))
+            squares, differences = squares_of(one, scale)
+            np.add.at(sums, first.groups, (squares * one.told()).sum(axis=0))
+            np.add.at(sums, first.of_differences, differences)
         scale = np.sqrt((WEIGHT_OF_FAULTS + sums) / (WEIGHT_OF_FAULTS + counts))
         if np.abs(scale / before - 1).max() < _STEADY:
             break
     return scale
 
 
-def squares_of(persons: Persons, scale: np.ndarray) -> np.ndarray:
-    """(M, C) expected squares of the deviations, times what is usual."""
-    found = posterior_of(sums_of(persons, scale), anything(persons))
-    variance, _ = _deviations(persons.precision, persons.usual * scale[persons.groups])
-    taken = variance @ persons.precision
-    mean = np.einsum("mij,mj->mi", variance, persons.pull) - taken @ found.mean
+def squares_of(persons: Persons, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(M, K) and (S,) expected squares of the deviations and of the differences of who stands
+    still, times what is usual."""
+    found, both = posterior_of(sums_of(persons, scale), anything(persons, scale)), persons.both
+    variance, _ = _deviations(persons.precision, persons.usual * scale[persons.groups], both)
+    taken = variance @ both.T @ persons.precision
+    mean = np.einsum("mij,mj->mi", variance, persons.pull @ both) - taken @ found.mean
     square = mean**2 + np.diagonal(variance, axis1=1, axis2=2)
     square += np.einsum("mij,jk,mik->mi", taken, found.covariance, taken, optimize=True)
-    return square / persons.usual**2
+    differences = scale[persons.of_differences] ** 2 * found.squares[len(persons.groups) :]
+    return square / persons.usual**2, differences
 
 
 def log_prior_of_scales(scale: np.ndarray) -> float:
@@ -275,8 +330,8 @@ class Pooled:
     """All that a laboratory's persons tell, to be kept: nothing of it grows with their number.
 
     precision (C, C), pull (C,) : of the sizes, as in ``Sums``. spread (C,) : standard deviation of
-    a person's deviations. root (C, K) : of the covariance of the sizes before the data, the faults
-    that were found among them.
+    a person's deviations, of each number. root (C, L) : of the covariance of the sizes before the
+    data, the faults that were found among them.
     """
 
     coordinates: tuple[Coordinate, ...]
@@ -292,8 +347,10 @@ class Pooled:
     def without(self, own: Sequence[Information]) -> Pooled:
         """By all others: what a person's sessions have added is taken away."""
         precision, pull = _laid(self.coordinates, own)
-        variance, _ = _deviations(precision, np.tile(self.spread, (len(own), 1)))
-        across = precision @ variance
-        added = (precision - across @ precision).sum(axis=0)
-        pulled = (pull - np.einsum("mij,mj->mi", across, pull)).sum(axis=0)
-        return replace(self, precision=self.precision - added, pull=self.pull - pulled)
+        moving = [one for one in self.coordinates if not one.standing]
+        numbers = [moving.index(replace(one, standing=False)) for one in self.coordinates]
+        spread = np.tile(self.spread[: len(moving)], (len(own), 1))
+        added = _sums(precision, pull, spread, np.eye(len(moving))[numbers])
+        return replace(
+            self, precision=self.precision - added.precision, pull=self.pull - added.pull
+        )

@@ -87,7 +87,7 @@ def causes_of(persons: Persons, centres_m: Mapping[str, np.ndarray]) -> tuple[Ca
     """
     found = []
     for effect in OF_A_LABORATORY:
-        mine = [one.target for one in persons.coordinates if one.effect == effect.name]
+        mine = [one.target for one in _moving(persons) if one.effect == effect.name]
         alike: dict[str, list[str]] = {}
         for target in dict.fromkeys(mine):
             found.append(_cause(persons, effect.name, target, [target], centres_m))
@@ -100,6 +100,10 @@ def causes_of(persons: Persons, centres_m: Mapping[str, np.ndarray]) -> tuple[Ca
     return tuple(found)
 
 
+def _moving(persons: Persons) -> Sequence[Coordinate]:
+    return persons.coordinates[: len(persons.groups)]
+
+
 def _cause(
     persons: Persons,
     effect: str,
@@ -107,8 +111,8 @@ def _cause(
     parts: Sequence[str],
     centres_m: Mapping[str, np.ndarray],
 ) -> Cause:
-    known = dict(zip(persons.coordinates, persons.parameters, strict=True))
-    at = {one: k for k, one in enumerate(persons.coordinates)}
+    known = dict(zip(_moving(persons), persons.parameters, strict=False))
+    at = {one: k for k, one in enumerate(known)}
     mine = [p for one, p in known.items() if (one.effect, one.target) == (effect, parts[0])]
     directions = np.zeros((len(at), len(mine)))
     for part, (k, parameter) in product(parts, enumerate(mine)):
@@ -121,7 +125,7 @@ def _cause(
             for axis, metres in zip("xyz", parameter.typical * shift_m, strict=True):
                 moved = Coordinate(PlateTranslation.name, part, axis)
                 directions[at[moved], k] = metres / known[moved].typical
-    return Cause(effect, target, tuple(mine), directions)
+    return Cause(effect, target, tuple(mine), persons.both @ directions)
 
 
 _TURNS = ("tilt_x", "tilt_y", "yaw")
@@ -153,7 +157,9 @@ class Laboratory:
 
     def _root(self, but: int | None = None) -> np.ndarray:
         there = [s * self.causes[k].directions for k, s in self.found.items() if k != but]
-        return np.column_stack([np.diag(self.persons.ordinary), self.persons.alike, *there])
+        ordinary = self.persons.both * self.persons.ordinary
+        differences = self.persons.differences(self.scale)
+        return np.column_stack([ordinary, differences, self.persons.alike, *there])
 
     def sizes(self, k: int, named_from: float, rng: np.random.Generator) -> tuple[Size, ...]:
         """Of a cause, if it is there."""
@@ -164,12 +170,13 @@ class Laboratory:
         """Sums with the deviations of some groups so many times as large, and the logarithm of the
         evidence for each; once for all causes of these groups."""
         if groups not in self._kept:
-            touched = np.isin(np.arange(len(self.scale)), list(groups))
+            touched = np.isin(np.arange(len(self.scale)), list(groups))  # of persons alone
             self._kept[groups] = []
             for times in _TIMES:
                 scale = np.where(touched, times * self.scale, self.scale)
                 sums = sums_of(self.persons, scale)
-                log = posterior_of(sums, anything(self.persons)).log_evidence
+                root = anything(self.persons, scale)
+                log = posterior_of(sums, root).log_evidence
                 self._kept[groups].append((sums, log + log_prior_of_scales(scale)))
         return self._kept[groups]
 
@@ -181,7 +188,8 @@ class Laboratory:
         """What is kept of it for the diagnosis of each person."""
         persons, sums = self.persons, self.sums
         spread = np.median(persons.usual, axis=0) * self.scale[persons.groups]
-        return Pooled(persons.coordinates, sums.precision, sums.pull, spread, self._root())
+        told = sums.precision, sums.pull, spread[persons.numbers]
+        return Pooled(persons.coordinates, *told, self._root())
 
 
 def laboratory_of(persons: Persons, causes: tuple[Cause, ...], prior_odds: float) -> Laboratory:
@@ -285,7 +293,7 @@ def _drawn(lab: Laboratory, k: int, rng: np.random.Generator) -> np.ndarray:
     """(D, k) sizes [typical] of a cause from the posterior if it is there, over how large the
     persons' deviations may be: few persons do not tell it."""
     cause = lab.causes[k]
-    touched = lab.persons.groups[cause.directions.any(axis=1)]
+    touched = lab.persons.groups[lab.persons.numbers[cause.directions.any(axis=1)]]
     offsets, logs = [], []
     for sums, log in lab.with_other_scales(frozenset(touched.tolist())):
         logs.append(log)

@@ -3,12 +3,14 @@
 The plates, the clock and the vertical belong to a laboratory, body and skin to a person. Of the
 person's equations only those of the shared faults are kept: of the white normal equations
 [G_oo G_os; G_so G_ss] x = [a_o; a_s] what is left when the own coefficients, of covariance R, are
-integrated out, G_ss - G_so (G_oo + R^-1)^-1 G_os and the like. These sum over persons.
+integrated out, G_ss - G_so (G_oo + R^-1)^-1 G_os and the like. These sum over persons. What trials
+tell in which a person stands still to be calibrated is kept apart from what motion tells: a plate
+that moved between them is no contradiction.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,12 +24,15 @@ from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.body import StatedMass
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.effects.effect import Effect, Parameter
+from bsip_cli.effects.frames import Turned
 from bsip_cli.effects.plates import ALL
 from bsip_cli.effects.scene import Scene
 
 STATED_MASS = StatedMass()
 OF_A_LABORATORY: tuple[Effect, ...] = tuple(
-    effect for effect in CATALOGUE if effect.of_the_lab and is_of_instruments(effect)
+    effect
+    for effect in CATALOGUE
+    if effect.of_the_lab and (is_of_instruments(effect) or isinstance(effect, Turned))
 )
 _MARGIN_S = 0.02  # delays of this size, and the low-pass of 20 Hz before frames are left out
 _ASKED = (*OF_A_LABORATORY, STATED_MASS)
@@ -35,11 +40,15 @@ _ASKED = (*OF_A_LABORATORY, STATED_MASS)
 
 @dataclass(frozen=True, order=True)
 class Coordinate:
-    """One number of a fault at a plate, or a channel of it; the clock has no target."""
+    """One number of a fault at a plate, or a channel of it; the clock has no target.
+
+    standing : as trials tell it in which a person stands still; else all others, or both alike.
+    """
 
     effect: str
     target: str
     parameter: str
+    standing: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +68,8 @@ class SharedTrial(FaultTrial):
     """A trial whose forces all are as simulated: near the ends of what is valid the measured course
     bends as feet come and go beside the plates, and its slope would be taken for a delay."""
 
+    standing: bool
+
     @cached_property
     def simulated(self) -> Scene:
         return as_simulated(self.scene)
@@ -76,7 +87,8 @@ def information_of(trials: Sequence[SharedTrial]) -> Information:
     About what one person shows alone they would not be: a few steps on two plates fit any fault.
     """
     session = session_of([_without_the_shared(one) for one in trials])
-    return _marginal(fitted(session, _hypotheses(trials)))
+    moving = {k for k, one in enumerate(trials) if not one.standing}
+    return _marginal(fitted(session, _hypotheses(trials, moving)), moving)
 
 
 def _without_the_shared(trial: FaultTrial) -> FaultTrial:
@@ -91,18 +103,23 @@ def _own_terms(errors: TrialErrors) -> list[Term]:
 
 
 def with_known(
-    trial: FaultTrial, coordinates: Sequence[Coordinate], mean: np.ndarray, root: np.ndarray
+    trial: FaultTrial,
+    standing: bool,
+    coordinates: Sequence[Coordinate],
+    mean: np.ndarray,
+    root: np.ndarray,
 ) -> FaultTrial:
     """A trial whose shared faults are known from others, instead of as all laboratories have them.
 
-    mean (C,), root (C, K) : of their sizes and of the covariance of these [typical].
+    standing : whether the person stands still. mean (C,), root (C, K) : of the sizes and of the
+    covariance of these [typical].
     """
     scene, filter_ = as_simulated(trial.scene), trial.errors.filter
     columns = np.zeros((*trial.errors.residual.shape, len(coordinates)))
     for effect in OF_A_LABORATORY:
         for target in effect.targets(trial.scene):
             parameters = effect.parameters(trial.scene, target)
-            mine = [Coordinate(effect.name, target, one.name) for one in parameters]
+            mine = [Coordinate(effect.name, target, p.name, standing) for p in parameters]
             if mine[0] in coordinates:
                 at = [coordinates.index(one) for one in mine]
                 typical = np.array([one.typical for one in parameters])
@@ -115,8 +132,9 @@ def with_known(
     return replace(trial, errors=replace(trial.errors, residual=residual, terms=terms))
 
 
-def _hypotheses(trials: Sequence[FaultTrial]) -> list[Hypothesis]:
-    """Every shared fault at every plate; all plates alike are these together."""
+def _hypotheses(trials: Sequence[FaultTrial], moving: Set[int]) -> list[Hypothesis]:
+    """Every shared fault at every plate, apart in motion and not; all plates alike are these
+    together."""
     found = []
     for effect in _ASKED:
         targets = [effect.targets(one.scene) for one in trials]
@@ -125,13 +143,19 @@ def _hypotheses(trials: Sequence[FaultTrial]) -> list[Hypothesis]:
                 continue
             holding = tuple(t for t, mine in enumerate(targets) if target in mine)
             count = len(effect.parameters(trials[holding[0]].scene, target))
-            found.append(Hypothesis(effect, target, holding, np.zeros(count)))
+            apart = [tuple(t for t in holding if (t in moving) == moves) for moves in (True, False)]
+            for mine in [holding] if effect is STATED_MASS else filter(None, apart):
+                found.append(Hypothesis(effect, target, mine, np.zeros(count)))
     return found
 
 
-def _marginal(fit: Fitted) -> Information:
+def _marginal(fit: Fitted, moving: Set[int]) -> Information:
     numbers = [
-        (Coordinate(one.effect.name, one.target, parameter.name), parameter, len(one.trials))
+        (
+            Coordinate(one.effect.name, one.target, parameter.name, not moving & {*one.trials}),
+            parameter,
+            len(one.trials),
+        )
         for one in fit.faults
         for parameter in one.parameters(fit.session)
     ]

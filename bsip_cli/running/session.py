@@ -43,14 +43,15 @@ def run_session(
     group: bool = False,
     verbose: bool = False,
     quiet: bool = False,
+    until: str | None = None,
 ) -> int:
     """Run a command's stages on a study and return the exit code.
 
     ``estimators`` stand for the configured ones, unless empty; ``group`` leaves out what is
-    about one participant; ``verify`` hashes every file, also where its times have not changed.
-    ``verbose`` and ``quiet`` as `follow` takes them.
+    about one participant; ``until`` is the last stage; ``verify`` hashes every file, also where
+    its times have not changed; ``verbose`` and ``quiet`` as `follow` takes them.
     """
-    stages = _stages(command, chosen, group)
+    stages = _stages(command, chosen, group, until)
     if any(stage.level == "cohort" for stage in stages):
         chosen = ()  # what is about all needs all
     opened = open_study(root, out, chosen, config_file, estimators)
@@ -70,11 +71,15 @@ def run_session(
     return follow(command, refusals, running, total, out, verbose=verbose, quiet=quiet)
 
 
-def _stages(command: str, chosen: tuple[str, ...], group: bool) -> tuple[Stage, ...]:
+def _stages(
+    command: str, chosen: tuple[str, ...], group: bool, until: str | None
+) -> tuple[Stage, ...]:
     """A command's stages, without those of the group for some participants, or these alone."""
     if group and chosen:
         raise UsageError("--group is about all participants", remedy="leave out --participant")
     stages = stages_named(command)
+    if until is not None:
+        stages = stages[: 1 + max(k for k, one in enumerate(stages) if one.name == until)]
     personal, of_all = by_level(stages)
     if group:
         return of_all

@@ -85,8 +85,10 @@ def _searched(
 ) -> tuple[Found, Library, HeldOut]:
     """Faults that the forces show, beside what the markers prove and other persons tell."""
     options = unit.config.diagnosis
-    told = [one.for_faults for one in trials]
-    session = session_of(told if known is None else [known.beside(one) for one in told])
+    told = [
+        x.for_faults if known is None else known.beside(x.for_faults, not x.moves) for x in trials
+    ]
+    session = session_of(told)
     alone = [t for t, one in enumerate(trials) if one.moves]
     library = library_of(session, ASKED, alone, options.fault_prior_odds)
     slips = [slip.hypothesis(t) for t, one in enumerate(trials) for slip in one.slips]

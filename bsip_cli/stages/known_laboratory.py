@@ -1,8 +1,9 @@
-"""What a person's diagnosis knows of plates, clock and vertical from the others recorded there."""
+"""What a person's diagnosis knows of plates, clock and vertical from the others recorded there, and
+the tables in which persons and laboratories tell it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,12 +12,19 @@ import pandas as pd
 
 from bsip_cli.diagnosis.fault_model import FaultTrial
 from bsip_cli.diagnosis.findings import Finding, Number, interval_words
-from bsip_cli.diagnosis.shared_faults import OF_A_LABORATORY, Coordinate, with_known
+from bsip_cli.diagnosis.laboratory import Pooled
+from bsip_cli.diagnosis.shared_faults import (
+    OF_A_LABORATORY,
+    Coordinate,
+    Information,
+    with_known,
+)
 from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.effect import Parameter
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnosis_rows import cause_record
-from bsip_cli.stages.shared_faults import information_in, pooled_in
 
+_KEY = ("effect", "target", "parameter", "standing")
 _FAULTS = {one.name for one in OF_A_LABORATORY}
 
 
@@ -30,8 +38,8 @@ class Known:
     root: np.ndarray
     rows: pd.DataFrame
 
-    def beside(self, trial: FaultTrial) -> FaultTrial:
-        return with_known(trial, self.coordinates, self.mean, self.root)
+    def beside(self, trial: FaultTrial, standing: bool) -> FaultTrial:
+        return with_known(trial, standing, self.coordinates, self.mean, self.root)
 
     def findings(self, trials: Sequence[FaultTrial]) -> Iterator[Finding]:
         """What the laboratory was found to have, in the trials on whose plates it is."""
@@ -119,3 +127,50 @@ def known_laboratory(unit: Unit) -> Known | None:
         vectors * np.sqrt(np.maximum(values, 0.0)),
         table,
     )
+
+
+# --- tables ---------------------------------------------------------------------------------------
+
+
+def coordinates_in(rows: pd.DataFrame) -> tuple[Coordinate, ...]:
+    return tuple(Coordinate(*one) for one in rows[[*_KEY]].itertuples(index=False))
+
+
+def information_in(rows: pd.DataFrame) -> Information:
+    """Of one session's rows of ``laboratory-information``."""
+    numbers = rows[["parameter", "unit", "most", "typical", "known_to"]].itertuples(index=False)
+    return Information(
+        coordinates_in(rows),
+        tuple(Parameter(n, u, -most, most, t, known_to=k) for n, u, most, t, k in numbers),
+        rows["trials"].to_numpy(),
+        rows[[f"precision_{k}" for k in range(len(rows))]].to_numpy(),
+        rows["pull"].to_numpy(),
+    )
+
+
+def pooled_in(rows: pd.DataFrame) -> Pooled:
+    """Of one laboratory's rows of ``laboratory-sums``."""
+    roots = rows.filter(regex=r"^root_").dropna(axis=1)
+    return Pooled(
+        coordinates_in(rows),
+        rows[[f"precision_{k}" for k in range(len(rows))]].to_numpy(),
+        rows["pull"].to_numpy(),
+        rows["spread"].to_numpy(),
+        roots.to_numpy(),
+    )
+
+
+def pooled_rows(laboratory: str, pooled: Pooled) -> Iterable[dict]:
+    """Of ``laboratory-sums``, one for each number of a fault."""
+    for k, one in enumerate(pooled.coordinates):
+        yield {
+            "laboratory": laboratory,
+            "effect": one.effect,
+            "target": one.target,
+            "parameter": one.parameter,
+            "standing": one.standing,
+            "spread": pooled.spread[k],
+            "pull": pooled.pull[k],
+            **{f"precision_{j}": x for j, x in enumerate(pooled.precision[k])},
+            **{f"root_{j}": x for j, x in enumerate(pooled.root[k])},
+        }

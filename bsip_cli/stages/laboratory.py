@@ -7,7 +7,7 @@ laboratory-sums, by which each person's diagnosis knows what the others tell.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import cast
 from zlib import crc32
 
@@ -34,7 +34,7 @@ from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.effects.scene import Scene
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
-from bsip_cli.stages.shared_faults import information_in, pooled_rows
+from bsip_cli.stages.known_laboratory import information_in, pooled_rows
 
 _SAME_PLACE_M = (
     0.02  # of every corner: what laboratories meet of a plate that is not where it is said
@@ -105,7 +105,7 @@ def _answer(unit: Unit, found: Mapping[str, Laboratory]) -> dict:
     for number, lab in found.items():
         posterior, coordinates = lab.posterior(), lab.persons.coordinates
         sd = np.sqrt(np.diag(posterior.covariance))
-        names = [" ".join((x.effect, x.target, x.parameter)) for x in coordinates]
+        names = [" ".join(map(str, astuple(x))) for x in coordinates]
         numbers = zip(names, posterior.mean.tolist(), sd.tolist(), strict=True)
         now[number] = {name: [mean, spread] for name, mean, spread in numbers}
     before = unit.said_before("laboratory-sums").get("answer", {})
@@ -244,16 +244,14 @@ def _counts(sessions: Sequence[_Session], cause: Cause) -> tuple[int, int]:
     plate, *channel = cause.target.split(" ")
     persons, trials = set(), 0
     for one in sessions:
-        numbers = [
-            int(count)
-            for c, count in zip(one.told.coordinates, one.told.trials, strict=True)
-            if c.effect == cause.effect
-            and c.target.split(" ")[1:] == channel
-            and plate in (ALL, c.target.split(" ")[0])
-        ]
-        if numbers:
+        counts: dict[bool, int] = {}  # in motion, and of who stands still
+        for c, count in zip(one.told.coordinates, one.told.trials, strict=True):
+            mine = c.effect == cause.effect and c.target.split(" ")[1:] == channel
+            if mine and plate in (ALL, c.target.split(" ")[0]):
+                counts[c.standing] = max(counts.get(c.standing, 0), int(count))
+        if counts:
             persons.add(one.person)
-            trials += max(numbers)
+            trials += sum(counts.values())
     return len(persons), trials
 
 

@@ -44,7 +44,7 @@ def run(unit: Unit) -> None:
         found = [diagnosed(unit, prior, *one, _LEAST_SAMPLES) for one in mine]
         told = [one for one in found if one is not None and one.held is None]
         if any(one.moves for one in told):
-            trials = [SharedTrial(one.errors, slow(one.scene)) for one in told]
+            trials = [SharedTrial(x.errors, slow(x.scene), not x.moves) for x in told]
             rows += _rows(session, information_of(trials))
             sessions[session] = {
                 "plates": _corners([scene for _, scene in mine]),
@@ -70,6 +70,7 @@ def _rows(session: str, told: Information) -> list[dict]:
             "effect": one.effect,
             "target": one.target,
             "parameter": one.parameter,
+            "standing": one.standing,
             "unit": parameter.unit,
             "typical": parameter.typical,
             "most": parameter.most,

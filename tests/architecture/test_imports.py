@@ -146,7 +146,6 @@ def test_stages_do_not_know_each_other():
         "stages.reconstruct",
         "stages.survey",
         "stages.report",
-        "stages.shared_faults",
         "stages.trial_scene",
     }
     pairs = {

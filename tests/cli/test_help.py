@@ -79,7 +79,11 @@ def test_every_stage_takes_the_same_arguments(name):
     arguments = [each.name for each in params if isinstance(each, click.Argument)]
     options = [each.opts for each in params if isinstance(each, click.Option)]
     assert arguments == ["study"]
-    own = {"identify": [["--estimator"]], "report": [["--group"]], "run": [["--group"]]}
+    own = {
+        "identify": [["--estimator"]],
+        "report": [["--group"]],
+        "run": [["--until"], ["--group"]],
+    }
     common = [["--out"], ["--participant"], ["--config"], ["--jobs"], ["--force"], ["--verify"]]
     common += [["-v", "--verbose"], ["-q", "--quiet"]]
     assert options == [*common, *own.get(name, [])]

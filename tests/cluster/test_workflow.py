@@ -7,7 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
@@ -40,9 +40,13 @@ pytestmark = [
 
 @dataclass
 class Place:
-    """A folder with a study in it, and the program that is to stand for bsip."""
+    """A folder with a study in it, and the program that is to stand for bsip.
+
+    told : its calls for what each participant tells of the laboratory.
+    """
 
     folder: Path
+    told: list[list[str]] = field(default_factory=list)
 
     @property
     def bsip(self) -> Path:
@@ -86,11 +90,16 @@ class Place:
         )
 
     def calls(self) -> list[list[str]]:
-        """What the stand-in was asked since this was last asked; the participants' calls sorted."""
+        """What the stand-in was asked since this was last asked, the participants' calls sorted;
+        without those for the laboratory, which it makes sure are the first and end by its sum."""
         notes = self.folder / "calls"
         lines = notes.read_text().splitlines() if notes.exists() else []
         notes.unlink(missing_ok=True)
         found = [json.loads(line) for line in lines]
+        first = [c for c in found if "--until" in c]
+        assert found[: len(first)] == first
+        assert ["--group" in c for c in first] == [False] * (len(first) - 1) + [True] * bool(first)
+        self.told, found = first[:-1], found[len(first) :]
         return sorted(c for c in found if "--participant" in c) + [
             c for c in found if "--participant" not in c
         ]
@@ -131,9 +140,21 @@ def test_everybody_is_asked_at_each_call(place):
     assert place.calls() == asked("sub-01", "sub-02")
 
 
+def test_the_laboratory_is_summed_once_all_have_told_of_it(place):
+    assert place.snakemake().returncode == 0
+    place.calls()
+    assert sorted(place.told) == [
+        [*call, "--until", "laboratory"] for call in asked("sub-01", "sub-02")
+    ]
+
+
 def test_one_failure_stops_nobody_and_fails_the_whole(place):
+    """What they tell of the laboratory is asked twice."""
     assert place.snakemake(FAILS="sub-01").returncode != 0
     assert place.calls() == asked("sub-01", "sub-02")
+    assert sorted(place.told) == [
+        [*call, "--until", "laboratory"] for call in asked("sub-01", "sub-01", "sub-02")
+    ]
     assert place.snakemake().returncode == 0
 
 
@@ -204,7 +225,7 @@ def test_make_cluster_fails_with_one_after_the_tables_of_the_others(place):
 
 def test_the_same_artifacts_as_make(tmp_path):
     options = StudyOptions(
-        participants=1,
+        participants=2,
         seed=3,
         sexes="M",
         tasks=("static", "sequence"),
@@ -215,9 +236,8 @@ def test_the_same_artifacts_as_make(tmp_path):
     place = Place(tmp_path)
     place.install(f'#!/bin/sh\nexec {sys.executable} -m bsip_cli "$@"\n')
     given = ("COHORT=study", "OUT=out")
-    for _ in range(2):  # the second brings the laboratory into each diagnosis
-        done = place.make("cluster", *given)
-        assert done.returncode == 0, done.stderr
+    done = place.make("cluster", *given)
+    assert done.returncode == 0, done.stderr
     of_workflow = place.content()
     done = place.make("cluster", *given)
     assert done.returncode == 0, done.stderr

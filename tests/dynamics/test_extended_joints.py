@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from bsip_cli.diagnosis.cause import Cause
 from bsip_cli.dynamics.joint_moments import Ground, joint_loads
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.implement import Implement
+from bsip_cli.effects.loads import Implement
 from bsip_cli.effects.scene import Scene
 from bsip_cli.stages.joints import besides, in_true_axes, sharing
 from tests.dynamics.test_joint_moments import KNOWN, feet, motion, phi_of

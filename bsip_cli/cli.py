@@ -35,7 +35,7 @@ _EFFECTS = ("--effect", "--size", "--target", "--effect-tasks")  # matched in th
 def _option(key: str) -> Any:
     """An option of the table, by its name; behind that of its command where others differ."""
     said = dict(_OPTIONS[key])
-    names = [key.split()[-1], *(said.pop(more) for more in ("short", "name") if more in said)]
+    names = [said.pop("short", ""), key.split()[-1], said.pop("name", "")]
     if "type" in said:
         said["type"] = _TYPES[said["type"]]
     if "choices" in said:
@@ -44,7 +44,7 @@ def _option(key: str) -> Any:
     if "range" in said:
         kind = click.FloatRange if said.get("type") is click.FLOAT else click.IntRange
         said["type"] = kind(*said.pop("range"))
-    return click.option(*names, show_default=bool(said.get("default")), **said)
+    return click.option(*filter(None, names), show_default=bool(said.get("default")), **said)
 
 
 def _with(*keys: str) -> Callable[[Any], Any]:
@@ -73,7 +73,7 @@ def cli() -> None:
 
 
 def _stage_command(name: str, summary: str) -> click.Command:
-    own = {"identify": ("--estimator",), "report": ("--group",), "run": ("--group", "--until")}
+    own = {"identify": ("--estimator",), "report": ("--group",), "run": ("--until", "--group")}
 
     @click.command(name, help=summary)
     @_study

@@ -187,7 +187,7 @@ class _Voice:
     def tell(self, outcome: Outcome) -> None:
         is_finding = outcome.exit_code != 0 or outcome.stage in FINDINGS
         for sentence in outcome.sentences if is_finding or not self.quiet else ():
-            alike = self.told.setdefault((outcome.stage, re.sub(_NAME, "", sentence)), [])
+            alike = self.told.setdefault((outcome.stage, re.sub(_NAME, "it", sentence)), [])
             if is_finding or not alike:
                 _say(outcome, sentence)
             alike += [] if is_finding else [outcome.unit]
@@ -198,7 +198,7 @@ class _Voice:
     def tell_of_the_others(self) -> None:
         for (stage, sentence), units in self.told.items():
             if len(units) > 1:
-                others = f"the same of {listed(units[1:])}: {sentence.lstrip(': ')}"
+                others = f"the same of {listed(units[1:])}: {sentence.removeprefix('it: ')}"
                 _write(stage, others)
 
 

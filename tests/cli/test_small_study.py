@@ -329,7 +329,8 @@ def test_every_trial_is_exported(first_run, bsip, tmp_path, what):
     if what == "opensim":  # one plate under both feet, of which one is lifted in the sequence only
         assert {f"{stem}_motion.mot" for stem in stems} < names
         assert {path for path in names if "osim" in path} == set(_models(first_run))
-        assert answer.err.count("no loads: the plates do not tell what acts on each foot") == 4
+        # once, and once of the other recordings
+        assert answer.err.count("no loads: the plates do not tell what acts on each foot") == 2
         return
     assert names == {f"{stem}_joint-moments.csv" for stem in stems}
     for stem in stems:

@@ -161,7 +161,7 @@ class Hypothesis:
 
 
 def _with(repair: PlateReading, now: PlateReading) -> PlateReading:
-    """One more repair of a plate's numbers, which may be exchanged or have a channel reversed."""
+    """One more repair of a plate's numbers; a reversed channel may come with another reference."""
     if repair.reversed_channel:
         about = now.about if repair.about == "stated" else repair.about
         return replace(now, reversed_channel=repair.reversed_channel, about=about)

@@ -4,7 +4,7 @@ One measure for every format and every way in which a plate's numbers may be mis
 of pressure against the feet on the ground, against the outline and the sensor, the moments at it.
 The scales are those of 130 sound plates of 40 public recordings: the centre of pressure lies within
 the feet's markers in the median and 85 mm beside them at most (sets with two markers on a foot);
-the vertical moment over the force is 3 mm, in golf swings 60, in quiet stance 0.1 and once 0.024.
+the vertical moment over the force is 3 mm, in golf swings 60, in one quiet stance 0.024 at least.
 
 A leg can turn little about its hip, so that the force under a foot leans from its centre of
 pressure towards the body: of the slope to the centre of mass it has 0.63 in the median over 66
@@ -25,7 +25,7 @@ BESIDE_M = 0.12
 """Half a foot's length: a centre of pressure so far beside the feet is not under them."""
 
 _DISTANCE_M, _TORQUE_M, _LEVEL_M = 0.03, 0.05, 0.005  # where the likelihood begins to fall
-_LITTLE_TORQUE_M = 3e-5  # the other way: soles hardly make less
+_LITTLE_TORQUE_M = 3e-5  # below it the likelihood falls too: soles hardly make less
 _LEAN, _ASTRAY = 0.63, 0.18  # of the slope to the body, and half of all are so far from it
 _PLACE_M = 0.024  # the markers tell where the body is, to this: see balance_median_m
 _LEVER_M = 0.05  # nobody stands nearer to the very middle of a plate but by chance

@@ -79,6 +79,8 @@ def test_a_sum_is_known_by_most_samples_and_two_feet_are_no_copy(monkeypatch):
     damaged = one.copy()
     damaged[1200:1230] = 0.0  # lost on the plate, not on the virtual one
     assert repeated(monkeypatch, a=damaged, b=other, c=total) == {"c": ("a", "b")}
+    little = 0.01 * other  # a plate that bears hardly anything belongs to the sum all the same
+    assert repeated(monkeypatch, a=one, b=little, c=one + little) == {"c": ("a", "b")}
     assert repeated(monkeypatch, a=one, b=damaged) == {"b": ("a",)}
     assert repeated(monkeypatch, a=one, b=np.roll(one, 700)) == {}
     assert repeated(monkeypatch, a=other, b=1.03 * other) == {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict, astuple, replace
 
 import numpy as np
 import pytest
@@ -10,7 +10,8 @@ import pytest
 from bsip_cli.config import load_config
 from bsip_cli.recordings.body_motion import USUAL
 from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
-from bsip_cli.recordings.plate_source import ForceOnPoint
+from bsip_cli.recordings.plate_source import C3dPlate, ForceOnPoint
+from bsip_cli.recordings.plates import LocalWrench
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.scene import handedness
 from bsip_cli.recordings.settle import SessionReading, settle_session
@@ -26,6 +27,21 @@ from tests.recordings.standing_on_two_plates import (
 )
 
 PLACE_OF_LAB = (0.6, 0.2, -0.04)
+
+
+def of_table_with_mx_reversed(**faults) -> list[ForceOnPoint]:
+    signs = np.array([-1.0, 1.0, 1.0])
+    return [replace(one, moment=one.moment * signs) for one in of_table(**faults)]
+
+
+def of_c3d_with_x_for_y(**faults) -> list[C3dPlate]:
+    """Fx and Fy, Mx and My exchanged, above sensors that lie under the surface."""
+    return [
+        replace(one, wrench=LocalWrench(*(part[:, [1, 0, 2]] for part in astuple(one.wrench))))
+        for one in of_c3d(**faults)
+    ]
+
+
 FAULTS = {
     "table, sound": (of_table, {}, ""),
     "points in mm": (of_table, {"point_scale": 1e3}, "mm"),
@@ -38,6 +54,11 @@ FAULTS = {
     ),
     "moments about the origin": (of_table, {"about": "origin"}, "laboratory's origin"),
     "moments about each plate's centre": (of_table, {"about": "fixed"}, "about one point"),
+    "moments about the centres, Mx reversed": (
+        of_table_with_mx_reversed,
+        {"about": "fixed"},
+        "about one point of the plate, the points for centres of pressure, reversed Mx",
+    ),
     "points in mm, moments about the centres in N mm": (
         of_table,
         {"about": "fixed", "point_scale": 1e3, "moment_scale": 1e3},
@@ -53,6 +74,11 @@ FAULTS = {
         of_c3d,
         {"origin_m": (0.0, 0.0, -0.04), "stated_origin_m": PLACE_OF_LAB},
         "for a place",
+    ),
+    "X and Y exchanged": (
+        of_c3d_with_x_for_y,
+        {"origin_m": (0.0, 0.0, -0.06)},
+        "in the other direction round",
     ),
     "the action on the plate": (of_c3d, {"sign": -1}, ""),
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from bsip_cli.recordings.analog import check_samples, sample_findings
@@ -23,6 +25,8 @@ _MOST_PLATES = 64
 _PLATE_UNITS = ("mm", "cm", "in", "m")
 _USUAL_SIDES_M = (0.35, 1.25)  # of plates as they are sold: so that one unit alone can fit
 _USUAL_LENGTHS_M = (1.0, 1e-3)  # m, mm
+_SAME_PLACE_M = 1e-3  # as precise as corners are written
+_PLACE_APART_M = 5e-3  # of two ways to read ORIGIN, so that they can be told apart
 _VOLTS = {"V", "v", "Volts", "volts", "mV"}
 
 
@@ -95,6 +99,7 @@ def _read_plate(
     corrects = corrects and bool(polynomial.any())
     polynomials = polynomial.reshape(2, 6) if corrects else None
     stated = PlateDescription(name, kind, written * plate_unit_m, origin, polynomials)
+    stated, about_origin = _without_place(stated)
     wrench, counts = local_wrench(channels, stated), raw / np.where(scales == 0, 1.0, scales)
     rate_hz = content.rate_hz * content.samples_per_frame
     samples = check_samples(channels, counts, wrench.force_N[:, 2], rate_hz)
@@ -103,7 +108,7 @@ def _read_plate(
     wrench, subtracted = without_baseline(wrench, name, down, usable, baseline)
     source = C3dPlate(stated, wrench, usable, rotation_world_lab)
     about_samples = [*sample_findings(name, samples), *subtracted]
-    return source, [*about_size, *about_units], about_samples
+    return source, [*about_size, *about_origin, *about_units], about_samples
 
 
 def _kind(group: Group, index: int) -> int:
@@ -139,6 +144,24 @@ def _plate_unit(
     action = f"read CORNERS and ORIGIN in {unit}: {_sides(written * size)}"
     expected += " in the unit of the points"
     return size, [Finding("unit", name, found, expected, action, "corrected")]
+
+
+def _without_place(stated: PlateDescription) -> tuple[PlateDescription, list[Finding]]:
+    """With moments about the plate's centre where ORIGIN repeats its place in the laboratory.
+
+    An offset in the plate's axes, which differ, is the same numbers by no chance.
+    """
+    centre, origin = stated.centre_m(), stated.origin_m
+    in_plate = stated.rotation_lab_plate().T @ centre
+    same = np.abs(origin - centre).max() < _SAME_PLACE_M
+    if stated.kind == 3 or not same or np.abs(in_plate - centre).max() < _PLACE_APART_M:
+        return stated, []
+    numbers_mm = ", ".join(f"{1e3 * value:.0f}" for value in origin)
+    found = f"ORIGIN is the plate's place in the laboratory ({numbers_mm} mm)"
+    expected = "the way from the plate's sensor to the middle of its surface"
+    action = "took the moments about the middle of its surface"
+    about = Finding("plate_origin", stated.name, found, expected, action, "corrected")
+    return replace(stated, origin_m=np.zeros(3)), [about]
 
 
 def _is_usual_plate(corners_m: np.ndarray) -> bool:

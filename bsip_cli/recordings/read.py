@@ -14,8 +14,8 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.files.regular import check_regular
 from bsip_cli.recordings.hypothesis import ALIKE_M
 from bsip_cli.recordings.model import Finding, Plate, Recording
-from bsip_cli.recordings.plate_reading import FrameChange
-from bsip_cli.recordings.plate_source import Opened
+from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange
+from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.scene import handedness
 from bsip_cli.recordings.settle import SessionReading, Verdict, settle_session
@@ -75,26 +75,33 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
     if recording.forces_note:
         return replace(recording, findings=(*recording.findings, *findings))
     plates: list[Plate] = []
-    reversed_names = []
+    reversed_names, missing = [], []
     by_name = {source.name: source for source in opened.sources}
     for source in opened.sources:
         verdict = session.plates.get(source.name, _UNLOADED)
-        if verdict.refusal or verdict.repeats:
+        if verdict.repeats:
+            continue
+        if verdict.refusal:
+            missing.append(source)
             continue
         if other := verdict.reading.place_of:
             if other not in by_name:
                 findings.append(_about(source.name, *_WITHOUT_PLACE))
+                missing.append(source)
                 continue
             source = source.in_place_of(by_name[other])
         plate = source.plate(verdict.reading)
         if fault := _no_person(plate):
             findings.append(fault)
+            missing.append(source)
             continue
         findings += source.findings(verdict.reading)
         plates.append(plate)
         if verdict.reading.sign < 0:
             findings.append(_reversed(plate))
             reversed_names.append(plate.name)
+    plates, about = _without_missing(plates, missing)
+    findings += about
     findings += sign_doubts(plates, reversed_names, recording.analog_rate_hz)
     note = why_no_forces(plates, bool(opened.sources))
     return replace(
@@ -103,6 +110,29 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
         findings=(*recording.findings, *findings),
         forces_note=note,
     )
+
+
+def _without_missing(
+    plates: Sequence[Plate], missing: Sequence[PlateSource]
+) -> tuple[list[Plate], list[Finding]]:
+    """Unusable while a plate that is left out is loaded: the others are not the whole force then.
+
+    Where a plate has an outline, the feet tell when somebody stands on it.
+    """
+    alone, findings = np.array(True), []
+    for source in missing:
+        if source.plate(AS_STATED).corners_m is not None:
+            continue
+        loaded = source.usable & (np.abs(lift_N(source)) > LOADED_N)
+        if plates and loaded.any():
+            found = f"left out, and loaded in {loaded.mean():.0%} of the time"
+            action = "left out the other plates' forces of that time"
+            expected = "all that bears the person"
+            findings.append(
+                Finding("plate_missing", source.name, found, expected, action, "excluded")
+            )
+        alone = alone & ~loaded
+    return [replace(plate, usable=plate.usable & alone) for plate in plates], findings
 
 
 def findings_about(session: SessionReading) -> list[Finding]:

@@ -240,8 +240,8 @@ def _settle_force_times(stamps: Stamps, markers: _MarkerTimes) -> _ForceTimes:
     """Unit and zero of the forces' times.
 
     Of seconds, ms and microseconds that one by which forces and markers last alike; stamps that
-    count rows have the rate that makes a whole number of rows per frame. Forces that lie outside
-    the markers' time but last as long were counted from another zero.
+    count rows have the rate that makes a whole number of rows per frame. Forces that begin at
+    another time than the markers but last as long were counted from another zero.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         increase = np.isfinite(stamps.values).all() and stamps.step() > 0
@@ -293,22 +293,29 @@ def _from_one_zero(settled: _ForceTimes, markers: _MarkerTimes) -> _ForceTimes:
     overlap_s = min(last, markers.first_s + markers.lasts_s()) - max(first, markers.first_s)
     is_together = overlap_s > min(near, 0.5 * (last - first))
     found = f"forces at {_span(first, last)} s and markers at {markers.span()} s"
-    is_simultaneous = is_as_long and (not is_together or apart_s <= markers.unsure_s)
     action, level = "took their first samples as simultaneous", "corrected"
-    if is_simultaneous:
-        if apart_s <= near or (is_together and np.isfinite(markers.unsure_s)):
+    counts_frames = not np.isfinite(markers.unsure_s)
+    # Clocks that were started apart do not stop after the same time: both files were cut alike.
+    if is_as_long and not (is_together and markers.unsure_s < apart_s <= near):
+        if apart_s <= (markers.unsure_s if is_together and not counts_frames else near):
             return replace(settled, is_simultaneous=True)  # within what is printed
-        found += f": as long, and {'those count frames' if is_together else 'never at once'}"
+        if counts_frames and is_together:
+            found += ": as long, and those count frames"
+        elif is_together:
+            found, level = f"{found}: as long, but not from one zero", "warning"
+            action += "; if both times are right, cut both files to the time that they share"
+        else:
+            found += ": as long, and never at once"
     elif not is_together:
         return replace(settled, stamps=None, note=found)
-    elif apart_s > near and (is_as_long or not np.isfinite(markers.unsure_s)):
+    elif counts_frames and apart_s > near:
         found, level = f"{found}: perhaps from another zero", "warning"
         action = "took both as written; if they were cut alike, give them the same first time"
     else:
         return settled
     said = Finding("time", "", found, "one clock", action, level)
     findings = (*settled.findings, said)
-    return replace(settled, is_simultaneous=is_simultaneous, findings=findings)
+    return replace(settled, is_simultaneous=is_as_long, findings=findings)
 
 
 def _span(first_s: float, last_s: float) -> str:

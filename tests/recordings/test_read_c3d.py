@@ -204,6 +204,21 @@ def test_origin_of_either_sign_gives_the_same_wrench(tmp_path, kind):
     _check_wrench(read_recording(_write(tmp_path / "a.c3d", spec)))
 
 
+@pytest.mark.parametrize("kind", [2, 4])
+def test_an_origin_that_repeats_the_place_of_the_plate(tmp_path, kind):
+    place = CORNERS_M.mean(axis=0)
+    spec = _spec(kind=kind, origin_m=np.zeros(3), stated_origin_m=place)
+    recording = read_recording(_write(tmp_path / "a.c3d", spec))
+    _check_wrench(recording)
+    assert _levels(recording, "plate_origin") == ["corrected"]
+
+
+def test_an_origin_that_is_nearly_the_place_of_the_plate_is_an_offset(tmp_path):
+    place = CORNERS_M.mean(axis=0) + np.array([0.0, 0.005, 0.0])
+    recording = read_recording(_write(tmp_path / "a.c3d", _spec(origin_m=place)))
+    assert _levels(recording, "plate_origin") == []
+
+
 def test_y_up_laboratory_is_turned(tmp_path):
     markers, labels = standing_markers(N)
     force, moment = standing_wrench(N * RATIO)

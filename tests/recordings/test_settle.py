@@ -11,10 +11,10 @@ from bsip_cli.config import load_config
 from bsip_cli.recordings.body_motion import USUAL
 from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
 from bsip_cli.recordings.plate_source import C3dPlate, ForceOnPoint
-from bsip_cli.recordings.plates import LocalWrench
+from bsip_cli.recordings.plates import LOADED_N, LocalWrench
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.scene import handedness
-from bsip_cli.recordings.settle import SessionReading, settle_session
+from bsip_cli.recordings.settle import SessionReading, Verdict, settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import Feet
 from tests.recordings.standing_on_two_plates import (
@@ -301,3 +301,20 @@ def test_a_trial_without_the_exchanged_plate_leaves_its_own_out():
     alone = assemble(opened([one]), session)
     assert alone.plates == ()
     assert [f.level for f in alone.findings if "lacks the plate" in f.found] == ["excluded"]
+
+
+def test_nothing_of_a_table_is_the_whole_force_while_a_plate_left_out_bears():
+    """A table has no outlines: no foot tells that a plate is missing from the sum."""
+    one, two = of_table()
+    steps_on = np.arange(len(two.usable)) < 150
+    two = replace(two, force_N=two.force_N * steps_on[:, None])
+    trial = opened([one, two])
+    left_out = SessionReading(plates={"1": Verdict(), "2": Verdict(refusal="its force is odd")})
+    recording = assemble(trial, left_out)
+    (plate,) = recording.plates
+    load = two.force_N[:, 2] > LOADED_N
+    np.testing.assert_array_equal(plate.usable, ~load)
+    (said,) = [f for f in recording.findings if f.check == "plate_missing"]
+    assert said.subject == "2" and said.level == "excluded"
+    seen = assemble(opened(of_c3d()), left_out)  # where the feet tell
+    assert seen.plates[0].usable.all()

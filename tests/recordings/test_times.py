@@ -262,14 +262,25 @@ def test_another_zero_that_is_not_certain_is_said(tmp_path, n_rows, start_s):
     assert "and markers at 12.3 to 16.29 s" in recording.forces_note
 
 
-def test_forces_that_cover_a_part_are_said_with_both_times(tmp_path):
-    recording = _pair(tmp_path, [f"{k / 1000:.3f}" for k in range(10 * N)], 1.0)
-    assert recording.plates[0].usable.mean() == pytest.approx(0.75, abs=0.01)
-    ((found, _),) = _said(recording)
-    times = "forces at 0 to 3.999 s and markers at 1 to 4.99 s"
-    assert found == f"{times}: perhaps from another zero"
+@pytest.mark.parametrize("start_s", [0.5, 1.0, 3.2])
+def test_files_cut_alike_whose_stamps_were_not_zeroed_alike(tmp_path, start_s):
+    """As long to a row, and partly at once: cut together, so the first samples belong together."""
+    recording = _pair(tmp_path, [f"{k / 1000:.3f}" for k in range(10 * N)], start_s)
+    force, _ = standing_wrench(10 * N)
+    assert recording.plates[0].usable.all()
+    np.testing.assert_allclose(_height(recording), force[: 10 * N - 9, 2], atol=1e-6)
+    ((found, action),) = _said(recording)
+    times = f"forces at 0 to 3.999 s and markers at {start_s:g} to {start_s + 3.99:g} s"
+    assert found == f"{times}: as long, but not from one zero"
+    assert action.startswith("took their first samples as simultaneous")
+
+
+@pytest.mark.parametrize("n_rows", [3500, 4500])
+def test_forces_that_cover_a_part_are_said_with_both_times(tmp_path, n_rows):
+    recording = _pair(tmp_path, [f"{k / 1000:.3f}" for k in range(n_rows)], 1.0)
+    assert recording.plates[0].usable.mean() == pytest.approx((n_rows - 1000) / 3991, abs=0.01)
     (finding,) = [f for f in recording.findings if f.check == "analog_nan"]
-    assert "1 to 4.99 s (the file has 0 to 3.999 s)" in finding.expected
+    assert f"1 to 4.99 s (the file has 0 to {(n_rows - 1) / 1000:g} s)" in finding.expected
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import pandas as pd
 
 from bsip_cli.report.blocks import (
     Bar,
@@ -236,22 +237,7 @@ def use_sentence(record: ParticipantRecord) -> str:
     if record.choice is None or record.choice.empty:
         return f"Use {_WORDS[RM]}: nothing was compared."
     first = record.choice.iloc[0]
-    said = f"Use {_WORDS[str(first['use'])]}"
-    compared = {
-        name: _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
-    }
-    said += f". OM errs {compared['om']} than RM"
-    same = compared["om"] == compared["om_rm_mass"]
-    said += " and RM+mass" if same else f", {compared['om_rm_mass']} than RM+mass"
-    if first["use"] == RM_MASS:
-        said += f", RM+mass {compared['rm_mass']} than RM"
-    judging = count(int(first["trials"]), "recording")
-    where = {
-        "whole_trials": f" in {judging} not used to identify it",
-        "held_out": f" in seconds of {judging} that were kept apart",
-    }
-    unsure = "" if first["use"] == OM else ": no sure gain by OM"
-    said += f"{where.get(str(first['data']), '')}{unsure}."
+    said = f"Use {_WORDS[str(first['use'])]}{_compared(first)}."
     others = [
         f"{method} for {listing(list(rows['movement']))}"
         for method, rows in record.choice.iloc[1:].groupby("use")
@@ -264,16 +250,37 @@ def use_sentence(record: ParticipantRecord) -> str:
     return " ".join([said, *([f"But {listing(others)}."] if others else []), *warned])
 
 
+def _compared(first: pd.Series) -> str:
+    """What the choice rests on, to go on with after the method's name."""
+    if not np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all():
+        return ": no recording is left to judge OM by"
+    compared = {
+        name: _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
+    }
+    said = f". OM errs {compared['om']} than RM"
+    same = compared["om"] == compared["om_rm_mass"]
+    said += " and RM+mass" if same else f", {compared['om_rm_mass']} than RM+mass"
+    if first["use"] == RM_MASS:
+        said += f", RM+mass {compared['rm_mass']} than RM"
+    judging = count(int(first["trials"]), "recording")
+    where = {
+        "whole_trials": f" in {judging} not used to identify it",
+        "held_out": f" in seconds of {judging} that were kept apart",
+    }
+    unsure = "" if first["use"] == OM else ": no sure gain by OM"
+    return f"{said}{where.get(str(first['data']), '')}{unsure}"
+
+
 def _change(ratio: float, log_error: float) -> str:
     """``31 to 45 % less`` or ``5 % less to 16 % more``: one standard error to either side."""
     ends = [100 * (end - 1) for end in Difference.of_ratio(ratio, log_error).interval()]
     if not np.isfinite(ends).all():
         ends = [100 * (ratio - 1)] * 2
     words = ["less" if end < 0 else "more" for end in ends]
-    low, high = (number(abs(end), 0) for end in ends)
     if words[0] != words[1]:
-        return f"{low} % less to {high} % more"
-    return f"{' to '.join(dict.fromkeys(sorted((low, high), key=int)))} % {words[0]}"
+        return f"{number(-ends[0], 0)} % less to {number(ends[1], 0)} % more"
+    sizes = [number(size, 0) for size in sorted(map(abs, ends))]
+    return f"{' to '.join(dict.fromkeys(sizes))} % {words[0]}"
 
 
 # --- what to do ---------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ from dataclasses import replace
 from html import unescape
 from xml.etree import ElementTree
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -214,6 +215,9 @@ def test_rm_is_used_where_nothing_is_sure(record):
     assert "OM errs 5 % less to 16 % more than RM," in said
     rare = record.identification.assign(rare=True)
     assert "Never use OM" in use_sentence(replace(record, identification=rare))
+    alone = choice.assign(ratio_om=np.nan, ratio_rm_mass=np.nan, ratio_om_rm_mass=np.nan)
+    said = use_sentence(replace(record, choice=alone, identification=rare))
+    assert ": no recording is left to judge OM by. " in said and "Never use OM" in said
 
 
 # --- sections -----------------------------------------------------------------------------------

@@ -98,8 +98,7 @@ def foot_contacts(
     """
     beside = nothing = np.zeros(n_frames, bool)
     if not plates:
-        reason = _finding("", "no force plate", "no frame is compared")
-        return FootContacts(nothing, {}, {}, nothing, nothing, np.zeros(n_frames), (reason,))
+        return FootContacts(nothing, {}, {}, nothing, nothing, np.zeros(n_frames), ())
     usable = np.logical_and.reduce([plate.usable for plate in plates])
     total = np.sum([plate.force_z_N for plate in plates], axis=0)
     on_ground, on_plate, reasons, measured = {}, {}, [], usable.copy()
@@ -229,7 +228,8 @@ def inside_outline(points_m: np.ndarray, corners_m: np.ndarray, tolerance_m: flo
     return inside
 
 
-def _finding(subject: str, found: str, action: str = "left these frames out") -> Finding:
+def _finding(subject: str, found: str) -> Finding:
+    action = "left these frames out"
     return Finding("contacts", subject, found, "every contact on a plate", action, "excluded")
 
 

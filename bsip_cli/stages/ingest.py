@@ -85,9 +85,8 @@ def run(unit: Unit) -> None:
         unit.participant.height_m,
         unit.config.ingest.mass_tolerance_percent,
     )
-    findings = [*about_mass, *findings, *contacts.reasons, *stated_otherwise]
-    if recording.forces_note:
-        unit.warn(f"{unit.name}: kinematics only: {recording.forces_note}")
+    without = [_without_forces(recording.forces_note)] if recording.forces_note else []
+    findings = [*about_mass, *without, *findings, *contacts.reasons, *stated_otherwise]
     said = findings_about(session)  # once, of all trials
     for finding in findings:
         if finding.level in ("warning", "excluded", "corrected") and finding not in said:
@@ -101,6 +100,13 @@ def run(unit: Unit) -> None:
     unit.write("contacts", _contact_table(times, contacts))
     used = Finding("marker_set", "", marker_set.name, "", marker_set.description, "info")
     unit.write("quality", [asdict(finding) for finding in (used, *findings)])
+
+
+def _without_forces(why: str) -> Finding:
+    expected = "a force on the person"
+    return Finding(
+        "forces", "", why, expected, "took the markers alone; no frame is compared", "excluded"
+    )
 
 
 def _without_zero(recording: Recording) -> tuple[Recording, list[Finding]]:

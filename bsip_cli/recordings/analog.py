@@ -29,9 +29,7 @@ _AROUND = 12  # samples on either side
 _ABSURD_N = 15_000.0  # triple jumpers land with 15 times their weight (Perttunen 2000): 12 kN
 _MANY = 0.02  # of the samples
 _FALSE_POSITIVE = 1e-3  # plates with a sound stretch that is called stuck or repeated
-_ROUNDING = (
-    4 / 3
-)  # steps that rounding alone leaves beside the cubic: (1 + (4 + 4 + 1 + 1) / 6) / 2
+_ROUNDING = 4 / 3  # steps beside the cubic by rounding alone: (1 + (4 + 4 + 1 + 1) / 6) / 2
 _BLOCK = 8  # samples: a shorter block holds too little noise to be known again
 _NAMED = 5  # stretches in a sentence
 
@@ -65,7 +63,10 @@ def check_samples(
     stuck = np.zeros(channels.shape, bool)
     silent = []
     spikes = spike_samples(channels, load)
-    gone = (channels == 0).all(axis=1) & _is_set_to_zero(channels, load)
+    absent, unloaded = (channels == 0).all(axis=1), np.abs(np.nan_to_num(load)) <= _ABRUPT_N
+    # Zero is no natural reading where most unloaded samples are noise, on both sides of zero.
+    is_natural = 2 * absent.sum() > unloaded.sum() or not (load[1:] * load[:-1] < 0).any()
+    gone = absent & is_natural
     # As the converter gave them: a calibration matrix mixes a channel at its limit with others.
     for i, channel in enumerate(counts.T):
         clipped |= _at_rail(channel) | _cut_off(channel, rate_hz)
@@ -76,8 +77,7 @@ def check_samples(
             silent.append(i)
             stuck[:, i] = False
     stuck &= ~clipped[:, None]
-    lost = lost_samples(channels, load, spikes, rate_hz)
-    lost |= stuck.all(axis=1) & (channels == 0).all(axis=1)
+    lost = _lost(absent, is_natural, load, spikes, rate_hz) | (stuck.all(axis=1) & absent)
     stuck &= ~lost[:, None]
     return SampleCheck(
         not_a_number=nan,
@@ -90,10 +90,10 @@ def check_samples(
     )
 
 
-def lost_samples(
-    channels: np.ndarray, load: np.ndarray, spikes: np.ndarray, rate_hz: float
+def _lost(
+    absent: np.ndarray, is_natural: bool, load: np.ndarray, spikes: np.ndarray, rate_hz: float
 ) -> np.ndarray:
-    """Stretches in which all channels (n, k) are zero amid load, (n,) bool.
+    """Stretches in which all channels are zero (``absent``) amid load, (n,) bool.
 
     It comes or goes with a jump that no foot makes in one sample and twice as high as any step
     elsewhere, or both with such steps; or loaded samples lie on both sides of a short stretch: a
@@ -101,44 +101,27 @@ def lost_samples(
     side, which may be half lost, belongs to them.
     """
     lost, size = np.zeros(len(load), bool), np.abs(np.nan_to_num(load))
-    heavy, near = size > _ABRUPT_N, 2
-    if _is_set_to_zero(channels, load):
-        near = min(2, int(_RISE_S * rate_hz))
-    gone = runs((channels == 0).all(axis=1))
-    leaps = _load_leaps(load, gone, spikes, rate_hz)
-    for (start, stop), leap in zip(gone, leaps, strict=True):
+    heavy, near = size > _ABRUPT_N, min(2, int(_RISE_S * rate_hz)) if is_natural else 2
+    stretches, foot = runs(absent), size.max(initial=0.0) / (_RISE_S * rate_hz)
+    leaps = _leaps(np.abs(load), stretches, spikes, _ABRUPT_N, foot)
+    for (start, stop), leap in zip(stretches, leaps, strict=True):
         amid = heavy[max(start - near, 0) : start].any() and heavy[stop : stop + near].any()
         if leap or (amid and stop - start <= _LOST_S * rate_hz):
             lost[max(start - 1, 0) : stop + 1] = True
     return lost
 
 
-def _is_set_to_zero(channels: np.ndarray, load: np.ndarray) -> bool:
-    """Whether zero in all channels may be what a plate reads without load: not one whose noise
-    is on both sides of zero in most of the unloaded samples."""
-    gone, unloaded = (channels == 0).all(axis=1), np.abs(np.nan_to_num(load)) <= _ABRUPT_N
-    return bool(2 * gone.sum() > unloaded.sum() or not (load[1:] * load[:-1] < 0).any())
-
-
-def _load_leaps(
-    load: np.ndarray, stretches: np.ndarray, spikes: np.ndarray, rate_hz: float
-) -> np.ndarray:
-    """Whether a load (n,) comes to or from stretches (m, 2) as under no foot, (m,) bool."""
-    foot = np.nanmax(np.abs(load), initial=0.0) / (_RISE_S * rate_hz)
-    one = _leaps(np.abs(load), stretches, spikes, max(_ABRUPT_N, foot)).any(axis=1)
-    return np.asarray(one | _leaps(np.abs(load), stretches, spikes, _ABRUPT_N).all(axis=1))
-
-
 def _leaps(
-    signal: np.ndarray, stretches: np.ndarray, spikes: np.ndarray, least: float
+    signal: np.ndarray, stretches: np.ndarray, spikes: np.ndarray, least: float, foot: float = 0.0
 ) -> np.ndarray:
-    """Whether a signal (n,) steps into and out of stretches (m, 2) by more than ``least`` and by
-    more than twice its largest step elsewhere, (m, 2) bool."""
+    """Whether a signal (n,) steps into and out of stretches (m, 2) by more than ``least`` and
+    twice its largest step elsewhere, or into or out of them by more than ``foot`` too, (m,)."""
     steps = np.pad(np.abs(np.nan_to_num(np.diff(signal))), 1)
     jumps = steps[stretches]
     steps[stretches] = 0.0
     steps[:-1][spikes] = steps[1:][spikes] = 0.0
-    return np.asarray(jumps > max(least, 2.0 * steps.max()))
+    jumps[jumps <= max(least, 2.0 * steps.max())] = 0.0
+    return np.asarray((jumps > foot).any(axis=1) | jumps.all(axis=1))
 
 
 def spike_samples(channels: np.ndarray, load: np.ndarray) -> np.ndarray:
@@ -302,8 +285,8 @@ def _stuck(
     lengths, size = held[:, 1] - held[:, 0], np.abs(np.nan_to_num(load))
     bears = ~gone if gone.any() else size > _ABRUPT_N
     on = np.array([2 * bears[a:b].sum() > b - a for a, b in held], bool)
-    faulty = _leaps(channel, held, spikes, _clear(channel)).any(axis=1)
-    faulty &= on | _load_leaps(load, held, spikes, rate_hz)
+    faulty = on | _leaps(np.abs(load), held, spikes, _ABRUPT_N, size.max() / (_RISE_S * rate_hz))
+    faulty &= _leaps(channel, held, spikes, _clear(channel))
     for loaded in (True, False):
         state = (bears == loaded) & ~gone
         for shorter, length in pairwise([0, *np.unique(lengths[on == loaded])]):

@@ -1,8 +1,9 @@
-"""Which analog samples can be believed: not NaN, clipped, stuck, lost or a spike."""
+"""Which analog samples can be believed: not NaN, clipped, stuck, lost, repeated or a spike."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -27,6 +28,10 @@ _TOUCHED = 20.0  # N or N m: what counts on a plate that bears nobody
 _AROUND = 12  # samples on either side
 _ABSURD_N = 15_000.0  # triple jumpers land with 15 times their weight (Perttunen 2000): 12 kN
 _MANY = 0.02  # of the samples
+_FALSE_POSITIVE = 1e-3  # plates with a sound stretch that is called stuck or repeated
+_ROUNDING = 4 / 3  # steps beside the cubic by rounding alone: (1 + (4 + 4 + 1 + 1) / 6) / 2
+_BLOCK = 8  # samples: a shorter block holds too little noise to be known again
+_NAMED = 5  # stretches in a sentence
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,13 +40,15 @@ class SampleCheck:
 
     not_a_number: np.ndarray
     clipped: np.ndarray
-    stuck: np.ndarray
-    lost: np.ndarray  # all channels zero amid load
+    stuck: np.ndarray  # (n, k): a channel repeats one value
+    lost: np.ndarray  # all channels zero amid load or noise
+    repeated: np.ndarray  # a block equal to the one before, as of a buffer written twice
     spikes: np.ndarray  # single samples far from both neighbours, or beyond 15 kN
     silent_channels: tuple[int, ...]  # identically zero although the plate is loaded
 
     def usable(self) -> np.ndarray:
-        return ~(self.not_a_number | self.clipped | self.stuck | self.lost | self.spikes)
+        faulty = self.not_a_number | self.clipped | self.lost | self.repeated | self.spikes
+        return ~(faulty | self.stuck.any(axis=1))
 
 
 def check_samples(
@@ -52,46 +59,69 @@ def check_samples(
     ``load`` (n,) is the plate's vertical force, used to see a channel that does not answer.
     """
     nan = ~np.isfinite(channels).all(axis=1)
-    clipped = np.zeros(len(channels), bool)
-    stuck = np.zeros(len(channels), bool)
+    clipped, noisy = np.zeros(len(channels), bool), np.zeros(len(channels), int)
+    stuck = np.zeros(channels.shape, bool)
     silent = []
+    spikes = spike_samples(channels, load)
+    absent, unloaded = (channels == 0).all(axis=1), np.abs(np.nan_to_num(load)) <= _ABRUPT_N
+    # Zero is no natural reading where most unloaded samples are noise, on both sides of zero.
+    is_natural = 2 * absent.sum() > unloaded.sum() or not (load[1:] * load[:-1] < 0).any()
+    gone = absent & is_natural
     # As the converter gave them: a calibration matrix mixes a channel at its limit with others.
     for i, channel in enumerate(counts.T):
         clipped |= _at_rail(channel) | _cut_off(channel, rate_hz)
-        stuck_here = _stuck(channel, load, rate_hz)
-        if stuck_here.any() and not np.nan_to_num(channel).any():
+        noise = _noise_beyond_rounding(channel)
+        stuck[:, i] = _stuck(channel, noise, load, gone, spikes, rate_hz, channels.shape[1])
+        noisy += noise
+        if stuck[:, i].any() and not np.nan_to_num(channel).any():
             silent.append(i)
-        else:
-            stuck |= stuck_here
-    lost = lost_samples(channels, load, rate_hz)
-    spikes = spike_samples(channels, load)
+            stuck[:, i] = False
+    stuck &= ~clipped[:, None]
+    lost = _lost(absent, is_natural, load, spikes, rate_hz) | (stuck.all(axis=1) & absent)
+    stuck &= ~lost[:, None]
     return SampleCheck(
-        nan, clipped, stuck & ~clipped, lost, spikes & ~clipped & ~lost, tuple(silent)
+        not_a_number=nan,
+        clipped=clipped,
+        stuck=stuck,
+        lost=lost,
+        repeated=repeated_samples(counts, noisy),
+        spikes=spikes & ~clipped & ~lost,
+        silent_channels=tuple(silent),
     )
 
 
-def lost_samples(channels: np.ndarray, load: np.ndarray, rate_hz: float) -> np.ndarray:
-    """Short stretches in which all channels (n, k) are zero amid load, (n,) bool.
+def _lost(
+    absent: np.ndarray, is_natural: bool, load: np.ndarray, spikes: np.ndarray, rate_hz: float
+) -> np.ndarray:
+    """Stretches in which all channels are zero (``absent``) amid load, (n,) bool.
 
-    Loaded samples lie on both sides; or on one, with a jump that no foot makes in one sample and
-    twice as high as any step elsewhere: a touch-down is lost with what was before it. Longer
-    ones may be flight on a plate whose small forces were set to zero. One sample on each side,
-    which may be half lost, belongs to them.
+    It comes or goes with a jump that no foot makes in one sample and twice as high as any step
+    elsewhere, or both with such steps; or loaded samples lie on both sides of a short stretch: a
+    longer one may be flight on a plate whose small forces were set to zero. One sample on each
+    side, which may be half lost, belongs to them.
     """
     lost, size = np.zeros(len(load), bool), np.abs(np.nan_to_num(load))
-    heavy = np.concatenate([[False], size > _ABRUPT_N, [False]])
-    gone = runs((channels == 0).all(axis=1))
-    steps = np.abs(np.diff(size, prepend=0.0, append=0.0))  # into each sample, and out of the last
-    jumps = steps[gone]
-    steps[gone] = 0.0
-    foot = size.max(initial=0.0) / (_RISE_S * rate_hz)
-    leaps = (jumps > max(_ABRUPT_N, foot, 2.0 * steps.max())).any(axis=1)
-    for (start, stop), leap in zip(gone, leaps, strict=True):
-        before = start == 0 or heavy[max(start - 1, 0) : start + 1].any()
-        after = stop == len(load) or heavy[stop + 1 : stop + 3].any()
-        if (leap or (before and after)) and stop - start <= _LOST_S * rate_hz:
+    heavy, near = size > _ABRUPT_N, min(2, int(_RISE_S * rate_hz)) if is_natural else 2
+    stretches, foot = runs(absent), size.max(initial=0.0) / (_RISE_S * rate_hz)
+    leaps = _leaps(np.abs(load), stretches, spikes, _ABRUPT_N, foot)
+    for (start, stop), leap in zip(stretches, leaps, strict=True):
+        amid = heavy[max(start - near, 0) : start].any() and heavy[stop : stop + near].any()
+        if leap or (amid and stop - start <= _LOST_S * rate_hz):
             lost[max(start - 1, 0) : stop + 1] = True
     return lost
+
+
+def _leaps(
+    signal: np.ndarray, stretches: np.ndarray, spikes: np.ndarray, least: float, foot: float = 0.0
+) -> np.ndarray:
+    """Whether a signal (n,) steps into and out of stretches (m, 2) by more than ``least`` and
+    twice its largest step elsewhere, or into or out of them by more than ``foot`` too, (m,)."""
+    steps = np.pad(np.abs(np.nan_to_num(np.diff(signal))), 1)
+    jumps = steps[stretches]
+    steps[stretches] = 0.0
+    steps[:-1][spikes] = steps[1:][spikes] = 0.0
+    jumps[jumps <= max(least, 2.0 * steps.max())] = 0.0
+    return np.asarray((jumps > foot).any(axis=1) | jumps.all(axis=1))
 
 
 def spike_samples(channels: np.ndarray, load: np.ndarray) -> np.ndarray:
@@ -125,9 +155,8 @@ def _spikes(signal: np.ndarray, least: float) -> np.ndarray:
     beside = _beside_cubic(whole)
     least = max(
         least,
-        _SPIKE_SHARE * float(np.abs(np.percentile(whole, [1, 99])).max()),
+        _clear(whole),
         _SPIKE_NOISE * float(np.median(np.abs(beside))),
-        _SPIKE_STEPS * float(steps[steps > 0].min()),
     )
     for k in np.flatnonzero((np.abs(beside) > least) & known).tolist():
         if 2 <= k < len(signal) - 2:
@@ -136,6 +165,13 @@ def _spikes(signal: np.ndarray, least: float) -> np.ndarray:
             around[k - first] -= beside[k]
             spikes[k] = np.abs(beside[k]) > _SPIKE_CLEAR * np.abs(_beside_cubic(around)).max()
     return spikes
+
+
+def _clear(signal: np.ndarray) -> float:
+    """What is more than the converter's steps, and counts against the signal's size."""
+    steps = np.abs(np.diff(signal))
+    size = np.abs(np.nanpercentile(signal, [1, 99])).max()
+    return float(max(_SPIKE_SHARE * size, _SPIKE_STEPS * steps[steps > 0].min(initial=size)))
 
 
 def _beside_cubic(signal: np.ndarray) -> np.ndarray:
@@ -184,23 +220,102 @@ def _cut_off(signal: np.ndarray, rate_hz: float) -> np.ndarray:
     return flat
 
 
-def _stuck(signal: np.ndarray, load: np.ndarray, rate_hz: float) -> np.ndarray:
-    """Stretches of a constant channel during which the plate's load changes."""
-    same = np.concatenate([[False], np.diff(signal) == 0])
-    stuck = np.zeros(len(signal), bool)
-    scale = np.max(np.abs(load[np.isfinite(load)]), initial=0.0)
-    for start, stop in runs(long_runs(same, round(_STUCK_S * rate_hz))):
-        part = load[start:stop]
-        if not np.isfinite(part).any():
-            continue
-        if np.nanmax(part) - np.nanmin(part) > max(_LOAD_CHANGE * scale, 50.0):
-            stuck[start - 1 : stop] = True
+def repeated_samples(channels: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    """Blocks of samples of all channels (n, k) that equal the block just before, (n,) bool.
+
+    ``noise`` (n,) counts the channels' events of noise: each comes again with 1/2 at most.
+    """
+    n, repeated = len(channels), np.zeros(len(channels), bool)
+    if n < 2 * _BLOCK:
+        return repeated
+    weights = np.random.default_rng(1).integers(1, 2**63, channels.shape[1] + _BLOCK, np.uint64)
+    rows = np.ascontiguousarray(channels, float).view(np.uint64) @ weights[_BLOCK:]
+    blocks = np.lib.stride_tricks.sliding_window_view(rows, _BLOCK) @ weights[:_BLOCK]
+    order = np.argsort(blocks, kind="stable")
+    lags = np.zeros(n, int)  # to the last block alike, if there is one
+    alike = blocks[order[1:]] == blocks[order[:-1]]
+    lags[order[1:][alike]] = np.diff(order)[alike]
+    starts = np.flatnonzero(np.diff(lags, prepend=0))
+    for start, stop in pairwise([*starts, n]):
+        lag = lags[start]
+        if noise[start : stop + _BLOCK - 1][:lag].sum() >= np.log2(n**2 / _FALSE_POSITIVE):
+            equal = runs((channels[lag:] == channels[:-lag]).all(axis=1)) + lag
+            for first, end in equal[equal[:, 1] - equal[:, 0] >= lag]:
+                repeated[first:end] |= first <= start < end
+    return repeated
+
+
+def _noise_beyond_rounding(signal: np.ndarray) -> np.ndarray:
+    """Samples (n,) that leave their neighbours' cubic to the other side than the one before, and
+    by more than rounding of a smooth course to the converter's steps (or to 32 bits) explains."""
+    whole = np.nan_to_num(signal)
+    steps = np.abs(np.diff(whole))
+    if len(whole) < 3 or not steps.any():
+        return np.zeros(len(whole), bool)
+    digit = np.finfo(np.float32).eps * np.abs(whole).max()
+    beside, least = _beside_cubic(whole), 1.01 * _ROUNDING * max(steps[steps > 0].min(), digit)
+    turns = (beside[1:] * beside[:-1] < 0) & (
+        np.maximum(*np.abs([beside[1:], beside[:-1]])) > least
+    )
+    return np.concatenate([[False], turns & (steps > 0)])
+
+
+def _stuck(
+    channel: np.ndarray,
+    noise: np.ndarray,
+    load: np.ndarray,
+    gone: np.ndarray,
+    spikes: np.ndarray,
+    rate_hz: float,
+    n_channels: int,
+) -> np.ndarray:
+    """Stretches of one value of a channel (n,) that its ``noise`` would have changed, (n,) bool.
+
+    If one of two stretches of a length holds T events of noise, the other holds none with
+    probability 2^-T; T is that of the calmest other stretch as long (or half of all there is),
+    loaded or unloaded as this one. All such stretches must be less than the rest.
+    Without noise, a stretch amid load is stuck if the channel leaps into it or out of it, and a
+    long one while the load changes. Where the plate is set to zero (``gone``), nothing is.
+    """
+    stuck, n = np.zeros(channel.shape, bool), len(channel)
+    held = runs((np.diff(channel) == 0) & ~gone[:-1]) + np.array([0, 1])
+    held = held[held[:, 1] - held[:, 0] >= max(4, _FLAT_S * rate_hz)]
+    if not len(held):
+        return stuck
+    lengths, size = held[:, 1] - held[:, 0], np.abs(np.nan_to_num(load))
+    bears = ~gone if gone.any() else size > _ABRUPT_N
+    on = np.array([2 * bears[a:b].sum() > b - a for a, b in held], bool)
+    faulty = on | _leaps(np.abs(load), held, spikes, _ABRUPT_N, size.max() / (_RISE_S * rate_hz))
+    faulty &= _leaps(channel, held, spikes, _clear(channel))
+    for loaded in (True, False):
+        state = (bears == loaded) & ~gone
+        for shorter, length in pairwise([0, *np.unique(lengths[on == loaded])]):
+            longer = (lengths >= length) & (on == loaded)
+            n_others = state.sum() - lengths[longer].sum()
+            part = min(length, n_others // 2)
+            events = np.log2(n * n_channels / max(part, 1) / _FALSE_POSITIVE)
+            if n_others < lengths[longer].sum() or part - shorter < events:
+                continue  # no exceptions; or the next shorter is no less probable
+            others = state.copy()
+            for a, b in held[longer]:
+                others[a:b] = False
+            total = np.cumsum(noise[others])
+            if (total[part:] - total[:-part]).min(initial=n) >= events:
+                faulty |= longer
+    change = np.array([np.ptp(size[a:b]) for a, b in held])
+    faulty |= (lengths > _STUCK_S * rate_hz) & (change > max(_LOAD_CHANGE * size.max(), 50.0))
+    for a, b in held[faulty]:
+        stuck[a:b] = True
     return stuck
 
 
-def sample_findings(plate: str, samples: SampleCheck) -> list[Finding]:
+def sample_findings(plate: str, samples: SampleCheck, rate_hz: float) -> list[Finding]:
     """Lines for the quality table about one plate's faulty samples."""
-    n = len(samples.stuck)
+    n, stuck = len(samples.stuck), samples.stuck
+    held = "; ".join(
+        f"channel {i + 1} {_times(stuck[:, i], rate_hz)}" for i in np.flatnonzero(stuck.any(axis=0))
+    )
+    lost, repeated = (_times(mask, rate_hz) for mask in (samples.lost, samples.repeated))
     findings = [
         Finding(
             check=f"analog_{name}",
@@ -213,8 +328,9 @@ def sample_findings(plate: str, samples: SampleCheck) -> list[Finding]:
         for name, words, mask in (
             ("nan", "are not a number", samples.not_a_number),
             ("clipped", "lie at the converter's limit", samples.clipped),
-            ("stuck", "do not answer to the load", samples.stuck),
-            ("lost", "are zero in all channels amid load", samples.lost),
+            ("stuck", f"repeat one value: {held}", stuck.any(axis=1)),
+            ("lost", f"are zero in all channels at once: {lost}", samples.lost),
+            ("repeated", f"equal the block before: {repeated}", samples.repeated),
             ("spike", "leave their neighbours and come back at once", samples.spikes),
         )
         if mask.any()
@@ -232,3 +348,10 @@ def sample_findings(plate: str, samples: SampleCheck) -> list[Finding]:
             )
         )
     return findings
+
+
+def _times(mask: np.ndarray, rate_hz: float) -> str:
+    """When, from the first sample; the first stretches."""
+    stretches = runs(mask)
+    first = ", ".join(f"{a / rate_hz:.3f} to {b / rate_hz:.3f} s" for a, b in stretches[:_NAMED])
+    return first + (f" and {len(stretches) - _NAMED} more" if len(stretches) > _NAMED else "")

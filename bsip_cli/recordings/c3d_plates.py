@@ -107,7 +107,7 @@ def _read_plate(
     baseline, usable = _baseline(group, content.samples_per_frame, len(raw)), samples.usable()
     wrench, subtracted = without_baseline(wrench, name, down, usable, baseline)
     source = C3dPlate(stated, wrench, usable, rotation_world_lab)
-    about_samples = [*sample_findings(name, samples), *subtracted]
+    about_samples = [*sample_findings(name, samples, rate_hz), *subtracted]
     return source, [*about_size, *about_origin, *about_units], about_samples
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from bsip_cli.files.force_files import forces_beside
 from bsip_cli.recordings import scene
-from bsip_cli.recordings.analog import spike_samples
+from bsip_cli.recordings.analog import check_samples, sample_findings
 from bsip_cli.recordings.model import Finding, Recording, refusal
 from bsip_cli.recordings.mot import GroundForce, Mot, read_mot
 from bsip_cli.recordings.plate_reading import PlateReading
@@ -164,18 +164,16 @@ def _source(
         rotation_world_lab=rotation,
     )
     wrench = source.plate(PlateReading()).wrench()  # points alone leap where the load begins
-    spikes = spike_samples(wrench, np.abs(wrench[:, :3]).max(axis=1)) & ~missing
+    samples = check_samples(wrench, wrench, np.abs(wrench[:, :3]).max(axis=1), grid.rate_hz)
+    samples = replace(samples, not_a_number=missing, silent_channels=())  # no column, or no torque
     expected = (
         f"forces as long as the markers, {markers.span()} s (the file "
         f"has {grid.samples_s[0]:.4g} to {grid.samples_s[-1]:.4g} s)"
     )
     none = f"no force for {missing.sum()} of {len(rows)} samples of the markers' time"
-    leaps = f"{spikes.sum()} of {len(rows)} samples leave their neighbours and come back at once"
-    said = ((missing, "nan", none, expected), (spikes, "spike", leaps, "none"))
-    return replace(source, usable=~missing & ~spikes), [
-        Finding(f"analog_{kind}", force.name, found, expected, "marked them unusable", "warning")
-        for mask, kind, found, expected in said
-        if mask.any()
+    return replace(source, usable=samples.usable()), [
+        replace(one, found=none, expected=expected) if one.check == "analog_nan" else one
+        for one in sample_findings(force.name, samples, grid.rate_hz)
     ]
 
 

@@ -4,9 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter1d
 
 from bsip_cli.recordings import plate_source as copies
-from bsip_cli.recordings.analog import check_samples, lost_samples
+from bsip_cli.recordings.analog import SampleCheck, check_samples, sample_findings
 
 RATE_HZ = 1000.0
 TIME_S = np.arange(4000) / RATE_HZ
@@ -95,7 +96,7 @@ def touching_down(rate_hz: float = 1000.0) -> np.ndarray:
 
 def lost_of(load: np.ndarray, rate_hz: float = 1000.0) -> np.ndarray:
     channels = np.column_stack([0.1 * load, 0.05 * load, load])
-    return lost_samples(channels, load, rate_hz)
+    return check_samples(channels, channels, load, rate_hz).lost
 
 
 @pytest.mark.parametrize("first", [470, 1470])  # over a touch-down, over a lift-off
@@ -119,3 +120,107 @@ def test_hops_whose_small_forces_are_set_to_zero_are_not_lost(rate_hz):
     load += np.random.default_rng(4).normal(0.0, 1.0, len(t))
     load[load < 25.0] = 0.0
     assert not lost_of(load, rate_hz).any()
+
+
+VARIATIONS = [  # rate [Hz], channels, the converter's step [N] (0: none), length of the fault [s]
+    (1000.0, 6, 0.0, 0.1),
+    (2000.0, 6, 0.5, 0.2),
+    (600.0, 8, 0.3, 0.31),
+    (240.0, 8, 0.0, 0.5),
+]
+
+
+def walking(rate_hz: float, k: int, step: float, noise: float = 1.0, seed: int = 3) -> np.ndarray:
+    """(n, k) channels under steps of a second, a third of it in the air; the load is borne by
+    the last, or by the last four of eight as Kistler has it."""
+    t = np.arange(round(6 * rate_hz)) / rate_hz
+    phase = np.clip((t % 1.0) / 0.7, 0.0, 1.0)
+    load = 1100.0 * np.sin(np.pi * phase) * (1.0 - 0.35 * np.sin(np.pi * phase) ** 4)
+    share = np.full(k, 0.1)
+    share[-upright(k) :] = 1.0 / upright(k)
+    sway = 0.05 * np.sin(2.0 * t[:, None] + np.arange(k)) * (np.arange(k) < k - upright(k))
+    channels = load[:, None] * (share + sway)
+    channels += np.random.default_rng(seed).normal(0.0, noise, channels.shape)
+    return step * np.round(channels / step) if step else channels
+
+
+def upright(k: int) -> int:
+    return 4 if k == 8 else 1
+
+
+def checked(channels: np.ndarray, rate_hz: float) -> SampleCheck:
+    load = channels[:, -upright(channels.shape[1]) :].sum(axis=1)
+    return check_samples(channels, channels, load, rate_hz)
+
+
+def set_to_zero(channels: np.ndarray) -> np.ndarray:
+    load = channels[:, -upright(channels.shape[1]) :].sum(axis=1)
+    return np.where(np.abs(load)[:, None] < 25.0, 0.0, channels)
+
+
+FAULTS = {
+    "all zero": lambda x, a, b: x[a:b] * 0.0,
+    "all held": lambda x, a, b: np.tile(x[a], (b - a, 1)),
+    "one held": lambda x, a, b: np.column_stack([np.full(b - a, x[a, 0]), x[a:b, 1:]]),
+    "vertical zero": lambda x, a, b: np.column_stack([x[a:b, :-1], np.zeros(b - a)]),
+    "vertical elsewhere": lambda x, a, b: np.column_stack(
+        [x[a:b, :-1], np.full(b - a, x[a - 40, -1])]
+    ),
+    "written twice": lambda x, a, b: x[2 * a - b : a],
+}
+
+
+@pytest.mark.parametrize("rate_hz,k,step,length_s", VARIATIONS)
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("zeroed", [False, True])
+def test_a_connector_lost_for_tenths_of_a_second(fault, zeroed, rate_hz, k, step, length_s):
+    """In stance, or from there into the air; what is sound stays."""
+    sound = walking(rate_hz, k, step)
+    sound = set_to_zero(sound) if zeroed else sound
+    assert checked(sound, rate_hz).usable().all()
+    for start_s in (2.12, 3.35):
+        a = round(start_s * rate_hz)
+        b = a + round(length_s * rate_hz)
+        damaged = sound.copy()
+        damaged[a:b] = FAULTS[fault](sound, a, b)
+        faulty = ~checked(damaged, rate_hz).usable()
+        changed = a + np.flatnonzero((damaged[a:b] != sound[a:b]).any(axis=1))
+        assert faulty[changed].mean() > 0.98
+        air = (damaged == 0).all(axis=1)  # a zero in the air is as good as one that is lost
+        assert not faulty[~air][np.flatnonzero(~air) < a - 4].any()
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    "noise,step",
+    [(1.0, 0.0), (1.0, 0.5), (0.3, 1.0), (0.3, 3.0), (0.05, 1.0), (0.0, 1.0), (0.0, 0.0)],
+)
+@pytest.mark.parametrize("rate_hz", [100.0, 200.0, 1000.0, 2000.0])
+def test_sound_plates_repeat_no_value_too_often(rate_hz, noise, step, seed):
+    """Fine, coarse and without noise; as they are, set to zero in the air, or smoothed."""
+    channels = walking(rate_hz, 8 if seed % 2 else 6, step, noise, seed)
+    smooth = uniform_filter1d(channels, max(3, round(0.02 * rate_hz)), axis=0)
+    for course in (channels, set_to_zero(channels), set_to_zero(smooth)):
+        assert checked(course, rate_hz).usable().all()
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05, 0.2, 1.0])
+def test_a_pause_between_movements_is_not_stuck(noise):
+    """A coarse converter in stance before and after squats, and a simulation that rests."""
+    channels = np.zeros((len(TIME_S), 6))
+    channels[:, 2] = quiet_then_moving() - NOISE[:, 2]
+    channels[:, 4] = 20.0 * np.sin(2 * np.pi * 0.4 * np.clip(TIME_S, 1.0, None))
+    for step in (0.0, 2.0) if noise == 0 else (2.0,):
+        course = channels + noise * NOISE
+        course = step * np.round(course / step) if step else course
+        assert check_samples(course, course, course[:, 2], RATE_HZ).usable().all()
+
+
+def test_what_is_lost_is_said_with_channel_and_time():
+    channels = walking(1000.0, 6, 0.0)
+    channels[2200:2350, 5] = 0.0
+    channels[4100:4300, 1] = channels[4100, 1]
+    found = sample_findings("2", checked(channels, 1000.0), 1000.0)
+    (one,) = [f for f in found if f.check == "analog_stuck"]
+    assert one.subject == "2"
+    assert "channel 2 4.100 to 4.300 s; channel 6 2.200 to 2.350 s" in one.found

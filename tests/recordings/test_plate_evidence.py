@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.recordings.analog import lost_samples, spike_samples
+from bsip_cli.recordings.analog import check_samples, spike_samples
 from bsip_cli.recordings.model import Plate, Recording
 from bsip_cli.recordings.plate_reading import AS_STATED
 from bsip_cli.recordings.plate_source import C3dPlate
@@ -162,7 +162,7 @@ def test_spikes_and_lost_samples_are_marked():
     load = channels[:, 2]
     assert np.flatnonzero(spike_samples(channels, load)).tolist() == [700]
     channels[300:330] = 0.0
-    lost = lost_samples(channels, channels[:, 2], RATE_HZ)
+    lost = check_samples(channels, channels, load, RATE_HZ).lost
     assert np.flatnonzero(lost).tolist() == list(range(299, 331))
 
 
@@ -195,10 +195,10 @@ def test_a_foot_that_touches_down_is_no_spike():
 
 
 def test_flight_on_a_plate_set_to_zero_is_not_lost():
-    load = np.zeros(3000)
-    load[:1000] = load[2000:] = 700.0
+    """Down in 50 ms and up in 10."""
+    load = np.interp(np.arange(3000), [950, 1000, 2000, 2010], [700.0, 0.0, 0.0, 700.0])
     channels = np.column_stack([0 * load, 0 * load, load])
-    assert not lost_samples(channels, load, RATE_HZ).any()  # a second: nobody loses so much
+    assert not check_samples(channels, channels, load, RATE_HZ).lost.any()
     assert not spike_samples(channels, load).any()
 
 

@@ -178,7 +178,8 @@ def light_of(
     title = headline(diagnosis).removesuffix(".")
     effects = [one.effect for cause in causes for one in cause]
     if set(effects) <= set(OBJECTS):
-        title = f"Explained by: {listing([effect_title(e) for e in dict.fromkeys(effects)])}"
+        objects = listing([effect_title(e) for e in dict.fromkeys(effects)])
+        title = f"Found: {objects}; errors of ordinary size"
     return Light("cause", title, named or f"Searched: {looked}.")
 
 

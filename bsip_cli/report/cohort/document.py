@@ -217,7 +217,10 @@ def _tables(record: CohortRecord) -> Iterator[Block]:
         for table in record.tables[: len(BUILDERS)]:  # those beside print are in the files
             yield Heading(table.title)
             yield from _table(table)
-            yield from (Paragraph(note, "note") for note in table.notes)
+            yield from (Paragraph(note, "note") for note in table.notes[:1])  # the legend
+        yield Paragraph(
+            "How each was tested, and what could not be, is in the Markdown files.", "note"
+        )
     if record.table_files:
         files = [(PurePosixPath(file).name, f"../{file}") for file in record.table_files]
         yield Links("The tables as files:", tuple(files))

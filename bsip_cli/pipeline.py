@@ -210,6 +210,31 @@ FINDINGS = ("choose", "diagnose", "laboratory", "extend")
 """Stages whose sentences are results; those of the others are remarks on the way."""
 
 
+_SHORT_S = 0.1
+_COSTS_S = {
+    "ingest participant": 6.0,
+    "ingest trial": 0.7,
+    "scale participant": 6.0,
+    "ik trial": 0.4,
+    "identify participant": 6.0,
+    "reconstruct trial": 0.4,
+    "laboratory participant": 13.0,
+    "laboratory cohort": 4.0,
+    "diagnose participant": 41.0,
+    "joints trial": 0.4,
+    "stats cohort": 4.5,
+    "report participant": 6.5,
+    "report cohort": 3.0,
+}
+"""Medians of a fresh run of the sample (`bsip run sample_data --jobs 2 -v`), which weigh the units
+in the bar of a run; all others take next to no time."""
+
+
+def cost_s(stage: str, level: str) -> float:
+    """About how long a unit takes beside others [s]."""
+    return _COSTS_S.get(f"{stage} {level}", _SHORT_S)
+
+
 def stages_named(name: str) -> tuple[Stage, ...]:
     """The stages behind one command, in order; ``run`` is all of them."""
     return STAGES if name == "run" else tuple(s for s in STAGES if s.name == name)

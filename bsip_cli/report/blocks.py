@@ -80,7 +80,6 @@ class Bar:
     kind: ClassVar[str] = "bar"
     title: str
     pieces: tuple[tuple[str, float], ...]
-    note: str
 
     def lengths(self) -> tuple[float, ...]:
         """[%] of what is above zero."""

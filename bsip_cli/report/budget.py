@@ -19,10 +19,11 @@ from bsip_cli.report.words import (
 FIRST = ("fz", "cop_ap", "cop_ml")  # components that a reader asks for first
 REST = "all others"
 UNKNOWN = "unknown"
+PARAMETERS = "the table's segment parameters"
 _FAULT = "fault:"
 _LAST = ("noise", UNKNOWN)
 _WORDS = {
-    "inertial_parameters": "the table's segment parameters",
+    "inertial_parameters": PARAMETERS,
     "joint_centres": "joint centres",
     "marker_places": "places of the markers",
     "soft_tissue": "soft tissue",

@@ -169,8 +169,9 @@ def causes_of(candidates: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], .
 
 
 def _importance(cause: tuple[Candidate, ...]) -> tuple[bool, float]:
-    changes = np.nan_to_num([one.rms_change for one in cause])
-    return not is_large(cause), -float(changes.max())
+    """Of a group, by what is to be expected of it: each member counts as probable as it is."""
+    expected = [np.nan_to_num(one.probability, nan=1.0) * one.rms_change for one in cause]
+    return not is_large(cause), -float(np.nansum(expected))
 
 
 def is_large(cause: Sequence[Candidate]) -> bool:
@@ -182,11 +183,10 @@ def is_large(cause: Sequence[Candidate]) -> bool:
 
 _EXAMPLES = (  # effects whose limits are told in the sentence
     ("sync_offset", "", "a delay of the forces"),
-    ("plate_translation", "", "a plate shifted"),
-    ("plate_gain", "fz", "vertical forces misread"),
+    ("plate_translation", "", "a plate's shift"),
+    ("plate_gain", "fz", "a misreading of vertical forces"),
 )
 OF_THE_WEIGHT = "W"  # group of what quiet standing tells
-_BY = ("plate_translation", "plate_gain")  # shifted *by* less than, but a delay *under*
 
 
 @dataclass(frozen=True)
@@ -251,10 +251,7 @@ def limits_sentence(limits: Sequence[Limit]) -> str:
 
 
 def _under(limit: Limit) -> str:
-    by = limit.effect in _BY
-    if not isfinite(limit.size):
-        return "by any amount" if by else "of any size"
-    return f"{'by less than' if by else 'under'} {limit.in_words()}"
+    return f"under {limit.in_words()}" if isfinite(limit.size) else "of any size"
 
 
 def looked_at(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[str, ...]:

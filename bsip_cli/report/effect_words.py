@@ -28,12 +28,12 @@ class Number(Protocol):
 _FORCES = (
     "The measured forces are not the true ones, and everything identified from them inherits the "
     "error.",
-    "Correct it in the lab, or let bsip write corrected files (bsip export), and run again.",
+    "Correct the forces in the lab, or write corrected files (bsip export), and run again.",
 )
 _CLOCKS = (
     "Forces and markers are not of the same moments, and everything identified from them inherits "
     "the error. A filter that only the forces have gone through delays them too.",
-    _FORCES[1],
+    "Correct the clock in the lab, or write corrected files (bsip export), and run again.",
 )
 _MOTION = (
     "The motion is not the true one, and the simulated forces with it.",
@@ -57,7 +57,7 @@ _PERSON = (
 _LOAD = (
     "A load that is not stated ends up in the masses of the body where its recording identifies "
     "them, and in the errors of the forces where it judges them.",
-    "If it belongs to the task, state its mass (tutorial: loads) and run again.",
+    "If the load belongs to the task, state its mass (tutorial: loads) and run again.",
 )
 WEIGHT = (
     "Either the stated mass is wrong or what the plates measure. Only if a scale confirms the stated "
@@ -66,11 +66,11 @@ WEIGHT = (
 )
 _CONTACT = (
     "The plates do not carry all of the ground force.",
-    "Leave these frames out, or record without anything in reach.",
+    "Leave out the frames with the contact, or record without anything in reach.",
 )
 _UNNAMED = (
     "Neither the forces nor the identified parameters should be trusted further than the report says.",
-    "See below, under errors, when it comes and goes, and look at the recording there.",
+    "Look at the recordings where the error comes and goes (report, under errors).",
 )
 
 
@@ -220,8 +220,6 @@ _PARTS = {  # of a size with several parts: which one the interval is of
 }
 _TOLD = (
     "added_mass",
-    "released_object",
-    "object_handled",
     "plate_gain",
 )  # their sentence has one such number only
 

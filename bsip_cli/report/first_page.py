@@ -13,6 +13,7 @@ from bsip_cli.report.blocks import (
     Bullets,
     Heading,
     Light,
+    Links,
     Numbered,
     Paragraph,
     Portrait,
@@ -34,6 +35,7 @@ from bsip_cli.report.effect_words import separating_recording
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.sticks import Motion, Pose, poses_of
 from bsip_cli.report.verdict import (
+    ALL_FAULTS,
     cause_line,
     consequences,
     light_of,
@@ -56,19 +58,19 @@ _MOST = 2  # causes, and things to do
 _PAIRS = ("om", "rm_mass", "om_rm_mass")
 _POSES = 8  # among which the one is chosen that is shown
 _COLOURS = {
-    "fine": "✓ no fault, no large error.",
-    "cause": "▲ faults, but no large error.",
-    "large": "■ a large error, explained or not.",
-    "inconclusive": "? nothing can be said.",
+    "fine": "✓: no fault, no large error.",
+    "cause": "▲: something found, but no large error.",
+    "large": "■: a large error, explained or not.",
+    "inconclusive": "?: nothing can be said.",
 }
 _USABLE = {
     "fine": "The data may be used: nothing needs to be corrected.",
     "cause": "The data may be used once what was found is corrected or stated.",
-    "large": "Do not use joint forces or parameters before the large error is understood.",
+    "large": "Use no results before the large error is understood.",
     "inconclusive": "Whether the data may be used cannot be said.",
 }
 _WORDS = {
-    OM: "OM, the segment parameters identified from this person's movement",
+    OM: "OM, the segment parameters identified from this person",
     RM_MASS: "RM+mass, the segment parameters of a table, all masses times one number",
     RM: "RM, the segment parameters of an anthropometric table",
 }
@@ -88,9 +90,9 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         Heading("How large are the errors?"),
         Scales(scales(record)),
         Paragraph(f"Root mean square (RMS), with {record.use()}. {SOURCES}", "note"),
-        *_sure(record),
+        *_sure(record, light),
         Heading("Which parameters to use"),
-        Paragraph(use_sentence(record)),
+        Paragraph(use_sentence(record, light.state == "large")),
         Heading("What to do next"),
         Bullets(tuple(to_do(record, light))),
     )
@@ -98,7 +100,8 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
 
 def light_for(record: ParticipantRecord) -> Light:
     """The answer, as `bsip show` prints it too."""
-    return light_of(record.diagnosis, record.detection, record.budget, large_errors(record))
+    large = large_errors(record)
+    return light_of(record.diagnosis, record.detection, record.budget, large, record.use())
 
 
 def large_errors(record: ParticipantRecord) -> list[str]:
@@ -123,12 +126,13 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
         person += f"; the plates say {number(plates, 1)} kg"
     yield "Person", f"{record.id}, {person}), {number(facts['height_m'], 2)} m"
     names = [trial.task for trial in record.trials]
-    tasks = [f"{names.count(name)} {name}" for name in dict.fromkeys(names)]
+    times = {name: names.count(name) for name in names}
+    tasks = [name if n == 1 else f"{n} × {name}" for name, n in times.items()]
     dates = sorted(trial.file_date for trial in record.trials if trial.file_date)
-    saved = f"; files of {' to '.join(dict.fromkeys((dates[0], dates[-1])))}" if dates else ""
+    saved = f"; files saved {' to '.join(dict.fromkeys((dates[0], dates[-1])))}" if dates else ""
     yield "Recordings", f"{listing(tasks)}{saved}"
     used = listing([trial.label for trial in record.identification_trials()])
-    yield "Based on", used
+    yield "Parameters from", used
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
     yield "Software", f"bsip {', '.join(versions)}"
     if record.facts["mass_note"]:
@@ -181,20 +185,20 @@ def _causes(record: ParticipantRecord) -> Iterator[Block]:
     if lines:
         yield Numbered(lines[:_MOST])
     if len(lines) > _MOST:
-        yield Paragraph(f"{len(lines) - _MOST} more below.", "note")
+        yield Links("", ((f"{len(lines) - _MOST} more below", f"#{ALL_FAULTS}"),))
 
 
-def _sure(record: ParticipantRecord) -> Iterator[Block]:
+def _sure(record: ParticipantRecord, light: Light) -> Iterator[Block]:
     """What might have been missed; nothing where no search was made."""
     if record.diagnosis is None or record.detection is None:
         return
     limits = limits_sentence(limits_of(record.detection, record.diagnosis))
     causes = _found(record)
     said = "Nothing was found that is more probable than not."
-    if causes and is_large(causes[0]):
+    if light.state == "large" and (not causes or is_large(causes[0])):
         said = "That the error is there is certain, its cause is not."
     elif causes:
-        said = "The probabilities above allow for ordinary errors."
+        said = "Each probability allows for ordinary errors."
     yield Heading("How sure is this?")
     yield Paragraph(f"{said} {limits}".rstrip())
 
@@ -207,9 +211,9 @@ def budget_bar(record: ParticipantRecord) -> tuple[Block, ...]:
         return ()
     return (
         Bar(
-            "What makes the squared error, with a table's masses (RM)",
+            "What makes the squared error of force and centre of pressure with a table (RM), faults or "
+            "not",
             tuple((piece.label, piece.share) for piece in pieces if abs(piece.share) >= 0.5),
-            "Vertical force and centre of pressure together.",
         ),
     )
 
@@ -232,12 +236,13 @@ def scales(record: ParticipantRecord) -> tuple[Scale, ...]:
 # --- which parameters ---------------------------------------------------------------------------
 
 
-def use_sentence(record: ParticipantRecord) -> str:
+def use_sentence(record: ParticipantRecord, is_wrong: bool = False) -> str:
     """Which method, by how much it is better than the others, and in which movements another."""
+    use = "Once the large error is understood, use" if is_wrong else "Use"
     if record.choice is None or record.choice.empty:
-        return f"Use {_WORDS[RM]}: nothing was compared."
+        return f"{use} {_WORDS[RM]}: nothing was compared."
     first = record.choice.iloc[0]
-    said = f"Use {_WORDS[str(first['use'])]}{_compared(first)}."
+    said = f"{use} {_WORDS[str(first['use'])]}{_compared(first)}."
     others = [
         f"{method} for {listing(list(rows['movement']))}"
         for method, rows in record.choice.iloc[1:].groupby("use")
@@ -257,15 +262,16 @@ def _compared(first: pd.Series) -> str:
     compared = {
         name: _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
     }
-    said = f". OM errs {compared['om']} than RM"
+    table, scaled = "a table (RM)", "a scaled table (RM+mass)"
+    said = f". OM errs {compared['om']} than {table}"
     same = compared["om"] == compared["om_rm_mass"]
-    said += " and RM+mass" if same else f", {compared['om_rm_mass']} than RM+mass"
+    said += f" and {scaled}" if same else f", {compared['om_rm_mass']} than {scaled}"
     if first["use"] == RM_MASS:
         said += f", RM+mass {compared['rm_mass']} than RM"
-    judging = count(int(first["trials"]), "recording")
+    n = int(first["trials"])
     where = {
-        "whole_trials": f" in {judging} not used to identify it",
-        "held_out": f" in seconds of {judging} that were kept apart",
+        "whole_trials": f" in {count(n, 'other recording')}",
+        "held_out": f" in seconds of {count(n, 'recording')} that were kept apart",
     }
     unsure = "" if first["use"] == OM else ": no sure gain by OM"
     return f"{said}{where.get(str(first['data']), '')}{unsure}"
@@ -290,13 +296,13 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
     """Whether the data may be used, and at most two things to do."""
     causes = _found(record)
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
+    said = [_USABLE[light.state], *said]
+    said += consequences(causes[:_MOST], only_actions=True)
     said += [
-        f"What is behind fault {k}: {_first_step(cause)}."
+        f"To find the cause of fault {k}: {_first_step(cause)}."
         for k, cause in enumerate(causes[:_MOST], start=1)
         if len(cause) > 1
     ][:1]
-    said = [_USABLE[light.state], *said]
-    said += consequences(causes[:_MOST], only_actions=True)
     large = [one for one, value in measured_of(record) if one.words(value) == "large"]
     if light.state == "inconclusive" and not large:
         said.append(

@@ -85,10 +85,10 @@ def _found(people: Sequence[Searched]) -> list[_Found]:
 def _told(found: _Found, people: Sequence[Searched]) -> str:
     unsure = [person for person in found.people if person not in found.named_of]
     possibly = "possibly " if not found.named_of else ""
-    where = (
-        f"{possibly}in {len(found.people)} of {_asked(found, people)} participants "
-        f"({named_people(list(found.people))})"
-    )
+    asked = _asked(found, people)
+    where = f"{possibly}in {len(found.people)} of {asked} participants"
+    if len(found.people) < asked:
+        where += f" ({named_people(list(found.people))})"
     every = [one.main_number() for of in found.people.values() for one in of]
     text = f"{capital(found.label)}: {where}{_sizes(every)}"
     if not unsure:

@@ -11,7 +11,14 @@ import pandas as pd
 
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.report.blocks import Light
-from bsip_cli.report.budget import REST, UNKNOWN, budget_sentences, fault_share, overall_pieces
+from bsip_cli.report.budget import (
+    PARAMETERS,
+    REST,
+    UNKNOWN,
+    budget_sentences,
+    fault_share,
+    overall_pieces,
+)
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
     UNNAMED,
@@ -41,6 +48,10 @@ from bsip_cli.report.words import (
     signed,
     trial_label,
 )
+from bsip_cli.statistics.methods import OM, RM
+
+ALL_FAULTS = "wrong"
+"""Address of the section that has all of them."""
 
 _UNTOLD = 1e-3  # probabilities this near to 0 or 1 are not told in digits
 _MOST_GAINS = 3
@@ -138,9 +149,11 @@ def light_of(
     detection: pd.DataFrame | None,
     budget: pd.DataFrame | None = None,
     large: Sequence[str] = (),
+    use: str = RM,
 ) -> Light:
     """Whether anything is wrong with a person's recordings: fine, a cause named, a large error that
-    nothing explains, or inconclusive. ``large``: the yardsticks beyond which the errors are."""
+    nothing explains, or inconclusive. ``large``: the yardsticks beyond which the errors are with
+    the method ``use``; ``budget`` is of RM's."""
     if diagnosis is None or detection is None:
         return Light("inconclusive", "Not examined", NOT_RUN)
     if diagnosis.empty:
@@ -150,11 +163,11 @@ def light_of(
     if unsure:
         return Light("inconclusive", "Inconclusive", f"{capital(unsure[0].what())}.")
     looked = count(len(looked_at(detection, diagnosis)), "recording")
-    how_large = f"Large: {listing(large)}." if large else ""
+    how_large = f"{capital(listing(large))}." if large else ""
     found = f"{count(len(causes), 'fault')} found" if causes else ""
     if large or any(is_large(cause) for cause in causes):
         nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
-        title = "; ".join(filter(None, (f"Large error, {mostly(budget)}", found)))
+        title = "; ".join(filter(None, (f"Large error{mostly(budget, use)}", found)))
         return Light("large", title, " ".join(filter(None, (how_large, "" if causes else nothing))))
     if not causes:
         nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
@@ -165,17 +178,21 @@ def light_of(
     title = headline(diagnosis).removesuffix(".")
     effects = [one.effect for cause in causes for one in cause]
     if set(effects) <= set(OBJECTS):
-        title = f"Explained by: {listing([effect_title(e) for e in dict.fromkeys(effects)])}"
+        objects = listing([effect_title(e) for e in dict.fromkeys(effects)])
+        title = f"Found: {objects}; errors of ordinary size"
     return Light("cause", title, named or f"Searched: {looked}.")
 
 
-def mostly(budget: pd.DataFrame | None) -> str:
-    """Of a large error, what makes the largest part of it: ``mostly soft tissue (56 %)``."""
+def mostly(budget: pd.DataFrame | None, use: str = RM) -> str:
+    """Of a large error, what makes the largest part of it: ``, mostly soft tissue (56 %)``. Errors
+    with identified parameters are not the table's."""
     parts = () if budget is None or budget.empty else overall_pieces(budget)
     most = max(parts, key=lambda one: one.share, default=None)
     if most is None or most.label in (UNKNOWN, REST):
-        return "cause unknown"
-    return f"mostly {most.label} ({number(most.share, 0)} %)"
+        return ", cause unknown"
+    if use == OM and PARAMETERS in most.label:
+        return " also with identified parameters"
+    return f", mostly {most.label} ({number(most.share, 0)} %)"
 
 
 def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
@@ -183,9 +200,10 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     sure = probability_words(probability_of(cause))
     if len(cause) > 1:
         others = len(cause) - _MOST_MEMBERS
-        shown = [_short(one) for one in cause[:_MOST_MEMBERS]]
+        named_first = sorted(cause, key=lambda one: one.effect == UNNAMED)
+        shown = [_short(one) for one in named_first[:_MOST_MEMBERS]]
         members = "; or ".join([*shown, *([f"{others} more"] if others > 0 else [])])
-        return f"One of {len(cause)}, not to be distinguished: {members} ({sure})."
+        return f"One of {len(cause)}, not to be distinguished: {members}; probability {sure}."
     (one,) = cause
     main = one.main_number()
     usual = beside_usual(one.effect, main) if main else ""
@@ -194,13 +212,15 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     where = f"in {len(one.trials)} of {len(everywhere)} recordings" if some else where
     if is_large(cause):
         error = one.what().partition("; ")[0].removeprefix(_UNEXPLAINED)
-        return f"Left unexplained: {error} (RMS), {where}."
+        return f"Unexplained by all that is named: {error} (RMS), {where}."
     sure = f"; probability {sure}" if sure else ""
     return f"{capital(one.told(remarks=False))}, {where}{usual}{sure}."
 
 
 def _short(one: Candidate) -> str:
     """The beginning of its sentence."""
+    if one.effect == UNNAMED:
+        return "a fault that bsip does not know"
     return re.split(r"[,:;] | \(", one.what())[0]
 
 
@@ -384,12 +404,12 @@ def consequences(
     with the numbers of its causes."""
     numbers: dict[str, list[int]] = {}
     for k, cause in enumerate(causes, start=1):
-        if only_actions and is_large(cause):
-            continue  # what to do then is said of the recording where the error is largest
+        if only_actions and (is_large(cause) or len(cause) > 1):
+            continue  # of these it is said elsewhere where to look, and what to record
         for meaning, action in _consequences_of(cause):
             text = action if only_actions else f"{meaning} {action}".rstrip()
             numbers.setdefault(text, []).append(k)
-    if len(causes) == 1:
+    if len(causes) == 1 and not only_actions:
         return tuple(filter(None, numbers))
     return tuple(
         f"{'Fault' if len(of) == 1 else 'Faults'} {listing([str(k) for k in of])}: {text}"

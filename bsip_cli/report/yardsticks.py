@@ -52,7 +52,7 @@ class Yardstick:
             value / end if np.isfinite(value) else 0.0,
             self.good / end,
             self.limit / end,
-            f"good to {number(self.good)} {self.unit.partition(' ')[0]}",
+            f"good to {self.good:.2g} {self.unit.partition(' ')[0]}",
             f"large from {number(self.limit, 0)} {self.unit.partition(' ')[0]}",
         )
 

@@ -6,7 +6,7 @@ import difflib
 import re
 import sys
 from collections import Counter
-from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +18,7 @@ from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, Load, load_config, with_estimators
 from bsip_cli.errors import BadDataError, UsageError, printable
-from bsip_cli.pipeline import FINDINGS, Stage, by_level, stages_named
+from bsip_cli.pipeline import FINDINGS, Stage, by_level, cost_s, stages_named
 from bsip_cli.running.runner import Manner, Outcome, refusal_sentence, run_stages
 from bsip_cli.study.dataset import describe_dataset, make_out
 from bsip_cli.study.study import Study, load_study
@@ -26,6 +26,7 @@ from bsip_cli.study.trials import listed
 
 _LOADS = "correct [[loads]] in study.toml"
 _NAME = r"sub-[A-Za-z0-9]+(_[a-z]+-[A-Za-z0-9]+)*"  # of a person or a recording
+_BAR = "{desc}: {percentage:3.0f}%|{bar}| {elapsed} gone, about {remaining} left"
 _SEVERITY = (0, 3, 4, 2, 1)  # of several exit codes the gravest counts
 
 
@@ -62,13 +63,10 @@ def run_session(
     participants = opened.study.participants
     manner = Manner(force=force, verify=verify, jobs=jobs)
     running = run_stages(stages, opened.study, out, opened.config, manner)
-    total = sum(
-        1
-        if s.level == "cohort"
-        else sum(len(p.trials) if s.level == "trial" else 1 for p in participants)
-        for s in stages
-    )
-    return follow(command, refusals, running, total, out, verbose=verbose, quiet=quiet)
+    persons, trials = len(participants), sum(len(p.trials) for p in participants)
+    units = {"cohort": 1, "participant": persons, "trial": trials}
+    total = sum(cost_s(s.name, s.level) * units[s.level] for s in stages)
+    return follow(command, refusals, running, total, out, _cost_s, verbose=verbose, quiet=quiet)
 
 
 def _stages(
@@ -149,30 +147,42 @@ def follow(
     command: str,
     refusals: Iterable[Outcome],
     running: Generator[Outcome, None, None],
-    total: int,
+    total: float,
     out: Path | None,
+    cost: Callable[[Outcome], float] = lambda outcome: 1.0,
+    /,
     *,
     verbose: bool = False,
     quiet: bool = False,
 ) -> int:
     """Tell the user what becomes of the units, with a bar of ``total`` steps; the exit code.
 
-    ``out``: the results' folder, None if they are not kept. ``verbose``: of each unit what it read
-    and how long it took. ``quiet``: findings and errors only.
+    ``cost``: how many steps a unit is; what need not be done takes its steps from the total, so
+    that the time left is that of what is done. ``out``: the results' folder, None if they are not
+    kept. ``verbose``: of each unit what it read and how long it took. ``quiet``: findings and
+    errors only.
     """
     outcomes, voice = list(refusals), _Voice(verbose, quiet)
     for outcome in outcomes:
         voice.tell(outcome)
-    bar = tqdm(total=total, desc=command, unit="unit", disable=True if quiet else None)
+    off = True if quiet else None  # None: where nobody watches
+    bar = tqdm(total=total, desc=command, bar_format=_BAR, smoothing=0, disable=off)
     with bar as progress, closing(running):  # whatever happens here, no process goes on
         for outcome in running:
             outcomes.append(outcome)
-            progress.update(outcome.state != "noted")
+            steps, is_idle = cost(outcome), outcome.state in ("fresh", "waiting")
+            progress.total -= steps if is_idle else 0
+            progress.update(0 if is_idle or outcome.state == "noted" else steps)
             voice.tell(outcome)
     voice.tell_of_the_others()
     if not quiet:
         _summary(command, outcomes, out)
     return _exit_code(outcomes)
+
+
+def _cost_s(outcome: Outcome) -> float:
+    level = "cohort" if outcome.unit == "group" else "participant"
+    return cost_s(outcome.stage, "trial" if "_task-" in outcome.unit else level)
 
 
 @dataclass

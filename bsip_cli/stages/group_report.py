@@ -14,6 +14,7 @@ from typing import Any
 import pandas as pd
 
 from bsip_cli.artifacts import file_rows
+from bsip_cli.report.blocks import Light
 from bsip_cli.report.cohort.document import SHOWN, cohort_document
 from bsip_cli.report.cohort.record import CohortRecord, Member, ratios_of, yardsticks_of
 from bsip_cli.report.origins import HowMade
@@ -87,7 +88,15 @@ def _member(unit: Unit, participant: Participant, use: str, errors: Mapping[str,
         _searched(unit, participant),
         use if errors else "",
         errors,
+        _light(unit, participant),
     )
+
+
+def _light(unit: Unit, participant: Participant) -> Light | None:
+    """The answer on the first page of the participant's report; None where there is none."""
+    if not unit.path("report-files", participant=participant).exists():
+        return None
+    return Light(**unit.facts("report-files", participant=participant)["light"])
 
 
 def _searched(unit: Unit, participant: Participant) -> Searched | None:

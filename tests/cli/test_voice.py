@@ -1,5 +1,10 @@
 """How much a run says: findings and errors only, or what each unit reads and how long it takes."""
 
+import re
+import time
+from io import StringIO
+
+from bsip_cli.pipeline import _COSTS_S, STAGES
 from bsip_cli.running.runner import Outcome
 from bsip_cli.running.session import follow
 
@@ -34,3 +39,29 @@ def test_quiet_says_findings_and_errors_only(capsys):
 
 def test_verbose_says_what_is_read_and_how_long_it_takes(capsys):
     assert "ingest: sub-2: 1.2 s; read markers" in said(capsys, verbose=True)
+
+
+class Terminal(StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_the_bar_counts_what_a_unit_costs_and_not_what_need_not_be_done(monkeypatch):
+    def cost(outcome):
+        return {"ik": 2, "diagnose": 12}[outcome.stage]
+
+    def running():
+        for outcome in (Outcome("ik", "sub-1", "done"), Outcome("diagnose", "sub-1", "fresh")):
+            time.sleep(0.2)  # longer than the bar waits before it is drawn again
+            yield outcome
+
+    monkeypatch.setattr("sys.stderr", terminal := Terminal())
+    assert follow("run", [], running(), 20, None, cost) == 0
+    drawn = [int(part) for part in re.findall(r"(\d+)%\|", terminal.getvalue())]
+    assert drawn[0] == 0
+    assert 10 in drawn  # 2 of 20
+    assert drawn[-1] == 25  # 2 of 8
+
+
+def test_every_cost_is_of_a_unit_that_there_is():
+    assert set(_COSTS_S) <= {f"{stage.name} {stage.level}" for stage in STAGES}

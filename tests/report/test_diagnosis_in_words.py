@@ -288,8 +288,8 @@ def test_limits_are_those_of_all_recordings_and_of_what_was_not_found(found):
 def test_limits_in_a_sentence(found):
     nothing = found[found["verdict"] == "rejected"]
     assert limits_sentence(limits_of(detection(TRIALS), nothing)) == (
-        "A delay of the forces under 2.5 ms, a plate shifted by less than 6.0 mm or vertical "
-        "forces misread by less than 1.1 % might have gone unseen."
+        "A delay of the forces under 2.5 ms, a plate's shift under 6.0 mm or a misreading "
+        "of vertical forces under 1.1 % might have gone unseen."
     )
     assert limits_sentence(()) == ""
 

@@ -29,16 +29,14 @@ def pose() -> Pose:
 
 
 def test_the_figure_shows_markers_force_and_when(pose):
-    (axes,) = stick_figure(pose, "squat $1$").axes
-    (markers,) = axes.lines
+    figure = stick_figure(pose, "squat $1$")
+    (markers,) = figure.axes[0].lines
     assert len(markers.get_xdata()) == 4
-    texts = [text.get_text() for text in axes.texts]
-    said = texts[-1]
+    said = figure.get_supxlabel()
     assert "measured ground force, 700 N" in said
     assert said.startswith(r"squat \$1\$, 0.25 s")
     unmeasured = replace(pose, force_N=np.full(3, np.nan))
-    (without,) = stick_figure(unmeasured, "squat").axes
-    assert not [text for text in without.texts if "ground force" in text.get_text()]
+    assert "ground force" not in stick_figure(unmeasured, "squat").get_supxlabel()
 
 
 def test_one_body_weight_is_half_as_long_as_the_person_is_tall(pose):

@@ -137,10 +137,10 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "the table's segment parameters 70 %" in first
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm , good" in first
-    assert "Use OM, the segment parameters identified from this person's movement" in first
-    assert "OM errs 34 to 46 % less than RM," in first
+    assert "Use OM, the segment parameters identified from this person" in first
+    assert "OM errs 34 to 46 % less than a table (RM)," in first
     assert "But RM for basketball." in first
-    assert "Correct it in the lab, or let bsip write corrected files" in first
+    assert "Fault 1: Correct the forces in the lab, or write corrected files" in first
 
 
 def test_yardsticks_are_those_of_data_that_identified_nothing(record, first):
@@ -192,9 +192,9 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
     (light,) = (block for block in front(large) if isinstance(block, Light))
     assert (light.state, light.title) == (
         "large",
-        "Large error, mostly the table's segment parameters (70 %)",
+        "Large error also with identified parameters",
     )
-    assert light.text.startswith("Large: vertical force 5.5 % of body weight. None of the")
+    assert light.text.startswith("Vertical force 5.5 % of body weight. None of the")
     *_, to_do = front(large)
     assert not any("nothing needs to be corrected" in item for item in to_do.items)
 
@@ -212,7 +212,7 @@ def test_rm_is_used_where_nothing_is_sure(record):
     choice = record.choice.assign(use="RM", ratio_om=1.05)
     said = use_sentence(replace(record, choice=choice))
     assert said.startswith("Use RM, the segment parameters of an anthropometric table")
-    assert "OM errs 5 % less to 16 % more than RM," in said
+    assert "OM errs 5 % less to 16 % more than a table (RM)," in said
     rare = record.identification.assign(rare=True)
     assert "Never use OM" in use_sentence(replace(record, identification=rare))
     alone = choice.assign(ratio_om=np.nan, ratio_rm_mass=np.nan, ratio_om_rm_mass=np.nan)

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from scipy.stats import norm
 
-from bsip_cli.report.blocks import Bullets, Grid
+from bsip_cli.report.blocks import Bullets, Grid, Light
 from bsip_cli.report.cohort import diagnoses
 from bsip_cli.report.cohort.record import CohortRecord, Member, Ratios
 from bsip_cli.report.origins import HowMade
@@ -90,7 +90,7 @@ def test_a_member_of_a_group_counts_and_is_told_as_one():
     offset = FOUND["effect"] == "plate_zero"
     named = FOUND[offset].assign(verdict="named", class_id="")
     first, *others = shared(ann=FOUND, bob=FOUND, eve=named, tom=FOUND)
-    assert "in 4 of 4 participants (ann, bob, eve and tom)" in first
+    assert "in 4 of 4 participants" in first and "(ann" not in first
     assert first.endswith("; one of several that look alike in ann, bob and tom.")
     assert "possibly in 3 of 4 participants" in others[-1]
     assert others[-1].endswith("; one of several that look alike in all of them.")
@@ -151,17 +151,34 @@ def test_what_is_shared_stands_in_the_section():
 
 
 @pytest.mark.parametrize(
-    ("tables", "said"),
+    ("states", "said"),
     [
-        ({"ann": TURNED, "bob": NOTHING}, "Something is wrong in 1 of 2 participants. In ann."),
-        ({"bob": NOTHING}, "Nothing wrong above the noise in 1 participant."),
-        ({"bob": None}, "Inconclusive. Nobody's recordings were searched for errors"),
-        ({"bob": TURNED.iloc[:0]}, "Inconclusive. No recording has motion"),
+        (
+            ["cause", "large", "cause"],
+            "large: 3 participants: 1 with a large error; 2 with something found but no large "
+            "error. Large error: eve. Force plate turned or tilted: plate 1: in 3 of 3",
+        ),
+        (
+            ["fine", "cause", "fine"],
+            "cause: 3 participants: 1 with something found but no large error; 2 fine.",
+        ),
+        (["fine"], "fine: 1 participant: 1 fine."),
+        (["fine", "inconclusive"], "inconclusive: 2 participants: 1 inconclusive; 1 fine."),
+        ([None], "inconclusive: Not known. Nobody's report was made"),
+        ([None, "fine"], "fine: 1 participant with a report: 1 fine."),
     ],
 )
-def test_the_verdict_of_all(tables, said):
-    light = diagnoses.light(cohort(**tables))
-    assert f"{light.title}. {light.text}".startswith(said)
+def test_the_light_of_all_is_that_of_their_own(states, said):
+    record = cohort(**dict.fromkeys(["ann", "eve", "bob"][: len(states)], TURNED))
+    lights = [state and Light(state, "", "") for state in states]
+    pairs = zip(record.members, lights, strict=True)
+    members = tuple(replace(member, light=one) for member, one in pairs)
+    light = diagnoses.light(replace(record, members=members))
+    assert f"{light.state}: {light.title}. {light.text}".startswith(said)
+
+
+def test_the_light_of_all_where_nobody_was_searched():
+    assert "run `bsip diagnose`" in diagnoses.light(cohort(bob=None)).text
 
 
 def test_what_a_probability_means_is_said_where_something_was_found():

@@ -67,11 +67,9 @@ def test_the_answer_is_that_of_the_first_page(reports, tmp_path):
     assert "sub-01: Fine" in "\n".join(shown(tmp_path))  # no report, no yardstick
     replace(reports, out=tmp_path).run("report", person)
     said = " ".join("\n".join(shown(tmp_path)).split())
-    assert said.startswith(
-        "sub-01: Large error, mostly the table's segment parameters (70 %). Large:"
-    )
+    assert said.startswith("sub-01: Large error also with identified parameters. Vertical force")
     page = replace(reports, out=tmp_path).html("sub-01")
-    assert "<strong>Large error, mostly the table&#39;s segment parameters (70 %)</strong>" in page
+    assert "<strong>Large error also with identified parameters</strong>" in page
 
 
 def test_of_several_people_each_has_a_line(reports):

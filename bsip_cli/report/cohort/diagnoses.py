@@ -6,15 +6,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Light, Paragraph, Section
-from bsip_cli.report.candidates import is_large
-from bsip_cli.report.cohort.record import CohortRecord
+from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Light, Paragraph, Section, State
+from bsip_cli.report.cohort.record import CohortRecord, Member
 from bsip_cli.report.shared import SHARED, Cause, Searched, named_people, shared_causes
 from bsip_cli.report.verdict import probability_of, probability_words
 from bsip_cli.report.words import MISSING, capital, count, labelled, listing
 
 _NOT_RUN = "Nobody's recordings were searched for errors: run `bsip diagnose`."
 _NO_TRIAL = "No recording has motion with every contact on a plate"
+_STATES: dict[State, str] = {  # the worst first
+    "large": "with a large error",
+    "cause": "with something found but no large error",
+    "inconclusive": "inconclusive",
+    "fine": "fine",
+}
 _SOME_ARE_WRONG = (
     "The probabilities hold as far as the model of ordinary errors does. Of findings with 95 %, one "
     "in twenty is expected not to be there: among many people some are not."
@@ -22,21 +27,26 @@ _SOME_ARE_WRONG = (
 
 
 def light(record: CohortRecord) -> Light:
-    """Whether anything is wrong in anybody's recordings."""
+    """How many of the persons' own lights are red, amber, without an answer, and fine; the worst
+    gives the colour."""
     people = _people(record)
-    asked = [p for p in people if p.was_searched]
-    if not asked:
-        return Light("inconclusive", "Inconclusive", f"{_NO_TRIAL}." if people else _NOT_RUN)
-    wrong = [p for p in asked if p.causes]
-    how_many = count(len(asked), "participant")
-    if not wrong:
-        return Light("fine", f"Nothing wrong above the noise in {how_many}", "")
-    large = [p.id for p in wrong if any(is_large(cause) for cause in p.causes)]
-    names = named_people([p.id for p in wrong])
-    said = f"In {names}." + (f" Large, cause unknown: {named_people(large)}." if large else "")
-    shared = " ".join(shared_causes(people)[:2])
-    title = f"Something is wrong in {len(wrong)} of {how_many}"
-    return Light("large" if large else "cause", title, f"{said} {shared}".rstrip())
+    of_state: dict[State, list[Member]] = {state: [] for state in _STATES}
+    for member in record.members:
+        if member.light is not None:
+            of_state[member.light.state].append(member)
+    there = [state for state, members in of_state.items() if members]
+    if not people:
+        return Light("inconclusive", "Not examined", _NOT_RUN)
+    if not there:
+        return Light("inconclusive", "Not known", "Nobody's report was made: run `bsip report`.")
+    known = sum(map(len, of_state.values()))
+    how_many = count(known, "participant")
+    if known < len(people):
+        how_many += " with a report"
+    title = f"{how_many}: {'; '.join(f'{len(of_state[s])} {_STATES[s]}' for s in there)}"
+    large = of_state["large"]
+    said = [f"Large error: {named_people([m.id for m in large])}."] if large else []
+    return Light(there[0], title, " ".join((*said, *shared_causes(people)[:2])))
 
 
 def section(record: CohortRecord) -> Section:

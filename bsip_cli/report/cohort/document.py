@@ -45,8 +45,8 @@ _FEWEST = 5  # persons among whom one can lie far out
 
 def cohort_document(record: CohortRecord) -> Document:
     return Document(
-        title="Cohort: does the motion explain the ground forces?",
-        subtitle="Ground forces computed from the motion, compared with the force plates.",
+        title="Cohort: do motion and measured forces agree?",
+        subtitle="Ground forces computed from the motion, against the plates'.",
         front=tuple(_front(record)),
         sections=(
             Section("people", "Who took part?", (_people(record),)),
@@ -71,7 +71,7 @@ def _front(record: CohortRecord) -> Iterator[Block]:
     yield Terms(
         (
             ("Participants", f"{len(done)} of {everyone} have identified parameters"),
-            ("Parameters to use", f"{used} (OM: identified; RM: table; RM+mass: table, scaled)"),
+            ("Parameters", f"use {used} (OM: identified; RM: table; RM+mass: scaled table)"),
             ("Software", f"bsip {software}"),
         )
     )
@@ -217,7 +217,10 @@ def _tables(record: CohortRecord) -> Iterator[Block]:
         for table in record.tables[: len(BUILDERS)]:  # those beside print are in the files
             yield Heading(table.title)
             yield from _table(table)
-            yield from (Paragraph(note, "note") for note in table.notes)
+            yield from (Paragraph(note, "note") for note in table.notes[:1])  # the legend
+        yield Paragraph(
+            "How each was tested, and what could not be, is in the Markdown files.", "note"
+        )
     if record.table_files:
         files = [(PurePosixPath(file).name, f"../{file}") for file in record.table_files]
         yield Links("The tables as files:", tuple(files))

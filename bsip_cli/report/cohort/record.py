@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from bsip_cli.report.blocks import Light
 from bsip_cli.report.origins import HowMade
 from bsip_cli.report.records import Refusal
 from bsip_cli.report.shared import Searched
@@ -85,7 +86,7 @@ def yardsticks_of(read: ReadValues, use: Mapping[str, str]) -> dict[str, dict[st
 @dataclass(frozen=True)
 class Member:
     """One participant of the study; what is shown of person and identification, which parameters
-    to use, the errors with them, and what a diagnosis found, if there."""
+    to use, the errors with them, what a diagnosis found, and the light of the report, if there."""
 
     id: str
     facts: Mapping[str, Any] | None
@@ -95,6 +96,7 @@ class Member:
     searched: Searched | None = None
     use: str = ""
     errors: Mapping[str, float] | None = None
+    light: Light | None = None
 
     def yardstick(self, name: str) -> float:
         """In the unit of the yardstick; NaN where it is not known."""

@@ -103,9 +103,9 @@ def legend_above(axes: Axes, columns: int = 4) -> None:
     )
 
 
-def plain(text: str) -> str:
+def plain(text: str, longest: int = LONGEST_LABEL) -> str:
     """A foreign label as it is: no mathematics, nothing unprintable, cut where it is too long."""
-    return literal(text if len(text) <= LONGEST_LABEL else f"{text[: LONGEST_LABEL - 1]}…")
+    return literal(text if len(text) <= longest else f"{text[: longest - 1]}…")
 
 
 def literal(text: str) -> str:

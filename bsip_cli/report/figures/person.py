@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -24,6 +22,7 @@ from bsip_cli.report.sticks import Pose
 _YAW, _PITCH = np.radians(-140.0), np.radians(12.0)  # from the front, from their right
 _WIDE_MM, _HIGH_MM = 62.0, 92.0
 _MARGIN_M = 0.06
+_LONGEST = 30  # letters of a trial's label in a line under the figure
 _TILE_M = 0.5
 _LIMBS = {"l": ("#9a9a9a", 2.2), "r": (INK, 1.8), "": (INK, 1.8)}
 
@@ -44,7 +43,7 @@ def stick_figure(pose: Pose, trial: str) -> Figure:
     axes.add_patch(Circle(tuple(head), pose.head_radius_m, fc="white", ec=INK, lw=1.4))
     markers = projected(pose.markers_m, centre)
     axes.plot(*markers.T, "o", ms=2.6, mfc="white", mec=BLUE, mew=0.8, label="markers")
-    points = [bones.reshape(-1, 2), markers, head[None] + pose.head_radius_m]
+    points = [bones.reshape(-1, 2), ground.reshape(-1, 2), markers, head[None] + pose.head_radius_m]
     if np.isfinite(pose.force_N).all():
         foot, tip = projected(pose.force_at_m, centre), projected(pose.tip_m(), centre)
         arrow = {"color": GREEN, "lw": 2.2, "arrowstyle": "-|>", "mutation_scale": 12}
@@ -56,16 +55,9 @@ def stick_figure(pose: Pose, trial: str) -> Figure:
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal")
     force = np.linalg.norm(pose.force_N)
-    lines = [plain(trial) + f", {pose.time_s:.2f} s", "black: right limbs; grey: left"]
+    lines = [plain(trial, _LONGEST) + f", {pose.time_s:.2f} s", "black: right limbs; grey: left"]
     lines += [f"green: measured ground force, {force:.0f} N"] if np.isfinite(force) else []
-    said: dict[str, Any] = {
-        "transform": axes.transAxes,
-        "fontsize": 7.5,
-        "color": SOFT,
-        "ha": "center",
-        "va": "top",
-    }
-    axes.text(0.5, -0.01, "\n".join(lines), **said)
+    figure.supxlabel("\n".join(lines), fontsize=7.5, color=SOFT)
     axes.set_axis_off()
     return figure
 

@@ -19,6 +19,7 @@ from bsip_cli.report.effect_words import (
 )
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import (
+    ALL_FAULTS,
     NOT_RUN,
     probability_words,
     put_right_sentence,
@@ -34,7 +35,7 @@ _FAR = 20.0  # times the largest usual size: not seen at all
 def section(record: ParticipantRecord) -> Section:
     if record.diagnosis is None or record.detection is None:
         blocks: tuple[Block, ...] = (Paragraph(NOT_RUN, "note"),)
-        return Section("wrong", "Is anything wrong, and how sure is that?", blocks)
+        return Section(ALL_FAULTS, "Is anything wrong, and how sure is that?", blocks)
     tables = (record.diagnosis, record.detection, record.gains, record.changes)
     said = verdict_of(*tables)
     events = [(t.stem, t.marker_events) for t in record.trials if t.marker_events is not None]
@@ -54,7 +55,7 @@ def section(record: ParticipantRecord) -> Section:
             "smallest group that holds as much."
         ),
     )
-    return Section("wrong", "Is anything wrong, and how sure is that?", blocks)
+    return Section(ALL_FAULTS, "Is anything wrong, and how sure is that?", blocks)
 
 
 # --- causes -------------------------------------------------------------------------------------

@@ -35,8 +35,8 @@ GLOSSARY = (
 
 def participant_document(record: ParticipantRecord) -> Document:
     return Document(
-        title=f"{record.id}: does the motion explain the ground forces?",
-        subtitle="Ground force computed from the markers' motion, beside the force plates'.",
+        title=f"{record.id}: do motion and measured forces agree?",
+        subtitle="Ground forces computed from the motion, against the plates'.",
         front=front(record),
         sections=(
             diagnosis.section(record),

@@ -42,10 +42,10 @@ from bsip_cli.motion.marker_exchange import (
     misfit_m,
     put_right,
     refitted,
+    swaps,
     with_exchanges,
 )
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit, best_source
-from bsip_cli.motion.marker_swaps import swaps
 
 # --- both arms or both legs that bear each other's labels throughout ------------------------------
 

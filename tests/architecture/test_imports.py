@@ -137,7 +137,6 @@ def test_stages_do_not_know_each_other():
     """They meet in files; two reports share their writing of files."""
     helpers = {
         "stages.diagnosis_rows",
-        "stages.error_budget",
         "stages.frames",
         "stages.identification_problem",
         "stages.known_laboratory",

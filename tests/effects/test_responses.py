@@ -10,8 +10,7 @@ import pinocchio as pin
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.effects.markers import during, step
 from bsip_cli.motion.inverse_kinematics import solve_trial
-from bsip_cli.motion.jacobian import marker_residuals
-from bsip_cli.motion.pose_response import marker_trust, pose_response, pose_responses
+from bsip_cli.motion.jacobian import marker_residuals, marker_trust, pose_response, pose_responses
 from tests.body.standing_person import away, markers_of, standing
 from tests.effects.moving_scene import derivatives, moving, rms, scene_of
 

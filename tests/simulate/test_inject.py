@@ -12,10 +12,9 @@ import pytest
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.simulate.command import inject_command
+from bsip_cli.simulate.command import inject_command, inject_recording
 from bsip_cli.simulate.effects import drawn
 from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.inject import inject_recording
 from bsip_cli.simulate.options import Asked, Laboratory, Rates, Richness
 from bsip_cli.simulate.recording import write_trial
 from tests.simulate.conftest import person_of, trial_of_task

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from bsip_cli.errors import UsageError
-from bsip_cli.simulate.markers import marker_paths, rigid_paths
 from bsip_cli.simulate.options import Laboratory, Rates, Richness, StudyOptions, preset
 from bsip_cli.simulate.recording import (
     FULL_SCALE,
+    marker_paths,
     plate_wrenches,
     plates_of,
+    rigid_paths,
     walkway_pose,
     write_trial,
 )

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bsip_cli.errors import UsageError
-from bsip_cli.simulate.effects import loads, markers, persons, plates  # noqa: F401
+from bsip_cli.simulate.effects import loads, markers, plates  # noqa: F401
 from bsip_cli.simulate.effects.base import KINDS, NOWHERE, TABLE, Effect, Target
 from bsip_cli.simulate.options import Asked, StudyOptions
 
@@ -68,7 +68,8 @@ def drawn(asked: Asked, rng: np.random.Generator) -> Effect:
             expected=f"{kind.least:g} to {kind.most:g} {kind.unit}, not 0",
         )
     target = _parsed(asked)
-    if target.name and kind.targets == NOWHERE:
+    nowhere = kind.targets == NOWHERE
+    if target.name and (nowhere or target.name not in (kind.choices or [target.name])):
         raise kind.wrong_target(target.name)
     return kind.draw(asked.size, target, rng)
 

@@ -56,9 +56,6 @@ class AddedMass(OnSegment, name="added_mass"):
         aside = OFF_AXIS_M * np.array([np.cos(angle), 0.0, np.sin(angle)])
         return cls(size, segment, aside + np.array([0.0, along, 0.0]))
 
-    def check_simulated(self) -> None:
-        self.checked(self.segment)
-
     def position_m(self, person: Person) -> np.ndarray:
         return super().position_m(person) + self.offset_m
 
@@ -87,9 +84,6 @@ class ReleasedObject(OnSegment, name="released_object"):
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
         segment, share = target.name or str(rng.choice(HANDS)), float(rng.uniform(0.35, 0.65))
         return cls(size, segment, share, target.settings.get("release_s"))
-
-    def check_simulated(self) -> None:
-        self.checked(self.segment)
 
     def position_m(self, person: Person) -> np.ndarray:
         return super().position_m(person) + np.array([IN_FRONT_M, 0.0, 0.0])
@@ -126,7 +120,6 @@ class WobblingMass(OnSegment, name="wobbling_mass"):
         segment = target.name or str(rng.choice(HEAVY))
         frequency = target.get("frequency", float(rng.uniform(3.5, 7.0)))
         damping = target.get("damping", float(rng.uniform(0.1, 0.3)))
-        cls.checked(segment)
         if not 0.5 <= frequency <= 20.0 or not 0.01 <= damping <= 1.0:
             raise UsageError(
                 f"a wobbling mass of {frequency:g} Hz with damping {damping:g}",
@@ -238,7 +231,7 @@ class UnmeasuredContact(OnSegment, name="unmeasured_contact"):
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        segment = cls.checked(target.name or str(rng.choice(HANDS)))
+        segment = target.name or str(rng.choice(HANDS))
         start = float(rng.uniform(0.15, 0.35))
         share = (start, start + float(rng.uniform(0.3, 0.45)))
         start_s, end_s = target.settings.get("start_s"), target.settings.get("end_s")
@@ -292,7 +285,7 @@ class ExternalForce(OnSegment, name="external_force"):
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        segment = cls.checked(target.name or str(rng.choice(SEGMENTS)))
+        segment = target.name or str(rng.choice(SEGMENTS))
         aside, heading = rng.uniform(0.0, MOST_ASIDE), rng.uniform(-np.pi, np.pi)
         up = np.sqrt(1 - aside**2)
         return cls(size, segment, np.array([aside * np.cos(heading), up, aside * np.sin(heading)]))
@@ -318,7 +311,7 @@ class ObjectHandled(OnSegment, name="object_handled"):
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        segment = cls.checked(target.name or str(rng.choice(HANDS)))
+        segment = target.name or str(rng.choice(HANDS))
         start = float(rng.uniform(0.2, 0.35))
         return cls(size, segment, (start, start + float(rng.uniform(0.25, 0.4))))
 
@@ -349,8 +342,6 @@ class Implement(OnSegment, name="implement"):
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
         hand = target.name or str(rng.choice(HANDS))
-        if hand not in HANDS:
-            raise cls.wrong_target(hand)
         distance = target.get("distance", float(rng.uniform(*CENTRES_M)))
         azimuth, out = rng.uniform(-np.pi, np.pi), rng.uniform(-MOST_TILT_RAD, MOST_TILT_RAD)
         flat = np.cos(out)

@@ -45,7 +45,7 @@ from bsip_cli.running.runner import Outcome, held_alone, lacking
 from bsip_cli.running.session import OpenedStudy, follow, open_study
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
-from bsip_cli.stages.frames import WRENCH, coordinates_from, markers_from, person_from
+from bsip_cli.stages.frames import WRENCH, coordinates_from, markers_from, person_from, person_of
 from bsip_cli.stages.joints import trial_of
 from bsip_cli.stages.trial_scene import plate_names
 from bsip_cli.study.dataset import describe_dataset
@@ -164,14 +164,13 @@ def _bids(unit: Unit, _: Tables) -> Texts:
 def _opensim(unit: Unit, asked: Tables) -> Texts:
     """Motion where the markers determine it; loads in the longest time in which the plates tell
     what acts on each foot, and on nothing else."""
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
     trial, name = trial_of(unit, person), unit.name
     known = trial.determined
     if known.sum() < 2:
         raise BadDataError("the markers determine no pose", file=name)
     said = [f"bsip {__version__} export: {name}, for {asked.model}; SI units, Y up"]
-    motion = coordinates(skeleton, trial.q[known])
+    motion = coordinates(person.skeleton, trial.q[known])
     texts = {f"{name}_motion.mot": mot_text(name, trial.times_s[known], motion, said)}
     wrenches = {f"foot_{s}": w for s, w in trial.ground(trial.readings).feet.wrench.items()}
     told = binary_erosion(known, iterations=_EDGE) & trial.measured & bool(trial.readings)

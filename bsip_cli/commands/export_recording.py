@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import empty_table, is_made_from
-from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.cause import Cause, delay_by
 from bsip_cli.diagnosis.corrected_wrench import (
     corrected_plates,
@@ -43,7 +42,7 @@ from bsip_cli.recordings.settle import SessionReading, Verdict
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import OpenedStudy, follow
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.frames import markers_from, person_from
+from bsip_cli.stages.frames import markers_from, person_of
 from bsip_cli.stages.survey import opened, reading_of
 from bsip_cli.stages.trial_scene import causes_of, plates_of
 
@@ -300,10 +299,8 @@ class _Correction:
         frames = np.searchsorted(table["time_s"], times - 0.5 / recording.marker_rate_hz)
         valid = table["valid"].to_numpy()[np.clip(frames, 0, len(table) - 1)]
         valid = valid if valid.any() else ~valid  # none in which the diagnosis saw all contacts
-        skeleton = load_skeleton(unit.config.skeleton)
-        person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
         none = np.empty((len(times), 0))
-        return Scene(times, person, none, none, none, np.empty(0), plates, valid)
+        return Scene(times, person_of(unit), none, none, none, np.empty(0), plates, valid)
 
     def _readings(self, before: Instruments) -> np.ndarray:
         corrected = corrected_plates(self._scene, [*self.causes])

@@ -9,13 +9,7 @@ import numpy as np
 
 from bsip_cli.body.person import Person
 from bsip_cli.motion import kernel
-from bsip_cli.motion.inverse_kinematics import Tree, tree_of
-
-
-def model_markers(person: Person, R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """(N, m, 3) world positions of the markers for orientations and joint centres R, p."""
-    segments = person.marker_segments
-    return p[:, segments] + np.einsum("fmij,mj->fmi", R[:, segments], person.markers_in_joint_m())
+from bsip_cli.motion.inverse_kinematics import Tree, model_markers, tree_of
 
 
 def marker_residuals(person: Person, q: np.ndarray, markers: np.ndarray) -> np.ndarray:

@@ -31,8 +31,16 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from bsip_cli.body.names import mirrored
-from bsip_cli.motion.level_change import LevelChange, find_level_change, two_levels
-from bsip_cli.motion.marker_events import BEYOND, MarkerEvent, event, offsets, pieces
+from bsip_cli.motion.marker_events import (
+    BEYOND,
+    LevelChange,
+    MarkerEvent,
+    event,
+    find_level_change,
+    offsets,
+    pieces,
+    two_levels,
+)
 from bsip_cli.motion.marker_exchange import (
     Exchange,
     Labelling,

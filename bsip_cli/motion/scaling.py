@@ -13,8 +13,15 @@ import numpy as np
 
 from bsip_cli.body.person import Person
 from bsip_cli.motion.calibration import Calibration
-from bsip_cli.motion.inverse_kinematics import Poses, solve_poses, solve_trial, tree_of
-from bsip_cli.motion.jacobian import model_markers, pose_columns, subtrees
+from bsip_cli.motion.inverse_kinematics import (
+    Poses,
+    joined,
+    model_markers,
+    solve_poses,
+    solve_trial,
+    tree_of,
+)
+from bsip_cli.motion.jacobian import pose_columns, subtrees
 from bsip_cli.motion.marker_events import offsets
 from bsip_cli.motion.marker_fit import marker_fit
 
@@ -123,12 +130,7 @@ def varied_frames(orientations: np.ndarray, count: int) -> np.ndarray:
 def _poses(person: Person, markers_m: np.ndarray, q: np.ndarray, ik: dict) -> Poses:
     """Each frame from its own start: the chosen frames are not neighbours."""
     parts = [solve_poses(person, markers_m[f : f + 1], q[f], **ik) for f in range(len(q))]
-    return Poses(
-        *(
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("q", "residual_m", "coordinate_sd", "converged")
-        )
-    )
+    return joined(parts)
 
 
 def _frame_weight(frames: int, options: ScalingOptions) -> float:

@@ -288,21 +288,13 @@ def measure_trial(
 
 
 def write_trial(
-    path: Path,
-    trial: Trial,
-    person: Person,
-    rates: Rates,
-    laboratory: Laboratory,
-    richness: Richness,
-    rng: np.random.Generator,
-    heading_error_rad: float = 0.0,
-    subject: str = "sub-01",
-    effects: Sequence[Effect] = (),
-) -> Measurement:
-    """Measure a trial and write it as C3D: points in mm, plates of type 2 in N and N mm."""
-    measurement = measure_trial(
-        trial, person, rates, laboratory, richness, rng, heading_error_rad, effects
-    )
+    path: Path, measurement: Measurement, quantised: bool = True, subject: str = "sub-01"
+) -> None:
+    """A measured trial as C3D: points in mm, plates of type 2 in N and N mm.
+
+    quantised : whether channels are rounded to the steps of a 16-bit converter, and clipped.
+    """
+    rates = measurement.rates
     c3d, plates, labels = ezc3d.c3d(), measurement.plates, measurement.labels
     names = [f"{name}{k + 1}" for k in range(len(plates)) for name in CHANNELS]
     point, analog = c3d["parameters"]["POINT"], c3d["parameters"]["ANALOG"]
@@ -328,12 +320,11 @@ def write_trial(
     data["points"] = homogeneous
     data["meta_points"]["residuals"] = np.where(lost, -1.0, 0.0)[None]
     data["meta_points"]["camera_masks"] = np.zeros((7, markers, frames), dtype=bool)
-    if richness.quantised:  # to the steps of a 16-bit converter, and clipped
+    if quantised:
         steps = np.tile(FULL_SCALE / ADC_STEPS, len(plates))
         channels = np.clip(np.round(channels / steps), -ADC_STEPS, ADC_STEPS - 1) * steps
     data["analogs"] = channels.T[None]
     c3d.write(str(path))
-    return measurement
 
 
 def _add_plates(c3d: ezc3d.c3d, plates: list[Plate]) -> None:

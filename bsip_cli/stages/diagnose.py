@@ -12,7 +12,6 @@ import pandas as pd
 
 from bsip_cli.artifacts import empty_table
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.error_budget import Line, Yardsticks, budget_of, large_errors
 from bsip_cli.diagnosis.error_model import TrialErrors, error_model
 from bsip_cli.diagnosis.fault_model import session_of
@@ -26,9 +25,9 @@ from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.report.budget import term_words
 from bsip_cli.report.verdict import verdict_of
 from bsip_cli.running.unit import Unit
+from bsip_cli.stages.diagnose_trial import cause_record, detection_rows, facts_of, rows_of
 from bsip_cli.stages.diagnosed_trials import Diagnosed, diagnosed, weighed
-from bsip_cli.stages.diagnosis_rows import cause_record, detection_rows, facts_of, rows_of
-from bsip_cli.stages.frames import person_from
+from bsip_cli.stages.frames import person_of
 from bsip_cli.stages.known_laboratory import Known, known_laboratory
 from bsip_cli.stages.reconstruct import scale_of
 
@@ -37,8 +36,7 @@ ASKED = (*CATALOGUE, *PATTERNS)
 
 def run(unit: Unit) -> None:
     """Read motion, wrench, person and RM of all trials; write what is wrong, with its evidence."""
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
     of_mass = weighed(unit, person)
     asked = [diagnosed(unit, of_mass.prior, t, s) for t, s in of_mass.scenes]
     trials = [one for one in asked if one is not None]

@@ -12,7 +12,7 @@ from bsip_cli.artifacts import empty_table
 from bsip_cli.body.inertia import PARAMETERS, UNITS
 from bsip_cli.body.names import in_words as segment_in_words
 from bsip_cli.body.person import Person
-from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.diagnosis.filtering import slow
 from bsip_cli.diagnosis.support import Support, support_of
 from bsip_cli.dynamics.base_parameters import expressions
@@ -33,7 +33,7 @@ from bsip_cli.identification.uncertainty import (
 )
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import spread_names
-from bsip_cli.stages.frames import WRENCH, bsip_table, load_words, loads_record, person_from
+from bsip_cli.stages.frames import WRENCH, bsip_table, load_words, loads_record, person_of
 from bsip_cli.stages.identification_problem import (
     duration_s,
     estimate_by,
@@ -51,8 +51,8 @@ _SHORTEST_S = 0.5
 
 def run(unit: Unit) -> None:
     """Read motion, wrench, person and RM; write bsip and what belongs to it."""
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
+    skeleton = person.skeleton
     regression = unit.read("regression")
     prior = prior_from(unit, regression, person)
     contacts = _external_contacts(unit, person, prior.phi)

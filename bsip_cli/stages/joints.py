@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.names import in_words
 from bsip_cli.body.person import Person
-from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.cause import Cause, method_of
 from bsip_cli.diagnosis.corrected_wrench import corrected_plates, is_of_the_forces
 from bsip_cli.dynamics.joint_moments import (
@@ -40,7 +39,7 @@ from bsip_cli.stages.frames import (
     coordinates_from,
     load_phi,
     loads_record,
-    person_from,
+    person_of,
 )
 from bsip_cli.stages.reconstruct import parameters_of
 from bsip_cli.stages.trial_scene import body_beside, causes_of, outline, plate_names, scene_of
@@ -56,8 +55,7 @@ _NO_POSE = "the markers do not determine the pose"
 
 def run(unit: Unit) -> None:
     """Read motion, plates, contacts and parameters; write joint-moments and joint-peaks."""
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
     trial, bsip = trial_of(unit, person), unit.read("bsip")
     methods, phi = parameters_of(bsip, person)
     spread = _spreads(unit, methods)

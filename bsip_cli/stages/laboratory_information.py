@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.filtering import slow
 from bsip_cli.diagnosis.shared_faults import Information, SharedTrial, information_of, inner
 from bsip_cli.effects.scene import Scene
@@ -20,7 +19,7 @@ from bsip_cli.stages.diagnosed_trials import (
     prior_of_shares,
     stated_sd,
 )
-from bsip_cli.stages.frames import person_from
+from bsip_cli.stages.frames import person_of
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study.study import Trial
 
@@ -29,8 +28,7 @@ _LEAST_SAMPLES = 3  # of the residual, by which an autoregression is defined: 0.
 
 def run(unit: Unit) -> None:
     """Read motion, wrench, person and RM of all trials; write the information of each session."""
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
     prior = prior_of_shares(unit, person)
     seen: dict[str, list[tuple[Trial, Scene]]] = {}
     for trial in unit.trials("kinematics", "wrench"):

@@ -24,10 +24,10 @@ from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH, coordinates_from, load_phi, loads_record, person_of
-from bsip_cli.statistics.effective_samples import effective_samples_of_pair
 from bsip_cli.statistics.fit_measures import correlation, fit_measures, posturography
 from bsip_cli.statistics.hypothesis_tests import fisher_z_difference, williams_t
 from bsip_cli.statistics.methods import MEASURED, METHODS
+from bsip_cli.statistics.samples import effective_samples_of_pair
 
 _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 _SHORTEST_HELD_OUT_S = 0.5

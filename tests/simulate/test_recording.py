@@ -14,6 +14,7 @@ from bsip_cli.simulate.options import Laboratory, Rates, Richness, StudyOptions,
 from bsip_cli.simulate.recording import (
     FULL_SCALE,
     marker_paths,
+    measure_trial,
     plate_wrenches,
     plates_of,
     rigid_paths,
@@ -31,8 +32,10 @@ def _written(tmp_path, trial, person, richness, laboratory=None, rates=None):
     path = tmp_path / "trial.c3d"
     rng = np.random.default_rng(5)
     rates = rates or Rates(100, 1000)
-    pose = write_trial(path, trial, person, rates, laboratory, richness, rng, 0.03).pose
-    return ezc3d.c3d(str(path), extract_forceplat_data=True), pose, plates_of(laboratory)
+    measured = measure_trial(trial, person, rates, laboratory, richness, rng, 0.03)
+    write_trial(path, measured, richness.quantised)
+    recorded = ezc3d.c3d(str(path), extract_forceplat_data=True)
+    return recorded, measured.pose, plates_of(laboratory)
 
 
 @pytest.mark.parametrize("task", ["squat", "walking", "basketball"])
@@ -179,14 +182,14 @@ def test_study_layout_and_truth(tmp_path):
     options = StudyOptions(
         participants=2, tasks=("static", "throwing"), durations_s={"static": 0.5, "throwing": 1.6}
     )
-    truth = simulate_study(tmp_path, options)
+    truths = simulate_study(tmp_path, options)
     table = (tmp_path / "participants.tsv").read_text().splitlines()
     assert table[0] == "participant_id\tsex\tmass_kg\theight_m"
     assert [row.split("\t")[1] for row in table[1:]] == ["M", "F"]
     assert (tmp_path / "sub-02" / "sub-02_task-throwing_run-1.c3d").is_file()
     record = json.loads((tmp_path / "truth" / "sub-02_truth.json").read_text())
     masses = [s["mass_kg"] for s in record["person"]["segments"].values()]
-    assert sum(masses) == pytest.approx(truth.participants[1].person.mass_kg)
+    assert sum(masses) == pytest.approx(truths[1].person.mass_kg)
     assert abs(float(table[2].split("\t")[2]) - sum(masses)) < 0.6
     ball = record["trials"]["sub-02_task-throwing_run-1"]["ball"]
     assert 0.15 <= ball["mass_kg"] <= 0.4

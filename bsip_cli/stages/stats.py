@@ -16,6 +16,7 @@ import pandas as pd
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.pipeline import STAGES, producer
+from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit
 from bsip_cli.statistics.cohort import (
     DATA_SHARE,
@@ -198,18 +199,13 @@ class _Missing:
 
     def add(self, what: str, *numbers: int) -> None:
         """`what` ("sub-02 has no ...") is not in the tables with these numbers."""
-        self._unit.warn(f"{what}: not in {_in_words(numbers)}")
+        tables = "table" if len(numbers) == 1 else "tables"
+        self._unit.warn(f"{what}: not in {tables} {listing([*map(str, numbers)])}")
         self.note(what, *numbers)
 
     def note(self, what: str, *numbers: int) -> None:
         """The same of what the user has been told already."""
         self.found.append({"sentence": what, "tables": [f"table{k}" for k in numbers]})
-
-
-def _in_words(numbers: tuple[int, ...]) -> str:
-    if len(numbers) == 1:
-        return f"table {numbers[0]}"
-    return f"tables {', '.join(map(str, numbers[:-1]))} and {numbers[-1]}"
 
 
 def _refused(unit: Unit, participant: Participant) -> str:

@@ -175,15 +175,17 @@ class _Correction:
                 self.left.append(f"{words}: it cannot be distinguished from {others} here")
             else:
                 self.causes[cause] = others
-        self.left += [
+        here = _said_of(unit.name, told, [*EFFECTS])
+        self.left += dict.fromkeys(
             f"{effect} {target}: of unknown size in this recording, or one of several causes"
-            for effect, target in _told_of(unit.name, told)
+            for effect, target in here[["effect", "target"]].to_numpy()
             if (effect, target) not in known
-        ]
-        self.left += [
+        )
+        # what is there and has no name, or acts like a fault but not evenly
+        self.left += dict.fromkeys(
             f"{sentence}: nothing tells its course exactly"
-            for sentence in _nameless(unit.name, told)
-        ]
+            for sentence in _said_of(unit.name, told, [UNEXPLAINED])["sentence"]
+        )
         about = _of_the_laboratory(unit, "named", "ambiguous") if self._plates else told[:0]
         self.left += dict.fromkeys(
             f"{sentence}: no size of it is known for this recording"
@@ -422,16 +424,6 @@ def _said_of(trial: str, told: pd.DataFrame, effects: Sequence[str]) -> pd.DataF
     """Rows of these effects that the diagnosis names, alone or in a group, in a trial."""
     here = np.array([trial in names.split(", ") for names in told["trials"]], dtype=bool)
     return told[here & told["effect"].isin(effects) & (told["verdict"] != "rejected")]
-
-
-def _told_of(trial: str, told: pd.DataFrame) -> list[tuple[str, str]]:
-    rows = _said_of(trial, told, list(EFFECTS))
-    return list(dict.fromkeys(zip(rows["effect"], rows["target"], strict=True)))
-
-
-def _nameless(trial: str, told: pd.DataFrame) -> list[str]:
-    """What is there and has no name, or acts like a fault but not evenly, in words."""
-    return list(dict.fromkeys(_said_of(trial, told, [UNEXPLAINED])["sentence"]))
 
 
 def _exchanged(events: pd.DataFrame) -> list[tuple[str, str, float, float]]:

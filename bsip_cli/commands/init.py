@@ -205,13 +205,14 @@ def init_command(request: Request) -> int:
 
 
 def _participant(name: str) -> str:
-    if name and not check_participant(name):
+    checked = check_participant(name) if name else ""
+    if name and not checked:
         raise UsageError(
             f"--participant {name!r}",
             expected="sub- and letters or digits",
             remedy="name it like sub-01",
         )
-    return check_participant(name) if name else ""
+    return checked
 
 
 def _check_out(out: Path) -> None:
@@ -389,25 +390,19 @@ def _told(request: Request, plan: _Plan) -> Iterator[str]:
     files = "linked" if request.link else "copied"
     n = sum(1 for _ in _files(plan))
     yield f"{n} files {files}; sources.tsv says what came from where"
-    yield f"next: bsip run {quote(str(request.out))} --out {quote(str(_results(request.out)))}"
-
-
-def _results(out: Path) -> Path:
-    return out / "derivatives" / "bsip"
+    results = request.out / "derivatives" / "bsip"
+    yield f"next: bsip run {quote(str(request.out))} --out {quote(str(results))}"
 
 
 def _unused_lines(unused: Sequence[Unused]) -> Iterator[str]:
     """What is no recording in one line for all kinds; everything else with its reason."""
     others = [one for one in unused if one.why == NO_RECORDING]
     if others:
-        yield f"not used, no recordings: {counted(_kind(one) for one in others)}"
+        kinds = counted(one.path.suffix.lower() or "without an ending" for one in others)
+        yield f"not used, no recordings: {kinds}"
     reasons: dict[str, list[str]] = defaultdict(list)
     for one in unused:
         if one not in others:
             reasons[one.why].append(one.path.name)
     for why, names in reasons.items():
         yield f"not used: {listed(names)}: {why}"
-
-
-def _kind(one: Unused) -> str:
-    return one.path.suffix.lower() or "without an ending"

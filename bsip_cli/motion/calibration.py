@@ -116,7 +116,10 @@ def _frames(
     """Origin and axes of every segment in the standing pose (ISB, as in Dumas 2007)."""
     p = centres.positions
     up = p["neck"] - p["waist"]
-    torso = _y_first(up, _torso_right(landmarks, p, up))
+    right = p["shoulder_r"] - p["shoulder_l"]
+    if "suprasternale" in landmarks and "c7" in landmarks:
+        right = np.cross(landmarks["suprasternale"] - landmarks["c7"], up)
+    torso = _y_first(up, right)
     frames = {
         "lower_torso": (p["waist"], centres.pelvis_axes),
         "upper_torso": (p["neck"], torso),
@@ -150,12 +153,6 @@ def _across_the_wrist(
         return elbow
     radial, ulnar = (landmarks[name] for name in names)
     return radial - ulnar if side == "r" else ulnar - radial
-
-
-def _torso_right(landmarks, centres, up):
-    if "suprasternale" in landmarks and "c7" in landmarks:
-        return np.cross(landmarks["suprasternale"] - landmarks["c7"], up)
-    return centres["shoulder_r"] - centres["shoulder_l"]
 
 
 def _head(landmarks: Mapping[str, np.ndarray], neck: np.ndarray, torso: np.ndarray) -> np.ndarray:

@@ -282,7 +282,8 @@ class _Search:
         self.frames = max(1, frames, most)
         self.least = max(3, round(_STAYS_S / (self.frames * fit.step_s())))
         self.columns = {
-            name: block_means(_with_squares(x), self.frames) for name, x in fit.pose.items()
+            name: block_means(np.concatenate([x, (x - np.mean(x, axis=0)) ** 2], 1), self.frames)
+            for name, x in fit.pose.items()
         }
         self.means = block_means(self.left, self.frames)
         self.best: dict[int, _Found | None] = {}
@@ -388,11 +389,6 @@ def _events(fit: MarkerFit, found: list[_Slip]) -> list[MarkerEvent]:
         frames = slice(slip.frame, stop)
         events.append(event(fit, kind, slip.m, frames, size, slip.z))  # type: ignore[arg-type]
     return events
-
-
-def _with_squares(x: np.ndarray) -> np.ndarray:
-    centred = x - np.mean(x, axis=0)
-    return np.concatenate([x, centred**2], axis=1)
 
 
 def block_means(x: np.ndarray, frames: int) -> np.ndarray:

@@ -165,10 +165,7 @@ def pooled_rows(laboratory: str, pooled: Pooled) -> Iterable[dict]:
     for k, one in enumerate(pooled.coordinates):
         yield {
             "laboratory": laboratory,
-            "effect": one.effect,
-            "target": one.target,
-            "parameter": one.parameter,
-            "standing": one.standing,
+            **vars(one),
             "spread": pooled.spread[k],
             "pull": pooled.pull[k],
             **{f"precision_{j}": x for j, x in enumerate(pooled.precision[k])},

@@ -45,7 +45,7 @@ def run(unit: Unit) -> None:
             trials = [SharedTrial(x.errors, slow(x.scene), not x.moves) for x in told]
             rows += _rows(session, information_of(trials))
             sessions[session] = {
-                "plates": _corners([scene for _, scene in mine]),
+                "plates": {p.name: p.corners_m.tolist() for _, s in mine for p in s.plates},
                 "trials": [one.trial.stem for one in told],
                 "moments_s": _moments([one.scene for one in told if one.moves]),
             }
@@ -65,14 +65,8 @@ def _rows(session: str, told: Information) -> list[dict]:
     return [
         {
             "session": session,
-            "effect": one.effect,
-            "target": one.target,
-            "parameter": one.parameter,
-            "standing": one.standing,
-            "unit": parameter.unit,
-            "typical": parameter.typical,
-            "most": parameter.most,
-            "known_to": parameter.known_to,
+            **vars(one),
+            **{name: getattr(parameter, name) for name in ("unit", "typical", "most", "known_to")},
             "trials": int(trials),
             "pull": told.pull[k],
             **{f"precision_{j}": x for j, x in enumerate(told.precision[k])},
@@ -87,7 +81,3 @@ def _moments(scenes: Sequence[Scene]) -> list[float]:
     times = [one.times_s[one.valid] - one.times_s[0] for one in scenes]
     whole = np.concatenate(times)
     return [float(whole.mean()), float(whole.std())]
-
-
-def _corners(scenes: Sequence[Scene]) -> dict[str, list[list[float]]]:
-    return {plate.name: plate.corners_m.tolist() for scene in scenes for plate in scene.plates}

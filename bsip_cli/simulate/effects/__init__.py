@@ -1,7 +1,4 @@
-"""Effects hidden in recordings: a class each, in the file of what it changes, and `effects.csv`.
-
-CATALOGUE holds those that a diagnosis should name, OUTSIDE those that it cannot know.
-"""
+"""Effects hidden in recordings: a class each, in the file of what it changes, and `effects.csv`."""
 
 from __future__ import annotations
 
@@ -16,10 +13,6 @@ from bsip_cli.simulate.effects.base import KINDS, NOWHERE, TABLE, Effect, Target
 from bsip_cli.simulate.options import Asked, StudyOptions
 
 EFFECTS = {name: KINDS[name] for name in TABLE}
-CATALOGUE, OUTSIDE = (
-    tuple(kind for name, kind in EFFECTS.items() if name.startswith("outside_") == outside)
-    for outside in (False, True)
-)
 NO_TARGET = ("", "-")
 EFFECT = 4  # the stream of random numbers, beside those of `study`
 

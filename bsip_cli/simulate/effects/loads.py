@@ -34,8 +34,6 @@ LEAST_RADIUS_M = 0.01
 MOST_TILT_RAD = 0.8
 UNSTEADINESS, PACE_HZ = 0.15, 0.6
 CLEAR_OF_FLIGHT_S = 0.3
-SLACK_M = 0.1
-FASTENED_M = (-1.2, 0.1, 0.3)  # a tether's far end from the first place of the pelvis
 CUTOFF_HZ = 10.0
 LOADED_N = 40.0
 
@@ -360,31 +358,6 @@ class Implement(OnSegment, name="implement"):
 
     def facts(self, person: Person) -> dict[str, Any]:
         return {"distance_m": float(np.linalg.norm(self.centre_m))}
-
-
-class ElasticTether(Effect, name="outside_elastic_tether"):
-    """A rubber band of `size` N/m pulls the pelvis back towards a fixed point."""
-
-    def plan(self, person: Person, plan: Plan) -> Plan:
-        fastened = plan.pelvis_m[plan.keep.start] + np.array(FASTENED_M)
-        return plan.with_load(Band(self.size, fastened))
-
-
-@dataclass(frozen=True, eq=False)
-class Band(Load):
-    """An elastic band from a fixed point (3,) to the pelvis, taut from the start."""
-
-    stiffness_n_m: float
-    fastened_m: np.ndarray
-
-    def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
-        """What the body exerts on the band."""
-        r = poses.origin_m["lower_torso"]
-        away = r - self.fastened_m
-        length = np.linalg.norm(away, axis=1, keepdims=True)
-        rest = float(np.linalg.norm(FASTENED_M)) - SLACK_M
-        force = self.stiffness_n_m * np.maximum(length - rest, 0.0) * away / length
-        return force, np.cross(r, force)
 
 
 # --- in measured data -----------------------------------------------------------------------------

@@ -1,7 +1,4 @@
-"""Markers that slip, are mistaken for each other, are smoothed, or stand still.
-
-Names that begin with ``outside_`` are outside the catalogue.
-"""
+"""Markers that slip, are mistaken for each other, are smoothed, or stand still."""
 
 from __future__ import annotations
 
@@ -24,7 +21,6 @@ SOFT = 0.1  # of the window of a slide, in which it speeds up, and slows down
 COMPANIONS = 3
 CLOSE_PAIRS = 5
 LEAST_FRAMES = 15  # a shorter stretch between gaps is not smoothed
-BURST_FRAMES = (4, 12)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,28 +168,6 @@ class OverSmoothing(Effect, name="over_smoothing"):
                 if part.stop - part.start >= LEAST_FRAMES:
                     points[part, column] = sosfiltfilt(filters, points[part, column], axis=0)
         return replace(instruments, points_m=points)
-
-
-@dataclass(frozen=True, eq=False)
-class RepeatedFrames(Effect, name="outside_repeated_frames"):
-    """The cameras stall: bursts of frames repeat the last one; `size` is their part."""
-
-    seed: int
-
-    @classmethod
-    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        return cls(size, int(rng.integers(1 << 31)))
-
-    def measured(self, instruments: Instruments) -> Instruments:
-        frames = len(instruments.points_m)
-        rng = np.random.default_rng([self.seed, frames])
-        source = np.arange(frames)
-        longest = BURST_FRAMES[1]
-        while np.mean(source != np.arange(frames)) < self.size and frames > 2 * longest:
-            first = int(rng.integers(1, frames - longest))
-            length = int(rng.integers(BURST_FRAMES[0], longest + 1))
-            source[first : first + length] = source[first - 1]
-        return replace(instruments, points_m=instruments.points_m[source])
 
 
 # --- persons who are not what landmarks, tables or the skeleton's joints say ----------------------

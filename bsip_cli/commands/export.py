@@ -447,12 +447,15 @@ def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson
             file=unit.path("bsip"),
             remedy="run `bsip identify` again with --force",
         )
+    paths = (unit.path(kind) for kind in _READER.reads)
+    head = f"bsip {__version__} export: participant {unit.name}, method {method}"
+    made_of = (head, *(f"{path.name} sha256 {file_hash(path)}" for path in paths))
     return IdentifiedPerson(
         person,
         tuple(from_readable(row) for row in values),
         unit.name,
         method,
-        _made_of(unit, method),
+        made_of,
     )
 
 
@@ -467,10 +470,3 @@ def _in_order(unit: Unit, kind: str, rows: pd.DataFrame, segments: tuple[str, ..
         )
     ordered = rows.set_index("segment").loc[list(segments)]
     return ordered.reset_index()
-
-
-def _made_of(unit: Unit, method: str) -> tuple[str, ...]:
-    """What stands at the head of every file."""
-    paths = (unit.path(kind) for kind in _READER.reads)
-    inputs = (f"{path.name} sha256 {file_hash(path)}" for path in paths)
-    return (f"bsip {__version__} export: participant {unit.name}, method {method}", *inputs)

@@ -175,7 +175,10 @@ def _own(
     own: list[tuple[_Jump, float]] = []
     while left:
         first = left[0]
-        together = [one for one in left if one is first or _overlap(one.frames, first.frames)]
+        begin, end = first.frames.start - 1, first.frames.stop + 1
+        together = [
+            x for x in left if x is first or (x.frames.start < end and begin < x.frames.stop)
+        ]
         peak = first.frames.start + int(np.nanargmax(distance[first.frames, first.m]))
         sd = np.hypot(spread[peak], 0.1 * distance[peak, first.m])
         candidates = [one.m for one in together if np.isfinite(distance[peak, one.m])]
@@ -188,10 +191,6 @@ def _own(
         dragged = [one for one in together if not missed[one.m] > _SAME * distance[peak, one.m]]
         left = [one for one in left if one is not source and one not in dragged]
     return own
-
-
-def _overlap(a: slice, b: slice) -> bool:
-    return a.start < b.stop + 1 and b.start < a.stop + 1
 
 
 def _away(residual: np.ndarray, width: int) -> np.ndarray:

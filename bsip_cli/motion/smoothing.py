@@ -172,7 +172,9 @@ def _noise(
     skeleton = person.skeleton
     frames = np.flatnonzero(determined)
     some = curves[frames[np.linspace(0, len(frames) - 1, _NOISE_FRAMES).astype(int)]]
-    unit = coordinate_covariance(person, _normalised(skeleton, some), _WEAK_PRIOR).mean(axis=0)
+    for part in _quaternions(skeleton):
+        some[:, part] /= np.linalg.norm(some[:, part], axis=1, keepdims=True)
+    unit = coordinate_covariance(person, some, _WEAK_PRIOR).mean(axis=0)
     seen = noise_level(curves, rate_hz)
     blocks = list(_blocks(skeleton))
     predicted = np.array(
@@ -203,13 +205,6 @@ def _blocks(skeleton: Skeleton) -> Iterator[tuple[slice, slice, int, float]]:
             yield slice(at, at + 4), slice(av, av + 3), 4, 2.0
         else:
             yield slice(at, at + 1), slice(av, av + 1), 1, 1.0
-
-
-def _normalised(skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
-    out = q.copy()
-    for part in _quaternions(skeleton):
-        out[:, part] /= np.linalg.norm(out[:, part], axis=1, keepdims=True)
-    return out
 
 
 def _continuous(skeleton: Skeleton, q: np.ndarray) -> np.ndarray:

@@ -122,11 +122,6 @@ def pose_responses(person: Person, q: np.ndarray, trust: np.ndarray | None = Non
     return PoseResponse(person, q, weights, inverse)
 
 
-def pose_response(person: Person, q: np.ndarray, errors_m: np.ndarray) -> np.ndarray:
-    """(N, nv, k) change of the pose, in the tangent space, for marker errors (N, m, 3, k) [m]."""
-    return pose_responses(person, q).of(errors_m)
-
-
 def marker_trust(residual_m: np.ndarray, limit_m: float) -> np.ndarray:
     """(N, m) part of its weight that the robust fit leaves a marker with residual (N, m, 3).
 

@@ -45,22 +45,6 @@ class Richness:
     girdle: bool = False
     trunk_bend: float = 0.0
 
-    @staticmethod
-    def none() -> Richness:
-        """No noise, no gaps, rigid markers, hinges along Z, joint centres as predicted."""
-        return Richness(
-            soft_tissue=0.0,
-            marker_noise_m=0.0,
-            marker_drift_m=0.0,
-            gaps=False,
-            force_noise_n=0.0,
-            moment_noise_nm=0.0,
-            quantised=False,
-            hinge_tilt=0.0,
-            joint_centre_offset=0.0,
-            placement_error_m=0.0,
-        )
-
 
 @dataclass(frozen=True)
 class Rates:

@@ -36,6 +36,7 @@ STATURE_M = {"M": (1.77, 0.07), "F": (1.64, 0.06)}
 BODY_MASS_INDEX = (23.5, 2.8)
 PELVIS_WIDTH_M = {"M": 0.238, "F": 0.240}
 THORAX_WIDTH_M = {"M": 0.150, "F": 0.132}
+LEAST_SHARE = 0.02  # of the largest second moment, of every other
 HALF_SHOULDER_WIDTH_M = {"M": 0.178, "F": 0.158}
 # Reed's hip and lumbar joint centres from the middle of the ASIS, in pelvis widths,
 # ISB pelvis axes (Dumas and Wojtusch 2018).
@@ -62,11 +63,6 @@ class Inertia:
     com_m: np.ndarray
     tensor_kgm2: np.ndarray
 
-    def is_physical(self) -> bool:
-        """Positive mass and positive definite second moments (pseudo-inertia > 0)."""
-        moments = np.linalg.eigvalsh(second_moments(self.tensor_kgm2))
-        return self.mass_kg > 0.0 and bool(moments.min() > 0.0)
-
 
 def second_moments(tensor: np.ndarray) -> np.ndarray:
     """Integral of r r^T dm about the centre of mass, from the inertia tensor."""
@@ -78,10 +74,10 @@ def tensor_of(moments: np.ndarray) -> np.ndarray:
     return np.trace(moments) * np.eye(3) - moments
 
 
-def nearest_physical(tensor: np.ndarray, least_share: float = 0.02) -> np.ndarray:
+def nearest_physical(tensor: np.ndarray) -> np.ndarray:
     """Raise too small principal second moments to a share of the largest one."""
     values, axes = np.linalg.eigh(second_moments(tensor))
-    values = np.maximum(values, least_share * values.max())
+    values = np.maximum(values, LEAST_SHARE * values.max())
     return tensor_of(axes @ np.diag(values) @ axes.T)
 
 

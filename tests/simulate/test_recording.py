@@ -23,8 +23,9 @@ from bsip_cli.simulate.recording import (
 )
 from bsip_cli.simulate.study import participant_person, simulate_study
 from bsip_cli.simulate.trial import simulate_trial
+from tests.simulate.conftest import NOTHING_RICH
 
-QUIET = replace(Richness.none(), quantised=True)
+QUIET = replace(NOTHING_RICH, quantised=True)
 
 
 def _written(tmp_path, trial, person, richness, laboratory=None, rates=None):
@@ -83,7 +84,7 @@ def test_integer_parameters_are_integers(tmp_path, trial, person):
 def test_without_noise_markers_are_rigid_on_their_bones(trial, person):
     here = trial("squat")
     poses = here.poses.part(slice(None, None, 10))
-    paths = marker_paths(person, poses, 100.0, Richness.none(), np.random.default_rng(0))
+    paths = marker_paths(person, poses, 100.0, NOTHING_RICH, np.random.default_rng(0))
     for label, path in rigid_paths(person, poses).items():
         assert np.array_equal(paths[label], path)
     for a, b in (("RKNEL", "RKNEM"), ("C7", "LAC"), ("RASIS", "LPSIS"), ("LCAL", "LMT2")):
@@ -94,7 +95,7 @@ def test_without_noise_markers_are_rigid_on_their_bones(trial, person):
 def test_skin_moves_by_millimetres(trial, person):
     here = trial("squat")
     poses = here.poses.part(slice(None, None, 10))
-    skin = replace(Richness.none(), soft_tissue=1.0)
+    skin = replace(NOTHING_RICH, soft_tissue=1.0)
     marked = {m: person.markers[m] for m in ("RKNEL", "RKNEM", "LKNEL", "LKNEM")}
     paths = marker_paths(person, poses, 100.0, skin, np.random.default_rng(0))
     bones = rigid_paths(person, poses)

@@ -4,12 +4,12 @@ Every limit is a multiple of one of three scales: what a marker is trusted to in
 kinematics, skin motion included (``marker_sd_m`` over the root of its weight); the noise of the
 recording; and the spread of the marker's own residual in its segment. What is found:
 
-swap (marker_swaps.py)
+swap (marker_exchange.py)
     Both markers lie at least twice as near to the other's place in the model as to their own, or
     the line between them reverses from one frame to the next; or both arms
-    (legs) fit twice as well exchanged. Where all markers involved then lie nearer to the model
-    (marker_exchange.py), the labels are corrected and the poses fitted again before the rest is
-    judged; else they stay as recorded.
+    (legs) fit twice as well exchanged. Where all markers involved then lie nearer to the model,
+    the labels are corrected and the poses fitted again before the rest is judged; else they stay
+    as recorded.
 jump
     The residual leaves its running median for less than a quarter second and comes back.
 slip

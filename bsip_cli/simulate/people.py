@@ -111,29 +111,16 @@ def combined(parts: list[tuple[Inertia, np.ndarray]]) -> Inertia:
 
 
 @dataclass(frozen=True, eq=False)
-class Person:
+class Person(Build):
     """A simulated person; the truth.
 
-    lengths_m : per segment (limbs per side), joint to joint; the foot heel to metatarsals.
-    joints_m : (3,) of each joint in its parent's frame: tjc and cjc in the abdomen,
-        neck (always zero), shoulder_* in the thorax, hip_* in lower_torso, and so on;
-        sternoclavicular_* in the thorax, if the shoulders move against it.
-    hinges : unit axes (3,) of elbow_* in the upper arm and knee_* in the thigh.
-    inertias : of the 16 bodies. ankle_height_m : of the ankle joint above the sole.
-    tissue : what of the segments swings on its bone.
+    inertias : of the 16 bodies. tissue : what of the segments swings on its bone.
     """
 
-    sex: str
     stature_m: float
     mass_kg: float
-    lengths_m: dict[str, float]
-    joints_m: dict[str, np.ndarray]
-    hinges: dict[str, np.ndarray]
     inertias: dict[str, Inertia]
     markers: dict[str, Marker]
-    ankle_height_m: float
-    pelvis_width_m: float
-    thorax_width_m: float
     trunk_bend: float
     tissue: dict[str, Swing]
 
@@ -192,17 +179,11 @@ def draw_person(rng: np.random.Generator, richness: Richness, sex: str = "") -> 
     if richness.girdle:
         joints, markers = with_girdle(rng, build, markers, richness)
     return Person(
-        sex=sex,
+        **vars(build) | {"joints_m": joints},
         stature_m=stature,
         mass_kg=mass,
-        lengths_m=build.lengths_m,
-        joints_m=joints,
-        hinges=build.hinges,
         inertias=inertias,
         markers=markers,
-        ankle_height_m=build.ankle_height_m,
-        pelvis_width_m=build.widths_m["pelvis"],
-        thorax_width_m=build.widths_m["thorax"],
         trunk_bend=richness.trunk_bend,
         tissue=draw_tissue(rng) if richness.measured_tissue else {},
     )

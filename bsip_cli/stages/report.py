@@ -158,12 +158,6 @@ def origin_of(path: Path, label: str) -> Origin:
     """Provenance of one artifact."""
     provenance = read_header(path)["provenance"]
     made_by = provenance["made_by"]
-    return Origin(
-        label,
-        made_by["stage"],
-        made_by["bsip_version"],
-        made_by["libraries"],
-        made_by["options"],
-        made_by["inputs"],
-        tuple(provenance["messages"]),
-    )
+    known = ("stage", "bsip_version", "libraries", "options", "inputs")
+    told = {name: made_by[name] for name in known}
+    return Origin(label, messages=tuple(provenance["messages"]), **told)

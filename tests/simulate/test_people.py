@@ -57,8 +57,8 @@ def test_regressions_miss_the_true_hip_by_millimetres():
     for seed in range(30):
         person = draw_person(np.random.default_rng(seed), Richness(placement_error_m=0.0))
         right, left = (person.markers[m].position_m for m in ("RASIS", "LASIS"))
-        predicted = 0.5 * (right + left) + np.array(HIP_FROM_ASIS[person.sex]) * (
-            person.pelvis_width_m
+        predicted = (
+            0.5 * (right + left) + np.array(HIP_FROM_ASIS[person.sex]) * person.widths_m["pelvis"]
         )
         misses.append(np.linalg.norm(predicted - person.joints_m["hip_r"]))
     assert 0.007 < np.mean(misses) < 0.016

@@ -42,7 +42,6 @@ class LevelChange:
     z: float
 
 
-@dataclass(frozen=True, eq=False)
 class _Problem:
     """Sums over the samples z = [X, y] (n, 1 + k + d): the constant, the columns, the signal.
 
@@ -62,16 +61,20 @@ class _Problem:
     coefficient_sd : prior spread of the columns' coefficients.
     """
 
-    z: np.ndarray
-    of_x: int
-    squares: np.ndarray
-    neighbours: np.ndarray
-    ends: np.ndarray
-    places: np.ndarray
-    after: np.ndarray
-    beside: np.ndarray
-    penalised: np.ndarray
-    coefficient_sd: float
+    def __init__(
+        self, y: np.ndarray, columns: np.ndarray, places: np.ndarray, coefficient_sd: float
+    ) -> None:
+        z = np.concatenate([np.ones((len(y), 1)), columns, y], axis=1)
+        z[:, 1:] -= z[:, 1:].mean(axis=0)
+        follow, from_on = z[1:].T @ z[:-1], np.zeros((len(z) + 1, z.shape[1]))
+        from_on[:-1] = np.cumsum(z[::-1], axis=0)[::-1]
+        self.z, self.of_x = z, 1 + columns.shape[1]
+        self.squares, self.neighbours = z.T @ z, follow + follow.T
+        self.ends = np.outer(z[0], z[0]) + np.outer(z[-1], z[-1])
+        self.places, self.after = places, from_on[places]
+        self.beside = from_on[places - 1] + from_on[places + 1]
+        self.penalised = np.diag([0.0] + [1.0] * columns.shape[1])
+        self.coefficient_sd = coefficient_sd
 
     def products(self, r: float) -> np.ndarray:
         """Sum of z z', whitened."""
@@ -128,7 +131,7 @@ def find_level_change(
     places = places[(places > 0) & (places < n)]
     if len(places) == 0 or n < _LEAST_FREEDOM + 2:
         return None
-    problem = _problem(y, columns, places, coefficient_sd)
+    problem = _Problem(y, columns, places, coefficient_sd)
     correlation = 0.0
     error = max(float(np.median(np.abs(np.diff(y, axis=0)))), _LEAST_ERROR)
     for _ in range(_ROUNDS):
@@ -138,28 +141,6 @@ def find_level_change(
         correlation = _correlation(problem, found, error)
         error = max(found.spread * np.sqrt(1.0 - correlation**2), _LEAST_ERROR)
     return _best(problem, correlation, error)
-
-
-def _problem(
-    y: np.ndarray, columns: np.ndarray, places: np.ndarray, coefficient_sd: float
-) -> _Problem:
-    z = np.concatenate([np.ones((len(y), 1)), columns, y], axis=1)
-    z[:, 1:] -= z[:, 1:].mean(axis=0)
-    follow = z[1:].T @ z[:-1]
-    from_on = np.zeros((len(z) + 1, z.shape[1]))
-    from_on[:-1] = np.cumsum(z[::-1], axis=0)[::-1]
-    return _Problem(
-        z,
-        1 + columns.shape[1],
-        z.T @ z,
-        follow + follow.T,
-        np.outer(z[0], z[0]) + np.outer(z[-1], z[-1]),
-        places,
-        from_on[places],
-        from_on[places - 1] + from_on[places + 1],
-        np.diag([0.0] + [1.0] * columns.shape[1]),
-        coefficient_sd,
-    )
 
 
 def _best(problem: _Problem, correlation: float, error: float) -> LevelChange | None:

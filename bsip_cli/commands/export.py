@@ -6,7 +6,6 @@ import re
 import shutil
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -296,11 +295,12 @@ def _check(request: Request) -> None:
 
 def _writers(request: Request, skeleton: Skeleton) -> dict[str, Writer]:
     """Ending of the file and who writes it, for every format that is asked for."""
+
+    def alone(text_of: Callable[[IdentifiedPerson], str]) -> Writer:
+        return lambda body: (text_of(body), "")
+
     formats = dict.fromkeys(request.formats or FORMATS)
-    writers: dict[str, Writer] = {}
-    for name in formats:
-        ending, text_of = FORMATS[name]
-        writers[ending] = partial(_without_note, text_of)
+    writers = {FORMATS[name][0]: alone(FORMATS[name][1]) for name in formats}
     if request.model_file is None:
         if request.model_bodies is not None:
             raise UsageError("--model-bodies belongs to --model-file", remedy="give both")
@@ -314,12 +314,6 @@ def _writers(request: Request, skeleton: Skeleton) -> dict[str, Writer]:
         return result.text, f"{model.file}, map {body_map.name}: {result.sentence}"
 
     return {**writers, FORMATS["osim"][0]: given}
-
-
-def _without_note(
-    text_of: Callable[[IdentifiedPerson], str], body: IdentifiedPerson
-) -> tuple[str, str]:
-    return text_of(body), ""
 
 
 def _given_model(file: Path, name: str | None, skeleton: Skeleton) -> tuple[GivenModel, BodyMap]:

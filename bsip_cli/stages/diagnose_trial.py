@@ -17,17 +17,10 @@ from bsip_cli.running.unit import Unit
 def run(unit: Unit) -> None:
     """Read the person's diagnosis and error budget; write this trial's part of them."""
     assert unit.trial is not None
-    _write_diagnosis(unit)
+    stem, overall = unit.trial.stem, unit.read("overall-diagnosis")
     budget = unit.read("overall-error-budget")
-    unit.write("error-budget", budget[budget["trial"] == unit.trial.stem])
-
-
-def _write_diagnosis(unit: Unit) -> None:
-    overall = unit.read("overall-diagnosis")
-    assert unit.trial is not None
-    stem = unit.trial.stem
-    looked_at = unit.facts("overall-diagnosis").get("trials", [])
-    if stem not in looked_at:
+    unit.write("error-budget", budget[budget["trial"] == stem])
+    if stem not in unit.facts("overall-diagnosis").get("trials", []):
         unit.write("diagnosis", empty_table("diagnosis"))
         return
     concerned = np.array([stem in trials.split(", ") for trials in overall["trials"]], dtype=bool)
@@ -38,8 +31,7 @@ def _write_diagnosis(unit: Unit) -> None:
         p_value = float(rows["p_value"].min()) if len(rows) else np.nan
         none = rows_of((nothing(p_value, (stem,)),), (stem,))
         rows = pd.concat([none, rows], ignore_index=True)
-        order = [1, *(rows["rank"][1:] + 1)]
-        rows["rank"] = order
+        rows["rank"] = [1, *(rows["rank"][1:] + 1)]
     rows["rank"] = rows["rank"].rank(method="dense").astype(int)
     unit.write("diagnosis", rows)
 

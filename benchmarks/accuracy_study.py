@@ -11,9 +11,8 @@ from bsip_cli.simulate.balance import balanced
 from bsip_cli.simulate.numerics import window
 from bsip_cli.simulate.options import preset
 from bsip_cli.simulate.people import Person
-from bsip_cli.simulate.plan import Plan
+from bsip_cli.simulate.plan import Plan, add_breath_of_motion, add_sway, plate_under, sketch_for
 from bsip_cli.simulate.recording import write_trial
-from bsip_cli.simulate.sketch import add_breath_of_motion, add_sway, plate_under, sketch_for
 from bsip_cli.simulate.study import participant_person, simulate_study
 from bsip_cli.simulate.trial import THIN, Trial, simulate_trial, trial_of
 

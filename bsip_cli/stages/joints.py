@@ -492,9 +492,7 @@ def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str])
 
 def _compared_with(method: str, methods: list[str]) -> str:
     """RM; of an extended model the one with a cause less."""
-    if method == RM:
-        return ""
     if not is_extended(method):
-        return RM
+        return "" if method == RM else RM
     before = [m for m in methods[: methods.index(method)] if is_extended(m)]
     return before[-1] if before else OM

@@ -14,8 +14,8 @@ import numpy as np
 
 from bsip_cli.simulate.numerics import wander, window
 from bsip_cli.simulate.people import SIDES, Person
-from bsip_cli.simulate.plan import Plan
-from bsip_cli.simulate.sketch import (
+from bsip_cli.simulate.plan import (
+    Plan,
     Sketch,
     add_breath_of_motion,
     add_squat,

@@ -8,9 +8,9 @@ import numpy as np
 
 from bsip_cli.simulate.numerics import glide, soft_polyline, step, window
 from bsip_cli.simulate.people import SIDES, Person
-from bsip_cli.simulate.plan import Plan
-from bsip_cli.simulate.sketch import (
+from bsip_cli.simulate.plan import (
     FootSketch,
+    Plan,
     Sketch,
     add_breath_of_motion,
     add_squat,

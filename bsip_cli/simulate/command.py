@@ -23,7 +23,7 @@ from bsip_cli.instruments.readings import Instruments
 from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot
 from bsip_cli.simulate.effects import effects_of, pair_up, touches
 from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.options import StudyOptions, preset
+from bsip_cli.simulate.options import PRESETS, StudyOptions
 from bsip_cli.simulate.study import simulate_study, write_text
 
 
@@ -45,7 +45,7 @@ def simulate_command(
 ) -> None:
     """Write a simulated study into a new or empty folder."""
     _check_new(study)
-    options = preset(preset_name)
+    options = PRESETS[preset_name]
     if participants is not None:
         options = replace(options, participants=participants, sexes="")
     if sequence_s is not None:

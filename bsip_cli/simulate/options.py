@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from bsip_cli.errors import UsageError
-
 ALL_TASKS = ("static", "sequence", "throwing", "basketball", "squat", "steps", "walking", "running")
 MORE_TASKS = ("hops", "stepon", "postures")
 
@@ -139,10 +137,3 @@ PRESETS = {
         participants=1, seed=2026, tasks=tuple(_DIAGNOSIS_S), durations_s=_DIAGNOSIS_S
     ),
 }
-
-
-def preset(name: str) -> StudyOptions:
-    """The options of a preset."""
-    if name not in PRESETS:
-        raise UsageError(f"unknown preset {name!r}", expected=" or ".join(PRESETS))
-    return PRESETS[name]

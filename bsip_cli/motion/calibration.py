@@ -282,9 +282,6 @@ def _pose(person: Person, frames: Mapping[str, Frame]) -> np.ndarray:
     return q
 
 
-# --- knees and ankles without markers, from how thigh, shank and foot moved -----------------------
-
-
 # --- a joint from the movement of the segments that it joins: SCoRE and SARA (Ehrig 2006, 2007) ---
 
 
@@ -359,9 +356,6 @@ def functional_joint(
         float(np.arccos(np.clip(cosine, -1.0, 1.0)).max()),
         float(np.sqrt((left**2).sum(axis=1).mean())),
     )
-
-
-# --------------------------------------------------------------------------------------------------
 
 
 _LEAST_TURN_DEG = {"knee": 30.0, "ankle": 20.0}  # less leaves the axis to the noise of the skin

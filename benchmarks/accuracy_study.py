@@ -9,11 +9,10 @@ import numpy as np
 
 from bsip_cli.simulate.balance import balanced
 from bsip_cli.simulate.numerics import window
-from bsip_cli.simulate.options import preset
+from bsip_cli.simulate.options import PRESETS
 from bsip_cli.simulate.people import Person
-from bsip_cli.simulate.plan import Plan
+from bsip_cli.simulate.plan import Plan, add_breath_of_motion, add_sway, plate_under, sketch_for
 from bsip_cli.simulate.recording import write_trial
-from bsip_cli.simulate.sketch import add_breath_of_motion, add_sway, plate_under, sketch_for
 from bsip_cli.simulate.study import participant_person, simulate_study
 from bsip_cli.simulate.trial import THIN, Trial, simulate_trial, trial_of
 
@@ -29,7 +28,7 @@ def write_study(folder: Path, people: int, seed: int, quick: bool = False) -> No
 
     quick : static trial and sequence alone.
     """
-    options = replace(preset("sample"), participants=people, seed=seed)
+    options = replace(PRESETS["sample"], participants=people, seed=seed)
     if quick:
         simulate_study(folder, replace(options, tasks=("static", "sequence")))
         return

@@ -23,7 +23,7 @@ from scipy.ndimage import gaussian_filter1d
 from bsip_cli.artifacts import read_artifact
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S
 from bsip_cli.simulate.numerics import derivative
-from bsip_cli.simulate.options import StudyOptions, preset
+from bsip_cli.simulate.options import PRESETS, StudyOptions
 from bsip_cli.simulate.plan import GRAVITY
 from bsip_cli.simulate.study import MOVEMENT, generator, participant_person, wobbling
 from bsip_cli.simulate.trial import Trial, simulate_trial
@@ -61,7 +61,7 @@ def main() -> None:
 
 def _options(written: dict) -> StudyOptions:
     """The sample's, with what a command line can change of it."""
-    base = preset("sample")
+    base = PRESETS["sample"]
     laboratory = replace(base.laboratory, plate_per_foot=written["laboratory"]["plate_per_foot"])
     return replace(
         base,

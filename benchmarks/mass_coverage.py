@@ -29,15 +29,15 @@ from bsip_cli.simulate.effects.loads import Support, UnmeasuredContact
 from bsip_cli.simulate.numerics import window
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
 from bsip_cli.simulate.people import Person, draw_person
-from bsip_cli.simulate.plan import Plan
-from bsip_cli.simulate.recording import write_trial
-from bsip_cli.simulate.sketch import (
+from bsip_cli.simulate.plan import (
+    Plan,
     add_breath_of_motion,
     add_squat,
     add_sway,
     plate_under,
     sketch_for,
 )
+from bsip_cli.simulate.recording import write_trial
 from bsip_cli.simulate.trial import THIN, Trial, simulate_trial, trial_of
 from bsip_cli.stages import ingest, survey
 from bsip_cli.study.study import load_study

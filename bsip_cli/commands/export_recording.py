@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import empty_table, is_made_from
-from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.cause import Cause, delay_by
 from bsip_cli.diagnosis.corrected_wrench import (
     corrected_plates,
@@ -43,7 +42,7 @@ from bsip_cli.recordings.settle import SessionReading, Verdict
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import OpenedStudy, follow
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.frames import markers_from, person_from
+from bsip_cli.stages.frames import markers_from, person_of
 from bsip_cli.stages.survey import opened, reading_of
 from bsip_cli.stages.trial_scene import causes_of, plates_of
 
@@ -176,15 +175,17 @@ class _Correction:
                 self.left.append(f"{words}: it cannot be distinguished from {others} here")
             else:
                 self.causes[cause] = others
-        self.left += [
+        here = _said_of(unit.name, told, [*EFFECTS])
+        self.left += dict.fromkeys(
             f"{effect} {target}: of unknown size in this recording, or one of several causes"
-            for effect, target in _told_of(unit.name, told)
+            for effect, target in here[["effect", "target"]].to_numpy()
             if (effect, target) not in known
-        ]
-        self.left += [
+        )
+        # what is there and has no name, or acts like a fault but not evenly
+        self.left += dict.fromkeys(
             f"{sentence}: nothing tells its course exactly"
-            for sentence in _nameless(unit.name, told)
-        ]
+            for sentence in _said_of(unit.name, told, [UNEXPLAINED])["sentence"]
+        )
         about = _of_the_laboratory(unit, "named", "ambiguous") if self._plates else told[:0]
         self.left += dict.fromkeys(
             f"{sentence}: no size of it is known for this recording"
@@ -300,10 +301,8 @@ class _Correction:
         frames = np.searchsorted(table["time_s"], times - 0.5 / recording.marker_rate_hz)
         valid = table["valid"].to_numpy()[np.clip(frames, 0, len(table) - 1)]
         valid = valid if valid.any() else ~valid  # none in which the diagnosis saw all contacts
-        skeleton = load_skeleton(unit.config.skeleton)
-        person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
         none = np.empty((len(times), 0))
-        return Scene(times, person, none, none, none, np.empty(0), plates, valid)
+        return Scene(times, person_of(unit), none, none, none, np.empty(0), plates, valid)
 
     def _readings(self, before: Instruments) -> np.ndarray:
         corrected = corrected_plates(self._scene, [*self.causes])
@@ -425,16 +424,6 @@ def _said_of(trial: str, told: pd.DataFrame, effects: Sequence[str]) -> pd.DataF
     """Rows of these effects that the diagnosis names, alone or in a group, in a trial."""
     here = np.array([trial in names.split(", ") for names in told["trials"]], dtype=bool)
     return told[here & told["effect"].isin(effects) & (told["verdict"] != "rejected")]
-
-
-def _told_of(trial: str, told: pd.DataFrame) -> list[tuple[str, str]]:
-    rows = _said_of(trial, told, list(EFFECTS))
-    return list(dict.fromkeys(zip(rows["effect"], rows["target"], strict=True)))
-
-
-def _nameless(trial: str, told: pd.DataFrame) -> list[str]:
-    """What is there and has no name, or acts like a fault but not evenly, in words."""
-    return list(dict.fromkeys(_said_of(trial, told, [UNEXPLAINED])["sentence"]))
 
 
 def _exchanged(events: pd.DataFrame) -> list[tuple[str, str, float, float]]:

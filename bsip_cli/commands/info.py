@@ -56,7 +56,9 @@ def _lines(path: Path) -> Iterator[str]:
     for field in pq.read_schema(path):
         known = (field.metadata or {}).items()
         notes = {key.decode(errors="replace"): text.decode(errors="replace") for key, text in known}
-        yield f"  {field.name}{_unit(notes)}  {notes.get('meaning', '')}".rstrip()
+        where = ", ".join(filter(None, (notes.get("unit"), notes.get("frame"))))
+        unit = f" [{where}]" if where else ""
+        yield f"  {field.name}{unit}  {notes.get('meaning', '')}".rstrip()
 
 
 def _made(made_by: dict[str, Any], title: str) -> Iterator[str]:
@@ -68,8 +70,3 @@ def _made(made_by: dict[str, Any], title: str) -> Iterator[str]:
         yield f"  input   {name} sha256 {digest}"
     for name, value in (made_by.get("options") or {}).items():
         yield f"  option  {name} = {json.dumps(value, ensure_ascii=False)}"
-
-
-def _unit(notes: dict[str, str]) -> str:
-    where = ", ".join(filter(None, (notes.get("unit"), notes.get("frame"))))
-    return f" [{where}]" if where else ""

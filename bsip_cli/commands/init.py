@@ -32,11 +32,6 @@ _NAMES = ("participants", "subjects")
 _KINDS = (".tsv", ".csv")
 
 
-def is_table(path: Path) -> bool:
-    """Whether a file is called as a table of people."""
-    return path.stem.casefold() in _NAMES and path.suffix.lower() in _KINDS
-
-
 def read_tables(
     files: Iterable[Path], people: Collection[str]
 ) -> tuple[dict[str, tuple[Path, StatedPerson]], list[str]]:
@@ -197,7 +192,8 @@ def init_command(request: Request) -> int:
             expected="C3D files, or TRC files with their MOT or STO beside them",
             remedy="correct what is said of each" if unused else "name the folder they lie in",
         )
-    tables = [one.path for one in files if is_table(one.path)]
+    called = [one.path for one in files if one.path.stem.casefold() in _NAMES]
+    tables = [path for path in called if path.suffix.lower() in _KINDS]
     plan = _planned(sources, unused, participant, tables)
     _write(request, plan)
     _say(_told(request, plan))
@@ -205,13 +201,14 @@ def init_command(request: Request) -> int:
 
 
 def _participant(name: str) -> str:
-    if name and not check_participant(name):
+    checked = check_participant(name) if name else ""
+    if name and not checked:
         raise UsageError(
             f"--participant {name!r}",
             expected="sub- and letters or digits",
             remedy="name it like sub-01",
         )
-    return check_participant(name) if name else ""
+    return checked
 
 
 def _check_out(out: Path) -> None:
@@ -272,7 +269,12 @@ def _write(request: Request, plan: _Plan) -> None:
                     place.symlink_to(source.resolve())
                 else:
                     shutil.copy2(source, place)
-            for name, text in _texts(request, plan).items():
+            texts = {
+                "participants.tsv": _table(_people_rows(plan.people)),
+                "study.toml": _study_toml(plan),
+                "sources.tsv": _table(_source_rows(request, plan)),
+            } | ({STARTER: plan.markers.starter} if plan.markers.starter else {})
+            for name, text in texts.items():
                 (made / name).write_text(text, encoding="utf-8")
             if out.is_dir():
                 out.rmdir()  # it is empty
@@ -290,16 +292,6 @@ def _files(plan: _Plan) -> Iterator[tuple[Path, Path]]:
         named = plan.named[source.path]
         for path in filter(None, (source.path, source.forces)):
             yield path, named.folder / f"{named.stem}{path.suffix.lower()}"
-
-
-def _texts(request: Request, plan: _Plan) -> dict[str, str]:
-    """The small files by name."""
-    texts = {
-        "participants.tsv": _table(_people_rows(plan.people)),
-        "study.toml": _study_toml(plan),
-        "sources.tsv": _table(_source_rows(request, plan)),
-    }
-    return texts | ({STARTER: plan.markers.starter} if plan.markers.starter else {})
 
 
 def _people_rows(people: Mapping[str, StatedPerson]) -> Iterator[tuple[str, ...]]:
@@ -389,25 +381,19 @@ def _told(request: Request, plan: _Plan) -> Iterator[str]:
     files = "linked" if request.link else "copied"
     n = sum(1 for _ in _files(plan))
     yield f"{n} files {files}; sources.tsv says what came from where"
-    yield f"next: bsip run {quote(str(request.out))} --out {quote(str(_results(request.out)))}"
-
-
-def _results(out: Path) -> Path:
-    return out / "derivatives" / "bsip"
+    results = request.out / "derivatives" / "bsip"
+    yield f"next: bsip run {quote(str(request.out))} --out {quote(str(results))}"
 
 
 def _unused_lines(unused: Sequence[Unused]) -> Iterator[str]:
     """What is no recording in one line for all kinds; everything else with its reason."""
     others = [one for one in unused if one.why == NO_RECORDING]
     if others:
-        yield f"not used, no recordings: {counted(_kind(one) for one in others)}"
+        kinds = counted(one.path.suffix.lower() or "without an ending" for one in others)
+        yield f"not used, no recordings: {kinds}"
     reasons: dict[str, list[str]] = defaultdict(list)
     for one in unused:
         if one not in others:
             reasons[one.why].append(one.path.name)
     for why, names in reasons.items():
         yield f"not used: {listed(names)}: {why}"
-
-
-def _kind(one: Unused) -> str:
-    return one.path.suffix.lower() or "without an ending"

@@ -48,7 +48,14 @@ def markers_command(request: Request) -> int:
     do without is missing.
     """
     recording = read_recording(request.file)
-    _say([f"{request.file}: {_size(recording)}", *_findings(recording)])
+    size = f"{len(recording.labels)} markers, {recording.n_frames} frames"
+    corrected = [one for one in recording.findings if one.check in ("labels", "points")]
+    _say(
+        [
+            f"{request.file}: {size} at {recording.marker_rate_hz:g} Hz",
+            *(f"{x.found}: {x.action}" + f" ({x.subject})" * bool(x.subject) for x in corrected),
+        ]
+    )
     guess, chosen = _chosen(request, recording)
     complete = bool(chosen.markers) and _compared(request, recording, chosen)
     if not chosen.markers:
@@ -71,7 +78,8 @@ def _compared(request: Request, recording: Recording, chosen: MarkerSet) -> bool
     )
     there = {match.index[m.label]: m for m in chosen.markers if m.label in match.index}
     words = {k: _meaning(recording.labels[k], marker) for k, marker in there.items()}
-    _say([*_prefix(match), "", "labels:", *_label_rows(recording, words, "not in the set")])
+    who = [f"labels of the person with the prefix '{match.prefix}'"] if match.prefix else []
+    _say([*who, "", "labels:", *_label_rows(recording, words, "not in the set")])
     config = load_config([])
     skeleton = load_skeleton(config.skeleton)
     informed = skeleton.informed({marker.segment for marker in there.values()})
@@ -86,22 +94,6 @@ def _compared(request: Request, recording: Recording, chosen: MarkerSet) -> bool
 
 def _say(lines: Sequence[str]) -> None:
     click.echo("\n".join(map(printable, lines)))
-
-
-def _size(recording: Recording) -> str:
-    return (
-        f"{len(recording.labels)} markers, {recording.n_frames} frames at "
-        f"{recording.marker_rate_hz:g} Hz"
-    )
-
-
-def _findings(recording: Recording) -> list[str]:
-    """What reading the points had to correct."""
-    return [
-        f"{finding.found}: {finding.action}" + (f" ({finding.subject})" if finding.subject else "")
-        for finding in recording.findings
-        if finding.check in ("labels", "points")
-    ]
 
 
 # --- which set ---------------------------------------------------------------------------------
@@ -140,10 +132,6 @@ def _rival(fit: SetFit) -> str:
     return f"  {fit.marker_set.name}: {fit.required_found} of {fit.required} markers"
 
 
-def _prefix(match: LabelMatch) -> list[str]:
-    return [f"labels of the person with the prefix '{match.prefix}'"] if match.prefix else []
-
-
 # --- what is there ------------------------------------------------------------------------------
 
 
@@ -159,11 +147,8 @@ def _label_rows(recording: Recording, words: Mapping[int, str], others: str) -> 
 
 def _meaning(label: str, marker: Marker) -> str:
     renamed = "" if label.strip().endswith(marker.label) else f"{marker.label}: "
-    return renamed + _place(marker.segment, marker.landmark)
-
-
-def _place(segment: str, landmark: str) -> str:
-    return f"{in_words(segment)}, {in_words(landmark) if landmark else 'tracks only'}"
+    landmark = in_words(marker.landmark) if marker.landmark else "tracks only"
+    return f"{renamed}{in_words(marker.segment)}, {landmark}"
 
 
 def _segment_rows(

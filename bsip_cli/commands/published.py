@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from bsip_cli.report.tables.formats import to_markdown
 from bsip_cli.report.tables.published import audited, printed
-from bsip_cli.statistics.published.paper import Paper, load_paper, names
+from bsip_cli.statistics.published.paper import load_paper, names
 
 
 def shown(what: str, paper: str | None) -> Iterator[str]:
@@ -18,20 +18,11 @@ def shown(what: str, paper: str | None) -> Iterator[str]:
         There is no such paper.
     """
     for one in (load_paper(name) for name in ([paper] if paper else names())):
-        yield from _audit(one) if what == "audit" else _tables(one)
-
-
-def _tables(paper: Paper) -> Iterator[str]:
-    for table in paper.tables:
-        yield to_markdown(printed(paper, table))
-
-
-def _audit(paper: Paper) -> Iterator[str]:
-    table = audited(paper)
-    yield to_markdown(table) if table.rows else f"**{paper.name}: {_sound(paper)}.**\n"
-
-
-def _sound(paper: Paper) -> str:
-    if all(table.design == "described" and not table.claims for table in paper.tables):
-        return "nothing in it can be recomputed from what is printed"
-    return "its numbers agree"
+        if what == "show":
+            yield from (to_markdown(printed(one, table)) for table in one.tables)
+        elif (slips := audited(one)).rows:
+            yield to_markdown(slips)
+        else:
+            is_told = any(table.design != "described" or table.claims for table in one.tables)
+            nothing = "nothing in it can be recomputed from what is printed"
+            yield f"**{one.name}: {'its numbers agree' if is_told else nothing}.**\n"

@@ -19,8 +19,7 @@ from bsip_cli.diagnosis.error_model import ErrorModel, Part
 from bsip_cli.diagnosis.findings import Finding, Number, interval_words
 from bsip_cli.diagnosis.patterns import UNEXPLAINED
 from bsip_cli.effects.plates import OF_THE_LAB
-from bsip_cli.statistics.effective_samples import effective_samples
-from bsip_cli.statistics.samples import Z95
+from bsip_cli.statistics.samples import Z95, effective_samples
 
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
 UNKNOWN, NOISE, TOTAL = "unknown", "noise", "total"

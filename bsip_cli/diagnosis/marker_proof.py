@@ -33,7 +33,7 @@ from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.markers import LEAST_S, ramp, ramp_of
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH
-from bsip_cli.statistics.effective_samples import effective_samples
+from bsip_cli.statistics.samples import effective_samples
 
 ENOUGH_HZ = 10.0  # for a course of many seconds
 BENT = 0.25  # of the markers' squared residuals, their means left out: less is skin that follows

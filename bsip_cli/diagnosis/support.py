@@ -21,8 +21,7 @@ from bsip_cli.diagnosis.findings import Finding, Number
 from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, Gain
 from bsip_cli.effects.loads import UnmeasuredContact
 from bsip_cli.effects.scene import Scene
-from bsip_cli.statistics.effective_samples import effective_samples
-from bsip_cli.statistics.samples import Z95
+from bsip_cli.statistics.samples import Z95, effective_samples
 
 HANDS, TRUNK = ("hand_l", "hand_r"), "upper_torso"
 STILL_M = 0.004  # root mean square distance of a hand that holds on from its mean place

@@ -19,8 +19,7 @@ from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.dynamics.segment_motion import Point, SegmentMotion, segment_motion
 from bsip_cli.dynamics.wrench_response import WrenchResponse, wrench_response
 from bsip_cli.motion.inverse_kinematics import tree_of
-from bsip_cli.motion.jacobian import model_markers
-from bsip_cli.motion.pose_response import PoseResponse, marker_trust, pose_responses
+from bsip_cli.motion.jacobian import PoseResponse, marker_trust, model_markers, pose_responses
 
 FINER = 4  # samples per frame of the wrench between frames
 SLOW_ENOUGH = 0.8  # of half the lower rate, when frames are left out

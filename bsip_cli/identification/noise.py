@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from bsip_cli.identification.equations import ResidualSeries
-from bsip_cli.statistics.effective_samples import effective_samples
+from bsip_cli.statistics.samples import effective_samples
 
 _ROUNDS = 8
 _QUIETEST = 0.1  # of the root-mean-square: no frame is trusted more than ten times the average

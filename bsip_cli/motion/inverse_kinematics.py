@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,6 +106,7 @@ def solve_poses(
     robust_limit_m: float,
     posture_sd_rad: float | np.ndarray,
     iterations: int,
+    may_show_nothing: bool = False,
 ) -> Poses:
     """Weighted least squares on all markers, robust beyond a limit, each frame from the last.
 
@@ -118,32 +120,10 @@ def solve_poses(
     Raises
     ------
     BadDataError
-        There is no frame, or no marker in any frame.
+        There is no frame, or no marker in any frame and that is not allowed.
     """
-    if markers_m.shape[0] == 0 or not np.isfinite(markers_m).any():
+    if not may_show_nothing and not np.isfinite(markers_m).any():
         raise BadDataError("no marker is visible in any frame", expected="tracked markers")
-    return _solved(
-        person,
-        markers_m,
-        q_first,
-        marker_sd_m=marker_sd_m,
-        robust_limit_m=robust_limit_m,
-        posture_sd_rad=posture_sd_rad,
-        iterations=iterations,
-    )
-
-
-def _solved(
-    person: Person,
-    markers_m: np.ndarray,
-    q_first: np.ndarray,
-    *,
-    marker_sd_m: float,
-    robust_limit_m: float,
-    posture_sd_rad: float | np.ndarray,
-    iterations: int,
-) -> Poses:
-    """As :func:`solve_poses`, for frames of which some or all may show nothing."""
     tree = tree_of(person)
     count, markers = markers_m.shape[:2]
     q, residual = np.empty((count, tree.nq)), np.empty((count, markers))
@@ -170,16 +150,17 @@ def solve_trial(person: Person, markers_m: np.ndarray, **options) -> Poses:
     if not seen.any():
         return solve_poses(person, markers_m, neutral(person), **options)
     start = first_pose(person, markers_m[first], **options)
-    after = _solved(person, markers_m[first:], start, **options)
+    after = solve_poses(person, markers_m[first:], start, **options)
     if first == 0:
         return after
-    before = _solved(person, markers_m[first - 1 :: -1], after.q[0], **options)
-    return Poses(
-        *(
-            np.concatenate([getattr(before, name)[::-1], getattr(after, name)])
-            for name in ("q", "residual_m", "coordinate_sd", "converged")
-        )
-    )
+    earlier, options = markers_m[first - 1 :: -1], options | {"may_show_nothing": True}
+    before = solve_poses(person, earlier, after.q[0], **options)
+    return joined([Poses(*(values[::-1] for values in vars(before).values())), after])
+
+
+def joined(parts: Sequence[Poses]) -> Poses:
+    """Poses of one after the other."""
+    return Poses(*map(np.concatenate, zip(*(vars(part).values() for part in parts), strict=True)))
 
 
 def first_pose(person: Person, markers_m: np.ndarray, **options) -> np.ndarray:
@@ -218,7 +199,7 @@ def place_base(person: Person, markers_m: np.ndarray, q: np.ndarray) -> np.ndarr
     """
     tree = tree_of(person)
     R, p = tree.forward(q[None])
-    model = _markers(person, R[0], p[0])
+    (model,) = model_markers(person, R, p)
     seen = np.isfinite(markers_m).all(axis=1)
     chosen = seen & (person.marker_segments == 0)
     if chosen.sum() < 3:
@@ -242,7 +223,7 @@ def _turned(person: Person, angles_rad: np.ndarray) -> np.ndarray:
     return q
 
 
-def _markers(person: Person, R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """(m, 3) world positions of the markers in one frame."""
+def model_markers(person: Person, R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """(N, m, 3) world positions of the markers for orientations and joint centres R, p."""
     segments = person.marker_segments
-    return p[segments] + np.einsum("mij,mj->mi", R[segments], person.markers_in_joint_m())
+    return p[:, segments] + np.einsum("fmij,mj->fmi", R[:, segments], person.markers_in_joint_m())

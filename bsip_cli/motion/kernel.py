@@ -402,18 +402,14 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
             _bend(d, w, sums, tree, N, H)
         while damping < 1e6:
             definite = _factor(H, damping, tree.v_parents, L)
-            if newton and not definite:
-                _assemble(d, w, sums, tree, H, g)
-                _add_prior(q, tree, task, H, g)
-                newton = False
-                continue
-            dv[:] = g
-            _solve(L, tree.v_parents, dv)
-            _step(q, dv, tree, base, trial)
-            trial_cost = _evaluate(trial, tree, task, measured, R, p, trial_residuals)
-            if trial_cost <= cost * (1 + 1e-14):
-                break
-            if newton:
+            if definite or not newton:
+                dv[:] = g
+                _solve(L, tree.v_parents, dv)
+                _step(q, dv, tree, base, trial)
+                trial_cost = _evaluate(trial, tree, task, measured, R, p, trial_residuals)
+                if trial_cost <= cost * (1 + 1e-14):
+                    break
+            if newton:  # its matrix does not help here
                 _assemble(d, w, sums, tree, H, g)
                 _add_prior(q, tree, task, H, g)
                 newton = False

@@ -4,12 +4,12 @@ Every limit is a multiple of one of three scales: what a marker is trusted to in
 kinematics, skin motion included (``marker_sd_m`` over the root of its weight); the noise of the
 recording; and the spread of the marker's own residual in its segment. What is found:
 
-swap (marker_swaps.py)
+swap (marker_exchange.py)
     Both markers lie at least twice as near to the other's place in the model as to their own, or
     the line between them reverses from one frame to the next; or both arms
-    (legs) fit twice as well exchanged. Where all markers involved then lie nearer to the model
-    (marker_exchange.py), the labels are corrected and the poses fitted again before the rest is
-    judged; else they stay as recorded.
+    (legs) fit twice as well exchanged. Where all markers involved then lie nearer to the model,
+    the labels are corrected and the poses fitted again before the rest is judged; else they stay
+    as recorded.
 jump
     The residual leaves its running median for less than a quarter second and comes back.
 slip
@@ -31,8 +31,16 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from bsip_cli.body.names import mirrored
-from bsip_cli.motion.level_change import LevelChange, find_level_change, two_levels
-from bsip_cli.motion.marker_events import BEYOND, MarkerEvent, event, offsets, pieces
+from bsip_cli.motion.marker_events import (
+    BEYOND,
+    LevelChange,
+    MarkerEvent,
+    event,
+    find_level_change,
+    offsets,
+    pieces,
+    two_levels,
+)
 from bsip_cli.motion.marker_exchange import (
     Exchange,
     Labelling,
@@ -42,10 +50,10 @@ from bsip_cli.motion.marker_exchange import (
     misfit_m,
     put_right,
     refitted,
+    swaps,
     with_exchanges,
 )
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit, best_source
-from bsip_cli.motion.marker_swaps import swaps
 
 # --- both arms or both legs that bear each other's labels throughout ------------------------------
 
@@ -167,7 +175,10 @@ def _own(
     own: list[tuple[_Jump, float]] = []
     while left:
         first = left[0]
-        together = [one for one in left if one is first or _overlap(one.frames, first.frames)]
+        begin, end = first.frames.start - 1, first.frames.stop + 1
+        together = [
+            x for x in left if x is first or (x.frames.start < end and begin < x.frames.stop)
+        ]
         peak = first.frames.start + int(np.nanargmax(distance[first.frames, first.m]))
         sd = np.hypot(spread[peak], 0.1 * distance[peak, first.m])
         candidates = [one.m for one in together if np.isfinite(distance[peak, one.m])]
@@ -180,10 +191,6 @@ def _own(
         dragged = [one for one in together if not missed[one.m] > _SAME * distance[peak, one.m]]
         left = [one for one in left if one is not source and one not in dragged]
     return own
-
-
-def _overlap(a: slice, b: slice) -> bool:
-    return a.start < b.stop + 1 and b.start < a.stop + 1
 
 
 def _away(residual: np.ndarray, width: int) -> np.ndarray:
@@ -274,7 +281,8 @@ class _Search:
         self.frames = max(1, frames, most)
         self.least = max(3, round(_STAYS_S / (self.frames * fit.step_s())))
         self.columns = {
-            name: block_means(_with_squares(x), self.frames) for name, x in fit.pose.items()
+            name: block_means(np.concatenate([x, (x - np.mean(x, axis=0)) ** 2], 1), self.frames)
+            for name, x in fit.pose.items()
         }
         self.means = block_means(self.left, self.frames)
         self.best: dict[int, _Found | None] = {}
@@ -380,11 +388,6 @@ def _events(fit: MarkerFit, found: list[_Slip]) -> list[MarkerEvent]:
         frames = slice(slip.frame, stop)
         events.append(event(fit, kind, slip.m, frames, size, slip.z))  # type: ignore[arg-type]
     return events
-
-
-def _with_squares(x: np.ndarray) -> np.ndarray:
-    centred = x - np.mean(x, axis=0)
-    return np.concatenate([x, centred**2], axis=1)
 
 
 def block_means(x: np.ndarray, frames: int) -> np.ndarray:

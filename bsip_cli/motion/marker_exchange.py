@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.motion.marker_events import MarkerEvent, event
+from bsip_cli.body.names import mirrored
+from bsip_cli.motion.marker_events import MarkerEvent, event, pieces
 from bsip_cli.motion.marker_fit import MarkerFit
 
 Refit = Callable[[np.ndarray, np.ndarray], MarkerFit]
@@ -118,3 +119,144 @@ def _event(fit: MarkerFit, one: Exchange, undone: bool) -> MarkerEvent:
     return event(
         fit, "swap", one.a, one.frames, apart, one.statistic, partner=one.b, put_right=undone
     )
+
+
+# --- pairs of markers that bear each other's labels for a while or throughout ---------------------
+
+
+_FAR = 3.0  # own residual over the trusted distance and over the trial's median residual
+_NEARER = 0.5  # distance to the other's place over that to the own
+_BRIDGE_S = 0.1  # breaks within one swap
+_UNSEEN_S = 0.25  # a reversal is looked for over gaps up to this long
+_MOST = 12
+
+
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """Two markers, the frames (N,) in which they may be exchanged, and how sharp the signs are."""
+
+    a: int
+    b: int
+    hit: np.ndarray
+    ratio: float
+    reverses: bool
+
+
+def swaps(labelling: Labelling, refit: Refit) -> Labelling:
+    """Labels of pairs corrected where that is clear, with the events.
+
+    Two signs, and either is enough. The path's: the line between the two reverses from one frame
+    to the next, which no segment does; it shows also where the pose follows the labels. The
+    model's: both markers are far from their own places and at least twice as near to the other's.
+    One wrong pair may turn a whole limb of the model over, so pairs are tried one at a time, and
+    one after which the poses fit no better is none.
+    """
+    tried: set[tuple[int, int]] = set()
+    for _ in range(_MOST):
+        fit = labelling.fit
+        pairs = [one for one in _suspects(fit) if (one.a, one.b) not in tried]
+        if not pairs:
+            break
+        pair = max(pairs, key=lambda one: (one.reverses, one.ratio * one.hit.sum()))
+        tried.add((pair.a, pair.b))
+        unseen = ~np.isfinite(fit.measured_m[:, [pair.a, pair.b], 0]).all(axis=1)
+        found = pieces(pair.hit, unseen, 1 + round(_BRIDGE_S / fit.step_s()))
+        suspected = [Exchange(pair.a, pair.b, piece, pair.ratio) for piece in found]
+        again = refitted(fit, refit, suspected)
+        if misfit_m(again.distance_m()) < misfit_m(fit.distance_m()):
+            labelling = put_right(labelling, again, refit, suspected)
+    return labelling
+
+
+def _suspects(fit: MarkerFit) -> list[_Pair]:
+    own = fit.distance_m()
+    usual = float(np.nanmedian(own)) if np.isfinite(own).any() else 0.0
+    far = _FAR * max(float(fit.trusted_m.min()), usual)
+    astray = own > far
+    paths = np.ascontiguousarray(np.moveaxis(fit.measured_m, 1, 0))
+    found = []
+    for a, b in _pairs(fit):
+        hit = astray[:, a] & astray[:, b]
+        if len(frames := np.flatnonzero(hit)):
+            hit[frames] = (_nearness(fit, own, a, b, frames) > 1.0 / _NEARER).all(axis=1)
+        line = paths[a] - paths[b]
+        hit, sharp = _between_reversals(line, fit.times_s, own[:, [a, b]], hit, far)
+        if hit.any():
+            ratio = float(np.nanmedian(_nearness(fit, own, a, b, np.flatnonzero(hit))))
+            found.append(_Pair(a, b, hit, max(ratio, sharp), sharp > 0))
+    return found
+
+
+def _nearness(fit: MarkerFit, own: np.ndarray, a: int, b: int, frames: np.ndarray) -> np.ndarray:
+    """(frames, 2) distance of two markers to their own places over that to the other's."""
+    across = np.linalg.norm(
+        fit.measured_m[frames][:, [a, b]] - fit.model_m[frames][:, [b, a]], axis=2
+    )
+    return own[frames][:, [a, b]] / np.maximum(across, 1e-4)
+
+
+def _pairs(fit: MarkerFit) -> Iterator[tuple[int, int]]:
+    """Markers of one segment, of the same one on both sides, or of two that share a joint."""
+    segments, parents = fit.segments, fit.parents
+    for a, first in enumerate(segments):
+        near = {first, mirrored(first), parents.get(first)}
+        for b in range(a + 1, len(segments)):
+            if segments[b] in near or parents.get(segments[b]) == first:
+                yield a, b
+
+
+def _between_reversals(
+    line: np.ndarray, times_s: np.ndarray, own: np.ndarray, hit: np.ndarray, far: float
+) -> tuple[np.ndarray, float]:
+    """The hits; where the line (N, 3) between two markers reverses, all frames between reversals.
+
+    Also its length over what it lacks of an exact reversal, 0 where there is none. ``own`` (N, 2)
+    are the distances of the two from the model.
+    """
+    seen = np.flatnonzero(np.isfinite(line[:, 0]))
+    d = line if len(seen) == len(line) else line[seen]
+    # Most pairs never turn by a right angle between two frames: nothing to look at.
+    if len(seen) < 4 or not (np.einsum("ni,ni->n", d[1:], d[:-1]) < 0).any():
+        return hit, 0.0
+    flips, sharp = _reversals(d, times_s[seen], far)
+    if not len(flips):
+        return hit, 0.0
+    state = np.zeros(len(seen), dtype=int)
+    state[flips] = 1
+    state = np.cumsum(state) % 2
+    both = own[seen].sum(axis=1)
+    shares = [float(hit[seen[state == k]].mean()) for k in (0, 1)]
+    means = [float(both[state == k].mean()) for k in (0, 1)]
+    if max(shares) > 0.1:
+        wrong = int(np.argmax(shares))
+    elif max(means) > 1.5 * min(means):
+        wrong = int(np.argmax(means))
+    else:
+        wrong = int((state == 1).mean() < 0.5)
+    between = np.zeros(len(hit), dtype=bool)
+    between[seen[state == wrong]] = True
+    return between, float(np.median(sharp))
+
+
+def _reversals(line: np.ndarray, times_s: np.ndarray, far: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frames (k,) from which on a line (N, 3) points the other way, having moved little before, and
+    its length over what it lacks of an exact reversal.
+
+    Where samples were interpolated, the frame between may lie anywhere on the way.
+    """
+    length = np.linalg.norm(line, axis=1)
+    calm = np.ones(len(line), dtype=bool)
+    calm[1:] = np.linalg.norm(np.diff(line, axis=0), axis=1) < 0.5 * length[1:]
+    sharp = np.zeros(len(line))
+    for step in (1, 2):
+        lacking = np.linalg.norm(line[step:] + line[:-step], axis=1)
+        turned = (lacking < 0.5 * length[step:]) & (length[step:] > far)
+        turned &= times_s[step:] - times_s[:-step] < _UNSEEN_S
+        if step == 1:
+            calm[1:] |= turned
+        else:
+            turned &= (sharp[1:-1] == 0) & (sharp[2:] == 0)
+        turned &= calm[:-step]
+        sharp[step:] += turned * length[step:] / np.maximum(lacking, 1e-4)
+    flips = np.flatnonzero(sharp)
+    return flips, sharp[flips]

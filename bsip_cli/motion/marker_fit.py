@@ -9,8 +9,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from bsip_cli.body.person import Person
-from bsip_cli.motion.inverse_kinematics import tree_of
-from bsip_cli.motion.jacobian import model_markers, pose_columns, subtrees
+from bsip_cli.motion.inverse_kinematics import model_markers, tree_of
+from bsip_cli.motion.jacobian import marker_trust, pose_columns, subtrees
 
 _RESPONSE_FRAMES = 16
 _POSTURE_SD_RAD = 3.0
@@ -131,19 +131,16 @@ def _response(
 
     W holds the weights that the robust loss leaves: a marker far off bends the pose little.
     """
-    distance = np.linalg.norm(residual_m, axis=2)
     frames = np.unique(np.linspace(0, len(R) - 1, _RESPONSE_FRAMES).astype(int))
     tree, m = tree_of(person), len(person.markers)
     columns = pose_columns(tree, R[frames], p[frames], model[frames], subtrees(person))
     turns = R[frames][:, person.marker_segments]
     columns = np.einsum("fmji,fmjv->fmiv", turns, columns).reshape(len(frames), 3 * m, tree.nv)
     total, seen_total = np.zeros((3 * m, 3 * m)), np.zeros(m)
-    for columns_f, d in zip(columns, distance[frames], strict=True):
-        seen = np.isfinite(d)
-        pull = np.where(
-            seen, np.minimum(1.0, limit_m / np.maximum(np.where(seen, d, 1.0), 1e-9)), 0
-        )
-        weight = np.repeat(person.marker_weights / marker_sd_m**2 * pull**2, 3)
+    trust = marker_trust(residual_m[frames], limit_m)
+    for columns_f, share in zip(columns, trust, strict=True):
+        seen = share > 0
+        weight = np.repeat(person.marker_weights / marker_sd_m**2 * share, 3)
         information = columns_f.T @ (weight[:, None] * columns_f)
         information[range(6, tree.nv), range(6, tree.nv)] += _POSTURE_SD_RAD**-2
         information[range(tree.nv), range(tree.nv)] += 1e-9 * np.trace(information) / tree.nv

@@ -172,7 +172,9 @@ def _noise(
     skeleton = person.skeleton
     frames = np.flatnonzero(determined)
     some = curves[frames[np.linspace(0, len(frames) - 1, _NOISE_FRAMES).astype(int)]]
-    unit = coordinate_covariance(person, _normalised(skeleton, some), _WEAK_PRIOR).mean(axis=0)
+    for part in _quaternions(skeleton):
+        some[:, part] /= np.linalg.norm(some[:, part], axis=1, keepdims=True)
+    unit = coordinate_covariance(person, some, _WEAK_PRIOR).mean(axis=0)
     seen = noise_level(curves, rate_hz)
     blocks = list(_blocks(skeleton))
     predicted = np.array(
@@ -197,38 +199,26 @@ def _blocks(skeleton: Skeleton) -> Iterator[tuple[slice, slice, int, float]]:
         skeleton.q_starts, skeleton.v_starts, skeleton.joint_types, strict=True
     ):
         if kind == "free":
-            yield slice(at, at + 3), slice(av, av + 3), 3, 1.0
             yield slice(at + 3, at + 7), slice(av + 3, av + 6), 4, 2.0
+            yield slice(at, at + 3), slice(av, av + 3), 3, 1.0
         elif kind == "spherical":
             yield slice(at, at + 4), slice(av, av + 3), 4, 2.0
         else:
             yield slice(at, at + 1), slice(av, av + 1), 1, 1.0
 
 
-def _normalised(skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
-    out = q.copy()
-    for at in _quaternions(skeleton):
-        out[:, at : at + 4] /= np.linalg.norm(out[:, at : at + 4], axis=1, keepdims=True)
-    return out
-
-
 def _continuous(skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
     """q with the quaternions' signs chosen so that they do not jump."""
     out = q.copy()
-    for at in _quaternions(skeleton):
-        x = out[:, at : at + 4]
+    for part in _quaternions(skeleton):
+        x = out[:, part]
         signs = np.sign(np.einsum("fi,fi->f", x[1:], x[:-1]))
         x[1:] *= np.cumprod(np.where(signs == 0, 1.0, signs))[:, None]
     return out
 
 
-def _quaternions(skeleton: Skeleton) -> list[int]:
-    offset = {"free": 3, "spherical": 0}
-    return [
-        start + offset[kind]
-        for start, kind in zip(skeleton.q_starts, skeleton.joint_types, strict=True)
-        if kind in offset
-    ]
+def _quaternions(skeleton: Skeleton) -> list[slice]:
+    return [part for part, _, count, _ in _blocks(skeleton) if count == 4]
 
 
 def _butterworth(
@@ -256,24 +246,22 @@ def _on_manifold(
     nv = len(skeleton.v_names)
     q = s.value.copy()
     v, a, sd = (np.zeros((frames, nv)) for _ in range(3))
-    for at, av, kind in zip(
-        skeleton.q_starts, skeleton.v_starts, skeleton.joint_types, strict=True
-    ):
-        if kind == "revolute":
-            v[:, av], a[:, av], sd[:, av] = s.first[:, at], s.second[:, at], s.second_sd[:, at]
-            continue
-        turning = slice(av + 3, av + 6) if kind == "free" else slice(av, av + 3)
-        quaternion = slice(at + 3, at + 7) if kind == "free" else slice(at, at + 4)
-        unit, v[:, turning], a[:, turning], sd[:, turning] = _angular(s, quaternion)
-        q[:, quaternion] = unit
-        if kind == "free":
-            v[:, av : av + 3], a[:, av : av + 3], sd[:, av : av + 3] = _linear(
-                s, slice(at, at + 3), unit, v[:, turning]
+    for part, turning, count, _ in _blocks(skeleton):
+        if count == 1:
+            found = [s.first[:, part], s.second[:, part], s.second_sd[:, part]]
+        elif count == 4:
+            q[:, part], *found = _angular(s, part)
+        else:  # of the base, whose turning is there already
+            quaternion, omega = (
+                slice(part.stop, part.stop + 4),
+                slice(turning.stop, turning.stop + 3),
             )
+            found = _linear(s, part, q[:, quaternion], v[:, omega])
+        v[:, turning], a[:, turning], sd[:, turning] = found
     return Motion(q, v, a, sd, inner, marker_noise_m, s.cutoff_hz)
 
 
-def _angular(s: SmoothSignal, part: slice):
+def _angular(s: SmoothSignal, part: slice) -> tuple[np.ndarray, ...]:
     """Unit quaternion, angular velocity and acceleration in body axes, and the latter's noise.
 
     With x the unnormalised curve and n = |x|^2: omega = 2 Im(x* x') / n and

@@ -250,7 +250,9 @@ def _penalty(
         c, inverse = _fit(normal, penalty, right)
         leverage = seen * _variances(basis.values, inverse)
         known = np.bincount(basis.knot_of_sample, leverage, minlength=len(stiffness))
-        new = _mean(known, window) / np.maximum(_mean(_pace(c), window), 1e-300)
+        n = len(c) - 4  # pace: mean square over the channels of the fourth differences
+        pace = (sum(_FOURTH[k] * c[k : k + n] for k in range(5)) ** 2).mean(axis=1)
+        new = _mean(known, window) / np.maximum(_mean(pace, window), 1e-300)
         new = np.exp(_mean(np.log(np.clip(new, *_STIFFNESS_RANGE)), max(3, window // 4)))
         settled = np.max(np.abs(np.log(new / stiffness))) < 0.1
         stiffness = new
@@ -294,25 +296,15 @@ def _cutoff_hz(basis: _Basis, penalty: _Penalty) -> np.ndarray:
 
 def _normal(basis: _Basis, weights: np.ndarray) -> np.ndarray:
     """(6, n) lower band of B^T diag(weights) B."""
-    return _lower_band(basis.values.T @ (basis.values * weights[:, None]))
-
-
-def _pace(c: np.ndarray) -> np.ndarray:
-    """Mean square over the channels of the coefficients' fourth differences."""
-    n = len(c) - 4
-    return (sum(_FOURTH[k] * c[k : k + n] for k in range(5)) ** 2).mean(axis=1)
-
-
-def _mean(x: np.ndarray, window: int) -> np.ndarray:
-    return uniform_filter1d(x, window, mode="nearest")
-
-
-def _lower_band(matrix: sparse.csr_array) -> np.ndarray:
-    """(6, n) lower band of a symmetric matrix."""
+    matrix = basis.values.T @ (basis.values * weights[:, None])
     band = np.zeros((_DEGREE + 1, matrix.shape[0]))
     for k in range(_DEGREE + 1):
         band[k, : matrix.shape[0] - k] = matrix.diagonal(-k)
     return band
+
+
+def _mean(x: np.ndarray, window: int) -> np.ndarray:
+    return uniform_filter1d(x, window, mode="nearest")
 
 
 def _fit(normal: np.ndarray, penalty: _Penalty, right: np.ndarray):

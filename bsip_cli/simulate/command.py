@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterator, Sequence
+import re
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import click
+import numpy as np
 
 from bsip_cli.errors import BadDataError, UsageError, printable
-from bsip_cli.files.folders import is_folder, lies_in
+from bsip_cli.files.folders import entries, is_folder, lies_in
+from bsip_cli.files.force_files import ENDINGS
 from bsip_cli.files.regular import check_regular, fault_of
-from bsip_cli.simulate.effects import effects_of, pair_up
-from bsip_cli.simulate.inject import inject_recording, inject_study, write_truth
-from bsip_cli.simulate.options import StudyOptions, preset
-from bsip_cli.simulate.study import simulate_study
+from bsip_cli.instruments.c3d_file import rewrite_c3d
+from bsip_cli.instruments.readings import Instruments
+from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot
+from bsip_cli.simulate.effects import effects_of, pair_up, touches
+from bsip_cli.simulate.effects.base import Effect
+from bsip_cli.simulate.options import PRESETS, StudyOptions
+from bsip_cli.simulate.study import simulate_study, write_text
 
 
 def simulate_command(
@@ -37,7 +45,7 @@ def simulate_command(
 ) -> None:
     """Write a simulated study into a new or empty folder."""
     _check_new(study)
-    options = preset(preset_name)
+    options = PRESETS[preset_name]
     if participants is not None:
         options = replace(options, participants=participants, sexes="")
     if sequence_s is not None:
@@ -130,3 +138,148 @@ def _writing(place: Path) -> Iterator[None]:
             file=place,
             remedy="make room there, or name another place",
         ) from None
+
+
+# --- measured recordings --------------------------------------------------------------------------
+
+
+RECORDING = re.compile(
+    r"(?P<participant>sub-[^_]+)(_ses-[^_]+)?_task-(?P<task>[^_]+).*\.(c3d|trc)$", re.I
+)
+
+
+def inject_recording(source: Path, copy: Path, effects: Sequence[Effect]) -> dict[str, object]:
+    """Hide effects in one recording; returns the truth about it.
+
+    Raises
+    ------
+    UsageError : an effect that measured data cannot have; a file of another kind.
+    BadDataError : the recording cannot take an effect.
+    """
+    check_injectable(effects)
+    kind = source.suffix.lower()
+    if kind not in (".c3d", ".trc"):
+        raise UsageError("not a recording", file=source, expected="a .c3d, or a .trc with a .mot")
+    copy.parent.mkdir(parents=True, exist_ok=True)
+
+    def change(before: Instruments) -> Instruments:
+        return _changed_by(effects, before, source)
+
+    after = (rewrite_c3d if kind == ".c3d" else rewrite_trc_mot)(source, copy, change)
+    return {"recorded_from_s": after.start_s, "effects": [effect.name for effect in effects]}
+
+
+def check_injectable(effects: Sequence[Effect]) -> None:
+    """Refuse effects that measured data cannot have afterwards."""
+    for effect in effects:
+        if not effect.injectable:
+            raise UsageError(
+                f"{effect.name} cannot be hidden in measured data: {effect.hint}",
+                remedy="hide it in a simulated study (bsip simulate)",
+            )
+
+
+def _changed_by(effects: Sequence[Effect], instruments: Instruments, file: Path) -> Instruments:
+    """Instruments with all effects, each of which must have changed something."""
+    for effect in effects:
+        if "plates" in effect.needs and not instruments.plates:
+            raise BadDataError(f"{effect.name} needs force plates, and there are none", file=file)
+        if "surface" in effect.needs and not instruments.surfaces_known:
+            raise BadDataError(
+                f"{effect.name} needs to know where the plates lie, and a MOT file does not say",
+                file=file,
+            )
+        try:
+            changed = effect.injected(instruments)
+        except (UsageError, BadDataError) as error:  # what is asked for may be in the other files
+            raise BadDataError(
+                error.found, expected=error.expected, remedy=error.remedy, file=file
+            ) from error
+        same = [
+            np.array_equal(getattr(instruments, name), getattr(changed, name), equal_nan=True)
+            for name in ("points_m", "readings")
+        ]
+        if all(same):
+            raise BadDataError(f"{effect.name} changes nothing in this recording", file=file)
+        instruments = changed
+    return instruments
+
+
+def inject_study(
+    study: Path, out: Path, options: StudyOptions, participants: Sequence[str] = ()
+) -> tuple[list[Path], list[BadDataError]]:
+    """Copy a study folder into a new one, with the options' effects in its recordings.
+
+    Hidden files and folders (.git, of a study under version control) are left behind.
+
+    participants : in whose recordings; empty: in everybody's.
+
+    Returns
+    -------
+    The changed recordings, and why others were refused; those are copied as they were, or not at
+    all where they cannot be read.
+    """
+    people = sorted(path.name for path in study.glob("sub-*") if is_folder(path))
+    unknown = sorted(set(participants) - set(people))
+    if not people:
+        raise UsageError("no folders sub-... in it", expected="a study", file=study)
+    if unknown:
+        raise UsageError(f"no participants {', '.join(unknown)}", expected=", ".join(people))
+    effects = {name: effects_of(options, k) for k, name in enumerate(people, start=1)}
+    check_injectable(effects[people[0]])
+    chosen = set(participants or people)
+    changed: list[Path] = []
+    refused: list[BadDataError] = []
+    trials: dict[str, dict[str, object]] = {name: {} for name in people}
+    files = _files_in(study, refused, (study,))
+    # forces come last: those of a changed TRC file are there by then
+    for source in sorted(files, key=lambda path: path.suffix.lower() in ENDINGS):
+        relative = source.relative_to(study)
+        place, match = out / relative, RECORDING.match(source.name)
+        who = match["participant"] if match else ""
+        active = []
+        if match and who in chosen and relative.parts[0] == who:
+            active = [e for e in effects[who] if touches(e, match["task"], options.effect_tasks)]
+        if active:
+            try:
+                trials[who][source.stem] = inject_recording(source, place, active)
+                changed.append(place)
+            except BadDataError as error:
+                refused.append(error)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        if not place.exists():  # neither changed, nor forces that were written with their TRC file
+            shutil.copyfile(source, place)
+    (out / "truth").mkdir(parents=True, exist_ok=True)
+    for name in chosen:
+        hidden = [effect.record() for effect in effects[name]]
+        record = {"participant_id": name, "effects": hidden, "trials": trials[name]}
+        write_truth(out / "truth" / f"{name}_injected.json", record)
+    return changed, refused
+
+
+def _files_in(folder: Path, refused: list[BadDataError], above: tuple[Path, ...]) -> Iterator[Path]:
+    """Every file that can be read, also where links lead, but not in circles."""
+    try:
+        paths = entries(folder)
+    except BadDataError as closed:
+        refused.append(closed)
+        return
+    for path in paths:
+        if is_folder(path) and not any(path.samefile(one) for one in above):
+            yield from _files_in(path, refused, (*above, path))
+        elif found := fault_of(path):
+            found = "leads in a circle" if is_folder(path) else found
+            refused.append(BadDataError(found, file=path, expected="a file that may be read"))
+        else:
+            yield path
+
+
+def write_truth(file: Path, record: Mapping[str, object]) -> None:
+    """What is hidden in a recording, or in all of a participant."""
+
+    def plain(value: object) -> object:
+        if isinstance(value, np.generic):
+            return value.item()
+        raise TypeError(f"{value!r} has no place in JSON")
+
+    write_text(file, json.dumps(record, indent=1, default=plain) + "\n")

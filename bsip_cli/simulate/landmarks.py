@@ -83,9 +83,15 @@ class Swing:
 
 @dataclass(frozen=True, eq=False)
 class Build:
-    """A person's sizes and joints, as in `Person`.
+    """A person's sizes and joints.
 
-    widths_m : of pelvis and thorax, and half that of the shoulders.
+    lengths_m : per segment (limbs per side), joint to joint; the foot heel to metatarsals.
+    widths_m : of pelvis and thorax, and half that of the shoulders. ankle_height_m : of the ankle
+        joint above the sole.
+    joints_m : (3,) of each joint in its parent's frame: tjc and cjc in the abdomen,
+        neck (always zero), shoulder_* in the thorax, hip_* in lower_torso, and so on;
+        sternoclavicular_* in the thorax, if the shoulders move against it.
+    hinges : unit axes (3,) of elbow_* in the upper arm and knee_* in the thigh.
     errors_m : for ljc, cjc and shoulder_*, true joint centre minus what landmarks predict (3,).
     """
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from bsip_cli.errors import UsageError
-
 ALL_TASKS = ("static", "sequence", "throwing", "basketball", "squat", "steps", "walking", "running")
 MORE_TASKS = ("hops", "stepon", "postures")
 
@@ -44,22 +42,6 @@ class Richness:
     inertia_variation: float = 1.0
     girdle: bool = False
     trunk_bend: float = 0.0
-
-    @staticmethod
-    def none() -> Richness:
-        """No noise, no gaps, rigid markers, hinges along Z, joint centres as predicted."""
-        return Richness(
-            soft_tissue=0.0,
-            marker_noise_m=0.0,
-            marker_drift_m=0.0,
-            gaps=False,
-            force_noise_n=0.0,
-            moment_noise_nm=0.0,
-            quantised=False,
-            hinge_tilt=0.0,
-            joint_centre_offset=0.0,
-            placement_error_m=0.0,
-        )
 
 
 @dataclass(frozen=True)
@@ -155,10 +137,3 @@ PRESETS = {
         participants=1, seed=2026, tasks=tuple(_DIAGNOSIS_S), durations_s=_DIAGNOSIS_S
     ),
 }
-
-
-def preset(name: str) -> StudyOptions:
-    """The options of a preset."""
-    if name not in PRESETS:
-        raise UsageError(f"unknown preset {name!r}", expected=" or ".join(PRESETS))
-    return PRESETS[name]

@@ -36,6 +36,7 @@ STATURE_M = {"M": (1.77, 0.07), "F": (1.64, 0.06)}
 BODY_MASS_INDEX = (23.5, 2.8)
 PELVIS_WIDTH_M = {"M": 0.238, "F": 0.240}
 THORAX_WIDTH_M = {"M": 0.150, "F": 0.132}
+LEAST_SHARE = 0.02  # of the largest second moment, of every other
 HALF_SHOULDER_WIDTH_M = {"M": 0.178, "F": 0.158}
 # Reed's hip and lumbar joint centres from the middle of the ASIS, in pelvis widths,
 # ISB pelvis axes (Dumas and Wojtusch 2018).
@@ -62,11 +63,6 @@ class Inertia:
     com_m: np.ndarray
     tensor_kgm2: np.ndarray
 
-    def is_physical(self) -> bool:
-        """Positive mass and positive definite second moments (pseudo-inertia > 0)."""
-        moments = np.linalg.eigvalsh(second_moments(self.tensor_kgm2))
-        return self.mass_kg > 0.0 and bool(moments.min() > 0.0)
-
 
 def second_moments(tensor: np.ndarray) -> np.ndarray:
     """Integral of r r^T dm about the centre of mass, from the inertia tensor."""
@@ -78,10 +74,10 @@ def tensor_of(moments: np.ndarray) -> np.ndarray:
     return np.trace(moments) * np.eye(3) - moments
 
 
-def nearest_physical(tensor: np.ndarray, least_share: float = 0.02) -> np.ndarray:
+def nearest_physical(tensor: np.ndarray) -> np.ndarray:
     """Raise too small principal second moments to a share of the largest one."""
     values, axes = np.linalg.eigh(second_moments(tensor))
-    values = np.maximum(values, least_share * values.max())
+    values = np.maximum(values, LEAST_SHARE * values.max())
     return tensor_of(axes @ np.diag(values) @ axes.T)
 
 
@@ -115,29 +111,16 @@ def combined(parts: list[tuple[Inertia, np.ndarray]]) -> Inertia:
 
 
 @dataclass(frozen=True, eq=False)
-class Person:
+class Person(Build):
     """A simulated person; the truth.
 
-    lengths_m : per segment (limbs per side), joint to joint; the foot heel to metatarsals.
-    joints_m : (3,) of each joint in its parent's frame: tjc and cjc in the abdomen,
-        neck (always zero), shoulder_* in the thorax, hip_* in lower_torso, and so on;
-        sternoclavicular_* in the thorax, if the shoulders move against it.
-    hinges : unit axes (3,) of elbow_* in the upper arm and knee_* in the thigh.
-    inertias : of the 16 bodies. ankle_height_m : of the ankle joint above the sole.
-    tissue : what of the segments swings on its bone.
+    inertias : of the 16 bodies. tissue : what of the segments swings on its bone.
     """
 
-    sex: str
     stature_m: float
     mass_kg: float
-    lengths_m: dict[str, float]
-    joints_m: dict[str, np.ndarray]
-    hinges: dict[str, np.ndarray]
     inertias: dict[str, Inertia]
     markers: dict[str, Marker]
-    ankle_height_m: float
-    pelvis_width_m: float
-    thorax_width_m: float
     trunk_bend: float
     tissue: dict[str, Swing]
 
@@ -196,17 +179,11 @@ def draw_person(rng: np.random.Generator, richness: Richness, sex: str = "") -> 
     if richness.girdle:
         joints, markers = with_girdle(rng, build, markers, richness)
     return Person(
-        sex=sex,
+        **vars(build) | {"joints_m": joints},
         stature_m=stature,
         mass_kg=mass,
-        lengths_m=build.lengths_m,
-        joints_m=joints,
-        hinges=build.hinges,
         inertias=inertias,
         markers=markers,
-        ankle_height_m=build.ankle_height_m,
-        pelvis_width_m=build.widths_m["pelvis"],
-        thorax_width_m=build.widths_m["thorax"],
         trunk_bend=richness.trunk_bend,
         tissue=draw_tissue(rng) if richness.measured_tissue else {},
     )

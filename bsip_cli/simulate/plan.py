@@ -1,4 +1,4 @@
-"""What a movement prescribes: joint angles, feet, support, and what the body carries.
+"""What a movement prescribes (joint angles, feet, support, what the body carries), and its sketch.
 
 Walkway frame: X ahead, Y up, Z right, origin on the ground; moments are about it. A plan leaves the
 pelvis' horizontal path (and in flight its whole pose) to `balance`.
@@ -13,7 +13,17 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from bsip_cli.simulate.numerics import rotate, second_derivative
+from bsip_cli.simulate.landmarks import heel_and_toe_m
+from bsip_cli.simulate.numerics import (
+    about_y,
+    about_z,
+    euler_zxy,
+    rotate,
+    second_derivative,
+    step,
+    wander,
+)
+from bsip_cli.simulate.people import SIDE_SIGN, SIDES, Person
 
 STEP_S = 0.001
 GRAVITY = np.array([0.0, -9.81, 0.0])
@@ -192,3 +202,169 @@ class Plan:
             loads=tuple(map(thin, self.loads)),
             keep=slice(self.keep.start // factor, -(-self.keep.stop // factor)),
         )
+
+
+# --- a movement under construction: arrays that the movements add to, then a plan -----------------
+
+
+MARGIN_S = 0.1  # simulated before and after what is recorded
+STANDING_REACH = 0.9925  # leg length in quiet stance, of the straight leg
+TOE_OUT_RAD = np.deg2rad(8.0)
+SWAY_M = (0.004, 0.003)  # ahead, aside
+
+
+@dataclass(eq=False)
+class FootSketch:
+    """How one foot moves. Times (T,); the foot is flat on the ground when all is zero.
+
+    ahead_m, aside_m : (T,) ankle over the ground, foot flat; raised_m : (T, 3) added.
+    toe_roll_rad : heel up about the metatarsal heads; heel_roll_rad : toes up about the heel.
+    tilt_rad : (T, 3) turn about the ankle (Z, X, Y), for a foot in the air.
+    cop_ahead_m : centre of pressure ahead of the ankle along the foot.
+    """
+
+    ahead_m: np.ndarray
+    aside_m: np.ndarray
+    raised_m: np.ndarray
+    toe_roll_rad: np.ndarray
+    heel_roll_rad: np.ndarray
+    tilt_rad: np.ndarray
+    share: np.ndarray
+    cop_ahead_m: np.ndarray
+    on_plate: np.ndarray
+
+
+@dataclass(eq=False)
+class Sketch:
+    """The joint angles and feet of a person, first in natural stance for all times t_s."""
+
+    person: Person
+    t_s: np.ndarray
+    recorded_s: tuple[float, float]
+    angles: dict[str, np.ndarray] = field(init=False)
+    pelvis_angles: np.ndarray = field(init=False)
+    pelvis_m: np.ndarray = field(init=False)
+    feet: dict[str, FootSketch] = field(init=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.t_s)
+        self.pelvis_angles = np.zeros((n, 3))
+        self.pelvis_m = np.tile([0.035, self._standing_height_m(), 0.0], (n, 1))
+        self.angles = {"waist": np.zeros((n, 3)), "neck": np.zeros((n, 3))}
+        self.feet = {}
+        for side in SIDES:
+            self.angles[f"shoulder_{side}"] = np.zeros((n, 3)) + np.deg2rad([2.0, 12.0, 10.0])
+            self.angles[f"elbow_{side}"] = np.zeros(n) + np.deg2rad(16.0)
+            self.angles[f"wrist_{side}"] = np.zeros((n, 3)) + np.deg2rad([3.0, 0.0, 70.0])
+            self.feet[side] = FootSketch(
+                ahead_m=np.zeros(n),
+                aside_m=np.zeros(n) + SIDE_SIGN[side] * self.half_stance_m(),
+                raised_m=np.zeros((n, 3)),
+                toe_roll_rad=np.zeros(n),
+                heel_roll_rad=np.zeros(n),
+                tilt_rad=np.zeros((n, 3)),
+                share=np.full(n, 0.5),
+                cop_ahead_m=np.zeros(n) + self.mid_foot_m(),
+                on_plate=np.ones(n, dtype=bool),
+            )
+
+    def half_stance_m(self) -> float:
+        """Half the distance of the ankles in natural stance."""
+        return 0.062 * self.person.stature_m
+
+    def mid_foot_m(self) -> float:
+        """Middle of the base of support ahead of the ankle."""
+        return 0.25 * self.person.lengths_m["foot_r"]
+
+    def _standing_height_m(self) -> float:
+        """Height of the lumbar joint centre with nearly straight legs."""
+        person, heights = self.person, []
+        for side, sign in SIDE_SIGN.items():
+            leg = person.lengths_m[f"thigh_{side}"] + person.lengths_m[f"shank_{side}"]
+            hip = person.joints_m[f"hip_{side}"]
+            aside = hip[2] - sign * self.half_stance_m()
+            reach = np.sqrt((STANDING_REACH * leg) ** 2 - aside**2)
+            heights.append(person.ankle_height_m + reach - hip[1])
+        return float(min(heights))
+
+    def sample_of(self, time_s: float) -> int:
+        return round((time_s - self.t_s[0]) / STEP_S)
+
+    def plan(self, **options: Any) -> Plan:
+        """Freeze the sketch; `options` are further fields of `Plan`."""
+        start = self.sample_of(self.recorded_s[0])
+        samples = round((self.recorded_s[1] - self.recorded_s[0]) / STEP_S)
+        return Plan(
+            step_s=STEP_S,
+            angles_rad=self.angles,
+            pelvis_angles_rad=self.pelvis_angles,
+            pelvis_m=self.pelvis_m,
+            feet={side: self._foot(side) for side in SIDES},
+            keep=slice(start, start + samples),
+            **options,
+        )
+
+    def _foot(self, side: str) -> Foot:
+        """The sketched foot as a path of its ankle and frame."""
+        foot = self.feet[side]
+        heel, toe = heel_and_toe_m(self.person.lengths_m[f"foot_{side}"])
+        toe_turn, heel_turn = about_z(-foot.toe_roll_rad), about_z(foot.heel_roll_rad)
+        ankle = np.broadcast_to([0.0, self.person.ankle_height_m, 0.0], foot.raised_m.shape)
+        for pivot_m, turn in ((toe, toe_turn), (heel, heel_turn)):
+            pivot = np.array([pivot_m, 0.0, 0.0])
+            ankle = pivot + rotate(turn, ankle - pivot)
+        yaw = about_y(np.full(1, -SIDE_SIGN[side] * TOE_OUT_RAD))[0]
+        base = np.stack([foot.ahead_m, np.zeros_like(foot.ahead_m), foot.aside_m], axis=1)
+        return Foot(
+            position_m=base + foot.raised_m + rotate(yaw, ankle),
+            rotation=yaw @ heel_turn @ toe_turn @ euler_zxy(foot.tilt_rad),
+            share=foot.share,
+            cop_m=base[:, [0, 2]] + yaw[[0, 2], 0] * foot.cop_ahead_m[:, None],
+            on_plate=foot.on_plate,
+        )
+
+
+def sketch_for(person: Person, duration_s: float) -> Sketch:
+    """An empty sketch recorded from 0 to duration_s, with margins around it."""
+    samples = round((duration_s + 2.0 * MARGIN_S) / STEP_S) + 1
+    return Sketch(person, np.arange(samples) * STEP_S - MARGIN_S, (0.0, duration_s))
+
+
+def plate_under(sketch: Sketch, rng: np.random.Generator) -> tuple[float, float]:
+    """A plate centre near the middle of natural stance."""
+    return (sketch.mid_foot_m() + rng.normal(0.0, 0.02), rng.normal(0.0, 0.03))
+
+
+def add_sway(sketch: Sketch, rng: np.random.Generator, scale: float = 1.0) -> None:
+    """Slow wandering of the COP: along the feet, and between them while both carry load."""
+    ahead = wander(sketch.t_s, rng, scale * SWAY_M[0], 0.15, 0.8)
+    aside = wander(sketch.t_s, rng, scale * SWAY_M[1], 0.15, 0.8) / (2.0 * sketch.half_stance_m())
+    aside *= 4.0 * sketch.feet["r"].share * sketch.feet["l"].share
+    for side, sign in SIDE_SIGN.items():
+        sketch.feet[side].cop_ahead_m += ahead
+        sketch.feet[side].share += sign * aside
+
+
+def add_breath_of_motion(sketch: Sketch, rng: np.random.Generator, size_rad: float) -> None:
+    """Tiny wandering of all joint angles of the upper body, and of the pelvis."""
+    for angle in [*sketch.angles.values(), sketch.pelvis_angles]:
+        for column in np.atleast_2d(angle.T):
+            column += wander(sketch.t_s, rng, size_rad, 0.15, 0.7)
+
+
+def add_squat(sketch: Sketch, down: np.ndarray, depth_m: float) -> None:
+    """Lower the pelvis by depth_m times `down` (T,), and lean the trunk with it."""
+    sketch.pelvis_m[:, 1] -= depth_m * down
+    lean = np.deg2rad(60.0) * depth_m * down
+    sketch.pelvis_angles[:, 0] -= 1.6 * lean
+    sketch.angles["waist"][:, 0] -= 1.5 * lean
+    sketch.angles["neck"][:, 0] += 1.5 * lean
+
+
+def held_ball(
+    sketch: Sketch, rng: np.random.Generator, side: str, release_s: float, mass_kg: float
+) -> Ball:
+    """A ball in front of the palm, let go over about 10 ms around release_s."""
+    hold = 1.0 - step(sketch.t_s, release_s - 0.006, release_s + 0.006)
+    place = np.array([0.035, -0.95 * sketch.person.lengths_m[f"hand_{side}"], 0.0])
+    return Ball(f"hand_{side}", mass_kg, place + 0.004 * rng.standard_normal(3), hold, release_s)

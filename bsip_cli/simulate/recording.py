@@ -8,14 +8,109 @@ from pathlib import Path
 
 import ezc3d
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.instruments.readings import Instruments, SensingPlate
 from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.markers import marker_paths
+from bsip_cli.simulate.landmarks import Marker, Swing, kind_of
+from bsip_cli.simulate.numerics import response, rotate, transpose, unskew
 from bsip_cli.simulate.options import Laboratory, Rates, Richness
 from bsip_cli.simulate.people import Person
-from bsip_cli.simulate.plan import STEP_S
+from bsip_cli.simulate.plan import STEP_S, Poses
 from bsip_cli.simulate.trial import Contact, Trial
+
+# --- markers --------------------------------------------------------------------------------------
+
+
+LAG_SMOOTHING_S = 0.02
+DRIFT_SMOOTHING_S = 0.3
+GAP_FRAMES = (5, 40)
+GAPS_PER_TRIAL = 1.5  # beyond the first one
+GAPS_PER_SECOND = 0.12
+LONGEST_GAP_SHARE = 0.15  # of a trial
+# The bones whose turning against a marker's bone moves the skin over it; * is the marker's side.
+NEIGHBOURS = {
+    "lower_torso": ("thigh_l", "thigh_r"),
+    "thorax": ("lower_torso", "head"),
+    "head": ("thorax", "thorax"),
+    "clavicle": ("thorax", "upper_arm*"),
+    "upper_arm": ("thorax", "forearm*"),
+    "forearm": ("upper_arm*", "hand*"),
+    "hand": ("forearm*", "forearm*"),
+    "thigh": ("lower_torso", "shank*"),
+    "shank": ("thigh*", "foot*"),
+    "foot": ("shank*", "shank*"),
+}
+MOVED_BY_THE_ARM = {"RAC": "upper_arm_r", "LAC": "upper_arm_l", "RSCAP": "upper_arm_r"}
+
+
+def rigid_paths(person: Person, poses: Poses) -> dict[str, np.ndarray]:
+    """(T, 3) path of every marker if it were fixed to its bone."""
+    return {
+        label: poses.point(marker.body, marker.position_m)
+        for label, marker in person.markers.items()
+    }
+
+
+def marker_paths(
+    person: Person, poses: Poses, rate_hz: float, richness: Richness, rng: np.random.Generator
+) -> dict[str, np.ndarray]:
+    """(T, 3) measured path of every marker; NaN where it is lost. Poses at the marker rate."""
+    paths = rigid_paths(person, poses)
+    for label, path in paths.items():
+        marker = person.markers[label]
+        if richness.soft_tissue:
+            segment = "upper_torso" if marker.body == "thorax" else marker.body
+            late = _late(marker, person.tissue.get(segment), path, rate_hz)
+            path = path + _skin_travel(label, marker, poses) + late
+        white = richness.marker_noise_m * rng.standard_normal(path.shape)
+        width = DRIFT_SMOOTHING_S * rate_hz
+        slow = gaussian_filter1d(rng.standard_normal(path.shape), width, axis=0, mode="reflect")
+        # a Gaussian filter of width s leaves 1 / sqrt(2 s sqrt(pi)) of white noise's deviation
+        gain = np.sqrt(2.0 * DRIFT_SMOOTHING_S * rate_hz * np.sqrt(np.pi))
+        paths[label] = path + (white + richness.marker_drift_m * gain * slow)
+    return _with_gaps(paths, rate_hz, rng) if richness.gaps else paths
+
+
+def _skin_travel(label: str, marker: Marker, poses: Poses) -> np.ndarray:
+    """(T, 3) travel of a marker over its bone, a smooth function of the nearby joints."""
+    own, side = poses.rotation[marker.body], marker.body[-2:]
+    first, second = (name.replace("*", side) for name in NEIGHBOURS[kind_of(marker.body)])
+    bodies = (first, MOVED_BY_THE_ARM.get(label, second))
+    turns = [unskew(transpose(own) @ poses.rotation[body]) for body in bodies]
+    sines = np.concatenate(turns, axis=1)
+    return rotate(own, np.hstack([sines, sines**2]) @ marker.skin_gain_m.T)
+
+
+def _late(marker: Marker, swing: Swing | None, path: np.ndarray, rate_hz: float) -> np.ndarray:
+    """(T, 3) soft tissue stays behind when the bone accelerates, or shares a swing driven by it."""
+    if swing is None and len(path) < 5:
+        return np.zeros_like(path)
+    acceleration = np.gradient(np.gradient(path, 1.0 / rate_hz, axis=0), 1.0 / rate_hz, axis=0)
+    if swing is None:
+        width = LAG_SMOOTHING_S * rate_hz
+        return -marker.lag_s2 * gaussian_filter1d(acceleration, width, axis=0, mode="nearest")
+    w, z = 2.0 * np.pi * swing.frequency_hz, swing.damping_ratio
+    denominator = [1.0, 2.0 * z * w, w * w]
+    return marker.swing_share * response([-1.0], denominator, acceleration, 1.0 / rate_hz)
+
+
+def _with_gaps(
+    paths: dict[str, np.ndarray], rate_hz: float, rng: np.random.Generator
+) -> dict[str, np.ndarray]:
+    """Lose a few markers for a short while each."""
+    labels = sorted(paths)
+    frames = len(paths[labels[0]])
+    longest = min(GAP_FRAMES[1], int(LONGEST_GAP_SHARE * frames))
+    if longest <= GAP_FRAMES[0]:
+        return paths
+    count = 1 + rng.poisson(GAPS_PER_TRIAL + GAPS_PER_SECOND * frames / rate_hz)
+    for label in rng.choice(labels, size=min(count, len(labels)), replace=False):
+        length = int(rng.integers(GAP_FRAMES[0], longest + 1))
+        start = int(rng.integers(0, frames - length))
+        paths[label][start : start + length] = np.nan
+    return paths
+
 
 SIMULATION_HZ = round(1.0 / STEP_S)
 MM = 1000.0
@@ -193,21 +288,13 @@ def measure_trial(
 
 
 def write_trial(
-    path: Path,
-    trial: Trial,
-    person: Person,
-    rates: Rates,
-    laboratory: Laboratory,
-    richness: Richness,
-    rng: np.random.Generator,
-    heading_error_rad: float = 0.0,
-    subject: str = "sub-01",
-    effects: Sequence[Effect] = (),
-) -> Measurement:
-    """Measure a trial and write it as C3D: points in mm, plates of type 2 in N and N mm."""
-    measurement = measure_trial(
-        trial, person, rates, laboratory, richness, rng, heading_error_rad, effects
-    )
+    path: Path, measurement: Measurement, quantised: bool = True, subject: str = "sub-01"
+) -> None:
+    """A measured trial as C3D: points in mm, plates of type 2 in N and N mm.
+
+    quantised : whether channels are rounded to the steps of a 16-bit converter, and clipped.
+    """
+    rates = measurement.rates
     c3d, plates, labels = ezc3d.c3d(), measurement.plates, measurement.labels
     names = [f"{name}{k + 1}" for k in range(len(plates)) for name in CHANNELS]
     point, analog = c3d["parameters"]["POINT"], c3d["parameters"]["ANALOG"]
@@ -233,12 +320,11 @@ def write_trial(
     data["points"] = homogeneous
     data["meta_points"]["residuals"] = np.where(lost, -1.0, 0.0)[None]
     data["meta_points"]["camera_masks"] = np.zeros((7, markers, frames), dtype=bool)
-    if richness.quantised:  # to the steps of a 16-bit converter, and clipped
+    if quantised:
         steps = np.tile(FULL_SCALE / ADC_STEPS, len(plates))
         channels = np.clip(np.round(channels / steps), -ADC_STEPS, ADC_STEPS - 1) * steps
     data["analogs"] = channels.T[None]
     c3d.write(str(path))
-    return measurement
 
 
 def _add_plates(c3d: ezc3d.c3d, plates: list[Plate]) -> None:

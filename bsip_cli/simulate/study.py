@@ -16,7 +16,7 @@ from bsip_cli.simulate.effects.loads import WobblingMass
 from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
 from bsip_cli.simulate.options import ALL_TASKS, MORE_TASKS, StudyOptions
 from bsip_cli.simulate.people import Inertia, Person, draw_person
-from bsip_cli.simulate.recording import SIMULATION_HZ, Measurement, write_trial
+from bsip_cli.simulate.recording import SIMULATION_HZ, Measurement, measure_trial, write_trial
 from bsip_cli.simulate.trial import Trial, simulate_trial
 
 HEADING_SPREAD_RAD = np.deg2rad(2.0)
@@ -35,14 +35,7 @@ class ParticipantTruth:
     trials: dict[str, dict[str, object]]
 
 
-@dataclass(frozen=True)
-class StudyTruth:
-    """All participants of a simulated study."""
-
-    participants: tuple[ParticipantTruth, ...]
-
-
-def simulate_study(folder: Path, options: StudyOptions) -> StudyTruth:
+def simulate_study(folder: Path, options: StudyOptions) -> list[ParticipantTruth]:
     """Write participants.tsv, study.toml, the recordings and truth/ into the folder."""
     folder = Path(folder)
     check_options(options)
@@ -59,7 +52,7 @@ def simulate_study(folder: Path, options: StudyOptions) -> StudyTruth:
     with_girdle = 'marker_set = "robert17"\nskeleton = "robert17"\n'
     settings = with_girdle if options.richness.girdle else 'marker_set = "hansen2017"\n'
     write_text(folder / "study.toml", settings)
-    return StudyTruth(tuple(truths))
+    return truths
 
 
 def check_options(options: StudyOptions) -> None:
@@ -126,8 +119,7 @@ def simulate_participant(folder: Path, options: StudyOptions, number: int) -> Pa
             ball_mass,
             body,
         )
-        measurement = write_trial(
-            folder / name / f"{stem}.c3d",
+        measurement = measure_trial(
             trial,
             person,
             options.rates_of(task),
@@ -135,9 +127,10 @@ def simulate_participant(folder: Path, options: StudyOptions, number: int) -> Pa
             options.richness,
             generator(options, number, RECORDING, task),
             heading_error,
-            name,
             body,
         )
+        path = folder / name / f"{stem}.c3d"
+        write_trial(path, measurement, options.richness.quantised, name)
         trials[stem] = _trial_record(trial, measurement, active, seed)
     record = {
         "participant_id": name,
@@ -171,8 +164,7 @@ def _person_record(person: Person) -> dict[str, object]:
         "sex": person.sex,
         "mass_kg": person.mass_kg,
         "stature_m": person.stature_m,
-        "pelvis_width_m": person.pelvis_width_m,
-        "thorax_width_m": person.thorax_width_m,
+        **{f"{name}_width_m": person.widths_m[name] for name in ("pelvis", "thorax")},
         "ankle_height_m": person.ankle_height_m,
         "trunk_bend": person.trunk_bend,
         "swinging_tissue": {name: asdict(swing) for name, swing in person.tissue.items()},
@@ -222,12 +214,7 @@ def _trial_record(
             "release_s": ball.release_s,
         },
         "contacts": [
-            {
-                "side": contact.side,
-                "start_s": contact.start_s,
-                "end_s": contact.end_s,
-                "on_plate": contact.on_plate,
-            }
+            {name: getattr(contact, name) for name in ("side", "start_s", "end_s", "on_plate")}
             for contact in trial.contacts
         ],
         "flights_s": [

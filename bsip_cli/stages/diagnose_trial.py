@@ -6,24 +6,21 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import empty_table
+from bsip_cli.diagnosis.evenness import plain
+from bsip_cli.diagnosis.fault_scores import Library, limits_of
+from bsip_cli.diagnosis.fault_search import Found, Verdict
+from bsip_cli.diagnosis.findings import Finding, Number
+from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, HeldOut, first_blocks, start_s
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.diagnosis_rows import nothing, rows_of
 
 
 def run(unit: Unit) -> None:
     """Read the person's diagnosis and error budget; write this trial's part of them."""
     assert unit.trial is not None
-    _write_diagnosis(unit)
+    stem, overall = unit.trial.stem, unit.read("overall-diagnosis")
     budget = unit.read("overall-error-budget")
-    unit.write("error-budget", budget[budget["trial"] == unit.trial.stem])
-
-
-def _write_diagnosis(unit: Unit) -> None:
-    overall = unit.read("overall-diagnosis")
-    assert unit.trial is not None
-    stem = unit.trial.stem
-    looked_at = unit.facts("overall-diagnosis").get("trials", [])
-    if stem not in looked_at:
+    unit.write("error-budget", budget[budget["trial"] == stem])
+    if stem not in unit.facts("overall-diagnosis").get("trials", []):
         unit.write("diagnosis", empty_table("diagnosis"))
         return
     concerned = np.array([stem in trials.split(", ") for trials in overall["trials"]], dtype=bool)
@@ -34,7 +31,133 @@ def _write_diagnosis(unit: Unit) -> None:
         p_value = float(rows["p_value"].min()) if len(rows) else np.nan
         none = rows_of((nothing(p_value, (stem,)),), (stem,))
         rows = pd.concat([none, rows], ignore_index=True)
-        order = [1, *(rows["rank"][1:] + 1)]
-        rows["rank"] = order
+        rows["rank"] = [1, *(rows["rank"][1:] + 1)]
     rows["rank"] = rows["rank"].rank(method="dense").astype(int)
     unit.write("diagnosis", rows)
+
+
+# --- what the artifacts of a person's diagnosis hold: rows of findings and limits, facts ----------
+
+
+_STEP = 1e-3  # of the typical size
+
+
+def rows_of(findings: tuple[Finding, ...], trials: tuple[str, ...]) -> pd.DataFrame:
+    """One row per parameter; where nothing is named in the trials that were looked at, a first row
+    that says so."""
+    if trials and all(one.verdict == "rejected" for one in findings):
+        least = pd.Series([one.p_value for one in findings], dtype=float).min()
+        findings = (nothing(least, trials), *findings)
+    rows = [
+        {
+            "rank": rank,
+            "effect": one.effect,
+            "target": one.target,
+            "parameter": number.name,
+            "estimate": number.value,
+            "unit": number.unit,
+            "ci_low": number.low,
+            "ci_high": number.high,
+            "p_value": one.p_value,
+            **dict(zip(("gain_percent", "gain_ci_low", "gain_ci_high"), one.gain, strict=True)),
+            "verdict": one.verdict,
+            "class_id": one.class_id,
+            "sentence": one.sentence,
+            "trials": ", ".join(one.trials),
+            "probability": one.probability,
+            "scope": one.scope,
+            "rms_change": one.rms_change,
+        }
+        for rank, one in enumerate(findings, start=1)
+        for number in one.numbers
+    ]
+    return pd.DataFrame(rows) if rows else empty_table("overall-diagnosis")
+
+
+def nothing(p_value: float, trials: tuple[str, ...]) -> Finding:
+    """That a diagnosis has found nothing."""
+    said = (Number("", "", np.nan),), "nothing wrong above the noise"
+    return Finding("none", "", trials, *said, p_value, 1 - p_value, scope="")
+
+
+def facts_of(found: Found, held: HeldOut, findings: tuple[Finding, ...]) -> dict:
+    """The faults in full: their values from all data and from each fold's training blocks, for
+    ``extend``, and the standard deviation of what is reported if the error's model is exact."""
+    session = found.fit.session
+    said = {(f.effect, f.target, f.trials): f.verdict for f in findings if f.verdict != "rejected"}
+    causes = []
+    for one in found.verdicts:
+        fault = found.fit.faults[one.number]
+        trials = tuple(session.trials[t].name for t in fault.trials)
+        key = plain(fault.effect).name, fault.target, trials
+        if key in said:
+            more = held.values(one.number).tolist(), _bounds(found, one)
+            causes.append(cause_record(*key, fault.values, *more, said[key]))
+    starts = first_blocks(session)
+    return {
+        "trials": [one.name for one in session.trials],
+        "causes": causes,
+        "block_s": BLOCK_S,
+        "folds": FOLDS,
+        "blocks": {
+            one.name: {"first": starts[t], "start_s": start_s(session, t)}
+            for t, one in enumerate(session.trials)
+        },
+    }
+
+
+def cause_record(
+    effect: str,
+    target: str,
+    trials: tuple[str, ...],
+    values: np.ndarray,
+    folds: list[list[float]] | None = None,
+    bounds: dict[str, float] | None = None,
+    verdict: str = "named",
+) -> dict:
+    """A cause for ``extend``; of the same sizes in every fold where ``folds`` says none."""
+    sizes = values.tolist()
+    return {
+        "effect": effect,
+        "target": target,
+        "trials": list(trials),
+        "verdict": verdict,
+        "values": sizes,
+        "folds": folds or [sizes] * FOLDS,
+        "bounds": bounds or {},
+    }
+
+
+def _bounds(found: Found, verdict: Verdict) -> dict[str, float]:
+    """Standard deviation of all that a fault reports, by the slope of that."""
+    fit, one = found.fit, found.fit.faults[verdict.number]
+    session, typical = fit.session, one.typical(found.fit.session)
+    mine = fit.coefficients(verdict.number)
+    slopes = []
+    for step in _STEP * np.diag(typical):
+        ahead, behind = (
+            np.array([x for *_, x in one.with_values(session, v).reported(session)])
+            for v in (one.values + step, one.values - step)
+        )
+        slopes.append((ahead - behind) / (2 * _STEP))
+    slope = np.stack(slopes, axis=1)
+    spread = np.sqrt(np.einsum("ij,jk,ik->i", slope, fit.covariance[mine, mine], slope))
+    names = [name for name, *_ in one.reported(session)]
+    return dict(zip(names, spread.tolist(), strict=True))
+
+
+def detection_rows(found: Found, library: Library, named_from: float) -> pd.DataFrame:
+    """The ``detection`` artifact: the smallest size of every fault that would have been named."""
+    session = found.fit.session
+    rows = [
+        {
+            "effect": limit.place.candidate.effect.name,
+            "target": limit.place.candidate.target,
+            "parameter": limit.parameter,
+            "unit": limit.unit,
+            "limit": limit.size,
+            "trials": ", ".join(session.trials[t].name for t in limit.place.trials),
+        }
+        for limit in limits_of(session, library, found.scores, named_from)
+    ]
+    return pd.DataFrame(rows)

@@ -34,8 +34,11 @@ def run(unit: Unit) -> None:
     """Read the diagnosis and what identified OM; write the extended model's parameters."""
     person = person_of(unit)
     causes = causes_of(unit)
-    unit.write("extended-skeleton", _skeleton_rows(person, causes))
-    bsip, trials = unit.read("bsip"), _identifying(unit)
+    bent = [cause for cause in causes if isinstance(cause.effect, MissingJoint)]
+    parts = _torso_rows(person, bent[0]) if bent else empty_table("extended-skeleton")
+    unit.write("extended-skeleton", parts)
+    bsip, stems = unit.read("bsip"), set(unit.read("used-blocks")["trial"])
+    trials = [trial for trial in unit.trials("kinematics", "wrench") if trial.stem in stems]
     if causes and not trials:
         unit.warn(f"{unit.name}: nothing was identified, so there is no OM to extend")
     if not causes or not trials:
@@ -47,12 +50,6 @@ def run(unit: Unit) -> None:
     unit.write("extended-bsip", extended)
     unit.write("bsip-change", changes)
     unit.warn(f"{unit.name}: {change_sentence(with_all_causes(changes))}")
-
-
-def _identifying(unit: Unit) -> list[Trial]:
-    """The trials that identified OM."""
-    stems = set(unit.read("used-blocks")["trial"])
-    return [trial for trial in unit.trials("kinematics", "wrench") if trial.stem in stems]
 
 
 # --- parameters -------------------------------------------------------------------------------
@@ -87,42 +84,34 @@ def _identified(
     prior = prior_from(unit, unit.read("regression"), person)
     recordings, _ = recordings_of(unit, person, trials, changes)
     problem, _ = problem_of(unit, person, prior, recordings)
-    found = readable(estimate_by(_estimator(unit), problem), prior)
+    # the estimator that identified OM, whatever is configured now
+    estimator = str(unit.read("identification").set_index("method")["estimator"][OM])
+    found = readable(estimate_by(estimator, problem), prior)
     return bsip_table(OM, person.skeleton.body_names, found.values, found.sd, found.share)
-
-
-def _estimator(unit: Unit) -> str:
-    """The one that identified OM, whatever is configured now."""
-    known = unit.read("identification").set_index("method")["estimator"]
-    return str(known[OM])
 
 
 # --- what the causes had done -----------------------------------------------------------------
 
 
 def _changes(bsip: pd.DataFrame, extended: pd.DataFrame) -> pd.DataFrame:
-    before = bsip[bsip["method"] == OM].set_index("segment")
-    tables = [
-        _change(before, extended[extended["method"] == method].set_index("segment"), method)
-        for method in dict.fromkeys(extended["method"])
-    ]
+    om = bsip[bsip["method"] == OM].set_index("segment")
+    tables = []
+    for method in dict.fromkeys(extended["method"]):
+        after = extended[extended["method"] == method].set_index("segment")
+        before, known = om.loc[after.index], {"method": method, "segment": list(after.index)}
+        mass = (after["mass_kg"] - before["mass_kg"]).to_numpy()
+        shift = (after[_COM] - before[_COM]).to_numpy()
+        length = np.linalg.norm(shift, axis=1)
+        table = pd.DataFrame(known | {"mass_change_kg": mass})
+        table[_COM_CHANGE] = shift
+        table["com_change_m"] = length
+        table["largest"] = _largest(mass, length)
+        table["sentence"] = [
+            f"{segment_label(segment)}: mass {m:+.3f} kg, centre of mass moved by {1000 * x:.1f} mm"
+            for segment, m, x in zip(after.index, mass, length, strict=True)
+        ]
+        tables.append(table)
     return pd.concat(tables, ignore_index=True)
-
-
-def _change(before: pd.DataFrame, after: pd.DataFrame, method: str) -> pd.DataFrame:
-    before = before.loc[after.index]
-    mass = (after["mass_kg"] - before["mass_kg"]).to_numpy()
-    shift = (after[_COM] - before[_COM]).to_numpy()
-    length = np.linalg.norm(shift, axis=1)
-    table = pd.DataFrame({"method": method, "segment": list(after.index), "mass_change_kg": mass})
-    table[_COM_CHANGE] = shift
-    table["com_change_m"] = length
-    table["largest"] = _largest(mass, length)
-    table["sentence"] = [
-        f"{segment_label(segment)}: mass {m:+.3f} kg, centre of mass moved by {1000 * x:.1f} mm"
-        for segment, m, x in zip(after.index, mass, length, strict=True)
-    ]
-    return table
 
 
 def _largest(mass: np.ndarray, length: np.ndarray) -> list[str]:
@@ -137,15 +126,8 @@ def _largest(mass: np.ndarray, length: np.ndarray) -> list[str]:
 # --- skeleton ---------------------------------------------------------------------------------
 
 
-def _skeleton_rows(person: Person, causes: tuple[Cause, ...]) -> pd.DataFrame:
-    """The two parts of the torso, if its second joint was named."""
-    for cause in causes:
-        if isinstance(cause.effect, MissingJoint):
-            return _torso_rows(person, cause)
-    return empty_table("extended-skeleton")
-
-
 def _torso_rows(person: Person, cause: Cause) -> pd.DataFrame:
+    """The two parts of the torso, whose second joint was named."""
     split = split_torso(person, cause.target, cause.values)
     skeleton, i = person.skeleton, person.skeleton.index(split.segment)
     below, above = f"{split.segment}_below", f"{split.segment}_above"

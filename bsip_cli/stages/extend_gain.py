@@ -21,24 +21,20 @@ def run(unit: Unit) -> None:
         return
     components = next(iter(concerned.values()))["blocks"]
     errors = {
-        component: pooled([_errors(one["blocks"][component]) for one in concerned.values()])
+        component: pooled(
+            [
+                BlockErrors(**{name: np.array(x) for name, x in one["blocks"][component].items()})
+                for one in concerned.values()
+            ]
+        )
         for component in components
     }
     methods = dict.fromkeys(one["method"] for one in concerned.values())
     seed = crc32(unit.name.encode())
-    rows = gain_rows(errors, ", ".join(methods), _data(concerned), seed)
+    data = "; ".join(
+        f"{kind}: {', '.join(stem for stem, one in concerned.items() if one['data'] == kind)}"
+        for kind in dict.fromkeys(one["data"] for one in concerned.values())
+    )  # held_out: a, b; identification: c
+    rows = gain_rows(errors, ", ".join(methods), data, seed)
     unit.write("overall-gain", rows)
     unit.warn(f"{unit.name}: {gain_sentence(rows) or 'no error could be compared'}")
-
-
-def _errors(sums: dict[str, list[float]]) -> BlockErrors:
-    return BlockErrors(**{name: np.array(values) for name, values in sums.items()})
-
-
-def _data(concerned: dict[str, dict]) -> str:
-    """``held_out: a, b; identification: c``."""
-    kinds = dict.fromkeys(one["data"] for one in concerned.values())
-    return "; ".join(
-        f"{kind}: {', '.join(stem for stem, one in concerned.items() if one['data'] == kind)}"
-        for kind in kinds
-    )

@@ -62,11 +62,12 @@ def run(unit: Unit) -> None:
     _amend(unit, judgement, wrenches, signals)
     last = list(signals)[-1]
     errors = _errors(judgement, signals, last, blocks)
-    unit.write(
-        "gain",
-        gain_rows(errors, last, _held_out(unit, judgement), crc32(unit.name.encode())),
-        facts=_facts(errors, last, judgement),
-    )
+    rows = gain_rows(errors, last, _held_out(unit, judgement), crc32(unit.name.encode()))
+    sums = {  # per block, for the gain over all trials
+        component: {name: values.tolist() for name, values in asdict(one).items()}
+        for component, one in errors.items()
+    }
+    unit.write("gain", rows, facts={"method": last, "data": judgement.data, "blocks": sums})
     unit.write("corrected-wrench", _corrected(scene, measured, [causes[k] for k in own]))
 
 
@@ -116,24 +117,12 @@ def _held_out(unit: Unit, judgement: Judgement) -> str:
         f"blocks of {facts['block_s']:g} s, in {facts['folds']} folds, each judged with the sizes "
         "of the causes that the other folds gave"
     )
-    return f"{judgement.data}: {sizes}; {_identified_by(judgement)}"
-
-
-def _identified_by(judgement: Judgement) -> str:
+    by = "the trial was held out of the identification"
     if judgement.data != "held_out":
-        return "the trial was used in the identification"
-    if judgement.used.any():
-        return "the judged seconds were held out of the identification, others of the trial not"
-    return "the trial was held out of the identification"
-
-
-def _facts(errors: dict[str, BlockErrors], method: str, judgement: Judgement) -> dict:
-    """The sums per block, for the gain over all trials."""
-    sums = {
-        component: {name: values.tolist() for name, values in asdict(one).items()}
-        for component, one in errors.items()
-    }
-    return {"method": method, "data": judgement.data, "blocks": sums}
+        by = "the trial was used in the identification"
+    elif judgement.used.any():
+        by = "the judged seconds were held out of the identification, others of the trial not"
+    return f"{judgement.data}: {sizes}; {by}"
 
 
 # --- forces without their errors --------------------------------------------------------------

@@ -12,7 +12,7 @@ from bsip_cli.artifacts import empty_table
 from bsip_cli.body.inertia import PARAMETERS, UNITS
 from bsip_cli.body.names import in_words as segment_in_words
 from bsip_cli.body.person import Person
-from bsip_cli.body.skeleton import Skeleton, load_skeleton
+from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.diagnosis.filtering import slow
 from bsip_cli.diagnosis.support import Support, support_of
 from bsip_cli.dynamics.base_parameters import expressions
@@ -33,7 +33,7 @@ from bsip_cli.identification.uncertainty import (
 )
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import spread_names
-from bsip_cli.stages.frames import WRENCH, bsip_table, load_words, loads_record, person_from
+from bsip_cli.stages.frames import WRENCH, bsip_table, load_words, loads_record, person_of
 from bsip_cli.stages.identification_problem import (
     duration_s,
     estimate_by,
@@ -51,21 +51,26 @@ _SHORTEST_S = 0.5
 
 def run(unit: Unit) -> None:
     """Read motion, wrench, person and RM; write bsip and what belongs to it."""
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
+    skeleton = person.skeleton
     regression = unit.read("regression")
     prior = prior_from(unit, regression, person)
     contacts = _external_contacts(unit, person, prior.phi)
     trials = _identification_trials(unit, contacts)
     recordings, blocks = recordings_of(unit, person, trials)
-    _tell_of_loads(unit, [trial for trial in trials if trial.stem in set(blocks["trial"])])
+    for trial in trials:
+        known = load_words(unit, trial) if trial.stem in set(blocks["trial"]) else ""
+        if known:
+            unit.warn(f"{unit.name}: taken off the forces of {trial.stem} as a known load: {known}")
     if duration_s(recordings) < _SHORTEST_S:
         _write_table_only(unit, regression, recordings, contacts)
         unit.write("covariance", _covariance_table(skeleton, {RM: prior.root}))
         return
     _tell_of_fixed(unit, person)
     problem, reference = problem_of(unit, person, prior, recordings)
-    estimators = _estimators(unit)
+    # by method: OM is the first that is configured, others go by their names
+    first, *others = unit.config.identify.estimators
+    estimators = {RM_MASS: "mass_factor", OM: first} | {name: name for name in others}
     estimates = {method: estimate_by(name, problem) for method, name in estimators.items()}
     results = {method: readable(estimate, prior) for method, estimate in estimates.items()}
     tables = [regression.drop(columns=["note", *spread_names()])]
@@ -119,12 +124,6 @@ def _as_records(contacts: Mapping[str, Support]) -> dict[str, dict]:
     return {stem: asdict(support) for stem, support in contacts.items()}
 
 
-def _estimators(unit: Unit) -> dict[str, str]:
-    """By method: RM+mass always; OM is the first that is configured, others go by their names."""
-    first, *others = unit.config.identify.estimators
-    return {RM_MASS: "mass_factor", OM: first} | {name: name for name in others}
-
-
 # --- which data -------------------------------------------------------------------------------
 
 
@@ -170,13 +169,6 @@ def _tell_of_contacts(
         if trial.stem in contacts:
             found = contacts[trial.stem].words()
             unit.warn(f"{unit.name}: {trial.stem} does not identify: {found}; {used}")
-
-
-def _tell_of_loads(unit: Unit, trials: list[Trial]) -> None:
-    for trial in trials:
-        known = load_words(unit, trial)
-        if known:
-            unit.warn(f"{unit.name}: taken off the forces of {trial.stem} as a known load: {known}")
 
 
 def _tell_of_fixed(unit: Unit, person: Person) -> None:

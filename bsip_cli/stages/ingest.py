@@ -59,7 +59,9 @@ def run(unit: Unit) -> None:
     if unit.config.ingest.zero_unloaded_plates:
         recording, zeroed = _without_zero(recording)
         findings += zeroed
-    filled = _fill(unit, recording, marker_set, names, match.index)
+    segment = {marker.label: marker.segment for marker in marker_set.markers}
+    segments = [segment[name] for name in names]
+    filled = _fill(unit, recording, [match.index[name] for name in names], segments)
     findings += _gap_findings(names, filled)
     wrench = wrench_at_marker_rate(recording)
     stated = asdict(recording.stated)
@@ -69,11 +71,11 @@ def run(unit: Unit) -> None:
         "analog_rate_hz": recording.analog_rate_hz,
     }
     person = {f"stated_{name}": stated[name] for name in ("mass_kg", "height_m", "sex")}
-    markers = {one: _markers_on(marker_set, names, filled, (one,)) for one in SEGMENTS}
+    markers = {one: filled.markers_m[:, np.equal(segments, one)] for one in SEGMENTS}
     feet = _foot_contacts(recording, markers, wrench)
     shown = feet.measured if feet.has_both else np.zeros_like(feet.measured)
     stretches = stretches_of(markers, feet.total_N, shown, recording.marker_rate_hz)
-    trunk = _markers_on(marker_set, names, filled, TRUNK)
+    trunk = filled.markers_m[:, np.isin(segments, TRUNK)]
     mass, about_mass = _mass_on_plates(unit, stated_mass(unit, person), stretches)
     if mass is None:
         loaded = feet.measured & upright_frames(markers)
@@ -152,17 +154,13 @@ def _require(unit: Unit, names: list[str], recording: Recording) -> None:
         )
 
 
-def _segment_of(marker_set: MarkerSet) -> dict[str, str]:
-    return {marker.label: marker.segment for marker in marker_set.markers}
-
-
-def _fill(unit, recording, marker_set, names, index) -> FilledMarkers:
-    positions = recording.markers_m[:, [index[name] for name in names]]
-    segment = _segment_of(marker_set)
+def _fill(
+    unit: Unit, recording: Recording, columns: list[int], segments: list[str]
+) -> FilledMarkers:
+    positions, options = recording.markers_m[:, columns], unit.config.ingest
     groups: dict[str, list[int]] = {}
-    for k, name in enumerate(names):
-        groups.setdefault(segment[name], []).append(k)
-    options = unit.config.ingest
+    for k, segment in enumerate(segments):
+        groups.setdefault(segment, []).append(k)
     return fill_gaps(
         positions,
         recording.marker_rate_hz,
@@ -170,14 +168,6 @@ def _fill(unit, recording, marker_set, names, index) -> FilledMarkers:
         options.max_gap_s,
         options.max_rigid_gap_s,
     )
-
-
-def _markers_on(
-    marker_set: MarkerSet, names: list[str], filled: FilledMarkers, segments: tuple[str, ...]
-) -> np.ndarray:
-    """The markers of some segments, (n_frames, k, 3)."""
-    segment = _segment_of(marker_set)
-    return filled.markers_m[:, [k for k, n in enumerate(names) if segment[n] in segments]]
 
 
 def _foot_contacts(

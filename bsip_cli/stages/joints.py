@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.names import in_words
 from bsip_cli.body.person import Person
-from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.cause import Cause, method_of
 from bsip_cli.diagnosis.corrected_wrench import corrected_plates, is_of_the_forces
 from bsip_cli.dynamics.joint_moments import (
@@ -40,7 +39,7 @@ from bsip_cli.stages.frames import (
     coordinates_from,
     load_phi,
     loads_record,
-    person_from,
+    person_of,
 )
 from bsip_cli.stages.reconstruct import parameters_of
 from bsip_cli.stages.trial_scene import body_beside, causes_of, outline, plate_names, scene_of
@@ -56,8 +55,7 @@ _NO_POSE = "the markers do not determine the pose"
 
 def run(unit: Unit) -> None:
     """Read motion, plates, contacts and parameters; write joint-moments and joint-peaks."""
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
     trial, bsip = trial_of(unit, person), unit.read("bsip")
     methods, phi = parameters_of(bsip, person)
     spread = _spreads(unit, methods)
@@ -146,7 +144,7 @@ def trial_of(unit: Unit, person: Person) -> _Trial:
     kinematics, contacts, wrench = (unit.read(k) for k in ("kinematics", "contacts", "wrench"))
     q, v, a = coordinates_from(kinematics, person.skeleton)
     motion = segment_motion(pinocchio_model(person), q, v, a)
-    names = {"l": "left", "r": "right"}
+    names, corners = {"l": "left", "r": "right"}, unit.read("plates")
     return _Trial(
         person,
         kinematics["time_s"].to_numpy(),
@@ -156,21 +154,16 @@ def trial_of(unit: Unit, person: Person) -> _Trial:
         kinematics["determined"].to_numpy(),
         wrench["valid"].to_numpy(),
         acceleration_noise(kinematics, person.skeleton),
-        _readings(unit.read("plates"), wrench),
+        tuple(
+            Reading(wrench[[f"plate{n}_{c}" for c in WRENCH]].to_numpy(), outline(corners, n))
+            for n in plate_names(wrench)
+        ),
         {side: _foot_points(person, motion, side) for side in SIDES},
         {side: contacts[f"{names[side]}_on_ground"].to_numpy() for side in SIDES},
         {side: contacts[f"{names[side]}_on_plate"].to_numpy() for side in SIDES},
         unit.config.joints.cutoff_hz,
         plate_names(wrench),
     )
-
-
-def _readings(corners: pd.DataFrame, wrench: pd.DataFrame) -> tuple[Reading, ...]:
-    found = []
-    for name in plate_names(wrench):
-        reading = wrench[[f"plate{name}_{c}" for c in WRENCH]].to_numpy()
-        found.append(Reading(reading, outline(corners, name)))
-    return tuple(found)
 
 
 def _foot_points(person: Person, motion: SegmentMotion, side: str) -> np.ndarray:
@@ -237,12 +230,10 @@ def _tell(unit: Unit, trial: _Trial, reasons: Reasons) -> None:
     parts = []
     for words, out in reasons.items():
         counts = out.sum(axis=0)
-        names = np.array(trial.person.skeleton.joints[1:])
+        names = list(map(in_words, trial.person.skeleton.joints[1:]))
         for frames in sorted(set(counts.tolist()) - {0}, reverse=True):
-            joints = names[counts == frames]
-            which = (
-                "all joints" if len(joints) == len(names) else listing(list(map(in_words, joints)))
-            )
+            joints = [name for name, n in zip(names, counts, strict=True) if n == frames]
+            which = "all joints" if len(joints) == len(names) else listing(joints)
             parts.append(f"{which} in {frames} ({words})")
     if parts:
         count = len(trial.times_s)
@@ -325,7 +316,12 @@ def _extended(
     of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
     for place, k in enumerate(own):
         among = [causes[j] for j in own[: place + 1]]
-        if not all(_is_carried(cause) for cause in among):
+        if not all(
+            is_of_the_forces(one)
+            or one.effect.on_its_segment
+            or isinstance(one.effect, (SegmentInertia, Turned))
+            for one in among
+        ):
             unit.warn(
                 f"{unit.name}: no joint moments of {method_of(among)}: what moves joints or "
                 "markers would need another motion"
@@ -341,12 +337,6 @@ def _extended(
         if reasons[_SHARED].any():
             unit.warn(f"{unit.name}: {method_of(among)}: joint moments are left out: {_SHARED}")
         yield method_of(among), loads, trial.valid(reasons)
-
-
-def _is_carried(cause: Cause) -> bool:
-    effect = cause.effect
-    of_a_body = effect.on_its_segment or isinstance(effect, (SegmentInertia, Turned))
-    return is_of_the_forces(cause) or of_a_body
 
 
 def sharing(person: Person, causes: Sequence[Cause]) -> np.ndarray:
@@ -386,9 +376,8 @@ def besides(
 ) -> dict[str, Ground]:
     """What acts on each segment: the ground, less what the causes at a segment need."""
     found = dict(on_feet)
-    nothing = Ground(
-        np.zeros((len(scene.times_s), 6)), np.zeros((len(scene.times_s), 6)), np.zeros(3)
-    )
+    none = np.zeros((len(scene.times_s), 6))
+    nothing = Ground(none, none, np.zeros(3))
     for cause in causes:
         if cause.effect.on_its_segment:
             held_by = cause.target.split("+")
@@ -503,9 +492,7 @@ def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str])
 
 def _compared_with(method: str, methods: list[str]) -> str:
     """RM; of an extended model the one with a cause less."""
-    if method == RM:
-        return ""
     if not is_extended(method):
-        return RM
+        return "" if method == RM else RM
     before = [m for m in methods[: methods.index(method)] if is_extended(m)]
     return before[-1] if before else OM

@@ -22,7 +22,7 @@ from bsip_cli.diagnosis.shared_faults import (
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Parameter
 from bsip_cli.running.unit import Unit
-from bsip_cli.stages.diagnosis_rows import cause_record
+from bsip_cli.stages.diagnose_trial import cause_record
 
 _KEY = ("effect", "target", "parameter", "standing")
 _FAULTS = {one.name for one in OF_A_LABORATORY}
@@ -165,10 +165,7 @@ def pooled_rows(laboratory: str, pooled: Pooled) -> Iterable[dict]:
     for k, one in enumerate(pooled.coordinates):
         yield {
             "laboratory": laboratory,
-            "effect": one.effect,
-            "target": one.target,
-            "parameter": one.parameter,
-            "standing": one.standing,
+            **vars(one),
             "spread": pooled.spread[k],
             "pull": pooled.pull[k],
             **{f"precision_{j}": x for j, x in enumerate(pooled.precision[k])},

@@ -189,7 +189,9 @@ def _rows(
         sentence = _sentence(one.cause, one.sizes, one.said, one.probability, counts)
         cells = {"sentence": sentence, "laboratory": laboratory, "scope": "laboratory"}
         yield from _rows_of(one, counts, cells)
-    order = _order(sessions, mine.recorded_on)
+    dates = mine.recorded_on
+    dated = [(dates[s.name], k) for k, s in enumerate(sessions) if s.name in dates]
+    order = [k for _, k in sorted(dated)]
     odds, named_from = options.fault_prior_odds, options.named_from
     for deviation in deviations_of(lab, odds, named_from, order, rng):
         them = [sessions[k] for k in deviation.sessions]
@@ -212,7 +214,11 @@ def _rows_of(
     for size in found.sizes:
         yield _row(
             (found.cause.effect, found.cause.target, size.parameter.name),
-            **_numbers(size),
+            estimate=size.value,
+            unit=size.parameter.unit,
+            ci_low=size.low,
+            ci_high=size.high,
+            limit=size.limit,
             probability=found.probability,
             verdict=found.said,
             class_id=found.class_id,
@@ -229,16 +235,6 @@ def _row(key: tuple[str, str, str], **cells: object) -> dict:
     return dict(zip(("effect", "target", "parameter"), key, strict=True)) | empty | cells
 
 
-def _numbers(size: Size) -> dict:
-    return {
-        "estimate": size.value,
-        "unit": size.parameter.unit,
-        "ci_low": size.low,
-        "ci_high": size.high,
-        "limit": size.limit,
-    }
-
-
 def _counts(sessions: Sequence[_Session], cause: Cause) -> tuple[int, int]:
     """Persons and trials that tell of a cause at its plate, or at any for all plates."""
     plate, *channel = cause.target.split(" ")
@@ -253,12 +249,6 @@ def _counts(sessions: Sequence[_Session], cause: Cause) -> tuple[int, int]:
             persons.add(one.person)
             trials += sum(counts.values())
     return len(persons), trials
-
-
-def _order(sessions: Sequence[_Session], dates: Mapping[str, str]) -> list[int]:
-    """Numbers of those that have a date, the earliest first."""
-    dated = [(dates[s.name], k) for k, s in enumerate(sessions) if s.name in dates]
-    return [k for _, k in sorted(dated)]
 
 
 # --- words --------------------------------------------------------------------------------------
@@ -287,16 +277,11 @@ def _sentence(
         return f"perhaps {words}, {told}; other causes look alike here: {remedy}"
     if said == "inconclusive":
         return f"cannot tell: {words}; no possible size would have been named {told}"
-    limit = _limit(sizes)
-    start = "not so" if probability < 0.5 else "not sure"
-    return f"{start}: {words}, probability {probability:.2g}; {limit} would have been named {told}"
-
-
-def _limit(sizes: Sequence[Size]) -> str:
-    """The smallest of what would have been named, as people read it."""
     best = min(sizes, key=lambda one: one.limit / one.parameter.typical)
     factor, unit = readable_unit(best.parameter.name, best.parameter.unit)
-    size = factor * best.limit
+    limit = with_unit(f"{factor * best.limit:.{digits_of(factor * best.limit)}f}", unit)
+    start = "not so" if probability < 0.5 else "not sure"
     return (
-        f"{best.parameter.name.replace('_', ' ')} {with_unit(f'{size:.{digits_of(size)}f}', unit)}"
+        f"{start}: {words}, probability {probability:.2g}; "
+        f"{best.parameter.name.replace('_', ' ')} {limit} would have been named {told}"
     )

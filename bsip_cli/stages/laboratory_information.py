@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.diagnosis.filtering import slow
 from bsip_cli.diagnosis.shared_faults import Information, SharedTrial, information_of, inner
 from bsip_cli.effects.scene import Scene
@@ -20,7 +19,7 @@ from bsip_cli.stages.diagnosed_trials import (
     prior_of_shares,
     stated_sd,
 )
-from bsip_cli.stages.frames import person_from
+from bsip_cli.stages.frames import person_of
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study.study import Trial
 
@@ -29,8 +28,7 @@ _LEAST_SAMPLES = 3  # of the residual, by which an autoregression is defined: 0.
 
 def run(unit: Unit) -> None:
     """Read motion, wrench, person and RM of all trials; write the information of each session."""
-    skeleton = load_skeleton(unit.config.skeleton)
-    person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
+    person = person_of(unit)
     prior = prior_of_shares(unit, person)
     seen: dict[str, list[tuple[Trial, Scene]]] = {}
     for trial in unit.trials("kinematics", "wrench"):
@@ -47,7 +45,7 @@ def run(unit: Unit) -> None:
             trials = [SharedTrial(x.errors, slow(x.scene), not x.moves) for x in told]
             rows += _rows(session, information_of(trials))
             sessions[session] = {
-                "plates": _corners([scene for _, scene in mine]),
+                "plates": {p.name: p.corners_m.tolist() for _, s in mine for p in s.plates},
                 "trials": [one.trial.stem for one in told],
                 "moments_s": _moments([one.scene for one in told if one.moves]),
             }
@@ -67,14 +65,8 @@ def _rows(session: str, told: Information) -> list[dict]:
     return [
         {
             "session": session,
-            "effect": one.effect,
-            "target": one.target,
-            "parameter": one.parameter,
-            "standing": one.standing,
-            "unit": parameter.unit,
-            "typical": parameter.typical,
-            "most": parameter.most,
-            "known_to": parameter.known_to,
+            **vars(one),
+            **{name: getattr(parameter, name) for name in ("unit", "typical", "most", "known_to")},
             "trials": int(trials),
             "pull": told.pull[k],
             **{f"precision_{j}": x for j, x in enumerate(told.precision[k])},
@@ -89,7 +81,3 @@ def _moments(scenes: Sequence[Scene]) -> list[float]:
     times = [one.times_s[one.valid] - one.times_s[0] for one in scenes]
     whole = np.concatenate(times)
     return [float(whole.mean()), float(whole.std())]
-
-
-def _corners(scenes: Sequence[Scene]) -> dict[str, list[list[float]]]:
-    return {plate.name: plate.corners_m.tolist() for scene in scenes for plate in scene.plates}

@@ -70,7 +70,10 @@ def compared(
 
 def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
     """From what is stated and the stretches that ingest found in these trials; warns."""
-    stretches = {trial.stem: _stretches(unit, trial) for trial in trials}
+    stretches = {}
+    for trial in trials:
+        records = map(Stretch.of, unit.facts("wrench", trial)["mass_stretches"])
+        stretches[trial.stem] = [one.without(unit.load_kg(trial)) for one in records]
     static = {trial.stem for trial in trials if trial.role == "static"}
     told = told_mass(stretches, unit.config.ingest.mass_half_width_percent, height_m, static)
     stated = stated_mass(unit, *(unit.facts("markers", trial) for trial in trials))
@@ -93,13 +96,6 @@ def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:
             f"{comparison.tolerance_percent:g} %)"
         )
     return PersonMass(stated.mass_kg, stated.source, told.mass_kg, "")
-
-
-def _stretches(unit: Unit, trial: Trial) -> list[Stretch]:
-    """Of a trial, known loads taken off."""
-    load_kg = unit.load_kg(trial)
-    records = unit.facts("wrench", trial)["mass_stretches"]
-    return [Stretch.of(record).without(load_kg) for record in records]
 
 
 def _from_plates(unit: Unit, told: ToldMass, without: str) -> PersonMass:

@@ -24,10 +24,10 @@ from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH, coordinates_from, load_phi, loads_record, person_of
-from bsip_cli.statistics.effective_samples import effective_samples_of_pair
 from bsip_cli.statistics.fit_measures import correlation, fit_measures, posturography
 from bsip_cli.statistics.hypothesis_tests import fisher_z_difference, williams_t
 from bsip_cli.statistics.methods import MEASURED, METHODS
+from bsip_cli.statistics.samples import effective_samples_of_pair
 
 _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 _SHORTEST_HELD_OUT_S = 0.5
@@ -56,7 +56,12 @@ def run(unit: Unit) -> None:
     compared = over_the_same_frames(signals)
     unit.write("fit", fit_rows(judgement, compared))
     unit.write("correlation-difference", _correlations(compared, judgement.judged))
-    unit.write("posturography", _sway(compared, judgement.judged, judgement.times_s))
+    rate, spans = 1.0 / float(np.median(np.diff(judgement.times_s))), stretches(judgement.judged)
+    sway = [
+        {"method": name} | asdict(posturography(one["cop_ap"], one["cop_ml"], rate, spans))
+        for name, one in compared.items()
+    ]
+    unit.write("posturography", sway)
 
 
 def _wrenches(
@@ -137,7 +142,7 @@ def judgement_of(unit: Unit, kinematics: pd.DataFrame, measured: pd.DataFrame) -
     judged, data = _judged(valid, used, times)
     rate = 1.0 / float(np.median(np.diff(times)))
     operator, frames = lowpass_operator(valid, rate, options.cutoff_hz)
-    weight = facts["mass_kg"] * GRAVITY_M_S2
+    weight, corners = facts["mass_kg"] * GRAVITY_M_S2, unit.read("plates")["z_m"].to_numpy()
     return Judgement(
         times,
         valid,
@@ -146,7 +151,7 @@ def judgement_of(unit: Unit, kinematics: pd.DataFrame, measured: pd.DataFrame) -
         data,
         operator,
         frames,
-        _surface_height(unit),
+        float(corners.mean()) if len(corners) else 0.0,  # the floor where no outline is known
         facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float),
         weight,
         options.cop_min_force_percent_bw / 100 * weight,
@@ -161,21 +166,9 @@ def parameters_of(bsip: pd.DataFrame, person: Person) -> tuple[list[str], np.nda
     for method in methods:
         rows = bsip[bsip["method"] == method].set_index("segment")
         rows = rows.loc[list(person.skeleton.body_names), list(bsip_names())].to_numpy()
-        columns.append(
-            np.concatenate(
-                [
-                    from_readable(row).moved(-origin).phi()
-                    for row, origin in zip(rows, origins, strict=True)
-                ]
-            )
-        )
+        pairs = zip(map(from_readable, rows), origins, strict=True)
+        columns.append(np.concatenate([one.moved(-origin).phi() for one, origin in pairs]))
     return methods, np.stack(columns, axis=1)
-
-
-def _surface_height(unit: Unit) -> float:
-    """Height of the plates' surface [m]; the floor where no outline is known."""
-    corners = unit.read("plates")["z_m"].to_numpy()
-    return float(corners.mean()) if len(corners) else 0.0
 
 
 def _used(unit: Unit, times: np.ndarray) -> np.ndarray:
@@ -272,11 +265,3 @@ def _correlations(signals: Signals, judged: np.ndarray) -> list[dict]:
                 }
             )
     return rows
-
-
-def _sway(signals: Signals, judged: np.ndarray, times: np.ndarray) -> list[dict]:
-    rate, spans = 1.0 / float(np.median(np.diff(times))), stretches(judged)
-    return [
-        {"method": name} | asdict(posturography(one["cop_ap"], one["cop_ml"], rate, spans))
-        for name, one in signals.items()
-    ]

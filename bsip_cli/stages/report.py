@@ -85,6 +85,7 @@ def record_of(unit: Unit) -> ParticipantRecord:
     """Everything that is there of the unit's participant."""
     assert unit.participant is not None
     usable = {kind: set(unit.trials(kind)) for kind in _TABLES.values()}
+    trials = sorted(unit.participant.trials, key=lambda trial: list(ROLES).index(trial.role))
     return ParticipantRecord(
         id=unit.participant.id,
         facts=unit.read("person").iloc[0],
@@ -92,11 +93,11 @@ def record_of(unit: Unit) -> ParticipantRecord:
         excitation=unit.read("excitation"),
         identification=unit.read("identification"),
         body=person_of(unit),
-        trials=tuple(_trial_record(unit, trial, usable) for trial in _by_role(unit.participant)),
+        trials=tuple(_trial_record(unit, trial, usable) for trial in trials),
         refusals=refusals_of(unit, unit.participant),
         origins=_origins(unit, usable),
         defaults=unit.shipped_options(),
-        loads=_loads(unit),
+        loads=tuple((trial_label(t.stem), load_words(unit, t)) for t in trials if unit.loads(t)),
         gains=_extended(unit, "overall-gain"),
         changes=_extended(unit, "bsip-change"),
         **{name: unit.read(kind) for name, kind in _FOUND.items() if unit.has(kind)},
@@ -112,17 +113,6 @@ def _extended(unit: Unit, kind: str) -> pd.DataFrame | None:
     return with_all_causes(unit.read(kind))
 
 
-def _loads(unit: Unit) -> tuple[tuple[str, str], ...]:
-    """Label of a trial and the known loads in it, for the trials that carry any."""
-    assert unit.participant is not None
-    carrying = [trial for trial in _by_role(unit.participant) if unit.loads(trial)]
-    return tuple((trial_label(trial.stem), load_words(unit, trial)) for trial in carrying)
-
-
-def _by_role(participant: Participant) -> list[Trial]:
-    return sorted(participant.trials, key=lambda trial: list(ROLES).index(trial.role))
-
-
 def _trial_record(unit: Unit, trial: Trial, usable: dict[str, set[Trial]]) -> TrialRecord:
     tables = {
         name: unit.read(kind, trial) if trial in usable[kind] else None
@@ -131,12 +121,8 @@ def _trial_record(unit: Unit, trial: Trial, usable: dict[str, set[Trial]]) -> Tr
     for name in ("reconstruction", "fit"):
         table = tables[name]
         tables[name] = with_all_causes(table) if table is not None else None
-    return TrialRecord(trial.stem, trial.task, trial.role, **tables, file_date=_date(trial.path))
-
-
-def _date(path: Path) -> str:
-    """When the file was last changed; empty where it is not there."""
-    return str(date.fromtimestamp(path.stat().st_mtime)) if path.exists() else ""
+    changed = date.fromtimestamp(trial.path.stat().st_mtime) if trial.path.exists() else ""
+    return TrialRecord(trial.stem, trial.task, trial.role, **tables, file_date=str(changed))
 
 
 def refusals_of(unit: Unit, participant: Participant) -> tuple[Refusal, ...]:
@@ -172,12 +158,6 @@ def origin_of(path: Path, label: str) -> Origin:
     """Provenance of one artifact."""
     provenance = read_header(path)["provenance"]
     made_by = provenance["made_by"]
-    return Origin(
-        label,
-        made_by["stage"],
-        made_by["bsip_version"],
-        made_by["libraries"],
-        made_by["options"],
-        made_by["inputs"],
-        tuple(provenance["messages"]),
-    )
+    known = ("stage", "bsip_version", "libraries", "options", "inputs")
+    told = {name: made_by[name] for name in known}
+    return Origin(label, messages=tuple(provenance["messages"]), **told)

@@ -15,8 +15,7 @@ from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError
 from bsip_cli.motion.calibration import Calibration, calibrate
 from bsip_cli.motion.plausible_body import Doubt, doubts_about, words_of
-from bsip_cli.motion.scaling import Refinement, ScalingOptions
-from bsip_cli.motion.scaling_trials import TrialMarkers, refine_over_trials
+from bsip_cli.motion.scaling import Refinement, ScalingOptions, TrialMarkers, refine_over_trials
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import markers_from, ordered_markers
 from bsip_cli.stages.person_mass import person_mass

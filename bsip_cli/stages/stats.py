@@ -16,6 +16,7 @@ import pandas as pd
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.pipeline import STAGES, producer
+from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit
 from bsip_cli.statistics.cohort import (
     DATA_SHARE,
@@ -37,7 +38,9 @@ from bsip_cli.statistics.cohort_values import (
 from bsip_cli.statistics.methods import MEASURED, METHODS, OM, RM
 from bsip_cli.study.study import Participant, Trial
 
-TRIAL_KINDS = ("fit", "posturography", "correlation-difference")
+# Kinds of a trial, and the numbers of the tables that each is in.
+IN_SEQUENCE = {"fit": (2, 4, 5, 6), "posturography": (3,), "correlation-difference": (5,)}
+IN_OTHERS = {"fit": (4, 5), "posturography": (), "correlation-difference": (5,)}
 ROWS_AT_ONCE = 50_000
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 MEASURES = ("rmse", "pearson_r", "schwer_m", "schwer_p", "schwer_c")
@@ -159,14 +162,19 @@ class _Cohort:
         for trial in participant.trials:
             if trial.role == "static":
                 continue
-            there = [k for k in TRIAL_KINDS if self._unit.stands(k, trial, participant)]
-            lacking = [kind for kind in TRIAL_KINDS if kind not in there]
-            tables = sorted({number for kind in lacking for number in _tables_of(kind, trial)})
+            there = [k for k in IN_OTHERS if self._unit.stands(k, trial, participant)]
+            lacking = [kind for kind in IN_OTHERS if kind not in there]
+            numbers = IN_SEQUENCE if trial.role == "sequence" else IN_OTHERS
+            tables = sorted({number for kind in lacking for number in numbers[kind]})
             if tables:
                 self._missing.add(f"{trial.stem} has no {', no '.join(lacking)}", *tables)
             if there:
                 frames = {kind: self._unit.read(kind, trial, participant) for kind in there}
-                data = _data(frames.get("fit"))
+                said = (
+                    {row["data"] for row in _rows(frames["fit"], OM)} if "fit" in there else set()
+                )
+                data = "held_out" if said else ""  # what the trial was to OM
+                data = "identification" if "identification" in said else data
                 stands_in = not self._has_sequences and data == "identification"
                 yield Recording(trial, "sequence" if stands_in else trial.role, data, frames)
 
@@ -198,18 +206,13 @@ class _Missing:
 
     def add(self, what: str, *numbers: int) -> None:
         """`what` ("sub-02 has no ...") is not in the tables with these numbers."""
-        self._unit.warn(f"{what}: not in {_in_words(numbers)}")
+        tables = "table" if len(numbers) == 1 else "tables"
+        self._unit.warn(f"{what}: not in {tables} {listing([*map(str, numbers)])}")
         self.note(what, *numbers)
 
     def note(self, what: str, *numbers: int) -> None:
         """The same of what the user has been told already."""
         self.found.append({"sentence": what, "tables": [f"table{k}" for k in numbers]})
-
-
-def _in_words(numbers: tuple[int, ...]) -> str:
-    if len(numbers) == 1:
-        return f"table {numbers[0]}"
-    return f"tables {', '.join(map(str, numbers[:-1]))} and {numbers[-1]}"
 
 
 def _refused(unit: Unit, participant: Participant) -> str:
@@ -219,18 +222,6 @@ def _refused(unit: Unit, participant: Participant) -> str:
     before = [stage.name for stage in STAGES[:last] if stage.level == "participant"]
     names = [s for s in before if (folder / f"{participant.id}_refusal-{s}.parquet").exists()]
     return names[0] if names else ""
-
-
-def _tables_of(kind: str, trial: Trial) -> tuple[int, ...]:
-    in_sequence = {"fit": (2, 4, 5, 6), "posturography": (3,), "correlation-difference": (5,)}
-    in_others = {"fit": (4, 5), "posturography": (), "correlation-difference": (5,)}
-    return (in_sequence if trial.role == "sequence" else in_others)[kind]
-
-
-def _data(fit: pd.DataFrame | None) -> str:
-    """What the trial was to OM."""
-    said = set() if fit is None else set(fit.loc[fit["method"] == OM, "data"])
-    return "identification" if "identification" in said else "held_out" if said else ""
 
 
 # --- one participant's results as tidy values -------------------------------------------------
@@ -287,7 +278,11 @@ def values_of(recording: Recording) -> list[Value]:
             values += _force_errors(recording, method, fits)
             values += _residuals(recording, method, fits)
     if "posturography" in recording.frames and recording.role == "sequence":
-        values += _sway(recording, recording.frames["posturography"])
+        for row in _rows(recording.frames["posturography"], MEASURED, *METHODS):
+            values += [
+                recording.value("table3", variable, row["method"], row[column], unit)
+                for variable, (column, unit) in SWAY.items()
+            ]
     return values
 
 
@@ -323,12 +318,6 @@ def _residuals(recording: Recording, method: str, fits: dict) -> Iterator[Value]
     force, moment = (hypot(*(errors[f"{kind}{axis}"] for axis in "xyz")) for kind in "fm")
     yield recording.value("table6", "force_residual", method, force, "N")
     yield recording.value("table6", "moment_residual", method, moment, "N m")
-
-
-def _sway(recording: Recording, frame: pd.DataFrame) -> Iterator[Value]:
-    for row in _rows(frame, MEASURED, *METHODS):
-        for variable, (column, unit) in SWAY.items():
-            yield recording.value("table3", variable, row["method"], row[column], unit)
 
 
 def correlations(recording: Recording) -> Iterator[CorrelationRun]:

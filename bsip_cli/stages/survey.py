@@ -103,16 +103,13 @@ def _row(verdict: Verdict) -> dict:
 
 def _verdict(row: dict) -> Verdict:
     centre, half = (tuple(row[name] for name in names) for names in (_CENTRE, _HALF))
+    same = ("moment_scale", "point_scale", "about", "place_of", "reversed_channel")
     reading = PlateReading(
-        moment_scale=row["moment_scale"],
-        point_scale=row["point_scale"],
-        about=row["about"],
+        **{name: row[name] for name in same},
         centre_m=None if pd.isna(centre[0]) else centre,
         turn=int(row["turn"]),
         mirrored=bool(row["reversed_round"]),
         sign=int(row["sign"]),
-        place_of=row["place_of"],
-        reversed_channel=row["reversed_channel"],
         half_size_m=None if pd.isna(half[0]) else half,
     )
     before, after = (

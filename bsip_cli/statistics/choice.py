@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm, t
 
-from bsip_cli.statistics.effective_samples import effective_samples
 from bsip_cli.statistics.methods import OM, RM, RM_MASS, SAME_WITHIN
-from bsip_cli.statistics.samples import Stretches
+from bsip_cli.statistics.samples import Stretches, effective_samples
 
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz", "cop_ap", "cop_ml")
 PAIRS = ((OM, RM), (OM, RM_MASS), (RM_MASS, RM))

@@ -111,18 +111,14 @@ def topics(values: Iterable[Value]) -> dict[Topic, list[Value]]:
     groups: dict[Topic, list[Value]] = defaultdict(list)
     for value in values:
         groups[line_of(value)].append(value)
-    return {_with_task_names(topic, group): group for topic, group in groups.items()}
+    names = {topic: sorted({value.task for value in group}) for topic, group in groups.items()}
+    return {replace(topic, task=", ".join(names[topic])): groups[topic] for topic in groups}
 
 
 def line_of(one: Value | Topic) -> Topic:
     """The topic of a value, or a topic itself, without the names of tasks that do not matter."""
     task = "" if one.table in OVER_TASKS else one.task
     return Topic(one.table, one.variable, task, one.role, one.unit)
-
-
-def _with_task_names(topic: Topic, group: Sequence[Value]) -> Topic:
-    names = ", ".join(sorted({value.task for value in group}))
-    return Topic(topic.table, topic.variable, names, topic.role, topic.unit)
 
 
 def per_participant(values: Iterable[Value], methods: Sequence[str]) -> NDArray[np.float64]:

@@ -9,8 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
-from bsip_cli.statistics.effective_samples import effective_samples_of_pair
-from bsip_cli.statistics.samples import Stretches, finite_stretches, is_constant, joined
+from bsip_cli.statistics.samples import (
+    Stretches,
+    effective_samples_of_pair,
+    finite_stretches,
+    is_constant,
+    joined,
+)
 
 ELLIPSE_SHARE = 0.95
 MM_PER_M = 1e3

@@ -136,8 +136,7 @@ def test_the_fitted_side_does_not_know_the_simulator():
 def test_stages_do_not_know_each_other():
     """They meet in files; two reports share their writing of files."""
     helpers = {
-        "stages.diagnosis_rows",
-        "stages.error_budget",
+        "stages.diagnose_trial",
         "stages.frames",
         "stages.identification_problem",
         "stages.known_laboratory",

@@ -60,8 +60,9 @@ def bsip(*arguments: str, allowed: Sequence[int] = (DONE,)) -> str:
     CommandError : it ended with another exit code.
     """
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+    module = "tests.blind.outside_effects" if arguments[0] == "simulate" else "bsip_cli"
     done = subprocess.run(
-        [sys.executable, "-m", "bsip_cli", *arguments],
+        [sys.executable, "-m", module, *arguments],
         capture_output=True,
         text=True,
         check=False,

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from bsip_cli.simulate.options import Richness, diagnosis
+from bsip_cli.simulate.options import PRESETS, Richness
 from bsip_cli.simulate.study import simulate_study
 from tests.blind.blind_running import ROOT, STAGES, TABLES, run_pipeline
 from tests.blind.blind_scoring import read_answer
@@ -70,7 +70,7 @@ def alarms_in(folder: Path, richness: Richness, options: argparse.Namespace) -> 
     study = folder / "study"
     if not (study / "participants.tsv").exists():
         asked = {"participants": options.people, "seed": options.seed, "richness": richness}
-        simulate_study(study, replace(diagnosis(), **asked))
+        simulate_study(study, replace(PRESETS["diagnosis"], **asked))
     problems = run_pipeline(folder, STAGES, options.jobs)
     if problems:
         raise SystemExit("\n".join(problems))

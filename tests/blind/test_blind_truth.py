@@ -20,6 +20,7 @@ from bsip_cli.simulate.effects.base import Effect as HiddenEffect
 from bsip_cli.simulate.options import Asked, Laboratory, StudyOptions
 from bsip_cli.simulate.recording import plates_of
 from bsip_cli.simulate.study import simulate_study
+from tests.blind import outside_effects  # noqa: F401 (the simulator knows them from here on)
 from tests.blind.blind_cases import CATALOGUE as RANGES
 from tests.blind.blind_cases import OUTSIDE, PAIRS
 from tests.blind.blind_truth import MAPPINGS, PLATE, Expected, equivalents, expected

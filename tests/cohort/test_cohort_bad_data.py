@@ -90,7 +90,7 @@ def test_refused_and_missing_trials(make_cohort):
 def test_participant_without_sequence_is_named(make_cohort):
     cohort = make_cohort(4)
     trial = next(t for t in cohort.study.participants[0].trials if t.task == "sequence")
-    for kind in stats_stage.TRIAL_KINDS:
+    for kind in stats_stage.IN_OTHERS:
         cohort.path(kind, "sub-01", trial).unlink()
     messages = cohort.perform("stats").sentences
     assert "sub-01 has no identification trial: not in tables 2, 3 and 6" in messages

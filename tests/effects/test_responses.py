@@ -10,8 +10,7 @@ import pinocchio as pin
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.effects.markers import during, step
 from bsip_cli.motion.inverse_kinematics import solve_trial
-from bsip_cli.motion.jacobian import marker_residuals
-from bsip_cli.motion.pose_response import marker_trust, pose_response, pose_responses
+from bsip_cli.motion.jacobian import marker_residuals, marker_trust, pose_responses
 from tests.body.standing_person import away, markers_of, standing
 from tests.effects.moving_scene import derivatives, moving, rms, scene_of
 
@@ -48,7 +47,7 @@ def test_some_markers_are_all_markers_without_error():
     errors[:, chosen] = 1e-3 * np.random.default_rng(6).normal(size=(len(q), 2, 3, 2))
     response = pose_responses(PERSON, q)
     np.testing.assert_allclose(
-        response.of(errors[:, chosen], chosen), pose_response(PERSON, q, errors)
+        response.of(errors[:, chosen], chosen), pose_responses(PERSON, q).of(errors)
     )
     np.testing.assert_allclose(response.left(errors[:, chosen], chosen), response.left(errors))
 

@@ -26,10 +26,10 @@ from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
 from bsip_cli.running.session import run_session
 from bsip_cli.running.unit import file_hash
-from bsip_cli.simulate.inject import inject_study
+from bsip_cli.simulate.command import inject_study
 from bsip_cli.simulate.options import Asked, Laboratory, Rates, StudyOptions
 from bsip_cli.simulate.study import simulate_study
-from bsip_cli.stages.diagnosis_rows import nothing, rows_of
+from bsip_cli.stages.diagnose_trial import nothing, rows_of
 from tests.exports.test_export_command import NOTES, Results, write_person
 
 STEM, STATIC = "sub-01_task-squat_run-1", "sub-01_task-static"

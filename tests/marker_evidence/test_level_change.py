@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from bsip_cli.motion.level_change import find_level_change
+from bsip_cli.motion.marker_events import find_level_change
 
 N = 200
 

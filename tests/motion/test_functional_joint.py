@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.person import rigid_motion
-from bsip_cli.motion.functional_legs import functional_joint
+from bsip_cli.motion.calibration import functional_joint
 
 CENTRE, AXIS = np.array([0.1, 0.2, 0.5]), np.array([0.1, 1.0, 0.2]) / np.sqrt(1.05)
 THIGH = np.array([[0.1, 0.1, 0.9], [0.15, 0.2, 0.8], [0.05, 0.25, 0.7], [0.1, 0.3, 0.75]])

@@ -11,8 +11,7 @@ import pytest
 from bsip_cli.body.markersets import load_marker_set
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.errors import BadDataError
-from bsip_cli.motion.calibration import calibrate
-from bsip_cli.motion.functional_legs import FunctionalLandmarks, functional_landmarks
+from bsip_cli.motion.calibration import FunctionalLandmarks, calibrate, functional_landmarks
 from bsip_cli.recordings.labels import match_labels
 from bsip_cli.recordings.read import read_recording
 from tests.body.standing_person import HEIGHT_M, standing_markers

@@ -9,9 +9,9 @@ import pytest
 
 from bsip_cli.recordings.gaps import fill_gaps, repeated_frames, without_repeats
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.simulate.effects import drawn
-from bsip_cli.simulate.inject import inject_recording
-from bsip_cli.simulate.options import Asked
+from bsip_cli.simulate.command import inject_recording
+from bsip_cli.simulate.effects.base import Target
+from tests.blind.outside_effects import RepeatedFrames
 
 SAMPLE = Path(__file__).parents[2] / "sample_data" / "sub-01"
 N, K = 200, 12
@@ -80,7 +80,7 @@ def test_the_one_marker_that_was_seen_anew_stays():
 @pytest.mark.parametrize("name", ["squat_run-1", "sequence_run-1", "walking_run-1"])
 def test_repeats_hidden_in_a_simulated_recording(tmp_path, name):
     source = SAMPLE / f"sub-01_task-{name}.c3d"
-    effect = drawn(Asked("outside_repeated_frames", 0.2, ""), np.random.default_rng(2))
+    effect = RepeatedFrames.draw(0.2, Target(), np.random.default_rng(2))
     inject_recording(source, tmp_path / source.name, [effect])
     sound, stalled = read_recording(source), read_recording(tmp_path / source.name)
     assert without_repeats(sound) == (sound, [])

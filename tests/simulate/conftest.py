@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.simulate.options import Richness
-from bsip_cli.simulate.people import Person, draw_person
+from bsip_cli.simulate.people import Inertia, Person, draw_person, second_moments
 from bsip_cli.simulate.trial import Trial, simulate_trial
 
 DURATION_S = {
@@ -43,3 +43,24 @@ def person() -> Person:
 def trial():
     """A function from the task's name to its trial."""
     return trial_of_task
+
+
+NOTHING_RICH = Richness(
+    soft_tissue=0.0,
+    marker_noise_m=0.0,
+    marker_drift_m=0.0,
+    gaps=False,
+    force_noise_n=0.0,
+    moment_noise_nm=0.0,
+    quantised=False,
+    hinge_tilt=0.0,
+    joint_centre_offset=0.0,
+    placement_error_m=0.0,
+)
+"""No noise, no gaps, rigid markers, hinges along Z, joint centres as predicted."""
+
+
+def is_physical(part: Inertia) -> bool:
+    """Positive mass and positive definite second moments (pseudo-inertia > 0)."""
+    moments = np.linalg.eigvalsh(second_moments(part.tensor_kgm2))
+    return part.mass_kg > 0.0 and bool(moments.min() > 0.0)

@@ -13,23 +13,21 @@ from bsip_cli.errors import UsageError
 from bsip_cli.instruments.readings import Instruments, SensingPlate, interpolated
 from bsip_cli.simulate.balance import Mixer
 from bsip_cli.simulate.effects import (
-    CATALOGUE,
     EFFECTS,
-    OUTSIDE,
     drawn,
     effects_of,
     pair_up,
     touches,
 )
 from bsip_cli.simulate.effects.loads import ChestMotion, Swinging
-from bsip_cli.simulate.effects.plates import play
 from bsip_cli.simulate.numerics import about_z, derivative
-from bsip_cli.simulate.options import Asked, Laboratory, Rates, Richness, StudyOptions
+from bsip_cli.simulate.options import Asked, Laboratory, Rates, StudyOptions
 from bsip_cli.simulate.plan import GRAVITY, Poses
 from bsip_cli.simulate.recording import MM, Measurement, measure_trial
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.simulate.trial import Trial, simulate_trial
-from tests.simulate.conftest import person_of
+from tests.blind.outside_effects import OUTSIDE, play
+from tests.simulate.conftest import NOTHING_RICH, is_physical, person_of
 
 G = 9.81
 PERSON_SEED = 3
@@ -102,7 +100,7 @@ def measured_with(task: str, *asked: tuple[str, float, str]) -> Measurement:
         person_of(PERSON_SEED),
         Rates(),
         Laboratory(),
-        Richness.none(),
+        NOTHING_RICH,
         rng,
         effects=effects,
     )
@@ -124,9 +122,9 @@ def cop_of(measurement: Measurement) -> np.ndarray:
 
 
 def test_the_vocabulary_is_the_contracts():
-    assert [effect.name for effect in CATALOGUE] == VOCABULARY.split()
+    assert [name for name in EFFECTS if name not in OUTSIDE] == VOCABULARY.split()
     assert len(OUTSIDE) >= 3
-    assert all(effect.name.startswith("outside_") for effect in OUTSIDE)
+    assert all(name.startswith("outside_") for name in OUTSIDE)
     assert set(SIZES) == set(EFFECTS)
     for effect in EFFECTS.values():
         assert effect.unit
@@ -185,7 +183,7 @@ def test_every_effect_is_seen_in_a_recording(name):
     effect = effect_of(name)
     rng = np.random.default_rng([PERSON_SEED, 7])
     trial = simulate_trial(effect.person(person), "squat", rng, 4.0, effects=[effect])
-    quiet = Richness.none()
+    quiet = NOTHING_RICH
     rng = np.random.default_rng(5)
     got = measure_trial(
         trial, effect.person(person), Rates(), Laboratory(), quiet, rng, effects=[effect]
@@ -562,7 +560,7 @@ def test_a_segment_far_from_the_table_keeps_the_persons_mass():
     assert total == pytest.approx(person.mass_kg)
     ratio = heavy.inertias["thigh_l"].mass_kg / person.inertias["thigh_l"].mass_kg
     assert ratio == pytest.approx(1.4)
-    assert all(part.is_physical() for part in heavy.segment_inertias().values())
+    assert all(is_physical(part) for part in heavy.segment_inertias().values())
 
 
 @pytest.mark.parametrize("joint", ["hip_r", "shoulder_l", "knee_l", "ankle_r", "elbow_r"])

@@ -12,12 +12,11 @@ import pytest
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.simulate.command import inject_command
+from bsip_cli.simulate.command import inject_command, inject_recording
 from bsip_cli.simulate.effects import drawn
 from bsip_cli.simulate.effects.base import Effect
-from bsip_cli.simulate.inject import inject_recording
 from bsip_cli.simulate.options import Asked, Laboratory, Rates, Richness
-from bsip_cli.simulate.recording import write_trial
+from bsip_cli.simulate.recording import measure_trial, write_trial
 from tests.simulate.conftest import person_of, trial_of_task
 
 G = 9.81
@@ -33,7 +32,7 @@ def recorded(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("recorded") / "sub-01_task-squat_run-1.c3d"
     rng, laboratory = np.random.default_rng(5), Laboratory(plates=2)
     trial, person = trial_of_task("squat"), person_of(3)
-    write_trial(path, trial, person, Rates(100, 500), laboratory, Richness(), rng)
+    write_trial(path, measure_trial(trial, person, Rates(100, 500), laboratory, Richness(), rng))
     return path
 
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.simulate.markers import marker_paths, rigid_paths
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import Person, draw_person
+from bsip_cli.simulate.recording import marker_paths, rigid_paths
 from bsip_cli.simulate.study import wobbling
 from bsip_cli.simulate.trial import simulate_trial
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from bsip_cli.statistics.effective_samples import effective_samples, effective_samples_of_pair
+from bsip_cli.statistics.samples import effective_samples, effective_samples_of_pair
 
 N = 12_000
 

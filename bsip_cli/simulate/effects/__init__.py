@@ -1,7 +1,4 @@
-"""Effects hidden in recordings: a class each, in the file of what it changes, and `effects.csv`.
-
-CATALOGUE holds those that a diagnosis should name, OUTSIDE those that it cannot know.
-"""
+"""Effects hidden in recordings: a class each, in the file of what it changes, and `effects.csv`."""
 
 from __future__ import annotations
 
@@ -11,15 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from bsip_cli.errors import UsageError
-from bsip_cli.simulate.effects import loads, markers, persons, plates  # noqa: F401
+from bsip_cli.simulate.effects import loads, markers, plates  # noqa: F401
 from bsip_cli.simulate.effects.base import KINDS, NOWHERE, TABLE, Effect, Target
 from bsip_cli.simulate.options import Asked, StudyOptions
 
 EFFECTS = {name: KINDS[name] for name in TABLE}
-CATALOGUE, OUTSIDE = (
-    tuple(kind for name, kind in EFFECTS.items() if name.startswith("outside_") == outside)
-    for outside in (False, True)
-)
 NO_TARGET = ("", "-")
 EFFECT = 4  # the stream of random numbers, beside those of `study`
 
@@ -68,7 +61,8 @@ def drawn(asked: Asked, rng: np.random.Generator) -> Effect:
             expected=f"{kind.least:g} to {kind.most:g} {kind.unit}, not 0",
         )
     target = _parsed(asked)
-    if target.name and kind.targets == NOWHERE:
+    nowhere = kind.targets == NOWHERE
+    if target.name and (nowhere or target.name not in (kind.choices or [target.name])):
         raise kind.wrong_target(target.name)
     return kind.draw(asked.size, target, rng)
 

@@ -49,7 +49,8 @@ class Effect:
     """Base of all effects. A concrete one is a frozen dataclass of its drawn parameters.
 
     name : as in `effects.csv`, which has the rest. unit, least, most : of the size, its bounds.
-    targets : what a target may be, in words. settings : keys that a target may set.
+    targets : what a target may be, in words. choices : names that it may have; empty: any.
+    settings : keys that a target may set.
     spares_static : not in static trials, unless they are asked for.
     personal : drawn for each participant; else once for the lab.
     injectable : whether it can be hidden in measured data. hint : for those that are not, why.
@@ -63,6 +64,7 @@ class Effect:
     least: ClassVar[float]
     most: ClassVar[float]
     targets: ClassVar[str]
+    choices: ClassVar[list[str]]
     settings: ClassVar[list[str]]
     spares_static: ClassVar[bool]
     personal: ClassVar[bool]
@@ -76,7 +78,12 @@ class Effect:
         row = TABLE[name]
         cls.name, cls.unit, cls.hint = name, row["unit"], row["hint"]
         cls.least, cls.most = float(row["least"]), float(row["most"])
-        cls.targets = row["targets"].format(segments=", ".join(SEGMENTS), joints=", ".join(JOINTS))
+        commas, spaces = (
+            {"segments": between.join(SEGMENTS), "joints": between.join(JOINTS)}
+            for between in (", ", " ")
+        )
+        cls.targets = row["targets"].format(**commas)
+        cls.choices = row["choices"].format(**spaces).split()
         cls.settings, cls.needs = row["settings"].split(), row["needs"].split()
         cls.spares_static = row["spares_static"] == "yes"
         cls.injectable = row["injectable"] == "yes"
@@ -138,12 +145,9 @@ class OnSegment(Effect):
 
     segment: str
 
-    @classmethod
-    def checked(cls, segment: str) -> str:
-        """The segment, if it is one."""
-        if segment not in SEGMENTS:
-            raise cls.wrong_target(segment)
-        return segment
+    def check_simulated(self) -> None:
+        if self.segment not in SEGMENTS:
+            raise self.wrong_target(self.segment)
 
     def position_m(self, person: Person) -> np.ndarray:
         """(3,) in the segment's frame."""

@@ -1,39 +1,62 @@
-"""Markers that slip, are mistaken for each other, are smoothed, or stand still.
-
-Names that begin with ``outside_`` are outside the catalogue.
-"""
+"""Markers that slip, are mistaken for each other, are smoothed, or stand still."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from bsip_cli.body.names import SEGMENTS
 from bsip_cli.instruments.readings import Instruments
-from bsip_cli.simulate.effects.base import Effect, Target, direction
+from bsip_cli.simulate.effects.base import JOINTS, Effect, Target, direction
 from bsip_cli.simulate.numerics import frame_of, glide, rotate, runs, step
+from bsip_cli.simulate.people import Inertia, Person
+from bsip_cli.simulate.plan import Plan
 
 SLIP_S = 0.05
 SOFT = 0.1  # of the window of a slide, in which it speeds up, and slows down
 COMPANIONS = 3
 CLOSE_PAIRS = 5
 LEAST_FRAMES = 15  # a shorter stretch between gaps is not smoothed
-BURST_FRAMES = (4, 12)
 
 
 @dataclass(frozen=True, eq=False)
-class MarkerShift(Effect, name="marker_shift"):
-    """A marker slips along the skin, within SLIP_S, and stays there.
+class OnSkin(Effect):
+    """A marker moves along the skin, and stays there.
 
-    along : (3,) unit vector in the frame of the three markers that keep their distance to
-        it best. from_share : the part of a trial after which it slips, unless from_s is given.
+    along : (3,) unit vector in the frame of the three markers that keep their distance to it best.
     """
 
     marker: str
     draw_of_marker: int
     along: np.ndarray
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        drawn = instruments.labels[self.draw_of_marker % len(instruments.labels)]
+        column = instruments.column(self.marker or drawn)
+        way = self.size * self.moved(instruments.frame_times_s())
+        points = instruments.points_m.copy()
+        points[:, column] += way[:, None] * rotate(companion_frame(points, column), self.along)
+        return replace(instruments, points_m=points)
+
+    @abstractmethod
+    def moved(self, times_s: np.ndarray) -> np.ndarray:
+        """(F,) part of the way that it has gone, 0 to 1."""
+
+    def place(self) -> str:
+        return self.marker
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerShift(OnSkin, name="marker_shift"):
+    """A marker slips along the skin, within SLIP_S, and stays there.
+
+    from_share : the part of a trial after which it slips, unless from_s is given.
+    """
+
     from_share: float
     from_s: float | None
 
@@ -43,32 +66,18 @@ class MarkerShift(Effect, name="marker_shift"):
         from_s = target.settings.get("from_s")
         return cls(size, target.name, number, direction(rng), share, from_s)
 
-    def measured(self, instruments: Instruments) -> Instruments:
-        drawn = instruments.labels[self.draw_of_marker % len(instruments.labels)]
-        column = instruments.column(self.marker or drawn)
-        times = instruments.frame_times_s()
-        start = self.from_share * times[-1] if self.from_s is None else self.from_s
-        slipped = step(times, start, start + SLIP_S)
-        frame = companion_frame(instruments.points_m, column)
-        points = instruments.points_m.copy()
-        points[:, column] += self.size * slipped[:, None] * rotate(frame, self.along)
-        return replace(instruments, points_m=points)
-
-    def place(self) -> str:
-        return self.marker
+    def moved(self, times_s: np.ndarray) -> np.ndarray:
+        start = self.from_share * times_s[-1] if self.from_s is None else self.from_s
+        return step(times_s, start, start + SLIP_S)
 
 
 @dataclass(frozen=True, eq=False)
-class MarkerSlide(Effect, name="marker_slide"):
+class MarkerSlide(OnSkin, name="marker_slide"):
     """A marker slides along the skin for a part of the trial, and stays there.
 
-    along : (3,) unit vector in the frame of the three markers that keep their distance to
-        it best. window_share : start and end as parts of a trial.
+    window_share : start and end as parts of a trial.
     """
 
-    marker: str
-    draw_of_marker: int
-    along: np.ndarray
     window_share: tuple[float, float]
 
     @classmethod
@@ -77,18 +86,9 @@ class MarkerSlide(Effect, name="marker_slide"):
         share = (start, start + float(rng.uniform(0.3, 0.5)))
         return cls(size, target.name, number, direction(rng), share)
 
-    def measured(self, instruments: Instruments) -> Instruments:
-        drawn = instruments.labels[self.draw_of_marker % len(instruments.labels)]
-        column = instruments.column(self.marker or drawn)
-        times = instruments.frame_times_s()
-        start, end = (share * times[-1] for share in self.window_share)
-        way = self.size * glide(times, start, end, SOFT * (end - start))
-        points = instruments.points_m.copy()
-        points[:, column] += way[:, None] * rotate(companion_frame(points, column), self.along)
-        return replace(instruments, points_m=points)
-
-    def place(self) -> str:
-        return self.marker
+    def moved(self, times_s: np.ndarray) -> np.ndarray:
+        start, end = (share * times_s[-1] for share in self.window_share)
+        return glide(times_s, start, end, SOFT * (end - start))
 
 
 def companion_frame(points_m: np.ndarray, column: int) -> np.ndarray:
@@ -170,23 +170,90 @@ class OverSmoothing(Effect, name="over_smoothing"):
         return replace(instruments, points_m=points)
 
 
-@dataclass(frozen=True, eq=False)
-class RepeatedFrames(Effect, name="outside_repeated_frames"):
-    """The cameras stall: bursts of frames repeat the last one; `size` is their part."""
+# --- persons who are not what landmarks, tables or the skeleton's joints say ----------------------
 
-    seed: int
+
+# Joints that a model finds between (or beside) markers of the segment above them.
+LANDMARKS = {"knee": ("KNEL", "KNEM"), "ankle": ("MALL", "MALM"), "elbow": ("ELB", "ELBM")}
+LEAST_RANGE_RAD = 0.25  # a trial that bends the waist less bends the spine less too
+
+
+@dataclass(frozen=True, eq=False)
+class JointCentre(Effect, name="joint_centre"):
+    """The true centre lies at shift_m from where its landmarks put it (parent segment's axes).
+
+    Hips and shoulders move against the markers; knees, ankles, elbows stay and their
+    landmarks are palpated wrongly by the opposite shift.
+    """
+
+    joint: str
+    shift_m: np.ndarray
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        return cls(size, int(rng.integers(1 << 31)))
+        joint = target.name or str(rng.choice(JOINTS))
+        return cls(size, joint, size * direction(rng))
 
-    def measured(self, instruments: Instruments) -> Instruments:
-        frames = len(instruments.points_m)
-        rng = np.random.default_rng([self.seed, frames])
-        source = np.arange(frames)
-        longest = BURST_FRAMES[1]
-        while np.mean(source != np.arange(frames)) < self.size and frames > 2 * longest:
-            first = int(rng.integers(1, frames - longest))
-            length = int(rng.integers(BURST_FRAMES[0], longest + 1))
-            source[first : first + length] = source[first - 1]
-        return replace(instruments, points_m=instruments.points_m[source])
+    def person(self, person: Person) -> Person:
+        kind, side = self.joint[:-2], self.joint[-1]
+        if kind not in LANDMARKS:
+            joints = {**person.joints_m, self.joint: person.joints_m[self.joint] + self.shift_m}
+            return replace(person, joints_m=joints)
+        markers = dict(person.markers)
+        for label in {side.upper() + name for name in LANDMARKS[kind]} & set(markers):
+            marker = markers[label]
+            markers[label] = replace(marker, position_m=marker.position_m - self.shift_m)
+        return replace(person, markers=markers)
+
+    def place(self) -> str:
+        return self.joint
+
+
+class MissingJoint(Effect, name="missing_joint"):
+    """The spine bends at T12/L1 through `size` rad, and the waist by as much less.
+
+    In all three axes the same part of the trunk's motion; in a trial that bends the trunk by
+    less than LEAST_RANGE_RAD, in proportion.
+    """
+
+    def plan(self, person: Person, plan: Plan) -> Plan:
+        waist = plan.angles_rad["waist"]
+        flexion_range = float(np.ptp(waist[plan.keep, 0]))
+        part = min(1.0, self.size / max(flexion_range, LEAST_RANGE_RAD))
+        angles = {**plan.angles_rad, "waist": (1.0 - part) * waist, "spine": part * waist}
+        notes = {**plan.notes, "missing_joint_range_rad": part * flexion_range}
+        return replace(plan, angles_rad=angles, notes=notes)
+
+    def place(self) -> str:
+        return "spine"
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentInertia(Effect, name="segment_inertia"):
+    """A segment is heavier by the part `size` of its mass, and so are its second moments.
+
+    The other segments are lighter in proportion: the person's mass stays. The centre of mass
+    moves away from the segment's origin by half of `size`, the origin's distance being 1.
+    """
+
+    segment: str
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        segment = target.name or str(rng.choice(SEGMENTS))
+        return cls(size, segment)
+
+    def person(self, person: Person) -> Person:
+        own = ("abdomen", "thorax") if self.segment == "upper_torso" else (self.segment,)
+        mass = sum(person.inertias[body].mass_kg for body in own)
+        others = (person.mass_kg - (1.0 + self.size) * mass) / (person.mass_kg - mass)
+        inertias = {}
+        for body, part in person.inertias.items():
+            scale = 1.0 + self.size if body in own else others
+            along = 1.0 + 0.5 * self.size if body in own else 1.0
+            com = part.com_m * np.array([1.0, along, 1.0])
+            inertias[body] = Inertia(scale * part.mass_kg, com, scale * part.tensor_kgm2)
+        return replace(person, inertias=inertias)
+
+    def place(self) -> str:
+        return self.segment

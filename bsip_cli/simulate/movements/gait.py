@@ -9,8 +9,7 @@ import numpy as np
 
 from bsip_cli.simulate.numerics import glide, step
 from bsip_cli.simulate.people import SIDE_SIGN, SIDES, Person
-from bsip_cli.simulate.plan import STEP_S, G, Plan
-from bsip_cli.simulate.sketch import Sketch, add_breath_of_motion
+from bsip_cli.simulate.plan import STEP_S, G, Plan, Sketch, add_breath_of_motion
 
 LONGEST_REACH = 0.985  # the knee stays bent, about 20 degrees
 STEPS = range(-8, 8)  # planned before and after the one on the plate

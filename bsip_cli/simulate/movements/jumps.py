@@ -9,8 +9,10 @@ import numpy as np
 from bsip_cli.simulate.kinematics import poses_of, turns_of
 from bsip_cli.simulate.numerics import bridge, glide, integral, soft_polyline, step
 from bsip_cli.simulate.people import SIDES, Person
-from bsip_cli.simulate.plan import STEP_S, G, Plan
-from bsip_cli.simulate.sketch import (
+from bsip_cli.simulate.plan import (
+    STEP_S,
+    G,
+    Plan,
     Sketch,
     add_breath_of_motion,
     add_sway,

@@ -14,8 +14,8 @@ import numpy as np
 
 from bsip_cli.simulate.numerics import wander, window
 from bsip_cli.simulate.people import SIDES, Person
-from bsip_cli.simulate.plan import Plan
-from bsip_cli.simulate.sketch import (
+from bsip_cli.simulate.plan import (
+    Plan,
     Sketch,
     add_breath_of_motion,
     add_squat,
@@ -103,13 +103,7 @@ class Block:
             depth = self.rng.uniform(0.08, 0.16) * self.sketch.person.stature_m
             add_squat(self.sketch, down, min(depth, DEEPEST_M_PER_S2 * (0.5 * (b - a)) ** 2))
 
-    def lift_right_leg(self) -> None:
-        self._lift_leg("r", "l", 1.0)
-
-    def lift_left_leg(self) -> None:
-        self._lift_leg("l", "r", -1.0)
-
-    def _lift_leg(self, side: str, other: str, out: float) -> None:
+    def lift_leg(self, side: str, other: str, out: float) -> None:
         """Stand on one leg and move hip, knee and ankle of the other."""
         t, foot = self.sketch.t_s, self.sketch.feet[side]
         shift = min(0.9, 0.22 * (self.end - self.start))
@@ -145,15 +139,9 @@ class Block:
 
     def both_arms(self) -> None:
         for side in SIDES:
-            self._arm_circle(side, 0.35, 0.8)
+            self.arm_circle(side, 0.35, 0.8)
 
-    def right_arm(self) -> None:
-        self._arm_circle("r", *FAST_HZ)
-
-    def left_arm(self) -> None:
-        self._arm_circle("l", *FAST_HZ)
-
-    def _arm_circle(self, side: str, *pace: float) -> None:
+    def arm_circle(self, side: str, *pace: float) -> None:
         size, middle = self.size([35, 22, 20], [60, 38, 45]), self.window(0.8)
         shoulder = self.sketch.angles[f"shoulder_{side}"]
         shoulder[:, 0] += size[0] * (0.8 * middle + self.wave(*pace))
@@ -196,7 +184,7 @@ class Block:
         """Arms, hands and head at once."""
         self.head()
         for side in SIDES:
-            self._arm_circle(side, 0.5, 1.2)
+            self.arm_circle(side, 0.5, 1.2)
             self.sketch.angles[f"wrist_{side}"][:, 2] += np.deg2rad(40.0) * self.wave(0.8, 1.6)
 
 
@@ -205,15 +193,15 @@ Track = tuple[tuple[Callable[[Block], None], float], ...]
 LOWER_TRACK: Track = (
     (Block.trunk, 3.6),
     (Block.squats, 3.6),
-    (Block.lift_right_leg, 4.8),
+    (lambda block: block.lift_leg("r", "l", 1.0), 4.8),
     (Block.twist, 3.0),
-    (Block.lift_left_leg, 4.8),
+    (lambda block: block.lift_leg("l", "r", -1.0), 4.8),
     (Block.shift_weight, 3.0),
 )
 UPPER_TRACK: Track = (
     (Block.both_arms, 3.6),
-    (Block.right_arm, 3.0),
-    (Block.left_arm, 3.0),
+    (lambda block: block.arm_circle("r", *FAST_HZ), 3.0),
+    (lambda block: block.arm_circle("l", *FAST_HZ), 3.0),
     (Block.elbows, 3.2),
     (Block.wrists, 3.2),
     (Block.head, 3.0),

@@ -104,19 +104,13 @@ _DENOMINATORS: tuple[tuple[str, Callable[[PrintedTable, Row, Paper], Interval], 
 )
 
 
-def _then(
-    of: Callable[..., Interval], form: Callable[[Interval], Interval]
-) -> Callable[..., Interval]:
-    return lambda *row: form(of(*row))
-
-
 _FORMS: dict[str, Callable[[Interval], Interval]] = {
     "({b} - {a})": lambda d: d,
     "({a} - {b})": Interval.negative,
     "|{b} - {a}|": Interval.size,
 }
 DEFINITIONS = tuple(
-    Definition(f"{above} / {below}", _then(of, form), is_paired)
+    Definition(f"{above} / {below}", lambda *row, of=of, form=form: form(of(*row)), is_paired)
     for below, of, is_paired in _DENOMINATORS
     for above, form in _FORMS.items()
 )

@@ -31,18 +31,9 @@ class Slip:
     is_remark: bool = False
 
 
-def slip(
-    table: PrintedTable,
-    row: str,
-    what: str,
-    *,
-    printed: str,
-    recomputed: str,
-    reading: str = "",
-    is_remark: bool = False,
-) -> Slip:
-    """Of a row of a table."""
-    return Slip(table.paper, table.number, row, what, printed, recomputed, reading, is_remark)
+def slip(table: PrintedTable, row: str, what: str, **said: Any) -> Slip:
+    """Of a row of a table; ``said`` as the last fields of :class:`Slip`."""
+    return Slip(table.paper, table.number, row, what, **said)
 
 
 def range_words(values: Interval, decimals: int = 2) -> str:
@@ -215,9 +206,6 @@ class Row:
         """
         return range_of(self.ci_text)
 
-    def with_cell(self, method: str, cell: Cell) -> Row:
-        return replace(self, cells={**self.cells, method: cell})
-
 
 @dataclass(frozen=True)
 class PrintedTable:
@@ -340,13 +328,11 @@ class Exchange:
 
     def undone(self, table: PrintedTable) -> PrintedTable:
         """The table with both cells where they belong."""
-        return replace(table, rows=tuple(self._undone(row) for row in table.rows))
-
-    def _undone(self, row: Row) -> Row:
+        rows = {row.name: row for row in table.rows}
         for here, there in ((self.first, self.second), (self.second, self.first)):
-            if row.name == here.row:
-                row = row.with_cell(here.method, there.cell)
-        return row
+            cells = {**rows[here.row].cells, here.method: there.cell}
+            rows[here.row] = replace(rows[here.row], cells=cells)
+        return replace(table, rows=tuple(rows.values()))
 
     def sentence(self) -> str:
         return f"{self.first.words()} and {self.second.words()} are exchanged"

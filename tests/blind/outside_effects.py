@@ -1,0 +1,177 @@
+"""Effects outside the catalogue: the right verdict on them is `unexplained`.
+
+The simulator that ships does not know them. ``python -m tests.blind.outside_effects simulate ...``
+is ``bsip`` with them.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from bsip_cli.cli import main
+from bsip_cli.instruments.readings import Instruments, SensingPlate
+from bsip_cli.simulate.effects import EFFECTS
+from bsip_cli.simulate.effects.base import KINDS, TABLE, Effect, Target
+from bsip_cli.simulate.effects.plates import ChannelFault, OfEveryPlate
+from bsip_cli.simulate.people import Person
+from bsip_cli.simulate.plan import Load, Plan, Poses
+
+OUTSIDE = {
+    row["name"]: row
+    for row in csv.DictReader(Path(__file__).with_suffix(".csv").read_text("utf-8").splitlines())
+}
+TABLE.update(OUTSIDE)
+LOADED_N = 40.0
+BELT_HZ = 5.0
+WANDERS_S = 1.5
+SLACK_M = 0.1
+FASTENED_M = (-1.2, 0.1, 0.3)  # a tether's far end from the first place of the pelvis
+BURST_FRAMES = (4, 12)
+
+
+@dataclass(frozen=True, eq=False)
+class BeltVibration(OfEveryPlate, name="outside_belt_vibration"):
+    """Plates shake vertically by `size` N at about 5 Hz while somebody stands on them."""
+
+    frequency_hz: float
+    phase_rad: float
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        frequency = BELT_HZ * float(rng.uniform(0.8, 1.2))
+        return cls(size, frequency, float(rng.uniform(-np.pi, np.pi)))
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        wave = np.sin(2.0 * np.pi * self.frequency_hz * times_s + self.phase_rad)
+        reading[:, 2] += self.size * wave * (np.abs(reading[:, 2]) > LOADED_N)
+
+
+class PlateHysteresis(OfEveryPlate, name="outside_plate_hysteresis"):
+    """Horizontal channels follow with a play of `size` N: they stick until moved by that much."""
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        for column in (0, 1):
+            reading[:, column] = play(reading[:, column], self.size)
+
+
+def play(values: np.ndarray, width: float) -> np.ndarray:
+    """(N,) output of a backlash of this full width; lost samples leave it where it is."""
+    result, at = np.empty_like(values), values[0]
+    for k, value in enumerate(values):
+        if value - at > 0.5 * width:
+            at = value - 0.5 * width
+        elif at - value > 0.5 * width:
+            at = value + 0.5 * width
+        result[k] = at
+    return result
+
+
+class PlateSaturation(OfEveryPlate, name="outside_plate_saturation"):
+    """The vertical channel flattens: at 1000 N it shows the part `size` too little.
+
+    The error grows with the square of the load.
+    """
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        reading[:, 2] *= 1.0 - np.minimum(self.size * (reading[:, 2] / 1000.0) ** 2, 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class RepeatedFrames(Effect, name="outside_repeated_frames"):
+    """The cameras stall: bursts of frames repeat the last one; `size` is their part."""
+
+    seed: int
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        return cls(size, int(rng.integers(1 << 31)))
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        frames = len(instruments.points_m)
+        rng = np.random.default_rng([self.seed, frames])
+        source = np.arange(frames)
+        longest = BURST_FRAMES[1]
+        while np.mean(source != np.arange(frames)) < self.size and frames > 2 * longest:
+            first = int(rng.integers(1, frames - longest))
+            length = int(rng.integers(BURST_FRAMES[0], longest + 1))
+            source[first : first + length] = source[first - 1]
+        return replace(instruments, points_m=instruments.points_m[source])
+
+
+class ElasticTether(Effect, name="outside_elastic_tether"):
+    """A rubber band of `size` N/m pulls the pelvis back towards a fixed point."""
+
+    def plan(self, person: Person, plan: Plan) -> Plan:
+        fastened = plan.pelvis_m[plan.keep.start] + np.array(FASTENED_M)
+        return plan.with_load(Band(self.size, fastened))
+
+
+@dataclass(frozen=True, eq=False)
+class Band(Load):
+    """An elastic band from a fixed point (3,) to the pelvis, taut from the start."""
+
+    stiffness_n_m: float
+    fastened_m: np.ndarray
+
+    def wrench(self, poses: Poses, step_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """What the body exerts on the band."""
+        r = poses.origin_m["lower_torso"]
+        away = r - self.fastened_m
+        length = np.linalg.norm(away, axis=1, keepdims=True)
+        rest = float(np.linalg.norm(FASTENED_M)) - SLACK_M
+        force = self.stiffness_n_m * np.maximum(length - rest, 0.0) * away / length
+        return force, np.cross(r, force)
+
+
+class LateChannel(ChannelFault, name="outside_late_channel"):
+    """The channel comes `size` seconds late: its amplifier's filter is slower than the others'."""
+
+    def shown(self, values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+        return np.interp(times_s - self.size, times_s, values)
+
+
+@dataclass(frozen=True, eq=False)
+class LooseConnector(OfEveryPlate, name="outside_loose_connector"):
+    """The vertical channel's gain wanders: a contact that opens and closes within seconds.
+
+    `size` is the standard deviation of the gain.
+    """
+
+    seed: int
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        return cls(size, int(rng.integers(1 << 31)))
+
+    def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
+        knots = np.arange(times_s[0], times_s[-1] + WANDERS_S, WANDERS_S)
+        drawn = np.random.default_rng([self.seed, len(times_s)]).standard_normal(len(knots))
+        reading[:, 2] *= 1.0 + self.size * np.interp(times_s, knots, drawn)
+
+
+@dataclass(frozen=True, eq=False)
+class ClockJump(Effect, name="outside_clock_jump"):
+    """From a moment on the force comes `size` seconds later: a buffer of the plates was lost."""
+
+    from_share: float
+
+    @classmethod
+    def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
+        return cls(size, float(rng.uniform(0.35, 0.65)))
+
+    def measured(self, instruments: Instruments) -> Instruments:
+        times = instruments.sample_times_s()
+        return instruments.with_forces_from(
+            times - self.size * (times > self.from_share * times[-1])
+        )
+
+
+EFFECTS.update({name: KINDS[name] for name in OUTSIDE})
+
+if __name__ == "__main__":
+    main()

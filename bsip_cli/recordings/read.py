@@ -218,7 +218,8 @@ def why_no_forces(plates: Sequence[Plate], had_some: bool = True) -> str:
     total = np.sum([np.where(p.usable, p.force_N[:, 2], 0.0) for p in plates], axis=0)
     largest = np.max(total, initial=0.0)
     if largest < LOADED_N:
-        return f"the force plates were never loaded (at most {largest:.0f} N)"
+        found = f"the force plates were never loaded (at most {largest:.3g} N)"
+        return f"{found}; if these are kN or parts of the weight, export them in N"
     return ""
 
 

@@ -33,6 +33,8 @@ _UNITS = (
     ("kilograms that were divided by 2.2046 once too often", 1 / 2.20462),
     ("kilograms that were divided by 9.81", 1 / 9.80665),
 )
+# What forces were written in, that were read in newton: newton over the unit.
+_FORCE_UNITS = (("pounds-force", 4.44822), ("kilogram-force", 9.80665))
 _CM_PER_M = 100.0
 _NEAR_CM = 3.0
 
@@ -226,7 +228,7 @@ class Comparison:
 
     def likely(self) -> str:
         """What the stated number is likely to be; empty if it is none of the known mistakes."""
-        for name, factor in _UNITS:
+        for name, factor in _UNITS if self.told.mass_kg >= LEAST_KG else ():
             if self._meets(self.stated_kg / factor):
                 return f"{self.stated_kg:g} is likely to be in {name}"
         height = self.height_m
@@ -238,14 +240,22 @@ class Comparison:
             return f"{self.stated_kg:g} is likely to be {turned:g} with two digits exchanged"
         return ""
 
+    def _likely_forces(self) -> str:
+        for name, newton in _FORCE_UNITS:
+            if self._meets(self.stated_kg / newton):
+                return f"the forces are likely to be in {name}: export them in N"
+        return ""
+
     def _meets(self, mass_kg: float) -> bool:
         allowed = self.tolerance_percent + self.told.half_width_percent
         return abs(_PERCENT * ((mass_kg + self.load_kg) / self.told.mass_kg - 1.0)) <= allowed
 
     def sentence(self, where: str) -> str:
         """Of a gross difference: both numbers, what is likely, what to do."""
-        likely = self.likely() or (
-            "a typing mistake, another person's row, a second person or a load on the plates"
+        likely = (
+            self.likely()
+            or self._likely_forces()
+            or ("a typing mistake, another person's row, a second person or a load on the plates")
         )
         return (
             f"the stated mass and the plates do not agree: {where} says {self.stated_kg:g} kg, "

@@ -64,3 +64,14 @@ def test_a_known_load_is_no_disagreement():
 def test_what_the_plates_do_not_tell_is_not_compared():
     finding = mass_finding(unknown("nobody stood on them"), None, "")
     assert finding.level == "info" and "nobody stood on them" in finding.found
+
+
+@pytest.mark.parametrize(
+    ("newton", "unit"), [(4.44822, "pounds-force"), (9.80665, "kilogram-force"), (2.0, "")]
+)
+def test_forces_in_another_unit_than_newton(newton, unit):
+    """The stated mass is right, and the plates' is too small by the unit."""
+    said = compared(50.3, 50.3 / newton)
+    assert said.likely() == "" and said.is_gross
+    sentence = said.sentence("participants.tsv")
+    assert ("the forces are likely to be in" in sentence) == bool(unit) and unit in sentence

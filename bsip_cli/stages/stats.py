@@ -16,7 +16,6 @@ import pandas as pd
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.pipeline import STAGES, producer
-from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit
 from bsip_cli.statistics.cohort import (
     DATA_SHARE,
@@ -206,8 +205,9 @@ class _Missing:
 
     def add(self, what: str, *numbers: int) -> None:
         """`what` ("sub-02 has no ...") is not in the tables with these numbers."""
-        tables = "table" if len(numbers) == 1 else "tables"
-        self._unit.warn(f"{what}: not in {tables} {listing([*map(str, numbers)])}")
+        *others, last = map(str, numbers)
+        tables = f"tables {', '.join(others)} and {last}" if others else f"table {last}"
+        self._unit.warn(f"{what}: not in {tables}")
         self.note(what, *numbers)
 
     def note(self, what: str, *numbers: int) -> None:

@@ -12,7 +12,7 @@ from bsip_cli.simulate.numerics import window
 from bsip_cli.simulate.options import PRESETS
 from bsip_cli.simulate.people import Person
 from bsip_cli.simulate.plan import Plan, add_breath_of_motion, add_sway, plate_under, sketch_for
-from bsip_cli.simulate.recording import write_trial
+from bsip_cli.simulate.recording import measure_trial, write_trial
 from bsip_cli.simulate.study import participant_person, simulate_study
 from bsip_cli.simulate.trial import THIN, Trial, simulate_trial, trial_of
 
@@ -38,16 +38,16 @@ def write_study(folder: Path, people: int, seed: int, quick: bool = False) -> No
         for k, (task, move) in enumerate(POOR.items()):
             rng = np.random.default_rng([seed, number, k])
             name = f"sub-{number:02d}"
-            write_trial(
-                folder / name / f"{name}_task-{task}_run-1.c3d",
+            measured = measure_trial(
                 move(person, rng),
                 person,
                 options.rates_of("squat"),
                 options.laboratory,
                 options.richness,
                 rng,
-                subject=name,
             )
+            path = folder / name / f"{name}_task-{task}_run-1.c3d"
+            write_trial(path, measured, options.richness.quantised, name)
 
 
 def squats(person: Person, rng: np.random.Generator) -> Trial:

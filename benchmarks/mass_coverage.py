@@ -37,7 +37,7 @@ from bsip_cli.simulate.plan import (
     plate_under,
     sketch_for,
 )
-from bsip_cli.simulate.recording import write_trial
+from bsip_cli.simulate.recording import measure_trial, write_trial
 from bsip_cli.simulate.trial import THIN, Trial, simulate_trial, trial_of
 from bsip_cli.stages import ingest, survey
 from bsip_cli.study.study import load_study
@@ -178,7 +178,9 @@ def stretches_of_case(kind: str, seed: int, folder: Path) -> tuple[float, list[S
     plates = f"[ingest]\nplates = [{', '.join(case.plates)}]\n" if case.plates else ""
     (study / "study.toml").write_text(f'marker_set = "hansen2017"\n{plates}')
     path = study / "sub-01" / f"{STEM}.c3d"
-    write_trial(path, case.trial, person, Rates(), case.laboratory, Richness(), rng)
+    rates, richness = Rates(), Richness()
+    measured = measure_trial(case.trial, person, rates, case.laboratory, richness, rng)
+    write_trial(path, measured, richness.quantised)
     config = load_config([study / "study.toml"])
     found, _ = load_study(study, config.roles.model_dump())
     participant = found.participants[0]

@@ -17,7 +17,7 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.simulate.options import Rates, StudyOptions
 from bsip_cli.simulate.people import Inertia, combined
-from bsip_cli.simulate.recording import write_trial
+from bsip_cli.simulate.recording import measure_trial, write_trial
 from bsip_cli.simulate.study import participant_person, simulate_study
 from bsip_cli.simulate.trial import simulate_trial
 from bsip_cli.study.study import load_study
@@ -157,15 +157,9 @@ def carried(tmp_path_factory):
         rng = np.random.default_rng([5, number])
         moved = simulate_trial(with_backpack(person), task, rng, OPTIONS.durations_s[task])
         path = root / "study" / "sub-01" / f"{stem}.c3d"
-        write_trial(
-            path,
-            moved,
-            person,
-            OPTIONS.rates_of(task),
-            OPTIONS.laboratory,
-            OPTIONS.richness,
-            rng,
-        )
+        rates, richness = OPTIONS.rates_of(task), OPTIONS.richness
+        measured = measure_trial(moved, person, rates, OPTIONS.laboratory, richness, rng)
+        write_trial(path, measured, richness.quantised)
     run = Run(root)
     states = run.everything("identify")
     assert set(states.values()) == {"done"}

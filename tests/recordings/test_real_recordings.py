@@ -240,3 +240,21 @@ def test_squat_moves_as_the_force_says(real_data):
     height = np.convolve(recording.markers_m[..., 2].mean(axis=1), np.ones(15) / 15, "same")
     acceleration = np.gradient(np.gradient(height)) * recording.marker_rate_hz**2
     assert np.corrcoef(acceleration[50:-50], force[50:-50])[0, 1] > 0.9
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (
+            ["opencap_subject4/walking1.trc", "opencap_subject4/walking2.trc"],
+            "reversed the moments",
+        ),
+        (["zoo_children/HC039A-straight.c3d", "zoo_children/HC039A-turn.c3d"], ""),
+    ],
+)
+def test_vertical_moments_go_with_the_turning_body(real_data, names, words):
+    trials = [TrialSamples.of(open_recording(real_data / name)) for name in names]
+    found = findings_about(settle_session(trials))
+    assert bool(words) == bool(found)
+    assert all(words in finding.action for finding in found)

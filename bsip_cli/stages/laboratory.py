@@ -280,7 +280,11 @@ def _sentence(
     cause: Cause, sizes: Sequence[Size], said: str, probability: float, counts: tuple[int, int]
 ) -> str:
     words, remedy = _words(cause, sizes), _effect(cause).remedy
-    told = f"by {counts[0]} persons and {counts[1]} recordings"
+    people, recordings = (
+        f"{n} {word}{'s' * (n != 1)}"
+        for n, word in zip(counts, ("person", "recording"), strict=True)
+    )
+    told = f"by {people} and {recordings}"
     if said == "named":
         return f"{words}, {told}; to make sure, {remedy}"
     if said == "ambiguous":

@@ -17,7 +17,13 @@ from bsip_cli import __version__
 from bsip_cli.errors import BsipError, not_readable
 from bsip_cli.files.regular import shipped
 from bsip_cli.pipeline import STAGES
-from bsip_cli.running.processes import EndedError, endings_kept, ignore_endings, raise_when_ended
+from bsip_cli.running.processes import (
+    EndedError,
+    endings_kept,
+    ignore_endings,
+    leave,
+    raise_when_ended,
+)
 
 # One thread per process: results do not depend on the number of cores, and --jobs decides the load.
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -302,4 +308,4 @@ def _end(sentence: str, exit_code: int) -> None:
             click.echo(f"bsip: {sentence}", err=True)
     with suppress(OSError):  # what stands in its buffer cannot be written either
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    sys.exit(exit_code)
+    leave(exit_code)

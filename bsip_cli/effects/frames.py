@@ -68,13 +68,12 @@ class CameraFrame(Turned):
     def change(self, scene: Scene, target: str, values: np.ndarray) -> np.ndarray:
         """The same motion turned back, under the same gravity."""
         weight = scene.mass_kg * GRAVITY_M_S2 * UP
-        centre, back = scene.centre_of_mass_m, Rotation.from_rotvec([-values[0], -values[1], 0.0])
+        centre = scene.centre_of_mass_m
+        back = Rotation.from_rotvec([-values[0], -values[1], 0.0]).as_matrix().T
         standing = np.hstack([np.broadcast_to(weight, centre.shape), np.cross(centre, weight)])
         force, moment = np.split(scene.predicted - standing, 2, axis=1)
-        moved = back.apply(centre) - centre
-        return np.hstack(
-            [back.apply(force) - force, back.apply(moment) - moment + np.cross(moved, weight)]
-        )
+        moved = centre @ back - centre
+        return np.hstack([force @ back - force, moment @ back - moment + np.cross(moved, weight)])
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         degrees = np.degrees(np.hypot(*values))

@@ -240,8 +240,8 @@ class PlateRotation(OfPlates):
         centre = np.mean([plate.centre_m() for plate in plates], axis=0)
         force = wrench[:, :3]
         moment = wrench[:, 3:] - np.cross(centre, force)
-        true = Rotation.from_rotvec(values)
-        dforce, dmoment = force - true.apply(force), moment - true.apply(moment)
+        true = Rotation.from_rotvec(values).as_matrix().T
+        dforce, dmoment = force - force @ true, moment - moment @ true
         return np.hstack([dforce, dmoment + np.cross(centre, dforce)])
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:

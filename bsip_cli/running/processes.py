@@ -18,7 +18,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Generic, TypeVar
+from typing import Generic, NoReturn, TypeVar
 
 ENDING = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
 _raised: list[int] = []
@@ -87,6 +87,15 @@ def ignore_endings() -> None:
 
 def _pass_over(_number: int, _frame: object) -> None:
     return
+
+
+def leave(exit_code: int) -> NoReturn:
+    """End with this code even if a signal comes while Python ends, which drops its handlers."""
+    ignore_endings()
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
+    sys.exit(exit_code)
 
 
 def signal_in(exit_code: int | None) -> int | None:

@@ -76,11 +76,11 @@ def run(unit: Unit) -> None:
     shown = feet.measured if feet.has_both else np.zeros_like(feet.measured)
     stretches = stretches_of(markers, feet.total_N, shown, recording.marker_rate_hz)
     trunk = filled.markers_m[:, np.isin(segments, TRUNK)]
-    mass, about_mass = _mass_on_plates(unit, stated_mass(unit, person), stretches)
+    mass, stands_kg, about_mass = _mass_on_plates(unit, stated_mass(unit, person), stretches)
     if mass is None:
         loaded = feet.measured & upright_frames(markers)
         mass = agreeing_mass(feet.total_N, trunk, loaded, recording.marker_rate_hz)
-    contacts = contact_windows(feet, trunk, mass, recording.marker_rate_hz)
+    contacts = contact_windows(feet, trunk, mass, recording.marker_rate_hz, stands_kg)
     stated_otherwise = against_table(
         recording.stated,
         unit.participant.mass_kg,
@@ -182,8 +182,9 @@ def _foot_contacts(
 
 def _mass_on_plates(
     unit: Unit, stated: StatedMass | None, stretches: tuple[Stretch, ...]
-) -> tuple[float | None, list[Finding]]:
-    """The mass [kg] on the plates, known loads included, and what is said of it.
+) -> tuple[float | None, float | None, list[Finding]]:
+    """The mass [kg] on the plates, known loads included, what the trial's plates tell for sure, and
+    what is said of both.
 
     The stated one, unless the trial's plates tell for sure a grossly different one; without a
     stated mass what they tell for sure; else None.
@@ -195,10 +196,11 @@ def _mass_on_plates(
     comparison = compared(unit, stated, told, unit.load_kg())
     about = [mass_finding(told, comparison, stated.source if stated else "")]
     from_plates = stated is None or (comparison is not None and comparison.is_gross)
+    told_kg = told.mass_kg if told.is_known else None
     if from_plates:
-        return (told.mass_kg if told.is_known else None), about
+        return told_kg, told_kg, about
     assert stated is not None
-    return stated.mass_kg + unit.load_kg(), about
+    return stated.mass_kg + unit.load_kg(), told_kg, about
 
 
 def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:

@@ -356,15 +356,16 @@ def in_true_axes(
     """The motion (N, nq), and where the vertical is tilted the ground's wrenches too, turned about
     the world's origin until the axes are upright."""
     for cause in (one for one in causes if isinstance(one.effect, Turned)):
-        back = Rotation.from_rotvec([*-cause.values, 0.0])
-        base = (back * Rotation.from_quat(q[:, 3:7])).as_quat()
-        q = np.hstack([back.apply(q[:, :3]), base, q[:, 7:]])
+        turn = Rotation.from_rotvec([*-cause.values, 0.0])
+        base = (turn * Rotation.from_quat(q[:, 3:7])).as_quat()
+        back = turn.as_matrix().T  # Rotation.apply refuses tables of a file, which are read-only
+        q = np.hstack([q[:, :3] @ back, base, q[:, 7:]])
         if isinstance(cause.effect, GravityTilt):
             on_feet = {
                 foot: Ground(
-                    np.hstack([back.apply(x) for x in np.hsplit(one.wrench, 2)]),
+                    np.hstack([x @ back for x in np.hsplit(one.wrench, 2)]),
                     one.noise,
-                    back.apply(one.noise_at_m),
+                    one.noise_at_m @ back,
                 )
                 for foot, one in on_feet.items()
             }

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import random
+import subprocess
 import sys
 
 import pytest
 
+from bsip_cli.running.processes import ENDING
 from tests.crash import faults
 from tests.crash.bench import Bench, by_processes
 from tests.crash.disturbances import disturbed, fault_rounds, signal_rounds
@@ -56,6 +58,17 @@ def test_signals_lose_and_leave_nothing(tmp_path, chance):
     hits, wrong = disturbed(signal_rounds(tmp_path, chance, count=5), tmp_path, jobs=1)
     assert wrong == []
     assert hits.total() > 0
+
+
+@pytest.mark.parametrize("ending", ENDING)
+def test_a_signal_while_python_ends_changes_nothing(ending):
+    command = [sys.executable, "-m", "bsip_cli", "info"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    said = process.stdout.read()  # to its end, which bsip closes as its last act
+    process.send_signal(ending)
+    assert process.wait() == 0 and process.stderr.read() == ""
+    assert said
 
 
 def test_what_is_not_whole_is_noticed(tmp_path):

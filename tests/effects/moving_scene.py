@@ -34,13 +34,20 @@ def phi() -> np.ndarray:
     return phi_of(person, regress(person, "M", MASS_KG).inertias)
 
 
+def unwritable(x: np.ndarray) -> np.ndarray:
+    seen = x.view()
+    seen.flags.writeable = False
+    return seen
+
+
 def scene_of(q: np.ndarray, v: np.ndarray, a: np.ndarray, **fields) -> Scene:
-    """Plates share the load, 0.4 to 0.6."""
+    """Plates share the load, 0.4 to 0.6. Arrays are read-only, as those of a file's table are."""
     times = np.arange(len(q)) / RATE_HZ
+    q, v, a = (unwritable(x) for x in (q, v, a))
     bare = Scene(times, standing().person, q, v, a, phi(), (), np.ones(len(q), dtype=bool))
     plates = (
-        Plate("1", CORNERS + ASIDE, 0.4 * bare.predicted),
-        Plate("2", CORNERS - ASIDE, 0.6 * bare.predicted),
+        Plate("1", CORNERS + ASIDE, unwritable(0.4 * bare.predicted)),
+        Plate("2", CORNERS - ASIDE, unwritable(0.6 * bare.predicted)),
     )
     return replace(bare, plates=plates, **fields)
 

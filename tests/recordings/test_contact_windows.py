@@ -36,9 +36,10 @@ def _plate(force_N: np.ndarray | float, corners=CORNERS, x: float = 0.25) -> Pla
     return PlateLoad("1", corners, force, cop, np.ones(N, bool))
 
 
-def _windows(left, right, plates, trunk=None, mass_kg=MASS_KG):
+def _windows(left, right, plates, trunk=None, mass_kg=MASS_KG, stands_kg=None):
     feet = foot_contacts({"l": left, "r": right}, RATE_HZ, plates, N)
-    return contact_windows(feet, _trunk() if trunk is None else trunk, mass_kg, RATE_HZ)
+    trunk = _trunk() if trunk is None else trunk
+    return contact_windows(feet, trunk, mass_kg, RATE_HZ, stands_kg)
 
 
 def test_standing_on_the_plate_is_valid():
@@ -179,6 +180,13 @@ def test_half_a_squat_on_a_plate_that_the_table_lacks():
     assert "a plate that is not in the file" in half.reasons[-1].found
     a_little = _windows(both, _foot(0.3), [_plate(0.9 * needed, corners=None)], trunk)
     assert a_little.valid.all()
+
+
+def test_plates_that_read_less_of_a_quiet_stance_too_are_no_missing_plate():
+    """A gain or a stated mass that is wrong by a quarter: the frames stay, for what comes after."""
+    feet, plate = (_foot(0.1), _foot(0.4)), _plate(0.75 * WEIGHT_N)
+    assert not _windows(*feet, [plate]).valid.any()
+    assert _windows(*feet, [plate], stands_kg=0.75 * MASS_KG).valid.all()
 
 
 def test_a_wrong_mass_is_no_seat():

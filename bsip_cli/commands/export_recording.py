@@ -439,7 +439,7 @@ def _stated(reading: PlateReading) -> PlateReading:
         moment_scale=1.0,
         point_scale=1.0,
         about="stated",
-        reversed_channel="",
+        channels="",
         centre_m=None,
     )
 

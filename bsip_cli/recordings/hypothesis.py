@@ -161,11 +161,11 @@ class Hypothesis:
 
 
 def _with(repair: PlateReading, now: PlateReading) -> PlateReading:
-    """One more repair of a plate's numbers; a reversed channel may come with another reference."""
-    if repair.reversed_channel:
+    """One more repair of a plate's numbers; one of its channels may come with another reference."""
+    if repair.channels:
         about = now.about if repair.about == "stated" else repair.about
-        return replace(now, reversed_channel=repair.reversed_channel, about=about)
-    return replace(repair, place_of=now.place_of, reversed_channel=now.reversed_channel)
+        return replace(now, channels=repair.channels, about=about)
+    return replace(repair, place_of=now.place_of, channels=now.channels)
 
 
 def _are_alike(one: PlateFit, other: PlateFit, with_torque: bool) -> bool:

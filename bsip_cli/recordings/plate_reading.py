@@ -17,7 +17,8 @@ Moved = Literal["", "all", "markers", "forces"]
 # hundred for a reference point or a turned plate, one in five hundred for corners the other way
 # round (none of 157 plates of 20 laboratories).
 _SCALED, _OTHER_POINT, TURNED, MIRRORED = -3.4, -4.6, -4.6, -6.2
-_MOMENTS_REVERSED = -6.2  # without the forces, or these without the moments, or one channel
+# Without the forces, or these without the moments, or one channel; two that are exchanged.
+_MOMENTS_REVERSED = -6.2
 REVERSED = -2.3  # the action on the plate: one in ten
 EXCHANGED = -5.3  # two plates
 ONE_ALONE = -0.7  # one plate of several: what goes wrong, goes wrong for all more often
@@ -40,7 +41,8 @@ class PlateReading:
     mirrored : the corners are taken in the other direction round.
     sign : -1 where the numbers are the action on the plate.
     place_of : the plate whose place (C3D), or points (MOT), belong to this one's force and moment.
-    reversed_channel : one of CHANNELS whose sign is the other, as written; "" if none.
+    channels : what is wrong with single channels, as written: "reversed" and one of CHANNELS,
+        "exchanged" and two forces or two moments; "" if nothing.
     half_size_m : half the outline's sides where the stated outline is too small.
     """
 
@@ -52,7 +54,7 @@ class PlateReading:
     mirrored: bool = False
     sign: int = 1
     place_of: str = ""
-    reversed_channel: str = ""
+    channels: str = ""
     half_size_m: tuple[float, float] | None = None
 
     def log_prior(self) -> float:
@@ -60,19 +62,25 @@ class PlateReading:
         scaled = (abs(self.moment_scale) != 1.0) + (self.point_scale != 1.0)
         return (
             _SCALED * scaled
-            + _MOMENTS_REVERSED * ((self.moment_scale < 0) + bool(self.reversed_channel))
+            + _MOMENTS_REVERSED * ((self.moment_scale < 0) + bool(self.channels))
             + _OTHER_POINT * (self.about != "stated")
             + TURNED * (self.turn != 0 and not self.mirrored)
             + MIRRORED * self.mirrored
         )
 
-    def force_signs(self) -> np.ndarray:
-        """Of Fx, Fy, Fz, (3,)."""
-        return np.array([-1.0 if name == self.reversed_channel else 1.0 for name in CHANNELS[:3]])
+    def force_matrix(self) -> np.ndarray:
+        """To Fx, Fy, Fz from what is written as such, (3, 3)."""
+        return self._matrix()[:3, :3]
 
-    def moment_signs(self) -> np.ndarray:
-        """Of Mx, My, Mz, (3,)."""
-        return np.array([-1.0 if name == self.reversed_channel else 1.0 for name in CHANNELS[3:]])
+    def moment_matrix(self) -> np.ndarray:
+        """To Mx, My, Mz from what is written as such, (3, 3)."""
+        return self._matrix()[3:, 3:]
+
+    def _matrix(self) -> np.ndarray:
+        right = np.eye(len(CHANNELS))
+        named = [k for k, name in enumerate(CHANNELS) if name in self.channels]
+        right[named] = -right[named] if len(named) == 1 else right[named[::-1]]
+        return right
 
     def words(self) -> str:
         """What was done about units, reference and axes, as one clause; empty if nothing."""
@@ -82,8 +90,7 @@ class PlateReading:
             _POINT_SCALES.get(self.point_scale, ""),
             _ABOUT[self.about],
         ]
-        if self.reversed_channel:
-            done.append(f"reversed {self.reversed_channel}")
+        done.append(self.channels)
         if self.place_of:
             done.append(f"exchanged its place with that of {self.place_of}")
         if self.mirrored:
@@ -94,6 +101,15 @@ class PlateReading:
 
 
 AS_STATED = PlateReading()
+
+
+def faults_of_channels(*level: int) -> list[str]:
+    """Each reversed; the two level forces or moments, by default x and y, exchanged."""
+    one, other = level or (0, 1)
+    pairs = ((CHANNELS[one + k], CHANNELS[other + k]) for k in (0, 3))
+    reversed_ = [f"reversed {name}" for name in CHANNELS]
+    return reversed_ + [f"exchanged {a} and {b}" for a, b in pairs]
+
 
 _MOMENT_SCALES = {
     1e-3: "read the moments in N mm",

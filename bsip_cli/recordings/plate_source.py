@@ -13,10 +13,10 @@ from scipy.ndimage import gaussian_filter1d
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.plate_reading import (
     AS_STATED,
-    CHANNELS,
     FrameChange,
     PlateReading,
     Reference,
+    faults_of_channels,
 )
 from bsip_cli.recordings.plates import (
     LOADED_N,
@@ -28,6 +28,7 @@ from bsip_cli.recordings.plates import (
 
 _THICK_M = 0.3  # no plate's sensors lie so deep under its surface
 _Z = np.array([1.0, 1.0, -1.0])
+_LEVEL = 0.5  # sine of an axis' slope
 _HARDLY = 0.05  # of a bell: less of it has points
 # Of the force: what makers state for a plate's linearity and cross talk. A copy or a sum is the
 # same reading and differs by rounding; the loads of two feet differ by tens of per cent mostly.
@@ -136,11 +137,11 @@ class C3dPlate:
         """Without the maker's correction of the centre of pressure, which is no linear one."""
         description = self.read_description(reading)
         axes = self.rotation_world_lab @ description.rotation_lab_plate()
-        force = reading.sign * axes * reading.force_signs()
+        force = reading.sign * axes @ reading.force_matrix()
         to_surface = axes @ crossing(self._surface_m(reading)) @ axes.T
         at_centre = crossing(self.rotation_world_lab @ description.centre_m()) - to_surface
         scale = reading.sign * reading.moment_scale
-        moment = np.hstack([at_centre @ force, scale * axes * reading.moment_signs()])
+        moment = np.hstack([at_centre @ force, scale * axes @ reading.moment_matrix()])
         return np.vstack([np.hstack([force, np.zeros((3, 3))]), moment])
 
     def at(self, samples: np.ndarray) -> C3dPlate:
@@ -196,8 +197,8 @@ class C3dPlate:
             abouts += ("reversed", "centred")
         for scale, about, turn, mirrored in product(scales, abouts, range(4), (False, True)):
             yield PlateReading(moment_scale=scale, about=about, turn=turn, mirrored=mirrored)
-        for channel in CHANNELS:
-            yield PlateReading(reversed_channel=channel)
+        for fault in faults_of_channels():
+            yield PlateReading(channels=fault)
 
     def findings(self, reading: PlateReading) -> list[Finding]:
         """The maker's correction of the centre of pressure; force and vertical moment stay."""
@@ -241,8 +242,8 @@ class C3dPlate:
     def _at_surface(self, reading: PlateReading) -> LocalWrench:
         """Before the sign of a reading."""
         wrench = LocalWrench(
-            self.wrench.force_N * reading.force_signs(),
-            self.wrench.moment_Nm * reading.moment_signs() * reading.moment_scale,
+            self.wrench.force_N @ reading.force_matrix().T,
+            self.wrench.moment_Nm @ reading.moment_matrix().T * reading.moment_scale,
         )
         return wrench.at_surface(self._surface_m(reading))
 
@@ -264,11 +265,11 @@ class ForceOnPoint:
     rotation_world_lab: np.ndarray  # (3, 3)
 
     def parts(self) -> np.ndarray:
-        """Force, moment, and the products of point and force that make up their cross product."""
+        """Force, moment, and the products of each coordinate of the point with each force."""
         f = self.force_N
         p = np.zeros_like(f) if self.points is None else self.points
-        products = p[:, [1, 2, 2, 0, 0, 1]] * f[:, [2, 1, 0, 2, 1, 0]]
-        return np.hstack([f, self.moment, products])
+        products = p[:, :, None] * f[:, None]
+        return np.hstack([f, self.moment, products.reshape(len(f), 9)])
 
     def matrix(self, reading: PlateReading) -> np.ndarray:
         moment = self._scaled_moment(reading)
@@ -345,8 +346,9 @@ class ForceOnPoint:
             abouts += ("origin", "fixed")
         for point, moment, about in product(points, (1.0, 1e-3, -1.0, -1e-3), abouts):
             yield PlateReading(moment_scale=moment, point_scale=point, about=about)
-        for channel, about in product(CHANNELS, abouts):
-            yield PlateReading(reversed_channel=channel, about=about)
+        level = np.flatnonzero(np.abs(self.rotation_world_lab[2]) < _LEVEL)
+        for fault, about in product(faults_of_channels(*level), abouts):
+            yield PlateReading(channels=fault, about=about)
 
     def findings(self, reading: PlateReading) -> list[Finding]:
         return []
@@ -377,19 +379,19 @@ class ForceOnPoint:
         x, y, z = (turn.T @ centre).tolist()
         return replace(reading, centre_m=(x, y, z))
 
-    # From the parts, lab frame, (3, 12) each.
+    # From the parts, lab frame, (3, 15) each.
 
     def _force(self, reading: PlateReading) -> np.ndarray:
-        return np.hstack([np.diag(reading.force_signs()), np.zeros((3, 9))])
+        return np.hstack([reading.force_matrix(), np.zeros((3, 12))])
 
     def _scaled_moment(self, reading: PlateReading) -> np.ndarray:
-        scaled = np.diag(reading.moment_scale * reading.moment_signs())
-        return np.hstack([_NONE, scaled, _NONE, _NONE])
+        scaled = reading.moment_scale * reading.moment_matrix()
+        return np.hstack([np.zeros((3, 3)), scaled, np.zeros((3, 9))])
 
     def _at_origin(self, reading: PlateReading) -> np.ndarray:
         """Moment of the force at its point about the lab's origin."""
-        signs = reading.force_signs()[[2, 1, 0, 2, 1, 0]]
-        return np.hstack([_NONE, _NONE, reading.point_scale * _CROSS_PRODUCT * signs])
+        cross = _CROSS_PRODUCT @ reading.force_matrix()
+        return np.hstack([np.zeros((3, 6)), reading.point_scale * cross.reshape(3, 9)])
 
     def _left(self, reading: PlateReading) -> np.ndarray:
         """Moment at the point."""
@@ -402,9 +404,8 @@ class ForceOnPoint:
         return left
 
 
-_NONE = np.zeros((3, 3))
-# y Fz, z Fy, z Fx, x Fz, x Fy, y Fx make up a point's moment.
-_CROSS_PRODUCT = np.array([[1, -1, 0, 0, 0, 0], [0, 0, 1, -1, 0, 0], [0, 0, 0, 0, 1, -1]])
+# (3, 3, 3): what the products of each coordinate of a point with each force add to its moment.
+_CROSS_PRODUCT = np.cross(np.eye(3)[:, None], np.eye(3)[None]).transpose(2, 0, 1)
 
 
 def _in_lab(change: np.ndarray, rotation_world_lab: np.ndarray) -> np.ndarray:

@@ -103,7 +103,7 @@ def _row(verdict: Verdict) -> dict:
 
 def _verdict(row: dict) -> Verdict:
     centre, half = (tuple(row[name] for name in names) for names in (_CENTRE, _HALF))
-    same = ("moment_scale", "point_scale", "about", "place_of", "reversed_channel")
+    same = ("moment_scale", "point_scale", "about", "place_of", "channels")
     reading = PlateReading(
         **{name: row[name] for name in same},
         centre_m=None if pd.isna(centre[0]) else centre,

@@ -167,9 +167,7 @@ def _channels(
     top = (moment - np.cross(centre, force)) @ axes
     if export.reference == "sensor":
         top = top - np.cross(own_force, [0.0, 0.0, -plate.depth_m])
-    signs = export.channel_signs * export.plate_signs.get(number, np.ones(6))
-    six = np.hstack([own_force, top]) * signs
-    return six[:, [1, 0, 2, 4, 3, 5]] if number == export.crossed_plate else six
+    return export.channels(number, np.hstack([own_force, top]), (0, 1))
 
 
 def _describe(plate: Plate, six: np.ndarray, export: Export, number: int) -> _Stated:

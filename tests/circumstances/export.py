@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,8 +19,8 @@ class Export:
     axes : (3, 3) exported = axes @ lab, of points and forces alike; marker_axes, force_axes: of
         one of them only, after it.
     point_unit, corner_unit, moment_unit : in which the numbers are; stated_* : what the file says.
-    channel_signs : (6,) of forces and moments; plate_signs by plate: (6,), after it;
-        of the crossed_plate the cables of x and y are exchanged.
+    channel_signs : (6,) of forces and moments; plate_signs by plate: (6,), after it; exchanged by
+        plate: whether the level forces, and the level moments, stand in each other's place.
     plate_order : which plate's readings stand where; corner_roll, corner_wound, doubled,
         summed : see c3d_export. reference : of the moments: sensor (C3D), surface; in MOT point,
         plate_centre, lab_origin.
@@ -40,7 +40,7 @@ class Export:
     # signs and plates
     channel_signs: np.ndarray = field(default_factory=lambda: np.ones(6))
     plate_signs: dict[int, np.ndarray] = field(default_factory=dict)
-    crossed_plate: int | None = None
+    exchanged: dict[int, tuple[bool, bool]] = field(default_factory=dict)
     plate_order: list[int] | None = None
     corner_roll: dict[int, int] = field(default_factory=dict)
     corner_wound: bool = False
@@ -82,3 +82,12 @@ class Export:
     encoding: str = "utf-8"
     trailing_lines: int = 0
     byte_order_mark: bool = False
+
+    def channels(self, number: int, six: np.ndarray, level: Sequence[int]) -> np.ndarray:
+        """(n, 6) of a plate as they are written, whose forces' axes ``level`` lie in the floor."""
+        six = six * self.channel_signs * self.plate_signs.get(number, np.ones(6))
+        for first, is_exchanged in zip((0, 3), self.exchanged.get(number, ()), strict=False):
+            if is_exchanged:
+                one, other = (first + k for k in level)
+                six[:, [one, other]] = six[:, [other, one]]
+        return six

@@ -67,9 +67,9 @@ def write_mot(path: Path, trial: Trial, export: Export, centres_m: np.ndarray) -
     columns: dict[str, np.ndarray] = {}
     # Exchanged plates: the force and torque of one stand with the points of the other.
     for k in range(count):
-        signs = export.channel_signs * export.plate_signs.get(k, np.ones(6))
         force, _, moment = own[order[k]]
-        _add(columns, k + 1, force * signs[:3], own[k][1], moment * signs[3:], export)
+        six = export.channels(k, np.hstack([force, moment]), np.argsort(np.abs(up))[:2])
+        _add(columns, k + 1, six[:, :3], own[k][1], six[:, 3:], export)
     if export.doubled:
         _add(columns, count + 1, *own[0], export)
     if export.summed:

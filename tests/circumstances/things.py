@@ -259,8 +259,17 @@ def one_plate_horizontal(export: Export, rng: np.random.Generator, plates: int) 
 
 
 def one_plate_axes(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.crossed_plate = _one_of(rng, plates)
-    return f"Fx and Fy, Mx and My of plate {export.crossed_plate + 1} exchanged"
+    plate = _one_of(rng, plates)
+    export.exchanged = {plate: (True, True)}
+    return f"Fx and Fy, Mx and My of plate {plate + 1} exchanged"
+
+
+def level_exchanged(export: Export, rng: np.random.Generator, plates: int) -> str:
+    which = range(plates) if rng.random() < 0.6 else [_one_of(rng, plates)]
+    forces = bool(rng.random() < 0.6)
+    export.exchanged = dict.fromkeys(which, (forces, not forces))
+    named = ", ".join(str(k + 1) for k in which)
+    return f"the level {'forces' if forces else 'moments'} of plate {named} exchanged"
 
 
 # Plates
@@ -526,6 +535,7 @@ THINGS = (
     Thing("signs", "signs", one_plate_component),
     Thing("signs", "signs", one_plate_horizontal, C3D),
     Thing("signs", "signs", one_plate_axes, C3D),
+    Thing("signs", "signs", level_exchanged),
     Thing("plates", "plates", plates_exchanged),
     Thing("plates", "plates", corners_turned, C3D),
     Thing("plates", "plates", corners_wound, C3D),

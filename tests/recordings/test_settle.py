@@ -42,6 +42,24 @@ def of_c3d_with_x_for_y(**faults) -> list[C3dPlate]:
     ]
 
 
+def of_c3d_with_fx_for_fy(**faults) -> list[C3dPlate]:
+    return [
+        replace(one, wrench=replace(one.wrench, force_N=one.wrench.force_N[:, [1, 0, 2]]))
+        for one in of_c3d(**faults)
+    ]
+
+
+def of_c3d_with_mx_for_my(**faults) -> list[C3dPlate]:
+    return [
+        replace(one, wrench=replace(one.wrench, moment_Nm=one.wrench.moment_Nm[:, [1, 0, 2]]))
+        for one in of_c3d(**faults)
+    ]
+
+
+def of_table_with_x_for_y(**faults) -> list[ForceOnPoint]:
+    return [replace(one, force_N=one.force_N[:, [1, 0, 2]]) for one in of_table(**faults)]
+
+
 FAULTS = {
     "table, sound": (of_table, {}, ""),
     "points in mm": (of_table, {"point_scale": 1e3}, "mm"),
@@ -80,6 +98,9 @@ FAULTS = {
         {"origin_m": (0.0, 0.0, -0.06)},
         "in the other direction round",
     ),
+    "Fx and Fy exchanged": (of_c3d_with_fx_for_fy, {}, "exchanged Fx and Fy"),
+    "Mx and My exchanged": (of_c3d_with_mx_for_my, {}, "exchanged Mx and My"),
+    "Fx and Fy of a table exchanged": (of_table_with_x_for_y, {}, "exchanged Fx and Fy"),
     "the action on the plate": (of_c3d, {"sign": -1}, ""),
 }
 

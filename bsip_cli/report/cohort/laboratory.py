@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from math import isfinite
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Paragraph, Section
@@ -52,11 +53,21 @@ def section(record: CohortRecord) -> Section:
 
 
 def named_sentences(table: pd.DataFrame) -> Iterator[str]:
-    """What is wrong with which laboratory, and who deviates from it."""
-    said = table[table["verdict"].isin(SAID)]
-    pairs = zip(said["laboratory"], said["sentence"], strict=True)
-    for laboratory, sentence in dict.fromkeys(pairs):
-        yield f"Laboratory {laboratory}: {sentence}."
+    """What is wrong with which laboratory, and who deviates from it; of causes that look alike the
+    likeliest, with the names of the others."""
+    said = table[table["verdict"].isin(SAID)].drop_duplicates(["laboratory", "sentence"])
+    alone = np.where(said["class_id"] == "", said["sentence"], said["class_id"])
+    for (laboratory, _), rows in said.groupby(["laboratory", alone], sort=False):
+        likeliest, *others = rows.sort_values("probability", ascending=False).to_dict("records")
+        text = f"Laboratory {laboratory}: {likeliest['sentence']}."
+        if others:
+            names = [
+                " ".join(filter(None, (effect_title(x["effect"]), f"({place})" * bool(place))))
+                for x in others
+                for place in [place_label(x["effect"], x["target"])]
+            ]
+            text += f" Or: {listing(names)}."
+        yield text
 
 
 def unnamed_sentences(table: pd.DataFrame) -> Iterator[str]:

@@ -95,9 +95,9 @@ def test_plates_that_turned_together_turn_about_the_middle_of_all():
     assert sum(found.values()) == pytest.approx(whole, abs=1e-9)
     middle = np.mean([plate.centre_m() for plate in scene.plates], axis=0)
     for plate in scene.plates:
-        turn = Rotation.from_rotvec([0.0, 0.02, 0.1])
-        force = turn.apply(plate.wrench[:, :3])
-        moment = turn.apply(plate.wrench[:, 3:] - np.cross(middle, plate.wrench[:, :3]))
+        turn = Rotation.from_rotvec([0.0, 0.02, 0.1]).as_matrix().T
+        force = plate.wrench[:, :3] @ turn
+        moment = (plate.wrench[:, 3:] - np.cross(middle, plate.wrench[:, :3])) @ turn
         assert found[plate.name][:, :3] == pytest.approx(force, abs=1e-9)
         assert found[plate.name][:, 3:] == pytest.approx(moment + np.cross(middle, force), abs=1e-9)
 

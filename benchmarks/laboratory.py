@@ -28,7 +28,7 @@ from benchmarks.measure import machine
 from bsip_cli.artifacts import read_artifact, read_header
 from bsip_cli.config import load_config
 from bsip_cli.diagnosis.fault_model import SIZES
-from bsip_cli.diagnosis.laboratory import Lag, persons_of, sums_of
+from bsip_cli.diagnosis.laboratory import Alike, persons_of, sums_of
 from bsip_cli.diagnosis.laboratory_deviations import deviations_of
 from bsip_cli.diagnosis.laboratory_search import Laboratory, causes_of, laboratory_of, verdicts_of
 from bsip_cli.diagnosis.shared_faults import STATED_MASS, Coordinate, Information
@@ -67,7 +67,7 @@ class Pool:
         self.centres_m = {plate: np.mean(x, axis=0) for plate, x in corners.items()}
         self.options = load_config([])
         mean_s, sd_s = np.mean([one["sessions"][""]["moments_s"] for one in facts], axis=0).tolist()
-        self.lag = Lag(0.001 * self.options.laboratory.tissue_lag_ms, (mean_s, sd_s))
+        self.alike = Alike(self.options.laboratory.alike, (mean_s, sd_s))
 
     def laboratory(
         self,
@@ -84,14 +84,14 @@ class Pool:
             told = [self._as_modelled(one, common, rng) for one in told]
         told = [with_faults(one, sizes or {}, manner == CLEAN) for one in told]
         masses = [self.mass_sd[k] for k in drawn]
-        persons = persons_of(told, masses, self.options.laboratory.between_persons, self.lag)
+        persons = persons_of(told, masses, self.options.laboratory.between_persons, self.alike)
         causes = causes_of(persons, self.centres_m)
         return laboratory_of(persons, causes, self.options.diagnosis.fault_prior_odds)
 
     def _of_all(self, rng: np.random.Generator) -> dict[Coordinate, float]:
-        """What every laboratory has of a fault, and skin that lags in all alike [typical]."""
+        """What every laboratory has of a fault, and what the model lacks of all alike [typical]."""
         first = persons_of(
-            self.told, self.mass_sd, self.options.laboratory.between_persons, self.lag
+            self.told, self.mass_sd, self.options.laboratory.between_persons, self.alike
         )
         number = first.ordinary * rng.standard_normal(len(first.ordinary))
         differences = first.differences(np.ones(first.count))

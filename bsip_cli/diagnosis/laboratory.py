@@ -92,41 +92,42 @@ class Persons:
 
 
 @dataclass(frozen=True)
-class Lag:
-    """Soft tissue that lags in all persons alike passes for a delay, other early than late in a
-    stance, and so for a clock's rate.
+class Alike:
+    """What the model of a body lacks of all persons alike passes for faults of the laboratory: of a
+    plate, and, since soft tissue lags other early than late in a stance, of a clock's delay and
+    rate.
 
-    size_s : standard deviation. moments_s : mean and standard deviation of the moments that tell of
-    the clock, from the start of a recording.
+    size : standard deviation [typical]. moments_s : mean and standard deviation of the moments that
+    tell of the clock, from the start of a recording.
     """
 
-    size_s: float
+    size: float
     moments_s: tuple[float, float]
 
     def root(
         self, coordinates: Sequence[Coordinate], known: Mapping[Coordinate, Parameter]
     ) -> np.ndarray:
-        """(C, 2) of the covariance [typical]: the same at all moments, and about their mean."""
+        """(C, C) of the covariance [typical]. Nothing of it is in who stands still."""
         mean_s, sd_s = self.moments_s
-        root = np.zeros((len(coordinates), 2))
-        for k, one in enumerate(coordinates):
-            if one.standing:
-                continue  # nothing in who stands still tells of time
-            if one.effect == SyncOffset.name:
-                root[k] = np.array([1.0, -mean_s / sd_s]) * self.size_s / known[one].typical
-            elif one.effect == ClockDrift.name:
-                root[k, 1] = self.size_s / sd_s / known[one].typical
+        moving = [one.effect != STATED_MASS.name and not one.standing for one in coordinates]
+        root = self.size * np.diag(np.array(moving, float))
+        names = {one.effect: k for k, one in enumerate(coordinates) if moving[k]}
+        if {SyncOffset.name, ClockDrift.name} <= names.keys():
+            delay, rate = names[SyncOffset.name], names[ClockDrift.name]
+            later = self.size * known[coordinates[delay]].typical / sd_s
+            root[rate, rate] = later / known[coordinates[rate]].typical
+            root[delay, rate] = -self.size * mean_s / sd_s
         return root
 
 
-NO_LAG = Lag(0.0, (0.0, 1.0))
+NOTHING_ALIKE = Alike(0.0, (0.0, 1.0))
 
 
 def persons_of(
     informations: Sequence[Information],
     mass_sd: Sequence[float],
     deviation: float,
-    lag: Lag = NO_LAG,
+    alike: Alike = NOTHING_ALIKE,
 ) -> Persons:
     """Lay out what was kept of each.
 
@@ -151,7 +152,7 @@ def persons_of(
         np.where(is_mass, masses[:, None], deviation),
         np.array([groups[kind] for kind in kinds]),
         np.where(is_mass, np.median(masses), SHARE),  # one scale weighs all: it may err too
-        lag.root(coordinates, known),
+        alike.root(coordinates, known),
     )
 
 

@@ -10,8 +10,8 @@ import pytest
 from bsip_cli.diagnosis.fault_model import FaultTrial
 from bsip_cli.diagnosis.filtering import slow
 from bsip_cli.diagnosis.laboratory import (
-    NO_LAG,
-    Lag,
+    NOTHING_ALIKE,
+    Alike,
     persons_of,
     posterior_of,
     scales_of,
@@ -174,13 +174,14 @@ def test_what_is_known_of_the_clock_is_no_residual_any_more():
     assert not any(x.term == "fault:sync_offset" for x in known.errors.terms)
 
 
-def test_a_lag_of_skin_in_all_persons_alike_is_no_clock():
-    """Two milliseconds in everybody, of however many persons; else it would be named."""
-    told = drawn(np.random.default_rng(10), {DELAY: 0.2}, 40, 0.02)
-    for lag, expected in ((NO_LAG, True), (Lag(0.0015, (1.0, 0.3)), False)):
-        persons = persons_of(told, [0.008] * len(told), BETWEEN, lag)
+@pytest.mark.parametrize("number", [DELAY, VERTICAL])
+def test_what_all_persons_have_alike_is_no_fault_of_the_laboratory(number):
+    """Two milliseconds or 0.8 % in everybody, of however many persons; else it would be named."""
+    told = drawn(np.random.default_rng(10), {number: 0.2}, 40, 0.02)
+    for alike, expected in ((NOTHING_ALIKE, True), (Alike(0.15, (1.0, 0.3)), False)):
+        persons = persons_of(told, [0.008] * len(told), BETWEEN, alike)
         lab = laboratory_of(persons, causes_of(persons, CENTRES_M), ODDS)
-        assert any(lab.causes[k].effect == "sync_offset" for k in lab.found) == expected
+        assert any(lab.causes[k].effect == number.effect for k in lab.found) == expected
 
 
 def test_the_sums_are_those_of_all_deviations_at_once():

@@ -57,7 +57,7 @@ def compared(unit: Unit, method: str, setup: Path) -> list[tuple[str, ...]]:
     person = person_from(unit.read("skeleton"), unit.read("marker-positions"), skeleton)
     trial = trial_of(unit, person)
     methods, phi = parameters_of(unit.read("bsip"), person)
-    body, feet = phi[:, [methods.index(method)]], trial.ground(trial.readings).on_feet
+    body, feet = phi[:, [methods.index(method)]], trial.ground(trial.readings)[1]
     known = Spread((None,), 0.0)
     found = joint_loads(person, trial.q, trial.v, trial.a, body, feet, known)
     R = segment_motion(pinocchio_model(person), trial.q, trial.v, trial.a).rotation

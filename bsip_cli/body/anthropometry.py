@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -81,19 +81,13 @@ def _torso(thorax: TableRow, abdomen: TableRow) -> TableRow:
 
 def _mean(one: TableRow, other: TableRow) -> TableRow:
     """Halfway between two rows; of two tensors that a body can have the mean is one as well."""
-    return TableRow(
-        (one.mass_fraction + other.mass_fraction) / 2,
-        (one.com + other.com) / 2,
-        (one.gyration + other.gyration) / 2,
-        (one.mean_length_m + other.mean_length_m) / 2,
-    )
+    pairs = zip(vars(one).values(), vars(other).values(), strict=True)
+    return TableRow(*((mine + theirs) / 2 for mine, theirs in pairs))
 
 
 def _row(row: dict[str, str]) -> TableRow:
-    gyration = np.empty((3, 3))
-    for i, a in enumerate("xyz"):
-        for j, b in enumerate("xyz"):
-            gyration[i, j] = _signed_square(row[f"r{min(a, b)}{max(a, b)}_pct"])
+    names = [[f"r{min(a, b)}{max(a, b)}_pct" for b in "xyz"] for a in "xyz"]
+    gyration = np.array([[_signed_square(row[name]) for name in line] for line in names])
     com = np.array([float(row[f"com_{axis}_pct"]) for axis in "xyz"]) / 100
     return TableRow(
         float(row["mass_percent"]) / 100, com, gyration, float(row["mean_length_mm"]) / 1000
@@ -177,7 +171,7 @@ def strays_of(sex: str, mass_kg: float, stature_m: float, rows: Sequence[str]) -
 
     sex : M, F or other, which has the mean variance of both.
     """
-    figures = _figures()
+    figures = read_toml(Path(__file__).parent / "tables" / "people.toml")
     sexes = ["M", "F"] if sex == OTHER else [sex]
     spreads = [figures["spread"][one] for one in sexes]
     com = np.full((len(rows), 3), np.nan)
@@ -186,12 +180,9 @@ def strays_of(sex: str, mass_kg: float, stature_m: float, rows: Sequence[str]) -
             com[i, _ALONG.get(row, 1)] = _sd(spreads, row, "com")
     index, (low, high) = mass_kg / stature_m**2, figures["holds"]["body_mass_index"]
     is_small = stature_m < figures["holds"]["stature_m"][sex]
-    more = [
-        _child_differs(figures["child"], row, stature_m)
-        if is_small
-        else _build_differs(figures["share"], row, mass_kg, stature_m)
-        for row in rows
-    ]
+    differs = partial(_build_differs, figures["share"], mass_kg)
+    differs = partial(_child_differs, figures["child"]) if is_small else differs
+    more = [differs(stature_m, row) for row in rows]
     outside = ""
     if is_small:
         outside = (
@@ -213,23 +204,18 @@ def strays_of(sex: str, mass_kg: float, stature_m: float, rows: Sequence[str]) -
     )
 
 
-@cache
-def _figures() -> dict:
-    return read_toml(Path(__file__).parent / "tables" / "people.toml")
-
-
 def _sd(spreads: Sequence[Mapping], row: str, name: str) -> float:
     """Of people, and of tables where they were compared; the mean variance of the sexes."""
     return float(np.sqrt(np.mean([np.sum(np.square(one[row][name])) for one in spreads])))
 
 
-def _child_differs(child: Mapping, row: str, stature_m: float) -> float:
+def _child_differs(child: Mapping, stature_m: float, row: str) -> float:
     """By how much [%] a boy's share of the body's mass differs from a man's."""
     boy, man = np.interp(stature_m, child["stature_m"], child[row]["boys"]), child[row]["men"]
     return 100 * abs(float(boy) / man - 1)
 
 
-def _build_differs(share: Mapping, row: str, mass_kg: float, stature_m: float) -> float:
+def _build_differs(share: Mapping, mass_kg: float, stature_m: float, row: str) -> float:
     """By how much [%] a segment's share differs from that of people of the same stature and the
     mean body-mass index."""
 

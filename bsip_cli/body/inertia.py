@@ -42,18 +42,14 @@ class Inertia:
 
     def is_physical(self) -> bool:
         """Positive mass and a positive second moment along every axis."""
-        return self.mass_kg > 0 and bool(
-            np.linalg.eigvalsh(second_moments(self.tensor_kgm2))[0] > 0
-        )
+        least = np.linalg.eigvalsh(second_moments(self.tensor_kgm2))[0]
+        return self.mass_kg > 0 and bool(least > 0)
 
 
 def from_phi(phi: np.ndarray) -> Inertia:
     """Inverse of :meth:`Inertia.phi`.
 
-    Raises
-    ------
-    ZeroDivisionError
-        The mass is zero: there is no centre of mass.
+    ZeroDivisionError: the mass is zero: there is no centre of mass.
     """
     mass = float(phi[0])
     if mass == 0.0:
@@ -75,14 +71,10 @@ def from_readable(values: np.ndarray) -> Inertia:
 
 def readable_jacobian(phi: np.ndarray) -> np.ndarray:
     """(10, 10) derivative of the readable parameters with respect to ``phi``, same frame."""
-    step = 1e-6
     columns = []
-    for k in range(10):
-        h = step * max(1.0, abs(phi[k]))
-        plus, minus = phi.copy(), phi.copy()
-        plus[k] += h
-        minus[k] -= h
-        difference = from_phi(plus).readable() - from_phi(minus).readable()
+    for k, unit in enumerate(np.eye(10)):
+        h = 1e-6 * max(1.0, abs(phi[k]))
+        difference = from_phi(phi + h * unit).readable() - from_phi(phi - h * unit).readable()
         columns.append(difference / (2 * h))
     return np.stack(columns, axis=1)
 

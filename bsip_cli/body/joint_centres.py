@@ -34,47 +34,38 @@ _C7, _SUPRASTERNALE = np.array([-0.126, 0.069]), np.array([0.167, -0.110])
 _BREADTH, _LENGTH_TO_TORSO = 0.742, 0.94
 
 
-@dataclass(frozen=True, eq=False)
-class Completed:
-    """Landmarks (3,) [m] with the stand-ins among them, and what was put in, in words."""
-
-    landmarks: Mapping[str, np.ndarray]
-    notes: tuple[str, ...]
-
-
-def with_trunk(
+def _with_trunk(
     landmarks: Mapping[str, np.ndarray],
     waist: np.ndarray,
     pelvis_axes: np.ndarray,
     sex: str,
     stature_m: float,
-) -> Completed:
-    """C7 and both acromia, whatever the set has of them.
+) -> tuple[Mapping[str, np.ndarray], list[str]]:
+    """Landmarks (3,) [m] with C7 and both acromia, whatever the set has of them, and what was put
+    in, in words.
 
     ``waist`` (3,) is the lumbar joint centre [m], ``pelvis_axes`` (3, 3) X, Y, Z as columns.
     """
-    wanted = ("c7", "acromion_l", "acromion_r")
-    missing = [name for name in wanted if name not in landmarks]
+    missing = [name for name in ("c7", "acromion_l", "acromion_r") if name not in landmarks]
     if not missing:
-        return Completed(landmarks, ())
-    acromia = "acromion_l" in landmarks and "acromion_r" in landmarks
-    if acromia:
+        return landmarks, []
+    right = pelvis_axes[:, 2]
+    if "acromion_l" in landmarks and "acromion_r" in landmarks:
         middle = 0.5 * (landmarks["acromion_l"] + landmarks["acromion_r"])
-        right = landmarks["acromion_r"] - landmarks["acromion_l"]
-        basis = "the acromia"
+        right, basis = landmarks["acromion_r"] - landmarks["acromion_l"], "the acromia"
     elif "c7" in landmarks and "suprasternale" in landmarks:
         middle = _between(landmarks["c7"], landmarks["suprasternale"], waist)
-        right, basis = pelvis_axes[:, 2], "C7 and the suprasternale"
+        basis = "C7 and the suprasternale"
     else:
         length = _LENGTH_TO_TORSO * mean_length_m(sex, "torso", stature_m)
-        middle, right = waist + length * pelvis_axes[:, 1], pelvis_axes[:, 2]
+        middle = waist + length * pelvis_axes[:, 1]
         basis = "the pelvis, the trunk straight on it"
+        if "suprasternale" not in landmarks and "c7" not in landmarks:
+            missing.append("suprasternale")
     placed = _placed(middle, waist, right)
-    if not acromia and "suprasternale" not in landmarks and "c7" not in landmarks:
-        missing.append("suprasternale")
     names = ", ".join(in_words(name) for name in missing)
     note = f"no marker for {names}: placed by mean proportions from {basis}"
-    return Completed(dict(landmarks) | {name: placed[name] for name in missing}, (note,))
+    return dict(landmarks) | {name: placed[name] for name in missing}, [note]
 
 
 def _between(c7: np.ndarray, suprasternale: np.ndarray, waist: np.ndarray) -> np.ndarray:
@@ -102,63 +93,6 @@ def _placed(middle: np.ndarray, waist: np.ndarray, right: np.ndarray) -> dict[st
         "acromion_r": middle + half,
         "acromion_l": middle - half,
     }
-
-
-@dataclass(frozen=True, eq=False)
-class Arm:
-    """Elbow's lateral landmark and wrist centre (3,) [m], where they are known, and the notes."""
-
-    lateral: np.ndarray
-    wrist: np.ndarray
-    notes: tuple[str, ...]
-
-
-def whole_arm(
-    landmarks: Mapping[str, np.ndarray],
-    shoulder: np.ndarray,
-    down: np.ndarray,
-    side: str,
-    sex: str,
-    stature_m: float,
-) -> Arm:
-    """The arm's landmarks; what is missing hangs down or goes on in a straight line.
-
-    ``shoulder`` (3,) is the joint centre [m], ``down`` (3,) the trunk's downward unit vector.
-    """
-    notes: list[str] = []
-    wrist = _wrist(landmarks, side, notes)
-    lateral = landmarks.get(f"elbow_lateral_{side}")
-    upper, fore = (mean_length_m(sex, row, stature_m) for row in ("arm", "forearm"))
-    if lateral is None and wrist is None:
-        notes.append(f"no markers on the {in_words(f'arm_{side}')}: it hangs straight down")
-        return Arm(shoulder + upper * down, shoulder + (upper + fore) * down, tuple(notes))
-    if lateral is None:
-        assert wrist is not None
-        notes.append(f"no marker on the {in_words(f'elbow_{side}')}: taken as straight")
-        return Arm(shoulder + upper / (upper + fore) * (wrist - shoulder), wrist, tuple(notes))
-    if wrist is None:
-        notes.append(
-            f"no marker on the {in_words(f'wrist_{side}')}: the forearm goes on straight from the "
-            "elbow, in its mean length"
-        )
-        along = lateral - shoulder
-        return Arm(lateral, lateral + fore * along / np.linalg.norm(along), tuple(notes))
-    return Arm(lateral, wrist, tuple(notes))
-
-
-def _wrist(landmarks: Mapping[str, np.ndarray], side: str, notes: list[str]) -> np.ndarray | None:
-    """The middle of the styloids; where only one marker sits on the wrist, that one."""
-    styloids = [
-        landmarks[name]
-        for name in (f"styloid_radial_{side}", f"styloid_ulnar_{side}")
-        if name in landmarks
-    ]
-    if len(styloids) == 2:
-        return 0.5 * (styloids[0] + styloids[1])
-    single = landmarks.get(f"wrist_{side}", styloids[0] if styloids else None)
-    if single is not None:
-        notes.append(f"the {in_words(f'wrist_{side}')} has one marker only: taken as its centre")
-    return single
 
 
 # --------------------------------------------------------------------------------------------------
@@ -211,35 +145,28 @@ def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: floa
     axes, middle, width = _pelvis(landmarks)
     _require_sides(landmarks, axes[:, 2])
     waist = middle + width * (axes @ _LJC[sex])
-    completed = with_trunk(landmarks, waist, axes, sex, stature_m)
-    landmarks, notes = completed.landmarks, list(completed.notes)
+    landmarks, notes = _with_trunk(landmarks, waist, axes, sex, stature_m)
     if sex == OTHER:
         notes.insert(0, _MEAN_OF_BOTH)
     hips = hip_centres(landmarks, sex)
     assert hips is not None
-    centres = {"waist": waist, "hip_r": hips["r"], "hip_l": hips["l"]}
-    width, line, right = _thorax(landmarks, axes, centres["waist"], stature_m, notes)
+    width, line, right = _thorax(landmarks, waist, stature_m, notes)
     part, angle = _CJC[sex]
-    centres["neck"] = landmarks["c7"] + part * width * _turned(line, right, angle)
+    neck = landmarks["c7"] + part * width * _turned(line, right, angle)
     down = _SJC[0] * width * _turned(line, right, _SJC[1])
     sternum = landmarks.get("suprasternale", landmarks["c7"] + width * line)
-    up = unit(centres["neck"] - waist)
+    up = unit(neck - waist)
     thorax = np.stack([unit(np.cross(up, right)), up, right], axis=1)
-    hinges: dict[str, np.ndarray] = {}
-    ends: dict[str, np.ndarray] = {}
+    centres = {"waist": waist, "hip_r": hips["r"], "hip_l": hips["l"], "neck": neck}
+    limbs = _Limbs(landmarks, sex, stature_m, centres, {}, {}, notes)
     for side, sign in (("l", -1.0), ("r", 1.0)):
         across = width * _SCJ * np.array([1.0, 1.0, sign])
         centres[f"sternoclavicular_{side}"] = sternum + thorax @ across
-        outward = right if side == "r" else -right
         raised = landmarks[f"acromion_{side}"] + down
         centres[f"shoulder_{side}"] = landmarks.get(f"shoulder_centre_{side}", raised)
-        shoulder, below = centres[f"shoulder_{side}"], unit(waist - centres["neck"])
-        arm = whole_arm(landmarks, shoulder, below, side, sex, stature_m)
-        notes += arm.notes
-        _arm(landmarks, arm, centres, hinges, ends, side, outward, stature_m, notes)
-        outward = axes[:, 2] if side == "r" else -axes[:, 2]
-        _leg(landmarks, centres, hinges, ends, side, outward, stature_m, notes)
-    return JointCentres(centres, axes, hinges, ends, tuple(notes))
+        limbs.add_arm(side, sign * right, unit(waist - neck))
+        limbs.add_leg(side, sign * axes[:, 2])
+    return JointCentres(centres, axes, limbs.hinges, limbs.ends, tuple(notes))
 
 
 def hip_centres(landmarks: Mapping[str, np.ndarray], sex: str) -> dict[str, np.ndarray] | None:
@@ -316,7 +243,10 @@ def _pelvis(landmarks: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray
     return np.stack([np.cross(y, z), y, z], axis=1), middle, float(np.linalg.norm(right - left))
 
 
-def _thorax(landmarks, pelvis, waist, stature_m, notes):
+def _thorax(
+    landmarks: Mapping[str, np.ndarray], waist: np.ndarray, stature_m: float, notes: list[str]
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Width, direction from C7 to the suprasternale, and to the right."""
     c7 = landmarks["c7"]
     if "suprasternale" in landmarks:
         line = landmarks["suprasternale"] - c7
@@ -328,51 +258,101 @@ def _thorax(landmarks, pelvis, waist, stature_m, notes):
     return _THORAX_WIDTH * stature_m, _turned(forward, right, _THORAX_SLOPE), right
 
 
-def _arm(landmarks, arm, centres, hinges, ends, side, outward, stature_m, notes):
-    shoulder, lateral, wrist = centres[f"shoulder_{side}"], arm.lateral, arm.wrist
-    long_axis = unit(shoulder - lateral)
-    medial = landmarks.get(f"elbow_medial_{side}")
-    if medial is not None:
-        elbow, across = 0.5 * (lateral + medial), lateral - medial
-    elif f"elbow_lateral_{side}" not in landmarks:
-        elbow, across = lateral, outward
-    else:
-        notes.append(_lateral_only(f"elbow_{side}"))
-        across = _across_bent_elbow(long_axis, lateral - wrist, outward)
-        elbow = lateral - _HALF_BREADTH["elbow"] * stature_m * unit(across)
-    centres[f"elbow_{side}"], centres[f"wrist_{side}"] = elbow, wrist
-    hinges[f"elbow_{side}"] = unit(across if side == "r" else -across)
-    hand = _mean(landmarks, tuple(f"metacarpal_{k}_{side}" for k in (2, 3, 5)))
-    if hand is not None:
-        ends[f"hand_{side}"] = hand
+@dataclass(frozen=True, eq=False)
+class _Limbs:
+    """Arms and legs, added side by side to what a :class:`JointCentres` holds."""
+
+    landmarks: Mapping[str, np.ndarray]
+    sex: str
+    stature_m: float
+    centres: dict[str, np.ndarray]
+    hinges: dict[str, np.ndarray]
+    ends: dict[str, np.ndarray]
+    notes: list[str]
+
+    def add_arm(self, side: str, outward: np.ndarray, down: np.ndarray) -> None:
+        """What is missing hangs along ``down`` (3,), the trunk's unit vector, or goes on in a
+        straight line."""
+        shoulder, wrist = self.centres[f"shoulder_{side}"], self._wrist(side)
+        lateral = self.landmarks.get(f"elbow_lateral_{side}")
+        half_m = 0.0 if lateral is None else _HALF_BREADTH["elbow"] * self.stature_m
+        upper, fore = (mean_length_m(self.sex, row, self.stature_m) for row in ("arm", "forearm"))
+        if lateral is None and wrist is None:
+            self.notes.append(
+                f"no markers on the {in_words(f'arm_{side}')}: it hangs straight down"
+            )
+            lateral, wrist = shoulder + upper * down, shoulder + (upper + fore) * down
+        elif lateral is None:
+            assert wrist is not None
+            self.notes.append(f"no marker on the {in_words(f'elbow_{side}')}: taken as straight")
+            lateral = shoulder + upper / (upper + fore) * (wrist - shoulder)
+        elif wrist is None:
+            self.notes.append(
+                f"no marker on the {in_words(f'wrist_{side}')}: the forearm goes on straight from "
+                "the elbow, in its mean length"
+            )
+            wrist = lateral + fore * (lateral - shoulder) / np.linalg.norm(lateral - shoulder)
+        if half_m:
+            outward = _across_bent_elbow(unit(shoulder - lateral), lateral - wrist, outward)
+        self.centres[f"wrist_{side}"] = wrist
+        self._add_hinge("elbow", "elbow", side, lateral, outward, half_m)
+        hand = _mean(self.landmarks, tuple(f"metacarpal_{k}_{side}" for k in (2, 3, 5)))
+        if hand is not None:
+            self.ends[f"hand_{side}"] = hand
+
+    def _wrist(self, side: str) -> np.ndarray | None:
+        """The middle of the styloids; where only one marker sits on the wrist, that one."""
+        names = (f"styloid_radial_{side}", f"styloid_ulnar_{side}")
+        styloids = [self.landmarks[name] for name in names if name in self.landmarks]
+        if len(styloids) == 2:
+            return 0.5 * (styloids[0] + styloids[1])
+        single = self.landmarks.get(f"wrist_{side}", styloids[0] if styloids else None)
+        if single is not None:
+            words = in_words(f"wrist_{side}")
+            self.notes.append(f"the {words} has one marker only: taken as its centre")
+        return single
+
+    def add_leg(self, side: str, outward: np.ndarray) -> None:
+        for joint, name in (("knee", "knee"), ("ankle", "malleolus")):
+            lateral = self.landmarks[f"{name}_lateral_{side}"]
+            half_m = _HALF_BREADTH[name] * self.stature_m
+            self._add_hinge(joint, name, side, lateral, outward, half_m)
+        toes = _mean(self.landmarks, _toes(side))
+        assert toes is not None
+        self.ends[f"foot_{side}"] = toes
+
+    def _add_hinge(
+        self,
+        joint: str,
+        name: str,
+        side: str,
+        lateral: np.ndarray,
+        outward: np.ndarray,
+        half_m: float,
+    ) -> None:
+        """Between both landmarks; where the lateral one is alone, ``half_m`` inwards of it."""
+        medial = self.landmarks.get(f"{name}_medial_{side}")
+        centre, across = lateral - half_m * unit(outward), outward
+        if medial is not None:
+            centre, across = 0.5 * (lateral + medial), lateral - medial
+        elif half_m:
+            words = in_words(f"{joint}_{side}")
+            self.notes.append(
+                f"the {words} has a lateral marker only: centre from the mean breadth"
+            )
+        self.centres[f"{joint}_{side}"] = centre
+        self.hinges[f"{joint}_{side}"] = unit(across if side == "r" else -across)
 
 
-def _across_bent_elbow(long_axis, forearm, outward):
+def _across_bent_elbow(
+    long_axis: np.ndarray, forearm: np.ndarray, outward: np.ndarray
+) -> np.ndarray:
     """Lateral direction: normal of the arm's plane where the elbow is bent, else the body's."""
     normal = np.cross(unit(forearm), long_axis)
     across = outward - (outward @ long_axis) * long_axis
     if np.linalg.norm(normal) < 0.35:  # less than about 20 degrees
         return unit(across)
     return unit(normal) * np.sign(normal @ across)
-
-
-def _leg(landmarks, centres, hinges, ends, side, outward, stature_m, notes):
-    for joint, name in (("knee", "knee"), ("ankle", "malleolus")):
-        lateral = landmarks[f"{name}_lateral_{side}"]
-        medial = landmarks.get(f"{name}_medial_{side}")
-        if medial is not None:
-            centres[f"{joint}_{side}"], across = 0.5 * (lateral + medial), lateral - medial
-        else:
-            notes.append(_lateral_only(f"{joint}_{side}"))
-            across = outward
-            half = _HALF_BREADTH[name] * stature_m
-            centres[f"{joint}_{side}"] = lateral - half * unit(across)
-        hinges[f"{joint}_{side}"] = unit(across if side == "r" else -across)
-    ends[f"foot_{side}"] = _mean(landmarks, _toes(side))
-
-
-def _lateral_only(joint: str) -> str:
-    return f"the {in_words(joint)} has a lateral marker only: centre from the mean breadth"
 
 
 def _toes(side: str) -> tuple[str, ...]:

@@ -2,32 +2,13 @@
 
 from __future__ import annotations
 
-_SIDED = {
-    "forehead",
-    "occiput",
-    "temple",
-    "acromion",
-    "acromial_angle",
-    "clavicle",
-    "asis",
-    "psis",
-    "elbow_lateral",
-    "elbow_medial",
-    "styloid_radial",
-    "styloid_ulnar",
-    "wrist",
-    "metacarpal_2",
-    "metacarpal_3",
-    "metacarpal_5",
-    "knee_lateral",
-    "knee_medial",
-    "malleolus_lateral",
-    "malleolus_medial",
-    "calcaneus",
-    "metatarsal_1",
-    "metatarsal_2",
-    "metatarsal_5",
-}
+_SIDED = (
+    *("forehead", "occiput", "temple", "acromion", "acromial_angle", "clavicle", "asis", "psis"),
+    *(f"{name}_{end}" for name in ("elbow", "knee", "malleolus") for end in ("lateral", "medial")),
+    *("styloid_radial", "styloid_ulnar", "wrist", "calcaneus"),
+    *(f"metacarpal_{k}" for k in (2, 3, 5)),
+    *(f"metatarsal_{k}" for k in (1, 2, 5)),
+)
 JOINT_CENTRES = frozenset(
     f"{name}_centre_{side}"
     for name in ("shoulder", "elbow", "hip", "knee", "ankle")

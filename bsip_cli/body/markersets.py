@@ -56,6 +56,10 @@ class MarkerSet:
         """Labels that a recording may lack without a word."""
         return frozenset(marker.label for marker in self.markers if marker.optional)
 
+    def on(self, segment: str) -> str:
+        """The labels on a segment, as a list in words."""
+        return ", ".join(marker.label for marker in self.markers if marker.segment == segment)
+
     def as_data(self) -> dict:
         """As JSON can hold it: what :meth:`from_data` reads."""
         return asdict(self)
@@ -76,7 +80,11 @@ def load_marker_set(name: str) -> MarkerSet:
     UsageError
         There is no such file, or it names unknown segments or landmarks: all faults at once.
     """
-    file = Path(name) if name.endswith(".toml") else _shipped_file(name)
+    file = Path(name) if name.endswith(".toml") else shipped("markersets", f"{name}.toml")
+    if not (name.endswith(".toml") or file.exists()):
+        others = shipped("markersets").glob("*.toml")
+        also = (other for other in others if name in read_toml(other).get("also_called", ()))
+        file = next(also, file)
     if not os.path.lexists(file):
         known = ", ".join(["auto", *shipped_names()])
         raise UsageError(
@@ -86,32 +94,13 @@ def load_marker_set(name: str) -> MarkerSet:
     faults = _faults(data)
     if faults:
         raise UsageError("; ".join(faults), file=file, remedy="configs/markersets has examples")
-    weights = data.get("weights", {})
-    aliases = data.get("aliases", {})
-    optional = data.get("optional", {}).get("markers", [])
-    markers = tuple(
-        Marker(
-            label,
-            segment,
-            landmark,
-            float(weights.get(label, 1.0)),
-            label in optional,
-            tuple(aliases.get(label, ())),
-        )
-        for segment, members in data["segments"].items()
-        for label, landmark in members.items()
-    )
-    return MarkerSet(file.stem, str(data.get("description", file.stem)), markers)
-
-
-def _shipped_file(name: str) -> Path:
-    """The file of this name, or the one that is also called so."""
-    file = shipped("markersets", f"{name}.toml")
-    others = () if file.exists() else shipped("markersets").glob("*.toml")
-    for other in others:
-        if name in read_toml(other).get("also_called", ()):
-            return other
-    return file
+    weights, aliases = data.get("weights", {}), data.get("aliases", {})
+    optional, markers = data.get("optional", {}).get("markers", []), []
+    for segment, members in data["segments"].items():
+        for label, landmark in members.items():
+            weight, names = float(weights.get(label, 1.0)), tuple(aliases.get(label, ()))
+            markers.append(Marker(label, segment, landmark, weight, label in optional, names))
+    return MarkerSet(file.stem, str(data.get("description", file.stem)), tuple(markers))
 
 
 def shipped_names() -> tuple[str, ...]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
+from bsip_cli.body.inertia import Inertia
 from bsip_cli.body.skeleton import Skeleton
 
 # --- how a rigid body has moved between points that are known before and after --------------------
@@ -86,7 +88,10 @@ class Person:
 
     def joint_rotations(self) -> np.ndarray:
         """(n, 3, 3) rotation of the segment in its parent at angle zero."""
-        return rotations_x(self.parent_tilt_rad - self.child_tilt_rad)
+        angles = self.parent_tilt_rad - self.child_tilt_rad
+        c, s, one, zero = np.cos(angles), np.sin(angles), np.ones_like(angles), 0.0 * angles
+        rows = [[one, zero, zero], [zero, c, -s], [zero, s, c]]
+        return np.moveaxis(np.array(rows), -1, 0)
 
     def hinge_axes(self) -> np.ndarray:
         """(n, 3) unit axis of each joint in its own segment (used for hinges)."""
@@ -98,9 +103,19 @@ class Person:
         return self.marker_positions_m + self.origin_in_joint_m[self.marker_segments]
 
 
-def rotations_x(angles_rad: np.ndarray) -> np.ndarray:
-    """(n, 3, 3) rotations about X."""
-    c, s = np.cos(angles_rad), np.sin(angles_rad)
-    one, zero = np.ones_like(c), np.zeros_like(c)
-    rows = [[one, zero, zero], [zero, c, -s], [zero, s, c]]
-    return np.moveaxis(np.array(rows), -1, 0)
+def load_parameters(
+    loads: Iterable[tuple[str, float, Iterable[float]]], person: Person
+) -> np.ndarray:
+    """(10 n,) parameters of point masses on the n segments with mass, about their joint centres
+    (Pinocchio's order); added to a person's they are those of person and loads.
+
+    loads : segment, mass [kg] and place (3,) [m] from the segment's origin, in its frame. A load's
+    moment of inertia about its own centre is neglected (1 kg of 10 cm has 0.002 kg m2).
+    """
+    skeleton = person.skeleton
+    phi = np.zeros((len(skeleton.bodies), 10))
+    for segment, mass_kg, place_m in loads:
+        from_joint = np.array(place_m) + person.origin_in_joint_m[skeleton.index(segment)]
+        point = Inertia(mass_kg, from_joint, np.zeros((3, 3)))
+        phi[skeleton.body_names.index(segment)] += point.phi()
+    return phi.ravel()

@@ -6,6 +6,7 @@ import os
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 from pathlib import Path
 from typing import Literal
 
@@ -65,10 +66,8 @@ class Skeleton:
 
     def carrying(self, segment: str, landmark: str) -> str:
         """The segment that a marker rides on, which its set puts on ``segment``."""
-        riding = (
-            s for s, own in zip(self.segments, self.landmarks, strict=True) if landmark in own
-        )
-        return next(riding, segment)
+        pairs = zip(self.segments, self.landmarks, strict=True)
+        return next((one for one, own in pairs if landmark in own), segment)
 
     def index(self, segment: str) -> int:
         return self.segments.index(segment)
@@ -105,12 +104,12 @@ class Skeleton:
     @cached_property
     def q_starts(self) -> tuple[int, ...]:
         """Where each joint's entries begin in q."""
-        return _starts(len(_Q_PARTS[kind]) for kind in self.joint_types)
+        return self._starts(_Q_PARTS)
 
     @cached_property
     def v_starts(self) -> tuple[int, ...]:
         """Where each joint's entries begin in v."""
-        return _starts(len(_V_PARTS[kind]) for kind in self.joint_types)
+        return self._starts(_V_PARTS)
 
     def _names(self, parts: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
         return tuple(
@@ -119,13 +118,24 @@ class Skeleton:
             for part in parts[kind]
         )
 
+    def _starts(self, parts: dict[str, tuple[str, ...]]) -> tuple[int, ...]:
+        sizes = [len(parts[kind]) for kind in self.joint_types]
+        return tuple(accumulate(sizes[:-1], initial=0))
 
-def _starts(sizes) -> tuple[int, ...]:
-    starts, total = [], 0
-    for size in sizes:
-        starts.append(total)
-        total += size
-    return tuple(starts)
+
+def named_file(folder: str, name: str, what: str) -> Path:
+    """The shipped file of this name in a folder of configs, or the one at a path.
+
+    Raises
+    ------
+    UsageError
+        There is no such file: the shipped names are told.
+    """
+    file = Path(name) if name.endswith(".toml") else shipped(folder, f"{name}.toml")
+    if not os.path.lexists(file):
+        known = ", ".join(sorted(path.stem for path in shipped(folder).glob("*.toml")))
+        raise UsageError(f"there is no such {what}", file=name, expected=known)
+    return file
 
 
 def load_skeleton(name: str) -> Skeleton:
@@ -136,10 +146,7 @@ def load_skeleton(name: str) -> Skeleton:
     UsageError
         There is no such file, or its tree is not one: the first fault is named.
     """
-    file = Path(name) if name.endswith(".toml") else shipped("skeletons", f"{name}.toml")
-    if not os.path.lexists(file):
-        known = ", ".join(sorted(path.stem for path in shipped("skeletons").glob("*.toml")))
-        raise UsageError("there is no such skeleton", file=name, expected=known)
+    file = named_file("skeletons", name, "skeleton")
     data = read_toml(file)
     try:
         rows = data["segments"]
@@ -185,10 +192,8 @@ def _check(skeleton: Skeleton, file: Path) -> None:
 def _check_known(skeleton: Skeleton, file: Path) -> None:
     """The segments whose frames, inertias and tables exist, each on its joint."""
     faults = [f"no {name}" for name in SEGMENTS if name not in skeleton.segments]
-    tree = skeleton
-    rows = zip(
-        tree.segments, tree.joints, tree.joint_types, tree.table_rows, tree.landmarks, strict=True
-    )
+    fields = ("segments", "joints", "joint_types", "table_rows", "landmarks")
+    rows = zip(*(getattr(skeleton, field) for field in fields), strict=True)
     faults += [fault for row in rows if (fault := _fault_of(*row))]
     leaves = set(skeleton.segments) - {skeleton.segments[i] for i in skeleton.parents if i >= 0}
     faults += [f"nothing that hangs on {name}" for name in LINKS if name in leaves]

@@ -171,7 +171,7 @@ def _opensim(unit: Unit, asked: Tables) -> Texts:
     said = [f"bsip {__version__} export: {name}, for {asked.model}; SI units, Y up"]
     motion = coordinates(person.skeleton, trial.q[known])
     texts = {f"{name}_motion.mot": mot_text(name, trial.times_s[known], motion, said)}
-    wrenches = {f"foot_{s}": w for s, w in trial.ground(trial.readings).feet.wrench.items()}
+    wrenches = {f"foot_{s}": w for s, w in trial.ground(trial.readings)[0].wrench.items()}
     told = binary_erosion(known, iterations=_EDGE) & trial.measured & bool(trial.readings)
     for side in SIDES:
         told &= np.isfinite(wrenches[f"foot_{side}"]).all(axis=1)

@@ -54,31 +54,28 @@ def calibrate(
     BadDataError
         Landmarks are missing (all are named).
     """
-    landmarks, placed = with_skin(_landmarks(marker_set, positions), sex)
-    moved = functional_landmarks(marker_set, landmarks, positions, trials, sex)
-    landmarks |= moved.landmarks
-    guess = height_m or _rough_stature(landmarks)
-    centres = joint_centres(landmarks, sex, guess)
-    lengths = _lengths(centres)
-    stature = height_m or stature_m(sex, {k: lengths[k] for k in ("torso", "thigh", "shank")})
-    frames = _frames(skeleton, centres, landmarks)
-    person = _person(skeleton, marker_set, positions, centres, frames, sex, stature, landmarks)
-    forward = centres.pelvis_axes[:, 0] * np.array([1.0, 1.0, 0.0])
-    return Calibration(
-        person,
-        _pose(person, frames),
-        unit(forward),
-        stature,
-        (*placed, *moved.notes, *centres.notes),
-    )
-
-
-def _landmarks(marker_set: MarkerSet, positions: Mapping[str, np.ndarray]) -> dict:
     gathered: dict[str, list[np.ndarray]] = {}
     for marker in marker_set.markers:
         if marker.landmark and marker.label in positions:
             gathered.setdefault(marker.landmark, []).append(positions[marker.label])
-    return {name: np.mean(found, axis=0) for name, found in gathered.items()}
+    means = {name: np.mean(found, axis=0) for name, found in gathered.items()}
+    landmarks, placed = with_skin(means, sex)
+    moved, notes = functional_landmarks(marker_set, landmarks, positions, trials, sex)
+    landmarks |= moved
+    guess = height_m or _rough_stature(landmarks)
+    centres = joint_centres(landmarks, sex, guess)
+    p = centres.positions
+    lengths = {"torso": float(np.linalg.norm(p["neck"] - p["waist"]))}
+    for row, a, b in (("thigh", "hip", "knee"), ("shank", "knee", "ankle")):
+        both = [np.linalg.norm(p[f"{a}_{s}"] - p[f"{b}_{s}"]) for s in "lr"]
+        lengths[row] = float(np.mean(both))
+    stature = height_m or stature_m(sex, lengths)
+    frames = _frames(skeleton, centres, landmarks)
+    person = _person(skeleton, marker_set, positions, centres, frames, sex, stature, landmarks)
+    forward = centres.pelvis_axes[:, 0] * np.array([1.0, 1.0, 0.0])
+    return Calibration(
+        person, _pose(person, frames), unit(forward), stature, (*placed, *notes, *centres.notes)
+    )
 
 
 # Heights above the heel marker, as parts of the stature: C7, the acromia, the ASIS.
@@ -95,19 +92,6 @@ def _rough_stature(landmarks: Mapping[str, np.ndarray]) -> float:
         expected="the heel and one of these in the static trial",
         remedy="state height_m in participants.tsv, or name these markers in a marker set",
     )
-
-
-def _lengths(centres: JointCentres) -> dict[str, float]:
-    p = centres.positions
-
-    def mean(a: str, b: str) -> float:
-        return float(np.mean([np.linalg.norm(p[f"{a}_{s}"] - p[f"{b}_{s}"]) for s in "lr"]))
-
-    return {
-        "torso": float(np.linalg.norm(p["neck"] - p["waist"])),
-        "thigh": mean("hip", "knee"),
-        "shank": mean("knee", "ankle"),
-    }
 
 
 def _frames(
@@ -135,24 +119,18 @@ def _frames(
         frames[f"forearm_{s}"] = (p[f"elbow_{s}"], _y_first(fore, elbow))
         frames[f"thigh_{s}"] = (p[f"hip_{s}"], _y_first(thigh, knee))
         frames[f"shank_{s}"] = (p[f"knee_{s}"], _y_first(shank, knee))
-        across = _across_the_wrist(landmarks, s, elbow)
+        names = (f"styloid_radial_{s}", f"styloid_ulnar_{s}")
+        across = elbow  # or to the person's right between the styloids
+        if all(name in landmarks for name in names):
+            across = (1.0 if s == "r" else -1.0) * (landmarks[names[0]] - landmarks[names[1]])
         end = centres.ends.get(f"hand_{s}")
         along = fore if end is None else p[f"wrist_{s}"] - end
         frames[f"hand_{s}"] = (p[f"wrist_{s}"], _y_first(along, across))
         sole = centres.ends[f"foot_{s}"] - landmarks[f"calcaneus_{s}"]
-        frames[f"foot_{s}"] = (p[f"ankle_{s}"], _x_first(sole, centres.hinges[f"ankle_{s}"]))
+        x = unit(sole)
+        y = unit(np.cross(centres.hinges[f"ankle_{s}"], x))
+        frames[f"foot_{s}"] = (p[f"ankle_{s}"], np.stack([x, y, np.cross(x, y)], axis=1))
     return {name: frames[name] for name in skeleton.segments}
-
-
-def _across_the_wrist(
-    landmarks: Mapping[str, np.ndarray], side: str, elbow: np.ndarray
-) -> np.ndarray:
-    """To the person's right between the styloids; as the elbow's hinge where they are not there."""
-    names = (f"styloid_radial_{side}", f"styloid_ulnar_{side}")
-    if not all(name in landmarks for name in names):
-        return elbow
-    radial, ulnar = (landmarks[name] for name in names)
-    return radial - ulnar if side == "r" else ulnar - radial
 
 
 def _head(landmarks: Mapping[str, np.ndarray], neck: np.ndarray, torso: np.ndarray) -> np.ndarray:
@@ -174,13 +152,6 @@ def _y_first(y: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
-def _x_first(x: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Axes with X along ``x`` and Z as near to ``z`` as that allows."""
-    x = unit(x)
-    y = unit(np.cross(z, x))
-    return np.stack([x, y, np.cross(x, y)], axis=1)
-
-
 def _person(skeleton, marker_set, positions, centres, frames, sex, stature, landmarks) -> Person:
     n = len(skeleton.segments)
     joints = dict(centres.positions) | {"root": centres.positions["waist"]}
@@ -196,17 +167,14 @@ def _person(skeleton, marker_set, positions, centres, frames, sex, stature, land
         in_parent[i] = parent_axes.T @ (joint - parent_start)
         if skeleton.joint_types[i] == "revolute":
             hinge = centres.hinges[skeleton.joints[i]]
-            parent_tilt[i] = _tilt(parent_axes.T @ hinge)
-            child_tilt[i] = _tilt(axes.T @ hinge)
+            for tilt, seen_from in ((parent_tilt, parent_axes), (child_tilt, axes)):
+                _, y, z = seen_from.T @ hinge  # the X part is the frame's own
+                tilt[i] = np.arctan2(-y, z)
     present = [m for m in marker_set.markers if m.label in positions]
     on = [skeleton.carrying(m.segment, m.landmark) for m in present]
     index = np.array([skeleton.index(segment) for segment in on])
-    local = np.array(
-        [
-            frames[segment][1].T @ (positions[m.label] - frames[segment][0])
-            for m, segment in zip(present, on, strict=True)
-        ]
-    )
+    placed = [(*frames[one], positions[m.label]) for m, one in zip(present, on, strict=True)]
+    local = np.array([axes.T @ (place - start) for start, axes, place in placed])
     return Person(
         skeleton,
         in_parent,
@@ -222,9 +190,14 @@ def _person(skeleton, marker_set, positions, centres, frames, sex, stature, land
     )
 
 
-def _tilt(axis: np.ndarray) -> float:
-    """Tilt about X of a hinge, from its direction in a segment (the X part is the frame's own)."""
-    return float(np.arctan2(-axis[1], axis[2]))
+_ENDS = {  # joints at both ends, by row of the table; of a clavicle, which has none
+    "": ("sternoclavicular", "shoulder"),
+    "torso": ("neck", "waist"),
+    "arm": ("shoulder", "elbow"),
+    "forearm": ("elbow", "wrist"),
+    "thigh": ("hip", "knee"),
+    "shank": ("knee", "ankle"),
+}
 
 
 def _table_lengths(skeleton, centres, frames, sex, stature, landmarks) -> np.ndarray:
@@ -233,31 +206,23 @@ def _table_lengths(skeleton, centres, frames, sex, stature, landmarks) -> np.nda
     lengths: list[float] = []
     for name, row in zip(skeleton.segments, skeleton.table_rows, strict=True):
         side = skeleton.side(name)
-        ends = {
-            "": (f"sternoclavicular_{side}", f"shoulder_{side}"),
-            "torso": ("neck", "waist"),
-            "arm": (f"shoulder_{side}", f"elbow_{side}"),
-            "forearm": (f"elbow_{side}", f"wrist_{side}"),
-            "thigh": (f"hip_{side}", f"knee_{side}"),
-            "shank": (f"knee_{side}", f"ankle_{side}"),
-        }
-        if row in ends:
-            a, b = ends[row]
-            lengths.append(float(np.linalg.norm(p[a] - p[b])))
+        if row in _ENDS:
+            start, end = (p[f"{joint}_{side}" if side else joint] for joint in _ENDS[row])
         elif row == "pelvis":
-            origin, axes = frames["lower_torso"]
-            middle = axes.T @ (0.5 * (p["hip_l"] + p["hip_r"]) - origin)
+            start, axes = frames["lower_torso"]
+            middle = axes.T @ (0.5 * (p["hip_l"] + p["hip_r"]) - start)
             lengths.append(float(np.hypot(middle[0], middle[1])))
+            continue
         elif row == "foot":
-            lengths.append(
-                float(np.linalg.norm(centres.ends[name] - landmarks[f"calcaneus_{side}"]))
-            )
+            start, end = landmarks[f"calcaneus_{side}"], centres.ends[name]
         elif row == "hand" and name in centres.ends:
-            lengths.append(float(np.linalg.norm(centres.ends[name] - p[f"wrist_{side}"])))
+            start, end = p[f"wrist_{side}"], centres.ends[name]
         elif row == "head" and "vertex" in landmarks:
-            lengths.append(float(np.linalg.norm(landmarks["vertex"] - p["neck"])))
+            start, end = p["neck"], landmarks["vertex"]
         else:
             lengths.append(mean_length_m(sex, row, stature))
+            continue
+        lengths.append(float(np.linalg.norm(end - start)))
     return np.array(lengths)
 
 
@@ -363,22 +328,15 @@ _LARGEST_RESIDUAL_M = 0.02  # the clusters do not turn about one line
 _HALF_M = 0.04  # of the distance of the epicondyles put in; only their middle and direction count
 
 
-@dataclass(frozen=True, eq=False)
-class FunctionalLandmarks:
-    """Landmarks (3,) [m] in the reference pose, and how they were found, in words."""
-
-    landmarks: Mapping[str, np.ndarray]
-    notes: tuple[str, ...]
-
-
 def functional_landmarks(
     marker_set: MarkerSet,
     landmarks: Mapping[str, np.ndarray],
     reference: Mapping[str, np.ndarray],
     trials: Sequence[Mapping[str, np.ndarray]],
     sex: str,
-) -> FunctionalLandmarks:
-    """Epicondyles and malleoli of the sides that have neither, where movement shows the joints.
+) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """Epicondyles and malleoli (3,) [m] in the reference pose of the sides that have neither, where
+    movement shows the joints, and how they were found, in words.
 
     Parameters
     ----------
@@ -409,7 +367,7 @@ def functional_landmarks(
             found[f"{name}_lateral_{side}"] = centre + _HALF_M * outward
             found[f"{name}_medial_{side}"] = centre - _HALF_M * outward
         notes += [_note(f"knee_{side}", knee), _note(f"ankle_{side}", ankle)]
-    return FunctionalLandmarks(found, tuple(notes))
+    return found, tuple(notes)
 
 
 def _forefoot(

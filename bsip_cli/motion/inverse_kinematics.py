@@ -64,28 +64,23 @@ class Tree:
 def tree_of(person: Person) -> Tree:
     """Flatten a person's skeleton for the kernel."""
     skeleton = person.skeleton
-    v_segments: list[int] = []
-    v_parents: list[int] = []
-    last: list[int] = []
-    for i, kind in enumerate(skeleton.joint_types):
-        before = last[skeleton.parents[i]] if i else -1
-        for _ in range({"free": 6, "spherical": 3, "revolute": 1}[kind]):
-            v_segments.append(i)
-            v_parents.append(before)
-            before = len(v_segments) - 1
-        last.append(before)
+    nv = len(skeleton.v_names)
+    sizes = np.diff([*skeleton.v_starts, nv])
+    v_parents = np.arange(-1, nv - 1)
+    for start, parent in zip(skeleton.v_starts[1:], skeleton.parents[1:], strict=True):
+        v_parents[start] = skeleton.v_starts[parent] + sizes[parent] - 1
     arrays = kernel.Tree(
         kinds=np.array([_KINDS[kind] for kind in skeleton.joint_types]),
         parents=np.array(skeleton.parents),
         q_starts=np.array(skeleton.q_starts),
         v_starts=np.array(skeleton.v_starts),
-        v_segments=np.array(v_segments),
-        v_parents=np.array(v_parents),
+        v_segments=np.repeat(np.arange(len(sizes)), sizes),
+        v_parents=v_parents,
         positions=person.joint_positions_m(),
         rotations=person.joint_rotations(),
         axes=person.hinge_axes(),
     )
-    return Tree(arrays, len(skeleton.q_names), len(skeleton.v_names))
+    return Tree(arrays, len(skeleton.q_names), nv)
 
 
 def neutral(person: Person) -> np.ndarray:
@@ -173,21 +168,15 @@ def first_pose(person: Person, markers_m: np.ndarray, **options) -> np.ndarray:
     rng = np.random.default_rng(_STARTS)
     best, least = neutral(person), np.inf
     for k in range(_STARTS):
-        start = (
-            neutral(person)
-            if k == 0
-            else _turned(person, rng.normal(0.0, _START_SD_RAD, len(person.skeleton.v_names)))
-        )
+        turns = rng.normal(0.0, _START_SD_RAD, len(person.skeleton.v_names)) if k else None
+        start = neutral(person) if turns is None else _turned(person, turns)
         placed = place_base(person, markers_m, start)
         poses = solve_poses(person, markers_m[None], placed, **options)
         misfit = float(np.nansum(np.minimum(poses.residual_m, _LARGEST_MISFIT_M) ** 2))
         if misfit < least:
             best, least = poses.q[0], misfit
-    hinges = [
-        at
-        for at, kind in zip(person.skeleton.q_starts, person.skeleton.joint_types, strict=True)
-        if kind == "revolute"
-    ]
+    joints = zip(person.skeleton.q_starts, person.skeleton.joint_types, strict=True)
+    hinges = [at for at, kind in joints if kind == "revolute"]
     best[hinges] = (best[hinges] + np.pi) % (2 * np.pi) - np.pi
     return best
 

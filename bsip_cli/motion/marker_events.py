@@ -103,11 +103,7 @@ def two_levels(y: np.ndarray, before: int, after: int) -> int:
 
 
 def find_level_change(
-    y: np.ndarray,
-    columns: np.ndarray,
-    coefficient_sd: float,
-    least: int,
-    at: int | None = None,
+    y: np.ndarray, columns: np.ndarray, coefficient_sd: float, least: int, at: int | None = None
 ) -> LevelChange | None:
     """Generalised least squares of y (n, d) on a constant, columns (n, k) and one step.
 

@@ -124,10 +124,7 @@ _LEAST_FRAMES = 5
 _SAME = 0.7  # a jump that another one explains to 30 % is the pose's
 
 
-@dataclass(frozen=True)
-class _Jump:
-    m: int
-    frames: slice
+_Jump = tuple[int, slice]  # marker and frames
 
 
 def jumps(
@@ -154,11 +151,10 @@ def jumps(
     for m in range(len(fit.labels)):
         for piece in pieces(beyond[:, m], ~np.isfinite(distance[:, m]), 2):
             if piece.stop - piece.start <= longest and _is_own(fit, m, piece, distance[:, m]):
-                found.append(_Jump(m, piece))
+                found.append((m, piece))
                 astray[piece, m] = True
     events = []
-    for jump, size in _own(fit, away, spread, found):
-        m, piece = jump.m, jump.frames
+    for (m, piece), size in _own(fit, away, spread, found):
         gap = filled is not None and filled[piece, m].mean() > 0.5
         note = ", where a gap was filled" if gap else ""
         statistic = float(np.nanmax(distance[piece, m]) / spread[piece, m].max())
@@ -171,24 +167,22 @@ def _own(
 ) -> list[tuple[_Jump, float]]:
     """The jumps without those that another one at the same time drags along, and their sizes."""
     distance = np.linalg.norm(away, axis=2)
-    left = sorted(found, key=lambda one: -float(np.nanmax(distance[one.frames, one.m])))
+    left = sorted(found, key=lambda one: -float(np.nanmax(distance[one[1], one[0]])))
     own: list[tuple[_Jump, float]] = []
     while left:
-        first = left[0]
-        begin, end = first.frames.start - 1, first.frames.stop + 1
-        together = [
-            x for x in left if x is first or (x.frames.start < end and begin < x.frames.stop)
-        ]
-        peak = first.frames.start + int(np.nanargmax(distance[first.frames, first.m]))
-        sd = np.hypot(spread[peak], 0.1 * distance[peak, first.m])
-        candidates = [one.m for one in together if np.isfinite(distance[peak, one.m])]
+        first, frames = left[0]
+        begin, end = frames.start - 1, frames.stop + 1
+        together = [x for x in left if x is left[0] or (x[1].start < end and begin < x[1].stop)]
+        peak = frames.start + int(np.nanargmax(distance[frames, first]))
+        sd = np.hypot(spread[peak], 0.1 * distance[peak, first])
+        candidates = [m for m, _ in together if np.isfinite(distance[peak, m])]
         m, vector = best_source(fit.response, away[peak], sd, candidates)
         made = np.einsum("jak,k->ja", fit.response[:, :, m], vector)
         missed = np.linalg.norm(away[peak] - made, axis=1)
-        source = next(one for one in together if one.m == m)
-        size = max(float(np.linalg.norm(vector)), float(np.nanmax(distance[source.frames, m])))
+        source = next(one for one in together if one[0] == m)
+        size = max(float(np.linalg.norm(vector)), float(np.nanmax(distance[source[1], m])))
         own.append((source, size))
-        dragged = [one for one in together if not missed[one.m] > _SAME * distance[peak, one.m]]
+        dragged = [x for x in together if not missed[x[0]] > _SAME * distance[peak, x[0]]]
         left = [one for one in left if one is not source and one not in dragged]
     return own
 
@@ -292,7 +286,14 @@ class _Search:
         for m in range(len(self.fit.labels)):
             if m not in self.best:
                 self.best[m] = self._change(m, self.least)
-        return [f for f in self.best.values() if f and _is_slip(f.change, self.fit.trusted_m[f.m])]
+        found = [(f, np.linalg.norm(f.change.step)) for f in self.best.values() if f]
+        return [
+            f
+            for f, size in found
+            if f.change.z > _CHANCE
+            and size > 0.5 * BEYOND * self.fit.trusted_m[f.m]  # the pose takes its part
+            and size > _SLIP * f.change.spread
+        ]
 
     def _change(self, m: int, least: int, block: int | None = None) -> _Found | None:
         seen = np.flatnonzero(np.isfinite(self.means[:, m, 0]))
@@ -360,15 +361,6 @@ def slips(fit: MarkerFit, residual: np.ndarray) -> tuple[list[MarkerEvent], np.n
         if np.linalg.norm(slip.vector) > BEYOND * fit.trusted_m[slip.m]:
             found.append(slip)
     return _events(fit, found), search.left
-
-
-def _is_slip(change: LevelChange, trusted_m: float) -> bool:
-    size = float(np.linalg.norm(change.step))
-    return bool(
-        change.z > _CHANCE
-        and size > 0.5 * BEYOND * trusted_m  # the pose takes its part
-        and size > _SLIP * change.spread
-    )
 
 
 def _events(fit: MarkerFit, found: list[_Slip]) -> list[MarkerEvent]:

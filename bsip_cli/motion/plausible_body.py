@@ -58,11 +58,8 @@ def doubts_about(
 
 def _stature_m(person: Person, sex: str) -> float:
     """From the long segments."""
-    lengths: dict[str, list[float]] = {}
-    for row, length in zip(person.skeleton.table_rows, person.lengths_m, strict=True):
-        if row in _LONG:
-            lengths.setdefault(row, []).append(float(length))
-    return stature_m(sex, {row: float(np.mean(found)) for row, found in lengths.items()})
+    rows = np.array(person.skeleton.table_rows)
+    return stature_m(sex, {row: float(person.lengths_m[rows == row].mean()) for row in _LONG})
 
 
 def _about_stature(person: Person, sex: str, height_m: float | None) -> Iterator[Doubt]:

@@ -166,24 +166,23 @@ def _parameters(person: Person, options: ScalingOptions) -> Iterator[_Parameter]
     skeleton = person.skeleton
     for i in range(len(skeleton.segments)):
         children = _children(person, i)
-        if _has_free_joints(person, i):
-            for child in _moving_joints(person, i):
-                for axis in range(3):
-                    yield _Parameter("joint", child, axis, options.joint_centre_sd_m)
-        elif children and i > 0:
+        for child in _moving_joints(person, i):
+            yield from _three("joint", child, options.joint_centre_sd_m)
+        if children and i > 0 and not _has_free_joints(person, i):
             yield _Parameter("length", i, 1, options.length_sd * person.lengths_m[i])
         if np.any(person.origin_in_joint_m[i]):
-            for axis in range(3):
-                yield _Parameter("origin", i, axis, options.joint_centre_sd_m)
+            yield from _three("origin", i, options.joint_centre_sd_m)
         if skeleton.joint_types[i] == "revolute":
             yield _Parameter("parent_tilt", i, 0, options.hinge_sd_rad)
             yield _Parameter("child_tilt", i, 0, options.hinge_sd_rad)
         if i > 0 and np.any(person.marker_segments == i):
-            for axis in range(3):
-                yield _Parameter("shift", i, axis, options.joint_centre_sd_m)
+            yield from _three("shift", i, options.joint_centre_sd_m)
     for m in range(len(person.markers)):
-        for axis in range(3):
-            yield _Parameter("marker", m, axis, options.marker_sd_m)
+        yield from _three("marker", m, options.marker_sd_m)
+
+
+def _three(kind: str, index: int, sd: float) -> Iterator[_Parameter]:
+    return (_Parameter(kind, index, axis, sd) for axis in range(3))
 
 
 def _has_free_joints(person: Person, segment: int) -> bool:
@@ -192,14 +191,12 @@ def _has_free_joints(person: Person, segment: int) -> bool:
 
 
 def _moving_joints(person: Person, segment: int) -> list[int]:
-    """Joints on such a segment that are not its origin by definition.
+    """Joints that lie anywhere on a segment and are not its origin by definition.
 
     Hips, shoulders and the waist are not; the neck is where the upper torso begins.
     """
-    joints = _children(person, segment)
-    if segment == 0:
-        return joints
-    return [c for c in joints if np.any(person.joint_in_parent_m[c])]
+    joints = _children(person, segment) if _has_free_joints(person, segment) else []
+    return [c for c in joints if segment == 0 or np.any(person.joint_in_parent_m[c])]
 
 
 def _prior_precision(
@@ -222,8 +219,7 @@ def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> 
     """The person with the parameters' changes ``x`` added to the first guess."""
     joints, origins = person.joint_in_parent_m.copy(), person.origin_in_joint_m.copy()
     tilts = {
-        "parent_tilt": person.parent_tilt_rad.copy(),
-        "child_tilt": person.child_tilt_rad.copy(),
+        f"{one}_tilt": getattr(person, f"{one}_tilt_rad").copy() for one in ("parent", "child")
     }
     places, lengths = person.marker_positions_m.copy(), person.lengths_m.copy()
     for parameter, value in zip(parameters, x, strict=True):
@@ -239,7 +235,7 @@ def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> 
             tilts[parameter.kind][i] += value
         elif parameter.kind == "shift":
             places[person.marker_segments == i, axis] += value
-            for child in _shifted_joints(person, i):
+            for child in _moving_joints(person, i):
                 joints[child, axis] += value
         else:
             places[i, axis] += value
@@ -257,11 +253,6 @@ def _with(person: Person, parameters: tuple[_Parameter, ...], x: np.ndarray) -> 
         child_tilt_rad=tilts["child_tilt"],
         marker_positions_m=places,
     )
-
-
-def _shifted_joints(person: Person, segment: int) -> list[int]:
-    """Joints that move with a segment's bones when its origin is found elsewhere."""
-    return _moving_joints(person, segment) if _has_free_joints(person, segment) else []
 
 
 # --- the equations ----------------------------------------------------------------------------
@@ -283,12 +274,8 @@ def _reduced_equations(
     residual = np.where(root > 0, (markers_m - model) * root, 0.0)
     below = subtrees(person)
     by_pose = pose_columns(tree, R, p, model, below) * root[..., None]
-    by_parameter = (
-        np.stack(
-            [_column(parameter, person, R, p, model, below) for parameter in parameters], axis=-1
-        )
-        * root[..., None]
-    )
+    each = [_column(parameter, person, R, p, model, below) for parameter in parameters]
+    by_parameter = np.stack(each, axis=-1) * root[..., None]
     frames = len(R)
     Jq = by_pose.reshape(frames, -1, tree.nv)
     Jp = by_parameter.reshape(frames, -1, len(parameters))
@@ -319,7 +306,7 @@ def _column(parameter: _Parameter, person: Person, R, p, model, below) -> np.nda
         column[:, below[i]] = np.cross(turning[:, None], model[:, below[i]] - p[:, None, i])
     elif parameter.kind == "shift":
         own = person.marker_segments == i
-        for child in _shifted_joints(person, i):
+        for child in _moving_joints(person, i):
             own = own | below[child]
         column[:, own] = R[:, None, i, :, axis]
     else:
@@ -371,22 +358,27 @@ def refine_over_trials(
     standing : the one frame that the calibration is like, of the trial with this number.
     ik : keyword options of :func:`solve_poses`.
     """
-    seen = [_thinned(one) for one in trials]
-    fit = _refined(calibration, standing, seen, frames, options, ik)
+    person, seen = calibration.person, []  # some of the frames that show nearly all markers
+    for one in trials:
+        fewer = one.frames(slice(None, None, max(1, len(one.times_s) // _FRAMES_PER_TRIAL)))
+        seen.append(fewer.frames(np.isfinite(fewer.markers_m[..., 0]).mean(axis=1) > _MOST))
+
+    def refined(standing: TrialMarkers, seen: Sequence[TrialMarkers]) -> Refinement:
+        markers = [standing.markers_m, *(one.markers_m for one in seen if len(one.times_s))]
+        poses = [solve_poses(person, standing.markers_m, calibration.q, **ik).q]
+        poses += [solve_trial(person, one, **ik).q for one in markers[1:]]
+        all_markers, all_poses = np.concatenate(markers), np.concatenate(poses)
+        orientations, _ = tree_of(person).forward(all_poses)
+        chosen = varied_frames(orientations, frames)
+        return refine(person, all_markers[chosen], all_poses[chosen], options, ik)
+
+    fit = refined(standing, seen)
     elsewhere = np.array([_elsewhere(fit.person, one, ik) for one in seen])
     elsewhere &= elsewhere.mean(axis=0) < _FEW
     if not elsewhere.any():
         return fit
-    standing = standing.without(elsewhere[standing_trial])
     kept = [one.without(off) for one, off in zip(seen, elsewhere, strict=True)]
-    return _refined(calibration, standing, kept, frames, options, ik)
-
-
-def _thinned(one: TrialMarkers) -> TrialMarkers:
-    """Some of the frames that show nearly all markers."""
-    stride = max(1, len(one.times_s) // _FRAMES_PER_TRIAL)
-    fewer = one.frames(slice(None, None, stride))
-    return fewer.frames(np.isfinite(fewer.markers_m[..., 0]).mean(axis=1) > _MOST)
+    return refined(standing.without(elsewhere[standing_trial]), kept)
 
 
 def _elsewhere(person: Person, one: TrialMarkers, ik: dict) -> np.ndarray:
@@ -398,22 +390,3 @@ def _elsewhere(person: Person, one: TrialMarkers, ik: dict) -> np.ndarray:
     fit = marker_fit(person, one.markers_m, poses.q, one.times_s, **scales)
     off = {event.marker for event in offsets(fit, fit.residual_m) if event.kind == "offset"}
     return np.isin(person.markers, list(off))
-
-
-def _refined(
-    calibration: Calibration,
-    standing: TrialMarkers,
-    seen: Sequence[TrialMarkers],
-    frames: int,
-    options: ScalingOptions,
-    ik: dict,
-) -> Refinement:
-    """To the frame ``standing`` and to what is seen in the trials."""
-    person = calibration.person
-    markers = [standing.markers_m, *(one.markers_m for one in seen if len(one.times_s))]
-    poses = [solve_poses(person, standing.markers_m, calibration.q, **ik).q]
-    poses += [solve_trial(person, one, **ik).q for one in markers[1:]]
-    all_markers, all_poses = np.concatenate(markers), np.concatenate(poses)
-    orientations, _ = tree_of(person).forward(all_poses)
-    chosen = varied_frames(orientations, frames)
-    return refine(person, all_markers[chosen], all_poses[chosen], options, ik)

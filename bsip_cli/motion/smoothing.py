@@ -46,7 +46,10 @@ def skin_corner_hz(
     white_m : the markers' white noise, each direction.
     robust_limit_m : beyond it a marker's pull on the poses fades.
     """
-    pull = _pulls(marker_residuals(person, q, markers), robust_limit_m)
+    residuals = marker_residuals(person, q, markers)
+    distance = np.linalg.norm(residuals, axis=2, keepdims=True)
+    weight = np.minimum(1.0, robust_limit_m / np.maximum(distance, 1e-12)) ** 2
+    pull = residuals * weight / np.nanmean(weight)  # as the poses feel them
     seen = np.isfinite(pull[..., 0])
     pull = pull[:, seen.sum(axis=0) > _SEEN_SHARE * seen.any(axis=1).sum()]
     coordinates = 3 * pull.shape[1]
@@ -61,13 +64,6 @@ def skin_corner_hz(
     band[1 + np.argmin(np.abs(f[1:] - np.mean(_BAND_HZ)))] = True  # none inside if short
     level = np.median(f[band] ** 4 * np.maximum(power[band] - white_m**2, 0.0))
     return float((level / white_m**2) ** 0.25)
-
-
-def _pulls(residuals: np.ndarray, robust_limit_m: float) -> np.ndarray:
-    """Residuals as the poses feel them: with the weights of the robust loss, their mean one."""
-    distance = np.linalg.norm(residuals, axis=2, keepdims=True)
-    weight = np.minimum(1.0, robust_limit_m / np.maximum(distance, 1e-12)) ** 2
-    return residuals * weight / np.nanmean(weight)
 
 
 # --------------------------------------------------------------------------------------------------
@@ -177,12 +173,9 @@ def _noise(
     unit = coordinate_covariance(person, some, _WEAK_PRIOR).mean(axis=0)
     seen = noise_level(curves, rate_hz)
     blocks = list(_blocks(skeleton))
-    predicted = np.array(
-        [
-            np.sqrt(np.diag(unit)[turning].sum() / count) / scale
-            for _, turning, count, scale in blocks
-        ]
-    )
+    variance = np.diag(unit)
+    spread = [np.sqrt(variance[turning].sum() / count) / k for _, turning, count, k in blocks]
+    predicted = np.array(spread)
     found = np.array([np.sqrt((seen[part] ** 2).mean()) for part, *_ in blocks])
     known = predicted < _LOOSE
     marker_noise = float(np.median(found[known] / predicted[known]))
@@ -252,11 +245,8 @@ def _on_manifold(
         elif count == 4:
             q[:, part], *found = _angular(s, part)
         else:  # of the base, whose turning is there already
-            quaternion, omega = (
-                slice(part.stop, part.stop + 4),
-                slice(turning.stop, turning.stop + 3),
-            )
-            found = _linear(s, part, q[:, quaternion], v[:, omega])
+            turn, omega = q[:, part.stop : part.stop + 4], v[:, turning.stop : turning.stop + 3]
+            found = _linear(s, part, turn, omega)
         v[:, turning], a[:, turning], sd[:, turning] = found
     return Motion(q, v, a, sd, inner, marker_noise_m, s.cutoff_hz)
 

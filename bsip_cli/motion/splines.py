@@ -194,6 +194,7 @@ class _Basis:
         self.intervals = max(int(np.ceil(self.x[-1])), 1)
         self.per_s = rate_hz / samples_per_knot
         self.size = self.intervals + _DEGREE
+        self.values, self.slopes, self.curves = map(self._derivative, range(3))
 
     def _derivative(self, order: int) -> sparse.csr_array:
         """Basis of degree 5 - order on the same knots, times the differences of that order."""
@@ -206,18 +207,6 @@ class _Basis:
             [np.full(size, s) for s in signs], offsets=range(order + 1), shape=(size, self.size)
         )
         return sparse.csr_array(basis @ differences) * self.per_s**order
-
-    @cached_property
-    def values(self) -> sparse.csr_array:
-        return self._derivative(0)
-
-    @cached_property
-    def slopes(self) -> sparse.csr_array:
-        return self._derivative(1)
-
-    @cached_property
-    def curves(self) -> sparse.csr_array:
-        return self._derivative(2)
 
     def power(self, omega: np.ndarray) -> np.ndarray:
         """Gain of B^T B far from the ends at these frequencies (radians per knot)."""

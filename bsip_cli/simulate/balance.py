@@ -176,11 +176,11 @@ def _balance(person: Person, plan: Plan, state: State, final: bool) -> tuple[Sta
         poses = state.poses(person, plan, turns)
         momentum = momentum_of(person.inertias, poses, plan.step_s)
         load = total_load(plan.all_loads(), poses, plan.step_s)
-        shift = _com_target(plan, momentum, cop, *load) - momentum.com_m
+        shift = _com_target(plan, momentum, cop, load) - momentum.com_m
         turn = np.zeros_like(shift)
         if final and plan.flights:
             locked = locked_inertia(person.inertias, poses, momentum.com_m)
-            turn = _turn_rate(plan, state.turn_rate, momentum, locked, *load) - state.turn_rate
+            turn = _turn_rate(plan, state.turn_rate, momentum, locked, load) - state.turn_rate
         turned = plan.step_s * np.abs(turn).sum(axis=0)
         left = max(np.abs(shift[inner]).max(), turned.max())
         if not left < DIVERGED_M:
@@ -237,13 +237,10 @@ def _with_sway(
 
 
 def _com_target(
-    plan: Plan,
-    momentum: Momentum,
-    cop_m: np.ndarray,
-    load_force: np.ndarray,
-    load_moment: np.ndarray,
+    plan: Plan, momentum: Momentum, cop_m: np.ndarray, carried: tuple[np.ndarray, np.ndarray]
 ) -> np.ndarray:
     """(T, 3) path of the centre of mass that puts the COP where it is planned."""
+    load_force, load_moment = carried
     height, mass = _height_target(plan, momentum, load_force), momentum.mass_kg
     lift = mass * (second_derivative(height, plan.step_s) + G)
     load = derivative(momentum.spin(), plan.step_s) + load_moment
@@ -327,8 +324,7 @@ def _turn_rate(
     rate: np.ndarray,
     momentum: Momentum,
     locked: np.ndarray,
-    load_force: np.ndarray,
-    load_moment: np.ndarray,
+    carried: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:
     """(T, 3) the pelvis' turning rate that keeps the angular momentum in flight.
 
@@ -336,6 +332,7 @@ def _turn_rate(
     stances are so short that it is kept throughout. The momentum that is kept is chosen,
     for each group of flights, so that the pelvis comes back to its planned orientation.
     """
+    load_force, load_moment = carried
     weight = _near_flights(plan, TURN_REACH_S)
     haste = LOADED_HASTE if plan.loads else HASTE
     result = np.zeros_like(rate)

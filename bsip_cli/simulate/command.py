@@ -50,15 +50,13 @@ def simulate_command(
         options = replace(options, participants=participants, sexes="")
     if sequence_s is not None:
         options = replace(options, durations_s={**options.durations_s, "sequence": sequence_s})
-    richness = replace(
-        options.richness, measured_tissue=soft_tissue == "measured", girdle=shoulder_girdle
-    )
+    tissue = soft_tissue == "measured"
     options = replace(
         options,
         seed=options.seed if seed is None else seed,
         tasks=tuple(tasks) or options.tasks,
         laboratory=replace(options.laboratory, plate_per_foot=plate_per_foot),
-        richness=richness,
+        richness=replace(options.richness, measured_tissue=tissue, girdle=shoulder_girdle),
         run=run,
         effects=pair_up(effects, sizes, targets),
         effect_tasks=tuple(effect_tasks),
@@ -161,11 +159,8 @@ def inject_recording(source: Path, copy: Path, effects: Sequence[Effect]) -> dic
     if kind not in (".c3d", ".trc"):
         raise UsageError("not a recording", file=source, expected="a .c3d, or a .trc with a .mot")
     copy.parent.mkdir(parents=True, exist_ok=True)
-
-    def change(before: Instruments) -> Instruments:
-        return _changed_by(effects, before, source)
-
-    after = (rewrite_c3d if kind == ".c3d" else rewrite_trc_mot)(source, copy, change)
+    rewrite = rewrite_c3d if kind == ".c3d" else rewrite_trc_mot
+    after = rewrite(source, copy, lambda before: _changed_by(effects, before, source))
     return {"recorded_from_s": after.start_s, "effects": [effect.name for effect in effects]}
 
 
@@ -195,11 +190,8 @@ def _changed_by(effects: Sequence[Effect], instruments: Instruments, file: Path)
             raise BadDataError(
                 error.found, expected=error.expected, remedy=error.remedy, file=file
             ) from error
-        same = [
-            np.array_equal(getattr(instruments, name), getattr(changed, name), equal_nan=True)
-            for name in ("points_m", "readings")
-        ]
-        if all(same):
+        pairs = [(x.points_m, x.readings) for x in (instruments, changed)]
+        if all(np.array_equal(a, b, equal_nan=True) for a, b in zip(*pairs, strict=True)):
             raise BadDataError(f"{effect.name} changes nothing in this recording", file=file)
         instruments = changed
     return instruments
@@ -276,10 +268,4 @@ def _files_in(folder: Path, refused: list[BadDataError], above: tuple[Path, ...]
 
 def write_truth(file: Path, record: Mapping[str, object]) -> None:
     """What is hidden in a recording, or in all of a participant."""
-
-    def plain(value: object) -> object:
-        if isinstance(value, np.generic):
-            return value.item()
-        raise TypeError(f"{value!r} has no place in JSON")
-
-    write_text(file, json.dumps(record, indent=1, default=plain) + "\n")
+    write_text(file, json.dumps(record, indent=1, default=np.generic.item) + "\n")

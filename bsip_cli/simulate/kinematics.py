@@ -51,17 +51,14 @@ def clavicle_turn(arm_in_thorax: np.ndarray, own_rad: np.ndarray, sign: float) -
 
 def turns_of(person: Person, plan: Plan) -> Turns:
     """What the plan prescribes above the hips, wherever the pelvis is."""
-    angles, bend = plan.angles_rad, person.trunk_bend
+    angles = plan.angles_rad
     turns = {
         "lower_torso": euler_zxy(plan.pelvis_angles_rad),
-        "abdomen": euler_zxy((1.0 - bend) * angles["waist"]),
+        "abdomen": euler_zxy(angles["waist"]),
         "head": euler_zxy(angles["neck"]),
     }
-    if bend:
-        turns["thorax"] = euler_zxy(bend * angles["waist"])
     if "spine" in angles:
-        spine = euler_zxy(angles["spine"])
-        turns["thorax"] = turns["thorax"] @ spine if bend else spine
+        turns["thorax"] = euler_zxy(angles["spine"])
     for side, sign in SIDE_SIGN.items():
         flexion, deviation, pronation = angles[f"wrist_{side}"].T
         arm = euler_zxy(np.array([1.0, -sign, sign]) * angles[f"shoulder_{side}"])
@@ -91,8 +88,7 @@ def poses_of(
 
     origin["abdomen"] = pelvis_m
     rotation["abdomen"] = pelvis_rotation @ turns["abdomen"]
-    bent = "thorax" in turns
-    thorax = rotation["abdomen"] @ turns["thorax"] if bent else rotation["abdomen"]
+    thorax = rotation["abdomen"] @ turns["thorax"] if "thorax" in turns else rotation["abdomen"]
     origin["thorax"] = poses.point("abdomen", joints["tjc"]) + rotate(thorax, joints["cjc"])
     rotation["thorax"] = thorax
     origin["head"], rotation["head"] = origin["thorax"], thorax @ turns["head"]

@@ -185,11 +185,8 @@ def _in_plane(degrees: float) -> np.ndarray:
 
 def _head_and_trunk(build: Build) -> Places:
     """Landmarks of the head, and of the thorax in the thorax frame (origin CJC)."""
-    h, size, width = (
-        build.lengths_m["head"],
-        build.lengths_m["upper_torso"],
-        build.widths_m["thorax"],
-    )
+    h, size = build.lengths_m["head"], build.lengths_m["upper_torso"]
+    width = build.widths_m["thorax"]
     share, angle = CERVICAL_SHARE[build.sex]
     c7 = -build.errors_m["cjc"] - share * width * _in_plane(angle - STERNUM_SLOPE_DEG)
     return {

@@ -25,7 +25,6 @@ class Richness:
     placement_error_m : marker placement, standard deviation per axis.
     inertia_variation : scale of the person's distance from the mean person.
     girdle : whether the shoulders move against the thorax, seen by 51 markers instead of 38.
-    trunk_bend : share of the waist rotation that happens at T12/L1 (0 = stiff trunk).
     """
 
     soft_tissue: float = 1.0
@@ -41,7 +40,6 @@ class Richness:
     placement_error_m: float = 0.005
     inertia_variation: float = 1.0
     girdle: bool = False
-    trunk_bend: float = 0.0
 
 
 @dataclass(frozen=True)

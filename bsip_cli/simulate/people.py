@@ -121,7 +121,6 @@ class Person(Build):
     mass_kg: float
     inertias: dict[str, Inertia]
     markers: dict[str, Marker]
-    trunk_bend: float
     tissue: dict[str, Swing]
 
     def segment_inertias(self) -> dict[str, Inertia]:
@@ -184,7 +183,6 @@ def draw_person(rng: np.random.Generator, richness: Richness, sex: str = "") -> 
         mass_kg=mass,
         inertias=inertias,
         markers=markers,
-        trunk_bend=richness.trunk_bend,
         tissue=draw_tissue(rng) if richness.measured_tissue else {},
     )
 

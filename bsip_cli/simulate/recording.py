@@ -294,18 +294,16 @@ def write_trial(
 
     quantised : whether channels are rounded to the steps of a 16-bit converter, and clipped.
     """
-    rates = measurement.rates
+    rates, parameters = measurement.rates, ("RATE", "LABELS", "DESCRIPTIONS", "UNITS")
     c3d, plates, labels = ezc3d.c3d(), measurement.plates, measurement.labels
     names = [f"{name}{k + 1}" for k in range(len(plates)) for name in CHANNELS]
-    point, analog = c3d["parameters"]["POINT"], c3d["parameters"]["ANALOG"]
-    point["RATE"]["value"] = [float(rates.marker_hz)]
-    point["LABELS"]["value"] = labels
-    point["DESCRIPTIONS"]["value"] = labels
-    point["UNITS"]["value"] = ["mm"]
-    analog["RATE"]["value"] = [float(rates.analog_hz)]
-    analog["LABELS"]["value"] = names
-    analog["DESCRIPTIONS"]["value"] = [f"Force plate {name[-1]}" for name in names]
-    analog["UNITS"]["value"] = [unit for _ in plates for unit in ["N"] * 3 + ["Nmm"] * 3]
+    said, units = [f"Force plate {name[-1]}" for name in names], ["N"] * 3 + ["Nmm"] * 3
+    for group, *values in (
+        ("POINT", [float(rates.marker_hz)], labels, labels, ["mm"]),
+        ("ANALOG", [float(rates.analog_hz)], names, said, units * len(plates)),
+    ):
+        for name, value in zip(parameters, values, strict=True):
+            c3d["parameters"][group][name]["value"] = value
     _add_plates(c3d, plates)
     c3d.add_parameter("SUBJECTS", "NAMES", [subject])
     c3d.add_parameter("SUBJECTS", "USES_PREFIXES", [0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from bsip_cli.errors import UsageError
 from bsip_cli.simulate.effects import effects_of, touches
 from bsip_cli.simulate.effects.base import Effect, body_of
 from bsip_cli.simulate.effects.loads import WobblingMass
-from bsip_cli.simulate.movements import DEFAULT_DURATION_S, MOVEMENTS
+from bsip_cli.simulate.movements import MOVEMENTS
 from bsip_cli.simulate.options import ALL_TASKS, MORE_TASKS, StudyOptions
 from bsip_cli.simulate.people import Inertia, Person, draw_person
 from bsip_cli.simulate.recording import SIMULATION_HZ, Measurement, measure_trial, write_trial
@@ -26,33 +26,24 @@ PERSON, MOVEMENT, RECORDING, LABORATORY = range(4)
 TASK_STREAMS = (*ALL_TASKS, "", *MORE_TASKS)  # new tasks at the end: old studies stay the same
 
 
-@dataclass(frozen=True)
-class ParticipantTruth:
-    """A participant of a simulated study: the person and the facts of each trial."""
-
-    participant: str
-    person: Person
-    trials: dict[str, dict[str, object]]
-
-
-def simulate_study(folder: Path, options: StudyOptions) -> list[ParticipantTruth]:
-    """Write participants.tsv, study.toml, the recordings and truth/ into the folder."""
+def simulate_study(folder: Path, options: StudyOptions) -> list[Person]:
+    """Write participants.tsv, study.toml, the recordings and truth/ into the folder; returns the
+    people."""
     folder = Path(folder)
     check_options(options)
     (folder / "truth").mkdir(parents=True, exist_ok=True)
     numbers = range(1, options.participants + 1)
-    truths = [simulate_participant(folder, options, number) for number in numbers]
+    people = [simulate_participant(folder, options, number)[0] for number in numbers]
     lines = ["participant_id\tsex\tmass_kg\theight_m"]  # as a lab notes them: a scale, a wall
-    for number, truth in zip(numbers, truths, strict=True):
+    for number, person in zip(numbers, people, strict=True):
         scale = generator(options, number, LABORATORY, "static")
-        person = truth.person
         mass = person.mass_kg + SCALE_SPREAD_KG * scale.standard_normal()
-        lines.append(f"{truth.participant}\t{person.sex}\t{mass:.1f}\t{person.stature_m:.2f}")
+        lines.append(f"sub-{number:02d}\t{person.sex}\t{mass:.1f}\t{person.stature_m:.2f}")
     write_text(folder / "participants.tsv", "\n".join(lines) + "\n")
     with_girdle = 'marker_set = "robert17"\nskeleton = "robert17"\n'
     settings = with_girdle if options.richness.girdle else 'marker_set = "hansen2017"\n'
     write_text(folder / "study.toml", settings)
-    return truths
+    return people
 
 
 def check_options(options: StudyOptions) -> None:
@@ -94,8 +85,11 @@ def participant_person(options: StudyOptions, number: int) -> Person:
     return draw_person(generator(options, number, PERSON), options.richness, sex)
 
 
-def simulate_participant(folder: Path, options: StudyOptions, number: int) -> ParticipantTruth:
-    """Write all recordings and the truth of one participant."""
+def simulate_participant(
+    folder: Path, options: StudyOptions, number: int
+) -> tuple[Person, dict[str, dict[str, object]]]:
+    """Write all recordings and the truth of one participant; returns the person, and the facts of
+    each trial."""
     name = f"sub-{number:02d}"
     person = participant_person(options, number)
     effects = effects_of(options, number)
@@ -111,24 +105,11 @@ def simulate_participant(folder: Path, options: StudyOptions, number: int) -> Pa
         active = [e for e in effects if touches(e, task, options.effect_tasks)]
         body = [*wobbling(person), *active]
         seed = seed_of(options, number, MOVEMENT, task)
-        trial = simulate_trial(
-            person,
-            task,
-            np.random.default_rng(seed),
-            options.durations_s.get(task, DEFAULT_DURATION_S[task]),
-            ball_mass,
-            body,
-        )
-        measurement = measure_trial(
-            trial,
-            person,
-            options.rates_of(task),
-            options.laboratory,
-            options.richness,
-            generator(options, number, RECORDING, task),
-            heading_error,
-            body,
-        )
+        rng, duration_s = np.random.default_rng(seed), options.durations_s.get(task)
+        trial = simulate_trial(person, task, rng, duration_s, ball_mass, body)
+        rates, noise = options.rates_of(task), generator(options, number, RECORDING, task)
+        world = rates, options.laboratory, options.richness
+        measurement = measure_trial(trial, person, *world, noise, heading_error, body)
         path = folder / name / f"{stem}.c3d"
         write_trial(path, measurement, options.richness.quantised, name)
         trials[stem] = _trial_record(trial, measurement, active, seed)
@@ -140,19 +121,15 @@ def simulate_participant(folder: Path, options: StudyOptions, number: int) -> Pa
         "trials": trials,
     }
     write_text(folder / "truth" / f"{name}_truth.json", json.dumps(record, indent=1) + "\n")
-    return ParticipantTruth(name, person, trials)
+    return person, trials
 
 
 def wobbling(person: Person) -> list[WobblingMass]:
     """What swings on the person's bones; part of the body, no effect that is hidden in it."""
+    masses = {name: person.inertias[body_of(name)].mass_kg for name in person.tissue}
     return [
-        WobblingMass(
-            swing.mass_share * person.inertias[body_of(segment)].mass_kg,
-            segment,
-            swing.frequency_hz,
-            swing.damping_ratio,
-        )
-        for segment, swing in person.tissue.items()
+        WobblingMass(one.mass_share * masses[name], name, one.frequency_hz, one.damping_ratio)
+        for name, one in person.tissue.items()
     ]
 
 
@@ -166,7 +143,6 @@ def _person_record(person: Person) -> dict[str, object]:
         "stature_m": person.stature_m,
         **{f"{name}_width_m": person.widths_m[name] for name in ("pelvis", "thorax")},
         "ankle_height_m": person.ankle_height_m,
-        "trunk_bend": person.trunk_bend,
         "swinging_tissue": {name: asdict(swing) for name, swing in person.tissue.items()},
         "segment_lengths_m": person.lengths_m,
         "joints_in_parent_m": {name: p.tolist() for name, p in person.joints_m.items()},
@@ -201,6 +177,7 @@ def _trial_record(
     times = plan.recorded_times_s()
     spans = [(times[first], times[last]) for first, last in plan.flights]
     length = len(trial.time_s) * plan.step_s
+    on_plate_n = [trial.on_plate[s] * force[:, 1] for s, force in trial.feet_force_n.items()]
     return {
         "seed": seed,
         "duration_s": len(measurement.points_m) / measurement.rates.marker_hz,
@@ -221,7 +198,7 @@ def _trial_record(
             [round(float(a), 3), round(float(b), 3)] for a, b in spans if b > 0.0 and a < length
         ],
         "all_contacts_measured_share": float(np.mean(trial.all_contacts_measured())),
-        "largest_vertical_force_n": float(trial.plate_force_n()[:, 1].max()),
+        "largest_vertical_force_n": float(sum(on_plate_n).max()),
         "walkway_to_lab": {"rotation": pose.rotation.tolist(), "offset_m": pose.offset_m.tolist()},
         **plan.notes,
     }

@@ -53,13 +53,6 @@ class Trial:
     contacts: tuple[Contact, ...]
     plan: Plan
 
-    def plate_force_n(self) -> np.ndarray:
-        """(T, 3) of the contacts on the first plate."""
-        force = np.zeros_like(self.force_n)
-        for side in SIDES:
-            force += self.on_plate[side][:, None] * self.feet_force_n[side]
-        return force
-
     def all_contacts_measured(self) -> np.ndarray:
         """(T,) no foot on the ground beside the plate."""
         on_ground = {side: np.abs(self.feet_force_n[side]).max(axis=1) > 0.0 for side in SIDES}

@@ -67,7 +67,12 @@ def run(unit: Unit) -> None:
     for judge in judges:
         by_movement.setdefault(judge.trial.task, []).append(judge)
     of_each = {movement: _differences(trials) for movement, trials in by_movement.items()}
-    found = {_ALL: _over_all(of_each), **of_each}
+    # every movement counts once; of a single one, as far as its own trials tell
+    over_all = next(iter(of_each.values()), _UNKNOWN)
+    if len(of_each) > 1:
+        logs = {pair: [one[pair].log for one in of_each.values()] for pair in PAIRS}
+        over_all = {pair: between(each) for pair, each in logs.items()}
+    found = {_ALL: over_all, **of_each}
     use = {movement: chosen(differences, is_rare) for movement, differences in found.items()}
     rows = []
     for movement, differences in found.items():
@@ -195,12 +200,3 @@ def _differences(judges: list[Judge]) -> Differences:
         (a, b): between([judge.log_error[a] - judge.log_error[b] for judge in judges])
         for a, b in PAIRS
     }
-
-
-def _over_all(of_each: dict[str, Differences]) -> Differences:
-    """Every movement counts once; of a single one, as far as its own trials tell."""
-    if not of_each:
-        return _UNKNOWN
-    if len(of_each) == 1:
-        return next(iter(of_each.values()))
-    return {pair: between([one[pair].log for one in of_each.values()]) for pair in PAIRS}

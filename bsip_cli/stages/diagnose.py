@@ -10,7 +10,7 @@ from zlib import crc32
 import numpy as np
 import pandas as pd
 
-from bsip_cli.artifacts import empty_table
+from bsip_cli.artifacts import empty_table, table_of
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.diagnosis.error_budget import Line, Yardsticks, budget_of, large_errors
 from bsip_cli.diagnosis.error_model import TrialErrors, error_model
@@ -50,12 +50,15 @@ def run(unit: Unit) -> None:
         found, library, held = _searched(unit, free, known)
         named_from = unit.config.diagnosis.named_from
         more = findings_of(found, held, named_from, rng)
-        findings = (*_still_open(findings, more), *more)
+        told = {(one.effect, one.target) for one in more if one.verdict == "named"}
+        if any((one.effect, one.target) in told for one in findings):
+            findings = ()  # the movements tell which cause of the class of the stated mass it is
+        findings = (*findings, *more)
         findings = tuple(sorted(findings, key=lambda one: one.verdict == "rejected"))
         facts |= facts_of(found, held, findings)
         limits = detection_rows(found, library, named_from)
-        findings = (*_of_markers(free, found, held, findings, rng), *findings)
-        facts["causes"] = [*_proven(free, found, held), *facts["causes"]]
+        findings = (*_of_markers(free, held, findings, rng), *findings)
+        facts["causes"] = [*_proven(free, held), *facts["causes"]]
         if known is not None:
             mine = [one.for_faults for one in free]
             findings = (*known.findings(mine), *findings)
@@ -73,14 +76,13 @@ def run(unit: Unit) -> None:
         [*(x.trial.stem for x in trials), *(t for f in findings for t in f.trials)]
     )
     facts["trials"] = list(names)
-    _write(unit, rows_of(findings, tuple(names)), limits, facts, budget)
-
-
-def _still_open(of_mass: Sequence[Finding], more: Sequence[Finding]) -> tuple[Finding, ...]:
-    """The class of the stated mass, unless the movements tell which of its causes it is."""
-    told = {(one.effect, one.target) for one in more if one.verdict == "named"}
-    is_told = any((one.effect, one.target) in told for one in of_mass)
-    return () if is_told else tuple(of_mass)
+    diagnosis = rows_of(findings, tuple(names))
+    unit.write("overall-error-budget", budget)
+    unit.write("overall-diagnosis", diagnosis, facts)
+    unit.write("detection", limits)
+    said = verdict_of(diagnosis, limits)
+    for sentence in filter(None, (said.headline, *said.causes, said.limits)):
+        unit.warn(f"{unit.name}: {sentence}")
 
 
 def _searched(
@@ -101,7 +103,6 @@ def _searched(
 
 def _of_markers(
     trials: Sequence[Diagnosed],
-    found: Found,
     held: HeldOut,
     findings: Sequence[Finding],
     rng: np.random.Generator,
@@ -120,7 +121,7 @@ def _of_markers(
             yield from bend_of(scene, (*one.slips, *one.shaken), stem, f"M{k}", rng)
 
 
-def _proven(trials: Sequence[Diagnosed], found: Found, held: HeldOut) -> Iterator[dict]:
+def _proven(trials: Sequence[Diagnosed], held: HeldOut) -> Iterator[dict]:
     """Slips that the forces show too, in full and with the same sizes for every fold: no plate
     helped to find them."""
     slips = [(one.trial.stem, slip) for one in trials for slip in one.slips]
@@ -135,19 +136,6 @@ def _beside(found: Sequence[Finding], large: Sequence[Finding]) -> Iterator[Find
     for one in large:
         if trials := tuple(t for t in one.trials if t not in told):
             yield replace(one, trials=trials)
-
-
-def _write(
-    unit: Unit, diagnosis: pd.DataFrame, limits: pd.DataFrame, facts: dict, budget: pd.DataFrame
-) -> None:
-    """The artifacts, and in words what they say."""
-    unit.write("overall-error-budget", budget)
-    unit.write("overall-diagnosis", diagnosis, facts)
-    unit.write("detection", limits)
-    said = verdict_of(diagnosis, limits)
-    for sentence in (said.headline, *said.causes, said.limits):
-        if sentence:
-            unit.warn(f"{unit.name}: {sentence}")
 
 
 # --- the error budget -----------------------------------------------------------------------------
@@ -178,7 +166,7 @@ def error_budget(
     rows = [*_rows(budget_of(model, grounds, every, rng), "", data)]
     for k in every:
         rows += _rows(budget_of(model, grounds, (k,), rng), errors[k].name, data)
-    budget = pd.DataFrame(rows)
+    budget = table_of(_KIND, rows)
     return budget, _large(unit, trials, errors, partial(_along, budget))
 
 
@@ -207,13 +195,9 @@ def _large(
     along: Callable[[Sequence[str], str], str],
 ) -> tuple[Finding, ...]:
     usual = error_model(errors, 1, adapt=False)
-    options = unit.config.diagnosis
-    yardsticks = Yardsticks(
-        options.large_cop_error_m,
-        0.01 * options.large_force_error_percent,
-        options.least_correlation,
-        trials[0].scene.mass_kg * GRAVITY_M_S2,
-    )
+    options, weight_N = unit.config.diagnosis, trials[0].scene.mass_kg * GRAVITY_M_S2
+    limits = options.large_cop_error_m, 0.01 * options.large_force_error_percent
+    yardsticks = Yardsticks(*limits, options.least_correlation, weight_N)
     asked = [k for k, one in enumerate(trials) if one.held is None]
     return large_errors(usual, [one.ground for one in trials], asked, yardsticks, along)
 
@@ -221,20 +205,10 @@ def _large(
 def _rows(lines: Sequence[Line], trial: str, data: str) -> Iterator[dict]:
     for one in lines:
         factor, unit = scale_of(one.component)
-        yield {
-            "term": one.term,
-            "target": one.target,
-            "component": one.component,
-            "rms": factor * one.rms,
-            "unit": unit,
-            "share_percent": 100 * one.share,
-            "share_low": 100 * one.share_low,
-            "share_high": 100 * one.share_high,
-            "gain_percent": one.gain.percent,
-            "gain_low": one.gain.ci_low,
-            "gain_high": one.gain.ci_high,
-            "data": data if np.isfinite(one.gain.percent) else "",
-            "trial": trial,
-            "scale": one.scale,
-            "alike": ", ".join(one.alike),
-        }
+        gain = one.gain
+        known: dict = {"term": one.term, "target": one.target, "component": one.component}
+        known |= {"rms": factor * one.rms, "unit": unit, "share_percent": 100 * one.share}
+        known |= {"share_low": 100 * one.share_low, "share_high": 100 * one.share_high}
+        known |= {"gain_percent": gain.percent, "gain_low": gain.ci_low, "gain_high": gain.ci_high}
+        known |= {"data": data if np.isfinite(gain.percent) else "", "trial": trial}
+        yield known | {"scale": one.scale, "alike": ", ".join(one.alike)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from bsip_cli.artifacts import empty_table
+from bsip_cli.artifacts import empty_table, table_of
 from bsip_cli.diagnosis.evenness import plain
 from bsip_cli.diagnosis.fault_scores import Library, limits_of
 from bsip_cli.diagnosis.fault_search import Found, Verdict
@@ -48,30 +48,17 @@ def rows_of(findings: tuple[Finding, ...], trials: tuple[str, ...]) -> pd.DataFr
     if trials and all(one.verdict == "rejected" for one in findings):
         least = pd.Series([one.p_value for one in findings], dtype=float).min()
         findings = (nothing(least, trials), *findings)
-    rows = [
-        {
-            "rank": rank,
-            "effect": one.effect,
-            "target": one.target,
-            "parameter": number.name,
-            "estimate": number.value,
-            "unit": number.unit,
-            "ci_low": number.low,
-            "ci_high": number.high,
-            "p_value": one.p_value,
-            **dict(zip(("gain_percent", "gain_ci_low", "gain_ci_high"), one.gain, strict=True)),
-            "verdict": one.verdict,
-            "class_id": one.class_id,
-            "sentence": one.sentence,
-            "trials": ", ".join(one.trials),
-            "probability": one.probability,
-            "scope": one.scope,
-            "rms_change": one.rms_change,
-        }
-        for rank, one in enumerate(findings, start=1)
-        for number in one.numbers
-    ]
-    return pd.DataFrame(rows) if rows else empty_table("overall-diagnosis")
+    of_all = ["effect", "target", "p_value", "verdict", "class_id", "sentence", "probability"]
+    of_all += ["scope", "rms_change"]
+    rows = []
+    for rank, one in enumerate(findings, start=1):
+        gain = zip(("gain_percent", "gain_ci_low", "gain_ci_high"), one.gain, strict=True)
+        known: dict = {name: getattr(one, name) for name in of_all} | dict(gain)
+        known |= {"rank": rank, "trials": ", ".join(one.trials)}
+        for x in one.numbers:
+            sizes = {"estimate": x.value, "unit": x.unit, "ci_low": x.low, "ci_high": x.high}
+            rows.append(known | {"parameter": x.name} | sizes)
+    return table_of("overall-diagnosis", rows)
 
 
 def nothing(p_value: float, trials: tuple[str, ...]) -> Finding:
@@ -117,15 +104,8 @@ def cause_record(
 ) -> dict:
     """A cause for ``extend``; of the same sizes in every fold where ``folds`` says none."""
     sizes = values.tolist()
-    return {
-        "effect": effect,
-        "target": target,
-        "trials": list(trials),
-        "verdict": verdict,
-        "values": sizes,
-        "folds": folds or [sizes] * FOLDS,
-        "bounds": bounds or {},
-    }
+    known = {"effect": effect, "target": target, "trials": list(trials), "verdict": verdict}
+    return known | {"values": sizes, "folds": folds or [sizes] * FOLDS, "bounds": bounds or {}}
 
 
 def _bounds(found: Found, verdict: Verdict) -> dict[str, float]:
@@ -149,15 +129,9 @@ def _bounds(found: Found, verdict: Verdict) -> dict[str, float]:
 def detection_rows(found: Found, library: Library, named_from: float) -> pd.DataFrame:
     """The ``detection`` artifact: the smallest size of every fault that would have been named."""
     session = found.fit.session
-    rows = [
-        {
-            "effect": limit.place.candidate.effect.name,
-            "target": limit.place.candidate.target,
-            "parameter": limit.parameter,
-            "unit": limit.unit,
-            "limit": limit.size,
-            "trials": ", ".join(session.trials[t].name for t in limit.place.trials),
-        }
-        for limit in limits_of(session, library, found.scores, named_from)
-    ]
-    return pd.DataFrame(rows)
+    rows = []
+    for limit in limits_of(session, library, found.scores, named_from):
+        asked, trials = limit.place.candidate, [session.trials[t].name for t in limit.place.trials]
+        row = {"effect": asked.effect.name, "target": asked.target, "parameter": limit.parameter}
+        rows.append(row | {"unit": limit.unit, "limit": limit.size, "trials": ", ".join(trials)})
+    return table_of("detection", rows)

@@ -118,21 +118,18 @@ def weighed(unit: Unit, person: Person) -> Weighed:
     return Weighed(heavier, as_read, share, findings)
 
 
-def prior_of_shares(unit: Unit, person: Person) -> Prior:
-    """How the stated mass is shared out, whatever it is."""
-    none = np.zeros(len(person.skeleton.bodies), dtype=bool)
-    known = {**_ORIGINS, "total_mass_sd_percent": 0.0}
-    return prior_from(unit, unit.read("regression"), person, none, **known)
-
-
-def prior_of(unit: Unit, person: Person, share: float | None = None) -> Prior:
+def prior_of(
+    unit: Unit, person: Person, share: float | None = None, whatever_mass: bool = False
+) -> Prior:
     """Of the parameters, none of which is taken for known; the plates' gain shows against a mass
     that a scale has told.
 
     share : by what part of the stated mass the plates read more, where they are believed instead.
+    whatever_mass : how the stated mass is shared out alone, whatever it is.
     """
     sd_percent = 100 * stated_sd(unit) if share is None else _READ_TO_PERCENT
     known = {"total_mass_sd_percent": sd_percent} if is_weighed(unit) else {}
+    known |= {"total_mass_sd_percent": 0.0} if whatever_mass else {}
     table = unit.read("regression").copy()
     table[[name for name in bsip_names() if not name.startswith("com")]] *= 1 + (share or 0.0)
     none = np.zeros(len(person.skeleton.bodies), dtype=bool)
@@ -155,19 +152,18 @@ def diagnosed(
     """None where the plates carry the person for fewer than ``least`` samples of the residual."""
     options, facts = unit.config.diagnosis, unit.read("person").iloc[0]
     fewer = slow(scene)
-    filter_ = _about_surface(filter_of(fewer, options.cutoff_hz), scene)
+    filter_ = filter_of(fewer, options.cutoff_hz)
+    heights = [plate.corners_m[:, 2] for plate in scene.plates]
+    height = float(np.mean(heights)) if heights else 0.0  # moments about the plates' surface
+    filter_ = replace(filter_, reference_m=np.append(filter_.reference_m[:2], height))
     if len(filter_.frames) < least:
         return None
     full = at_full_rate(filter_, scene, options.cutoff_hz)
     measured, residual = full.one(scene.measured), full.one(scene.measured - scene.predicted)
     contact = unit.facts("identification")["external_contacts"].get(trial.stem)
     rng = np.random.default_rng(crc32(trial.stem.encode()))
-    found = (
-        slips_of(fewer, _slips(unit, trial), options.named_from, rng)
-        if trial.role != STATIC
-        else ()
-    )
-    markers = alone_and_shaken(fewer, found)
+    off = _slips(unit, trial) if trial.role != STATIC else []
+    markers = alone_and_shaken(fewer, slips_of(fewer, off, options.named_from, rng) if off else ())
     terms = [
         replace(x, columns=filter_(x.columns))
         for x in error_terms(fewer, prior.root, options.landmark_sd_m, options.skin_factor)
@@ -190,13 +186,6 @@ def diagnosed(
     return Diagnosed(trial, scene, errors, ground, held, *markers)
 
 
-def _about_surface(filter_: Filter, scene: Scene) -> Filter:
-    """Moments about a point of the plates' surface."""
-    heights = [plate.corners_m[:, 2] for plate in scene.plates]
-    height = float(np.mean(heights)) if heights else 0.0
-    return replace(filter_, reference_m=np.append(filter_.reference_m[:2], height))
-
-
 def _named(scene: Scene, filter_: Filter, causes: Sequence[Mapping]) -> Iterator[Term]:
     """Faults with the sizes that the diagnosis has found, and how they might differ."""
     for one in causes:
@@ -207,14 +196,8 @@ def _named(scene: Scene, filter_: Filter, causes: Sequence[Mapping]) -> Iterator
         typical = [p.typical for p in effect.parameters(scene, target) if not p.scan]
         columns = filter_(effect.tangent(scene, target, values) * np.array(typical))
         known = filter_.one(effect.change(scene, target, values))
-        yield Term(
-            FAULT + effect.name,
-            target,
-            f"{FAULT}{effect.name} {target} named",
-            len(one["trials"]) == 1,
-            columns,
-            known,
-        )
+        name, alone = FAULT + effect.name, len(one["trials"]) == 1
+        yield Term(name, target, f"{name} {target} named", alone, columns, known)
 
 
 def _of_hands(scene: Scene, filter_: Filter) -> Iterator[Term]:
@@ -231,16 +214,16 @@ def _of_hands(scene: Scene, filter_: Filter) -> Iterator[Term]:
 def _slips(unit: Unit, trial: Trial) -> list[Slip]:
     """Markers off their places that the inverse kinematics has found, a slip's before those of
     the whole trial."""
-    events = unit.read("marker-events", trial)
-    slips = events["kind"] == "slip"
-    throughout = (events["kind"] == "offset") & (events["statistic"] > _FAR_OFF)
-    return [*_off(events[slips]), *_off(events[throughout], BEFORE_S, _FAR_OFF)]
-
-
-def _off(events: pd.DataFrame, before_s: float = 0.0, least: float = 0.0) -> list[Slip]:
-    """``least``: how far off a marker must be, in the spreads that its statistic is in."""
-    columns = (events[name] for name in ("marker", "start_s", "statistic", "size_m"))
+    columns = ["marker", "start_s", "statistic", "size_m"]
+    kinds = {
+        kind: rows[columns] for kind, rows in unit.read("marker-events", trial).groupby("kind")
+    }
+    slips, offsets = (kinds.get(one, pd.DataFrame(columns=columns)) for one in ("slip", "offset"))
     return [
-        Slip(str(m), float(t) - before_s, float(z), least * float(size) / float(z))
-        for m, t, z, size in zip(*columns, strict=True)
+        *(Slip(str(m), float(t), float(z), 0.0) for m, t, z, _ in slips.to_numpy()),
+        *(
+            Slip(str(m), float(t) - BEFORE_S, float(z), _FAR_OFF * float(size) / float(z))
+            for m, t, z, size in offsets.to_numpy()
+            if z > _FAR_OFF
+        ),
     ]

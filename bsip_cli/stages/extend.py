@@ -14,6 +14,7 @@ from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.verdict import change_sentence
 from bsip_cli.report.words import segment_label
 from bsip_cli.running.unit import Unit
+from bsip_cli.schemas import column_names
 from bsip_cli.stages.frames import bsip_table, person_of
 from bsip_cli.stages.identification_problem import (
     estimate_by,
@@ -105,22 +106,17 @@ def _changes(bsip: pd.DataFrame, extended: pd.DataFrame) -> pd.DataFrame:
         table = pd.DataFrame(known | {"mass_change_kg": mass})
         table[_COM_CHANGE] = shift
         table["com_change_m"] = length
-        table["largest"] = _largest(mass, length)
+        words: list[list[str]] = [[] for _ in mass]
+        for name, sizes in (("mass", np.abs(mass)), ("centre of mass", length)):
+            if sizes.max() > 0:
+                words[int(sizes.argmax())].append(name)
+        table["largest"] = [" and ".join(found) for found in words]
         table["sentence"] = [
             f"{segment_label(segment)}: mass {m:+.3f} kg, centre of mass moved by {1000 * x:.1f} mm"
             for segment, m, x in zip(after.index, mass, length, strict=True)
         ]
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
-
-
-def _largest(mass: np.ndarray, length: np.ndarray) -> list[str]:
-    """Which segments change most; none where nothing changes."""
-    words: list[list[str]] = [[] for _ in mass]
-    for name, sizes in (("mass", np.abs(mass)), ("centre of mass", length)):
-        if sizes.max() > 0:
-            words[int(sizes.argmax())].append(name)
-    return [" and ".join(found) for found in words]
 
 
 # --- skeleton ---------------------------------------------------------------------------------
@@ -138,17 +134,8 @@ def _torso_rows(person: Person, cause: Cause) -> pd.DataFrame:
         (below, parent, skeleton.joints[i], person.joint_in_parent_m[i], split.below, 1 - shares),
         (above, below, "T12/L1", split.joint_m, 1 - split.below, shares),
     )
-    return pd.DataFrame(
-        [
-            {
-                "segment": segment,
-                "parent": hangs_on,
-                "joint": joint,
-                **dict(zip(("joint_x_m", "joint_y_m", "joint_z_m"), place, strict=True)),
-                "length_m": part * float(np.linalg.norm(whole)),
-                "mass_share": part,
-                **{f"{axis}_share": x for axis, x in zip(AXES, turned, strict=True)},
-            }
-            for segment, hangs_on, joint, place, part, turned in parts
-        ]
-    )
+    columns = ["segment", "parent", "joint", "joint_x_m", "joint_y_m", "joint_z_m", "mass_share"]
+    rows = [(*names, *place, part, *turned) for *names, place, part, turned in parts]
+    table = pd.DataFrame(rows, columns=[*columns, *(f"{axis}_share" for axis in AXES)])
+    table["length_m"] = table["mass_share"] * float(np.linalg.norm(whole))
+    return table[column_names("extended-skeleton")]

@@ -49,17 +49,17 @@ def run(unit: Unit) -> None:
     blocks = blocks_of(unit, unit.trial.stem)
     scene, parameters = _scene(unit, person, extended)
     fold = blocks.fold_of(judgement.times_s)
-    raw: Wrenches = {
-        MEASURED: measured[WRENCH].to_numpy(),
-        OM: scene.wrench_of(parameters[OM]),
-    }
+    raw: Wrenches = {MEASURED: measured[WRENCH].to_numpy(), OM: scene.wrench_of(parameters[OM])}
     for place, k in enumerate(own):
         among = [causes[j] for j in own[: place + 1]]
         predicted = scene.wrench_of(parameters[method_of(causes[: k + 1])])
         raw[method_of(among)] = predicted + unseen_change_by(among, scene, fold)
-    wrenches = {name: judgement.filtered(wrench) for name, wrench in raw.items()}
-    signals = {name: judgement.signals(wrench) for name, wrench in wrenches.items()}
-    _amend(unit, judgement, wrenches, signals)
+    wrenches, signals = judgement.compared(raw)
+    ours = [name for name in signals if is_extended(name)]
+    rows = reconstruction_rows(judgement, {name: wrenches[name] for name in ours}, signals)
+    unit.amend("reconstruction", rows)
+    alike = over_the_same_frames(signals)
+    unit.amend("fit", fit_rows(judgement, {name: alike[name] for name in (MEASURED, *ours)}))
     last = list(signals)[-1]
     errors = _errors(judgement, signals, last, blocks)
     rows = gain_rows(errors, last, _held_out(unit, judgement), crc32(unit.name.encode()))
@@ -82,16 +82,6 @@ def _scene(
     return scene, dict(zip(methods, carried.T, strict=True))
 
 
-def _amend(unit: Unit, judgement: Judgement, wrenches: Wrenches, signals: Signals) -> None:
-    ours = [name for name in signals if is_extended(name)]
-    rows = reconstruction_rows(
-        judgement, {name: wrenches[name] for name in ours}, {name: signals[name] for name in ours}
-    )
-    unit.amend("reconstruction", rows)
-    compared = over_the_same_frames(signals)
-    unit.amend("fit", fit_rows(judgement, {name: compared[name] for name in (MEASURED, *ours)}))
-
-
 # --- gain -------------------------------------------------------------------------------------
 
 
@@ -99,14 +89,12 @@ def _errors(
     judgement: Judgement, signals: Signals, method: str, blocks: Blocks
 ) -> dict[str, BlockErrors]:
     """Per component, in the units that people read."""
-    judged = judgement.judged
+    judged, errors = judgement.judged, {}
     numbers = blocks.of(judgement.times_s)[judged]
-    errors = {}
     for component in signals[MEASURED]:
         scale, _ = scale_of(component)
-        measured, before, after = (
-            scale * signals[name][component][judged] for name in (MEASURED, OM, method)
-        )
+        compared = (scale * signals[name][component][judged] for name in (MEASURED, OM, method))
+        measured, before, after = compared
         errors[component] = block_errors(measured, before, after, numbers)
     return errors
 

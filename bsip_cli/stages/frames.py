@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from bsip_cli.body.loads import PointMass, load_parameters
-from bsip_cli.body.person import Person
+from bsip_cli.body.person import Person, load_parameters
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.report.words import listing, segment_label
 from bsip_cli.running.unit import Unit
@@ -66,8 +65,7 @@ def coordinates_from(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """q (N, nq), v (N, nv) and a (N, nv) of a ``kinematics`` table."""
     q = frame[[f"q_{name}" for name in skeleton.q_names]].to_numpy()
-    v = frame[[f"v_{name}" for name in skeleton.v_names]].to_numpy()
-    a = frame[[f"a_{name}" for name in skeleton.v_names]].to_numpy()
+    v, a = (frame[[f"{one}_{name}" for name in skeleton.v_names]].to_numpy() for one in "va")
     return q, v, a
 
 
@@ -98,8 +96,7 @@ def bsip_table(
 def load_phi(unit: Unit, person: Person, trial: Trial | None = None) -> np.ndarray:
     """(10 n,) parameters of a trial's loads about the joint centres; the unit's own by default."""
     loads = unit.loads(trial)
-    points = (PointMass(x.segment, x.mass_kg, np.array(x.position_m)) for x in loads)
-    return load_parameters(points, person)
+    return load_parameters([(x.segment, x.mass_kg, x.position_m) for x in loads], person)
 
 
 def load_words(unit: Unit, trial: Trial | None = None) -> str:

@@ -59,7 +59,11 @@ def record_of(unit: Unit) -> CohortRecord:
             unit.read("comparisons"), criteria, facts["fitted_on"], facts["missing"]
         ),
         table_files=tuple(unit.read("tables-files")["file"]),
-        missing=tuple(_missing_sentence(gone) for gone in facts["missing"]),
+        missing=tuple(
+            f"{gone['sentence']}: not in table{'s' if len(gone['tables']) > 1 else ''} "
+            + listing([tag.removeprefix("table") for tag in gone["tables"]])
+            for gone in facts["missing"]
+        ),
         made=HowMade.of(_origins(unit)),
         defaults=unit.shipped_options(),
         laboratory=unit.read("laboratory") if unit.has("laboratory") else None,
@@ -73,30 +77,20 @@ def _use(unit: Unit, participant: Participant) -> str:
     return str(unit.read("choice", participant=participant)["use"].iloc[0])
 
 
-def _missing_sentence(gone: dict) -> str:
-    numbers = [tag.removeprefix("table") for tag in gone["tables"]]
-    return f"{gone['sentence']}: not in table{'s' if len(numbers) > 1 else ''} {listing(numbers)}"
-
-
 def _member(unit: Unit, participant: Participant, use: str, errors: Mapping[str, float]) -> Member:
+    has_page = unit.path("report-files", participant=participant).exists()
+    facts = unit.facts("report-files", participant=participant) if has_page else {}
     return Member(
         participant.id,
         _shown(unit, "person", participant),
         _shown(unit, "identification", participant, OM),
-        unit.path("report-files", participant=participant).exists(),
+        has_page,
         refusals_of(unit, participant),
         _searched(unit, participant),
         use if errors else "",
         errors,
-        _light(unit, participant),
+        Light(**facts["light"]) if has_page else None,
     )
-
-
-def _light(unit: Unit, participant: Participant) -> Light | None:
-    """The answer on the first page of the participant's report; None where there is none."""
-    if not unit.path("report-files", participant=participant).exists():
-        return None
-    return Light(**unit.facts("report-files", participant=participant)["light"])
 
 
 def _searched(unit: Unit, participant: Participant) -> Searched | None:

@@ -83,23 +83,16 @@ def recordings_of(
         for start, stop in stretches(use):
             blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})
         motion = coordinates_from(kinematics, person.skeleton)
-        carried = _load_wrench(unit, person, trial, *motion)
-        measured = np.nan_to_num(wrench[WRENCH].to_numpy()) - carried
+        measured = np.nan_to_num(wrench[WRENCH].to_numpy())
+        if unit.loads(trial):
+            phi = load_phi(unit, person, trial)[:, None]
+            carried = predicted_wrench(pinocchio_model(person), *motion, phi, np.zeros(3))
+            measured = measured - carried[..., 0]
         if changes and trial.stem in changes:
             measured = measured - changes[trial.stem]
         level = acceleration_noise(kinematics, person.skeleton)
         recordings.append(Recording(*motion, measured, use, rate, level))
     return recordings, pd.DataFrame(blocks, columns=["trial", "start_s", "end_s"])
-
-
-def _load_wrench(
-    unit: Unit, person: Person, trial: Trial, q: np.ndarray, v: np.ndarray, a: np.ndarray
-) -> np.ndarray:
-    """(N, 6) part of the ground wrench that a trial's known loads need."""
-    if not unit.loads(trial):
-        return np.zeros((len(q), 6))
-    phi = load_phi(unit, person, trial)[:, None]
-    return predicted_wrench(pinocchio_model(person), q, v, a, phi, np.zeros(3))[..., 0]
 
 
 def duration_s(recordings: list[Recording]) -> float:
@@ -135,11 +128,7 @@ def problem_of(
     )
     options = unit.config.identify
     cutoff = options.cutoff_hz
-    judgement = (
-        options.trust_ratio,
-        options.sigma_percent_limit,
-        options.spread_weight,
-    )
+    judgement = (options.trust_ratio, options.sigma_percent_limit, options.spread_weight)
     instruments = Instruments(options.plate_place_sd_m, options.delay_sd_s, prior.phi)
     joint = accumulate(model, recordings, cutoff, reference)
     noise = even_noise(_FIRST_NOISE, joint.samples)

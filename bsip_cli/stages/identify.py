@@ -32,7 +32,7 @@ from bsip_cli.identification.uncertainty import (
     root_of,
 )
 from bsip_cli.running.unit import Unit
-from bsip_cli.schemas import spread_names
+from bsip_cli.schemas import column_names, spread_names
 from bsip_cli.stages.frames import WRENCH, bsip_table, load_words, loads_record, person_of
 from bsip_cli.stages.identification_problem import (
     duration_s,
@@ -56,6 +56,7 @@ def run(unit: Unit) -> None:
     regression = unit.read("regression")
     prior = prior_from(unit, regression, person)
     contacts = _external_contacts(unit, person, prior.phi)
+    facts = {"external_contacts": {stem: asdict(one) for stem, one in contacts.items()}}
     trials = _identification_trials(unit, contacts)
     recordings, blocks = recordings_of(unit, person, trials)
     for trial in trials:
@@ -63,10 +64,16 @@ def run(unit: Unit) -> None:
         if known:
             unit.warn(f"{unit.name}: taken off the forces of {trial.stem} as a known load: {known}")
     if duration_s(recordings) < _SHORTEST_S:
-        _write_table_only(unit, regression, recordings, contacts)
+        _write_table_only(unit, regression, recordings, facts)
         unit.write("covariance", _covariance_table(skeleton, {RM: prior.root}))
         return
-    _tell_of_fixed(unit, person)
+    lost = person.without_data()[list(skeleton.bodies)]
+    fixed = [name for name, is_lost in zip(skeleton.body_names, lost, strict=True) if is_lost]
+    if fixed:
+        unit.warn(
+            f"{unit.name}: no data for {', '.join(map(segment_in_words, fixed))}: no markers show "
+            "how they move, OM keeps the table's values (RM) there"
+        )
     problem, reference = problem_of(unit, person, prior, recordings)
     # by method: OM is the first that is configured, others go by their names
     first, *others = unit.config.identify.estimators
@@ -80,33 +87,21 @@ def run(unit: Unit) -> None:
             bsip_table(method, skeleton.body_names, result.values, result.sd, result.share)
         )
     rarity = _rarity(unit, skeleton, problem, estimates)
-    unit.write(
-        "bsip",
-        pd.concat(tables, ignore_index=True),
-        facts={
-            "reference_m": reference.tolist(),
-            "noise_rms": problem.noise.rms.tolist(),
-            "loads": {trial.stem: loads_record(unit, trial) for trial in trials},
-        },
-    )
+    made: dict = {"reference_m": reference.tolist(), "noise_rms": problem.noise.rms.tolist()}
+    made["loads"] = {trial.stem: loads_record(unit, trial) for trial in trials}
+    unit.write("bsip", pd.concat(tables, ignore_index=True), made)
     roots = {method: root_of(estimate.covariance) for method, estimate in estimates.items()}
     unit.write("covariance", _covariance_table(skeleton, {RM: prior.root} | roots))
     unit.write("base-parameters", _base_table(skeleton, problem))
     found = excitation(problem)
     unit.write("excitation", _excitation_table(person, problem, found, results[OM].share))
-    unit.write(
-        "identification",
-        _summary(problem, found, estimates, estimators, blocks).assign(**rarity),
-        facts={"external_contacts": _as_records(contacts)},
-    )
+    summary = _summary(problem, found, estimates, estimators, blocks).assign(**rarity)
+    unit.write("identification", summary[column_names("identification")], facts)
     unit.write("used-blocks", blocks)
 
 
 def _write_table_only(
-    unit: Unit,
-    regression: pd.DataFrame,
-    recordings: list[Recording],
-    contacts: Mapping[str, Support],
+    unit: Unit, regression: pd.DataFrame, recordings: list[Recording], facts: dict
 ) -> None:
     """Without forces that belong to the motion the table's values stand alone."""
     unit.warn(
@@ -116,12 +111,7 @@ def _write_table_only(
     unit.write("bsip", regression.drop(columns=["note", *spread_names()]))
     for kind in ("base-parameters", "excitation", "used-blocks"):
         unit.write(kind, empty_table(kind))
-    facts = {"external_contacts": _as_records(contacts)}
     unit.write("identification", empty_table("identification"), facts)
-
-
-def _as_records(contacts: Mapping[str, Support]) -> dict[str, dict]:
-    return {stem: asdict(support) for stem, support in contacts.items()}
 
 
 # --- which data -------------------------------------------------------------------------------
@@ -131,8 +121,8 @@ def _external_contacts(unit: Unit, person: Person, phi: np.ndarray) -> dict[str,
     """What bears part of the body beside the plates, by trial; phi (10 n,) of the table."""
     found = {}
     for trial in unit.trials("kinematics", "wrench"):
-        support = support_of(slow(motion_and_wrench_of(unit, person, phi, trial)))
-        if support is not None:
+        scene = slow(motion_and_wrench_of(unit, person, phi, trial))
+        if (support := support_of(scene)) is not None:
             found[trial.stem] = support
     return found
 
@@ -169,17 +159,6 @@ def _tell_of_contacts(
         if trial.stem in contacts:
             found = contacts[trial.stem].words()
             unit.warn(f"{unit.name}: {trial.stem} does not identify: {found}; {used}")
-
-
-def _tell_of_fixed(unit: Unit, person: Person) -> None:
-    skeleton, lost = person.skeleton, person.without_data()
-    fixed = [skeleton.segments[i] for i in skeleton.bodies if lost[i]]
-    if fixed:
-        names = ", ".join(map(segment_in_words, fixed))
-        unit.warn(
-            f"{unit.name}: no data for {names}: no markers show how they move, OM keeps the "
-            "table's values (RM) there"
-        )
 
 
 # --- the estimate -----------------------------------------------------------------------------
@@ -237,17 +216,14 @@ def _covariance_table(skeleton: Skeleton, roots: dict[str, np.ndarray]) -> pd.Da
 def _base_table(skeleton: Skeleton, problem: Problem) -> pd.DataFrame:
     fit = base_parameters(problem)
     named = expressions(problem.basis, skeleton.body_names)
-    return pd.DataFrame(
-        {
-            "name": [row[0] for row in named],
-            "expression": [row[1] for row in named],
-            "value": fit.values,
-            "unit": [row[2] for row in named],
-            "sd": np.sqrt(np.diag(fit.covariance)),
-            "sigma_percent": fit.sigma_percent(),
-            "rm_value": fit.rm_values,
-        }
-    ).sort_values("sigma_percent", kind="stable", ignore_index=True)
+    table = pd.DataFrame(named, columns=["name", "expression", "unit"]).assign(
+        value=fit.values,
+        sd=np.sqrt(np.diag(fit.covariance)),
+        sigma_percent=fit.sigma_percent(),
+        rm_value=fit.rm_values,
+    )
+    table = table.sort_values("sigma_percent", kind="stable", ignore_index=True)
+    return table[column_names("base-parameters")]
 
 
 def _excitation_table(
@@ -292,22 +268,15 @@ def _summary(
 ) -> pd.DataFrame:
     names = [f"rms_{name}" for name in WRENCH]
     table_kg = float(problem.prior.phi[::10].sum())
-    rows = []
+    equations, rows = problem.equations, []
+    of_all = {"samples": equations.samples, "duration_s": equations.duration_s}
+    of_all |= {"effective_samples": float(problem.noise.effective.sum())}
+    of_all |= {"rank": problem.basis.rank, "condition_number": found.condition_number}
     for method, estimate in estimates.items():
-        rows.append(
-            {
-                "estimator": estimators[method],
-                "method": method,
-                "trials": ", ".join(blocks["trial"].unique()),
-                "samples": problem.equations.samples,
-                "duration_s": problem.equations.duration_s,
-                "effective_samples": float(problem.noise.effective.sum()),
-                "rank": problem.basis.rank,
-                "condition_number": found.condition_number,
-                "mass_factor": float(estimate.phi[::10].sum()) / table_kg,
-                "mass_factor_sd": float(np.sqrt(estimate.covariance[::10, ::10].sum())) / table_kg,
-                **dict(zip(names, estimate.residual_rms(problem), strict=True)),
-                "note": estimate.note,
-            }
-        )
+        row: dict = {"estimator": estimators[method], "method": method, "note": estimate.note}
+        row |= {"trials": ", ".join(blocks["trial"].unique())} | of_all
+        row["mass_factor"] = float(estimate.phi[::10].sum()) / table_kg
+        sd_kg = float(np.sqrt(estimate.covariance[::10, ::10].sum()))
+        row["mass_factor_sd"] = sd_kg / table_kg
+        rows.append(row | dict(zip(names, estimate.residual_rms(problem), strict=True)))
     return pd.DataFrame(rows)

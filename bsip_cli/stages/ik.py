@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import asdict
 
 import numpy as np
@@ -42,21 +41,12 @@ def run(unit: Unit) -> None:
     options = unit.config.smoothing.model_dump()
     options["robust_limit_m"] = unit.config.ik.robust_limit_m
     motion = smooth_motion(person, poses.q, known, rate, markers=evidence.markers_m, **options)
-    unit.write(
-        "kinematics",
-        _kinematics(times, angle_sd, poses, motion, person.skeleton),
-        facts={"marker_noise_m": motion.marker_noise_m, "marker_rms_m": poses.rms_m()},
-    )
-    unit.write(
-        "marker-residuals",
-        pd.DataFrame(
-            {
-                "time_s": np.repeat(times, len(person.markers)),
-                "marker": np.tile(np.array(person.markers, dtype=object), len(times)),
-                "residual_m": poses.residual_m.ravel(),
-            }
-        ),
-    )
+    facts = {"marker_noise_m": motion.marker_noise_m, "marker_rms_m": poses.rms_m()}
+    unit.write("kinematics", _kinematics(times, angle_sd, poses, motion, person.skeleton), facts)
+    names = np.tile(np.array(person.markers, dtype=object), len(times))
+    residuals = {"time_s": np.repeat(times, len(person.markers)), "marker": names}
+    residuals["residual_m"] = poses.residual_m.ravel()
+    unit.write("marker-residuals", pd.DataFrame(residuals))
     unit.write("marker-events", [asdict(one) for one in evidence.events])
 
 
@@ -85,7 +75,13 @@ def _determined(
     """
     skeleton = person.skeleton
     if not decided.all():
-        names = ", ".join(_undecided(skeleton, decided))
+        angles = zip(skeleton.joints, np.split(decided, skeleton.v_starts[1:]), strict=True)
+        counts = [(joint, int((~own).sum()), len(own)) for joint, own in angles]
+        names = ", ".join(
+            (f"{count} of {size} coordinates of " if count < size else "") + the_joint(joint)
+            for joint, count, size in counts
+            if count
+        )
         unit.warn(f"{unit.name}: no markers decide {names}; held near the neutral pose")
     sd = np.where(decided, poses.coordinate_sd, 0.0)
     sd[:, :3] = 0.0  # the base's position is in metres
@@ -94,26 +90,12 @@ def _determined(
     known = (of_joint < unit.config.ik.undetermined_sd_rad) & seen[:, None]
     for i, parent in enumerate(skeleton.parents[1:], start=1):
         known[:, i] &= known[:, parent]
-    lost = [
-        the_joint(name)
-        for name, ok in zip(skeleton.joints, known.all(axis=0), strict=True)
-        if not ok
-    ]
+    whole = zip(skeleton.joints, known.all(axis=0), strict=True)
+    lost = [the_joint(name) for name, ok in whole if not ok]
     if lost:
         count = int((~known.all(axis=1)).sum())
         unit.warn(f"{unit.name}: {count} frames without a pose of {', '.join(lost)}")
     return known, of_joint.max(axis=1)
-
-
-def _undecided(skeleton: Skeleton, decided: np.ndarray) -> Iterator[str]:
-    """Joints of which some coordinates are not decided, in words."""
-    of_joints = np.split(decided, skeleton.v_starts[1:])
-    for joint, angles in zip(skeleton.joints, of_joints, strict=True):
-        count = int((~angles).sum())
-        if count == len(angles):
-            yield the_joint(joint)
-        elif count:
-            yield f"{count} of {len(angles)} coordinates of {the_joint(joint)}"
 
 
 def _evidence(
@@ -139,21 +121,10 @@ def _evidence(
 def _kinematics(
     times: np.ndarray, angle_sd: np.ndarray, poses: Poses, motion: Motion, skeleton: Skeleton
 ) -> pd.DataFrame:
-    known = {
-        "time_s": times,
-        "determined": motion.inner,
-        "marker_rms_m": poses.frame_rms_m(),
-        "angle_sd_rad": angle_sd,
-        "cutoff_hz": motion.cutoff_hz,
-    }
-    courses = {
-        "q": (motion.q, skeleton.q_names),
-        "v": (motion.v, skeleton.v_names),
-        "a": (motion.a, skeleton.v_names),
-        "sd": (motion.a_sd, skeleton.v_names),
-    }
-    tables = [
-        pd.DataFrame(values, columns=[f"{prefix}_{name}" for name in names])
-        for prefix, (values, names) in courses.items()
-    ]
-    return pd.concat([pd.DataFrame(known), *tables], axis=1)
+    known = {"time_s": times, "determined": motion.inner, "marker_rms_m": poses.frame_rms_m()}
+    known |= {"angle_sd_rad": angle_sd, "cutoff_hz": motion.cutoff_hz}
+    tables = [pd.DataFrame(known)]
+    for prefix, values in (("q", motion.q), ("v", motion.v), ("a", motion.a), ("sd", motion.a_sd)):
+        names = skeleton.q_names if prefix == "q" else skeleton.v_names
+        tables.append(pd.DataFrame(values, columns=[f"{prefix}_{name}" for name in names]))
+    return pd.concat(tables, axis=1)

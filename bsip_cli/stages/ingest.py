@@ -14,7 +14,7 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.c3d_person import against_table
 from bsip_cli.recordings.contacts import (
     ContactWindows,
-    FootContacts,
+    PlateLoad,
     agreeing_mass,
     contact_windows,
     foot_contacts,
@@ -71,23 +71,14 @@ def run(unit: Unit) -> None:
         "analog_rate_hz": recording.analog_rate_hz,
     }
     person = {f"stated_{name}": stated[name] for name in ("mass_kg", "height_m", "sex")}
-    markers = {one: filled.markers_m[:, np.equal(segments, one)] for one in SEGMENTS}
-    feet = _foot_contacts(recording, markers, wrench)
-    shown = feet.measured if feet.has_both else np.zeros_like(feet.measured)
-    stretches = stretches_of(markers, feet.total_N, shown, recording.marker_rate_hz)
-    trunk = filled.markers_m[:, np.isin(segments, TRUNK)]
-    mass, stands_kg, about_mass = _mass_on_plates(unit, stated_mass(unit, person), stretches)
-    if mass is None:
-        loaded = feet.measured & upright_frames(markers)
-        mass = agreeing_mass(feet.total_N, trunk, loaded, recording.marker_rate_hz)
-    contacts = contact_windows(feet, trunk, mass, recording.marker_rate_hz, stands_kg)
-    stated_otherwise = against_table(
-        recording.stated,
-        unit.participant.mass_kg,
-        unit.participant.height_m,
-        unit.config.ingest.mass_tolerance_percent,
-    )
-    without = [_without_forces(recording.forces_note)] if recording.forces_note else []
+    loads, about = plate_loads(recording, wrench), stated_mass(unit, person)
+    found = _contacts(unit, recording, filled.markers_m, segments, loads, about)
+    contacts, stretches, about_mass = found
+    table, tolerance = unit.participant, unit.config.ingest.mass_tolerance_percent
+    stated_otherwise = against_table(recording.stated, table.mass_kg, table.height_m, tolerance)
+    why, taken = recording.forces_note, "took the markers alone; no frame is compared"
+    expected = "a force on the person"
+    without = [Finding("forces", "", why, expected, taken, "excluded")] if why else []
     findings = [*about_mass, *without, *findings, *contacts.reasons, *stated_otherwise]
     said = findings_about(session)  # once, of all trials
     for finding in findings:
@@ -98,27 +89,23 @@ def run(unit: Unit) -> None:
     unit.write("markers", _marker_table(times, names, filled), facts | meant | person)
     known = {"mass_stretches": [one.record() for one in stretches]}
     unit.write("wrench", _wrench_table(times, wrench, contacts), facts | known)
-    unit.write("plates", _plate_rows(recording))
+    corners = [
+        {"plate": plate.name, "corner": k + 1, "x_m": x, "y_m": y, "z_m": z}
+        for plate in recording.plates
+        if plate.corners_m is not None
+        for k, (x, y, z) in enumerate(plate.corners_m)
+    ]
+    unit.write("plates", corners)
     unit.write("contacts", _contact_table(times, contacts))
     used = Finding("marker_set", "", marker_set.name, "", marker_set.description, "info")
     unit.write("quality", [asdict(finding) for finding in (used, *findings)])
 
 
-def _without_forces(why: str) -> Finding:
-    expected = "a force on the person"
-    return Finding(
-        "forces", "", why, expected, "took the markers alone; no frame is compared", "excluded"
-    )
-
-
 def _without_zero(recording: Recording) -> tuple[Recording, list[Finding]]:
-    done = [
-        subtract_zero(
-            plate,
-            plate_zero(plate, recording.analog_rate_hz, surely_free=nobody_near(recording, plate)),
-        )
-        for plate in recording.plates
-    ]
+    done, rate_hz = [], recording.analog_rate_hz
+    for plate in recording.plates:
+        zero = plate_zero(plate, rate_hz, surely_free=nobody_near(recording, plate))
+        done.append(subtract_zero(plate, zero))
     return replace(recording, plates=tuple(plate for plate, _ in done)), [f for _, f in done]
 
 
@@ -158,26 +145,32 @@ def _fill(
     unit: Unit, recording: Recording, columns: list[int], segments: list[str]
 ) -> FilledMarkers:
     positions, options = recording.markers_m[:, columns], unit.config.ingest
-    groups: dict[str, list[int]] = {}
-    for k, segment in enumerate(segments):
-        groups.setdefault(segment, []).append(k)
-    return fill_gaps(
-        positions,
-        recording.marker_rate_hz,
-        list(groups.values()),
-        options.max_gap_s,
-        options.max_rigid_gap_s,
-    )
+    groups = [np.flatnonzero(np.equal(segments, one)).tolist() for one in dict.fromkeys(segments)]
+    longest = options.max_gap_s, options.max_rigid_gap_s
+    return fill_gaps(positions, recording.marker_rate_hz, groups, *longest)
 
 
-def _foot_contacts(
-    recording: Recording, markers_m: dict[str, np.ndarray], wrench: FrameWrench
-) -> FootContacts:
-    feet = {side: markers_m[f"foot_{side}"] for side in "lr"}
-    feet = {side: markers for side, markers in feet.items() if markers.shape[1]}
-    loads = plate_loads(recording, wrench)
-    rate_hz = recording.marker_rate_hz
-    return foot_contacts(feet, rate_hz, loads, recording.n_frames)
+def _contacts(
+    unit: Unit,
+    recording: Recording,
+    markers_m: np.ndarray,
+    segments: list[str],
+    loads: tuple[PlateLoad, ...],
+    stated: StatedMass | None,
+) -> tuple[ContactWindows, tuple[Stretch, ...], list[Finding]]:
+    """When what is on the plates, the stretches that tell the mass, and what is said of that;
+    markers_m (N, m, 3) on segments (m)."""
+    rate_hz, trunk = recording.marker_rate_hz, markers_m[:, np.isin(segments, TRUNK)]
+    markers = {one: markers_m[:, np.equal(segments, one)] for one in SEGMENTS}
+    own = {side: markers[f"foot_{side}"] for side in "lr" if markers[f"foot_{side}"].shape[1]}
+    feet = foot_contacts(own, rate_hz, loads, recording.n_frames)
+    shown = feet.measured if feet.has_both else np.zeros_like(feet.measured)
+    stretches = stretches_of(markers, feet.total_N, shown, rate_hz)
+    mass, stands_kg, about_mass = _mass_on_plates(unit, stated, stretches)
+    if mass is None:
+        loaded = feet.measured & upright_frames(markers)
+        mass = agreeing_mass(feet.total_N, trunk, loaded, rate_hz)
+    return contact_windows(feet, trunk, mass, rate_hz, stands_kg), stretches, about_mass
 
 
 def _mass_on_plates(
@@ -204,12 +197,11 @@ def _mass_on_plates(
 
 
 def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:
-    findings = []
-    is_open = ~np.isfinite(filled.markers_m[..., 0])
+    findings, is_open = [], ~np.isfinite(filled.markers_m[..., 0])
     for k, name in enumerate(names):
-        closed, left = int(filled.filled[:, k].sum()), int(is_open[:, k].sum())
+        counts = (int(one[:, k].sum()) for one in (filled.filled, is_open, filled.rigid))
+        closed, left, rigid = counts
         if closed or left:
-            rigid = int(filled.rigid[:, k].sum())
             found = f"{closed + left} of {len(is_open)} frames missing"
             action = (
                 f"{rigid} filled by the segment's other markers, {closed - rigid} by a spline, "
@@ -223,15 +215,10 @@ def _gap_findings(names: list[str], filled: FilledMarkers) -> list[Finding]:
 
 
 def _marker_table(times: np.ndarray, names: list[str], filled: FilledMarkers) -> pd.DataFrame:
-    positions = filled.markers_m.reshape(-1, 3)
-    return pd.DataFrame(
-        {
-            "time_s": np.repeat(times, len(names)),
-            "marker": np.tile(np.array(names, dtype=object), len(times)),
-            **dict(zip(("x_m", "y_m", "z_m"), positions.T, strict=True)),
-            "filled": filled.filled.ravel(),
-        }
-    )
+    labels = np.tile(np.array(names, dtype=object), len(times))
+    table = pd.DataFrame({"time_s": np.repeat(times, len(names)), "marker": labels})
+    table[["x_m", "y_m", "z_m"]] = filled.markers_m.reshape(-1, 3)
+    return table.assign(filled=filled.filled.ravel())
 
 
 def _wrench_table(times: np.ndarray, wrench: FrameWrench, contacts: ContactWindows) -> pd.DataFrame:
@@ -240,15 +227,6 @@ def _wrench_table(times: np.ndarray, wrench: FrameWrench, contacts: ContactWindo
     for name, rows in zip(wrench.names, wrench.per_plate, strict=True):
         table |= {f"plate{name}_{c}": row for c, row in zip(WRENCH, rows.T, strict=True)}
     return pd.DataFrame(table)
-
-
-def _plate_rows(recording: Recording) -> list[dict]:
-    return [
-        {"plate": plate.name, "corner": k + 1, "x_m": x, "y_m": y, "z_m": z}
-        for plate in recording.plates
-        if plate.corners_m is not None
-        for k, (x, y, z) in enumerate(plate.corners_m)
-    ]
 
 
 def _contact_table(times: np.ndarray, contacts: ContactWindows) -> pd.DataFrame:

@@ -10,6 +10,7 @@ import pandas as pd
 from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
+from bsip_cli.artifacts import table_of
 from bsip_cli.body.names import in_words
 from bsip_cli.body.person import Person
 from bsip_cli.diagnosis.cause import Cause, method_of
@@ -59,12 +60,12 @@ def run(unit: Unit) -> None:
     trial, bsip = trial_of(unit, person), unit.read("bsip")
     methods, phi = parameters_of(bsip, person)
     spread = _spreads(unit, methods)
-    ground = trial.ground(trial.readings)
-    reasons = _reasons(unit, trial, ground.feet)
+    feet, on_feet = trial.ground(trial.readings)
+    reasons = _reasons(unit, trial, feet)
     _tell(unit, trial, reasons)
     noise = _of_accelerations(trial, phi[:, -1])
     known = load_phi(unit, person)[:, None]
-    loads = trial.loads(phi + known, ground.on_feet, spread)
+    loads = trial.loads(phi + known, on_feet, spread)
     tables = [_table(trial, methods, loads, trial.valid(reasons), noise)]
     for method, its_loads, ok in _extended(unit, trial, bsip, spread, methods):
         tables.append(_table(trial, [method], its_loads, ok, noise))
@@ -75,12 +76,6 @@ def run(unit: Unit) -> None:
 
 
 # --- what was measured ------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class _Ground:
-    feet: FootForces
-    on_feet: dict[str, Ground]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,41 +111,35 @@ class _Trial:
         motion = (self.q, self.v, self.a)
         return joint_loads(self.person, *motion, phi, touched, spread, every=every)
 
-    def ground(self, readings: Sequence[Reading]) -> _Ground:
-        """Each foot's wrench, and its noise after the low-pass."""
+    def ground(self, readings: Sequence[Reading]) -> tuple[FootForces, dict[str, Ground]]:
+        """Each foot's wrench, and by segment with its noise after the low-pass."""
         feet = foot_forces(readings, self.feet_m, self.on_ground, self.on_plate, self.rate_hz)
         left = np.sqrt(noise_left(self.rate_hz, self.cutoff_hz))
         on_feet = {}
         for side in SIDES:
             noise, at = np.zeros((len(self.q), 6)), np.zeros(3)
             if feet.plate[side].any():
-                most = feet.plate[side].sum(axis=0).argmax()
-                at = _middle(readings[most])
-                noise[feet.plate[side].any(axis=1)] = left * plate_noise(readings[most], at)
+                plate = readings[feet.plate[side].sum(axis=0).argmax()]
+                if plate.corners_m is not None:
+                    at = np.asarray(plate.corners_m.mean(axis=0))
+                else:  # the middle of its load
+                    loaded = np.nan_to_num(plate.wrench[:, 2]) > 0
+                    at = np.append(np.nanmedian(plate.cop_m()[loaded], axis=0), 0.0)
+                noise[feet.plate[side].any(axis=1)] = left * plate_noise(plate, at)
             on_feet[f"foot_{side}"] = Ground(feet.wrench[side], noise, at)
-        return _Ground(feet, on_feet)
-
-
-def _middle(plate: Reading) -> np.ndarray:
-    """(3,) of the plate; where no outline is known, of its load."""
-    if plate.corners_m is not None:
-        return np.asarray(plate.corners_m.mean(axis=0))
-    cop = plate.cop_m()
-    return np.append(np.nanmedian(cop[np.nan_to_num(plate.wrench[:, 2]) > 0], axis=0), 0.0)
+        return feet, on_feet
 
 
 def trial_of(unit: Unit, person: Person) -> _Trial:
     """Motion, plates and feet of the unit's trial."""
     kinematics, contacts, wrench = (unit.read(k) for k in ("kinematics", "contacts", "wrench"))
-    q, v, a = coordinates_from(kinematics, person.skeleton)
-    motion = segment_motion(pinocchio_model(person), q, v, a)
+    coordinates = coordinates_from(kinematics, person.skeleton)
+    motion = segment_motion(pinocchio_model(person), *coordinates)
     names, corners = {"l": "left", "r": "right"}, unit.read("plates")
     return _Trial(
         person,
         kinematics["time_s"].to_numpy(),
-        q,
-        v,
-        a,
+        *coordinates,
         kinematics["determined"].to_numpy(),
         wrench["valid"].to_numpy(),
         acceleration_noise(kinematics, person.skeleton),
@@ -316,23 +305,24 @@ def _extended(
     of_om = replace(spread, covariances=(spread.covariances[methods.index(OM)],))
     for place, k in enumerate(own):
         among = [causes[j] for j in own[: place + 1]]
-        if not all(
-            is_of_the_forces(one)
-            or one.effect.on_its_segment
-            or isinstance(one.effect, (SegmentInertia, Turned))
+        another_motion = [
+            one
             for one in among
-        ):
+            if not (is_of_the_forces(one) or one.effect.on_its_segment)
+            and not isinstance(one.effect, (SegmentInertia, Turned))
+        ]
+        if another_motion:
             unit.warn(
                 f"{unit.name}: no joint moments of {method_of(among)}: what moves joints or "
                 "markers would need another motion"
             )
             return
-        ground = trial.ground(_corrected(trial, scene, among))
-        q, on_feet = in_true_axes(trial.q, ground.on_feet, among)
-        touched = besides(replace(scene, q=q), on_feet, among)
+        feet, on_feet = trial.ground(_corrected(trial, scene, among))
+        q, upright = in_true_axes(trial.q, on_feet, among)
+        touched = besides(replace(scene, q=q), upright, among)
         body = phi[:, names.index(method_of(causes[: k + 1]))] + known
         loads = replace(trial, q=q).loads(body[:, None], touched, of_om)
-        reasons = _reasons(unit, trial, ground.feet)
+        reasons = _reasons(unit, trial, feet)
         reasons[_SHARED] = np.tile(sharing(person, among), (len(trial.q), 1))
         if reasons[_SHARED].any():
             unit.warn(f"{unit.name}: {method_of(among)}: joint moments are left out: {_SHARED}")
@@ -361,14 +351,11 @@ def in_true_axes(
         back = turn.as_matrix().T  # Rotation.apply refuses tables of a file, which are read-only
         q = np.hstack([q[:, :3] @ back, base, q[:, 7:]])
         if isinstance(cause.effect, GravityTilt):
-            on_feet = {
-                foot: Ground(
-                    np.hstack([x @ back for x in np.hsplit(one.wrench, 2)]),
-                    one.noise,
-                    one.noise_at_m @ back,
-                )
-                for foot, one in on_feet.items()
-            }
+            turned = {}
+            for foot, one in on_feet.items():
+                wrench = np.hstack([x @ back for x in np.hsplit(one.wrench, 2)])
+                turned[foot] = Ground(wrench, one.noise, one.noise_at_m @ back)
+            on_feet = turned
     return q, on_feet
 
 
@@ -417,15 +404,9 @@ def _table(
         for sd, of_motion in zip((loads.force_sd_N, loads.moment_sd_Nm), noise, strict=True)
     )
     rate = loads.rate_rad_s[..., None]
-    numbers = {
-        "force_N": force,
-        "force_sd_N": force_sd,
-        "moment_Nm": moment,
-        "moment_sd_Nm": moment_sd,
-        "power_W": moment * rate,
-        "power_sd_W": moment_sd * np.abs(rate),
-        "valid": ok,
-    }
+    numbers = {"force_N": force, "force_sd_N": force_sd, "moment_Nm": moment}
+    numbers |= {"moment_sd_Nm": moment_sd, "power_W": moment * rate}
+    numbers |= {"power_sd_W": moment_sd * np.abs(rate), "valid": ok}
     keys = [(m, joint, axis) for m in methods for joint in loads.joints for axis in axes_of(joint)]
     words = {
         name: pd.Categorical(each, list(dict.fromkeys(each))).repeat(len(trial.times_s))
@@ -476,19 +457,16 @@ def peaks_of(moments: pd.DataFrame, mass_kg: float, left_out: Mapping[str, str])
             change = change[np.isfinite(change)]
             alike = [n for n, key in enumerate(keys) if key[:2] == (other, joint)]
             largest = np.abs(peak[alike]).max(initial=0.0, where=np.isfinite(peak[alike]))
-        most = change[np.abs(change).argmax()] if len(change) else np.nan
-        rows.append(
-            {"method": method, "joint": joint, "axis": axis}
-            | {"peak_Nm": peak[k], "peak_sd_Nm": sd[k], "peak_Nm_kg": peak[k] / mass_kg}
-            | {"peak_at_s": time_s[k], "frames": int(known[k].sum()), "compared_with": other}
-            | {
-                "change_Nm": most,
-                "change_rms_Nm": np.sqrt((change**2).mean()) if len(change) else np.nan,
-            }
-            | {"change_percent": 100 * abs(most) / largest if len(change) else np.nan}
-            | {"left_out": left_out[joint]}
-        )
-    return pd.DataFrame(rows)
+        row = {"method": method, "joint": joint, "axis": axis, "left_out": left_out[joint]}
+        row |= {"peak_Nm": peak[k], "peak_sd_Nm": sd[k], "peak_Nm_kg": peak[k] / mass_kg}
+        row |= {"peak_at_s": time_s[k], "frames": int(known[k].sum()), "compared_with": other}
+        row |= dict.fromkeys(("change_Nm", "change_rms_Nm", "change_percent"), np.nan)
+        if len(change):
+            most = change[np.abs(change).argmax()]
+            row |= {"change_Nm": most, "change_rms_Nm": np.sqrt((change**2).mean())}
+            row["change_percent"] = 100 * abs(most) / largest
+        rows.append(row)
+    return table_of("joint-peaks", rows)
 
 
 def _compared_with(method: str, methods: list[str]) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,12 +12,7 @@ import pandas as pd
 from bsip_cli.diagnosis.fault_model import FaultTrial
 from bsip_cli.diagnosis.findings import Finding, Number, interval_words
 from bsip_cli.diagnosis.laboratory import Pooled
-from bsip_cli.diagnosis.shared_faults import (
-    OF_A_LABORATORY,
-    Coordinate,
-    Information,
-    with_known,
-)
+from bsip_cli.diagnosis.shared_faults import OF_A_LABORATORY, Coordinate, Information, with_known
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.effect import Parameter
 from bsip_cli.running.unit import Unit
@@ -43,19 +37,23 @@ class Known:
 
     def findings(self, trials: Sequence[FaultTrial]) -> Iterator[Finding]:
         """What the laboratory was found to have, in the trials on whose plates it is."""
-        for cause in self._named():
-            held = [one for one in trials if cause.target in cause.effect.targets(one.scene)]
+        named = self.rows[self.rows["verdict"] == "named"]
+        for (name, target), rows in named.groupby(["effect", "target"], sort=False):
+            effect, first = EFFECTS[str(name)], rows.iloc[0]
+            held = [one for one in trials if target in effect.targets(one.scene)]
             if held:
-                words = cause.effect.sentence(held[0].scene, cause.target, cause.values)
-                known = f"; this is known from the laboratory ({cause.persons} persons)"
+                columns = ["parameter", "unit", "estimate", "ci_low", "ci_high"]
+                numbers = tuple(Number(*one) for one in rows[columns].itertuples(index=False))
+                words = effect.sentence(held[0].scene, str(target), rows["estimate"].to_numpy())
+                known = f"; this is known from the laboratory ({int(first['persons'])} persons)"
                 yield Finding(
-                    cause.effect.name,
-                    cause.target,
+                    effect.name,
+                    str(target),
                     tuple(one.name for one in held),
-                    cause.numbers,
-                    words + interval_words(cause.numbers) + known,
-                    1 - cause.probability,
-                    cause.probability,
+                    numbers,
+                    words + interval_words(numbers) + known,
+                    1 - float(first["probability"]),
+                    float(first["probability"]),
                     scope="laboratory",
                 )
 
@@ -80,24 +78,6 @@ class Known:
         smaller = np.fmin(own["limit"].to_numpy(), theirs.reindex(both).to_numpy())
         together = own["trials"].str.count(",")
         return own.assign(limit=np.where(together == together.max(), smaller, own["limit"]))
-
-    def _named(self) -> Iterator[_Cause]:
-        named = self.rows[self.rows["verdict"] == "named"]
-        for (effect, target), rows in named.groupby(["effect", "target"], sort=False):
-            yield _Cause(str(effect), str(target), rows.to_dict("records"))
-
-
-class _Cause:
-    """A fault that the laboratory was found to have."""
-
-    def __init__(self, effect: str, target: str, rows: Sequence[dict[Any, Any]]) -> None:
-        self.effect, self.target = EFFECTS[effect], target
-        self.values = np.array([one["estimate"] for one in rows])
-        self.numbers = tuple(
-            Number(x["parameter"], x["unit"], x["estimate"], x["ci_low"], x["ci_high"])
-            for x in rows
-        )
-        self.persons, self.probability = int(rows[0]["persons"]), float(rows[0]["probability"])
 
 
 def known_laboratory(unit: Unit) -> Known | None:
@@ -163,11 +143,7 @@ def pooled_in(rows: pd.DataFrame) -> Pooled:
 def pooled_rows(laboratory: str, pooled: Pooled) -> Iterable[dict]:
     """Of ``laboratory-sums``, one for each number of a fault."""
     for k, one in enumerate(pooled.coordinates):
-        yield {
-            "laboratory": laboratory,
-            **vars(one),
-            "spread": pooled.spread[k],
-            "pull": pooled.pull[k],
-            **{f"precision_{j}": x for j, x in enumerate(pooled.precision[k])},
-            **{f"root_{j}": x for j, x in enumerate(pooled.root[k])},
-        }
+        known = {"spread": pooled.spread[k], "pull": pooled.pull[k]}
+        for name, row in (("precision", pooled.precision[k]), ("root", pooled.root[k])):
+            known |= {f"{name}_{j}": x for j, x in enumerate(row)}
+        yield {"laboratory": laboratory, **vars(one), **known}

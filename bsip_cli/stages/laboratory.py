@@ -70,10 +70,8 @@ def run(unit: Unit) -> None:
         rows += _rows(unit, str(number), sessions, lab)
         sums += pooled_rows(str(number), lab.pooled())
     if len(laboratories) > 1:
-        counts = ", ".join(
-            f"{len({s.person for s in one})} in laboratory {k}"
-            for k, one in enumerate(laboratories, start=1)
-        )
+        people = [len({session.person for session in one}) for one in laboratories]
+        counts = ", ".join(f"{n} in laboratory {k}" for k, n in enumerate(people, start=1))
         unit.warn(
             f"the recordings are of {len(laboratories)} laboratories, by the places of their "
             f"plates: persons {counts}; each is judged by itself"
@@ -149,11 +147,11 @@ def _laboratories(sessions: Sequence[_Session]) -> list[list[_Session]]:
     """Sessions whose plates have the same names and places, the most first."""
     found: list[list[_Session]] = []
     for one in sessions:
-        mine = next((lab for lab in found if _alike(lab[0].plates, one.plates)), None)
-        if mine is None:
-            found.append([one])
+        mine = [lab for lab in found if _alike(lab[0].plates, one.plates)]
+        if mine:
+            mine[0].append(one)
         else:
-            mine.append(one)
+            found.append([one])
     return sorted(found, key=len, reverse=True)
 
 
@@ -211,21 +209,12 @@ def _rows_of(
     found: Verdict | Deviation, counts: tuple[int, int], cells: Mapping[str, str]
 ) -> Iterator[dict]:
     """One for each number of a cause; counts : persons and trials that tell of it."""
-    for size in found.sizes:
-        yield _row(
-            (found.cause.effect, found.cause.target, size.parameter.name),
-            estimate=size.value,
-            unit=size.parameter.unit,
-            ci_low=size.low,
-            ci_high=size.high,
-            limit=size.limit,
-            probability=found.probability,
-            verdict=found.said,
-            class_id=found.class_id,
-            persons=counts[0],
-            trials=counts[1],
-            **cells,
-        )
+    of_all = {"probability": found.probability, "verdict": found.said, "class_id": found.class_id}
+    of_all |= {"persons": counts[0], "trials": counts[1], **cells}
+    for x in found.sizes:
+        size = {"estimate": x.value, "unit": x.parameter.unit, "ci_low": x.low, "ci_high": x.high}
+        key = found.cause.effect, found.cause.target, x.parameter.name
+        yield _row(key, limit=x.limit, **size, **of_all)
 
 
 def _row(key: tuple[str, str, str], **cells: object) -> dict:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pandas as pd
 
@@ -12,13 +10,7 @@ from bsip_cli.diagnosis.shared_faults import Information, SharedTrial, informati
 from bsip_cli.effects.scene import Scene
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
-from bsip_cli.stages.diagnosed_trials import (
-    STATIC,
-    diagnosed,
-    is_weighed,
-    prior_of_shares,
-    stated_sd,
-)
+from bsip_cli.stages.diagnosed_trials import STATIC, diagnosed, is_weighed, prior_of, stated_sd
 from bsip_cli.stages.frames import person_of
 from bsip_cli.stages.trial_scene import scene_of
 from bsip_cli.study.study import Trial
@@ -29,7 +21,7 @@ _LEAST_SAMPLES = 3  # of the residual, by which an autoregression is defined: 0.
 def run(unit: Unit) -> None:
     """Read motion, wrench, person and RM of all trials; write the information of each session."""
     person = person_of(unit)
-    prior = prior_of_shares(unit, person)
+    prior = prior_of(unit, person, whatever_mass=True)
     seen: dict[str, list[tuple[Trial, Scene]]] = {}
     for trial in unit.trials("kinematics", "wrench"):
         scene = scene_of(unit, person, prior.phi, trial)
@@ -42,12 +34,15 @@ def run(unit: Unit) -> None:
         found = [diagnosed(unit, prior, *one, _LEAST_SAMPLES) for one in mine]
         told = [one for one in found if one is not None and one.held is None]
         if any(one.moves for one in told):
+            scenes = [one.scene for one in told if one.moves]
+            moments = np.concatenate([one.times_s[one.valid] - one.times_s[0] for one in scenes])
             trials = [SharedTrial(x.errors, slow(x.scene), not x.moves) for x in told]
             rows += _rows(session, information_of(trials))
             sessions[session] = {
                 "plates": {p.name: p.corners_m.tolist() for _, s in mine for p in s.plates},
                 "trials": [one.trial.stem for one in told],
-                "moments_s": _moments([one.scene for one in told if one.moves]),
+                # mean and standard deviation of those that tell of the clock, from each start
+                "moments_s": [float(moments.mean()), float(moments.std())],
             }
     if not sessions:
         unit.warn(
@@ -73,11 +68,3 @@ def _rows(session: str, told: Information) -> list[dict]:
         }
         for k, (one, parameter, trials) in enumerate(numbers)
     ]
-
-
-def _moments(scenes: Sequence[Scene]) -> list[float]:
-    """Mean of the moments, from the start of each trial, at which they tell of the clock, and their
-    standard deviation."""
-    times = [one.times_s[one.valid] - one.times_s[0] for one in scenes]
-    whole = np.concatenate(times)
-    return [float(whole.mean()), float(whole.std())]

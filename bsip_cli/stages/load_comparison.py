@@ -43,7 +43,14 @@ def compared(unit: Unit, loads_off: Unit, sets: tuple[Sequence[Trial], Sequence[
     declared = load_phi(unit, person, sets[0][0]) - load_phi(unit, person, sets[1][0])
     bodies = [k for k, own in enumerate(declared.reshape(-1, 10)) if own.any()]
     loaded = [skeleton.bodies[k] for k in bodies]
-    _check_seen(unit, person, loaded)
+    unseen = [i for i in loaded if person.without_data()[i]]
+    if unseen:
+        raise BadDataError(
+            f"a load lies on {_names(person, unseen)}, whose motion no markers show",
+            file=unit.name,
+            expected="a load on a segment with markers",
+            remedy="record with markers there, or put the load on another segment",
+        )
     prior = prior_from(unit, unit.read("regression"), person)
     heavy, plain = (_problem(loads_off, person, prior, trials) for trials in sets)
     estimator = unit.config.identify.estimators[0]
@@ -63,26 +70,10 @@ def compared(unit: Unit, loads_off: Unit, sets: tuple[Sequence[Trial], Sequence[
         both = _Block(LOADED, own.phi, own.covariance, declared[part], declared[part])
         names = [skeleton.segments[i] for i in loaded]
         rows += [*both.rows(names), *both.centres(names, person.origin_in_joint_m[loaded])]
-    unit.write(
-        "load-comparison",
-        pd.DataFrame(rows, columns=column_names("load-comparison")),
-        facts={
-            name: [trial.stem for trial in trials]
-            for name, trials in zip(("with", "without"), sets, strict=True)
-        }
-        | {"estimator": estimator},
-    )
-
-
-def _check_seen(unit: Unit, person: Person, loaded: Sequence[int]) -> None:
-    unseen = [i for i in loaded if person.without_data()[i]]
-    if unseen:
-        raise BadDataError(
-            f"a load lies on {_names(person, unseen)}, whose motion no markers show",
-            file=unit.name,
-            expected="a load on a segment with markers",
-            remedy="record with markers there, or put the load on another segment",
-        )
+    stems = ([trial.stem for trial in trials] for trials in sets)
+    facts: dict = dict(zip(("with", "without"), stems, strict=True)) | {"estimator": estimator}
+    table = pd.DataFrame(rows, columns=column_names("load-comparison"))
+    unit.write("load-comparison", table, facts)
 
 
 def _names(person: Person, segments: Sequence[int]) -> str:

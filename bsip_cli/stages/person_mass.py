@@ -12,9 +12,7 @@ from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import load_words
 from bsip_cli.study.study import Trial
 
-UNKNOWN = "unknown"
-PLATES = "plates"
-TABLE = "participants.tsv"
+UNKNOWN, PLATES, TABLE = "unknown", "plates", "participants.tsv"
 VAGUE_PERCENT = 50.0  # half of an interval that still shows pounds to be no kilograms
 
 
@@ -57,15 +55,9 @@ def compared(
     assert unit.participant is not None
     if stated is None or not told.is_known:
         return None
-    options = unit.config.ingest
-    return Comparison(
-        stated.mass_kg,
-        load_kg,
-        told,
-        options.mass_tolerance_percent,
-        options.mass_gross_percent,
-        height_m or unit.participant.height_m,
-    )
+    options, height_m = unit.config.ingest, height_m or unit.participant.height_m
+    limits = options.mass_tolerance_percent, options.mass_gross_percent
+    return Comparison(stated.mass_kg, load_kg, told, *limits, height_m)
 
 
 def person_mass(unit: Unit, trials: list[Trial], height_m: float) -> PersonMass:

@@ -45,14 +45,9 @@ def run(unit: Unit) -> None:
         unit.warn(
             f"{unit.name}: no interval in which every contact is on a plate; nothing to judge"
         )
-    raw = _wrenches(unit, person, kinematics, measured)
-    wrenches = {name: judgement.filtered(wrench) for name, wrench in raw.items()}
-    signals = {name: judgement.signals(wrench) for name, wrench in wrenches.items()}
-    unit.write(
-        "reconstruction",
-        reconstruction_rows(judgement, wrenches, signals),
-        facts={"loads": loads_record(unit)},
-    )
+    wrenches, signals = judgement.compared(_wrenches(unit, person, kinematics, measured))
+    rows = reconstruction_rows(judgement, wrenches, signals)
+    unit.write("reconstruction", rows, facts={"loads": loads_record(unit)})
     compared = over_the_same_frames(signals)
     unit.write("fit", fit_rows(judgement, compared))
     unit.write("correlation-difference", _correlations(compared, judgement.judged))
@@ -103,19 +98,17 @@ class Judgement:
     body_weight_N: float
     min_force_N: float
 
-    def filtered(self, wrench: np.ndarray) -> np.ndarray:
-        """(N, 6) low-passed inside the valid stretches, as it was outside."""
-        smooth = wrench.copy()
-        smooth[self.frames] = self.operator @ np.nan_to_num(wrench)
-        return smooth
-
-    def signals(self, wrench: np.ndarray) -> dict[str, np.ndarray]:
-        """All judged components (N,) of a wrench [N, N m, m]."""
-        signals = dict(zip(_COMPONENTS, wrench.T, strict=True))
-        cop = centre_of_pressure(wrench, self.surface_height_m, self.min_force_N)
-        signals["cop_ap"], signals["cop_ml"] = anterior_and_right(cop, self.anterior)
-        signals["grf_vertical"] = signals["fz"]
-        return signals
+    def compared(self, wrenches: Wrenches) -> tuple[Wrenches, Signals]:
+        """Low-passed inside the valid stretches, as they were outside; all judged components."""
+        smooth, signals = {}, {}
+        for name, wrench in wrenches.items():
+            smooth[name] = wrench.copy()
+            smooth[name][self.frames] = self.operator @ np.nan_to_num(wrench)
+            one = signals[name] = dict(zip(_COMPONENTS, smooth[name].T, strict=True))
+            cop = centre_of_pressure(smooth[name], self.surface_height_m, self.min_force_N)
+            one["cop_ap"], one["cop_ml"] = anterior_and_right(cop, self.anterior)
+            one["grf_vertical"] = one["fz"]
+        return smooth, signals
 
 
 def over_the_same_frames(signals: Signals) -> Signals:
@@ -139,23 +132,16 @@ def judgement_of(unit: Unit, kinematics: pd.DataFrame, measured: pd.DataFrame) -
     times = kinematics["time_s"].to_numpy()
     valid = measured["valid"].to_numpy() & kinematics["determined"].to_numpy()
     used = _used(unit, times)
-    judged, data = _judged(valid, used, times)
+    judged, data = valid & ~used, "held_out"
+    if used.any() and judged.sum() * float(np.median(np.diff(times))) < _SHORTEST_HELD_OUT_S:
+        judged, data = valid, "identification"  # nothing else is left to judge by
     rate = 1.0 / float(np.median(np.diff(times)))
-    operator, frames = lowpass_operator(valid, rate, options.cutoff_hz)
+    frames = (times, valid, used, judged, data, *lowpass_operator(valid, rate, options.cutoff_hz))
     weight, corners = facts["mass_kg"] * GRAVITY_M_S2, unit.read("plates")["z_m"].to_numpy()
-    return Judgement(
-        times,
-        valid,
-        used,
-        judged,
-        data,
-        operator,
-        frames,
-        float(corners.mean()) if len(corners) else 0.0,  # the floor where no outline is known
-        facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float),
-        weight,
-        options.cop_min_force_percent_bw / 100 * weight,
-    )
+    height_m = float(corners.mean()) if len(corners) else 0.0  # the floor: no outline is known
+    anterior = facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
+    least_N = options.cop_min_force_percent_bw / 100 * weight
+    return Judgement(*frames, height_m, anterior, weight, least_N)
 
 
 def parameters_of(bsip: pd.DataFrame, person: Person) -> tuple[list[str], np.ndarray]:
@@ -179,14 +165,6 @@ def _used(unit: Unit, times: np.ndarray) -> np.ndarray:
     for row in blocks[blocks["trial"] == unit.trial.stem].itertuples():
         used |= (times >= row.start_s) & (times <= row.end_s)
     return used
-
-
-def _judged(valid: np.ndarray, used: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, str]:
-    """Frames to judge by: those not used to identify, or all where none are left."""
-    fresh = valid & ~used
-    if used.any() and fresh.sum() * float(np.median(np.diff(times))) < _SHORTEST_HELD_OUT_S:
-        return valid, "identification"
-    return fresh, "held_out"
 
 
 # --- tables ---------------------------------------------------------------------------------
@@ -245,23 +223,10 @@ def _correlations(signals: Signals, judged: np.ndarray) -> list[dict]:
             x, y, z = (signals[name][component] for name in (MEASURED, a, b))
             r_a, r_b, r_ab = (correlation(p, q, spans) for p, q in ((x, y), (x, z), (y, z)))
             n = min(effective_samples_of_pair(x, y, spans), effective_samples_of_pair(x, z, spans))
-            williams = williams_t(r_a, r_b, r_ab, n)
-            fisher = fisher_z_difference(r_a, n, r_b, n)
-            rows.append(
-                {
-                    "component": component,
-                    "method_a": a,
-                    "method_b": b,
-                    "r_a": r_a,
-                    "r_b": r_b,
-                    "r_ab": r_ab,
-                    "n_effective": n,
-                    "williams_t": williams.statistic,
-                    "df": williams.df1,
-                    "williams_p": williams.p_value,
-                    "fisher_z": fisher.statistic,
-                    "fisher_p": fisher.p_value,
-                    "reason": williams.reason,
-                }
-            )
+            known: dict = {"component": component, "method_a": a, "method_b": b}
+            known |= {"r_a": r_a, "r_b": r_b, "r_ab": r_ab, "n_effective": n}
+            one, other = williams_t(r_a, r_b, r_ab, n), fisher_z_difference(r_a, n, r_b, n)
+            known |= {"williams_t": one.statistic, "df": one.df1, "williams_p": one.p_value}
+            known |= {"fisher_z": other.statistic, "fisher_p": other.p_value}
+            rows.append(known | {"reason": one.reason})
     return rows

@@ -14,39 +14,21 @@ from pathlib import Path
 
 import pandas as pd
 
-from bsip_cli.artifacts import (
-    file_rows,
-    is_made_from,
-    read_artifact,
-    read_header,
-    write_bytes,
-)
+from bsip_cli.artifacts import file_rows, is_made_from, read_artifact, read_header, write_bytes
 from bsip_cli.report.blocks import Document, Grid, Picture
 from bsip_cli.report.first_page import light_for
 from bsip_cli.report.page import FILES, render
 from bsip_cli.report.participant.document import participant_document
-from bsip_cli.report.records import (
-    Origin,
-    ParticipantRecord,
-    Refusal,
-    TrialRecord,
-    with_all_causes,
-)
+from bsip_cli.report.records import Origin, ParticipantRecord, Refusal, TrialRecord, with_all_causes
 from bsip_cli.report.words import ROLES, trial_label
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import SCHEMAS
 from bsip_cli.stages.frames import load_words, person_of
 from bsip_cli.study.study import Participant, Trial
 
-_TABLES = {  # field of a trial's record: kind of artifact
-    "quality": "quality",
-    "kinematics": "kinematics",
-    "residuals": "marker-residuals",
-    "marker_events": "marker-events",
-    "reconstruction": "reconstruction",
-    "fit": "fit",
-    "joint_moments": "joint-moments",
-    "joint_peaks": "joint-peaks",
+_KINDS = ("quality", "kinematics", "marker-events", "reconstruction", "fit", "joint-moments")
+_TABLES = {"residuals": "marker-residuals"} | {  # field of a trial's record: kind of artifact
+    kind.replace("-", "_"): kind for kind in (*_KINDS, "joint-peaks")
 }
 _DIGITS = "%.6g"  # of a number in a CSV file
 _FOUND = {  # field of a participant's record: kind that is there only if its stage has run

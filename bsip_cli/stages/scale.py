@@ -46,15 +46,10 @@ def run(unit: Unit) -> None:
     _, quiet = _unrest(still)
     marker_set = _marker_set(unit, still.trial)
     assert unit.participant is not None
-    height_m = _height_m(unit, recorded)
-    calibration = calibrate(
-        skeleton,
-        marker_set,
-        _mean_positions(still, quiet),
-        unit.participant.sex,
-        height_m,
-        [dict(zip(one.labels, one.positions.swapaxes(0, 1), strict=True)) for one in recorded],
-    )
+    sex, height_m = unit.participant.sex, _height_m(unit, recorded)
+    tracks = [dict(zip(x.labels, x.positions.swapaxes(0, 1), strict=True)) for x in recorded]
+    standing = _mean_positions(still, quiet)
+    calibration = calibrate(skeleton, marker_set, standing, sex, height_m, tracks)
     _require_markers(unit, marker_set, calibration.person)
     mass = person_mass(unit, [one.trial for one in recorded], calibration.stature_m)
     if unit.config.marker_set == "auto":
@@ -63,30 +58,18 @@ def run(unit: Unit) -> None:
     for note in calibration.notes:
         unit.warn(f"{unit.name}: {note}")
     fit = _refine(unit, calibration, recorded, still, quiet)
-    _doubt(
-        unit, doubts_about(fit.person, fit.poses.q, unit.participant.sex, height_m, mass.mass_kg)
-    )
+    kg = mass.mass_kg
+    _doubt(unit, doubts_about(fit.person, fit.poses.q, sex, height_m, kg))
     _warn_missing(unit, marker_set, fit.person)
     unit.write("skeleton", _skeleton_table(skeleton, calibration, fit))
     unit.write("marker-positions", _marker_table(skeleton, calibration, fit))
-    unit.write(
-        "person",
-        [
-            {
-                "sex": unit.participant.sex,
-                "mass_kg": mass.mass_kg,
-                "mass_source": mass.source,
-                "plate_mass_kg": mass.plate_kg,
-                "mass_note": mass.note,
-                "height_m": calibration.stature_m,
-                "anterior_x": calibration.anterior[0],
-                "anterior_y": calibration.anterior[1],
-                "calibration_trial": still.trial.stem,
-                "marker_rms_m": fit.poses.rms_m(),
-            }
-        ],
-        facts={"marker_set": marker_set.name, "rms_before_m": fit.rms_before_m},
-    )
+    ahead = calibration.anterior
+    row = {"sex": sex, "mass_kg": kg, "mass_source": mass.source, "plate_mass_kg": mass.plate_kg}
+    row |= {"mass_note": mass.note, "height_m": calibration.stature_m}
+    row |= {"anterior_x": ahead[0], "anterior_y": ahead[1]}
+    row |= {"calibration_trial": still.trial.stem, "marker_rms_m": fit.poses.rms_m()}
+    facts = {"marker_set": marker_set.name, "rms_before_m": fit.rms_before_m}
+    unit.write("person", [row], facts)
 
 
 def _height_m(unit: Unit, recorded: list[_Recorded]) -> float | None:
@@ -122,17 +105,13 @@ def _require_markers(unit: Unit, marker_set: MarkerSet, person: Person) -> None:
     lost = [name for name in held if without_side(name) not in allowed]
     if not lost:
         return
-    serve = [f"{_would_do(marker_set, name) or 'some'} on the {in_words(name)}" for name in lost]
+    serve = [f"{marker_set.on(name) or 'some'} on the {in_words(name)}" for name in lost]
     raise BadDataError(
         f"no markers on the {', '.join(map(in_words, lost))}",
         expected="; ".join(serve),
         remedy="record these, or let the segment be held at the neutral pose: study.toml [scale] "
         f"may_be_held = {json.dumps([*allowed, *dict.fromkeys(map(without_side, lost))])}",
     )
-
-
-def _would_do(marker_set: MarkerSet, segment: str) -> str:
-    return ", ".join(m.label for m in marker_set.markers if m.segment == segment)
 
 
 def _marker_set(unit: Unit, trial: Trial) -> MarkerSet:
@@ -199,12 +178,9 @@ def _unrest(one: _Recorded) -> tuple[float, slice]:
 
 def _mean_positions(one: _Recorded, frames: slice) -> dict[str, np.ndarray]:
     """Label to mean position over the frames in which the marker is visible."""
-    positions = one.positions[frames]
-    return {
-        label: positions[np.isfinite(positions[:, k, 0]), k].mean(axis=0)
-        for k, label in enumerate(one.labels)
-        if np.isfinite(positions[:, k, 0]).any()
-    }
+    tracks = zip(one.labels, one.positions[frames].swapaxes(0, 1), strict=True)
+    seen = {label: track[np.isfinite(track[:, 0])] for label, track in tracks}
+    return {label: places.mean(axis=0) for label, places in seen.items() if len(places)}
 
 
 # --- the fit ----------------------------------------------------------------------------------
@@ -222,15 +198,10 @@ def _refine(
     (number,) = (k for k, one in enumerate(recorded) if one is still)
     middle = (quiet.start + quiet.stop) // 2
     options = unit.config.scale
-    return refine_over_trials(
-        calibration,
-        in_order(still, slice(middle, middle + 1)),
-        number,
-        map(in_order, recorded),
-        options.frames,
-        ScalingOptions(**options.model_dump(exclude={"frames", "may_be_held"})),
-        unit.config.ik.model_dump(exclude={"undetermined_sd_rad", "held_sd_rad"}),
-    )
+    standing, trials = in_order(still, slice(middle, middle + 1)), map(in_order, recorded)
+    how = ScalingOptions(**options.model_dump(exclude={"frames", "may_be_held"}))
+    ik = unit.config.ik.model_dump(exclude={"undetermined_sd_rad", "held_sd_rad"})
+    return refine_over_trials(calibration, standing, number, trials, options.frames, how, ik)
 
 
 # --- what is written --------------------------------------------------------------------------
@@ -240,7 +211,7 @@ def _warn_missing(unit: Unit, marker_set: MarkerSet, person: Person) -> None:
     skeleton = person.skeleton
     for i in np.flatnonzero(person.held):
         segment, parent = skeleton.segments[i], skeleton.segments[skeleton.parents[i]]
-        known = _would_do(marker_set, segment)
+        known = marker_set.on(segment)
         serve = f"; {known} would do" if known else ""
         unit.warn(
             f"{unit.name}: no markers on the {in_words(segment)}: its joint is held at the neutral "
@@ -252,23 +223,14 @@ def _skeleton_table(skeleton: Skeleton, calibration: Calibration, fit: Refinemen
     first, person = calibration.person, fit.person
     parents = [skeleton.segments[i] if i >= 0 else "" for i in skeleton.parents]
     moved = person.joint_positions_m() - first.joint_positions_m()
-    table = {
-        "segment": list(skeleton.segments),
-        "parent": parents,
-        "joint": list(skeleton.joints),
-        "joint_type": list(skeleton.joint_types),
-    }
+    table: dict = {"segment": list(skeleton.segments), "parent": parents}
+    table |= {"joint": list(skeleton.joints), "joint_type": list(skeleton.joint_types)}
     for name, values in (("joint", person.joint_in_parent_m), ("origin", person.origin_in_joint_m)):
         table |= {f"{name}_{axis}_m": values[:, k] for k, axis in enumerate("xyz")}
-    table |= {
-        "parent_tilt_rad": person.parent_tilt_rad,
-        "child_tilt_rad": person.child_tilt_rad,
-        "length_m": person.lengths_m,
-        "first_guess_m": first.lengths_m,
-        "length_sd_m": fit.length_sd_m,
-        "joint_shift_m": np.linalg.norm(moved, axis=1),
-        "held": person.held,
-    }
+    table |= {name: getattr(person, name) for name in ("parent_tilt_rad", "child_tilt_rad")}
+    table |= {"length_m": person.lengths_m, "first_guess_m": first.lengths_m}
+    table |= {"length_sd_m": fit.length_sd_m, "joint_shift_m": np.linalg.norm(moved, axis=1)}
+    table |= {"held": person.held}
     return pd.DataFrame(table)
 
 
@@ -278,16 +240,8 @@ def _marker_table(skeleton: Skeleton, calibration: Calibration, fit: Refinement)
     seen = np.isfinite(fit.poses.residual_m)
     squares = np.where(seen, fit.poses.residual_m, 0.0) ** 2
     rms = np.sqrt(squares.sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
-    positions = person.marker_positions_m
-    return pd.DataFrame(
-        {
-            "marker": list(person.markers),
-            "segment": [skeleton.segments[i] for i in person.marker_segments],
-            "x_m": positions[:, 0],
-            "y_m": positions[:, 1],
-            "z_m": positions[:, 2],
-            "weight": person.marker_weights,
-            "shift_m": np.linalg.norm(moved, axis=1),
-            "residual_m": np.where(seen.any(axis=0), rms, np.nan),
-        }
-    )
+    segments = [skeleton.segments[i] for i in person.marker_segments]
+    table = pd.DataFrame({"marker": list(person.markers), "segment": segments})
+    table[["x_m", "y_m", "z_m"]] = person.marker_positions_m
+    table["weight"], table["shift_m"] = person.marker_weights, np.linalg.norm(moved, axis=1)
+    return table.assign(residual_m=np.where(seen.any(axis=0), rms, np.nan))

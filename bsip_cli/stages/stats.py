@@ -45,15 +45,9 @@ COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 MEASURES = ("rmse", "pearson_r", "schwer_m", "schwer_p", "schwer_c")
 """Columns of ``fit`` in table 5."""
 
-SWAY = {
-    "mean_velocity": ("mean_velocity_mm_s", "mm/s"),
-    "sway_length": ("sway_length_mm", "mm"),
-    "ellipse_area": ("ellipse_area_mm2", "mm2"),
-    "rms_ap": ("rms_ap_mm", "mm"),
-    "rms_ml": ("rms_ml_mm", "mm"),
-    "rms_ap_origin": ("rms_ap_origin_m", "m"),
-    "rms_ml_origin": ("rms_ml_origin_m", "m"),
-}
+SWAY = {"mean_velocity": "mm/s", "sway_length": "mm", "ellipse_area": "mm2"}
+SWAY |= {"rms_ap": "mm", "rms_ml": "mm", "rms_ap_origin": "m", "rms_ml_origin": "m"}
+"""Units of what of ``posturography`` is in table 3."""
 
 
 def run(unit: Unit) -> None:
@@ -67,7 +61,7 @@ class _Cohort:
 
     def __init__(self, unit: Unit) -> None:
         self._unit = unit
-        self._missing = _Missing(unit)
+        self._missing: list[dict[str, str | list[str]]] = []
         trials = (trial for person in unit.study.participants for trial in person.trials)
         self._has_sequences = any(trial.role == "sequence" for trial in trials)
         self._lines: dict[Topic, None] = {}
@@ -88,7 +82,7 @@ class _Cohort:
             Nobody has any.
         """
         for name, why in self._unit.left_out.items():
-            self._missing.note(f"{name} is left out, since {why}", 1, 2, 3, 4, 5, 6)
+            self._lacks(f"{name} is left out, since {why}", 1, 2, 3, 4, 5, 6, is_told=True)
         waiting: list[Value] = []
         for participant in self._unit.study.participants:
             waiting += self._values_of(participant)
@@ -109,28 +103,22 @@ class _Cohort:
             {"table": table, "task": task, "role": role, **counts}
             for (table, task, role), counts in self._fitted.items()
         ]
-        return {
-            "missing": self._missing.found,
-            "participants": self._participants,
-            "fitted_on": fitted,
-        }
+        return {"missing": self._missing, "participants": self._participants, "fitted_on": fitted}
 
     def _values_of(self, participant: Participant) -> list[Value]:
         if refused := _refused(self._unit, participant):
-            self._missing.add(f"{participant.id} was refused by {refused}", 1, 2, 3, 4, 5, 6)
+            self._lacks(f"{participant.id} was refused by {refused}", 1, 2, 3, 4, 5, 6)
             return []
         bsip = self._inertias(participant)
         recordings = list(self._recordings(participant))
         if recordings and not any(recording.role == "sequence" for recording in recordings):
-            self._missing.add(f"{participant.id} has no identification trial", 2, 3, 6)
+            self._lacks(f"{participant.id} has no identification trial", 2, 3, 6)
         tests = person_tests("table5", (c for each in recordings for c in correlations(each)))
         self._tests.add(tests)
-        values = [
-            *(masses(participant, bsip) if bsip is not None else ()),
-            *(value for recording in recordings for value in values_of(recording)),
-            *(centres(participant, bsip) if bsip is not None else ()),
-            *(value for test in tests for value in test.values()),
-        ]
+        values = list(masses(participant, bsip)) if bsip is not None else []
+        values += [value for recording in recordings for value in values_of(recording)]
+        values += list(centres(participant, bsip)) if bsip is not None else []
+        values += [value for test in tests for value in test.values()]
         self._participants += bool(values)
         self._lines |= {line_of(value): None for value in values if value.method != PAIR}
         self._count_fitted(values)
@@ -145,15 +133,24 @@ class _Cohort:
             self._fitted[place]["identification"] += "identification" in found
             self._fitted[place]["everyone"] += 1
 
+    def _lacks(self, what: str, *numbers: int, is_told: bool = False) -> None:
+        """`what` ("sub-02 has no ...") is not in the tables with these numbers: the user is told,
+        unless that is done."""
+        *others, last = map(str, numbers)
+        tables = f"tables {', '.join(others)} and {last}" if others else f"table {last}"
+        if not is_told:
+            self._unit.warn(f"{what}: not in {tables}")
+        self._missing.append({"sentence": what, "tables": [f"table{k}" for k in numbers]})
+
     def _inertias(self, participant: Participant) -> pd.DataFrame | None:
         if not self._unit.path("bsip", participant=participant).exists():
-            self._missing.add(f"{participant.id} has no identified parameters", 1, 6)
+            self._lacks(f"{participant.id} has no identified parameters", 1, 6)
             return None
         frame = self._unit.read("bsip", participant=participant)
         lacking = [method for method in (OM, RM) if method not in set(frame["method"])]
         if lacking:
             what = f"{participant.id} has no parameters of {' and '.join(lacking)}"
-            self._missing.add(what, 1, 6)
+            self._lacks(what, 1, 6)
         return frame
 
     def _recordings(self, participant: Participant) -> Iterator[Recording]:
@@ -166,14 +163,12 @@ class _Cohort:
             numbers = IN_SEQUENCE if trial.role == "sequence" else IN_OTHERS
             tables = sorted({number for kind in lacking for number in numbers[kind]})
             if tables:
-                self._missing.add(f"{trial.stem} has no {', no '.join(lacking)}", *tables)
+                self._lacks(f"{trial.stem} has no {', no '.join(lacking)}", *tables)
             if there:
                 frames = {kind: self._unit.read(kind, trial, participant) for kind in there}
-                said = (
-                    {row["data"] for row in _rows(frames["fit"], OM)} if "fit" in there else set()
-                )
-                data = "held_out" if said else ""  # what the trial was to OM
-                data = "identification" if "identification" in said else data
+                said = [row["data"] for row in _rows(frames["fit"], OM)] if "fit" in there else []
+                # what the trial was to OM
+                data = "identification" if "identification" in said else "held_out" * bool(said)
                 stands_in = not self._has_sequences and data == "identification"
                 yield Recording(trial, "sequence" if stands_in else trial.role, data, frames)
 
@@ -194,25 +189,6 @@ class _Cohort:
 
 
 # --- who is there ---------------------------------------------------------------------------
-
-
-class _Missing:
-    """Collects, and tells the user, what is in which tables not."""
-
-    def __init__(self, unit: Unit) -> None:
-        self._unit = unit
-        self.found: list[dict[str, str | list[str]]] = []
-
-    def add(self, what: str, *numbers: int) -> None:
-        """`what` ("sub-02 has no ...") is not in the tables with these numbers."""
-        *others, last = map(str, numbers)
-        tables = f"tables {', '.join(others)} and {last}" if others else f"table {last}"
-        self._unit.warn(f"{what}: not in {tables}")
-        self.note(what, *numbers)
-
-    def note(self, what: str, *numbers: int) -> None:
-        """The same of what the user has been told already."""
-        self.found.append({"sentence": what, "tables": [f"table{k}" for k in numbers]})
 
 
 def _refused(unit: Unit, participant: Participant) -> str:
@@ -279,10 +255,9 @@ def values_of(recording: Recording) -> list[Value]:
             values += _residuals(recording, method, fits)
     if "posturography" in recording.frames and recording.role == "sequence":
         for row in _rows(recording.frames["posturography"], MEASURED, *METHODS):
-            values += [
-                recording.value("table3", variable, row["method"], row[column], unit)
-                for variable, (column, unit) in SWAY.items()
-            ]
+            for name, unit in SWAY.items():
+                value = row[f"{name}_{unit.replace('/', '_')}"]
+                values.append(recording.value("table3", name, row["method"], value, unit))
     return values
 
 

@@ -33,29 +33,20 @@ def run(unit: Unit) -> None:
     options = unit.config.ingest
     limits = GateLimits(**{one.name: getattr(options, one.name) for one in fields(GateLimits)})
     for session in dict.fromkeys(trial.session for trial in unit.participant.trials):
-        seen = [
-            survey
-            for trial in unit.participant.trials
-            if trial.session == session and (survey := _survey(unit, trial)) is not None
-        ]
+        mine = (trial for trial in unit.participant.trials if trial.session == session)
+        seen = [one for one in (_survey(unit, trial) for trial in mine) if one is not None]
         if not seen:
             continue
-        _require_size(unit, seen)
+        heights = [one.height_m for one in seen if one.height_m is not None]
+        if heights and (fault := no_person(max(heights), unit.participant.height_m)):
+            found, expected, remedy = fault
+            raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
         reading = settle_session(seen, limits)
         rows += rows_of(session or "", reading)
         whose = f"{unit.name}, session {session}" if session else unit.name
         for finding in findings_about(reading):
             unit.warn(f"{whose}: {finding.sentence()}")
     unit.write("readings", rows)
-
-
-def _require_size(unit: Unit, seen: list[TrialSamples]) -> None:
-    """The markers are those of somebody as tall as stated, or as people are."""
-    assert unit.participant is not None
-    heights = [one.height_m for one in seen if one.height_m is not None]
-    if heights and (fault := no_person(max(heights), unit.participant.height_m)):
-        found, expected, remedy = fault
-        raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
 
 
 def _survey(unit: Unit, trial: Trial) -> TrialSamples | None:
@@ -133,11 +124,8 @@ def reading_of(table: pd.DataFrame, trial: Trial) -> SessionReading:
         return SessionReading()
     first = rows[0]
     frame = FrameChange(
-        first["moved"],
-        int(first["axis"]),
-        first["turned_deg"],
-        first["turned_sd_deg"],
-        first["unsure_m"],
-        bool(first["corners_only"]),
+        **{name: first[name] for name in ("moved", "turned_deg", "turned_sd_deg", "unsure_m")},
+        axis=int(first["axis"]),
+        corners_only=bool(first["corners_only"]),
     )
     return SessionReading(frame, {row["plate"]: _verdict(row) for row in rows if row["plate"]})

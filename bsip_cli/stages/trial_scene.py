@@ -111,17 +111,10 @@ def _about_load(reading: np.ndarray) -> np.ndarray | None:
 def causes_of(unit: Unit) -> tuple[Cause, ...]:
     """In the order of rank; what is unexplained is no cause that a model could be extended by."""
     found = unit.facts("overall-diagnosis").get("causes", [])
-    return tuple(
-        Cause(
-            EFFECTS[one["effect"]],
-            one["target"],
-            tuple(one["trials"]),
-            np.array(one["values"]),
-            np.array(one["folds"]),
-        )
-        for one in found
-        if one["effect"] in EFFECTS and one["verdict"] in _NAMED
-    )
+    causes = [one for one in found if one["effect"] in EFFECTS and one["verdict"] in _NAMED]
+    keys = [(EFFECTS[one["effect"]], one["target"], tuple(one["trials"])) for one in causes]
+    sizes = [(np.array(one["values"]), np.array(one["folds"])) for one in causes]
+    return tuple(Cause(*key, *both) for key, both in zip(keys, sizes, strict=True))
 
 
 def body_beside(unit: Unit, phi: np.ndarray) -> np.ndarray:

@@ -113,13 +113,8 @@ def t_and_rank_tests(pair: Pair, alpha: float) -> tuple[Comparison, ...]:
         lilliefors_p=normality.p_value,
         reason=test.reason or normality.reason,
     )
-    d_z = TestResult(
-        n=test.n,
-        difference=test.difference,
-        effect_size=d_of_differences(pair.x, pair.y),
-        effect_size_name="d_z",
-        reason=test.reason,
-    )
+    d_z = TestResult(n=test.n, difference=test.difference, reason=test.reason)
+    d_z = d_z.with_(effect_size=d_of_differences(pair.x, pair.y), effect_size_name="d_z")
     ranks = wilcoxon(pair.x, pair.y)
     by_rank = pair.row("wilcoxon", "added", ranks, effect_size_name="rank-biserial")
     return by_t, pair.row("d_z", "added", d_z), by_rank
@@ -159,16 +154,11 @@ def methods_beside_each_other(
     differences = {(i, j): lilliefors_test(table[:, i] - table[:, j]).p_value for i, j in pairs}
     why = joined(*(test.reason for test in of_each))
     normality = [test.p_value for test in of_each]
+    apart, within = one_way_anova(list(table.T), alpha), repeated_measures_anova(table, alpha)
+    of_pairs = list(differences.values())
     cases: tuple[tuple[str, str, Origin, Any, Sequence[float], str], ...] = (
-        ("one_way_anova", "t", "published", one_way_anova(list(table.T), alpha), normality, why),
-        (
-            "repeated_measures_anova",
-            "paired_t",
-            "added",
-            repeated_measures_anova(table, alpha),
-            list(differences.values()),
-            "",
-        ),
+        ("one_way_anova", "t", "published", apart, normality, why),
+        ("repeated_measures_anova", "paired_t", "added", within, of_pairs, ""),
     )
     for name, after, origin, (test, post_hoc), normal, doubt in cases:
         numbers = vars(test) | {
@@ -180,9 +170,8 @@ def methods_beside_each_other(
         for (i, j), p in differences.items():
             numbers = _pair_numbers(table[:, i], table[:, j], post_hoc, (i, j), test.reason)
             pair = methods[i], methods[j]
-            yield Comparison(
-                topic, f"bonferroni_{after}", origin, *pair, **(numbers | {"lilliefors_p": p})
-            )
+            numbers["lilliefors_p"] = p
+            yield Comparison(topic, f"bonferroni_{after}", origin, *pair, **numbers)
 
 
 def _pair_numbers(
@@ -295,19 +284,13 @@ class PersonTest:
     fisher: TestResult
 
     def values(self) -> tuple[Value, ...]:
-        numbers = {
-            "williams_t": self.williams.statistic,
-            "williams_df": self.williams.df1,
-            "williams_p": self.williams.p_value,
-            "fisher_z": self.fisher.statistic,
-            "fisher_p": self.fisher.p_value,
-        }
+        one, other = self.williams, self.fisher
+        numbers = {"williams_t": one.statistic, "williams_df": one.df1, "williams_p": one.p_value}
+        numbers |= {"fisher_z": other.statistic, "fisher_p": other.p_value}
         about, component = self.topic, self.topic.variable.removesuffix("_r")
         place = (self.participant, "", about.task, about.role, "", about.table)
-        return tuple(
-            Value(*place, f"{component}_{name}", PAIR, number, "1")
-            for name, number in numbers.items()
-        )
+        named = ((f"{component}_{name}", number) for name, number in numbers.items())
+        return tuple(Value(*place, name, PAIR, number, "1") for name, number in named)
 
 
 def person_tests(table: str, runs: Iterable[CorrelationRun]) -> tuple[PersonTest, ...]:

@@ -74,16 +74,9 @@ def fit_measures(
     rmse = float(np.sqrt(np.mean((c - m) ** 2)))
     percent = 100.0 * rmse / body_weight_N if body_weight_N else nan
     magnitude, phase = _magnitude_and_phase(m, c)
-    return FitMeasures(
-        rmse=rmse,
-        rmse_percent_bw=percent,
-        pearson_r=_pearson(m, c),
-        schwer_m=magnitude,
-        schwer_p=phase,
-        schwer_c=hypot(magnitude, phase),
-        n=len(m),
-        n_effective=effective_samples_of_pair(measured, computed, parts),
-    )
+    schwer = magnitude, phase, hypot(magnitude, phase)
+    n_effective = effective_samples_of_pair(measured, computed, parts)
+    return FitMeasures(rmse, percent, _pearson(m, c), *schwer, len(m), n_effective)
 
 
 def correlation(x: ArrayLike, y: ArrayLike, stretches: Stretches | None = None) -> float:
@@ -135,10 +128,7 @@ class Posturography:
 
 
 def posturography(
-    cop_ap_m: ArrayLike,
-    cop_ml_m: ArrayLike,
-    rate_hz: float,
-    stretches: Stretches | None = None,
+    cop_ap_m: ArrayLike, cop_ml_m: ArrayLike, rate_hz: float, stretches: Stretches | None = None
 ) -> Posturography:
     """RMS, mean velocity, path length and 95 % ellipse area of a centre of pressure.
 
@@ -168,27 +158,18 @@ def posturography(
     n = path.shape[1]
     if n == 0:
         return Posturography()
-    rms_ap_mm, rms_ml_mm = path.std(axis=1) * MM_PER_M
-    rms_ap_origin_m, rms_ml_origin_m = np.sqrt(np.mean(path**2, axis=1))
+    ap_mm, ml_mm = (path.std(axis=1) * MM_PER_M).tolist()
+    ap_origin_m, ml_origin_m = np.sqrt(np.mean(path**2, axis=1)).tolist()
     length_m = sum(
         float(np.hypot(np.diff(ap[start:stop]), np.diff(ml[start:stop])).sum())
         for start, stop in parts
     )
     duration_s = sum(stop - start - 1 for start, stop in parts) / rate_hz
-    return Posturography(
-        rms_ap_mm=float(rms_ap_mm),
-        rms_ml_mm=float(rms_ml_mm),
-        rms_ap_origin_m=float(rms_ap_origin_m),
-        rms_ml_origin_m=float(rms_ml_origin_m),
-        mean_velocity_mm_s=length_m * MM_PER_M / duration_s if duration_s else nan,
-        sway_length_mm=length_m * MM_PER_M if duration_s else nan,
-        ellipse_area_mm2=_ellipse_area(path * MM_PER_M) if n >= 3 else nan,
-        duration_s=duration_s,
-        n=n,
-    )
-
-
-def _ellipse_area(points: np.ndarray) -> float:
-    """Area of the prediction ellipse of points (2, n), in their unit squared."""
-    determinant = max(float(np.linalg.det(np.cov(points))), 0.0)  # rounding may dip below 0
-    return float(pi * chi2.ppf(ELLIPSE_SHARE, df=2) * sqrt(determinant))
+    area = nan
+    if n >= 3:
+        determinant = max(float(np.linalg.det(np.cov(path * MM_PER_M))), 0.0)  # rounding: below 0
+        area = float(pi * chi2.ppf(ELLIPSE_SHARE, df=2) * sqrt(determinant))
+    length_mm = length_m * MM_PER_M if duration_s else nan
+    velocity_mm_s = length_m * MM_PER_M / duration_s if duration_s else nan
+    rms = ap_mm, ml_mm, ap_origin_m, ml_origin_m
+    return Posturography(*rms, velocity_mm_s, length_mm, area, duration_s, n)

@@ -11,6 +11,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from itertools import combinations
 from math import atanh, isnan, nan, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,24 +77,20 @@ def described_pair(x: NDArray[np.float64], y: NDArray[np.float64]) -> TestResult
 def paired_t(x: ArrayLike, y: ArrayLike, confidence: float = 0.95) -> TestResult:
     """Paired samples t test, two-sided (Student 1908), as in Hansen 2017, tables 1 and 2.
 
-    Raises
-    ------
-    ValueError
-        if x and y differ in shape.
+    ValueError: if x and y differ in shape.
     """
     x, y = finite_pairs(x, y)
     found = described_pair(x, y)
     if reason := _why_no_t(x, y):
         return found.with_(reason=reason)
     test = stats.ttest_1samp(x - y, 0.0)
-    interval = test.confidence_interval(confidence)
-    return found.with_(
-        ci_low=float(interval.low),
-        ci_high=float(interval.high),
-        statistic=float(test.statistic),
-        df1=float(test.df),
-        p_value=float(test.pvalue),
-    )
+    return _tested(found, test, test.confidence_interval(confidence), test.pvalue)
+
+
+def _tested(found: TestResult, test: Any, interval: Any, p_value: float) -> TestResult:
+    numbers = {"statistic": test.statistic, "df1": test.df, "p_value": p_value}
+    numbers |= {"ci_low": interval.low, "ci_high": interval.high}
+    return found.with_(**{name: float(number) for name, number in numbers.items()})
 
 
 def d_of_differences(x: ArrayLike, y: ArrayLike) -> float:
@@ -110,11 +107,7 @@ def wilcoxon(x: ArrayLike, y: ArrayLike) -> TestResult:
     correction for ties. The statistic is the smaller of the two sums of ranks, the difference the
     median of the pairwise means (Hodges and Lehmann 1963), the effect size the rank-biserial
     correlation (Kerby 2014): (positive - negative ranks) / all ranks.
-
-    Raises
-    ------
-    ValueError
-        if x and y differ in shape.
+    ValueError: if x and y differ in shape.
     """
     x, y = finite_pairs(x, y)
     whole, unit = _without_rounding(x, y)
@@ -166,22 +159,15 @@ def equivalence_tost(x: ArrayLike, y: ArrayLike, bound: float, alpha: float = 0.
     upper = stats.ttest_1samp(difference, bound, alternative="less")
     interval = stats.ttest_1samp(difference, 0.0).confidence_interval(1.0 - 2.0 * alpha)
     weaker = lower if lower.statistic <= -upper.statistic else upper
-    return found.with_(
-        ci_low=float(interval.low),
-        ci_high=float(interval.high),
-        statistic=float(weaker.statistic),
-        df1=float(len(x) - 1),
-        p_value=float(max(lower.pvalue, upper.pvalue)),
-    )
+    return _tested(found, weaker, interval, max(lower.pvalue, upper.pvalue))
 
 
 def sign_test(x: ArrayLike, y: ArrayLike) -> TestResult:
     """In how many participants each value is the smaller, and whether that is chance (exact)."""
     x, y = finite_pairs(x, y)
     own, other = int(np.sum(x < y)), int(np.sum(y < x))
-    found = TestResult(
-        n=len(x), effect_size=own / len(x) if len(x) else nan, count_a=own, count_b=other
-    )
+    share = own / len(x) if len(x) else nan
+    found = TestResult(n=len(x), effect_size=share, count_a=own, count_b=other)
     if own + other >= MINIMUM_FOR_WILCOXON:
         return found.with_(p_value=float(stats.binomtest(own, own + other).pvalue))
     return found.with_(
@@ -236,17 +222,10 @@ def _pair_sum(ordered: NDArray[np.int64], number: int) -> int:
 
 
 def _signed_rank_p(nonzero: NDArray[np.float64], ranks: NDArray[np.float64]) -> float:
-    n = len(nonzero)
-    if len(np.unique(ranks)) == n:
-        method = "exact" if n <= EXACT_WILCOXON_UP_TO else "asymptotic"
-        return float(stats.wilcoxon(nonzero, method=method).pvalue)
-    if n > EXACT_WITH_TIES_UP_TO:
-        return float(stats.wilcoxon(nonzero, method="asymptotic").pvalue)
-    signs = (np.arange(2**n)[:, None] >> np.arange(n)) & 1
-    sums = signs @ ranks
-    middle = ranks.sum() / 2.0
-    extreme = abs(float(ranks[nonzero > 0].sum()) - middle)
-    return float(np.mean(np.abs(sums - middle) >= extreme - 1e-9))
+    n, has_ties = len(nonzero), len(np.unique(ranks)) < len(nonzero)
+    exact = stats.PermutationMethod(n_resamples=2**n) if has_ties else "exact"
+    is_exact = n <= (EXACT_WITH_TIES_UP_TO if has_ties else EXACT_WILCOXON_UP_TO)
+    return float(stats.wilcoxon(nonzero, method=exact if is_exact else "asymptotic").pvalue)
 
 
 # --- more than two methods: one-way analysis of variance, and the one for repeated measures -------
@@ -331,7 +310,11 @@ def repeated_measures_anova(matrix: ArrayLike, alpha: float = 0.05) -> tuple[Tes
     ss_error = float(np.sum(_doubly_centred(table) ** 2))
     df_effect, df_error = float(k - 1), float((k - 1) * (n - 1))
     f = (ss_effect / df_effect) / (ss_error / df_error)
-    epsilon = _greenhouse_geisser(table)
+    covariance = _doubly_centred(np.cov(table, rowvar=False))
+    epsilon = float(np.trace(covariance) ** 2 / ((k - 1) * np.sum(covariance**2)))
+    pairs = list(combinations(range(k), 2))
+    confidence = 1.0 - alpha / len(pairs)
+    after = {(i, j): paired_t(table[:, i], table[:, j], confidence) for i, j in pairs}
     return found.with_(
         statistic=f,
         df1=epsilon * df_effect,
@@ -339,7 +322,7 @@ def repeated_measures_anova(matrix: ArrayLike, alpha: float = 0.05) -> tuple[Tes
         p_value=float(stats.f.sf(f, epsilon * df_effect, epsilon * df_error)),
         effect_size=ss_effect / (ss_effect + ss_error),
         epsilon=epsilon,
-    ), _paired_post_hoc(table, alpha)
+    ), _bonferroni(after)
 
 
 def _nothing_left(residual: NDArray[np.float64], values: NDArray[np.float64]) -> bool:
@@ -351,12 +334,6 @@ def _doubly_centred(table: NDArray[np.float64]) -> NDArray[np.float64]:
     return table - rows - columns + table.mean()
 
 
-def _greenhouse_geisser(table: NDArray[np.float64]) -> float:
-    covariance = _doubly_centred(np.cov(table, rowvar=False))
-    k = len(covariance)
-    return float(np.trace(covariance) ** 2 / ((k - 1) * np.sum(covariance**2)))
-
-
 def _pooled_post_hoc(
     samples: Sequence[NDArray[np.float64]], variance: float, df: float, alpha: float
 ) -> PostHoc:
@@ -366,22 +343,10 @@ def _pooled_post_hoc(
     for i, j in pairs:
         d = float(samples[i].mean() - samples[j].mean())
         e = sqrt(variance * (1.0 / len(samples[i]) + 1.0 / len(samples[j])))
-        p = 2.0 * float(stats.t.sf(abs(d) / e, df))
-        found[i, j] = TestResult(
-            difference=d,
-            ci_low=d - critical * e,
-            ci_high=d + critical * e,
-            statistic=d / e,
-            df1=df,
-            p_value=p,
-        )
+        p, ends = 2.0 * float(stats.t.sf(abs(d) / e, df)), (d - critical * e, d + critical * e)
+        one = TestResult(difference=d, statistic=d / e, df1=df, p_value=p)
+        found[i, j] = one.with_(ci_low=ends[0], ci_high=ends[1])
     return _bonferroni(found)
-
-
-def _paired_post_hoc(table: NDArray[np.float64], alpha: float) -> PostHoc:
-    pairs = list(combinations(range(table.shape[1]), 2))
-    confidence = 1.0 - alpha / len(pairs)
-    return _bonferroni({(i, j): paired_t(table[:, i], table[:, j], confidence) for i, j in pairs})
 
 
 def _bonferroni(tests: PostHoc) -> PostHoc:

@@ -65,11 +65,7 @@ def adjusted_p_values(
 
     Bonferroni: m p. Holm 1979 (Scand. J. Stat. 6): the same guarantee, never larger. Tests that
     were not possible (nan) stay nan and do not count in m.
-
-    Raises
-    ------
-    ValueError
-        if a p value lies outside 0 .. 1.
+    ValueError: if a p value lies outside 0 .. 1.
     """
     p = np.array(p_values, dtype=float)
     possible = ~np.isnan(p)

@@ -144,16 +144,15 @@ def sound_session(laboratory: str, number: int) -> Session:
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         (folder / "truth").mkdir()
-        known = simulate_participant(folder, options, number + 1)
+        person, records = simulate_participant(folder, options, number + 1)
         plates, trials, labels = [], [], ()
-        for stem, record in known.trials.items():
-            content = ezc3d.c3d(str(folder / known.participant / f"{stem}.c3d"))
+        for stem, record in records.items():
+            content = ezc3d.c3d(str(folder / f"sub-{number + 1:02d}" / f"{stem}.c3d"))
             labels = tuple(content["parameters"]["POINT"]["LABELS"]["value"])
             corners = content["parameters"]["FORCE_PLATFORM"]["CORNERS"]["value"] / 1000.0
             plates = [Plate(corners[:, :, k].T, lab.plate_depth_m) for k in range(corners.shape[2])]
             measured = float(str(record["all_contacts_measured_share"]))
             trials.append(_trial(stem.split("_", 1)[1], content, plates, measured))
-    person = known.person
     return Session(
         laboratory,
         person.sex,

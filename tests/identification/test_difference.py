@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.body.loads import PointMass, load_parameters
+from bsip_cli.body.person import load_parameters
 from bsip_cli.identification.difference import change_of_segments, difference
 from bsip_cli.identification.estimator import Estimate, Problem
 from tests.identification.synthetic_identification import problem_of, regressor, world
@@ -25,7 +25,7 @@ def gaussian(problem: Problem) -> Estimate:
 
 
 def load_phi() -> np.ndarray:
-    return load_parameters([PointMass(SHANK, 1.0, np.array([0.02, -0.2, 0.03]))], world().person)
+    return load_parameters([(SHANK, 1.0, (0.02, -0.2, 0.03))], world().person)
 
 
 def draws(seeds: tuple[int, int]):

@@ -86,11 +86,10 @@ def _pose(skeleton: Skeleton, q: np.ndarray, determined: np.ndarray) -> Iterator
 
 
 def _plate(name: str, wrench: np.ndarray) -> Iterator[Channel]:
-    for c, (what, unit) in enumerate(
-        [(w, u) for w, u in (("f", "N"), ("m", "N m")) for _ in "xyz"]
-    ):
-        axis, point = "xyz"[c % 3], f"plate{name}"
-        yield Channel(f"{point}_{what}{axis}", axis, "MISC", point, unit, "global", wrench[:, c])
+    point = f"plate{name}"
+    for (what, unit), values in zip((("f", "N"), ("m", "N m")), np.hsplit(wrench, 2), strict=True):
+        for axis, one in zip("xyz", values.T, strict=True):
+            yield Channel(f"{point}_{what}{axis}", axis, "MISC", point, unit, "global", one)
 
 
 def motion_tsv(columns: Sequence[Channel]) -> str:

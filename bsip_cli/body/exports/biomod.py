@@ -6,12 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bsip_cli.body.exports.identified import (
-    BALL_AXES,
-    IdentifiedPerson,
-    numbers,
-    plain_names,
-)
+from bsip_cli.body.exports.identified import BALL_AXES, IdentifiedPerson, numbers
 from bsip_cli.body.gravity import GRAVITY_M_S2
 
 _NOTES = (
@@ -22,20 +17,17 @@ _NOTES = (
 
 
 def biomod_text(body: IdentifiedPerson) -> str:
-    """A bioMod file, version 4.
-
-    Raises
-    ------
-    BadDataError
-        A segment's inertia is impossible, or two markers would have one name.
-    """
+    """A bioMod file, version 4; errors as of `check_bodies` and `markers`."""
     body.check_bodies()
     lines = ["version 4", *(f"// {line}" for line in (*body.made_of, *_NOTES)), ""]
     lines += [f"gravity {numbers([0.0, 0.0, -GRAVITY_M_S2])}", ""]
     lines += ["segment base", "    translations xyz", "    mass 0", "endsegment", ""]
     for i in range(len(body.person.skeleton.segments)):
         lines += [*_segment_lines(body, i), ""]
-    lines += _marker_lines(body)
+    for name, segment, place in body.markers():
+        parent = body.person.skeleton.segments[segment]
+        lines += [f"marker {name}", f"    parent {parent}"]
+        lines += [f"    position {numbers(place)}", "endmarker"]
     return "\n".join(lines)
 
 
@@ -45,10 +37,8 @@ def _segment_lines(body: IdentifiedPerson, i: int) -> Iterator[str]:
     skeleton = person.skeleton
     kind, segment = skeleton.joint_types[i], skeleton.segments[i]
     parent = skeleton.segments[skeleton.parents[i]] if i else "base"
-    position, tilt = person.joint_positions_m()[i], 0.0
-    rotations = BALL_AXES
-    if kind == "free":
-        tilt = np.pi / 2
+    position, rotations = person.joint_positions_m()[i], BALL_AXES
+    tilt = np.pi / 2 if kind == "free" else 0.0
     if kind == "revolute":
         hinge = skeleton.joints[i]
         yield f"segment {hinge}"
@@ -70,13 +60,3 @@ def _segment_lines(body: IdentifiedPerson, i: int) -> Iterator[str]:
         yield f"        {numbers(row)}"
     yield f"    com {numbers(inertia.com_m)}"
     yield "endsegment"
-
-
-def _marker_lines(body: IdentifiedPerson) -> Iterator[str]:
-    person = body.person
-    names, places = plain_names(person.markers), person.markers_in_joint_m()
-    for name, segment, place in zip(names, person.marker_segments, places, strict=True):
-        yield f"marker {name}"
-        yield f"    parent {person.skeleton.segments[segment]}"
-        yield f"    position {numbers(place)}"
-        yield "endmarker"

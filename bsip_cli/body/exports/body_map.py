@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 
-from bsip_cli.body.skeleton import Skeleton
+from bsip_cli.body.skeleton import Skeleton, named_file
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
 from bsip_cli.files.regular import read_toml
@@ -48,11 +46,7 @@ def load_body_map(name: str) -> BodyMap:
     UsageError
         There is no such file, or it is no map.
     """
-    file = Path(name) if name.endswith(".toml") else shipped("opensim", f"{name}.toml")
-    if not os.path.lexists(file):
-        raise UsageError(
-            "there is no such map of bodies", file=name, expected=", ".join(shipped_names())
-        )
+    file = named_file("opensim", name, "map of bodies")
     data = read_toml(file)
     try:
         groups = tuple(_group(row) for row in data["groups"])
@@ -101,11 +95,8 @@ def check_segments(body_map: BodyMap, skeleton: Skeleton) -> None:
 
 
 def _group(row: dict) -> BodyGroup:
-    group = BodyGroup(
-        _texts(row["bodies"]),
-        _texts(row["segments"]),
-        tuple((str(segment), str(body)) for segment, body in row["joints"]),
-    )
+    joints = tuple((str(segment), str(body)) for segment, body in row["joints"])
+    group = BodyGroup(_texts(row["bodies"]), _texts(row["segments"]), joints)
     if not (group.bodies and group.segments and group.joints):
         raise ValueError("a group without bodies, segments or joints")
     return group

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -82,6 +83,18 @@ class IdentifiedPerson:
             said.append(f"{name}: impossible tensor replaced by the nearest, {away}")
         return replace(self, inertias=tuple(inertias), made_of=(*self.made_of, *said))
 
+    def markers(self) -> Iterator[tuple[str, int, np.ndarray]]:
+        """Plain name, segment and place (3,) in the segment's joint [m] of each.
+
+        Raises
+        ------
+        BadDataError
+            Two markers would have one name.
+        """
+        person = self.person
+        names, places = plain_names(person.markers), person.markers_in_joint_m()
+        return zip(names, person.marker_segments.tolist(), places, strict=True)
+
     def height_of_base_m(self) -> float:
         """How high the base joint stands in the neutral pose over the lowest marker or joint."""
         rotations, joints = neutral_pose(self.person)
@@ -107,6 +120,12 @@ def neutral_pose(person: Person) -> tuple[np.ndarray, np.ndarray]:
 def numbers(values: Iterable[float]) -> str:
     """Numbers separated by blanks, with all their digits."""
     return " ".join(f"{value:.17g}" for value in np.asarray(values, dtype=float).ravel())
+
+
+def xml_text(root: ET.Element, declared: bool = True) -> str:
+    """A document as text, indented."""
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode", xml_declaration=declared) + "\n"
 
 
 def xml_comment(lines: Iterable[str]) -> str:

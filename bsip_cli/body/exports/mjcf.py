@@ -6,12 +6,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 
-from bsip_cli.body.exports.identified import (
-    IdentifiedPerson,
-    numbers,
-    plain_names,
-    xml_comment,
-)
+from bsip_cli.body.exports.identified import IdentifiedPerson, numbers, xml_comment, xml_text
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import Inertia
 
@@ -26,13 +21,8 @@ _ROD = Inertia(1e-6, np.zeros(3), 1e-9 * np.eye(3))
 
 
 def mjcf_text(body: IdentifiedPerson) -> str:
-    """A MuJoCo model with a free base, ball joints and hinges.
-
-    Raises
-    ------
-    BadDataError
-        A segment's inertia is impossible, or two markers would have one name.
-    """
+    """A MuJoCo model with a free base, ball joints and hinges. Errors as of `check_bodies` and
+    `markers`."""
     body.check_bodies()
     root = ET.Element("mujoco", model=body.name)
     root.append(ET.Comment(xml_comment((*body.made_of, *_NOTES))))
@@ -44,8 +34,7 @@ def mjcf_text(body: IdentifiedPerson) -> str:
         above = elements[parent] if parent >= 0 else world
         elements.append(_add_body(above, body, i))
     _add_sites(elements, body)
-    ET.indent(root)
-    return ET.tostring(root, encoding="unicode") + "\n"
+    return xml_text(root, declared=False)
 
 
 def _add_body(above: ET.Element, body: IdentifiedPerson, i: int) -> ET.Element:
@@ -78,9 +67,7 @@ def _add_body(above: ET.Element, body: IdentifiedPerson, i: int) -> ET.Element:
 
 
 def _add_sites(elements: list[ET.Element], body: IdentifiedPerson) -> None:
-    person = body.person
-    names, places = plain_names(person.markers), person.markers_in_joint_m()
-    for name, segment, place in zip(names, person.marker_segments, places, strict=True):
+    for name, segment, place in body.markers():
         # Sites go before the child bodies, which is how such files are read.
         first = next((k for k, e in enumerate(elements[segment]) if e.tag == "body"), None)
         site = ET.Element("site", name=name, pos=numbers(place))

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bsip_cli.body.exports.identified import xml_comment
+from bsip_cli.body.exports.identified import xml_comment, xml_text
 from bsip_cli.body.exports.osim import COORDINATES
 from bsip_cli.body.skeleton import Skeleton
 
@@ -98,15 +98,11 @@ def loads_xml(segments: Sequence[str], data_file: str, said: Sequence[str]) -> s
         ):
             ET.SubElement(one, tag).text = text
     ET.SubElement(top, "datafile").text = data_file
-    return _text(document)
+    return xml_text(document)
 
 
 def setup_xml(
-    name: str,
-    files: Mapping[str, str],
-    from_s: float,
-    to_s: float,
-    said: Sequence[str],
+    name: str, files: Mapping[str, str], from_s: float, to_s: float, said: Sequence[str]
 ) -> str:
     """Set-up of InverseDynamicsTool; files : ``model_file``, ``coordinates_file`` and
     ``external_loads_file``, beside it. The motion is smooth: no further filter."""
@@ -121,15 +117,10 @@ def setup_xml(
         ("output_gen_force_file", f"{name}.sto"),
     ):
         ET.SubElement(tool, tag).text = text
-    return _text(document)
+    return xml_text(document)
 
 
 def _document(said: Sequence[str]) -> ET.Element:
     document = ET.Element("OpenSimDocument", Version="40000")
     document.append(ET.Comment(xml_comment(said)))
     return document
-
-
-def _text(document: ET.Element) -> str:
-    ET.indent(document)
-    return ET.tostring(document, encoding="unicode", xml_declaration=True) + "\n"

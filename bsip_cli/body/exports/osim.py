@@ -6,12 +6,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 
-from bsip_cli.body.exports.identified import (
-    IdentifiedPerson,
-    numbers,
-    plain_names,
-    xml_comment,
-)
+from bsip_cli.body.exports.identified import IdentifiedPerson, numbers, xml_comment, xml_text
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import Inertia
 
@@ -33,13 +28,8 @@ _NOTES = (
 
 
 def osim_text(body: IdentifiedPerson) -> str:
-    """An OpenSim 4 model: bodies, custom and pin joints, markers.
-
-    Raises
-    ------
-    BadDataError
-        A segment's inertia is impossible, or two markers would have one name.
-    """
+    """An OpenSim 4 model: bodies, custom and pin joints, markers. Errors as of `check_bodies` and
+    `markers`."""
     body.check_bodies()
     document = ET.Element("OpenSimDocument", Version="40000")
     document.append(ET.Comment(xml_comment((*body.made_of, *_NOTES))))
@@ -52,18 +42,14 @@ def osim_text(body: IdentifiedPerson) -> str:
         set_inertia(ET.SubElement(bodies, "Body", name=name), body.in_joint(i))
         _add_joint(joints, body, i)
     _add_markers(markers, body)
-    ET.indent(document)
-    return ET.tostring(document, encoding="unicode", xml_declaration=True) + "\n"
+    return xml_text(document)
 
 
 def set_inertia(element: ET.Element, inertia: Inertia) -> None:
     """Write mass, mass centre and inertia about it (xx yy zz xy xz yz) of a ``Body``."""
     values = inertia.readable()
-    for tag, part in (
-        ("mass", values[:1]),
-        ("mass_center", values[1:4]),
-        ("inertia", values[4:]),
-    ):
+    parts = {"mass": values[:1], "mass_center": values[1:4], "inertia": values[4:]}
+    for tag, part in parts.items():
         found = element.find(tag)
         child = ET.SubElement(element, tag) if found is None else found
         child.text = numbers(part)
@@ -118,11 +104,9 @@ def _add_transform(joint: ET.Element, name: str, kind: str) -> None:
 
 
 def _add_markers(markers: ET.Element, body: IdentifiedPerson) -> None:
-    person = body.person
-    names, places = plain_names(person.markers), person.markers_in_joint_m()
-    for name, segment, place in zip(names, person.marker_segments, places, strict=True):
+    for name, segment, place in body.markers():
         marker = ET.SubElement(markers, "Marker", name=name)
-        socket = f"/bodyset/{person.skeleton.segments[segment]}"
+        socket = f"/bodyset/{body.person.skeleton.segments[segment]}"
         ET.SubElement(marker, "socket_parent_frame").text = socket
         ET.SubElement(marker, "location").text = numbers(place)
         ET.SubElement(marker, "fixed").text = "true"

@@ -8,11 +8,12 @@ on each other by joint centres that both have.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
+from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.exports.body_map import BodyGroup, BodyMap
 from bsip_cli.body.exports.identified import IdentifiedPerson, neutral_pose, xml_comment
@@ -24,28 +25,13 @@ _BODIES = "Model/BodySet/objects/Body"
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
-    """Orientation (3, 3) and origin (3,) [m] of a frame in another."""
-
-    rotation: np.ndarray
-    origin_m: np.ndarray
-
-    def __matmul__(self, inner: Placement) -> Placement:
-        origin = self.origin_m + self.rotation @ inner.origin_m
-        return Placement(self.rotation @ inner.rotation, origin)
-
-    def inverse(self) -> Placement:
-        return Placement(self.rotation.T, -self.rotation.T @ self.origin_m)
-
-
-@dataclass(frozen=True)
 class GivenJoint:
     """A joint at zero coordinates: its frame in the parent body and in the child body."""
 
     parent: str
     child: str
-    in_parent: Placement
-    in_child: Placement
+    in_parent: pin.SE3
+    in_child: pin.SE3
 
 
 @dataclass(frozen=True)
@@ -132,19 +118,14 @@ def check_fits(model: GivenModel, body_map: BodyMap) -> None:
 
 
 def with_inertias(model: GivenModel, body_map: BodyMap, person: IdentifiedPerson) -> Replacement:
-    """The model with the inertial parameters of the person; nothing else changes.
-
-    Raises
-    ------
-    BadDataError
-        A segment's inertia is impossible.
-    """
+    """The model with the inertial parameters of the person; nothing else changes. Errors as of
+    `check_bodies`."""
     person.check_bodies()
     changed: dict[str, Inertia] = {}
     misfit: dict[str, float] = {}
     for group in body_map.groups:
         shift, misfit[group.bodies[0]] = _fit(model, group, person)
-        whole = segments_as_one(person, group.segments).moved(-shift)
+        whole = pin.SE3(np.eye(3), shift).act(_segments_as_one(person, group.segments))
         changed |= _shared(model, group, whole)
     document = deepcopy(model.document)
     for element in document.iterfind(_BODIES):
@@ -175,13 +156,8 @@ def _fit(model: GivenModel, group: BodyGroup, person: IdentifiedPerson) -> tuple
     rotations, joints = neutral_pose(person.person)
     first = skeleton.index(group.segments[0])
     theirs = np.array([_joint_centre(model, group, body) for _, body in group.joints])
-    ours = np.array(
-        [
-            rotations[first].T @ (joints[skeleton.index(segment)] - joints[first])
-            for segment, _ in group.joints
-        ]
-    )
-    shifts = theirs - ours
+    ways = [joints[skeleton.index(segment)] - joints[first] for segment, _ in group.joints]
+    shifts = theirs - np.array([rotations[first].T @ way for way in ways])
     shift = shifts.mean(axis=0)
     return shift, float(np.linalg.norm(shifts - shift, axis=1).max())
 
@@ -190,34 +166,34 @@ def _joint_centre(model: GivenModel, group: BodyGroup, body: str) -> np.ndarray:
     """(3,) centre of the joint that carries a body, in the group's frame."""
     joint, placed = model.joints[body], _placements(model, group)
     if body in placed:
-        return (placed[body] @ joint.in_child).origin_m
-    return (placed[joint.parent] @ joint.in_parent).origin_m
+        return (placed[body] * joint.in_child).translation
+    return (placed[joint.parent] * joint.in_parent).translation
 
 
-def _shared(model: GivenModel, group: BodyGroup, whole: Inertia) -> dict[str, Inertia]:
+def _shared(model: GivenModel, group: BodyGroup, whole: pin.Inertia) -> dict[str, Inertia]:
     """Each body's part of the whole: all parts have its shape, so together they are it."""
     total = sum(model.masses_kg[body] for body in group.bodies)
     parts = {}
     for body, place in _placements(model, group).items():
         part = model.masses_kg[body] / total
-        own = Inertia(part * whole.mass_kg, whole.com_m, part * whole.tensor_kgm2)
-        parts[body] = seen_from(own, place.rotation, place.origin_m)
+        own = pin.Inertia(part * whole.mass, whole.lever, part * whole.inertia)
+        parts[body] = _read(place.actInv(own))
     return parts
 
 
-def _placements(model: GivenModel, group: BodyGroup) -> dict[str, Placement]:
+def _placements(model: GivenModel, group: BodyGroup) -> dict[str, pin.SE3]:
     """The group's bodies in the frame of its first one, at zero coordinates."""
-    placed = {group.bodies[0]: Placement(np.eye(3), np.zeros(3))}
+    placed = {group.bodies[0]: pin.SE3.Identity()}
     inner = [
         joint for joint in model.joints.values() if {joint.parent, joint.child} <= set(group.bodies)
     ]
     for _ in inner:  # every round places at least one more body, if it can be placed at all
         for joint in inner:
-            across = joint.in_parent @ joint.in_child.inverse()
+            across = joint.in_parent * joint.in_child.inverse()
             if joint.parent in placed:
-                placed.setdefault(joint.child, placed[joint.parent] @ across)
+                placed.setdefault(joint.child, placed[joint.parent] * across)
             elif joint.child in placed:
-                placed[joint.parent] = placed[joint.child] @ across.inverse()
+                placed[joint.parent] = placed[joint.child] * across.inverse()
     return placed
 
 
@@ -237,7 +213,7 @@ def _joint(element: ET.Element) -> GivenJoint:
         if socket in frames:
             ends.append((_last(frames[socket].findtext("socket_parent")), _offset(frames[socket])))
         else:
-            ends.append((socket, Placement(np.eye(3), np.zeros(3))))
+            ends.append((socket, pin.SE3.Identity()))
     (parent, in_parent), (child, in_child) = ends
     return GivenJoint(parent, child, in_parent, in_child)
 
@@ -249,17 +225,10 @@ def _last(path: str | None) -> str:
     return path.strip().rpartition("/")[2]
 
 
-def _offset(frame: ET.Element) -> Placement:
+def _offset(frame: ET.Element) -> pin.SE3:
     """Of an offset frame: turned about X, then the new Y, then the new Z."""
-    turns = _three(frame.findtext("orientation", "0 0 0"))
-    rotation = np.eye(3)
-    for k, angle in enumerate(turns):
-        c, s = np.cos(angle), np.sin(angle)
-        turn = np.eye(3)
-        a, b = (k + 1) % 3, (k + 2) % 3
-        turn[a, a], turn[a, b], turn[b, a], turn[b, b] = c, -s, s, c
-        rotation = rotation @ turn
-    return Placement(rotation, _three(frame.findtext("translation", "0 0 0")))
+    turns = Rotation.from_euler("XYZ", _three(frame.findtext("orientation", "0 0 0")))
+    return pin.SE3(turns.as_matrix(), _three(frame.findtext("translation", "0 0 0")))
 
 
 def _three(text: str) -> np.ndarray:
@@ -276,32 +245,18 @@ def _number(text: str) -> float:
     return value
 
 
-def seen_from(inertia: Inertia, rotation: np.ndarray, origin_m: np.ndarray) -> Inertia:
-    """The same body seen from a frame with this orientation (3, 3) and origin (3,) in its own."""
-    com = rotation.T @ (inertia.com_m - origin_m)
-    return Inertia(inertia.mass_kg, com, rotation.T @ inertia.tensor_kgm2 @ rotation)
-
-
-def united(parts: Sequence[Inertia]) -> Inertia:
-    """Several bodies, all seen from one frame, as one."""
-    mass = sum(part.mass_kg for part in parts)
-    com = np.sum([part.mass_kg * part.com_m for part in parts], axis=0) / mass
-    tensor = np.zeros((3, 3))
-    for part in parts:
-        arm = part.com_m - com
-        tensor += part.tensor_kgm2
-        tensor += part.mass_kg * (float(arm @ arm) * np.eye(3) - np.outer(arm, arm))
-    return Inertia(mass, com, tensor)
-
-
-def segments_as_one(body: IdentifiedPerson, segments: tuple[str, ...]) -> Inertia:
+def _segments_as_one(body: IdentifiedPerson, segments: tuple[str, ...]) -> pin.Inertia:
     """Segments united in the neutral pose, in the frame of the first one's joint."""
     rotations, joints = neutral_pose(body.person)
     at = [body.person.skeleton.index(name) for name in segments]
-    first = at[0]
-    parts = []
+    first = pin.SE3(rotations[at[0]], joints[at[0]])
+    whole = pin.Inertia.Zero()
     for i in at:
-        rotation = rotations[i].T @ rotations[first]
-        origin = rotations[i].T @ (joints[first] - joints[i])
-        parts.append(seen_from(body.in_joint(i), rotation, origin))
-    return united(parts)
+        own = body.in_joint(i)
+        part = pin.Inertia(own.mass_kg, own.com_m, own.tensor_kgm2)
+        whole += first.actInv(pin.SE3(rotations[i], joints[i])).act(part)
+    return whole
+
+
+def _read(inertia: pin.Inertia) -> Inertia:
+    return Inertia(inertia.mass, np.array(inertia.lever), np.array(inertia.inertia))

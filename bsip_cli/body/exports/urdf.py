@@ -12,6 +12,7 @@ from bsip_cli.body.exports.identified import (
     IdentifiedPerson,
     numbers,
     xml_comment,
+    xml_text,
 )
 from bsip_cli.body.inertia import Inertia
 
@@ -27,13 +28,7 @@ _NOTES = (
 
 
 def urdf_text(body: IdentifiedPerson) -> str:
-    """A URDF robot; the reader adds the free base.
-
-    Raises
-    ------
-    BadDataError
-        A segment's inertia is impossible.
-    """
+    """A URDF robot; the reader adds the free base. Errors as of `check_bodies`."""
     body.check_bodies()
     robot = ET.Element("robot", name=body.name)
     robot.append(ET.Comment(xml_comment((*body.made_of, *_NOTES))))
@@ -41,8 +36,7 @@ def urdf_text(body: IdentifiedPerson) -> str:
     for i, segment in enumerate(body.person.skeleton.segments):
         _add_joints(robot, body, i)
         _add_link(robot, segment, body.in_joint(i))
-    ET.indent(robot)
-    return ET.tostring(robot, encoding="unicode", xml_declaration=True) + "\n"
+    return xml_text(robot)
 
 
 def _add_link(robot: ET.Element, name: str, inertia: Inertia | None = None) -> None:
@@ -78,16 +72,9 @@ def _add_joints(robot: ET.Element, body: IdentifiedPerson, i: int) -> None:
             _add_link(robot, link)
         ends = [parent, *between, segment]
         for k, letter in enumerate(BALL_AXES):
-            place = position if k == 0 else np.zeros(3)
-            _add_joint(
-                robot,
-                f"{name}_{letter}",
-                "continuous",
-                ends[k],
-                ends[k + 1],
-                xyz=place,
-                axis=_AXES[letter],
-            )
+            place, axis = position if k == 0 else np.zeros(3), _AXES[letter]
+            one = f"{name}_{letter}"
+            _add_joint(robot, one, "continuous", ends[k], ends[k + 1], xyz=place, axis=axis)
 
 
 def _add_joint(

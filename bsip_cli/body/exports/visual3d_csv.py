@@ -12,22 +12,10 @@ from bsip_cli.body.exports.identified import IdentifiedPerson
 from bsip_cli.body.inertia import Inertia
 
 # Visual3D's default names of segments; what it lacks stays empty.
-VISUAL3D_SEGMENTS = {
-    "lower_torso": "RPV",
-    "upper_torso": "RTA",
-    "head": "RHE",
-    "upper_arm_l": "LAR",
-    "upper_arm_r": "RAR",
-    "forearm_l": "LFA",
-    "forearm_r": "RFA",
-    "hand_l": "LHA",
-    "hand_r": "RHA",
-    "thigh_l": "LTH",
-    "thigh_r": "RTH",
-    "shank_l": "LSK",
-    "shank_r": "RSK",
-    "foot_l": "LFT",
-    "foot_r": "RFT",
+_LIMBS = {"upper_arm": "AR", "forearm": "FA", "hand": "HA"}
+_LIMBS |= {"thigh": "TH", "shank": "SK", "foot": "FT"}
+VISUAL3D_SEGMENTS = {"lower_torso": "RPV", "upper_torso": "RTA", "head": "RHE"} | {
+    f"{name}_{side}": side.upper() + code for name, code in _LIMBS.items() for side in "lr"
 }
 
 # Rows are x, y and z of the table in the segment's axes (X anterior, Y up, Z right).

@@ -8,7 +8,7 @@ the same in every trial that it touches.
 from __future__ import annotations
 
 import csv
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib.resources import files
 from typing import Any, ClassVar, Self
 
@@ -17,7 +17,7 @@ import numpy as np
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.errors import UsageError
 from bsip_cli.instruments.readings import Instruments
-from bsip_cli.simulate.people import Person
+from bsip_cli.simulate.people import Inertia, Person, combined
 from bsip_cli.simulate.plan import Plan
 
 NOWHERE = "none"  # what the target of an effect without a place may be
@@ -163,6 +163,21 @@ class OnSegment(Effect):
 def body_of(segment: str) -> str:
     """The simulated body of a segment; things on the upper torso sit on the thorax."""
     return "thorax" if segment == "upper_torso" else segment
+
+
+def with_body(person: Person, segment: str, more: Inertia) -> Person:
+    """The person with a rigid body fixed to a segment; ``more`` in the axes of its body."""
+    body, origin = body_of(segment), np.zeros(3)
+    heavier = combined([(person.inertias[body], origin), (more, origin)])
+    return replace(person, inertias={**person.inertias, body: heavier})
+
+
+def span(
+    rng: np.random.Generator, first: float, last: float, shortest: float, longest: float
+) -> tuple[float, float]:
+    """Start (between first and last) and end as parts of a trial."""
+    start = float(rng.uniform(first, last))
+    return start, start + float(rng.uniform(shortest, longest))
 
 
 def direction(rng: np.random.Generator) -> np.ndarray:

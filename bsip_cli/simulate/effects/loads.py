@@ -13,9 +13,9 @@ from bsip_cli.body.markersets import load_marker_set, shipped_names
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.instruments.readings import Instruments
-from bsip_cli.simulate.effects.base import Effect, OnSegment, Target, body_of
+from bsip_cli.simulate.effects.base import Effect, OnSegment, Target, body_of, span, with_body
 from bsip_cli.simulate.numerics import response, rotate, second_derivative, step, window
-from bsip_cli.simulate.people import Inertia, Person, combined
+from bsip_cli.simulate.people import Inertia, Person
 from bsip_cli.simulate.plan import GRAVITY, Ball, G, Load, Plan, Poses
 
 HANDS = ["hand_l", "hand_r"]
@@ -60,9 +60,7 @@ class AddedMass(OnSegment, name="added_mass"):
     def body(self, person: Person) -> Person:
         tensor = 0.4 * self.size * BALL_RADIUS_M**2 * np.eye(3)
         ball = Inertia(self.size, self.position_m(person), tensor)
-        body, origin = body_of(self.segment), np.zeros(3)
-        heavier = combined([(person.inertias[body], origin), (ball, origin)])
-        return replace(person, inertias={**person.inertias, body: heavier})
+        return with_body(person, self.segment, ball)
 
     def injected(self, instruments: Instruments) -> Instruments:
         return with_mass_at(instruments, self.segment, self.size)
@@ -229,9 +227,7 @@ class UnmeasuredContact(OnSegment, name="unmeasured_contact"):
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        segment = target.name or str(rng.choice(HANDS))
-        start = float(rng.uniform(0.15, 0.35))
-        share = (start, start + float(rng.uniform(0.3, 0.45)))
+        segment, share = target.name or str(rng.choice(HANDS)), span(rng, 0.15, 0.35, 0.3, 0.45)
         start_s, end_s = target.settings.get("start_s"), target.settings.get("end_s")
         heading, phase = rng.uniform(-np.pi, np.pi, 2).tolist()
         return cls(size, segment, share, start_s, end_s, heading, phase)
@@ -310,8 +306,7 @@ class ObjectHandled(OnSegment, name="object_handled"):
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
         segment = target.name or str(rng.choice(HANDS))
-        start = float(rng.uniform(0.2, 0.35))
-        return cls(size, segment, (start, start + float(rng.uniform(0.25, 0.4))))
+        return cls(size, segment, span(rng, 0.2, 0.35, 0.25, 0.4))
 
     def window_s(self, length_s: float) -> tuple[float, float]:
         """Start and end in a trial of this length."""
@@ -352,9 +347,7 @@ class Implement(OnSegment, name="implement"):
         across = self.spread_m**2 * (np.eye(3) - np.outer(axis, axis))
         tensor = self.size * (across + LEAST_RADIUS_M**2 * np.eye(3))
         held = Inertia(self.size, self.position_m(person) + self.centre_m, tensor)
-        body, origin = body_of(self.segment), np.zeros(3)
-        heavier = combined([(person.inertias[body], origin), (held, origin)])
-        return replace(person, inertias={**person.inertias, body: heavier})
+        return with_body(person, self.segment, held)
 
     def facts(self, person: Person) -> dict[str, Any]:
         return {"distance_m": float(np.linalg.norm(self.centre_m))}

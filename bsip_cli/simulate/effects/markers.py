@@ -11,7 +11,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.instruments.readings import Instruments
-from bsip_cli.simulate.effects.base import JOINTS, Effect, Target, direction
+from bsip_cli.simulate.effects.base import JOINTS, Effect, Target, direction, span
 from bsip_cli.simulate.numerics import frame_of, glide, rotate, runs, step
 from bsip_cli.simulate.people import Inertia, Person
 from bsip_cli.simulate.plan import Plan
@@ -82,8 +82,7 @@ class MarkerSlide(OnSkin, name="marker_slide"):
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        number, start = int(rng.integers(1 << 16)), float(rng.uniform(0.1, 0.4))
-        share = (start, start + float(rng.uniform(0.3, 0.5)))
+        number, share = int(rng.integers(1 << 16)), span(rng, 0.1, 0.4, 0.3, 0.5)
         return cls(size, target.name, number, direction(rng), share)
 
     def moved(self, times_s: np.ndarray) -> np.ndarray:
@@ -240,8 +239,7 @@ class SegmentInertia(Effect, name="segment_inertia"):
 
     @classmethod
     def draw(cls, size: float, target: Target, rng: np.random.Generator) -> Self:
-        segment = target.name or str(rng.choice(SEGMENTS))
-        return cls(size, segment)
+        return cls(size, target.name or str(rng.choice(SEGMENTS)))
 
     def person(self, person: Person) -> Person:
         own = ("abdomen", "thorax") if self.segment == "upper_torso" else (self.segment,)

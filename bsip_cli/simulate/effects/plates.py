@@ -95,6 +95,9 @@ class OfEveryPlate(Effect, ABC):
     def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
         """Change a plate's true reading (N, 6) into what it shows, at times (N,)."""
 
+    def place(self) -> str:
+        return f"plate {self.plate}" if self.plate else "all plates"
+
 
 @dataclass(frozen=True, eq=False)
 class PlateTranslation(OfEveryPlate, name="plate_translation"):
@@ -113,9 +116,6 @@ class PlateTranslation(OfEveryPlate, name="plate_translation"):
     def read(self, reading: np.ndarray, plate: SensingPlate, times_s: np.ndarray) -> None:
         reading[:, 3:] -= np.cross(plate.axes.T @ self.shift_m, reading[:, :3])
 
-    def place(self) -> str:
-        return f"plate {self.plate}" if self.plate else "all plates"
-
 
 @dataclass(frozen=True, eq=False)
 class PlateRotation(OfEveryPlate, name="plate_rotation"):
@@ -133,9 +133,6 @@ class PlateRotation(OfEveryPlate, name="plate_rotation"):
         force, moment = plate.lab_wrench(reading, plate.centre_m)
         turn = from_rotation_vector(self.turn_rad)
         reading[:] = plate.reading(force @ turn, moment @ turn, plate.centre_m)
-
-    def place(self) -> str:
-        return f"plate {self.plate}" if self.plate else "all plates"
 
 
 def _axis(name: str, rng: np.random.Generator) -> np.ndarray:

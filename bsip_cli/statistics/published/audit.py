@@ -27,7 +27,6 @@ from bsip_cli.statistics.published.paper import (
     middle_of,
     pairs_that_differ_by,
     range_words,
-    slip,
 )
 
 
@@ -36,7 +35,7 @@ def _unlike(
 ) -> Iterator[Slip]:
     """A test whose printed number is none that was computed."""
     if not computed.meets(row.printed(test)):
-        yield slip(table, row.name, test, printed=row.tests[test], recomputed=found)
+        yield table.slip(row.name, test, row.tests[test], found)
 
 
 # --- the ways in which papers compute Cohen's d of two methods in the same people -----------------
@@ -51,20 +50,15 @@ class Definition:
     of: Callable[[PrintedTable, Row, Paper], Interval]
     is_paired: bool = False
 
-    def words(self, table: PrintedTable) -> str:
-        a, b = table.methods
-        return self.formula.format(a=a, b=b)
 
+def definition_of(paper: Paper, table: PrintedTable) -> tuple[Definition, int]:
+    """The definition that most rows follow, of equals the plainest, and how many do."""
 
-def definition_of(paper: Paper, table: PrintedTable) -> Definition | None:
-    """The definition that most rows follow, of equals the plainest; None if no row follows any."""
-    best = max(DEFINITIONS, key=lambda one: followers(paper, table, one))
-    return best if followers(paper, table, best) else None
+    def followers(one: Definition) -> int:
+        return sum(one.of(table, row, paper).meets(row.printed("d")) for row in table.rows)
 
-
-def followers(paper: Paper, table: PrintedTable, one: Definition) -> int:
-    """How many rows print what a definition gives."""
-    return sum(one.of(table, row, paper).meets(row.printed("d")) for row in table.rows)
+    best = max(DEFINITIONS, key=followers)
+    return best, followers(best)
 
 
 def _over(denominator: Callable[[float, float], float]) -> Callable[..., Interval]:
@@ -83,9 +77,7 @@ def _over(denominator: Callable[[float, float], float]) -> Callable[..., Interva
 
 
 def _of_differences(_: PrintedTable, row: Row, paper: Paper) -> Interval:
-    """t / sqrt(n) of first - second, turned."""
-    root = sqrt(paper.participants)
-    return image(lambda t: -t / root, row.printed("t"))
+    return image(lambda t: -t / sqrt(paper.participants), row.printed("t"))
 
 
 def _hedges(table: PrintedTable, row: Row, paper: Paper) -> Interval:
@@ -163,17 +155,11 @@ def _marks(table: PrintedTable) -> Iterator[Slip]:
             wrong = _wrong_signs(table, method, cell.marks)
             if wrong:
                 likely = [sign for sign in unused if method in table.marks[sign]]
-                yield slip(
-                    table,
-                    f"{row.name} {method}",
-                    "marks",
-                    printed=cell.text,
-                    recomputed="; ".join(wrong),
-                    reading=f"one {cell.marks[-1]} for {likely[0]}" if len(likely) == 1 else "",
-                )
+                reading = f"one {cell.marks[-1]} for {likely[0]}" if len(likely) == 1 else ""
+                where, found = f"{row.name} {method}", "; ".join(wrong)
+                yield table.slip(where, "marks", cell.text, found, reading=reading)
     for sign in unused:
-        found = "no cell has it"
-        yield slip(table, "all rows", "marks", printed=f"{sign} in the legend", recomputed=found)
+        yield table.slip("all rows", "marks", f"{sign} in the legend", "no cell has it")
 
 
 def _wrong_signs(table: PrintedTable, method: str, marks: str) -> list[str]:
@@ -199,11 +185,10 @@ _NARROW = 1e-9  # less than the arithmetic of rounding is good for
 
 def paired_slips(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
     """What in a paired table contradicts the rest of it."""
-    exchange = exchanged_cells(table)
-    meant = table if exchange is None else exchange.undone(table)
+    meant, exchange = exchanged_cells(table)
     df = paper.participants - 1
     for row in table.rows:
-        yield from _difference(table, row, "" if exchange is None else exchange.sentence())
+        yield from _difference(table, row, exchange)
         t = t_of_interval(row.ends(), df)
         yield from _unlike(table, row, "t", t, f"{range_words(t)} from the interval")
         p = image(lambda t: float(2 * stats.t.sf(t, df)), row.printed("t").size())
@@ -218,20 +203,13 @@ def _difference(table: PrintedTable, row: Row, exchange: str) -> Iterator[Slip]:
     if agrees(table, row):
         return
     first, second = table.methods
+    found = pairs_that_differ_by(table, middle_of(row))
     reading = exchange
-    if not reading:
-        found = pairs_that_differ_by(table, middle_of(row))
-        if len(found) == 1:
-            (a, b) = found[0]
-            reading = f"interval and t belong to {a.words()} less {b.words()}"
-    yield slip(
-        table,
-        row.name,
-        "means and interval",
-        printed=f"{first} - {second} = {mean_difference(table, row).middle:.2f}",
-        recomputed=f"the interval's middle is {range_words(middle_of(row))}",
-        reading=reading,
-    )
+    if not exchange and len(found) == 1:
+        reading = f"interval and t belong to {found[0][0].words()} less {found[0][1].words()}"
+    printed = f"{first} - {second} = {mean_difference(table, row).middle:.2f}"
+    middle = f"the interval's middle is {range_words(middle_of(row))}"
+    yield table.slip(row.name, "means and interval", printed, middle, reading=reading)
 
 
 def t_of_interval(ends: tuple[Interval, Interval], df: int) -> Interval:
@@ -253,37 +231,30 @@ def _star(paper: Paper, table: PrintedTable, row: Row) -> Iterator[Slip]:
         return
     should = is_small if table.star == "p < alpha" else not is_small
     if should != row.tests["p"].endswith("*"):
-        found = f"{table.star} has a star"
-        yield slip(table, row.name, "star", printed=row.tests["p"], recomputed=found)
+        yield table.slip(row.name, "star", row.tests["p"], f"{table.star} has a star")
 
 
 def _effect_sizes(paper: Paper, table: PrintedTable, meant: PrintedTable) -> Iterator[Slip]:
     """Cohen's d of the printed means, and of those that were meant."""
     what = "Cohen's d"
-    definition = definition_of(paper, table)
-    if definition is None:
-        found = "no row follows any of the usual definitions"
-        yield slip(table, "all rows", what, printed="d", recomputed=found)
+    definition, count = definition_of(paper, table)
+    if not count:
+        yield table.slip("all rows", what, "d", "no row follows any of the usual definitions")
         return
     for row, true in zip(table.rows, meant.rows, strict=True):
         computed = definition.of(table, row, paper)
         if not computed.meets(row.printed("d")):
-            found = range_words(computed)
-            yield slip(table, row.name, what, printed=row.tests["d"], recomputed=found)
+            yield table.slip(row.name, what, row.tests["d"], range_words(computed))
         elif row != true:
             right = range_words(definition.of(table, true, paper))
             found = f"computed from the means as printed; {right} from those that were meant"
-            yield slip(table, row.name, what, printed=row.tests["d"], recomputed=found)
+            yield table.slip(row.name, what, row.tests["d"], found)
     if not definition.is_paired:
-        follow = f"{followers(paper, table, definition)} of {len(table.rows)} rows"
-        yield slip(
-            table,
-            "all rows",
-            "definition of Cohen's d",
-            printed=f"{definition.words(table)} in {follow}",
-            recomputed="not the d of the differences, t / sqrt(n), though the test is paired",
-            is_remark=True,
-        )
+        a, b = table.methods
+        printed = f"{definition.formula.format(a=a, b=b)} in {count} of {len(table.rows)} rows"
+        found = "not the d of the differences, t / sqrt(n), though the test is paired"
+        what = "definition of Cohen's d"
+        yield table.slip("all rows", what, printed, found, is_remark=True)
 
 
 # --- sway: what the measures of one path say of each other, and of its unit -----------------------
@@ -316,25 +287,19 @@ def sway_slips(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
 
 
 def _duration(stated: Interval, table: PrintedTable, rows: dict[str, Row]) -> Iterator[Slip]:
-    found = [
-        image(
-            lambda a, b: a / b, rows[LENGTH].cells[method].mean, rows[VELOCITY].cells[method].mean
-        )
-        for method in table.methods
-    ]
+    found = []
+    for method in table.methods:
+        length, velocity = (rows[key].cells[method].mean for key in (LENGTH, VELOCITY))
+        found.append(image(lambda a, b: a / b, length, velocity))
     if all(one.meets(stated) for one in found):
         return
     whole = Interval(min(one.low for one in found), max(one.high for one in found))
     steps = (METRES[a] / METRES[b] for a in METRES for b in METRES)
     fits = any(Interval(whole.low * k, whole.high * k).meets(stated) for k in steps)
-    yield slip(
-        table,
-        f"{rows[LENGTH].name} / {rows[VELOCITY].name}",
-        "duration",
-        printed=f"the sequence lasts {stated.middle:g} s",
-        recomputed=f"{range_words(whole)} s",
-        reading="" if fits else "no choice of units makes it so",
-    )
+    where = f"{rows[LENGTH].name} / {rows[VELOCITY].name}"
+    printed, computed = f"the sequence lasts {stated.middle:g} s", f"{range_words(whole)} s"
+    reading = "" if fits else "no choice of units makes it so"
+    yield table.slip(where, "duration", printed, computed, reading=reading)
 
 
 def unit_of_length(paper: Paper, table: PrintedTable) -> str:
@@ -351,14 +316,10 @@ def _unit(paper: Paper, table: PrintedTable) -> Iterator[Slip]:
     linked = next(row for row in table.rows if row.error_of)
     for row, method, error in _impossible(paper, table, linked.unit):
         beside = f"{table.methods[0]} {row.cells[table.methods[0]].text}"
-        yield slip(
-            table,
-            f"{row.name} {method}",
-            "unit",
-            printed=f"{row.cells[method].text} beside {beside} {row.unit}",
-            recomputed=f"the two paths are {error.middle:.2f} mm apart (root mean square)",
-            reading=f"the unit is {unit}, unless an offset sets the paths apart" if unit else "",
-        )
+        printed = f"{row.cells[method].text} beside {beside} {row.unit}"
+        found = f"the two paths are {error.middle:.2f} mm apart (root mean square)"
+        reading = f"the unit is {unit}, unless an offset sets the paths apart" if unit else ""
+        yield table.slip(f"{row.name} {method}", "unit", printed, found, reading=reading)
 
 
 def _impossible(
@@ -392,15 +353,11 @@ def _about_an_origin(table: PrintedTable, rows: dict[str, Row]) -> Iterator[Slip
         )
         most = likely.high / sqrt(1 - STRAIGHT**2)
         if mine < EVEN * rest and row.cells[method].mean.low > most:
-            yield slip(
-                table,
-                row.name,
-                "origin",
-                printed=f"{row.cells[method].text}, equal in all people within {100 * mine:.1g} %",
-                recomputed=f"about {likely.middle:.1g} from the area, if about the mean",
-                reading="the distance from an origin that all share, not about the mean",
-                is_remark=True,
-            )
+            printed = f"{row.cells[method].text}, equal in all people within {100 * mine:.1g} %"
+            found = f"about {likely.middle:.1g} from the area, if about the mean"
+            reading = "the distance from an origin that all share, not about the mean"
+            remark = {"reading": reading, "is_remark": True}
+            yield table.slip(row.name, "origin", printed, found, **remark)
 
 
 def _evenness(row: Row, method: str) -> Interval:
@@ -439,13 +396,9 @@ def _sums(body_mass_kg: Cell, table: PrintedTable) -> Iterator[Slip]:
         parts = [row.cells[method].mean for row in table.rows]
         whole = Interval(sum(one.low for one in parts), sum(one.high for one in parts))
         if not whole.meets(body_mass_kg.mean):
-            yield slip(
-                table,
-                "sum of all rows",
-                "body mass",
-                printed=f"people of {body_mass_kg.text} kg",
-                recomputed=f"the segments of {method} add up to {range_words(whole)} kg",
-            )
+            found = f"the segments of {method} add up to {range_words(whole)} kg"
+            printed = f"people of {body_mass_kg.text} kg"
+            yield table.slip("sum of all rows", "body mass", printed, found)
 
 
 def _means_of_few(table: PrintedTable) -> Iterator[Slip]:
@@ -454,14 +407,9 @@ def _means_of_few(table: PrintedTable) -> Iterator[Slip]:
         mean, most = row.cells["mean"].mean, row.cells["max"].mean
         least = most.low / table.values
         if mean.high < least:
-            yield slip(
-                table,
-                row.name,
-                "mean",
-                printed=row.cells["mean"].text,
-                recomputed=f"at least {least:.3f} if over {table.values} values, of which one is "
-                f"{row.cells['max'].text}",
-            )
+            top = row.cells["max"].text
+            found = f"at least {least:.3f} if over {table.values} values, of which one is {top}"
+            yield table.slip(row.name, "mean", row.cells["mean"].text, found)
 
 
 def _claim(paper: Paper, table: PrintedTable, claim: Claim) -> Iterator[Slip]:
@@ -473,14 +421,11 @@ def _claim(paper: Paper, table: PrintedTable, claim: Claim) -> Iterator[Slip]:
     whole = len(false) == len(table.rows)
     meant = as_meant(table)
     is_put_right = not any(_is_false(paper, meant, row, claim) for row in meant.rows)
-    yield slip(
-        table,
-        "all rows" if whole else ", ".join(false),
-        f"the {claim.where}",
-        printed=f"{f'{claim.method} ' if claim.method else 'all rows '}{claim.says}{but}",
-        recomputed="the table says the opposite" if whole else "not in these rows",
-        reading="true once the exchanged cells are corrected" if is_put_right else "",
-    )
+    where, what = "all rows" if whole else ", ".join(false), f"the {claim.where}"
+    printed = f"{claim.method or 'all rows'} {claim.says}{but}"
+    found = "the table says the opposite" if whole else "not in these rows"
+    reading = "true once the exchanged cells are corrected" if is_put_right else ""
+    yield table.slip(where, what, printed, found, reading=reading)
 
 
 def _is_false(paper: Paper, table: PrintedTable, row: Row, claim: Claim) -> bool:

@@ -31,11 +31,6 @@ class Slip:
     is_remark: bool = False
 
 
-def slip(table: PrintedTable, row: str, what: str, **said: Any) -> Slip:
-    """Of a row of a table; ``said`` as the last fields of :class:`Slip`."""
-    return Slip(table.paper, table.number, row, what, **said)
-
-
 def range_words(values: Interval, decimals: int = 2) -> str:
     """2.41, or 2.41 to 2.45 where rounding matters."""
     low, high = f"{values.low:.{decimals}f}", f"{values.high:.{decimals}f}"
@@ -92,10 +87,7 @@ def image(function: Callable[..., float], *arguments: Interval) -> Interval:
 def rounded_from(text: str) -> Interval:
     """The numbers that are printed as ``text``.
 
-    Raises
-    ------
-    ValueError
-        `text` is no number.
+    ValueError: `text` is no number.
     """
     _, _, decimals = text.partition(".")
     half = 0.5 * 10.0 ** -len(decimals)
@@ -115,10 +107,7 @@ class Cell:
     def spread(self) -> Interval:
         """The standard deviation.
 
-        Raises
-        ------
-        ValueError
-            None is printed.
+        ValueError: none is printed.
         """
         if self.sd is None:
             raise ValueError(f"{self.text} has no standard deviation")
@@ -128,10 +117,7 @@ class Cell:
     def of(cls, text: str) -> Cell:
         """From print.
 
-        Raises
-        ------
-        ValueError
-            `text` is neither a number nor M(SD).
+        ValueError: `text` is neither a number nor M(SD).
         """
         found = _CELL.fullmatch(text)
         if found is None:
@@ -145,10 +131,7 @@ class Cell:
 def range_of(text: str) -> tuple[Interval, Interval]:
     """Both ends of a printed [low, high].
 
-    Raises
-    ------
-    ValueError
-        `text` is no such range.
+    ValueError: `text` is no such range.
     """
     found = _RANGE.fullmatch(text)
     if found is None:
@@ -199,10 +182,7 @@ class Row:
     def ends(self) -> tuple[Interval, Interval]:
         """Of the interval of the mean difference.
 
-        Raises
-        ------
-        ValueError
-            None is printed.
+        ValueError: none is printed.
         """
         return range_of(self.ci_text)
 
@@ -229,6 +209,10 @@ class PrintedTable:
 
     def row(self, name: str) -> Row:
         return next(row for row in self.rows if row.name == name)
+
+    def slip(self, row: str, what: str, printed: str, recomputed: str, **more: Any) -> Slip:
+        """In a row; ``more`` as the last fields of :class:`Slip`."""
+        return Slip(self.paper, self.number, row, what, printed, recomputed, **more)
 
 
 @dataclass(frozen=True)
@@ -319,33 +303,20 @@ class Place:
         return f"{self.row} {self.method} ({self.cell.text})"
 
 
-@dataclass(frozen=True)
-class Exchange:
-    """Two cells that stand in each other's place."""
-
-    first: Place
-    second: Place
-
-    def undone(self, table: PrintedTable) -> PrintedTable:
-        """The table with both cells where they belong."""
+def exchanged_cells(table: PrintedTable) -> tuple[PrintedTable, str]:
+    """The table after the only exchange of two cells by which the means of all rows agree with
+    their intervals, and which that is, in words; as it is, and nothing, if they agree as printed,
+    or if no or several exchanges would do."""
+    found: list[tuple[PrintedTable, str]] = []
+    for first, second in () if _agree(table) else combinations(_places(table), 2):
         rows = {row.name: row for row in table.rows}
-        for here, there in ((self.first, self.second), (self.second, self.first)):
+        for here, there in ((first, second), (second, first)):
             cells = {**rows[here.row].cells, here.method: there.cell}
             rows[here.row] = replace(rows[here.row], cells=cells)
-        return replace(table, rows=tuple(rows.values()))
-
-    def sentence(self) -> str:
-        return f"{self.first.words()} and {self.second.words()} are exchanged"
-
-
-def exchanged_cells(table: PrintedTable) -> Exchange | None:
-    """The only exchange of two cells after which the means of all rows agree with their
-    intervals; None if they agree as printed, or if no or several exchanges would do."""
-    if _agree(table):
-        return None
-    exchanges = (Exchange(a, b) for a, b in combinations(_places(table), 2))
-    found = [one for one in exchanges if _agree(one.undone(table))]
-    return found[0] if len(found) == 1 else None
+        undone = replace(table, rows=tuple(rows.values()))
+        if _agree(undone):
+            found.append((undone, f"{first.words()} and {second.words()} are exchanged"))
+    return found[0] if len(found) == 1 else (table, "")
 
 
 def pairs_that_differ_by(table: PrintedTable, difference: Interval) -> list[tuple[Place, Place]]:
@@ -356,8 +327,7 @@ def pairs_that_differ_by(table: PrintedTable, difference: Interval) -> list[tupl
 
 def as_meant(table: PrintedTable) -> PrintedTable:
     """The table with exchanged cells where they belong; as it is where none are."""
-    exchange = exchanged_cells(table) if table.design == "paired" else None
-    return table if exchange is None else exchange.undone(table)
+    return exchanged_cells(table)[0] if table.design == "paired" else table
 
 
 def middle_of(row: Row) -> Interval:

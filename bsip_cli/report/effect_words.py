@@ -115,7 +115,7 @@ EFFECT_WORDS = {
     "camera_frame": EffectWords("cameras turned against plates and gravity", *_FRAME),
     "external_force": EffectWords("constant force beside the plates", *_CONTACT),
     "object_handled": EffectWords("object picked up and put down", *_LOAD),
-    "unexplained": EffectWords("something without a name", *_UNNAMED),
+    "unexplained": EffectWords("error of unknown cause", *_UNNAMED),
 }
 
 

@@ -23,12 +23,11 @@ from bsip_cli.report.blocks import (
 )
 from bsip_cli.report.budget import overall_pieces
 from bsip_cli.report.candidates import (
+    OF_THE_WEIGHT,
     Candidate,
     candidates_of,
     causes_of,
     is_large,
-    limits_of,
-    limits_sentence,
     looked_at,
 )
 from bsip_cli.report.effect_words import separating_recording
@@ -36,9 +35,11 @@ from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.sticks import Motion, Pose, poses_of
 from bsip_cli.report.verdict import (
     ALL_FAULTS,
+    CAUSE_UNKNOWN,
     cause_line,
     consequences,
     light_of,
+    unseen,
 )
 from bsip_cli.report.words import capital, count, listing, number
 from bsip_cli.report.yardsticks import (
@@ -55,14 +56,9 @@ from bsip_cli.statistics.methods import OM, RM, RM_MASS
 
 _SEXES = {"M": "man", "F": "woman"}
 _MOST = 2  # causes, and things to do
-_PAIRS = ("om", "rm_mass", "om_rm_mass")
+_PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
 _POSES = 8  # among which the one is chosen that is shown
-_COLOURS = {
-    "fine": "✓: no fault, no large error.",
-    "cause": "▲: something found, but no large error.",
-    "large": "■: a large error, explained or not.",
-    "inconclusive": "?: nothing can be said.",
-}
+_SIGNS = "Signs: ✓ fine; ▲ something found, no large error; ■ large error; ? inconclusive."
 _USABLE = {
     "fine": "The data may be used: nothing needs to be corrected.",
     "cause": "The data may be used once what was found is corrected or stated.",
@@ -70,9 +66,9 @@ _USABLE = {
     "inconclusive": "Whether the data may be used cannot be said.",
 }
 _WORDS = {
-    OM: "OM, the segment parameters identified from this person",
-    RM_MASS: "RM+mass, the segment parameters of a table, all masses times one number",
-    RM: "RM, the segment parameters of an anthropometric table",
+    OM: "OM (segment parameters identified from this person)",
+    RM_MASS: "RM+mass (segment parameters of a table, masses times one number)",
+    RM: "RM (segment parameters of an anthropometric table)",
 }
 
 
@@ -84,7 +80,7 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         Terms((*who(record),)),
         Heading("Is anything wrong?"),
         light,
-        Paragraph(_COLOURS[light.state], "note"),
+        Paragraph(_SIGNS, "note"),
         *_causes(record),
         *budget_bar(record),
         Heading("How large are the errors?"),
@@ -92,7 +88,7 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         Paragraph(f"Root mean square (RMS), with {record.use()}. {SOURCES}", "note"),
         *_sure(record, light),
         Heading("Which parameters to use"),
-        Paragraph(use_sentence(record, light.state == "large")),
+        Paragraph(use_sentence(record.choice, record.identification, light.state == "large")),
         Heading("What to do next"),
         Bullets(tuple(to_do(record, light))),
     )
@@ -132,7 +128,7 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     saved = f"; files saved {' to '.join(dict.fromkeys((dates[0], dates[-1])))}" if dates else ""
     yield "Recordings", f"{listing(tasks)}{saved}"
     used = listing([trial.label for trial in record.identification_trials()])
-    yield "Parameters from", used
+    yield "Identified from", used
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
     yield "Software", f"bsip {', '.join(versions)}"
     if record.facts["mass_note"]:
@@ -185,22 +181,27 @@ def _causes(record: ParticipantRecord) -> Iterator[Block]:
     if lines:
         yield Numbered(lines[:_MOST])
     if len(lines) > _MOST:
-        yield Links("", ((f"{len(lines) - _MOST} more below", f"#{ALL_FAULTS}"),))
+        more = f"{count(len(lines) - _MOST, 'more finding')} below"
+        yield Links("", ((more, f"#{ALL_FAULTS}"),))
 
 
 def _sure(record: ParticipantRecord, light: Light) -> Iterator[Block]:
-    """What might have been missed; nothing where no search was made."""
+    """Of the error, of what was found, of what might have been missed; nothing where no search was
+    made."""
     if record.diagnosis is None or record.detection is None:
         return
-    limits = limits_sentence(limits_of(record.detection, record.diagnosis))
-    causes = _found(record)
-    said = "Nothing was found that is more probable than not."
-    if light.state == "large" and (not causes or is_large(causes[0])):
-        said = "That the error is there is certain, its cause is not."
-    elif causes:
-        said = "Each probability allows for ordinary errors."
+    said = []
+    if light.state == "large":
+        cause = (
+            "its cause is not known" if CAUSE_UNKNOWN in light.title else "its causes are estimates"
+        )
+        said.append(f"That the error is large is certain; {cause}.")
+    if any(not is_large(cause) for cause in _found(record)):
+        said.append("How probable a finding is stands behind it.")
+    elif light.state != "large":
+        said.append("No fault is more probable than not.")
     yield Heading("How sure is this?")
-    yield Paragraph(f"{said} {limits}".rstrip())
+    yield Paragraph(" ".join((*said, unseen(record.detection, record.diagnosis))).rstrip())
 
 
 def budget_bar(record: ParticipantRecord) -> tuple[Block, ...]:
@@ -211,8 +212,8 @@ def budget_bar(record: ParticipantRecord) -> tuple[Block, ...]:
         return ()
     return (
         Bar(
-            "What makes the squared error of force and centre of pressure with a table (RM), faults or "
-            "not",
+            "What makes the error of force and centre of pressure with a table's parameters (RM), in "
+            "shares of its square",
             tuple((piece.label, piece.share) for piece in pieces if abs(piece.share) >= 0.5),
         ),
     )
@@ -236,19 +237,22 @@ def scales(record: ParticipantRecord) -> tuple[Scale, ...]:
 # --- which parameters ---------------------------------------------------------------------------
 
 
-def use_sentence(record: ParticipantRecord, is_wrong: bool = False) -> str:
-    """Which method, by how much it is better than the others, and in which movements another."""
+def use_sentence(
+    choice: pd.DataFrame | None, identification: pd.DataFrame, is_wrong: bool = False
+) -> str:
+    """Which method, by how much it is better than the others, and in which movements another; from
+    the artifacts of these names."""
     use = "Once the large error is understood, use" if is_wrong else "Use"
-    if record.choice is None or record.choice.empty:
+    if choice is None or choice.empty:
         return f"{use} {_WORDS[RM]}: nothing was compared."
-    first = record.choice.iloc[0]
+    first = choice.iloc[0]
     said = f"{use} {_WORDS[str(first['use'])]}{_compared(first)}."
     others = [
         f"{method} for {listing(list(rows['movement']))}"
-        for method, rows in record.choice.iloc[1:].groupby("use")
+        for method, rows in choice.iloc[1:].groupby("use")
         if method != first["use"]
     ]
-    rare = record.identification[record.identification["rare"].astype(bool)]
+    rare = identification[identification["rare"].astype(bool)]
     warned = [
         f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare["method"]
     ]
@@ -259,22 +263,21 @@ def _compared(first: pd.Series) -> str:
     """What the choice rests on, to go on with after the method's name."""
     if not np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all():
         return ": no recording is left to judge OM by"
-    compared = {
-        name: _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
-    }
-    table, scaled = "a table (RM)", "a scaled table (RM+mass)"
-    said = f". OM errs {compared['om']} than {table}"
-    same = compared["om"] == compared["om_rm_mass"]
-    said += f" and {scaled}" if same else f", {compared['om_rm_mass']} than {scaled}"
-    if first["use"] == RM_MASS:
-        said += f", RM+mass {compared['rm_mass']} than RM"
+    om, scaled, over_scaled = (
+        _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
+    )
     n = int(first["trials"])
     where = {
-        "whole_trials": f" in {count(n, 'other recording')}",
-        "held_out": f" in seconds of {count(n, 'recording')} that were kept apart",
-    }
-    unsure = "" if first["use"] == OM else ": no sure gain by OM"
-    return f"{said}{where.get(str(first['data']), '')}{unsure}"
+        "whole_trials": f"in {count(n, 'other recording')} ",
+        "held_out": f"in seconds of {count(n, 'recording')} that were kept apart ",
+    }.get(str(first["data"]), "")
+    if first["use"] == RM_MASS:
+        return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"
+    both = "RM and RM+mass (table, masses times one number)"
+    said = f"{om} than {both}" if om == over_scaled else f"{om} than RM, {over_scaled} than RM+mass"
+    if first["use"] == OM:
+        return f": {where}it errs {said}"
+    return f": {where}OM (identified) errs {said}, which is no sure gain"
 
 
 def _change(ratio: float, log_error: float) -> str:
@@ -299,7 +302,7 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
     said = [_USABLE[light.state], *said]
     said += consequences(causes[:_MOST], only_actions=True)
     said += [
-        f"To find the cause of fault {k}: {_first_step(cause)}."
+        f"To learn the cause of finding {k}, {_first_step(cause)}."
         for k, cause in enumerate(causes[:_MOST], start=1)
         if len(cause) > 1
     ][:1]
@@ -313,6 +316,8 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
 
 
 def _first_step(cause: Sequence[Candidate]) -> str:
+    if cause[0].class_id == OF_THE_WEIGHT:
+        return "weigh the person on a scale"
     return separating_recording([(one.effect, one.target) for one in cause], most=1)
 
 

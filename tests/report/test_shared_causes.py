@@ -132,7 +132,7 @@ def text_of(record: CohortRecord) -> str:
 def test_the_section_lists_causes_and_names_those_without():
     record = cohort(ann=FOUND, bob=NOTHING, eve=None, tom=TURNED.iloc[:0])
     text = text_of(record)
-    assert "Nothing wrong above the noise was found in bob (searched: sequence (run 1))." in text
+    assert "No fault was found in bob (searched: sequence (run 1))." in text
     assert "Not searched for errors: eve." in text
     assert "No recording has motion with every contact on a plate: tom." in text
     (grid,) = (b for b in diagnoses.section(record).blocks if isinstance(b, Grid))

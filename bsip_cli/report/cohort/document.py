@@ -25,7 +25,7 @@ from bsip_cli.report.cohort import diagnoses, gain, laboratory
 from bsip_cli.report.cohort.record import CohortRecord, Member
 from bsip_cli.report.figures.strips import Strip, strips
 from bsip_cli.report.origins import how_made
-from bsip_cli.report.tables.build import BUILDERS
+from bsip_cli.report.tables.build import BUILDERS, IN_PRINT
 from bsip_cli.report.tables.model import Table
 from bsip_cli.report.words import MISSING, count, listing, number, signed, significant, trial_label
 from bsip_cli.report.yardsticks import COP_LIMIT_M, FORCE_LIMIT_PERCENT, Yardstick, yardsticks
@@ -36,6 +36,7 @@ SHOWN = {
 }
 """Columns of a participant's artifacts that are shown."""
 
+_KEPT = ("n", "p")  # columns of the tables, beside means
 _MOST = 6  # sentences of a kind on the first page
 _FAR = 3.0
 """Robust standard deviations (median absolute deviation times 1.4826) beyond the median: Leys 2013,
@@ -208,35 +209,45 @@ def _person(record: CohortRecord, member: Member) -> tuple[str | Cell, ...]:
 
 def _tables(record: CohortRecord) -> Iterator[Block]:
     """With their legends; tests compare people, so a single one has none."""
-    people = [member for member in record.members if member.identification is not None]
+    files: dict[str, list[tuple[str, str]]] = {}
+    for file in map(PurePosixPath, record.table_files):
+        files.setdefault(file.stem, []).append((file.suffix.removeprefix("."), f"../{file}"))
     if not record.tables:
         yield Paragraph("No tables were made.", "warning")
-    elif len(people) < 2:
+    elif len([m for m in record.members if m.identification is not None]) < 2:
         yield Paragraph("Tests compare people: of one person there is nothing to test.", "note")
+        yield Links("The tables as files:", tuple((name, of[0][1]) for name, of in files.items()))
     else:
-        for table in record.tables[: len(BUILDERS)]:  # those beside print are in the files
+        yield Paragraph("All tests, and how each was made, are in the files.", "note")
+        for tag, table in zip(BUILDERS, record.tables, strict=False):
             yield Heading(table.title)
-            yield from _table(table)
-            yield from (Paragraph(note, "note") for note in table.notes[:1])  # the legend
-        yield Paragraph(
-            "How each was tested, and what could not be, is in the Markdown files.", "note"
-        )
-    if record.table_files:
-        files = [(PurePosixPath(file).name, f"../{file}") for file in record.table_files]
-        yield Links("The tables as files:", tuple(files))
+            if tag in IN_PRINT:
+                yield from _table(table)
+            if own := files.pop(table.name, []):
+                yield Links("As a file:", tuple(own))
+        beside = tuple((name, of[0][1]) for name, of in files.items())
+        yield from [Links("Beside the published values:", beside)] if beside else []
 
 
 def _table(table: Table) -> Iterator[Block]:
-    columns = table.printed_columns()
+    """Means, the interval of their difference, and its p-value."""
+    headings = [column.heading for column in table.printed_columns()]
+    kept = [
+        k
+        for k, column in enumerate(table.printed_columns())
+        if column.text or column.heading.endswith(("M(SD)", " CI")) or column.heading in _KEPT
+    ]
     if not table.rows:
         yield Paragraph("There are no numbers for this table.", "note")
         return
-    words = next((k for k, column in enumerate(columns) if not column.text), len(columns))
+    words = sum(table.printed_columns()[k].text for k in kept)
     rows: list[tuple[str | Cell, ...]] = []
     group = ""
     for row in table.rows:
         if row.group != group:
             group = row.group
-            rows.append((Cell(group, "group"), *[""] * (len(columns) - 1)))
-        rows.append(table.printed_cells(row))
-    yield Grid(tuple(column.heading for column in columns), tuple(rows), words=max(1, words))
+            rows.append((Cell(group, "group"), *[""] * (len(kept) - 1)))
+        cells = table.printed_cells(row)
+        rows.append(tuple(cells[k] for k in kept))
+    yield Grid(tuple(headings[k] for k in kept), tuple(rows), words=max(1, words))
+    yield from (Paragraph(note, "note") for note in table.notes[:1])  # the legend

@@ -195,8 +195,8 @@ class Ceiling(Component):
         ceiling = self._ceiling(scene)
         return (
             f"no known fault makes what the forces show: {OF_THE_LAB[target]} stays below "
-            f"{ceiling:.0f} N where the motion needs up to {lacking:.0f} {unit} more, as of a channel "
-            "at its limit"
+            f"{ceiling:.0f} N where the motion needs up to {lacking:.0f} {unit} more, as of a "
+            "channel at its limit"
         )
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from os.path import commonprefix
 
 import numpy as np
 import pandas as pd
@@ -111,7 +110,7 @@ def verdict_of(
     everywhere = looked_at(detection, diagnosis)
     light = light_of(diagnosis, detection, budget)
     return Verdict(
-        f"{light.title}. {light.text}",
+        f"{light.title}. {light.text}".rstrip(),
         bool(causes),
         tuple(cause_text(cause, everywhere) for cause in causes),
         (
@@ -212,7 +211,8 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
 def _group_line(cause: Sequence[Candidate], sure: str) -> str:
     """What all say is said once."""
     texts = [one.what().removesuffix(_OR_THE_MASS) for one in cause]
-    common = commonprefix(texts).rpartition(": ")[0]
+    heads = {text.partition(": ")[0] for text in texts}
+    common = heads.pop() if len(heads) == 1 else ""
     rest = [text.removeprefix(f"{common}: ") for text in texts]
     if cause[0].class_id == OF_THE_WEIGHT:
         mass = probability_words(1 - probability_of(cause))

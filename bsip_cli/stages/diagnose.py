@@ -147,7 +147,7 @@ def _write(
     unit.write("detection", limits)
     said = verdict_of(diagnosis, limits, budget=budget)
     lines = [cause_line(one, facts["trials"]) for one in causes_of(candidates_of(diagnosis))]
-    for sentence in filter(None, (said.headline, *lines, said.limits)):
+    for sentence in filter(None, (*(lines or [said.headline]), said.limits)):
         unit.warn(f"{unit.name}: {sentence}")
 
 

@@ -131,5 +131,5 @@ def _origins(unit: Unit) -> Iterator[Origin]:
                 if path.exists():
                     origin = origin_of(path, name)
                     origin.options.pop("participant", None)
-                    found = kind == "overall-diagnosis"
+                    found = kind in ("overall-diagnosis", "report-files")
                     yield replace(origin, messages=()) if found else origin

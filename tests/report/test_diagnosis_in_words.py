@@ -18,10 +18,10 @@ from bsip_cli.report.effect_words import (
 )
 from bsip_cli.report.participant.diagnosis import limit_blocks, nearest
 from bsip_cli.report.verdict import (
+    cause_line,
     cause_text,
     change_sentence,
     gain_sentence,
-    cause_line,
     light_of,
     probability_words,
     verdict_of,
@@ -132,8 +132,8 @@ def test_what_quiet_standing_tells_gives_its_advice_once(found):
     several = rows.assign(sentence=[told, told.replace("a gain", "an offset")])
     (group,) = causes_of(candidates_of(several))
     assert cause_line(group, TRIALS) == (
-        "The plates read 60.0 kg, 2.6 kg less than stated: a gain, an offset, or the stated mass is "
-        "wrong (probability 33.3 %)."
+        "The plates read 60.0 kg, 2.6 kg less than stated: a gain, an offset, or the stated mass "
+        "is wrong (probability 33.3 %)."
     )
     assert "The measured forces are not the true ones" not in text
 
@@ -293,8 +293,8 @@ def test_soft_tissue_or_a_bend_of_the_trunk(found):
 
 def test_what_acts_like_a_cause_but_not_evenly_has_no_name(found):
     uneven = found[found["rank"] == 1].assign(
-        effect=UNNAMED, sentence="no known fault makes what the forces show: plate 1 is turned, but not "
-        "evenly (yaw: 95 % interval 1.75 to 2.26°)",
+        effect=UNNAMED, sentence="no known fault makes what the forces show: plate 1 is turned, "
+        "but not evenly (yaw: 95 % interval 1.75 to 2.26°)",
     )  # fmt: skip
     text = text_of(uneven, detection(TRIALS))
     assert (

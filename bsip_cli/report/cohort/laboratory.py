@@ -56,7 +56,7 @@ def section(record: CohortRecord) -> Section:
     return Section("laboratory", "The laboratory", tuple(blocks))
 
 
-def _listed(rows: pd.DataFrame) -> list[Mapping[Any, Any]]:
+def _listed(rows: pd.DataFrame) -> list[dict]:
     """What is said, and of each other fault the likeliest number."""
     said = rows["verdict"].isin(SAID)
     rest = rows[~said & ~rows["effect"].isin(rows.loc[said, "effect"])]

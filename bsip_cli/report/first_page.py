@@ -55,7 +55,7 @@ from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 
 _SEXES = {"M": "man", "F": "woman"}
-_MOST = 2  # causes, and things to do
+_MOST, _MOST_TO_DO = 3, 2  # causes, and things to do
 _PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
 _POSES = 8  # among which the one is chosen that is shown
 _SIGNS = "Signs: ✓ fine; ▲ something found, no large error; ■ large error; ? inconclusive."
@@ -197,7 +197,7 @@ def _sure(record: ParticipantRecord, light: Light) -> Iterator[Block]:
         )
         said.append(f"That the error is large is certain; {cause}.")
     if any(not is_large(cause) for cause in _found(record)):
-        said.append("How probable a finding is stands behind it.")
+        said.append("Each finding states its own probability.")
     elif light.state != "large":
         said.append("No fault is more probable than not.")
     yield Heading("How sure is this?")
@@ -312,7 +312,7 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
             "Record a movement in which every foot that touches the ground stands on a plate."
         )
     said += [text for one in large[:1] if (text := _where_large(record, one))]
-    return said[: _MOST + 1] if len(said) > 1 else [*said, *advice(record)]
+    return said[: _MOST_TO_DO + 1] if len(said) > 1 else [*said, *advice(record)]
 
 
 def _first_step(cause: Sequence[Candidate]) -> str:

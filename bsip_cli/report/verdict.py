@@ -205,7 +205,7 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
         error, *good = one.what().removeprefix(_UNEXPLAINED).split("; ")
         return f"{capital('; '.join([f'{error}, {where}', *good[:1]]))}."
     sure = f"; probability {sure}" if sure else ""
-    return f"{capital(one.told(remarks=False))}, {where}{usual}{sure}."
+    return f"{capital(one.told(remarks=one.is_of_all))}, {where}{usual}{sure}."
 
 
 def _group_line(cause: Sequence[Candidate], sure: str) -> str:
@@ -216,7 +216,7 @@ def _group_line(cause: Sequence[Candidate], sure: str) -> str:
     rest = [text.removeprefix(f"{common}: ") for text in texts]
     if cause[0].class_id == OF_THE_WEIGHT:
         mass = probability_words(1 - probability_of(cause))
-        return f"{capital(common)}: {', '.join(rest)}{_OR_THE_MASS} (probability {mass})."
+        return f"{capital(common)}: either {', '.join(rest)}{_OR_THE_MASS} (probability {mass})."
     ranked = sorted(zip(cause, rest, strict=True), key=lambda pair: pair[0].effect == UNNAMED)
     members = [
         "an error of unknown cause" if one.effect == UNNAMED else re.split(r"[,:;] | \(", text)[0]

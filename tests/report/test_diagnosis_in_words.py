@@ -132,8 +132,8 @@ def test_what_quiet_standing_tells_gives_its_advice_once(found):
     several = rows.assign(sentence=[told, told.replace("a gain", "an offset")])
     (group,) = causes_of(candidates_of(several))
     assert cause_line(group, TRIALS) == (
-        "The plates read 60.0 kg, 2.6 kg less than stated: a gain, an offset, or the stated mass "
-        "is wrong (probability 33.3 %)."
+        "The plates read 60.0 kg, 2.6 kg less than stated: either a gain, an offset, or the "
+        "stated mass is wrong (probability 33.3 %)."
     )
     assert "The measured forces are not the true ones" not in text
 

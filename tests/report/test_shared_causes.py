@@ -191,3 +191,8 @@ def test_a_person_without_report_has_no_link():
     record = replace(record, members=(replace(record.members[0], has_report=False),))
     (grid,) = (b for b in diagnoses.section(record).blocks if isinstance(b, Grid))
     assert not grid.cells()[0][0].link
+
+
+def test_what_the_laboratory_tells_of_itself_is_not_shared_again():
+    known = TURNED.assign(sentence=TURNED["sentence"] + "; this is known from the laboratory (2)")
+    assert shared(ann=known, eve=known) == ()

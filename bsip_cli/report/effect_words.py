@@ -57,7 +57,7 @@ _PERSON = (
 _LOAD = (
     "A load that is not stated ends up in the masses of the body where its recording identifies "
     "them, and in the errors of the forces where it judges them.",
-    "If the load belongs to the task, state its mass (tutorial: loads) and run again.",
+    "Weigh it, state its mass (tutorial: loads) and run again.",
 )
 WEIGHT = (
     "Either the stated mass is wrong or what the plates measure. Only if a scale confirms the stated "

@@ -273,8 +273,10 @@ def _compared(first: pd.Series) -> str:
     }.get(str(first["data"]), "")
     if first["use"] == RM_MASS:
         return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"
-    both = "RM and RM+mass (table, masses times one number)"
-    said = f"{om} than {both}" if om == over_scaled else f"{om} than RM, {over_scaled} than RM+mass"
+    table, times = "RM (table)", "RM+mass (table, masses times one number)"
+    said = f"{om} than {table} and {times}"
+    if om != over_scaled:
+        said = f"{om} than {table}, {over_scaled} than {times}"
     if first["use"] == OM:
         return f": {where}it errs {said}"
     return f": {where}OM (identified) errs {said}, which is no sure gain"

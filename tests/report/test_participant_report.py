@@ -138,7 +138,7 @@ def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm , good" in first
     assert "Use OM (segment parameters identified from this person): in " in first
-    assert "it errs 34 to 46 % less than RM," in first
+    assert "it errs 34 to 46 % less than RM (table)," in first
     assert "But RM for basketball." in first
     assert "Finding 1: Correct the forces in the lab, or write corrected files" in first
 
@@ -212,7 +212,7 @@ def test_rm_is_used_where_nothing_is_sure(record):
     choice = record.choice.assign(use="RM", ratio_om=1.05)
     said = use_sentence(choice, record.identification)
     assert said.startswith("Use RM (segment parameters of an anthropometric table)")
-    assert "OM (identified) errs 5 % less to 16 % more than RM," in said
+    assert "OM (identified) errs 5 % less to 16 % more than RM (table)," in said
     rare = record.identification.assign(rare=True)
     assert "Never use OM" in use_sentence(record.choice, rare)
     alone = choice.assign(ratio_om=np.nan, ratio_rm_mass=np.nan, ratio_om_rm_mass=np.nan)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from bsip_cli.report.blocks import (
     Bar,
@@ -31,8 +31,8 @@ from bsip_cli.report.candidates import (
     looked_at,
 )
 from bsip_cli.report.effect_words import separating_recording
+from bsip_cli.report.gains import use_sentence
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.sticks import Motion, Pose, poses_of
 from bsip_cli.report.verdict import (
     ALL_FAULTS,
     CAUSE_UNKNOWN,
@@ -51,12 +51,12 @@ from bsip_cli.report.yardsticks import (
     errors_of,
     yardsticks,
 )
-from bsip_cli.statistics.choice import Difference
-from bsip_cli.statistics.methods import OM, RM, RM_MASS
+
+if TYPE_CHECKING:
+    from bsip_cli.report.figures.person import Pose
 
 _SEXES = {"M": "man", "F": "woman"}
 _MOST, _MOST_TO_DO = 3, 2  # causes, and things to do
-_PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
 _POSES = 8  # among which the one is chosen that is shown
 _SIGNS = "Signs: ✓ fine; ▲ something found, no large error; ■ large error; ? inconclusive."
 _USABLE = {
@@ -64,11 +64,6 @@ _USABLE = {
     "cause": "The data may be used once what was found is corrected or stated.",
     "large": "Use no results before the large error is understood.",
     "inconclusive": "Whether the data may be used cannot be said.",
-}
-_WORDS = {
-    OM: "OM (segment parameters identified from this person)",
-    RM_MASS: "RM+mass (segment parameters of a table, masses times one number)",
-    RM: "RM (segment parameters of an anthropometric table)",
 }
 
 
@@ -153,6 +148,8 @@ def portrait(record: ParticipantRecord) -> tuple[Block, ...]:
 
 
 def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
+    from bsip_cli.report.figures.person import Motion, poses_of
+
     if trial.kinematics is None:
         return ()
     anterior = record.facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
@@ -232,66 +229,6 @@ def measured_of(record: ParticipantRecord) -> tuple[tuple[Yardstick, float], ...
 
 def scales(record: ParticipantRecord) -> tuple[Scale, ...]:
     return tuple(yardstick.scale(value) for yardstick, value in measured_of(record))
-
-
-# --- which parameters ---------------------------------------------------------------------------
-
-
-def use_sentence(
-    choice: pd.DataFrame | None, identification: pd.DataFrame, is_wrong: bool = False
-) -> str:
-    """Which method, by how much it is better than the others, and in which movements another; from
-    the artifacts of these names."""
-    use = "Once the large error is understood, use" if is_wrong else "Use"
-    if choice is None or choice.empty:
-        return f"{use} {_WORDS[RM]}: nothing was compared."
-    first = choice.iloc[0]
-    said = f"{use} {_WORDS[str(first['use'])]}{_compared(first)}."
-    others = [
-        f"{method} for {listing(list(rows['movement']))}"
-        for method, rows in choice.iloc[1:].groupby("use")
-        if method != first["use"]
-    ]
-    rare = identification[identification["rare"].astype(bool)]
-    warned = [
-        f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare["method"]
-    ]
-    return " ".join([said, *([f"But {listing(others)}."] if others else []), *warned])
-
-
-def _compared(first: pd.Series) -> str:
-    """What the choice rests on, to go on with after the method's name."""
-    if not np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all():
-        return ": no recording is left to judge OM by"
-    om, scaled, over_scaled = (
-        _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
-    )
-    n = int(first["trials"])
-    where = {
-        "whole_trials": f"in {count(n, 'other recording')} ",
-        "held_out": f"in seconds of {count(n, 'recording')} that were kept apart ",
-    }.get(str(first["data"]), "")
-    if first["use"] == RM_MASS:
-        return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"
-    table, times = "RM (table)", "RM+mass (table, masses times one number)"
-    said = f"{om} than {table} and {times}"
-    if om != over_scaled:
-        said = f"{om} than {table}, {over_scaled} than {times}"
-    if first["use"] == OM:
-        return f": {where}it errs {said}"
-    return f": {where}OM (identified) errs {said}, which is no sure gain"
-
-
-def _change(ratio: float, log_error: float) -> str:
-    """``31 to 45 % less`` or ``5 % less to 16 % more``: one standard error to either side."""
-    ends = [100 * (end - 1) for end in Difference.of_ratio(ratio, log_error).interval()]
-    if not np.isfinite(ends).all():
-        ends = [100 * (ratio - 1)] * 2
-    words = ["less" if end < 0 else "more" for end in ends]
-    if words[0] != words[1]:
-        return f"{number(-ends[0], 0)} % less to {number(ends[1], 0)} % more"
-    sizes = [number(size, 0) for size in sorted(map(abs, ends))]
-    return f"{' to '.join(dict.fromkeys(sizes))} % {words[0]}"
 
 
 # --- what to do ---------------------------------------------------------------------------------

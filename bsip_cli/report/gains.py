@@ -9,8 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from bsip_cli.report.words import COMPONENTS, number, signed
+from bsip_cli.report.words import COMPONENTS, count, listing, number, signed
+from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import METHODS, OM, RIVALS, RM, RM_MASS, SAME_WITHIN
+
+_WORDS = {
+    OM: "OM (segment parameters identified from this person)",
+    RM_MASS: "RM+mass (segment parameters of a table, masses times one number)",
+    RM: "RM (segment parameters of an anthropometric table)",
+}
+_PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
 
 
 @dataclass(frozen=True)
@@ -138,3 +146,63 @@ def one_number_alone(quantity: str, rm_mass: float, om: float, over_rm_mass: flo
         f"One number for the whole mass alone ({RM_MASS}) changes RM's error in the {quantity} by "
         f"{signed(100.0 * rm_mass)} %, OM by {signed(100.0 * om)} %: {gained}."
     )
+
+
+# --- which parameters ---------------------------------------------------------------------------
+
+
+def use_sentence(
+    choice: pd.DataFrame | None, identification: pd.DataFrame, is_wrong: bool = False
+) -> str:
+    """Which method, by how much it is better than the others, and in which movements another; from
+    the artifacts of these names."""
+    use = "Once the large error is understood, use" if is_wrong else "Use"
+    if choice is None or choice.empty:
+        return f"{use} {_WORDS[RM]}: nothing was compared."
+    first = choice.iloc[0]
+    said = f"{use} {_WORDS[str(first['use'])]}{_compared(first)}."
+    others = [
+        f"{method} for {listing(list(rows['movement']))}"
+        for method, rows in choice.iloc[1:].groupby("use")
+        if method != first["use"]
+    ]
+    rare = identification[identification["rare"].astype(bool)]
+    warned = [
+        f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare["method"]
+    ]
+    return " ".join([said, *([f"But {listing(others)}."] if others else []), *warned])
+
+
+def _compared(first: pd.Series) -> str:
+    """What the choice rests on, to go on with after the method's name."""
+    if not np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all():
+        return ": no recording is left to judge OM by"
+    om, scaled, over_scaled = (
+        _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
+    )
+    n = int(first["trials"])
+    where = {
+        "whole_trials": f"in {count(n, 'other recording')} ",
+        "held_out": f"in seconds of {count(n, 'recording')} that were kept apart ",
+    }.get(str(first["data"]), "")
+    if first["use"] == RM_MASS:
+        return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"
+    table, times = "RM (table)", "RM+mass (table, masses times one number)"
+    said = f"{om} than {table} and {times}"
+    if om != over_scaled:
+        said = f"{om} than {table}, {over_scaled} than {times}"
+    if first["use"] == OM:
+        return f": {where}it errs {said}"
+    return f": {where}OM (identified) errs {said}, which is no sure gain"
+
+
+def _change(ratio: float, log_error: float) -> str:
+    """``31 to 45 % less`` or ``5 % less to 16 % more``: one standard error to either side."""
+    ends = [100 * (end - 1) for end in Difference.of_ratio(ratio, log_error).interval()]
+    if not np.isfinite(ends).all():
+        ends = [100 * (ratio - 1)] * 2
+    words = ["less" if end < 0 else "more" for end in ends]
+    if words[0] != words[1]:
+        return f"{number(-ends[0], 0)} % less to {number(ends[1], 0)} % more"
+    sizes = [number(size, 0) for size in sorted(map(abs, ends))]
+    return f"{' to '.join(dict.fromkeys(sizes))} % {words[0]}"

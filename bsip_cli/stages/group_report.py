@@ -17,8 +17,7 @@ from bsip_cli.artifacts import file_rows
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.cohort.document import SHOWN, cohort_document
 from bsip_cli.report.cohort.record import CohortRecord, Member, ratios_of, yardsticks_of
-from bsip_cli.report.origins import HowMade
-from bsip_cli.report.records import Origin
+from bsip_cli.report.records import HowMade, Origin
 from bsip_cli.report.shared import Searched, searched
 from bsip_cli.report.tables.build import build_tables
 from bsip_cli.report.words import listing

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -56,9 +57,9 @@ if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
 
 _SEXES = {"M": "man", "F": "woman"}
-_MOST, _MOST_TO_DO = 3, 2  # causes, and things to do
+_MOST = 2  # causes, and things to do
 _POSES = 8  # among which the one is chosen that is shown
-_SIGNS = "Signs: ✓ fine; ▲ something found, no large error; ■ large error; ? inconclusive."
+_SIGNS = "✓ fine; ▲ something found; ■ large error; ? inconclusive."
 _USABLE = {
     "fine": "The data may be used: nothing needs to be corrected.",
     "cause": "The data may be used once what was found is corrected or stated.",
@@ -74,7 +75,7 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         *portrait(record),
         Terms((*who(record),)),
         Heading("Is anything wrong?"),
-        light,
+        replace(light, text="") if _found(record) and large_errors(record) else light,
         Paragraph(_SIGNS, "note"),
         *_causes(record),
         *budget_bar(record),
@@ -209,8 +210,7 @@ def budget_bar(record: ParticipantRecord) -> tuple[Block, ...]:
         return ()
     return (
         Bar(
-            "What makes the error of force and centre of pressure with a table's parameters (RM), in "
-            "shares of its square",
+            "What makes the squared error of the forces with a table's parameters (RM)",
             tuple((piece.label, piece.share) for piece in pieces if abs(piece.share) >= 0.5),
         ),
     )
@@ -251,7 +251,7 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
             "Record a movement in which every foot that touches the ground stands on a plate."
         )
     said += [text for one in large[:1] if (text := _where_large(record, one))]
-    return said[: _MOST_TO_DO + 1] if len(said) > 1 else [*said, *advice(record)]
+    return said[: _MOST + 1] if len(said) > 1 else [*said, *advice(record)]
 
 
 def _first_step(cause: Sequence[Candidate]) -> str:
@@ -273,8 +273,8 @@ def _where_large(record: ParticipantRecord, yardstick: Yardstick) -> str:
         return ""
     worst = max(known, key=known.__getitem__)
     return (
-        f"Look at {worst}, where the {_within_sentence(yardstick.title)} is largest: does a foot miss "
-        "the plate, does something touch the person, are plates and markers in their places?"
+        f"Look at {worst}, where the {_within_sentence(yardstick.title)} is largest: a foot beside the "
+        "plate, a hand on something, plates or markers out of place?"
     )
 
 

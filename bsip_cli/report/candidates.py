@@ -91,12 +91,6 @@ class Candidate:
         return effect_title(self.effect) + (f": {where}" if where else "")
 
     @property
-    def answer(self) -> str:
-        """The verdict, but ``unnamed`` for something that was found and has no name."""
-        unnamed = self.verdict == "named" and self.effect == UNNAMED
-        return "unnamed" if unnamed else self.verdict
-
-    @property
     def is_of_all(self) -> bool:
         """The laboratory's, as all its persons together tell it."""
         return _OF_ALL in self.sentence

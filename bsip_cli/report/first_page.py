@@ -274,7 +274,7 @@ def _where_large(record: ParticipantRecord, yardstick: Yardstick) -> str:
     worst = max(known, key=known.__getitem__)
     return (
         f"Look at {worst}, where the {_within_sentence(yardstick.title)} is largest: a foot beside the "
-        "plate, a hand on something, plates or markers out of place?"
+        "plate, a hand on something, plates or markers out of place, forces that start late?"
     )
 
 

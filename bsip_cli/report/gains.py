@@ -11,7 +11,7 @@ import pandas as pd
 
 from bsip_cli.report.words import COMPONENTS, count, listing, number, signed
 from bsip_cli.statistics.choice import Difference
-from bsip_cli.statistics.methods import METHODS, OM, RIVALS, RM, RM_MASS, SAME_WITHIN
+from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
 
 _WORDS = {
     OM: "OM (segment parameters identified from this person)",
@@ -33,21 +33,6 @@ class Errors:
         """Relative change of RM's error: -0.4 is 40 % less."""
         return relative_change(self.of[RM], self.of.get(method, np.nan))
 
-    def rival(self) -> str:
-        """The better of RM and RM+mass."""
-        return min((method for method in RIVALS if method in self.of), key=self.of.__getitem__)
-
-    def over_rival(self) -> float:
-        """Relative change by OM of the error of the better of RM and RM+mass."""
-        return relative_change(self.of[self.rival()], self.of[OM])
-
-    def better(self) -> str:
-        """``OM``, its better rival, or empty where they are the same or not known."""
-        change = self.over_rival()
-        if not np.isfinite(change) or abs(change) <= SAME_WITHIN:
-            return ""
-        return OM if change < 0.0 else self.rival()
-
 
 @dataclass(frozen=True)
 class Gain(Errors):
@@ -56,15 +41,6 @@ class Gain(Errors):
     trial: str
     frames: int
     held_out: bool
-
-
-@dataclass(frozen=True)
-class PooledGain(Errors):
-    """Those over all frames of n trials, and in how many of these OM or one of its rivals leads."""
-
-    trials: int
-    om_better: int
-    rival_better: int
 
 
 def relative_change(before: float, after: float) -> float:
@@ -99,26 +75,12 @@ def _measure(component: str, row: pd.Series) -> tuple[str, str]:
     return "rmse", str(row["unit"])
 
 
-def pooled_gains(gains: Iterable[Gain]) -> tuple[PooledGain, ...]:
+def pooled_gains(gains: Iterable[Gain]) -> tuple[Errors, ...]:
     """Over all frames of the trials, component by component, so that a stride of 0.2 s counts for
     no more than it is; trials without numbers are left out."""
     known = [gain for gain in gains if np.isfinite(list(gain.of.values())).all()]
-    pooled = []
-    for component in COMPONENTS:
-        of_it = [gain for gain in known if gain.component == component]
-        if of_it:
-            leads = [gain.better() for gain in of_it]
-            pooled.append(
-                PooledGain(
-                    component,
-                    of_it[0].unit,
-                    _pooled(of_it),
-                    len(of_it),
-                    leads.count(OM),
-                    sum(lead in RIVALS for lead in leads),
-                )
-            )
-    return tuple(pooled)
+    of_each = ([gain for gain in known if gain.component == name] for name in COMPONENTS)
+    return tuple(Errors(of[0].component, of[0].unit, _pooled(of)) for of in of_each if of)
 
 
 def _pooled(gains: Sequence[Gain]) -> dict[str, float]:

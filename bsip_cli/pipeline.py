@@ -206,7 +206,7 @@ STAGES = (
 )
 
 
-FINDINGS = ("choose", "diagnose", "laboratory", "extend")
+FINDINGS = ("choose", "diagnose", "laboratory", "extend", "report")
 """Stages whose sentences are results; those of the others are remarks on the way."""
 
 

@@ -122,7 +122,7 @@ def regress(person: Person, sex: str, mass_kg: float, table: str = "dumas2007") 
         note = ""
         if not body.is_physical():
             body = Inertia(mass, body.com_m, nearest_physical_tensor(tensor))
-            note = "the table's tensor breaks the triangle inequality: nearest possible one taken"
+            note = "no body has the table's moments of inertia; the nearest possible ones are taken"
         inertias.append(body)
         notes.append(note)
     return Regression(tuple(inertias), tuple(notes))

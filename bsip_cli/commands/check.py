@@ -40,7 +40,7 @@ def check_study(
 
 def _about(unit: Unit, person: Participant) -> Iterator[str]:
     stated = [
-        person.sex,
+        {"M": "man", "F": "woman"}.get(person.sex, "sex other or not stated"),
         "mass not stated" if person.mass_kg is None else f"{person.mass_kg:g} kg",
         "height not stated" if person.height_m is None else f"{person.height_m:g} m",
     ]

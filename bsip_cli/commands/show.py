@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from shutil import get_terminal_size
 from textwrap import fill
@@ -10,12 +11,12 @@ from textwrap import fill
 import pandas as pd
 
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
-from bsip_cli.body.names import in_words
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.budget import overall_pieces
 from bsip_cli.report.candidates import candidates_of, causes_of, looked_at
 from bsip_cli.report.cohort.laboratory import named_sentences, unnamed_sentences
+from bsip_cli.report.gains import use_sentence
 from bsip_cli.report.participant.joints import largest_changes
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.shared import SHARED, Searched, searched, shared_causes
@@ -30,7 +31,6 @@ from bsip_cli.report.verdict import (
 from bsip_cli.report.words import listing
 from bsip_cli.running.freshness import outdated
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.statistics.methods import OM, is_extended
 from bsip_cli.study.trials import listed
 
 _WIDEST = 100  # letters in a line
@@ -64,7 +64,7 @@ def shown(out: Path, full: bool = False) -> Iterator[str]:
             remedy="run `bsip run` first, or name the folder that it was given with --out",
         )
     yield from ["\n".join(notes)] if notes else []
-    if full and tables:
+    if full and tables and len(list(out.glob("sub-*"))) > 1:  # of one person nothing is tested
         yield "\n".join(map(printable, tables.split("\n")))
     everybody, unread = [], []
     folders = sorted(path for path in out.glob("sub-*") if path.is_dir())
@@ -76,11 +76,6 @@ def shown(out: Path, full: bool = False) -> Iterator[str]:
         except BadDataError as error:
             unread.append(folder.name)
             yield f"\n{error}"
-        if full:
-            try:
-                yield from _joints(folder, _width(get_terminal_size().columns))
-            except BadDataError as error:
-                yield str(error)
     yield from _laboratory(out)
     yield from _no_more_true(out, get_terminal_size().columns)
     yield from _shared_text(shared_causes(everybody), get_terminal_size().columns)
@@ -140,37 +135,45 @@ def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | Non
         return None
     facts = read_header(_path(folder, "overall-diagnosis"))["provenance"]["facts"]
     if not full:
-        lines = list(_findings(folder, diagnosis, detection))
-        lines = lines if alone else lines[:1]
+        lines = _findings(folder, diagnosis, detection, alone)
         return searched(folder.name, diagnosis, facts), "\n".join(lines)
     gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
     budget = _table(folder, "overall-error-budget")
     found = verdict_of(diagnosis, detection, gains, changes, budget)
     right = put_right_sentence(_marker_events(folder))
+    if light := _light(folder):
+        found = replace(found, headline=f"{light.title}. {light.text}")
+    changed = tuple(f"{said}." for said in largest_changes(_peaks(folder)))
+    found = replace(found, results=(*found.results, *changed))
     text = verdict_text(folder.name, found, right, get_terminal_size().columns)
     return searched(folder.name, diagnosis, facts), text
 
 
-def _findings(folder: Path, diagnosis: pd.DataFrame, detection: pd.DataFrame) -> Iterator[str]:
+def _findings(
+    folder: Path, diagnosis: pd.DataFrame, detection: pd.DataFrame, alone: bool
+) -> Iterator[str]:
     """A line each, the most important first: whether anything is wrong, the causes, what makes the
-    error, which parameters to use, what is changed at the joints."""
+    error, which parameters to use, what is changed at the joints. Of one among many the first."""
     width = _width(get_terminal_size().columns)
     budget, choice = (_table(folder, kind) for kind in ("overall-error-budget", "choice"))
     light = _light(folder) or light_of(diagnosis, detection, budget)
-    use = "" if choice is None else f" Use {choice['use'].iloc[0]}."
+    use = "" if alone or choice is None else f" Use {choice['use'].iloc[0]}."
     yield _wrapped(f"{folder.name}: {light.title}. {light.text}{use}", width)
+    if not alone:
+        return
     causes = causes_of(candidates_of(diagnosis))
     everywhere = looked_at(detection, diagnosis)
     for number, cause in enumerate(causes[:_MOST], start=1):
         yield _wrapped(cause_line(cause, everywhere), width, f"{number:2d}. ")
     if len(causes) > _MOST:
-        yield f"  - {len(causes) - _MOST} more causes: --full"
+        yield f"  - {len(causes) - _MOST} more findings: --full"
     if budget is not None and (pieces := overall_pieces(budget)):
         parts = listing([f"{one.label} {one.share:.0f} %" for one in pieces])
         yield _wrapped(f"The error of the table's parameters (RM): {parts}.", width, "  - ")
     if choice is not None:
-        said = str(choice["sentence"].iloc[0]).partition(". ")[0].rstrip(".")
-        yield _wrapped(f"{said}.", width, "  - ")
+        identified = _table(folder, "identification")
+        assert identified is not None  # it was chosen among what was identified
+        yield _wrapped(use_sentence(choice, identified, light.state == "large"), width, "  - ")
     for said in largest_changes(_peaks(folder)):
         yield _wrapped(f"{said}.", width, "  - ")
 
@@ -192,33 +195,6 @@ def _peaks(folder: Path) -> pd.DataFrame:
         for path in files
     ]
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
-
-
-def _joints(folder: Path, width: int) -> Iterator[str]:
-    """What OM, and what was named, change most at a joint: a line each."""
-    peaks, lines = _peaks(folder), []
-    if peaks.empty:
-        return
-    for asked in (peaks["method"].eq(OM), peaks["method"].map(is_extended).astype(bool)):
-        rows = peaks[asked].dropna(subset="change_Nm")
-        if len(rows):
-            most = rows.iloc[int(rows["change_Nm"].abs().argmax())]
-            lines.append(_wrapped(_change_in_words(most.to_dict()), width, "  - "))
-    if lines:
-        name = printable(folder.name)
-        title = f"{name}: largest changes of joint moments (*_joint-peaks.parquet has all)"
-        yield "\n".join([f"\n{_wrapped(title, width)}", *lines])
-
-
-def _change_in_words(row: dict) -> str:
-    """``OM against RM: left knee extension +0.6 N m, with a peak of 72.0 N m (1.15 N m/kg), in
-    sub-01_task-walking``."""
-    axis = str(row["axis"]).replace("_", " ")
-    return (
-        f"{row['method']} against {row['compared_with']}: {in_words(row['joint'])} {axis} "
-        f"{row['change_Nm']:+.1f} N m, with a peak of {row['peak_Nm']:.1f} N m "
-        f"({row['peak_Nm_kg']:.2f} N m/kg), in {row['trial']}"
-    )
 
 
 def _no_more_true(out: Path, columns: int) -> Iterator[str]:

@@ -280,8 +280,8 @@ def _sum(parts: Iterable[np.ndarray]) -> np.ndarray:
 _LOUD = 0.5  # of the yardstick, by which a component varies at least for its course to count
 _WORDS = {
     **{name: words.replace("horizontal force", "force") for name, words in OF_THE_LAB.items()},
-    "cop_ap": "the centre of pressure, forwards,",
-    "cop_ml": "the centre of pressure, sideways,",
+    "cop_ap": "the centre of pressure forwards",
+    "cop_ml": "the centre of pressure sideways",
 }
 
 
@@ -364,14 +364,14 @@ def _finding(
     factor, read = (1000.0, "mm") if unit == "m" else (1.0, unit)
     trials = tuple(dict.fromkeys(one.trial for one in found))
     follows = (
-        f", and what is simulated follows it with a correlation of {worst.correlation:.2f}"
+        f", and simulated and measured hardly go together (correlation {worst.correlation:.2f})"
         if worst.correlation < yardsticks.correlation
         else ""
     )
     sentence = (
-        f"large error, cause unknown: beside all that is named, and ordinary errors of ordinary "
-        f"size, {_WORDS[worst.component]} errs by {factor * worst.error:.3g} {read}{follows}; "
-        f"no good recording has more than {factor * yardsticks.of(worst.component):.3g} {read}; "
+        f"large error, cause unknown: {factor * worst.error:.3g} {read} of "
+        f"{_WORDS[worst.component]} (RMS) remain unexplained{follows}; in good recordings at most "
+        f"{factor * yardsticks.of(worst.component):.3g} {read} remain; "
         f"{along(trials, worst.component)}{interval_words((number,))}"
     )
     return Finding(UNEXPLAINED, "", trials, (number,), sentence, worst.chance, 1 - worst.chance)

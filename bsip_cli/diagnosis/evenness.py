@@ -49,7 +49,7 @@ class Uneven(Nameless):
 
     def sentence(self, scene: Scene, target: str, values: np.ndarray) -> str:
         told = self.effect.sentence(scene, target, values)
-        return f"something without a name acts as if {told}, but not evenly"
+        return f"no known fault makes what the forces show: {told}, but not evenly"
 
 
 def plain(effect: Effect) -> Effect:

@@ -353,14 +353,10 @@ def _note(fit: Fit, terms: Terms, of_the_body: int) -> str:
     """``of_the_body``: how many of the spreads are; those of the instruments come after them."""
     masses, centres, *tensors = 1 / np.sqrt(fit.weights.spread[:of_the_body])
     note = (
-        f"the data decide as much as {fit.decided:.0f} of {terms.table.size} parameters, the table "
-        "the rest; distance from the table in standard deviations among people: masses "
-        f"{masses:.2f}, centres of mass {centres:.2f}, inertias "
-        f"{min(tensors):.2f} to {max(tensors):.2f}"
+        f"the data decide {fit.decided:.0f} of {terms.table.size} parameters, the table the rest; "
+        f"masses lie {masses:.2f} standard deviations among people from the table, centres of mass "
+        f"{centres:.2f}, inertias {min(tensors):.2f} to {max(tensors):.2f}"
     )
     if fit.decided < _LITTLE:
-        note += (
-            "; too little motion, or errors that hide what it tells (see the diagnosis): the "
-            "parameters stay near the table (RM)"
-        )
+        note += "; too little motion, or errors that hide what it tells"
     return note

@@ -59,6 +59,6 @@ def _note(factor: float, sd: float, phi: np.ndarray) -> str:
     low, high = factor - Z95 * sd, factor + Z95 * sd
     before = float(phi[::10].sum())
     return (
-        f"all masses and tensors of the table (RM) times {factor:.4f} (95 % interval {low:.4f} to "
-        f"{high:.4f}): {before:.2f} kg become {factor * before:.2f} kg"
+        f"the table's masses (RM) times {factor:.4f} (95 % interval {low:.4f} to {high:.4f}), "
+        f"{factor * before:.2f} kg in all"
     )

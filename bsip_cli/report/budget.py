@@ -73,8 +73,15 @@ def _overall(budget: pd.DataFrame) -> pd.DataFrame:
 
 
 def _cut(rows: pd.DataFrame) -> tuple[Piece, ...]:
-    found = [_together(rows, terms) for terms in _groups(rows)]
-    large = [one for one in found if abs(one.share) >= _WORTH and one.label not in _LAST]
+    """What was found has its own piece, however small."""
+    groups = list(_groups(rows))
+    found = [_together(rows, terms) for terms in groups]
+    least = [0.5 if terms[0].startswith(_FAULT) else _WORTH for terms in groups]
+    large = [
+        one
+        for one, size in zip(found, least, strict=True)
+        if (one.share >= size or one.share <= -_WORTH) and one.label not in _LAST
+    ]
     large.sort(key=lambda one: -one.share)
     last = [one for one in found if one.label in _LAST]
     others = 100.0 - sum(one.share for one in (*large, *last))

@@ -28,6 +28,7 @@ UNNAMED = "unexplained"
 _INTERVAL = re.compile(r" \([^()]*: 95 % interval .*$")  # what follows it the report says itself
 _ADVICE = re.compile(r"; ([^;]* look alike here: )?to tell them apart, .*$")
 _REMARK = re.compile(r"; this is [^;]*")  # what markers prove by themselves
+_OF_ALL = "; this is known from the laboratory"
 _REASON = re.compile(r" \([^()]*\)$")  # how improbable a rejected candidate is
 _MINUS = re.compile(r"(?<![\w.)])-(?=\d)")
 _SIGNED = re.compile(r"[+−]\d")
@@ -90,10 +91,9 @@ class Candidate:
         return effect_title(self.effect) + (f": {where}" if where else "")
 
     @property
-    def answer(self) -> str:
-        """The verdict, but ``unnamed`` for something that was found and has no name."""
-        unnamed = self.verdict == "named" and self.effect == UNNAMED
-        return "unnamed" if unnamed else self.verdict
+    def is_of_all(self) -> bool:
+        """The laboratory's, as all its persons together tell it."""
+        return _OF_ALL in self.sentence
 
     def what(self) -> str:
         """Its sentence without interval, advice and reason."""

@@ -57,7 +57,7 @@ _PERSON = (
 _LOAD = (
     "A load that is not stated ends up in the masses of the body where its recording identifies "
     "them, and in the errors of the forces where it judges them.",
-    "If the load belongs to the task, state its mass (tutorial: loads) and run again.",
+    "Weigh it, state its mass (tutorial: loads) and run again.",
 )
 WEIGHT = (
     "Either the stated mass is wrong or what the plates measure. Only if a scale confirms the stated "
@@ -115,7 +115,7 @@ EFFECT_WORDS = {
     "camera_frame": EffectWords("cameras turned against plates and gravity", *_FRAME),
     "external_force": EffectWords("constant force beside the plates", *_CONTACT),
     "object_handled": EffectWords("object picked up and put down", *_LOAD),
-    "unexplained": EffectWords("something without a name", *_UNNAMED),
+    "unexplained": EffectWords("error of unknown cause", *_UNNAMED),
 }
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from bsip_cli.report.blocks import (
     Bar,
@@ -23,22 +24,23 @@ from bsip_cli.report.blocks import (
 )
 from bsip_cli.report.budget import overall_pieces
 from bsip_cli.report.candidates import (
+    OF_THE_WEIGHT,
     Candidate,
     candidates_of,
     causes_of,
     is_large,
-    limits_of,
-    limits_sentence,
     looked_at,
 )
 from bsip_cli.report.effect_words import separating_recording
+from bsip_cli.report.gains import use_sentence
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
-from bsip_cli.report.sticks import Motion, Pose, poses_of
 from bsip_cli.report.verdict import (
     ALL_FAULTS,
+    CAUSE_UNKNOWN,
     cause_line,
     consequences,
     light_of,
+    unseen,
 )
 from bsip_cli.report.words import capital, count, listing, number
 from bsip_cli.report.yardsticks import (
@@ -50,29 +52,19 @@ from bsip_cli.report.yardsticks import (
     errors_of,
     yardsticks,
 )
-from bsip_cli.statistics.choice import Difference
-from bsip_cli.statistics.methods import OM, RM, RM_MASS
+
+if TYPE_CHECKING:
+    from bsip_cli.report.figures.person import Pose
 
 _SEXES = {"M": "man", "F": "woman"}
 _MOST = 2  # causes, and things to do
-_PAIRS = ("om", "rm_mass", "om_rm_mass")
 _POSES = 8  # among which the one is chosen that is shown
-_COLOURS = {
-    "fine": "✓: no fault, no large error.",
-    "cause": "▲: something found, but no large error.",
-    "large": "■: a large error, explained or not.",
-    "inconclusive": "?: nothing can be said.",
-}
+_SIGNS = "✓ fine; ▲ something found; ■ large error; ? inconclusive."
 _USABLE = {
     "fine": "The data may be used: nothing needs to be corrected.",
     "cause": "The data may be used once what was found is corrected or stated.",
     "large": "Use no results before the large error is understood.",
     "inconclusive": "Whether the data may be used cannot be said.",
-}
-_WORDS = {
-    OM: "OM, the segment parameters identified from this person",
-    RM_MASS: "RM+mass, the segment parameters of a table, all masses times one number",
-    RM: "RM, the segment parameters of an anthropometric table",
 }
 
 
@@ -83,8 +75,8 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         *portrait(record),
         Terms((*who(record),)),
         Heading("Is anything wrong?"),
-        light,
-        Paragraph(_COLOURS[light.state], "note"),
+        replace(light, text="") if _found(record) and large_errors(record) else light,
+        Paragraph(_SIGNS, "note"),
         *_causes(record),
         *budget_bar(record),
         Heading("How large are the errors?"),
@@ -92,7 +84,7 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         Paragraph(f"Root mean square (RMS), with {record.use()}. {SOURCES}", "note"),
         *_sure(record, light),
         Heading("Which parameters to use"),
-        Paragraph(use_sentence(record, light.state == "large")),
+        Paragraph(use_sentence(record.choice, record.identification, light.state == "large")),
         Heading("What to do next"),
         Bullets(tuple(to_do(record, light))),
     )
@@ -132,7 +124,7 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     saved = f"; files saved {' to '.join(dict.fromkeys((dates[0], dates[-1])))}" if dates else ""
     yield "Recordings", f"{listing(tasks)}{saved}"
     used = listing([trial.label for trial in record.identification_trials()])
-    yield "Parameters from", used
+    yield "Identified from", used
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
     yield "Software", f"bsip {', '.join(versions)}"
     if record.facts["mass_note"]:
@@ -157,6 +149,8 @@ def portrait(record: ParticipantRecord) -> tuple[Block, ...]:
 
 
 def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
+    from bsip_cli.report.figures.person import Motion, poses_of
+
     if trial.kinematics is None:
         return ()
     anterior = record.facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
@@ -185,22 +179,27 @@ def _causes(record: ParticipantRecord) -> Iterator[Block]:
     if lines:
         yield Numbered(lines[:_MOST])
     if len(lines) > _MOST:
-        yield Links("", ((f"{len(lines) - _MOST} more below", f"#{ALL_FAULTS}"),))
+        more = f"{count(len(lines) - _MOST, 'more finding')} below"
+        yield Links("", ((more, f"#{ALL_FAULTS}"),))
 
 
 def _sure(record: ParticipantRecord, light: Light) -> Iterator[Block]:
-    """What might have been missed; nothing where no search was made."""
+    """Of the error, of what was found, of what might have been missed; nothing where no search was
+    made."""
     if record.diagnosis is None or record.detection is None:
         return
-    limits = limits_sentence(limits_of(record.detection, record.diagnosis))
-    causes = _found(record)
-    said = "Nothing was found that is more probable than not."
-    if light.state == "large" and (not causes or is_large(causes[0])):
-        said = "That the error is there is certain, its cause is not."
-    elif causes:
-        said = "Each probability allows for ordinary errors."
+    said = []
+    if light.state == "large":
+        cause = (
+            "its cause is not known" if CAUSE_UNKNOWN in light.title else "its causes are estimates"
+        )
+        said.append(f"That the error is large is certain; {cause}.")
+    if any(not is_large(cause) for cause in _found(record)):
+        said.append("Each finding states its own probability.")
+    elif light.state != "large":
+        said.append("No fault is more probable than not.")
     yield Heading("How sure is this?")
-    yield Paragraph(f"{said} {limits}".rstrip())
+    yield Paragraph(" ".join((*said, unseen(record.detection, record.diagnosis))).rstrip())
 
 
 def budget_bar(record: ParticipantRecord) -> tuple[Block, ...]:
@@ -211,8 +210,7 @@ def budget_bar(record: ParticipantRecord) -> tuple[Block, ...]:
         return ()
     return (
         Bar(
-            "What makes the squared error of force and centre of pressure with a table (RM), faults or "
-            "not",
+            "What makes the squared error of the forces with a table's parameters (RM)",
             tuple((piece.label, piece.share) for piece in pieces if abs(piece.share) >= 0.5),
         ),
     )
@@ -233,62 +231,6 @@ def scales(record: ParticipantRecord) -> tuple[Scale, ...]:
     return tuple(yardstick.scale(value) for yardstick, value in measured_of(record))
 
 
-# --- which parameters ---------------------------------------------------------------------------
-
-
-def use_sentence(record: ParticipantRecord, is_wrong: bool = False) -> str:
-    """Which method, by how much it is better than the others, and in which movements another."""
-    use = "Once the large error is understood, use" if is_wrong else "Use"
-    if record.choice is None or record.choice.empty:
-        return f"{use} {_WORDS[RM]}: nothing was compared."
-    first = record.choice.iloc[0]
-    said = f"{use} {_WORDS[str(first['use'])]}{_compared(first)}."
-    others = [
-        f"{method} for {listing(list(rows['movement']))}"
-        for method, rows in record.choice.iloc[1:].groupby("use")
-        if method != first["use"]
-    ]
-    rare = record.identification[record.identification["rare"].astype(bool)]
-    warned = [
-        f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare["method"]
-    ]
-    return " ".join([said, *([f"But {listing(others)}."] if others else []), *warned])
-
-
-def _compared(first: pd.Series) -> str:
-    """What the choice rests on, to go on with after the method's name."""
-    if not np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all():
-        return ": no recording is left to judge OM by"
-    compared = {
-        name: _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
-    }
-    table, scaled = "a table (RM)", "a scaled table (RM+mass)"
-    said = f". OM errs {compared['om']} than {table}"
-    same = compared["om"] == compared["om_rm_mass"]
-    said += f" and {scaled}" if same else f", {compared['om_rm_mass']} than {scaled}"
-    if first["use"] == RM_MASS:
-        said += f", RM+mass {compared['rm_mass']} than RM"
-    n = int(first["trials"])
-    where = {
-        "whole_trials": f" in {count(n, 'other recording')}",
-        "held_out": f" in seconds of {count(n, 'recording')} that were kept apart",
-    }
-    unsure = "" if first["use"] == OM else ": no sure gain by OM"
-    return f"{said}{where.get(str(first['data']), '')}{unsure}"
-
-
-def _change(ratio: float, log_error: float) -> str:
-    """``31 to 45 % less`` or ``5 % less to 16 % more``: one standard error to either side."""
-    ends = [100 * (end - 1) for end in Difference.of_ratio(ratio, log_error).interval()]
-    if not np.isfinite(ends).all():
-        ends = [100 * (ratio - 1)] * 2
-    words = ["less" if end < 0 else "more" for end in ends]
-    if words[0] != words[1]:
-        return f"{number(-ends[0], 0)} % less to {number(ends[1], 0)} % more"
-    sizes = [number(size, 0) for size in sorted(map(abs, ends))]
-    return f"{' to '.join(dict.fromkeys(sizes))} % {words[0]}"
-
-
 # --- what to do ---------------------------------------------------------------------------------
 
 
@@ -299,7 +241,7 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
     said = [_USABLE[light.state], *said]
     said += consequences(causes[:_MOST], only_actions=True)
     said += [
-        f"To find the cause of fault {k}: {_first_step(cause)}."
+        f"To learn the cause of finding {k}, {_first_step(cause)}."
         for k, cause in enumerate(causes[:_MOST], start=1)
         if len(cause) > 1
     ][:1]
@@ -313,6 +255,8 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
 
 
 def _first_step(cause: Sequence[Candidate]) -> str:
+    if cause[0].class_id == OF_THE_WEIGHT:
+        return "weigh the person on a scale"
     return separating_recording([(one.effect, one.target) for one in cause], most=1)
 
 
@@ -329,8 +273,8 @@ def _where_large(record: ParticipantRecord, yardstick: Yardstick) -> str:
         return ""
     worst = max(known, key=known.__getitem__)
     return (
-        f"Look at {worst}, where the {_within_sentence(yardstick.title)} is largest: does a foot miss "
-        "the plate, does something touch the person, are plates and markers in their places?"
+        f"Look at {worst}, where the {_within_sentence(yardstick.title)} is largest: a foot beside the "
+        "plate, a hand on something, plates or markers out of place, forces that start late?"
     )
 
 

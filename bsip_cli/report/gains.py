@@ -9,8 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from bsip_cli.report.words import COMPONENTS, number, signed
-from bsip_cli.statistics.methods import METHODS, OM, RIVALS, RM, RM_MASS, SAME_WITHIN
+from bsip_cli.report.words import COMPONENTS, count, listing, number, signed
+from bsip_cli.statistics.choice import Difference
+from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
+
+_WORDS = {
+    OM: "OM (segment parameters identified from this person)",
+    RM_MASS: "RM+mass (segment parameters of a table, masses times one number)",
+    RM: "RM (segment parameters of an anthropometric table)",
+}
+_PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
 
 
 @dataclass(frozen=True)
@@ -25,21 +33,6 @@ class Errors:
         """Relative change of RM's error: -0.4 is 40 % less."""
         return relative_change(self.of[RM], self.of.get(method, np.nan))
 
-    def rival(self) -> str:
-        """The better of RM and RM+mass."""
-        return min((method for method in RIVALS if method in self.of), key=self.of.__getitem__)
-
-    def over_rival(self) -> float:
-        """Relative change by OM of the error of the better of RM and RM+mass."""
-        return relative_change(self.of[self.rival()], self.of[OM])
-
-    def better(self) -> str:
-        """``OM``, its better rival, or empty where they are the same or not known."""
-        change = self.over_rival()
-        if not np.isfinite(change) or abs(change) <= SAME_WITHIN:
-            return ""
-        return OM if change < 0.0 else self.rival()
-
 
 @dataclass(frozen=True)
 class Gain(Errors):
@@ -48,15 +41,6 @@ class Gain(Errors):
     trial: str
     frames: int
     held_out: bool
-
-
-@dataclass(frozen=True)
-class PooledGain(Errors):
-    """Those over all frames of n trials, and in how many of these OM or one of its rivals leads."""
-
-    trials: int
-    om_better: int
-    rival_better: int
 
 
 def relative_change(before: float, after: float) -> float:
@@ -91,26 +75,12 @@ def _measure(component: str, row: pd.Series) -> tuple[str, str]:
     return "rmse", str(row["unit"])
 
 
-def pooled_gains(gains: Iterable[Gain]) -> tuple[PooledGain, ...]:
+def pooled_gains(gains: Iterable[Gain]) -> tuple[Errors, ...]:
     """Over all frames of the trials, component by component, so that a stride of 0.2 s counts for
     no more than it is; trials without numbers are left out."""
     known = [gain for gain in gains if np.isfinite(list(gain.of.values())).all()]
-    pooled = []
-    for component in COMPONENTS:
-        of_it = [gain for gain in known if gain.component == component]
-        if of_it:
-            leads = [gain.better() for gain in of_it]
-            pooled.append(
-                PooledGain(
-                    component,
-                    of_it[0].unit,
-                    _pooled(of_it),
-                    len(of_it),
-                    leads.count(OM),
-                    sum(lead in RIVALS for lead in leads),
-                )
-            )
-    return tuple(pooled)
+    of_each = ([gain for gain in known if gain.component == name] for name in COMPONENTS)
+    return tuple(Errors(of[0].component, of[0].unit, _pooled(of)) for of in of_each if of)
 
 
 def _pooled(gains: Sequence[Gain]) -> dict[str, float]:
@@ -138,3 +108,63 @@ def one_number_alone(quantity: str, rm_mass: float, om: float, over_rm_mass: flo
         f"One number for the whole mass alone ({RM_MASS}) changes RM's error in the {quantity} by "
         f"{signed(100.0 * rm_mass)} %, OM by {signed(100.0 * om)} %: {gained}."
     )
+
+
+# --- which parameters ---------------------------------------------------------------------------
+
+
+def use_sentence(
+    choice: pd.DataFrame | None, identification: pd.DataFrame, is_wrong: bool = False
+) -> str:
+    """Which method, by how much it is better than the others, and in which movements another; from
+    the artifacts of these names."""
+    use = "Once the large error is understood, use" if is_wrong else "Use"
+    if choice is None or choice.empty:
+        return f"{use} {_WORDS[RM]}: nothing was compared."
+    first = choice.iloc[0]
+    said = f"{use} {_WORDS[str(first['use'])]}{_compared(first)}."
+    others = [
+        f"{method} for {listing(list(rows['movement']))}"
+        for method, rows in choice.iloc[1:].groupby("use")
+        if method != first["use"]
+    ]
+    rare = identification[identification["rare"].astype(bool)]
+    warned = [
+        f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare["method"]
+    ]
+    return " ".join([said, *([f"But {listing(others)}."] if others else []), *warned])
+
+
+def _compared(first: pd.Series) -> str:
+    """What the choice rests on, to go on with after the method's name."""
+    if not np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all():
+        return ": no recording is left to judge OM by"
+    om, scaled, over_scaled = (
+        _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
+    )
+    n = int(first["trials"])
+    where = {
+        "whole_trials": f"in {count(n, 'other recording')} ",
+        "held_out": f"in seconds of {count(n, 'recording')} that were kept apart ",
+    }.get(str(first["data"]), "")
+    if first["use"] == RM_MASS:
+        return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"
+    table, times = "RM (table)", "RM+mass (table, masses times one number)"
+    said = f"{om} than {table} and {times}"
+    if om != over_scaled:
+        said = f"{om} than {table}, {over_scaled} than {times}"
+    if first["use"] == OM:
+        return f": {where}it errs {said}"
+    return f": {where}OM (identified) errs {said}, which is no sure gain"
+
+
+def _change(ratio: float, log_error: float) -> str:
+    """``31 to 45 % less`` or ``5 % less to 16 % more``: one standard error to either side."""
+    ends = [100 * (end - 1) for end in Difference.of_ratio(ratio, log_error).interval()]
+    if not np.isfinite(ends).all():
+        ends = [100 * (ratio - 1)] * 2
+    words = ["less" if end < 0 else "more" for end in ends]
+    if words[0] != words[1]:
+        return f"{number(-ends[0], 0)} % less to {number(ends[1], 0)} % more"
+    sizes = [number(size, 0) for size in sorted(map(abs, ends))]
+    return f"{' to '.join(dict.fromkeys(sizes))} % {words[0]}"

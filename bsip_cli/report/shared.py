@@ -15,7 +15,7 @@ from bsip_cli.report.words import capital, listing, number, task_of
 from bsip_cli.statistics.samples import p_of_one_size
 
 SHARED = (
-    "Shared causes may point to the laboratory, the protocol or the model rather than to a person "
+    "Shared causes may point to the laboratory, the task or the model rather than to a person "
     "(a few of very many may be coincidence):"
 )
 _MOST_NAMED = 12  # participants in one sentence
@@ -53,7 +53,7 @@ def searched(participant: str, diagnosis: pd.DataFrame, facts: Mapping[str, Any]
 
 def shared_causes(people: Sequence[Searched]) -> tuple[str, ...]:
     """A sentence for each cause that more than one person has, be it as one of several that look
-    alike; what most people have comes first."""
+    alike; what most people have comes first. What the laboratory tells of itself is said there."""
     shared = [found for found in _found(people) if len(found.people) > 1]
     shared.sort(key=lambda found: -len(found.people))
     said = [_told(found, people) for found in shared[:_MOST_TOLD]]
@@ -74,7 +74,7 @@ def _found(people: Sequence[Searched]) -> list[_Found]:
     found: dict[str, _Found] = {}
     for person in people:
         for cause in person.causes:
-            for one in cause:
+            for one in (x for x in cause if not x.is_of_all):
                 known = found.setdefault(one.label, _Found(one.label, {}, set()))
                 known.people.setdefault(person.id, []).append(one)
                 if len(cause) == 1:

@@ -60,14 +60,13 @@ _MOST_MEMBERS = 2  # of a group, in a line
 _MOST_CHANGES = 2
 _MOST_STEPS = 3
 _WORTH_KG, _WORTH_MM = 0.05, 1.0  # changes of the parameters below are none to a reader
-_NO_TRIAL = "Inconclusive: no recording has motion with every contact on a plate."
+_NO_TRIAL = "No recording has motion with every contact on a plate."
 _OF_THE_LAB = (
     "It is a matter of the laboratory: whoever else was recorded there has it too, if it is there."
 )
-_NOTHING = "Nothing is wrong above the noise."
-_UNEXPLAINED = (
-    "large error, cause unknown: beside all that is named, and ordinary errors of ordinary size, "
-)
+CAUSE_UNKNOWN = "cause unknown"
+_UNEXPLAINED = f"large error, {CAUSE_UNKNOWN}: "
+_OR_THE_MASS = ", or the stated mass is wrong"
 NOT_RUN = "The recordings were not searched for errors: run `bsip diagnose`."
 
 
@@ -109,8 +108,9 @@ def verdict_of(
     it is known."""
     causes = causes_of(candidates_of(diagnosis))
     everywhere = looked_at(detection, diagnosis)
+    light = light_of(diagnosis, detection, budget)
     return Verdict(
-        headline(diagnosis),
+        f"{light.title}. {light.text}".rstrip(),
         bool(causes),
         tuple(cause_text(cause, everywhere) for cause in causes),
         (
@@ -119,68 +119,63 @@ def verdict_of(
             *_seen_in(everywhere),
         ),
         (*filter(None, [_named_twice(causes)]), *consequences(causes)),
-        limits_sentence(limits_of(detection, diagnosis)),
+        unseen(detection, diagnosis),
     )
 
 
-def headline(diagnosis: pd.DataFrame) -> str:
-    """One sentence on whether anything is wrong."""
-    if diagnosis.empty:
-        return _NO_TRIAL
-    causes = causes_of(candidates_of(diagnosis))
-    if not causes:
-        return _NOTHING
-    unnamed = sum(len(c) == 1 and c[0].effect == UNNAMED for c in causes)
-    classes = sum(len(c) > 1 for c in causes)
-    named = len(causes) - unnamed - classes
-    if unnamed == len(causes):
-        return "Something is wrong that has no name in the catalogue of faults."
-    parts = [f"{count(named, 'fault')} named"] if named else []
-    if classes:
-        how_many = str(classes) if named else count(classes, "fault")
-        parts.append(f"{how_many} narrowed down to several")
-    if unnamed:
-        parts.append(f"{unnamed if parts else count(unnamed, 'fault')} without a name")
-    return f"Something is wrong: {listing(parts)}."
+def unseen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> str:
+    """What might have been missed; empty where that is not known."""
+    if any(is_large(cause) for cause in causes_of(candidates_of(diagnosis))):
+        return "Faults of any size may hide behind so large an error."
+    return limits_sentence(limits_of(detection, diagnosis))
 
 
 def light_of(
     diagnosis: pd.DataFrame | None,
     detection: pd.DataFrame | None,
     budget: pd.DataFrame | None = None,
-    large: Sequence[str] = (),
+    large: Sequence[str] | None = None,
     use: str = RM,
 ) -> Light:
     """Whether anything is wrong with a person's recordings: fine, a cause named, a large error that
     nothing explains, or inconclusive. ``large``: the yardsticks beyond which the errors are with
-    the method ``use``; ``budget`` is of RM's."""
+    the method ``use``, None where that is not known; ``budget`` is of RM's."""
     if diagnosis is None or detection is None:
         return Light("inconclusive", "Not examined", NOT_RUN)
     if diagnosis.empty:
-        return Light("inconclusive", "Inconclusive", _NO_TRIAL.removeprefix("Inconclusive: "))
+        return Light("inconclusive", "Inconclusive", _NO_TRIAL)
     causes = causes_of(candidates_of(diagnosis))
     unsure = [c[0] for c in causes if c[0].effect == "inconclusive"]
     if unsure:
         return Light("inconclusive", "Inconclusive", f"{capital(unsure[0].what())}.")
     looked = count(len(looked_at(detection, diagnosis)), "recording")
-    how_large = f"{capital(listing(large))}." if large else ""
-    found = f"{count(len(causes), 'fault')} found" if causes else ""
+    nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
+    found = _how_many(causes)
     if large or any(is_large(cause) for cause in causes):
-        nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
         title = "; ".join(filter(None, (f"Large error{mostly(budget, use)}", found)))
-        return Light("large", title, " ".join(filter(None, (how_large, "" if causes else nothing))))
+        said = f"Large with {use}: {listing(large)}." if large else ""
+        return Light("large", title, " ".join(filter(None, (said, "" if causes else nothing))))
     if not causes:
-        nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
-        return Light("fine", "Fine: no fault found, errors of ordinary size", nothing)
+        title = "No fault found" if large is None else "Fine: no fault found, no large error"
+        return Light("fine", title, nothing)
     share = np.nan if budget is None else fault_share(budget)
     size = f"{number(share, 0)} %" if share >= 1.0 else "less than 1 %"
-    named = "" if np.isnan(share) else f"What was found makes {size} of the simulation's error."
-    title = headline(diagnosis).removesuffix(".")
-    effects = [one.effect for cause in causes for one in cause]
-    if set(effects) <= set(OBJECTS):
-        objects = listing([effect_title(e) for e in dict.fromkeys(effects)])
-        title = f"Found: {objects}; errors of ordinary size"
+    named = "" if np.isnan(share) else f"What was found makes {size} of the squared error."
+    title = capital(found) if large is None else f"{capital(found)}; no large error"
     return Light("cause", title, named or f"Searched: {looked}.")
+
+
+def _how_many(causes: Sequence[Sequence[Candidate]]) -> str:
+    """``2 faults and 1 error of unknown cause found``; empty where nothing but a large error was.
+    What a task may be about is no fault."""
+    found = [cause for cause in causes if not is_large(cause)]
+    objects = [c for c in found if all(one.effect in OBJECTS for one in c)]
+    unnamed = [c for c in found if len(c) == 1 and c[0].effect == UNNAMED]
+    faults = len(found) - len(objects) - len(unnamed)
+    parts = [count(faults, "fault")] if faults else []
+    parts += [f"{count(len(unnamed), 'error')} of unknown cause"] if unnamed else []
+    parts += dict.fromkeys(effect_title(one.effect) for c in objects for one in c)
+    return f"{listing(parts)} found" if parts else ""
 
 
 def mostly(budget: pd.DataFrame | None, use: str = RM) -> str:
@@ -189,7 +184,7 @@ def mostly(budget: pd.DataFrame | None, use: str = RM) -> str:
     parts = () if budget is None or budget.empty else overall_pieces(budget)
     most = max(parts, key=lambda one: one.share, default=None)
     if most is None or most.label in (UNKNOWN, REST):
-        return ", cause unknown"
+        return f", {CAUSE_UNKNOWN}"
     if use == OM and PARAMETERS in most.label:
         return " also with identified parameters"
     return f", mostly {most.label} ({number(most.share, 0)} %)"
@@ -199,29 +194,41 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     """What, how large beside what laboratories meet, where and how sure, as short as possible."""
     sure = probability_words(probability_of(cause))
     if len(cause) > 1:
-        others = len(cause) - _MOST_MEMBERS
-        named_first = sorted(cause, key=lambda one: one.effect == UNNAMED)
-        shown = [_short(one) for one in named_first[:_MOST_MEMBERS]]
-        members = "; or ".join([*shown, *([f"{others} more"] if others > 0 else [])])
-        return f"One of {len(cause)}, not to be distinguished: {members}; probability {sure}."
+        return _group_line(cause, sure)
     (one,) = cause
     main = one.main_number()
-    usual = beside_usual(one.effect, main) if main else ""
+    usual = beside_usual(one.effect, main) if main and one.effect not in OBJECTS else ""
     some = _MOST_NAMED < len(one.trials) < len(everywhere)
     where = where_seen(one.trials, everywhere)
     where = f"in {len(one.trials)} of {len(everywhere)} recordings" if some else where
     if is_large(cause):
-        error = one.what().partition("; ")[0].removeprefix(_UNEXPLAINED)
-        return f"Unexplained by all that is named: {error} (RMS), {where}."
+        error, *good = one.what().removeprefix(_UNEXPLAINED).split("; ")
+        return f"{capital('; '.join([f'{error}, {where}', *good[:1]]))}."
     sure = f"; probability {sure}" if sure else ""
-    return f"{capital(one.told(remarks=False))}, {where}{usual}{sure}."
+    return f"{capital(one.told(remarks=one.is_of_all))}, {where}{usual}{sure}."
 
 
-def _short(one: Candidate) -> str:
-    """The beginning of its sentence."""
-    if one.effect == UNNAMED:
-        return "a fault that bsip does not know"
-    return re.split(r"[,:;] | \(", one.what())[0]
+def _group_line(cause: Sequence[Candidate], sure: str) -> str:
+    """What all say is said once."""
+    texts = [one.what().removesuffix(_OR_THE_MASS) for one in cause]
+    heads = {text.partition(": ")[0] for text in texts}
+    common = heads.pop() if len(heads) == 1 else ""
+    rest = [text.removeprefix(f"{common}: ") for text in texts]
+    if cause[0].class_id == OF_THE_WEIGHT:
+        mass = probability_words(1 - probability_of(cause))
+        return f"{capital(common)}: either {', '.join(rest)}{_OR_THE_MASS} (probability {mass})."
+    ranked = sorted(zip(cause, rest, strict=True), key=lambda pair: pair[0].effect == UNNAMED)
+    members = [
+        "an error of unknown cause" if one.effect == UNNAMED else re.split(r"[,:;] | \(", text)[0]
+        for one, text in ranked[:_MOST_MEMBERS]
+    ]
+    if len(cause) > _MOST_MEMBERS:
+        members.append(count(len(cause) - _MOST_MEMBERS, "other"))
+    head = f"{capital(common)}: one" if common else "One"
+    return (
+        f"{head} of {len(cause)} causes that look alike here: {', or '.join(members)}; probability "
+        f"that it is one of them {sure}."
+    )
 
 
 def _seen_in(everywhere: Sequence[str]) -> tuple[str, ...]:
@@ -245,7 +252,7 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     )
     apart = separating_recording([(one.effect, one.target) for one in cause], _MOST_STEPS)
     if first.class_id == OF_THE_WEIGHT:
-        apart = f"weigh the person as recorded; {apart}"
+        apart = f"weigh the person on a scale; {apart}"
     return (
         f"One of these, which these recordings cannot distinguish{common}: {members}. "
         f"{sure}{' ' if sure else ''}To distinguish them: {apart}."
@@ -296,7 +303,7 @@ def _explained(one: Candidate, position: int, cause: Sequence[Candidate]) -> str
     digits = 0 if gain >= 10 else 1
     share, least, most = (number(x, digits) for x in (gain, low, high))
     which = f"({_letter(position)}) " if len(cause) > 1 else ""
-    perhaps = "" if low > 0 else ", perhaps nothing"
+    perhaps = "" if low > 0 else ": too few seconds to be sure"
     return (
         f"{which}explains {share} % ({least} to {most} %{perhaps}) of the squared difference in "
         "seconds it was not fitted to"
@@ -412,7 +419,7 @@ def consequences(
     if len(causes) == 1 and not only_actions:
         return tuple(filter(None, numbers))
     return tuple(
-        f"{'Fault' if len(of) == 1 else 'Faults'} {listing([str(k) for k in of])}: {text}"
+        f"{'Finding' if len(of) == 1 else 'Findings'} {listing([str(k) for k in of])}: {text}"
         for text, of in numbers.items()
         if text
     )

@@ -23,7 +23,8 @@ from bsip_cli.diagnosis.marker_proof import BEND, bend_of, shaken_finding
 from bsip_cli.diagnosis.patterns import PATTERNS, UNEXPLAINED
 from bsip_cli.effects.catalogue import CATALOGUE
 from bsip_cli.report.budget import term_words
-from bsip_cli.report.verdict import verdict_of
+from bsip_cli.report.candidates import candidates_of, causes_of
+from bsip_cli.report.verdict import cause_line, verdict_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.diagnose_trial import cause_record, detection_rows, facts_of, rows_of
 from bsip_cli.stages.diagnosed_trials import Diagnosed, diagnosed, weighed
@@ -80,8 +81,9 @@ def run(unit: Unit) -> None:
     unit.write("overall-error-budget", budget)
     unit.write("overall-diagnosis", diagnosis, facts)
     unit.write("detection", limits)
-    said = verdict_of(diagnosis, limits)
-    for sentence in filter(None, (said.headline, *said.causes, said.limits)):
+    said = verdict_of(diagnosis, limits, budget=budget)
+    lines = [cause_line(one, facts["trials"]) for one in causes_of(candidates_of(diagnosis))]
+    for sentence in filter(None, (*(lines or [said.headline]), said.limits)):
         unit.warn(f"{unit.name}: {sentence}")
 
 
@@ -181,7 +183,7 @@ def _along(budget: pd.DataFrame, trials: Sequence[str], component: str) -> str:
     ]
     shares = rows.groupby("term", sort=False)["share_percent"].mean()
     if shares.empty or not shares.max() > _MOST_PERCENT:
-        return "it goes along with nothing that bsip knows"
+        return "nothing that bsip knows goes along with it"
     return (
         f"{shares.max():.0f} % of it would go along with {term_words(str(shares.idxmax()))}, which "
         "is not sure enough to be named"

@@ -17,8 +17,7 @@ from bsip_cli.artifacts import file_rows
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.cohort.document import SHOWN, cohort_document
 from bsip_cli.report.cohort.record import CohortRecord, Member, ratios_of, yardsticks_of
-from bsip_cli.report.origins import HowMade
-from bsip_cli.report.records import Origin
+from bsip_cli.report.records import HowMade, Origin
 from bsip_cli.report.shared import Searched, searched
 from bsip_cli.report.tables.build import build_tables
 from bsip_cli.report.words import listing
@@ -125,5 +124,5 @@ def _origins(unit: Unit) -> Iterator[Origin]:
                 if path.exists():
                     origin = origin_of(path, name)
                     origin.options.pop("participant", None)
-                    found = kind == "overall-diagnosis"
+                    found = kind in ("overall-diagnosis", "report-files")
                     yield replace(origin, messages=()) if found else origin

@@ -82,7 +82,7 @@ def run(unit: Unit) -> None:
     results = {method: readable(estimate, prior) for method, estimate in estimates.items()}
     tables = [regression.drop(columns=["note", *spread_names()])]
     for method, result in results.items():
-        unit.warn(f"{unit.name}: {method} ({estimators[method]}): {estimates[method].note}")
+        unit.warn(f"{unit.name}: {method}: {estimates[method].note}")
         tables.append(
             bsip_table(method, skeleton.body_names, result.values, result.sd, result.share)
         )

@@ -222,11 +222,23 @@ def _tell(unit: Unit, trial: _Trial, reasons: Reasons) -> None:
         names = list(map(in_words, trial.person.skeleton.joints[1:]))
         for frames in sorted(set(counts.tolist()) - {0}, reverse=True):
             joints = [name for name, n in zip(names, counts, strict=True) if n == frames]
-            which = "all joints" if len(joints) == len(names) else listing(joints)
+            which = "all joints" if len(joints) == len(names) else listing(_legs(joints))
             parts.append(f"{which} in {frames} ({words})")
     if parts:
         count = len(trial.times_s)
-        unit.warn(f"{unit.name}: of {count} frames joint moments are left out: {'; '.join(parts)}")
+        unit.warn(f"{unit.name}: joint moments left out of {count} frames: {'; '.join(parts)}")
+
+
+def _legs(joints: list[str]) -> list[str]:
+    """A whole leg, or both, by that name."""
+    whole = {
+        side: [f"{side} {joint}" for joint in ("hip", "knee", "ankle")]
+        for side in ("left", "right")
+    }
+    found = [side for side, own in whole.items() if set(own) <= set(joints)]
+    rest = [name for name in joints if not any(name in whole[side] for side in found)]
+    legs = ["both legs"] if len(found) == 2 else [f"the {side} leg" for side in found]
+    return [*legs, *rest]
 
 
 def _words_of(trial: _Trial, reasons: Reasons) -> dict[str, str]:

@@ -32,6 +32,7 @@ from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.plates import ALL
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.effects.scene import Scene
+from bsip_cli.report.cohort.laboratory import named_sentences
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names
 from bsip_cli.stages.known_laboratory import information_in, pooled_rows
@@ -76,9 +77,6 @@ def run(unit: Unit) -> None:
             f"the recordings are of {len(laboratories)} laboratories, by the places of their "
             f"plates: persons {counts}; each is judged by itself"
         )
-    said = [row for row in rows if row["verdict"] in ("named", "ambiguous")]
-    for sentence in dict.fromkeys(f"laboratory {x['laboratory']}: {x['sentence']}" for x in said):
-        unit.warn(sentence)
     if not rows:
         sentence = "no recording has motion with every contact on a plate"
         unit.warn(f"laboratory: nothing can be said: {sentence}")
@@ -90,6 +88,8 @@ def run(unit: Unit) -> None:
         "answer": _answer(unit, found),
     }
     table = pd.DataFrame(rows, columns=column_names("laboratory"))
+    for sentence in named_sentences(table):
+        unit.warn(sentence)
     unit.write("laboratory", table, facts)
     families = [name for row in sums for name in row if name.startswith(("precision_", "root_"))]
     columns = [*column_names("laboratory-sums"), *dict.fromkeys(families)]

@@ -43,7 +43,9 @@ def run(unit: Unit) -> None:
     assert unit.participant is not None
     record = record_of(unit)
     rows = file_rows(unit.out, write_page(unit, participant_document(record)))
-    unit.write("report-files", rows, facts={"light": asdict(light_for(record))})
+    light = light_for(record)
+    unit.warn(f"{unit.name}: {light.title}. {light.text}".rstrip())
+    unit.write("report-files", rows, facts={"light": asdict(light)})
 
 
 def write_page(unit: Unit, document: Document) -> list[Path]:

@@ -12,8 +12,9 @@ from bsip_cli.report.tables.build import BESIDE, NAMES, render_markdown, show
 from bsip_cli.report.tables.formats import escape_latex as latex
 from bsip_cli.report.tables.formats import escape_markdown as markdown
 from bsip_cli.report.tables.formats import to_csv, to_latex, to_markdown
-from bsip_cli.report.tables.labels import interval, mean_sd, number, p_value, segment
+from bsip_cli.report.tables.labels import interval, mean_sd, number, p_value
 from bsip_cli.report.tables.model import Column, Row, Table
+from bsip_cli.report.words import segment_label
 from bsip_cli.statistics.cohort import Criteria
 
 NASTY = r"50% of A&B_1 #2 {x} ~y ^z $5 \end{table} a|b <b>*bold*</b> `c`"
@@ -121,10 +122,10 @@ def test_numbers():
 
 
 def test_segments_in_words():
-    assert segment("upper_arm_l") == "left upper arm"
-    assert segment("lower_torso") == "lower torso"
-    assert segment("clavicle_r") == "right clavicle"
-    assert segment("head") == "head"
+    assert segment_label("upper_arm_l") == "left upper arm"
+    assert segment_label("lower_torso") == "lower torso"
+    assert segment_label("clavicle_r") == "right clavicle"
+    assert segment_label("head") == "head"
 
 
 def rows_of(text: str) -> list[list[str]]:

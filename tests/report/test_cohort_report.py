@@ -12,7 +12,7 @@ from bsip_cli.artifacts import empty_table
 from bsip_cli.report.blocks import Grid
 from bsip_cli.report.cohort.document import cohort_document, is_far
 from bsip_cli.report.cohort.record import CohortRecord, Ratios
-from bsip_cli.report.origins import HowMade
+from bsip_cli.report.records import HowMade
 from bsip_cli.report.words import MISSING
 from bsip_cli.schemas import column_names
 from bsip_cli.stages.group_report import record_of
@@ -41,8 +41,8 @@ def test_who_is_missing_is_said(page):
     assert "sub-03 has no identified parameters: not in tables 1 and 6" in page
 
 
-def test_all_five_tables_are_there(page):
-    for k in range(1, 6):
+def test_all_six_tables_are_there(page):
+    for k in range(1, 7):
         assert re.search(rf"<h3>Table {k}\. ", page)
     assert "table4_cross_validation.csv" in page
 
@@ -149,8 +149,9 @@ def of_laboratory(reports, table: pd.DataFrame | None) -> tuple[str, list[list[s
     record = replace(record_of(reports.unit("report")), laboratory=table)
     document = cohort_document(record)
     (section,) = [one for one in document.sections if one.anchor == "laboratory"]
-    texts = [getattr(block, "text", "") for block in section.blocks]
-    texts += [item for block in section.blocks for item in getattr(block, "items", ())]
+    said = (*document.front, *section.blocks)
+    texts = [getattr(block, "text", "") for block in said]
+    texts += [item for block in said for item in getattr(block, "items", ())]
     grids = [block for block in section.blocks if isinstance(block, Grid)]
     rows = [[cell.text for cell in row] for grid in grids for row in grid.cells()]
     return " ".join(texts), rows
@@ -159,13 +160,19 @@ def of_laboratory(reports, table: pd.DataFrame | None) -> tuple[str, list[list[s
 def test_a_fault_of_the_laboratory_is_told_with_its_numbers(reports):
     text, rows = of_laboratory(reports, laboratory("named", 0.9999))
     assert "Laboratory 1: the forces were recorded 11 ms after the markers." in text
-    assert rows[0][3:] == ["11 ms", "9.0 ms to 13 ms", "6.0 ms", "over 99.9 %", "7"]
+    assert rows[0][3:] == ["11 ms (9.0 ms to 13 ms)", "6.0 ms", "over 99.9 %"]
 
 
 def test_a_sound_laboratory_is_told_with_what_would_have_been_seen(reports):
     text, _ = of_laboratory(reports, laboratory("rejected", 0.01))
     assert "no fault of plates, clock or vertical was named" in text
     assert "would have shown a delay of 6.0 ms" in text
+
+
+def test_one_person_is_no_laboratory(reports):
+    text, rows = of_laboratory(reports, laboratory("named", 0.9999).assign(persons=1))
+    assert "stands in the person's report" in text
+    assert "11 ms" not in text and not rows
 
 
 def test_a_cohort_whose_laboratory_was_not_asked(reports):

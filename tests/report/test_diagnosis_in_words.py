@@ -18,10 +18,11 @@ from bsip_cli.report.effect_words import (
 )
 from bsip_cli.report.participant.diagnosis import limit_blocks, nearest
 from bsip_cli.report.verdict import (
+    cause_line,
     cause_text,
     change_sentence,
     gain_sentence,
-    headline,
+    light_of,
     probability_words,
     verdict_of,
 )
@@ -45,16 +46,16 @@ def text_of(*tables) -> str:
 
 def test_the_verdict_says_what_how_large_how_sure_and_where(found):
     text = text_of(found, detection(TRIALS))
-    assert text.startswith("Something is wrong: 1 fault named and 1 narrowed down to several.")
+    assert text.startswith("2 faults found. Searched: 2 recordings.")
     assert (
         "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
         "both recordings. Probability 99.5 %; explains 8.0 % (4.0 to 12.0 %) of the squared" in text
     )
     assert text.count(EFFECT_WORDS["plate_rotation"].consequence) == 1  # plate_zero's is the same
-    assert f"Faults 1 and 2: {EFFECT_WORDS['plate_rotation'].consequence}" in text
+    assert f"Findings 1 and 2: {EFFECT_WORDS['plate_rotation'].consequence}" in text
     group = found.replace({"effect": {"added_mass": "plate_gain"}})
-    assert "Faults 1 and 2: The measured forces" in text_of(group, detection(TRIALS))
-    assert "Fault 1: It is a matter of the laboratory" in text  # the group may be the person's
+    assert "Findings 1 and 2: The measured forces" in text_of(group, detection(TRIALS))
+    assert "Finding 1: It is a matter of the laboratory" in text  # the group may be the person's
 
 
 def test_what_only_the_markers_prove_says_so(found):
@@ -81,7 +82,9 @@ def test_a_trial_of_which_something_was_told_before_is_looked_at_too(found):
 
 def test_how_sure_is_a_probability_and_what_it_explains(found):
     text = text_of(found.assign(gain_ci_low=-1.0), detection(TRIALS))
-    assert "Probability 99.5 %; explains 8.0 % (−1.0 to 12.0 %, perhaps nothing) of" in text
+    assert (
+        "Probability 99.5 %; explains 8.0 % (−1.0 to 12.0 %: too few seconds to be sure) of" in text
+    )
     sure = text_of(found.assign(probability=1 - 1e-9, gain_ci_high=140.0), detection(TRIALS))
     assert "Probability over 99.9 %; explains 8.0 % (4.0 to 100.0 %) of" in sure
     told = found[found["rank"] == 1].assign(probability=np.nan, gain_percent=np.nan)
@@ -126,6 +129,12 @@ def test_what_quiet_standing_tells_gives_its_advice_once(found):
     assert "weigh it" not in text and text.count("To distinguish them") == 1
     assert "Together 66.7 %, else the stated mass is wrong; (a) explains" in text
     assert "Either the stated mass is wrong or what the plates measure" in text
+    several = rows.assign(sentence=[told, told.replace("a gain", "an offset")])
+    (group,) = causes_of(candidates_of(several))
+    assert cause_line(group, TRIALS) == (
+        "The plates read 60.0 kg, 2.6 kg less than stated: either a gain, an offset, or the "
+        "stated mass is wrong (probability 33.3 %)."
+    )
     assert "The measured forces are not the true ones" not in text
 
 
@@ -160,16 +169,34 @@ def test_nothing_wrong(found):
     first = pd.DataFrame([{**none.iloc[0], "effect": "none", "verdict": "named", "rank": 1}])
     said = verdict_of(pd.concat([first, none]), detection(TRIALS))
     assert not said.found
-    assert said.headline == "Nothing is wrong above the noise."
+    assert said.headline.startswith("No fault found. None of the")
     assert said.paragraphs()[1] == "Recordings looked at: basketball (run 1) and sequence (run 1)."
     assert said.paragraphs()[2].endswith("might have gone unseen.")
+
+
+def test_a_large_error_is_one_plain_line_and_hides_faults(found):
+    large = found[found["rank"] == 1].assign(
+        effect=UNNAMED, target="", parameter="error", trials=TRIALS[0],
+        sentence="large error, cause unknown: 23 N of the vertical force (RMS) remain unexplained; "
+        "in good recordings at most 15.2 N remain; nothing that bsip knows goes along with it",
+    )  # fmt: skip
+    said = verdict_of(large, detection(TRIALS))
+    assert said.headline.startswith("Large error, cause unknown.")
+    assert said.limits == "Faults of any size may hide behind so large an error."
+    (cause,) = causes_of(candidates_of(large))
+    assert cause_line(cause, TRIALS) == (
+        "23 N of the vertical force (RMS) remain unexplained, only in sequence (run 1); in good "
+        "recordings at most 15.2 N remain."
+    )
+    both = pd.concat([large, found[found["rank"] > 1]])
+    assert light_of(both, detection(TRIALS)).title == "Large error, cause unknown; 1 fault found"
 
 
 def test_something_that_cannot_be_named(found):
     row = found[found["effect"] == "plate_zero"].assign(
         effect=UNNAMED, verdict="named", class_id="", sentence="something goes along with fz"
     )
-    assert headline(row) == "Something is wrong that has no name in the catalogue of faults."
+    assert light_of(row, detection(TRIALS)).title == "1 error of unknown cause found"
     text = text_of(row, detection(TRIALS))
     assert "Something goes along with fz (95 % interval 8.8 to 10.8 N)" in text
     assert EFFECT_WORDS[UNNAMED].consequence in text
@@ -213,10 +240,10 @@ def test_a_regularity_without_a_name_has_a_label(found):
     )
     assert (
         candidates_of(spring)[0].label
-        == "something without a name: pull on the pelvis along Y, growing along Z"
+        == "error of unknown cause: pull on the pelvis along Y, growing along Z"
     )
     swing = spring.assign(target="fx", parameter="amplitude")
-    assert candidates_of(swing)[0].label == "something without a name: swing, force x"
+    assert candidates_of(swing)[0].label == "error of unknown cause: swing, force x"
 
 
 def test_the_table_says_what_came_near(found):
@@ -266,11 +293,13 @@ def test_soft_tissue_or_a_bend_of_the_trunk(found):
 
 def test_what_acts_like_a_cause_but_not_evenly_has_no_name(found):
     uneven = found[found["rank"] == 1].assign(
-        effect=UNNAMED, sentence="something without a name acts as if plate 1 is turned, but not "
-        "evenly (yaw: 95 % interval 1.75 to 2.26°)",
+        effect=UNNAMED, sentence="no known fault makes what the forces show: plate 1 is turned, "
+        "but not evenly (yaw: 95 % interval 1.75 to 2.26°)",
     )  # fmt: skip
     text = text_of(uneven, detection(TRIALS))
-    assert "Something without a name acts as if plate 1 is turned, but not evenly (95 %" in text
+    assert (
+        "No known fault makes what the forces show: plate 1 is turned, but not evenly (95 %" in text
+    )
     assert EFFECT_WORDS[UNNAMED].consequence in text
 
 

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.report.figures.person import projected, stick_figure
-from bsip_cli.report.sticks import Pose
+from bsip_cli.report.figures.person import Pose, projected, stick_figure
 
 
 @pytest.fixture

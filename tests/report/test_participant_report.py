@@ -11,7 +11,8 @@ import pandas as pd
 import pytest
 
 from bsip_cli.report.blocks import Light, Picture
-from bsip_cli.report.first_page import front, use_sentence
+from bsip_cli.report.first_page import front
+from bsip_cli.report.gains import use_sentence
 from bsip_cli.report.participant import joints
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import ParticipantRecord
@@ -128,19 +129,19 @@ def test_second_run_gives_the_same_bytes(reports):
 
 def test_the_first_page_says_who_what_how_large_how_sure_and_what_to_do(first):
     assert f"sub-01, man, {MASS_KG} kg (participants.tsv; the plates say 63.1 kg), 1.63 m" in first
-    assert "Something is wrong: 1 fault named and 1 narrowed down to several" in first
+    assert "2 faults found; no large error" in first
     assert (
         "Plate 1 is turned by +2.0 degrees (about the vertical: 95 % interval 1.75 to 2.26°), in "
         "both recordings, a usual size (1 to 4°); probability 99.5 %." in first
     )
-    assert "One of 2, not to be distinguished: " in first
+    assert "One of 2 causes that look alike here: " in first
     assert "the table's segment parameters 70 %" in first
     assert "unknown 20 %" in first
     assert "Markers from model: 6.7 mm , good" in first
-    assert "Use OM, the segment parameters identified from this person" in first
-    assert "OM errs 34 to 46 % less than a table (RM)," in first
+    assert "Use OM (segment parameters identified from this person): in " in first
+    assert "it errs 34 to 46 % less than RM (table)," in first
     assert "But RM for basketball." in first
-    assert "Fault 1: Correct the forces in the lab, or write corrected files" in first
+    assert "Finding 1: Correct the forces in the lab, or write corrected files" in first
 
 
 def test_yardsticks_are_those_of_data_that_identified_nothing(record, first):
@@ -168,9 +169,9 @@ def test_the_light_has_four_states(record):
     assert light(record, large).state == "large"
     beside = pd.concat([large, found[found["rank"] > 1]])
     assert light(record, beside).title == (
-        "Large error, mostly the table's segment parameters (70 %); 2 faults found"
+        "Large error, mostly the table's segment parameters (70 %); 1 fault found"
     )
-    assert light_of(beside, record.detection).title == "Large error, cause unknown; 2 faults found"
+    assert light_of(beside, record.detection).title == "Large error, cause unknown; 1 fault found"
     small = large.assign(target="1 fz", parameter="amplitude")
     assert light(record, small).state == "cause"  # a regularity without a name is no large error
     unsure = large.assign(effect="inconclusive", parameter="", sentence="too short")
@@ -194,7 +195,7 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
         "large",
         "Large error also with identified parameters",
     )
-    assert light.text.startswith("Vertical force 5.5 % of body weight. None of the")
+    assert light.text.startswith("Large with OM: vertical force 5.5 % of body weight. None of the")
     *_, to_do = front(large)
     assert not any("nothing needs to be corrected" in item for item in to_do.items)
 
@@ -210,13 +211,13 @@ def test_what_is_fine_is_to_be_used_as_it_is(record):
 
 def test_rm_is_used_where_nothing_is_sure(record):
     choice = record.choice.assign(use="RM", ratio_om=1.05)
-    said = use_sentence(replace(record, choice=choice))
-    assert said.startswith("Use RM, the segment parameters of an anthropometric table")
-    assert "OM errs 5 % less to 16 % more than a table (RM)," in said
+    said = use_sentence(choice, record.identification)
+    assert said.startswith("Use RM (segment parameters of an anthropometric table)")
+    assert "OM (identified) errs 5 % less to 16 % more than RM (table)," in said
     rare = record.identification.assign(rare=True)
-    assert "Never use OM" in use_sentence(replace(record, identification=rare))
+    assert "Never use OM" in use_sentence(record.choice, rare)
     alone = choice.assign(ratio_om=np.nan, ratio_rm_mass=np.nan, ratio_om_rm_mass=np.nan)
-    said = use_sentence(replace(record, choice=alone, identification=rare))
+    said = use_sentence(alone, rare)
     assert ": no recording is left to judge OM by. " in said and "Never use OM" in said
 
 

@@ -12,7 +12,7 @@ from scipy.stats import norm
 from bsip_cli.report.blocks import Bullets, Grid, Light
 from bsip_cli.report.cohort import diagnoses
 from bsip_cli.report.cohort.record import CohortRecord, Member, Ratios
-from bsip_cli.report.origins import HowMade
+from bsip_cli.report.records import HowMade
 from bsip_cli.report.shared import named_people, searched, shared_causes
 from tests.report.fake_study import diagnosis
 
@@ -132,7 +132,7 @@ def text_of(record: CohortRecord) -> str:
 def test_the_section_lists_causes_and_names_those_without():
     record = cohort(ann=FOUND, bob=NOTHING, eve=None, tom=TURNED.iloc[:0])
     text = text_of(record)
-    assert "Nothing wrong above the noise was found in bob (searched: sequence (run 1))." in text
+    assert "No fault was found in bob (searched: sequence (run 1))." in text
     assert "Not searched for errors: eve." in text
     assert "No recording has motion with every contact on a plate: tom." in text
     (grid,) = (b for b in diagnoses.section(record).blocks if isinstance(b, Grid))
@@ -191,3 +191,8 @@ def test_a_person_without_report_has_no_link():
     record = replace(record, members=(replace(record.members[0], has_report=False),))
     (grid,) = (b for b in diagnoses.section(record).blocks if isinstance(b, Grid))
     assert not grid.cells()[0][0].link
+
+
+def test_what_the_laboratory_tells_of_itself_is_not_shared_again():
+    known = TURNED.assign(sentence=TURNED["sentence"] + "; this is known from the laboratory (2)")
+    assert shared(ann=known, eve=known) == ()

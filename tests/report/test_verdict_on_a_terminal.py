@@ -21,7 +21,7 @@ def test_causes_are_numbered_and_lines_fit():
         assert max(map(len, text.splitlines())) <= min(columns, 100)
     assert "\n 1. Plate 1 is turned by +2.0 degrees" in text
     assert "\n 2. One of these, which these recordings cannot distinguish" in text
-    assert text.startswith("\n## Is anything wrong: sub-01\nSomething is wrong: 1 fault named")
+    assert text.startswith("\n## Is anything wrong: sub-01\n2 faults found.")
 
 
 def test_what_was_put_right_is_told_too():
@@ -46,10 +46,10 @@ def test_a_person_fits_on_a_screen_the_most_important_first(reports, tmp_path):
     Artifacts(tmp_path, person).write_all()
     text = "\n".join(shown(tmp_path))
     assert len(text.splitlines()) <= 24 and max(map(len, text.splitlines())) <= 100
-    assert text.startswith("sub-01: Something is wrong: 1 fault named and 1 narrowed down")
+    assert text.startswith("sub-01: 2 faults found")
     flat = " ".join(text.split())
     assert " 1. Plate 1 is turned by +2.0 degrees" in flat
-    assert "Use OM: it errs less." in flat
+    assert "Use OM (segment parameters identified" in flat
     assert "Identification (OM against RM) changes" in flat
     full = "\n".join(shown(tmp_path, full=True))
     assert "## Is anything wrong: sub-01" in full and len(full) > len(text)
@@ -64,16 +64,18 @@ def test_the_answer_is_that_of_the_first_page(reports, tmp_path):
     artifacts.write("overall-diagnosis", nothing)
     for trial in person.trials[1:]:
         artifacts.write("fit", artifacts.fit(trial).assign(rmse_percent_bw=9.0), trial)
-    assert "sub-01: Fine" in "\n".join(shown(tmp_path))  # no report, no yardstick
+    assert "sub-01: No fault found" in "\n".join(shown(tmp_path))  # no report, no yardstick
     replace(reports, out=tmp_path).run("report", person)
     said = " ".join("\n".join(shown(tmp_path)).split())
-    assert said.startswith("sub-01: Large error also with identified parameters. Vertical force")
+    assert said.startswith(
+        "sub-01: Large error also with identified parameters. Large with OM: vertical force"
+    )
     page = replace(reports, out=tmp_path).html("sub-01")
     assert "<strong>Large error also with identified parameters</strong>" in page
 
 
 def test_of_several_people_each_has_a_line(reports):
     text = "\n".join(shown(reports.out))
-    assert "sub-01: Something is wrong" in text and "sub-02: Something is wrong" in text
+    assert "sub-01: 2 faults found" in text and "sub-02: 2 faults found" in text
     assert "Plate 1 is turned" not in text
     assert text.rstrip().endswith("report: " + str(reports.out / "group" / "report.html"))

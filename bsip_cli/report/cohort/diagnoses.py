@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Light, Paragraph, Section, State
 from bsip_cli.report.cohort.record import CohortRecord, Member
 from bsip_cli.report.shared import SHARED, Cause, Searched, named_people, shared_causes
@@ -57,12 +55,8 @@ def section(record: CohortRecord) -> Section:
     reports = {m.id for m in record.members if m.has_report}
     rows = tuple(_row(one.id, cause, reports) for one in people for cause in one.causes)
     if rows:
-        head = ("participant", "found", "recordings", "probability", "removes [%]")
-        caption = (
-            "What was found, or a group of which one is there. Probability: of the cause, or of the "
-            "group. Removes: of the squared difference between measured and simulated forces, in "
-            "units of its noise, in seconds left out when its size was fitted, with 95 % interval"
-        )
+        head = ("participant", "found", "recordings", "probability")
+        caption = "Probability: that the cause, or one of the group, is there"
         blocks.append(Grid(head, rows, caption, words=3))
     if shared := shared_causes(people):
         blocks += [Paragraph(SHARED), Bullets(shared, "warning")]
@@ -95,7 +89,7 @@ def _nothing_found(people: Sequence[Searched]) -> list[str]:
         if one.was_searched and not one.causes:
             of_movements.setdefault(_movements(one), []).append(one.id)
     return [
-        f"Nothing wrong above the noise was found in {named_people(names)}{movements}."
+        f"No fault was found in {named_people(names)}{movements}."
         for movements, names in of_movements.items()
     ]
 
@@ -105,12 +99,10 @@ def _movements(one: Searched) -> str:
 
 
 def _row(person: str, cause: Cause, reports: set[str]) -> tuple[str | Cell, ...]:
-    tested = next((one for one in cause if np.isfinite(one.gain[0])), cause[0])
     told = [capital(one.told()) for one in cause]
     return (
         Cell(person, link=f"../{person}/report.html" if person in reports else ""),
         told[0] if len(told) == 1 else f"One of these: {'; '.join(told)}",
         labelled(listing(list(dict.fromkeys(t for one in cause for t in one.trials)))),
         probability_words(probability_of(cause)) or MISSING,
-        tested.removes(),
     )

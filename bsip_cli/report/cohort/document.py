@@ -21,14 +21,26 @@ from bsip_cli.report.blocks import (
     Section,
     Terms,
 )
-from bsip_cli.report.cohort import diagnoses, gain, laboratory
-from bsip_cli.report.cohort.record import CohortRecord, Member
-from bsip_cli.report.figures.strips import Strip, strips
-from bsip_cli.report.origins import how_made
-from bsip_cli.report.tables.build import BUILDERS
+from bsip_cli.report.cohort import diagnoses, laboratory
+from bsip_cli.report.cohort.record import CohortRecord, Member, Ratios
+from bsip_cli.report.figures.strips import Strip, gain_dots, strips
+from bsip_cli.report.gains import one_number_alone
+from bsip_cli.report.records import how_made
+from bsip_cli.report.tables.build import BUILDERS, IN_PRINT
 from bsip_cli.report.tables.model import Table
-from bsip_cli.report.words import MISSING, count, listing, number, signed, significant, trial_label
+from bsip_cli.report.words import (
+    MISSING,
+    component_label,
+    count,
+    listing,
+    number,
+    percent,
+    signed,
+    significant,
+    trial_label,
+)
 from bsip_cli.report.yardsticks import COP_LIMIT_M, FORCE_LIMIT_PERCENT, Yardstick, yardsticks
+from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
 
 SHOWN = {
     "person": ("calibration_trial", "sex", "mass_kg", "plate_mass_kg", "height_m", "marker_rms_m"),
@@ -36,6 +48,7 @@ SHOWN = {
 }
 """Columns of a participant's artifacts that are shown."""
 
+_KEPT = ("n", "p")  # columns of the tables, beside means
 _MOST = 6  # sentences of a kind on the first page
 _FAR = 3.0
 """Robust standard deviations (median absolute deviation times 1.4826) beyond the median: Leys 2013,
@@ -52,7 +65,9 @@ def cohort_document(record: CohortRecord) -> Document:
             Section("people", "Who took part?", (_people(record),)),
             diagnoses.section(record),
             laboratory.section(record),
-            gain.section(record),
+            Section(
+                "gain", "Do identified parameters follow the forces better?", tuple(_gain(record))
+            ),
             Section("tables", "The papers' tables", tuple(_tables(record))),
             Section("made", "How was it made?", tuple(how_made(record.made, record.defaults))),
         ),
@@ -208,35 +223,130 @@ def _person(record: CohortRecord, member: Member) -> tuple[str | Cell, ...]:
 
 def _tables(record: CohortRecord) -> Iterator[Block]:
     """With their legends; tests compare people, so a single one has none."""
-    people = [member for member in record.members if member.identification is not None]
+    files: dict[str, list[tuple[str, str]]] = {}
+    for file in map(PurePosixPath, record.table_files):
+        files.setdefault(file.stem, []).append((file.suffix.removeprefix("."), f"../{file}"))
     if not record.tables:
         yield Paragraph("No tables were made.", "warning")
-    elif len(people) < 2:
+    elif len([m for m in record.members if m.identification is not None]) < 2:
         yield Paragraph("Tests compare people: of one person there is nothing to test.", "note")
+        yield Links("The tables as files:", tuple((name, of[0][1]) for name, of in files.items()))
     else:
-        for table in record.tables[: len(BUILDERS)]:  # those beside print are in the files
+        yield Paragraph("All tests, and how each was made, are in the files.", "note")
+        for tag, table in zip(BUILDERS, record.tables, strict=False):
             yield Heading(table.title)
-            yield from _table(table)
-            yield from (Paragraph(note, "note") for note in table.notes[:1])  # the legend
-        yield Paragraph(
-            "How each was tested, and what could not be, is in the Markdown files.", "note"
-        )
-    if record.table_files:
-        files = [(PurePosixPath(file).name, f"../{file}") for file in record.table_files]
-        yield Links("The tables as files:", tuple(files))
+            if tag in IN_PRINT:
+                yield from _table(table)
+            if own := files.pop(table.name, []):
+                yield Links("As a file:", tuple(own))
+        beside = tuple((name, of[0][1]) for name, of in files.items())
+        yield from [Links("Beside the published values:", beside)] if beside else []
 
 
 def _table(table: Table) -> Iterator[Block]:
-    columns = table.printed_columns()
+    """Means, the interval of their difference, and its p-value."""
+    headings = [column.heading for column in table.printed_columns()]
+    kept = [
+        k
+        for k, column in enumerate(table.printed_columns())
+        if column.text or column.heading.endswith(("M(SD)", " CI")) or column.heading in _KEPT
+    ]
     if not table.rows:
         yield Paragraph("There are no numbers for this table.", "note")
         return
-    words = next((k for k, column in enumerate(columns) if not column.text), len(columns))
+    words = sum(table.printed_columns()[k].text for k in kept)
     rows: list[tuple[str | Cell, ...]] = []
     group = ""
     for row in table.rows:
         if row.group != group:
             group = row.group
-            rows.append((Cell(group, "group"), *[""] * (len(columns) - 1)))
-        rows.append(table.printed_cells(row))
-    yield Grid(tuple(column.heading for column in columns), tuple(rows), words=max(1, words))
+            rows.append((Cell(group, "group"), *[""] * (len(kept) - 1)))
+        cells = table.printed_cells(row)
+        rows.append(tuple(cells[k] for k in kept))
+    yield Grid(tuple(headings[k] for k in kept), tuple(rows), words=max(1, words))
+    yield from (Paragraph(note, "note") for note in table.notes[:1])  # the legend
+
+
+# --- the gain of identification -------------------------------------------------------------------
+
+
+def _gain(record: CohortRecord) -> Iterator[Block]:
+    ratios = record.ratios
+    names = tuple(ratios.of_component)
+    if not names:
+        yield Paragraph("No trial could be compared with both methods.", "warning")
+        return
+    if not ratios.held_out:
+        yield Paragraph(
+            "Nobody has held-out data: these numbers are from the data that identified the "
+            "parameters, and favour OM.",
+            "warning",
+        )
+    worse = [component_label(name) for name in names if _is_worse(ratios.over_rival(name))]
+    yield Paragraph(
+        f"RM or RM+mass follows better on the whole, or in more participants, in: {listing(worse)}."
+        if worse
+        else "OM follows better than RM and RM+mass in every component.",
+        "warning" if worse else "good",
+    )
+    yield from _one_number(ratios)
+    others = [method for method in METHODS if method != RM]
+    of_method = {m: np.array([ratios.over_rm(name, m) for name in names]) for m in others}
+    where = "held-out data" if ratios.held_out else "the data that identified the parameters"
+    data = pd.concat(table.assign(component=name) for name, table in ratios.of_component.items())
+    yield Picture(
+        gain_dots([component_label(name) for name in names], of_method),
+        "gain",
+        f"Error of RM+mass and of OM over error of RM, on {where}; a dot per participant, the bar "
+        "their geometric mean.",
+        "Dots: error ratios per component.",
+        "left of 1 follows better. What RM+mass gains is one number's doing, no gain of "
+        "identification.",
+        "use OM only where its dots lie left of those of RM+mass.",
+        data.reset_index(),
+    )
+    yield Grid(
+        ("component", RM_MASS, OM, "OM better", "RM or RM+mass better", "the same", "all"),
+        tuple(_row(name, ratios) for name in names),
+        f"Change of the error from RM. The same: within {percent(SAME_WITHIN)} %.",
+        groups=(("", 1), ("typical change [%]", 2), ("number of participants", 4)),
+    )
+
+
+def _one_number(ratios: Ratios) -> Iterator[Block]:
+    """What one number for the whole mass does without identification."""
+    name = "grf_vertical"
+    if name in ratios.of_component:
+        rm_mass, om = (_typical(ratios.over_rm(name, method)) for method in (RM_MASS, OM))
+        if np.isfinite(rm_mass):
+            over = (1 + om) / (1 + rm_mass) - 1
+            yield Paragraph(one_number_alone(component_label(name), rm_mass, om, over))
+
+
+def _typical(ratios: np.ndarray) -> float:
+    """Relative change of the errors, their geometric mean; NaN without any."""
+    known = ratios[np.isfinite(ratios)]
+    return float(np.exp(np.log(known).mean())) - 1.0 if len(known) else float("nan")
+
+
+def _counts(ratios: np.ndarray) -> tuple[int, int, int]:
+    """In how many participants OM is better, in how many worse, and of how many."""
+    better, worse = int((ratios < 1 - SAME_WITHIN).sum()), int((ratios > 1 + SAME_WITHIN).sum())
+    return better, worse, int(np.isfinite(ratios).sum())
+
+
+def _is_worse(ratios: np.ndarray) -> bool:
+    better, worse, _ = _counts(ratios)
+    return _typical(ratios) > 0.0 or worse > better
+
+
+def _row(component: str, ratios: Ratios) -> tuple[str, ...]:
+    better, worse, everyone = _counts(ratios.over_rival(component))
+    return (
+        component_label(component),
+        *(signed(100.0 * _typical(ratios.over_rm(component, m))) for m in (RM_MASS, OM)),
+        str(better),
+        str(worse),
+        str(everyone - better - worse),
+        str(everyone),
+    )

@@ -17,12 +17,12 @@ from bsip_cli.report.words import MISSING, capital, listing
 
 SAID = ("named", "ambiguous")
 _NOT_RUN = "Nobody asked for the faults of the laboratory: run `bsip laboratory`."
-_HEAD = ("fault", "where", "number", "estimate", "95 % interval", "limit", "probability", "persons")
+_HEAD = ("fault", "where", "number", "estimate (95 % interval)", "seen from", "probability")
 _CAPTION = (
-    "Estimate and interval: if the fault is there. Limit: what would have been named in 95 of 100 "
-    "laboratories with these recordings. Probability: that it is there. Of all plates alike only "
-    "what is there is listed"
+    "What was found, and of each other fault the likeliest place. Estimate: if the fault is there. "
+    "Seen from: this size would be named in 95 of 100 laboratories with these recordings"
 )
+_ALONE = "Of one person what is wrong with the laboratory stands in the person's report."
 _WHAT_TO_DO = (
     "Check what is named on the spot, as its sentence says, before any number is corrected. What is "
     "wrong in the same way with the model of every person here can look like a plate elsewhere."
@@ -35,27 +35,41 @@ def first(record: CohortRecord) -> Iterator[Block]:
         yield Paragraph(_NOT_RUN, "note")
         return
     said = tuple(named_sentences(record.laboratory))
+    unnamed = tuple(unnamed_sentences(record.laboratory))
     if said:
         yield Bullets(said, "warning")
         yield Paragraph(_WHAT_TO_DO, "note")
-    yield from (Paragraph(text, "good") for text in unnamed_sentences(record.laboratory))
+    yield from (Paragraph(text, "good") for text in unnamed)
+    if not said and not unnamed:
+        yield Paragraph(_ALONE, "note")
 
 
 def section(record: CohortRecord) -> Section:
     table = record.laboratory
-    if table is None:
-        return Section("laboratory", "The laboratory", (Paragraph(_NOT_RUN, "note"),))
-    blocks: list[Block] = [*first(record)]
-    for number, rows in table[table["scope"] == "laboratory"].groupby("laboratory"):
-        cells = tuple(_row(row) for row in rows.to_dict("records") if _is_listed(row))
-        blocks.append(Grid(_HEAD, cells, f"Laboratory {number}. {_CAPTION}", words=3))
+    blocks: list[Block] = [Paragraph(_NOT_RUN, "note")] if table is None else []
+    if table is not None:
+        for number, rows in _of_several(table).groupby("laboratory"):
+            name = f"laboratory_{number}"
+            cells = tuple(map(_row, _listed(rows)))
+            caption = f"Laboratory {number}. {_CAPTION}"
+            blocks.append(Grid(_HEAD, cells, caption, words=3, name=name, data=rows))
     return Section("laboratory", "The laboratory", tuple(blocks))
 
 
+def _listed(rows: pd.DataFrame) -> list[dict]:
+    """What is said, and of each other fault the likeliest number."""
+    said = rows["verdict"].isin(SAID)
+    rest = rows[~said & ~rows["effect"].isin(rows.loc[said, "effect"])]
+    likeliest = rest.sort_values("probability", ascending=False).drop_duplicates("effect")
+    return pd.concat([rows[said], likeliest]).to_dict("records")
+
+
 def named_sentences(table: pd.DataFrame) -> Iterator[str]:
-    """What is wrong with which laboratory, and who deviates from it; of causes that look alike the
-    likeliest, with the names of the others."""
-    said = table[table["verdict"].isin(SAID)].drop_duplicates(["laboratory", "sentence"])
+    """What is wrong with which laboratory of several persons, and who deviates from it; of causes
+    that look alike the likeliest, with the names of the others."""
+    several = table["laboratory"].isin(_of_several(table)["laboratory"])
+    said = table[several & table["verdict"].isin(SAID)]
+    said = said.drop_duplicates(["laboratory", "sentence"])
     alone = np.where(said["class_id"] == "", said["sentence"], said["class_id"])
     for (laboratory, _), rows in said.groupby(["laboratory", alone], sort=False):
         likeliest, *others = rows.sort_values("probability", ascending=False).to_dict("records")
@@ -66,7 +80,7 @@ def named_sentences(table: pd.DataFrame) -> Iterator[str]:
                 for x in others
                 for place in [place_label(x["effect"], x["target"])]
             ]
-            text += f" Or: {listing(names)}."
+            text += f" It may also be: {listing(names)}."
         yield text
 
 
@@ -74,13 +88,20 @@ def unnamed_sentences(table: pd.DataFrame) -> Iterator[str]:
     """Of a laboratory in which nothing is wrong, what would have been named."""
     for sentence in table.loc[table["effect"] == "inconclusive", "sentence"]:
         yield f"Nothing can be said of the laboratory: {sentence}."
-    for number, rows in table[table["scope"] == "laboratory"].groupby("laboratory"):
+    for number, rows in _of_several(table).groupby("laboratory"):
         if not rows["verdict"].isin(SAID).any():
             limits = listing([x for x in map(_limit_words, _best(rows)) if x])
             yield (
                 f"Laboratory {number}: no fault of plates, clock or vertical was named; these "
                 f"recordings would have shown {limits}."
             )
+
+
+def _of_several(table: pd.DataFrame) -> pd.DataFrame:
+    """Rows of laboratories in which several persons were recorded: of one alone, the person's own
+    diagnosis weighs more causes than those of a laboratory."""
+    rows = table[table["scope"] == "laboratory"]
+    return rows[rows.groupby("laboratory")["persons"].transform("max") > 1]
 
 
 _TOLD = {
@@ -105,10 +126,6 @@ def _limit_words(row: Mapping[Any, Any]) -> str:
     return f"{_TOLD[row['effect'], row['parameter']]} {size}"
 
 
-def _is_listed(row: Mapping[Any, Any]) -> bool:
-    return row["verdict"] in SAID or not row["target"].startswith("all")
-
-
 def _row(row: Mapping[Any, Any]) -> tuple[str | Cell, ...]:
     name, unit = row["parameter"], row["unit"]
     low, high, estimate, limit = (
@@ -119,9 +136,7 @@ def _row(row: Mapping[Any, Any]) -> tuple[str | Cell, ...]:
         Cell(capital(effect_title(row["effect"])), "warning" if row["verdict"] in SAID else ""),
         place_label(row["effect"], row["target"]),
         parameter_label(row["effect"], name),
-        estimate,
-        f"{low} to {high}",
+        f"{estimate} ({low} to {high})",
         limit,
         probability_words(row["probability"]),
-        str(row["persons"]),
     )

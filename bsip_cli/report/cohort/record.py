@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.report.blocks import Light
-from bsip_cli.report.origins import HowMade
-from bsip_cli.report.records import Refusal
+from bsip_cli.report.records import HowMade, Refusal
 from bsip_cli.report.shared import Searched
 from bsip_cli.report.tables.model import Table
 from bsip_cli.report.words import COMPONENTS

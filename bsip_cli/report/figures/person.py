@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+import pandas as pd
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from bsip_cli.body.person import Person
+from bsip_cli.motion.inverse_kinematics import tree_of
 from bsip_cli.report.figures.canvas import (
     BLUE,
     FAINT,
@@ -17,7 +22,7 @@ from bsip_cli.report.figures.canvas import (
     new_figure,
     plain,
 )
-from bsip_cli.report.sticks import Pose
+from bsip_cli.report.records import clock_of, flags_of, signals_of
 
 _YAW, _PITCH = np.radians(-140.0), np.radians(12.0)  # from the front, from their right
 _WIDE_MM, _HIGH_MM = 62.0, 92.0
@@ -77,3 +82,193 @@ def _tiles(ground_m: float, centre_m: np.ndarray) -> np.ndarray:
     along = [[(x, y, 0.0) for y in ends] for x in steps]
     across = [[(x, y, 0.0) for x in ends] for y in steps]
     return np.array(along + across) + np.array([centre_m[0], centre_m[1], ground_m])
+
+
+# --- poses ----------------------------------------------------------------------------------------
+
+_FORCES = ("fx_N", "fy_N", "fz_N")
+_HEAD_RADIUS_M = 0.1
+_ON_GROUND_PERCENTILE = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Skeleton:
+    """Bones as pairs of points, each a segment with a position (in joint axes of that segment)."""
+
+    starts: np.ndarray
+    start_m: np.ndarray
+    ends: np.ndarray
+    end_m: np.ndarray
+    sides: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A trial's motion as the model makes it; anterior (2,) is the person's forward direction in
+    the world."""
+
+    body: Person
+    kinematics: pd.DataFrame
+    reconstruction: pd.DataFrame | None
+    anterior: np.ndarray
+    body_weight_N: float
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Positions and force in the person's axes (anterior, right, up).
+
+    Attributes
+    ----------
+    bones_m : (b, 2, 3) end points; sides : (b,) ``l``, ``r`` or empty.
+    head_m : (3,) centre; head_radius_m : its radius. markers_m : (m, 3) as the model carries them.
+    force_at_m : (3,) where the ground force acts; force_N : (3,), NaN where it is not measured.
+    ground_m : height of the ground. body_weight_N : what an arrow of half a body height stands for.
+    """
+
+    time_s: float
+    bones_m: np.ndarray
+    sides: tuple[str, ...]
+    head_m: np.ndarray
+    head_radius_m: float
+    markers_m: np.ndarray
+    force_at_m: np.ndarray
+    force_N: np.ndarray
+    ground_m: float
+    body_weight_N: float
+
+    def tip_m(self) -> np.ndarray:
+        """(3,) tip of the force's arrow."""
+        top = float(self.head_m[2]) + self.head_radius_m - self.ground_m
+        return self.force_at_m + self.force_N * 0.5 * top / self.body_weight_N
+
+    def reach_m(self) -> float:
+        """How far the bones reach from the pelvis on the average."""
+        return float(np.linalg.norm(self.bones_m - self.bones_m[0, 0], axis=-1).mean())
+
+    def is_loaded(self) -> bool:
+        """The plates carry half the body's weight at least."""
+        return bool(self.force_N[2] > 0.5 * self.body_weight_N)
+
+
+def poses_of(motion: Motion, instants: int) -> tuple[Pose, ...]:
+    """Poses at evenly spread instants; none where no frame is determined."""
+    rows = _compared(motion)
+    if rows.empty:
+        return ()
+    rows = rows.iloc[np.unique(np.linspace(0, len(rows) - 1, instants).astype(int))]
+    body = motion.body
+    q = rows[[f"q_{name}" for name in body.skeleton.q_names]].to_numpy()
+    R, p = tree_of(body).forward(q)
+    axes = _person_axes(motion.anterior)
+    lines = _bones(body)
+    start = _points(R, p, lines.starts, lines.start_m) @ axes.T
+    end = _points(R, p, lines.ends, lines.end_m) @ axes.T
+    head = body.skeleton.index("head") if "head" in body.skeleton.segments else 0
+    centre = _centre_of_markers(body, head, np.array([0.0, 0.15, 0.0]))
+    heads = (p[:, head] + R[:, head] @ centre) @ axes.T
+    markers = _points(R, p, body.marker_segments, body.markers_in_joint_m()) @ axes.T
+    low = np.minimum(start[..., 2], end[..., 2]).min(axis=1)
+    times = rows["time_s"].to_numpy()
+    ground = float(np.percentile(low, _ON_GROUND_PERCENTILE))
+    force, point = _forces(motion.reconstruction, times, axes, ground)
+    return tuple(
+        Pose(
+            float(times[k]),
+            np.stack([start[k], end[k]], axis=1),
+            lines.sides,
+            heads[k],
+            _HEAD_RADIUS_M,
+            markers[k],
+            point[k],
+            force[k],
+            ground,
+            motion.body_weight_N,
+        )
+        for k in range(len(times))
+    )
+
+
+def _compared(motion: Motion) -> pd.DataFrame:
+    """Rows of determined frames, within the compared span if there is one."""
+    kinematics, reconstruction = motion.kinematics, motion.reconstruction
+    rows = kinematics[kinematics["determined"].astype(bool)]
+    if reconstruction is not None:
+        compared = clock_of(reconstruction)[flags_of(reconstruction, "valid")]
+        if len(compared):
+            inside = rows["time_s"].between(compared[0], compared[-1])
+            rows = rows[inside] if inside.any() else rows
+    return rows
+
+
+def _person_axes(anterior: np.ndarray) -> np.ndarray:
+    """(3, 3) rows: forward, to the right, up."""
+    x, y = anterior / np.linalg.norm(anterior)
+    return np.array([[x, y, 0.0], [y, -x, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _points(R: np.ndarray, p: np.ndarray, segments: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """(n, b, 3) world positions of points fixed to segments."""
+    return p[:, segments] + np.einsum("nbij,bj->nbi", R[:, segments], local)
+
+
+def _bones(body: Person) -> _Skeleton:
+    """From each joint to the next one; the last segments of a limb end at their markers."""
+    skeleton, joints = body.skeleton, body.joint_positions_m()
+    bones: list[tuple[int, np.ndarray, np.ndarray]] = []
+    for i, name in enumerate(skeleton.segments):
+        children = [k for k, parent in enumerate(skeleton.parents) if parent == i]
+        origin = body.origin_in_joint_m[i]
+        bones += [(i, np.zeros(3), origin)] if origin.any() else []
+        bones += [(i, origin, joints[k]) for k in children if not np.allclose(joints[k], origin)]
+        if not children and name != "head":
+            bones += [(i, np.zeros(3), tip) for tip in _tips(body, i)]
+    segments = np.array([i for i, _, _ in bones])
+    return _Skeleton(
+        segments,
+        np.array([a for _, a, _ in bones]),
+        segments,
+        np.array([b for _, _, b in bones]),
+        tuple(_side(body, i, tip) for i, _, tip in bones),
+    )
+
+
+def _side(body: Person, segment: int, tip: np.ndarray) -> str:
+    side = body.skeleton.side(body.skeleton.segments[segment])
+    if side or abs(tip[2]) < 0.02:  # on the trunk, what leads sideways leads to a limb
+        return side
+    return "r" if tip[2] > 0.0 else "l"
+
+
+def _tips(body: Person, segment: int) -> list[np.ndarray]:
+    """Where a limb ends: its farthest marker, for a foot the hindmost too."""
+    own = body.markers_in_joint_m()[body.marker_segments == segment]
+    if len(own) == 0:
+        return [np.array([0.0, -body.lengths_m[segment], 0.0])]
+    tips = [own[np.argmax(np.linalg.norm(own, axis=1))]]
+    if body.skeleton.segments[segment].startswith("foot"):
+        tips = [own[np.argmax(own[:, 0])], own[np.argmin(own[:, 0])]]
+    return tips
+
+
+def _centre_of_markers(body: Person, segment: int, otherwise: np.ndarray) -> np.ndarray:
+    own = body.markers_in_joint_m()[body.marker_segments == segment]
+    return own.mean(axis=0) if len(own) else otherwise
+
+
+def _forces(
+    reconstruction: pd.DataFrame | None, times: np.ndarray, axes: np.ndarray, ground_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) measured force and its point in person axes; NaN where it is not whole."""
+    force, point = np.full((len(times), 3), np.nan), np.full((len(times), 3), np.nan)
+    if reconstruction is None or len(clock_of(reconstruction)) == 0:
+        return force, point
+    clock = clock_of(reconstruction)
+    nearest = np.clip(np.searchsorted(clock, times - 1e-9), 0, len(clock) - 1)
+    seen = (np.abs(clock[nearest] - times) < 0.02) & flags_of(reconstruction, "valid")[nearest]
+    columns = [signals_of(reconstruction, name)["measured"] for name in _FORCES]
+    world = np.stack([column[nearest] for column in columns], axis=1)
+    ap, ml = (signals_of(reconstruction, f"cop_{name}_m")["measured"] for name in ("ap", "ml"))
+    force[seen] = (world @ axes.T)[seen]
+    point[seen] = np.stack([ap[nearest], ml[nearest], np.full(len(times), ground_m)], axis=1)[seen]
+    return force, point

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from bsip_cli.report.blocks import Block, Bullets, Document, Heading, Section, Terms
 from bsip_cli.report.first_page import front
-from bsip_cli.report.origins import HowMade, how_made
 from bsip_cli.report.participant import diagnosis, errors, joints, parameters, recording
-from bsip_cli.report.records import ParticipantRecord
+from bsip_cli.report.records import HowMade, ParticipantRecord, how_made
 
 CANNOT_KNOW = (
     "A mass behind a spherical joint enters the ground force only together with its neighbour's "

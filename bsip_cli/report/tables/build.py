@@ -8,40 +8,28 @@ from pathlib import Path
 
 import pandas as pd
 
-from bsip_cli.report.tables import (
-    centres_of_mass,
-    cop_rmse,
-    cross_validation,
-    notes,
-    posturography,
-    published,
-    segment_mass,
-    six_components,
-)
+from bsip_cli.report.tables import notes, paired, posturography, published, six_components
 from bsip_cli.report.tables.formats import to_csv, to_latex, to_markdown
 from bsip_cli.report.tables.model import Results, Table
 from bsip_cli.statistics.cohort import Criteria
 from bsip_cli.statistics.cohort_values import Comparison
 
 BUILDERS: dict[str, Callable[[Results, Criteria], Table]] = {
-    "table1": segment_mass.build,
-    "table2": cop_rmse.build,
+    "table1": paired.segment_mass,
+    "table2": paired.cop_rmse,
     "table3": posturography.build,
-    "table4": cross_validation.build,
+    "table4": paired.cross_validation,
     "table5": six_components.build,
-    "table6": centres_of_mass.build,
+    "table6": paired.centres_of_mass,
 }
 IN_PRINT = ("table1", "table2", "table3", "table4")
-NAMES = tuple(
-    module.NAME
-    for module in (
-        segment_mass,
-        cop_rmse,
-        posturography,
-        cross_validation,
-        six_components,
-        centres_of_mass,
-    )
+NAMES = (
+    "table1_segment_mass",
+    "table2_cop_rmse",
+    "table3_posturography",
+    "table4_cross_validation",
+    "table5_six_components",
+    "table6_centres_of_mass",
 )
 BESIDE = tuple(published.name_beside(tag) for tag in IN_PRINT)
 RENDERERS: dict[str, Callable[[Table], str]] = {

@@ -32,15 +32,6 @@ SEGMENT_ORDER = (
 )
 """As in table 1 of Hansen 2017; other segments follow."""
 
-_SIDES = {"l": "left", "r": "right"}
-
-
-def segment(name: str) -> str:
-    """left upper arm for upper_arm_l."""
-    stem, _, end = name.rpartition("_")
-    words = f"{_SIDES[end]} {stem}" if stem and end in _SIDES else name
-    return words.replace("_", " ")
-
 
 def segment_rank(name: str) -> int:
     return SEGMENT_ORDER.index(name) if name in SEGMENT_ORDER else len(SEGMENT_ORDER)

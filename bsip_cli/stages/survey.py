@@ -30,23 +30,25 @@ def run(unit: Unit) -> None:
     """Look at every recording of the participant; write readings, decided for each session."""
     assert unit.participant is not None
     rows: list[dict] = []
+    delays_s: dict[str, float] = {}
     options = unit.config.ingest
     limits = GateLimits(**{one.name: getattr(options, one.name) for one in fields(GateLimits)})
     for session in dict.fromkeys(trial.session for trial in unit.participant.trials):
         seen = [
             survey
             for trial in unit.participant.trials
-            if trial.session == session and (survey := _survey(unit, trial)) is not None
+            if trial.session == session and (survey := _survey(unit, trial, limits)) is not None
         ]
         if not seen:
             continue
         _require_size(unit, seen)
         reading = settle_session(seen, limits)
         rows += rows_of(session or "", reading)
+        delays_s |= reading.delays_s
         whose = f"{unit.name}, session {session}" if session else unit.name
         for finding in findings_about(reading):
             unit.warn(f"{whose}: {finding.sentence()}")
-    unit.write("readings", rows)
+    unit.write("readings", rows, {"delays_s": delays_s})
 
 
 def _require_size(unit: Unit, seen: list[TrialSamples]) -> None:
@@ -58,10 +60,10 @@ def _require_size(unit: Unit, seen: list[TrialSamples]) -> None:
         raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
 
 
-def _survey(unit: Unit, trial: Trial) -> TrialSamples | None:
+def _survey(unit: Unit, trial: Trial, limits: GateLimits) -> TrialSamples | None:
     """None where the recording cannot be read: its own turn will say why."""
     try:
-        return TrialSamples.of(opened(unit, trial))
+        return TrialSamples.of(opened(unit, trial), limits)
     except BadDataError:
         return None
 
@@ -126,8 +128,10 @@ def _verdict(row: dict) -> Verdict:
     )
 
 
-def reading_of(table: pd.DataFrame, trial: Trial) -> SessionReading:
-    """What the survey decided, by its ``readings``, for the session of a trial."""
+def reading_of(unit: Unit) -> SessionReading:
+    """What the survey decided, by its ``readings``, for the session of the unit's trial."""
+    trial, table = unit.trial, unit.read("readings")
+    assert trial is not None
     rows = table[table["session"] == (trial.session or "")].to_dict("records")
     if not rows:
         return SessionReading()
@@ -140,4 +144,5 @@ def reading_of(table: pd.DataFrame, trial: Trial) -> SessionReading:
         first["unsure_m"],
         bool(first["corners_only"]),
     )
-    return SessionReading(frame, {row["plate"]: _verdict(row) for row in rows if row["plate"]})
+    plates = {row["plate"]: _verdict(row) for row in rows if row["plate"]}
+    return SessionReading(frame, plates, unit.facts("readings")["delays_s"])

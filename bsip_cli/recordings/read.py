@@ -162,11 +162,16 @@ def _about_frame(frame: FrameChange) -> list[Finding]:
     return [Finding(check, "", found, expected, action, "corrected")]
 
 
-def _about_delay(delay_s: float) -> list[Finding]:
-    if not delay_s:
-        return []
+def delay_words(delay_s: float) -> str:
+    """Empty if there is none."""
     when = "later" if delay_s > 0 else "earlier"
-    found = f"the forces come {abs(delay_s):.2f} s {when} than the motion that they drive"
+    words = f"the forces come {abs(delay_s):.2f} s {when} than the motion that they drive"
+    return words if delay_s else ""
+
+
+def _about_delay(delay_s: float) -> list[Finding]:
+    if not (found := delay_words(delay_s)):
+        return []
     action = "moved them by that; start markers and forces by one signal to know it better"
     expected = "one clock of markers and forces"
     return [Finding("delay", "forces", found, expected, action, "corrected")]

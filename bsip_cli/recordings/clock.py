@@ -75,7 +75,9 @@ def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
     if not np.isfinite(body.rate).any():
         return None
     shifts = np.arange(-round(_MOST_S * rate_hz / step), round(_MOST_S * rate_hz / step) + 1)
-    likely = [Balance.of(body, _shifted(total, k), limits).log_likelihood(limits) for k in shifts]
+    likely = [
+        Balance.of(body, _shifted(total, int(k)), limits).log_likelihood(limits) for k in shifts
+    ]
     return Lags(shifts * step / rate_hz, np.array(likely))
 
 

@@ -37,11 +37,11 @@ def force_in_N(unit: str) -> float | None:
 def moment_in_Nm(unit: str) -> float | None:
     """Size of a moment unit in N m; accepts Nm, N.mm, ntmm, Newton-meters, in-lb, ft.lbf."""
     word = re.sub(r"[\W_]", "", unit.lower())
-    for force, size in _FORCES:
-        for length in (re.match(f"(?:{force})(.+)", word), re.fullmatch(f"(.+?)(?:{force})", word)):
-            rest = word[length.start(1) : length.end(1)] if length else ""
-            if (length_m := length_in_m(rest)) is not None:
-                return size * length_m
+    for parts in ((word[:k], word[k:]) for k in range(1, len(word))):
+        for force, length in (parts, parts[::-1]):
+            force_N, length_m = force_in_N(force), length_in_m(length)
+            if force_N is not None and length_m is not None:
+                return force_N * length_m
     return None
 
 

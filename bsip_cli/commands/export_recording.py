@@ -38,6 +38,7 @@ from bsip_cli.instruments.trc_mot_files import rewrite_trc_mot
 from bsip_cli.pipeline import Stage
 from bsip_cli.recordings.plate_reading import PlateReading
 from bsip_cli.recordings.plate_source import Opened
+from bsip_cli.recordings.read import delay_words
 from bsip_cli.recordings.settle import SessionReading, Verdict
 from bsip_cli.running.runner import Outcome, lacking
 from bsip_cli.running.session import OpenedStudy, follow
@@ -195,6 +196,7 @@ class _Correction:
         )
         kept = [
             self._session.frame.words(),
+            delay_words(self._session.delays_s.get(self._opened.recording.path.stem, 0.0)),
             *(f"plate {n}: {w}" for n, r in self._plates.items() if (w := _stated(r).words())),
         ]
         self.left += [f"{words}: bsip reads the file so" for words in kept if words]
@@ -407,7 +409,7 @@ def _of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
 
 def _opened(unit: Unit) -> tuple[Opened, SessionReading]:
     assert unit.trial is not None
-    session = reading_of(unit.read("readings"), unit.trial)
+    session = reading_of(unit)
     return opened(unit, unit.trial).in_frame(session.frame), session
 
 

@@ -35,6 +35,7 @@ from bsip_cli.recordings.c3d_format import (
 )
 from bsip_cli.recordings.c3d_layout import (
     Layout,
+    about_scales,
     says_unsigned,
     scaling_of,
     settle_layout,
@@ -92,6 +93,7 @@ def read_content(path: Path) -> Content:
     layout, findings = settle_layout(path, header, stated, len(raw))
     rate_hz, about_rate = settle_rate(path, header, stated, layout)
     point_scale, about_scale = settle_scale(header, stated)
+    about_scale += about_scales(stated.get("ANALOG", {}), layout.n_channels)
     scaling = scaling_of(stated.get("ANALOG", {}), layout.n_channels, says_unsigned(records))
     if needs_mending(header, records, layout, rate_hz):
         samples = _read_pieces(

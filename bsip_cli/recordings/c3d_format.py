@@ -182,14 +182,15 @@ def read_records(path: Path, content: bytes) -> list[Record]:
 
 def _follow(content: bytes, at: int, found: list[Record]) -> int | None:
     """Add the record at a byte to those found; where the next one is, None behind the last."""
-    if not 0 <= at < len(content) - 2:
+    if not 0 <= at < len(content):
         raise _BrokenError("its records run into the data")
     if not (n_letters := abs(_signed(content[at]))):
         return None
-    group, after = _signed(content[at + 1]), at + 2 + n_letters
+    after = at + 2 + n_letters
     letters = content[at + 2 : after]
     if len(content) < after + 4 or not all(32 <= byte < 127 for byte in letters):
         raise _BrokenError(f"the record at byte {at} has no readable name")
+    group = _signed(content[at + 1])
     name, step = letters.decode("ascii").strip().upper(), content[after] + 256 * content[after + 1]
     kind, value, end = BYTE, b"", after + 2
     shape: tuple[int, ...] = (0,)

@@ -221,6 +221,16 @@ def settle_scale(header: Header, parameters: Parameters) -> tuple[float, list[Fi
     return size, [Finding("scale", "points", found, "one scale", f"used {size:g}", "warning")]
 
 
+def about_scales(group: Group, n_channels: int) -> list[Finding]:
+    """A warning where there are scales, and not for all channels."""
+    n_scales = np.ravel(numbers(group, "SCALE")).size
+    if n_scales == 0 or n_scales >= n_channels:
+        return []
+    found = f"ANALOG:SCALE has {n_scales} numbers for {n_channels} channels"
+    action = f"took 1 for those after the {n_scales}th; export the trial again"
+    return [Finding("scale", "analog", found, "one for each channel", action, "warning")]
+
+
 @dataclass(frozen=True, eq=False)
 class Scaling:
     """Of the analog channels: (count - offset) x scale, each (n_channels,)."""
@@ -240,7 +250,8 @@ class Scaling:
 def scaling_of(group: Group, n_channels: int, is_unsigned: bool) -> Scaling:
     """GEN_SCALE times SCALE, one where the file says nothing; OFFSET, zero likewise.
 
-    What the file says may be no number, or zero: a plate of such channels is left out.
+    What the file says may be no number, or zero: a plate of such channels is left out. An offset of
+    -32768 is the middle of counts without sign, written with one.
     """
     general = number(group, "GEN_SCALE") if np.size(group.get("GEN_SCALE", ())) else 1.0
     scales, offsets = np.ones(n_channels), np.zeros(n_channels)
@@ -249,6 +260,7 @@ def scaling_of(group: Group, n_channels: int, is_unsigned: bool) -> Scaling:
         values[: len(given)] = given
     with np.errstate(invalid="ignore", over="ignore"):
         scales *= general
+    is_unsigned = is_unsigned or bool((offsets == -_WORD // 2).any())
     if is_unsigned:
         offsets = np.where(offsets < 0, offsets + _WORD, offsets)
     return Scaling(scales, offsets, is_unsigned)

@@ -38,6 +38,7 @@ _TIME = re.compile(r"^times?\b|^t$", re.IGNORECASE)
 _AGAIN = "export the forces again"
 _MOST_FORCES = 64  # as many plates are read of a C3D file
 _NAMES_TOLD = 12
+_LIGHT_N = 20.0  # laboratories set points and moments below 10 to 20 N to nothing
 _NO_FORCE = 1e-9  # of the trial's largest force: where its point lies says nothing
 
 
@@ -255,9 +256,11 @@ def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Fi
     largest = max(np.abs(f.force_N[np.isfinite(f.force_N)]).max(initial=0) for f in forces)
     for force in forces:  # a missing point or moment of no force is zero
         idle = (np.abs(force.force_N) <= _NO_FORCE * largest).all(axis=1)
+        light = np.linalg.norm(force.force_N, axis=1) < _LIGHT_N
         for values in (force.point, force.moment):
             if values is not None:
                 values[idle & ~np.isfinite(values).all(axis=1)] = 0.0
+                _hold_nearest(values, light & ~np.isfinite(values).all(axis=1), ~light)
     unknown = [name for i, name in enumerate(table.names) if i not in used]
     told = ", ".join(printable(name[:40]) for name in unknown[:_NAMES_TOLD])
     more = f" and {len(unknown) - _NAMES_TOLD} more" if len(unknown) > _NAMES_TOLD else ""
@@ -265,6 +268,17 @@ def _forces(table: _Table, path: Path) -> tuple[tuple[GroundForce, ...], list[Fi
     expected = "force, point and moment of each plate, by axis"
     about = Finding("columns", "", found, expected, "left them out", "info")
     return forces, [about] if unknown else []
+
+
+def _hold_nearest(values: np.ndarray, missing: np.ndarray, known: np.ndarray) -> None:
+    """Fill missing rows (n, 3) by those nearest in time that are known under load, in place."""
+    rows = np.flatnonzero(known & np.isfinite(values).all(axis=1))
+    if len(rows):
+        here = np.flatnonzero(missing)
+        after = np.searchsorted(rows, here).clip(1, len(rows) - 1) if len(rows) > 1 else 0 * here
+        before = (after - 1).clip(0)
+        is_nearer = here - rows[before] < rows[after] - here
+        values[here] = values[np.where(is_nearer, rows[before], rows[after])]
 
 
 def _force(

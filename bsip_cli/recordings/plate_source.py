@@ -57,6 +57,9 @@ class PlateSource(Protocol):
     def at(self, samples: np.ndarray) -> PlateSource:
         """These samples alone."""
 
+    def later(self, by: int) -> PlateSource:
+        """Each sample's ``by``-th after it, not usable where there is none."""
+
     def smoothed(self, sigma: float) -> PlateSource:
         """Averaged with a bell of a standard deviation of so many samples."""
 
@@ -88,6 +91,12 @@ class PlateSource(Protocol):
         """What is to be said of this reading beyond its words."""
 
 
+def _later(n: int, by: int) -> tuple[np.ndarray, np.ndarray]:
+    """The ``by``-th after each of n samples, the nearest one where there is none, and where."""
+    samples = np.arange(n) + by
+    return samples.clip(0, n - 1), (samples >= 0) & (samples < n)
+
+
 def lift_N(source: PlateSource) -> np.ndarray:
     """Vertical force as the file says, world frame, (n,)."""
     return np.asarray(source.parts() @ source.matrix(AS_STATED)[2])
@@ -106,6 +115,11 @@ class Opened:
         names = set(map(str, numbers))
         chosen = (source for source in self.sources if not names or source.name in names)
         return replace(self, sources=tuple(chosen))
+
+    def with_forces_from(self, delay_s: float) -> Opened:
+        """With the forces of so much later, of a clock that came late."""
+        by = round(delay_s * self.recording.analog_rate_hz)
+        return replace(self, sources=tuple(one.later(by) for one in self.sources)) if by else self
 
     def in_frame(self, change: FrameChange) -> Opened:
         """In other axes."""
@@ -147,6 +161,11 @@ class C3dPlate:
     def at(self, samples: np.ndarray) -> C3dPlate:
         part = LocalWrench(self.wrench.force_N[samples], self.wrench.moment_Nm[samples])
         return replace(self, wrench=part, usable=self.usable[samples])
+
+    def later(self, by: int) -> C3dPlate:
+        samples, there = _later(len(self.usable), by)
+        part = self.at(samples)
+        return replace(part, usable=part.usable & there)
 
     def smoothed(self, sigma: float) -> C3dPlate:
         parts = (
@@ -290,6 +309,11 @@ class ForceOnPoint:
             moment=self.moment[samples],
             usable=self.usable[samples],
         )
+
+    def later(self, by: int) -> ForceOnPoint:
+        samples, there = _later(len(self.usable), by)
+        part = self.at(samples)
+        return replace(part, usable=part.usable & there)
 
     def smoothed(self, sigma: float) -> ForceOnPoint:
         """Points where there are any: zero says that there is no force."""

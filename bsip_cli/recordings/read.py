@@ -71,7 +71,9 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
     """The recording with its plates, understood as all trials of the session say."""
     opened = opened.in_frame(session.frame)
     recording = opened.recording
-    findings = [*findings_about(session), *_about_sides(recording)]
+    delay_s = session.delays_s.get(recording.path.stem, 0.0)
+    opened = opened.with_forces_from(delay_s)
+    findings = [*findings_about(session), *_about_delay(delay_s), *_about_sides(recording)]
     if recording.forces_note:
         return replace(recording, findings=(*recording.findings, *findings))
     plates: list[Plate] = []
@@ -158,6 +160,21 @@ def _about_frame(frame: FrameChange) -> list[Finding]:
         action = f"{frame.words()}, in all trials; if instead left and right labels are exchanged, "
         action += "rename them"
     return [Finding(check, "", found, expected, action, "corrected")]
+
+
+def delay_words(delay_s: float) -> str:
+    """Empty if there is none."""
+    when = "later" if delay_s > 0 else "earlier"
+    words = f"the forces come {abs(delay_s):.2f} s {when} than the motion that they drive"
+    return words if delay_s else ""
+
+
+def _about_delay(delay_s: float) -> list[Finding]:
+    if not (found := delay_words(delay_s)):
+        return []
+    action = "moved them by that; start markers and forces by one signal to know it better"
+    expected = "one clock of markers and forces"
+    return [Finding("delay", "forces", found, expected, action, "corrected")]
 
 
 def _about_plate(name: str, verdict: Verdict) -> list[Finding]:

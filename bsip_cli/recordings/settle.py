@@ -17,6 +17,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bsip_cli.recordings.body_motion import USUAL, GateLimits
+from bsip_cli.recordings.clock import DELAYED
 from bsip_cli.recordings.hypothesis import AS_IT_IS, Hypothesis
 from bsip_cli.recordings.plate_fit import PlateFit
 from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange, PlateReading
@@ -63,14 +64,33 @@ class Verdict:
 
 @dataclass(frozen=True)
 class SessionReading:
-    """How all recordings of a session are to be understood: their axes, and each plate."""
+    """How all recordings of a session are to be understood: their axes, and each plate.
+
+    ``delays_s`` : by trial, of the forces after the markers, where there is one.
+    """
 
     frame: FrameChange = field(default_factory=FrameChange)
     plates: Mapping[str, Verdict] = field(default_factory=dict)
+    delays_s: Mapping[str, float] = field(default_factory=dict)
+    log_posterior: float = field(default=0.0, compare=False)  # but for a constant
 
 
 def settle_session(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -> SessionReading:
-    """The axes and the plates' readings that make a person of a session."""
+    """The axes and the plates' readings that make a person of a session, and the delays of single
+    trials: what either may explain, the likelier does."""
+    surely = np.log(limits.corrected_percent / (100 - limits.corrected_percent))
+    best = _settled(trials, limits)
+    for k, trial in enumerate(trials):
+        if trial.late is not None:
+            others = [*trials[:k], trial.late, *trials[k + 1 :]]
+            other = _settled(others, limits)
+            if other.log_posterior + DELAYED - best.log_posterior > surely:
+                trials, best = others, other
+    delays = {trial.name: trial.delay_s for trial in trials if trial.delay_s}
+    return replace(best, delays_s=delays)
+
+
+def _settled(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReading:
     is_mirrored = Handedness.of_all([trial.hands for trial in trials]).is_mirrored
     changes = MIRRORS if is_mirrored else (FrameChange(), *FORCES_MOVED)
     repeats = repeated_plates([trial.sources for trial in trials])
@@ -83,7 +103,8 @@ def settle_session(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -
     chosen = _corrected(hypotheses)
     verdicts = {name: _verdict(hypotheses[0].fits[name], chosen, name) for name in chosen.of.fits}
     repeated = {name: Verdict(repeats=others) for name, others in repeats.items()}
-    return SessionReading(chosen.of.frame, verdicts | repeated)
+    known = chosen.of.log_posterior
+    return SessionReading(chosen.of.frame, verdicts | repeated, log_posterior=known)
 
 
 # --- the choice -------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from bsip_cli.files.force_files import forces_beside
 from bsip_cli.recordings import scene
@@ -28,6 +29,7 @@ from bsip_cli.recordings.timebase import (
     onto_grid,
 )
 from bsip_cli.recordings.trc import Trc, read_trc
+from bsip_cli.recordings.under_the_feet import BESIDE_M
 from bsip_cli.recordings.units import length_in_m, moment_in_Nm
 
 _VALUES_PER_BYTE = (
@@ -47,9 +49,9 @@ def open_trc_mot(path: Path) -> Opened:
     mot_path = forces_beside(path)
     mot = read_mot(mot_path) if mot_path else None
     most = _VALUES_PER_BYTE * sum(file.stat().st_size for file in (path, mot_path) if file)
-    up = _up(trc, mot)
-    rotation = scene.rotation_to_z_up(up)
-    analog_rate_hz, sources, note, found = _forces(mot, rotation, times, most)
+    up, up_of_forces = _ups(trc, positions, mot)
+    rotation, of_forces = map(scene.rotation_to_z_up, (up, up_of_forces))
+    analog_rate_hz, sources, note, found = _forces(mot, of_forces, times, most)
     recording = Recording(
         path=path,
         marker_rate_hz=times.rate_hz,
@@ -57,7 +59,7 @@ def open_trc_mot(path: Path) -> Opened:
         markers_m=positions @ rotation.T,
         analog_rate_hz=analog_rate_hz,
         plates=(),
-        findings=(*trc.findings, *findings, *scene.findings_about(up), *found),
+        findings=(*trc.findings, *findings, *_about_ups(up, up_of_forces), *found),
         rotation_world_lab=rotation,
         forces_note=note,
         time0_s=times.first_s,
@@ -87,8 +89,12 @@ def _even_markers(trc: Trc, path: Path) -> tuple[_MarkerTimes, np.ndarray, tuple
     return times, onto_grid(grid, trc.positions_m), (*findings, *grid.findings)
 
 
-def _up(trc: Trc, mot: Mot | None) -> scene.Up:
-    """From the direction of the forces, the markers telling its sign; else labels; else Y."""
+def _ups(trc: Trc, positions_m: np.ndarray, mot: Mot | None) -> tuple[scene.Up, scene.Up]:
+    """Of the markers, and of the forces, which a conversion may have left in other axes.
+
+    From the direction of the forces, the markers telling its sign; else labels; else Y.
+    """
+    by_labels = scene.up_from_labels(trc.labels, trc.positions_m)
     surface = None
     if mot is not None:
         force = np.concatenate([f.force_N for f in mot.forces])
@@ -97,12 +103,43 @@ def _up(trc: Trc, mot: Mot | None) -> scene.Up:
         on_floor = np.concatenate(points)[loaded] * _MM  # at least: what is low is low in any unit
         if loaded.any():
             mean = np.abs(force[loaded]).mean(axis=0)
+            of_forces = scene.Up(int(np.argmax(mean)), 1, "the forces point there")
+            if by_labels and {by_labels.axis, of_forces.axis} == {1, 2}:
+                feet_m = _feet(trc.labels, positions_m) @ scene.rotation_to_z_up(by_labels).T
+                points_m = on_floor / _MM @ scene.rotation_to_z_up(of_forces).T
+                if _lie_below(points_m, feet_m):
+                    return by_labels, of_forces
             surface = scene.up_from_surface(mean[None], on_floor, trc.positions_m)
-    return (
-        surface
-        or scene.up_from_labels(trc.labels, trc.positions_m)
-        or scene.Up(1, 1, "the convention of TRC files")
-    )
+    up = surface or by_labels or scene.Up(1, 1, "the convention of TRC files")
+    return up, up
+
+
+def _feet(labels: tuple[str, ...], positions_m: np.ndarray) -> np.ndarray:
+    """Every place of every marker of the feet, (n, 3)."""
+    by_segment = scene.by_segment(labels, positions_m)
+    feet = [by_segment[foot].reshape(-1, 3) for foot in ("foot_l", "foot_r") if foot in by_segment]
+    every = np.concatenate(feet or [np.zeros((0, 3))])
+    return every[np.isfinite(every).all(axis=1)]
+
+
+def _lie_below(points_m: np.ndarray, feet_m: np.ndarray) -> bool:
+    """Whether points of force (n, 3) lie where the feet are seen, in axes turned by some right
+    angle about the vertical."""
+    points = points_m[np.isfinite(points_m).all(axis=1), :2] @ np.array([1.0, 1j])
+    if not len(points) or not len(feet_m):
+        return False
+    near = cKDTree(feet_m[:, :2])
+    turned = (points * 1j**quarter for quarter in range(4))
+    distances = (near.query(np.column_stack([z.real, z.imag]))[0] for z in turned)
+    return any(np.median(distance) < BESIDE_M for distance in distances)
+
+
+def _about_ups(up: scene.Up, of_forces: scene.Up) -> list[Finding]:
+    if up.axis == of_forces.axis:
+        return scene.findings_about(up)
+    found = f"the forces point along {of_forces.name}, and the body stands along {up.name}"
+    action = "turned both files' axes Z-up, each in its own way"
+    return [Finding("up_axis", "forces", found, "one laboratory frame", action, "corrected")]
 
 
 def _forces(

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bsip_cli.recordings.body_motion import SMOOTH_S, Body
+from bsip_cli.recordings.body_motion import SMOOTH_S, USUAL, Body, GateLimits
+from bsip_cli.recordings.clock import lags
 from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.plate_reading import FrameChange
 from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N
@@ -23,9 +24,11 @@ class TrialSamples:
     """Some samples at which plates are loaded.
 
     ``sources`` by their names, none if no plate is loaded, and ``smooth``, averaged over as long as
-    the ``body``; for each ``loaded`` (n,) bool; the ``feet``.
+    the ``body``; for each ``loaded`` (n,) bool; the ``feet``. ``late`` : the same with the forces
+    of ``delay_s`` later, if these go with the motion far better; None else.
     """
 
+    name: str
     hands: Handedness
     height_m: float | None
     sources: dict[str, PlateSource]
@@ -33,9 +36,21 @@ class TrialSamples:
     loaded: dict[str, np.ndarray]
     feet: Feet
     body: Body
+    delay_s: float = 0.0
+    late: TrialSamples | None = None
 
     @classmethod
-    def of(cls, opened: Opened) -> TrialSamples:
+    def of(cls, opened: Opened, limits: GateLimits = USUAL) -> TrialSamples:
+        stated = cls._of(opened)
+        seen = lags(opened, limits) if stated.sources else None
+        delay_s = 0.0 if seen is None else seen.delay_s(limits)
+        if not delay_s:
+            return stated
+        late = cls._of(opened.with_forces_from(delay_s))
+        return replace(stated, late=replace(late, delay_s=delay_s))
+
+    @classmethod
+    def _of(cls, opened: Opened) -> TrialSamples:
         recording = opened.recording
         markers, rate_hz = recording.markers_m, recording.analog_rate_hz
         segments = by_segment(recording.labels, markers)
@@ -51,6 +66,7 @@ class TrialSamples:
         sides = [side if side in "lr" else "" for side in sides]
         floor = sources[0].floor_m() if sources else 0.0
         return cls(
+            name=recording.path.stem,
             hands=handedness(recording.labels, markers),
             height_m=height_m(segments),
             sources={s.name: s.at(samples) for s in sources},

@@ -10,6 +10,13 @@ _WORDS = {"mete": "m", "metr": "m", "deci": "dm", "centi": "cm", "milli": "mm"}
 _WORDS |= {"inch": "in", "foot": "ft", "feet": "ft"}
 _SIGNS = {'"': "in", "''": "in", "\N{DOUBLE PRIME}": "in", "'": "ft", "\N{PRIME}": "ft"}
 
+_FORCES = (
+    ("newtons?|newt|nt|n", 1.0),
+    ("kn", 1000.0),
+    ("lbs?f?|lbfs|pounds?(?:force)?", 4.4482216152605),
+    ("kgs?f?|kgfs|kp", 9.80665),
+)
+
 
 def length_in_m(unit: str) -> float | None:
     """Size of a length unit in metres; None if the spelling is unknown."""
@@ -24,20 +31,18 @@ def length_in_m(unit: str) -> float | None:
 
 def force_in_N(unit: str) -> float | None:
     """Size of a force unit in newtons; None if it is no force unit (volts, empty)."""
-    word = unit.strip().lower()
-    if word in ("n", "nt") or word.startswith("newt"):
-        return 1.0
-    return 1000.0 if word == "kn" else None
+    return next((size for word, size in _FORCES if re.fullmatch(word, unit.strip().lower())), None)
 
 
 def moment_in_Nm(unit: str) -> float | None:
-    """Size of a moment unit in N m; accepts Nm, N.mm, ntmm, Newton-meters."""
+    """Size of a moment unit in N m; accepts Nm, N.mm, ntmm, Newton-meters, in-lb, ft.lbf."""
     word = re.sub(r"[\W_]", "", unit.lower())
-    of_force = re.match("(k?)(?:newtons|newton|nt|n)", word)
-    length_m = length_in_m(word[of_force.end() :]) if of_force else None
-    if of_force is None or length_m is None:
-        return None
-    return 1000.0 * length_m if word.startswith("kn") else length_m
+    for parts in ((word[:k], word[k:]) for k in range(1, len(word))):
+        for force, length in (parts, parts[::-1]):
+            force_N, length_m = force_in_N(force), length_in_m(length)
+            if force_N is not None and length_m is not None:
+                return force_N * length_m
+    return None
 
 
 def length_name(size_m: float) -> str:

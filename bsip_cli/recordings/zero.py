@@ -16,6 +16,7 @@ _LEAST_S = 0.4
 _LARGEST_N = 45.0
 _QUIET_N = 5.0  # slow changes
 _PULL_N = -20.0
+_HEAVIEST_N = 2500.0  # nobody stands on one plate so heavily
 _LOW_M = 0.3  # above the plate: whoever stands on it has a marker below this height
 _CLEAR_M = 0.3  # beyond the outline
 _FEWEST_LOW = 2  # markers seen low in a frame: the feet are in view
@@ -78,14 +79,19 @@ def without_baseline(
     good: np.ndarray,
     baseline: slice | None,
 ) -> tuple[LocalWrench, list[Finding]]:
-    """Subtract the mean of the ZERO samples if it is a pull, which no person can do."""
+    """Subtract the mean of the ZERO samples if it is a pull, which no person can do.
+
+    Where the plate never pushes, and pulls no more than a person weighs, somebody stood on it from
+    the first and its sign is the other one.
+    """
     if baseline is None or not good[baseline].all():
         return wrench, []
     force, moment = (x[baseline].mean(axis=0) for x in (wrench.force_N, wrench.moment_Nm))
     level = down_sign * force[2]
     rest = (down_sign * wrench.force_N[:, 2] - level)[good]
     is_loaded_above = np.percentile(rest, 95) > LOADED_N and np.percentile(rest, 2) > _PULL_N
-    if level > _PULL_N or not is_loaded_above:
+    is_reversed = level > -_HEAVIEST_N and level + np.percentile(rest, 98) < -_PULL_N
+    if level > _PULL_N or not is_loaded_above or is_reversed:
         return wrench, []
     found = f"{level:.0f} N in the samples of FORCE_PLATFORM:ZERO, a pull"
     expected, action = "0 N without load", "subtracted that baseline from all channels"

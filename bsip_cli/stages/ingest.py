@@ -32,17 +32,17 @@ from bsip_cli.recordings.zero import nobody_near, plate_zero, subtract_zero
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH
 from bsip_cli.stages.person_mass import VAGUE_PERCENT, StatedMass, compared, stated_mass
-from bsip_cli.stages.survey import opened, reading_of
+from bsip_cli.stages.survey import opened, prefix_of, reading_of
 
 
 def run(unit: Unit) -> None:
     """Read one recording; write markers, wrench, plates, contacts and quality."""
     assert unit.trial is not None and unit.participant is not None
-    session = reading_of(unit.read("readings"), unit.trial)
+    session = reading_of(unit)
     recording = assemble(opened(unit, unit.trial), session)
     marker_set, told = _marker_set(unit, recording)
     labels, paired = with_pairs_named(
-        recording.labels, recording.markers_m, marker_set, _prefix(unit)
+        recording.labels, recording.markers_m, marker_set, prefix_of(unit)
     )
     recording = replace(recording, labels=labels)
     match = match_labels(
@@ -50,7 +50,7 @@ def run(unit: Unit) -> None:
         marker_set.wanted(),
         optional=marker_set.optional(),
         seen=np.isfinite(recording.markers_m[..., 0]).any(axis=0),
-        prefix=_prefix(unit),
+        prefix=prefix_of(unit),
     )
     names = [marker.label for marker in marker_set.markers if marker.label in match.index]
     _require(unit, names, recording)
@@ -109,18 +109,13 @@ def _without_zero(recording: Recording) -> tuple[Recording, list[Finding]]:
     return replace(recording, plates=tuple(plate for plate, _ in done)), [f for _, f in done]
 
 
-def _prefix(unit: Unit) -> str:
-    assert unit.participant is not None
-    return unit.config.ingest.prefixes.get(unit.participant.id, "")
-
-
 def _marker_set(unit: Unit, recording: Recording) -> tuple[MarkerSet, tuple[Finding, ...]]:
     """The set that is configured, or told from the labels, and how."""
     if unit.config.marker_set != "auto":
         return load_marker_set(unit.config.marker_set), ()
     assert unit.trial is not None
     source = quote(str(unit.trial.path))
-    guess = guess_marker_set(recording.labels, _prefix(unit), source)
+    guess = guess_marker_set(recording.labels, prefix_of(unit), source)
     return guess.marker_set, guess.findings()
 
 

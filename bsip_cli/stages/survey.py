@@ -5,12 +5,16 @@ Written as rows of ``readings``, and read back for each trial.
 
 from __future__ import annotations
 
-from dataclasses import asdict, fields
+from collections.abc import Sequence
+from dataclasses import asdict, fields, replace
 
 import pandas as pd
 
 from bsip_cli.errors import BadDataError
+from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.recordings.body_motion import GateLimits
+from bsip_cli.recordings.label_words import bones
+from bsip_cli.recordings.labels import person_of
 from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
 from bsip_cli.recordings.plate_source import Opened
 from bsip_cli.recordings.read import findings_about, open_recording
@@ -30,11 +34,13 @@ def run(unit: Unit) -> None:
     """Look at every recording of the participant; write readings, decided for each session."""
     assert unit.participant is not None
     rows: list[dict] = []
+    delays_s: dict[str, float] = {}
     options = unit.config.ingest
     limits = GateLimits(**{one.name: getattr(options, one.name) for one in fields(GateLimits)})
+    _say_copies(unit, unit.participant.trials)
     for session in dict.fromkeys(trial.session for trial in unit.participant.trials):
         mine = (trial for trial in unit.participant.trials if trial.session == session)
-        seen = [one for one in (_survey(unit, trial) for trial in mine) if one is not None]
+        seen = [x for x in (_survey(unit, trial, limits) for trial in mine) if x is not None]
         if not seen:
             continue
         heights = [one.height_m for one in seen if one.height_m is not None]
@@ -43,27 +49,62 @@ def run(unit: Unit) -> None:
             raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
         reading = settle_session(seen, limits)
         rows += rows_of(session or "", reading)
+        delays_s |= reading.delays_s
         whose = f"{unit.name}, session {session}" if session else unit.name
         for finding in findings_about(reading):
             unit.warn(f"{whose}: {finding.sentence()}")
-    unit.write("readings", rows)
+    unit.write("readings", rows, {"delays_s": delays_s})
 
 
-def _survey(unit: Unit, trial: Trial) -> TrialSamples | None:
+def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:
+    """One movement under two names would be held out from itself."""
+    first: dict[str, Trial] = {}
+    for trial in trials:
+        one = first.setdefault(file_hash(trial.path), trial)
+        if one is not trial:
+            unit.warn(
+                f"{unit.name}: {trial.path.name} is a copy of {one.path.name}: what is found in "
+                "one is no test of the other; remove one of them"
+            )
+
+
+def _survey(unit: Unit, trial: Trial, limits: GateLimits) -> TrialSamples | None:
     """None where the recording cannot be read: its own turn will say why."""
+    assert unit.participant is not None
     try:
-        return TrialSamples.of(opened(unit, trial))
+        found = opened(unit, trial)
     except BadDataError:
         return None
+    seen = TrialSamples.of(found, limits)
+    if seen.height_m is not None and no_person(seen.height_m, unit.participant.height_m):
+        try:
+            person_of(found.recording.labels, bones, prefix_of(unit))
+        except BadDataError as two:  # people are no giant
+            raise BadDataError(
+                two.found, expected=two.expected, remedy=two.remedy, file=trial.path
+            ) from two
+    return seen
 
 
 # --- to rows and back -------------------------------------------------------------------------
 
 
 def opened(unit: Unit, trial: Trial) -> Opened:
-    """A trial's recording, of the plates that count."""
+    """A trial's recording, of the plates that count and of the person whose markers do."""
     found: Opened = unit.recordings.get(trial.stem) or open_recording(trial.path)
+    if prefix := prefix_of(unit):
+        recording = found.recording
+        own = sorted(person_of(recording.labels, bones, prefix).names)
+        labels = tuple(recording.labels[k] for k in own)
+        recording = replace(recording, labels=labels, markers_m=recording.markers_m[:, own])
+        found = replace(found, recording=recording)
     return found.with_plates(unit.config.ingest.plates)
+
+
+def prefix_of(unit: Unit) -> str:
+    """What the participant's labels begin with where a file holds several people."""
+    assert unit.participant is not None
+    return unit.config.ingest.prefixes.get(unit.participant.id, "")
 
 
 def rows_of(session: str, reading: SessionReading) -> list[dict]:
@@ -117,8 +158,10 @@ def _verdict(row: dict) -> Verdict:
     )
 
 
-def reading_of(table: pd.DataFrame, trial: Trial) -> SessionReading:
-    """What the survey decided, by its ``readings``, for the session of a trial."""
+def reading_of(unit: Unit) -> SessionReading:
+    """What the survey decided, by its ``readings``, for the session of the unit's trial."""
+    trial, table = unit.trial, unit.read("readings")
+    assert trial is not None
     rows = table[table["session"] == (trial.session or "")].to_dict("records")
     if not rows:
         return SessionReading()
@@ -128,4 +171,5 @@ def reading_of(table: pd.DataFrame, trial: Trial) -> SessionReading:
         axis=int(first["axis"]),
         corners_only=bool(first["corners_only"]),
     )
-    return SessionReading(frame, {row["plate"]: _verdict(row) for row in rows if row["plate"]})
+    plates = {row["plate"]: _verdict(row) for row in rows if row["plate"]}
+    return SessionReading(frame, plates, unit.facts("readings")["delays_s"])

@@ -44,3 +44,13 @@ def test_says_what_each_recording_is(bsip, study):
 def test_a_study_that_is_none(bsip, tmp_path):
     answer = bsip("check", tmp_path / "nowhere")
     assert answer.code in (2, 3) and "nowhere" in answer.err
+
+
+def test_a_recording_under_two_names_is_said(bsip, study):
+    folder = study / "sub-01"
+    (folder / "sub-01_task-steps.c3d").unlink()
+    assert "is a copy of" not in bsip("check", study).err
+    shutil.copy(folder / "sub-01_task-squat_run-1.c3d", folder / "sub-01_task-squat_run-2.c3d")
+    answer = bsip("check", study)
+    said = "sub-01_task-squat_run-2.c3d is a copy of sub-01_task-squat_run-1.c3d"
+    assert answer.code == 0 and said in answer.err

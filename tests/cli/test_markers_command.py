@@ -13,6 +13,7 @@ from bsip_cli.artifacts import read_header
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
 from bsip_cli.commands.markers import Request, markers_command
 from bsip_cli.errors import BadDataError, UsageError
+from tests.recordings.recording_writers import standing_markers, write_trc
 
 LINE_M = 1.5
 HANSEN = [marker.label for marker in load_marker_set("hansen2017").markers]
@@ -265,3 +266,22 @@ def test_two_people_of_one_recording_in_a_study(bsip, here):
         assert list(table["marker"][:3]) == HANSEN[:3]
     apart_m = np.linalg.norm(first_y["sub-02"] - first_y["sub-01"])
     assert apart_m == pytest.approx(LINE_M / 2, abs=1e-5)
+
+
+def test_two_people_far_apart_are_no_giant(bsip, tmp_path):
+    """The size of each counts, not the way from one's feet to the other's head."""
+    markers, labels = standing_markers(80)
+    folder = tmp_path / "study" / "sub-01"
+    folder.mkdir(parents=True)
+    both = np.concatenate([markers, markers + np.array([4.0, 0.0, 0.0])], axis=1)
+    names = [f"{name}:{label}" for name in ("Anna", "Ben") for label in labels]
+    write_trc(folder / "sub-01_task-static.trc", np.arange(80) / 100.0, both, names)
+    (tmp_path / "study" / "participants.tsv").write_text(
+        "participant_id\tsex\tmass_kg\theight_m\nsub-01\tF\t60\t1.7\n"
+    )
+    refused = bsip("check", tmp_path / "study")
+    assert refused.code == 3 and " tall" not in refused.err
+    assert "sub-01_task-static.trc: 2 people in one file: 'Anna:'" in refused.err
+    (tmp_path / "study" / "study.toml").write_text('[ingest]\nprefixes = { sub-01 = "Ben" }\n')
+    chosen = bsip("check", tmp_path / "study")
+    assert " tall" not in chosen.err and "2 people" not in chosen.err

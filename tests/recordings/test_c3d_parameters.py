@@ -9,6 +9,7 @@ import pytest
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.c3d_format import (
+    BLOCK,
     DEC,
     PC,
     floats,
@@ -31,6 +32,19 @@ def content(tmp_path) -> bytearray:
 
 def _parameters(tmp_path, content: bytes):
     return parameters_of(read_records(tmp_path / "a.c3d", bytes(content)), PC)
+
+
+def test_records_may_end_with_the_last_byte_before_the_data(tmp_path):
+    """The two zeros behind the last one, or the first of them."""
+    group = bytes([5, 255]) + b"POINT" + struct.pack("<H", 3) + bytes([0])
+    head = bytes([2, 80]).ljust(BLOCK, b"\0") + bytes([1, 80, 1, PC])
+    for end in (b"\0\0", b"\0"):
+        (record,) = read_records(tmp_path / "a.c3d", head + group + end)
+        assert record.name == "POINT"
+    with pytest.raises(BadDataError, match="no readable name"):
+        read_records(tmp_path / "a.c3d", head + group[:-1])
+    with pytest.raises(BadDataError, match="no readable name"):
+        read_records(tmp_path / "a.c3d", head + group + b"\5")
 
 
 def test_numbers_of_a_good_file(tmp_path, content):

@@ -5,8 +5,10 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from bsip_cli.recordings.c3d_layout import about_scales, scaling_of
 from bsip_cli.recordings.read import read_recording
 from tests.recordings.recording_writers import (
     PlateSpec,
@@ -32,6 +34,23 @@ def _write(path: Path, place: int, dimensions: int, value: float) -> None:
     assert tuple(content[place : place + 2]) == (4, dimensions)
     struct.pack_into("<f", content, place + 2 + dimensions, value)
     path.write_bytes(content)
+
+
+@pytest.mark.parametrize(("n_scales", "is_said"), [(0, False), (7, True), (12, False), (16, False)])
+def test_scales_that_do_not_reach_all_channels_are_said(n_scales, is_said):
+    found = [f.found for f in about_scales({"SCALE": np.full(n_scales, 0.1)}, 12)]
+    assert found == ["ANALOG:SCALE has 7 numbers for 12 channels"] * is_said
+
+
+@pytest.mark.parametrize("offset", [-32768.0, -32767.0, 0.0])
+def test_an_offset_of_half_the_counts_is_of_counts_without_sign(offset):
+    group = {"OFFSET": np.array([offset, 0.0])}
+    counts = np.array([[-32768.0, 32767.0, -32760.0], [-3.0, 4.0, 5.0]])
+    found = scaling_of(group, 2, is_unsigned=False).applied(counts, is_float=False)
+    if offset == -32768.0:
+        np.testing.assert_array_equal(found[0], [0.0, -1.0, 8.0])
+    else:
+        np.testing.assert_array_equal(found, counts - np.array([[offset], [0.0]]))
 
 
 def _excluded(path: Path) -> tuple[int, list[str]]:

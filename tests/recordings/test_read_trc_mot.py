@@ -264,3 +264,52 @@ def test_broken_mot_is_refused(tmp_path, text):
     (tmp_path / "a.mot").write_text(text)
     with pytest.raises(BadDataError):
         read_recording(path)
+
+
+@pytest.mark.parametrize("markers_y_up", [True, False])
+def test_markers_and_forces_in_other_axes_are_turned_each_in_its_own_way(tmp_path, markers_y_up):
+    """A conversion may turn a TRC and leave its MOT, or the other way round."""
+    markers, labels = standing_markers(N)
+    time_s, (force, moment) = np.arange(N) / 100.0, standing_wrench(N)
+    write_trc(tmp_path / "a.trc", time_s, markers @ TURN if markers_y_up else markers, labels)
+    write_mot(tmp_path / "a.mot", time_s, _columns(force, moment, y_up=not markers_y_up))
+    recording = read_recording(tmp_path / "a.trc")
+    assert {f.check: f.level for f in recording.findings} == {"up_axis": "corrected"}
+    np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)
+    np.testing.assert_allclose(recording.plates[0].force_N, force, atol=1e-6 * force.max())
+
+
+def test_who_lies_on_the_plates_keeps_the_forces_axes(tmp_path):
+    """Head and feet along the laboratory's Z, forces along Y: no conversion."""
+    markers, labels = standing_markers(N)
+    lying = markers @ np.array([[1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0]])
+    write_trc(tmp_path / "a.trc", np.arange(N) / 100.0, lying @ TURN, labels)
+    force, _ = standing_wrench(N)
+    under_the_back = np.cross([0.2, 0.9, 0.0], force)
+    columns = _columns(force, under_the_back)
+    write_mot(tmp_path / "a.mot", np.arange(N) / 100.0, columns)
+    recording = read_recording(tmp_path / "a.trc")
+    assert not any(f.check == "up_axis" and f.subject for f in recording.findings)
+    np.testing.assert_allclose(recording.rotation_world_lab @ TURN.T, np.eye(3), atol=1e-12)
+
+
+@pytest.mark.parametrize("light_N", [12.0, 40.0])
+def test_a_missing_point_is_the_nearest_known_one_under_a_light_force_only(tmp_path, light_N):
+    markers, labels = standing_markers(N)
+    time_s, (force, moment) = np.arange(N) / 100.0, standing_wrench(N)
+    columns = _columns(force, moment)
+    lifted = slice(50, 60)
+    noise = np.random.default_rng(2).normal(0.0, 1.0, (3, 10))
+    for axis, value in zip("xyz", noise + np.array([[0.0], [light_N], [0.0]]), strict=True):
+        columns[f"ground_force_1_v{axis}"][lifted] = value
+        for name in (f"ground_force_1_p{axis}", f"ground_force_1_m{axis}"):
+            columns[name][lifted] = np.nan
+    write_trc(tmp_path / "a.trc", time_s, markers @ TURN, labels)
+    write_mot(tmp_path / "a.mot", time_s, columns)
+    (plate,) = read_recording(tmp_path / "a.trc").plates
+    if light_N > 20.0:
+        assert not plate.usable[lifted].any()
+        return
+    assert plate.usable[lifted].all()
+    held = [49] * 5 + [60] * 5
+    np.testing.assert_allclose(plate.cop_m(0.0)[lifted], plate.cop_m(0.0)[held], atol=1e-9)

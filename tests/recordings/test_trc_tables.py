@@ -7,7 +7,7 @@ import pytest
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.read import read_recording
-from bsip_cli.recordings.units import length_in_m, moment_in_Nm
+from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
 from tests.recordings.recording_writers import standing_markers, write_trc
 
 N = 40
@@ -210,11 +210,24 @@ def test_a_stated_unit_that_no_person_fits(tmp_path, word):
         ("kN.m", 1e3),
         ("Nm", 1.0),
         ("N-mm", 1e-3),
+        ("Newton-millimeters", 1e-3),
+        ("in-lbf", 0.1129848),
+        ("lb.ft", 1.3558179),
+        ("kgf.cm", 0.0980665),
         ("V", None),
+        ("Newton", None),
     ],
 )
 def test_units_of_moment(word, size):
-    assert moment_in_Nm(word) == size
+    assert moment_in_Nm(word) == (size and pytest.approx(size, rel=1e-6))
+
+
+@pytest.mark.parametrize(
+    ("word", "size"),
+    [("N", 1.0), ("Newt", 1.0), ("kN", 1e3), ("lbf", 4.448222), ("kp", 9.80665), ("", None)],
+)
+def test_units_of_force(word, size):
+    assert force_in_N(word) == (size and pytest.approx(size, rel=1e-6))
 
 
 def test_the_case_of_unnamed_trajectories(shared_cases):

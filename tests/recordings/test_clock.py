@@ -1,0 +1,103 @@
+"""Forces of another clock are found by the body that they drive, and moved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bsip_cli.recordings.clock import lags
+from bsip_cli.recordings.plate_source import C3dPlate, Opened
+from bsip_cli.recordings.plates import LocalWrench
+from bsip_cli.recordings.read import assemble, open_recording
+from bsip_cli.recordings.settle import settle_session
+from bsip_cli.recordings.trial_samples import TrialSamples
+from tests.recordings.standing_on_two_plates import RATE_HZ, N, motion, of_c3d, of_table, opened
+
+REAL = {  # one of each: quiet on one leg, squats, gait, golf, jump, sitting down, running
+    "biobuddy_ech/right_knee.c3d": True,
+    "opencap_subject4/squats1.trc": True,
+    "zoo_children/HC031A-straight.c3d": False,
+    "ktk_walk_and_serve/walk.c3d": True,
+    "golf_french/swing3.c3d": True,
+    "motionanalysis_helenhayes/Sample_Jump2.c3d": True,
+    "opencap_subject4/STS1.trc": True,
+    "hamner_other/run200.trc": False,
+    "golf_french/static.c3d": False,
+}
+
+
+def session_of(trial: Opened, *others: Opened):
+    return settle_session([TrialSamples.of(one) for one in (trial, *others)])
+
+
+@pytest.mark.parametrize("make", [of_c3d, of_table])
+@pytest.mark.parametrize("delay_s", [-0.65, -0.5, 0.55, 0.8])
+def test_a_delay_is_found_and_taken_off(make, delay_s):
+    sound = opened(make())
+    late = sound.with_forces_from(-delay_s)
+    session = session_of(late)
+    assert session.delays_s == {"a": pytest.approx(delay_s, abs=0.015)}
+    read = assemble(late, session)
+    (said,) = (f for f in read.findings if f.check == "delay")
+    assert said.level == "corrected" and f"{abs(session.delays_s['a']):.2f} s" in said.found
+    by = round(session.delays_s["a"] * RATE_HZ)
+    whole = slice(max(-by, 0), N - max(by, 0))
+    assert all(plate.usable[whole].all() for plate in read.plates)
+    lost = np.ones(N, bool)
+    lost[whole] = False
+    assert not any(plate.usable[lost].any() for plate in read.plates)
+    truth = assemble(sound, session_of(sound))
+    for found, true in zip(read.plates, truth.plates, strict=True):
+        off = np.abs(found.force_N - true.force_N)[whole][abs(by) : -abs(by)]
+        assert off.max() < 0.05 * true.force_N[:, 2].max()
+
+
+def test_small_delays_and_sound_trials_are_left_alone():
+    for delay_s in (-0.06, 0.0, 0.06):
+        assert session_of(opened(of_c3d()).with_forces_from(delay_s)).delays_s == {}
+
+
+def test_quiet_stance_tells_no_delay():
+    still = np.repeat(motion()[0][:1], N, axis=0)
+    still += np.random.default_rng(5).normal(0.0, 2e-4, still.shape)
+    assert session_of(opened(of_c3d(), still).with_forces_from(0.4)).delays_s == {}
+
+
+def test_side_forces_of_the_other_sign_are_no_delay():
+    """Half a period later they would go with the motion; a repair explains them better."""
+    signs = np.array([-1.0, -1.0, 1.0])
+    wrong = [
+        C3dPlate(
+            one.description,
+            LocalWrench(one.wrench.force_N * signs, one.wrench.moment_Nm * signs),
+            one.usable,
+            one.rotation_world_lab,
+        )
+        for one in of_c3d()
+    ]
+    assert session_of(opened(wrong)).delays_s == {}
+
+
+def test_only_the_trial_that_is_late_is_moved():
+    sound, late = opened(of_c3d()), opened(of_c3d()).with_forces_from(-0.6)
+    assert len(session_of(sound, sound, late).delays_s) == 1
+
+
+def test_without_forces_or_at_two_frames_a_second_nothing_is_asked():
+    assert lags(opened([])) is None
+    slow = opened(of_c3d())
+    recording = replace(slow.recording, marker_rate_hz=2.0, analog_rate_hz=2.0)
+    assert lags(replace(slow, recording=recording)) is None
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_recordings_have_no_delay_and_a_hidden_one_is_found(real_data, name):
+    sound = open_recording(real_data / name)
+    assert session_of(sound).delays_s == {}
+    hidden = session_of(sound.with_forces_from(-0.37)).delays_s
+    if REAL[name]:
+        assert list(hidden.values()) == [pytest.approx(0.37, abs=0.04)]
+    else:
+        assert all(abs(found - 0.37) < 0.04 for found in hidden.values())

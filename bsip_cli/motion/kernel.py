@@ -2,8 +2,7 @@
 
 The Gauss-Newton matrix of a tree of markers is the joint-space mass matrix of point masses: every
 marker is a mass of its weight. It is built by the composite-rigid-body algorithm and factored
-without fill-in by the tree's own sparsity (Featherstone 2008, chapters 6.2 and 8.6). The innermost
-loops are spelled out: as expressions of small arrays they take several times as long.
+without fill-in by the tree's own sparsity (Featherstone 2008, chapters 6.2 and 8.6).
 """
 
 from __future__ import annotations
@@ -38,11 +37,6 @@ def _cross(a, b, out):
 
 
 @compiled
-def _squared(a):
-    return a[0] ** 2 + a[1] ** 2 + a[2] ** 2
-
-
-@compiled
 def _rotation_of_quaternion(q, out):
     x, y, z, w = q[0], q[1], q[2], q[3]
     out[0, 0] = 1 - 2 * (y * y + z * z)
@@ -59,7 +53,7 @@ def _rotation_of_quaternion(q, out):
 @compiled
 def _turn_quaternion(q, omega):
     """q <- q * exp(omega), omega in the body's own axes."""
-    angle = np.sqrt(_squared(omega))
+    angle = np.sqrt(omega[0] ** 2 + omega[1] ** 2 + omega[2] ** 2)
     k = 0.5 if angle < 1e-12 else np.sin(0.5 * angle) / angle
     c = np.cos(0.5 * angle)
     ex, ey, ez = k * omega[0], k * omega[1], k * omega[2]
@@ -68,16 +62,19 @@ def _turn_quaternion(q, omega):
     q[1] = y * c + w * ey + z * ex - x * ez
     q[2] = z * c + w * ez + x * ey - y * ex
     q[3] = w * c - x * ex - y * ey - z * ez
-    q[:4] /= np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+    norm = np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+    for k2 in range(4):
+        q[k2] /= norm
 
 
 @compiled
 def _rotation_vector(q, out):
     """Rotation vector of a unit quaternion, by the shorter way."""
     sign = 1.0 if q[3] >= 0 else -1.0
-    s = np.sqrt(_squared(q))
+    s = np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2)
     k = 2.0 if s < 1e-12 else 2.0 * np.arctan2(s, sign * q[3]) / s
-    out[:] = sign * k * q[:3]
+    for i in range(3):
+        out[i] = sign * k * q[i]
 
 
 @compiled
@@ -85,7 +82,8 @@ def _hinge_rotation(u, angle, out):
     """Rotation by an angle about a unit axis (Rodrigues)."""
     c, s = np.cos(angle), np.sin(angle)
     for j in range(3):
-        out[j] = (1 - c) * u[j] * u
+        for k in range(3):
+            out[j, k] = (1 - c) * u[j] * u[k]
         out[j, j] += c
     out[0, 1] -= s * u[2]
     out[0, 2] += s * u[1]
@@ -138,7 +136,7 @@ def _cost(residuals, q, tree, task):
     """Half the weighted squares, growing like the logarithm beyond the limit, plus the prior."""
     total, limit = 0.0, task.limit
     for m in range(task.weights.size):
-        d2 = _squared(residuals[m])
+        d2 = residuals[m, 0] ** 2 + residuals[m, 1] ** 2 + residuals[m, 2] ** 2
         if np.isnan(d2):
             continue
         d = np.sqrt(d2)
@@ -171,18 +169,25 @@ def _columns(R, p, tree, d, w):
     for i in range(tree.kinds.size):
         at = tree.v_starts[i]
         if tree.kinds[i] == FREE:
-            d[at : at + 3] = w[at + 3 : at + 6] = R[i].T
-            w[at : at + 3] = d[at + 3 : at + 6] = 0.0
+            for k in range(3):
+                for j in range(3):
+                    d[at + k, j] = R[i, j, k]
+                    w[at + k, j] = 0.0
+                    d[at + 3 + k, j] = 0.0
+                    w[at + 3 + k, j] = R[i, j, k]
             continue
-        r[:] = p[i] - p[0]
+        for j in range(3):
+            r[j] = p[i, j] - p[0, j]
         if tree.kinds[i] == SPHERICAL:
             for k in range(3):
-                w[at + k] = R[i, :, k]
+                for j in range(3):
+                    w[at + k, j] = R[i, j, k]
                 _cross(r, w[at + k], d[at + k])
         else:
-            w[at] = R[i, :, 0] * tree.axes[i, 0]
-            for k in range(1, 3):
-                w[at] += R[i, :, k] * tree.axes[i, k]
+            for j in range(3):
+                w[at, j] = 0.0
+                for k in range(3):
+                    w[at, j] += R[i, j, k] * tree.axes[i, k]
             _cross(r, w[at], d[at])
 
 
@@ -190,14 +195,17 @@ def _columns(R, p, tree, d, w):
 def _gather(residuals, measured, base, tree, task, sums):
     """Sums over each segment's own markers, then over all that hang on it."""
     sums.weight[:] = 0.0
-    sums.first[:] = sums.force[:] = sums.moment[:] = 0.0
-    sums.second[:] = sums.product[:] = 0.0
+    sums.first[:] = 0.0
+    sums.second[:] = 0.0
+    sums.force[:] = 0.0
+    sums.moment[:] = 0.0
+    sums.product[:] = 0.0
     x, moment = np.empty(3), np.empty(3)
     for m in range(task.weights.size):
         if np.isnan(residuals[m, 0]):
             continue
         i, r = task.segments[m], residuals[m]
-        distance = np.sqrt(_squared(r))
+        distance = np.sqrt(r[0] ** 2 + r[1] ** 2 + r[2] ** 2)
         trust = 1.0 if distance <= task.limit else (task.limit / distance) ** 2
         weight = task.weights[m] * trust
         for j in range(3):
@@ -214,11 +222,13 @@ def _gather(residuals, measured, base, tree, task, sums):
     for i in range(tree.kinds.size - 1, 0, -1):
         a = tree.parents[i]
         sums.weight[a] += sums.weight[i]
-        sums.first[a] += sums.first[i]
-        sums.second[a] += sums.second[i]
-        sums.force[a] += sums.force[i]
-        sums.moment[a] += sums.moment[i]
-        sums.product[a] += sums.product[i]
+        for j in range(3):
+            sums.first[a, j] += sums.first[i, j]
+            sums.force[a, j] += sums.force[i, j]
+            sums.moment[a, j] += sums.moment[i, j]
+            for k in range(3):
+                sums.second[a, j, k] += sums.second[i, j, k]
+                sums.product[a, j, k] += sums.product[i, j, k]
 
 
 @compiled
@@ -370,8 +380,14 @@ def _solve_frame(q, measured, tree, task, max_steps, residuals, L):
     d, w = np.zeros((nv, 3)), np.zeros((nv, 3))
     H, g, dv = np.zeros((nv, nv)), np.zeros(nv), np.zeros(nv)
     N = np.zeros((nv, 3))
-    a, b, c = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
-    sums = Sums(np.zeros(n), a, np.zeros((n, 3, 3)), b, c, np.zeros((n, 3, 3)))
+    sums = Sums(
+        np.zeros(n),
+        np.zeros((n, 3)),
+        np.zeros((n, 3, 3)),
+        np.zeros((n, 3)),
+        np.zeros((n, 3)),
+        np.zeros((n, 3, 3)),
+    )
     trial, trial_residuals = q.copy(), residuals.copy()
     cost = _evaluate(q, tree, task, measured, R, p, residuals)
     damping, taken = 0.0, -1
@@ -437,7 +453,9 @@ def solve_frames(markers, q_first, tree, task, max_steps, q_out, residual_out, s
         for k in range(nv):
             sd_out[frame, k] = 1.0 / L[k, k]
         for m in range(task.weights.size):
-            residual_out[frame, m] = np.sqrt(_squared(residuals[m]))
+            residual_out[frame, m] = np.sqrt(
+                residuals[m, 0] ** 2 + residuals[m, 1] ** 2 + residuals[m, 2] ** 2
+            )
 
 
 @compiled
@@ -456,8 +474,10 @@ def marker_columns(R, p, markers, tree, below, columns):
     for frame in range(markers.shape[0]):
         _columns(R[frame], p[frame], tree, d, w)
         for m in range(markers.shape[1]):
-            x[:] = markers[frame, m] - p[frame, 0]
+            for j in range(3):
+                x[j] = markers[frame, m, j] - p[frame, 0, j]
             for k in range(nv):
                 if below[tree.v_segments[k], m]:
                     _cross(w[k], x, turned)
-                    columns[frame, m, :, k] = d[k] + turned
+                    for j in range(3):
+                        columns[frame, m, j, k] = d[k, j] + turned[j]

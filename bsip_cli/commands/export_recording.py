@@ -409,7 +409,7 @@ def _of_the_laboratory(unit: Unit, *verdicts: str) -> pd.DataFrame:
 
 def _opened(unit: Unit) -> tuple[Opened, SessionReading]:
     assert unit.trial is not None
-    session = reading_of(unit)
+    session = reading_of(unit.read("readings"), unit.facts("readings"), unit.trial)
     return opened(unit, unit.trial).in_frame(session.frame), session
 
 

@@ -16,7 +16,7 @@ from bsip_cli.recordings.units import length_in_m, length_name
 _PERSON_M = (0.25, 8.0)  # the markers' extent in one frame: a limb to two people
 _ANYTHING_M = (0.02, 30.0)  # a clearly stated unit is doubted only beyond this
 _FEWEST_MARKERS = 4  # that make a volume
-_LARGEST_LAB_M = 100.0
+LARGEST_LAB_M = 100.0
 _FASTEST_M_S = 15.0  # half of the markers, half of the time: a sprinter's
 _SMOOTH = 0.2  # of the markers' distance from their middle: their second difference
 _USUAL_M = 1.6
@@ -94,11 +94,11 @@ def settle_unit(
 
 def without_absurd(positions_m: np.ndarray) -> list[Finding]:
     """Turn positions beyond any laboratory into missing ones (in place), and say so."""
-    absurd = ((positions_m > _LARGEST_LAB_M) | (positions_m < -_LARGEST_LAB_M)).any(axis=-1)
+    absurd = ((positions_m > LARGEST_LAB_M) | (positions_m < -LARGEST_LAB_M)).any(axis=-1)
     if not absurd.any():
         return []
     positions_m[absurd] = np.nan
-    found = f"{int(absurd.sum())} positions more than {_LARGEST_LAB_M:g} m away"
+    found = f"{int(absurd.sum())} positions more than {LARGEST_LAB_M:g} m away"
     expected, action = "markers in a laboratory", "took them as missing"
     return [Finding("points", "", found, expected, action, "warning")]
 

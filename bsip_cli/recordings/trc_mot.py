@@ -123,13 +123,14 @@ def _feet(labels: tuple[str, ...], positions_m: np.ndarray) -> np.ndarray:
 
 
 def _lie_below(points_m: np.ndarray, feet_m: np.ndarray) -> bool:
-    """Whether points of force (n, 3) lie where the feet are seen, in axes turned by some right
-    angle about the vertical."""
+    """Whether points of force (n, 3), in m or, where no laboratory is so large, in cm or mm, lie
+    where the feet are seen, in axes turned by some right angle about the vertical."""
     points = points_m[np.isfinite(points_m).all(axis=1), :2] @ np.array([1.0, 1j])
     if not len(points) or not len(feet_m):
         return False
     near = cKDTree(feet_m[:, :2])
-    turned = (points * 1j**quarter for quarter in range(4))
+    sizes = (1.0,) if np.median(np.abs(points)) < scene.LARGEST_LAB_M else (1e-2, 1e-3)
+    turned = (points * size * 1j**quarter for size in sizes for quarter in range(4))
     distances = (near.query(np.column_stack([z.real, z.imag]))[0] for z in turned)
     return any(np.median(distance) < BESIDE_M for distance in distances)
 

@@ -38,7 +38,7 @@ from bsip_cli.stages.survey import opened, prefix_of, reading_of
 def run(unit: Unit) -> None:
     """Read one recording; write markers, wrench, plates, contacts and quality."""
     assert unit.trial is not None and unit.participant is not None
-    session = reading_of(unit)
+    session = reading_of(unit.read("readings"), unit.facts("readings"), unit.trial)
     recording = assemble(opened(unit, unit.trial), session)
     marker_set, told = _marker_set(unit, recording)
     labels, paired = with_pairs_named(

@@ -158,10 +158,8 @@ def _verdict(row: dict) -> Verdict:
     )
 
 
-def reading_of(unit: Unit) -> SessionReading:
-    """What the survey decided, by its ``readings``, for the session of the unit's trial."""
-    trial, table = unit.trial, unit.read("readings")
-    assert trial is not None
+def reading_of(table: pd.DataFrame, facts: dict, trial: Trial) -> SessionReading:
+    """What the survey decided, by its ``readings`` and their facts, for a trial's session."""
     rows = table[table["session"] == (trial.session or "")].to_dict("records")
     if not rows:
         return SessionReading()
@@ -172,4 +170,4 @@ def reading_of(unit: Unit) -> SessionReading:
         corners_only=bool(first["corners_only"]),
     )
     plates = {row["plate"]: _verdict(row) for row in rows if row["plate"]}
-    return SessionReading(frame, plates, unit.facts("readings")["delays_s"])
+    return SessionReading(frame, plates, facts["delays_s"])

@@ -266,15 +266,24 @@ def test_broken_mot_is_refused(tmp_path, text):
         read_recording(path)
 
 
+@pytest.mark.parametrize("point_scale", [1.0, 1000.0])
 @pytest.mark.parametrize("markers_y_up", [True, False])
-def test_markers_and_forces_in_other_axes_are_turned_each_in_its_own_way(tmp_path, markers_y_up):
+def test_markers_and_forces_in_other_axes_are_turned_each_in_its_own_way(
+    tmp_path, markers_y_up, point_scale
+):
     """A conversion may turn a TRC and leave its MOT, or the other way round."""
     markers, labels = standing_markers(N)
     time_s, (force, moment) = np.arange(N) / 100.0, standing_wrench(N)
     write_trc(tmp_path / "a.trc", time_s, markers @ TURN if markers_y_up else markers, labels)
-    write_mot(tmp_path / "a.mot", time_s, _columns(force, moment, y_up=not markers_y_up))
+    write_mot(
+        tmp_path / "a.mot",
+        time_s,
+        _columns(force, moment, "numbered", point_scale, not markers_y_up),
+    )
     recording = read_recording(tmp_path / "a.trc")
-    assert {f.check: f.level for f in recording.findings} == {"up_axis": "corrected"}
+    found = {f.check: f.level for f in recording.findings}
+    expected = {"up_axis": "corrected"} | ({"plate_cop": "corrected"} if point_scale != 1 else {})
+    assert found == expected
     np.testing.assert_allclose(recording.markers_m, markers, atol=1e-6)
     np.testing.assert_allclose(recording.plates[0].force_N, force, atol=1e-6 * force.max())
 

@@ -60,7 +60,11 @@ def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:
     """One movement under two names would be held out from itself."""
     first: dict[str, Trial] = {}
     for trial in trials:
-        one = first.setdefault(file_hash(trial.path), trial)
+        try:
+            content = file_hash(trial.path)
+        except BadDataError:  # in memory, or not readable, which its own turn will say
+            continue
+        one = first.setdefault(content, trial)
         if one is not trial:
             unit.warn(
                 f"{unit.name}: {trial.path.name} is a copy of {one.path.name}: what is found in "

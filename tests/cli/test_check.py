@@ -28,7 +28,7 @@ def test_says_what_each_recording_is(bsip, study):
     answer = bsip("check", study)
     assert answer.code == 3
     head, *lines = answer.out.splitlines()
-    assert head == "sub-01: M, mass not stated, height not stated"
+    assert head == "sub-01: man, mass not stated, height not stated"
     assert [line.split()[0].split("-")[-1] for line in lines] == [
         "1.c3d",
         "static.c3d",

@@ -38,7 +38,7 @@ def test_almost_no_data_leave_rm_and_say_so():
     np.testing.assert_allclose(read.share, 0.0, atol=1e-4)
     assert np.all(read.sd[:, :4] < 1.001 * world().prior.readable_sd[:, :4])
     assert "decide 0 of 150" in found.note
-    assert "table (RM)" in found.note
+    assert "the table the rest" in found.note
 
 
 def standing():

@@ -236,6 +236,8 @@ def why_no_forces(plates: Sequence[Plate], had_some: bool = True) -> str:
     largest = np.max(total, initial=0.0)
     if largest < LOADED_N:
         found = f"the force plates were never loaded (at most {largest:.3g} N)"
+        if not total.any():
+            return found
         return (
             f"{found}; if these are kN or parts of the weight, export them in N; if the plates "
             "were set to zero under the person, record again"

@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 
 from bsip_cli.recordings.body_motion import SMOOTH_S, USUAL, Balance, Body, GateLimits
 from bsip_cli.recordings.plate_reading import AS_STATED
-from bsip_cli.recordings.plate_source import Opened, PlateSource
+from bsip_cli.recordings.plate_source import Opened, PlateSource, later_samples
 from bsip_cli.recordings.scene import by_segment
 
 DELAYED = -4.6
@@ -80,6 +80,5 @@ def _wrench(source: PlateSource, samples: np.ndarray, sigma: float) -> np.ndarra
 
 def _shifted(values: np.ndarray, by: int) -> np.ndarray:
     """Each row's ``by``-th after it, NaN where there is none."""
-    rows = np.arange(len(values)) + by
-    there = (rows >= 0) & (rows < len(values))
-    return np.where(there[:, None], values[rows.clip(0, len(values) - 1)], np.nan)
+    rows, there = later_samples(len(values), by)
+    return np.where(there[:, None], values[rows], np.nan)

@@ -91,7 +91,7 @@ class PlateSource(Protocol):
         """What is to be said of this reading beyond its words."""
 
 
-def _later(n: int, by: int) -> tuple[np.ndarray, np.ndarray]:
+def later_samples(n: int, by: int) -> tuple[np.ndarray, np.ndarray]:
     """The ``by``-th after each of n samples, the nearest one where there is none, and where."""
     samples = np.arange(n) + by
     return samples.clip(0, n - 1), (samples >= 0) & (samples < n)
@@ -163,7 +163,7 @@ class C3dPlate:
         return replace(self, wrench=part, usable=self.usable[samples])
 
     def later(self, by: int) -> C3dPlate:
-        samples, there = _later(len(self.usable), by)
+        samples, there = later_samples(len(self.usable), by)
         part = self.at(samples)
         return replace(part, usable=part.usable & there)
 
@@ -311,7 +311,7 @@ class ForceOnPoint:
         )
 
     def later(self, by: int) -> ForceOnPoint:
-        samples, there = _later(len(self.usable), by)
+        samples, there = later_samples(len(self.usable), by)
         part = self.at(samples)
         return replace(part, usable=part.usable & there)
 

@@ -75,13 +75,14 @@ def named_sentences(table: pd.DataFrame) -> Iterator[str]:
         likeliest, *others = rows.sort_values("probability", ascending=False).to_dict("records")
         text = f"Laboratory {laboratory}: {likeliest['sentence']}."
         if others:
-            names = [
-                " ".join(filter(None, (effect_title(x["effect"]), f"({place})" * bool(place))))
-                for x in others
-                for place in [place_label(x["effect"], x["target"])]
-            ]
-            text += f" It may also be: {listing(names)}."
+            text += f" It may also be: {listing([_named(one) for one in others])}."
         yield text
+
+
+def _named(row: Mapping[Any, Any]) -> str:
+    """A fault and, where there is a choice, its place."""
+    title, place = effect_title(row["effect"]), place_label(row["effect"], row["target"])
+    return f"{title} ({place})" if place else title
 
 
 def unnamed_sentences(table: pd.DataFrame) -> Iterator[str]:

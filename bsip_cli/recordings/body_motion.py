@@ -4,7 +4,8 @@ The sum of all plates' wrenches is the rate of the body's momentum, linear and a
 markers tell. Horizontal forces go with the acceleration of the centre of mass, moments about it
 with the rate of the angular momentum. In complete intervals of 50 sound public recordings the
 forces correlate by 0.5 to 0.99 in movement (median 0.9), moments about level axes by 0.4 to 0.97,
-about the vertical by 0 to 0.9, and none clearly below zero over a second or more.
+about the vertical by 0 to 0.9, and none clearly below zero over a second or more. Where they
+correlate by 0.9, forces are 0.75 to 1.25 times as large as the motion, level moments 0.9 to 1.6.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ _FEWEST_FRAMES = 10
 _ROUNDS = 5  # of weights that follow the residuals
 _FALLS = 0.2  # of gravity: less is flight
 _CLOSEST = 0.97  # correlation: the highest of moments in sound recordings, see above
+_ALIKE = 0.2  # logarithm of force over motion: its scatter over sound recordings, see above
 _KINDS = {"force": [0, 1], "level": [3, 4], "vertical": [5]}  # columns of a wrench
+_SIZES = {"force": [0, 1], "lift": [2], "level": [3, 4]}  # those whose sizes are compared
 # Of the way from a segment's markers, which mark its lower joint or the top of the trunk, to those
 # of the segment that it hangs on: about there is its centre of mass.
 _TO_NEIGHBOUR = dict.fromkeys(("thigh", "shank", "upper_arm", "forearm"), 0.5) | {
@@ -116,6 +119,10 @@ class Body:
         angular = np.linalg.det(change) * angular
         return replace(self, place_m=self.place_m @ change.T, rate=np.hstack([linear, angular]))
 
+    def faster(self, times: float) -> Body:
+        """The same so many times as fast."""
+        return replace(self, rate=self.rate * times**2, noise=self.noise * times**4)
+
 
 @dataclass(frozen=True)
 class Balance:
@@ -123,12 +130,14 @@ class Balance:
 
     gaps_m : of each trial, of the centre of mass from over the centre of pressure, movement taken
     off, RMS; without trials in which nothing is known. correlations : of force with motion, by
-    kind; numbers : how many independent ones they are of.
+    kind; numbers : how many independent ones they are of. sizes : of force over motion, logarithm,
+    each with their correlation.
     """
 
     gaps_m: tuple[float, ...] = ()
     correlations: Mapping[str, float] | None = None
     numbers: float = 0.0
+    sizes: tuple[tuple[float, float], ...] = ()
 
     @classmethod
     def of(cls, body: Body, wrench: np.ndarray, limits: GateLimits) -> Balance:
@@ -145,13 +154,18 @@ class Balance:
         together = some.about_means(force, motion)
         force2 = some.about_means(force, force) + some.noise
         motion2 = some.about_means(motion, motion) + some.noise
+
+        def correlation(k: list[int]) -> float:
+            return float(together[k].sum() / np.sqrt(force2[k].sum() * motion2[k].sum()))
+
         return cls(
             tuple(np.sqrt(some.member @ lean2 / some.member.sum(axis=1)) / GRAVITY_M_S2),
-            {
-                kind: float(together[k].sum() / np.sqrt(force2[k].sum() * motion2[k].sum()))
-                for kind, k in _KINDS.items()
-            },
+            {kind: correlation(k) for kind, k in _KINDS.items()},
             some.numbers,
+            tuple(
+                (0.5 * float(np.log(force2[k].sum() / motion2[k].sum())), correlation(k))
+                for k in _SIZES.values()
+            ),
         )
 
     def log_likelihood(self, limits: GateLimits) -> float:
@@ -170,6 +184,17 @@ class Balance:
         close = np.clip(list(self.correlations.values()), -_CLOSEST, _CLOSEST)
         axes = np.array([len(_KINDS[kind]) for kind in self.correlations])
         return float(-0.5 * self.numbers * np.sum(axes * np.sign(close) * np.log(1.0 - close**2)))
+
+    def size_log_likelihood(self, times: float = 1.0) -> float:
+        """That forces are as large as they need be if the body moves so many times as fast,
+        logarithm: as Student's t with four degrees of freedom. The one may be all the larger the
+        less they go together."""
+        total = 0.0
+        for size, alike in self.sizes:
+            if alike > 0:
+                room = _ALIKE**2 + np.log(alike) ** 2 + (1 - alike**2) / self.numbers
+                total -= 2.5 * np.log1p(0.25 * (size - 2 * np.log(times)) ** 2 / room)
+        return float(total)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
-"""Do the forces come when the body moves as they drive it? Systems that are started by hand differ
-by tenths of a second.
+"""Do the forces come when the body moves as they drive it, and does it move as fast? Systems that
+are started by hand differ by tenths of a second, or by whole ones; and a file may state another
+rate than that of the cameras, so that accelerations are wrong by its square.
 
 In 35 public trials with movement forces and body go together best within 0.04 s of the stated time,
 and a hidden delay of 0.3 s was found to 0.04 s.
@@ -7,6 +8,7 @@ and a hidden delay of 0.3 s was found to 0.04 s.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,17 +23,26 @@ DELAYED = -4.6
 """Logarithm: clocks differ by more than `LEAST_S` in one trial of a hundred."""
 
 LEAST_S = 0.1  # a smaller delay is left to the diagnosis, which sees it along the simulation
-_MOST_S = 1.0
+_MOST_S = 10.0  # whoever lets more pass has another recording
 _STEP_S = 0.02  # half of the bell that forces and markers are averaged with
 _NEAR_S = 0.1  # lags so near are one
+
+OTHER_RATE = -4.6
+"""Logarithm: one session of a hundred states another rate than that of its cameras."""
+
+# How many times as fast as stated: ratios of usual rates (50, 60, 100, 120, 150, 200, 240, 250 Hz).
+_SLOWER = (1.2, 1.25, 1.5, 1.67, 2.0, 2.4, 3.0, 4.0)
+PACES = np.array([1.0, *_SLOWER, *(1 / times for times in _SLOWER)])
 
 
 @dataclass(frozen=True, eq=False)
 class Lags:
-    """How well forces go with the body if they are taken from later, logarithm, (n,) each."""
+    """How well forces go with the body if they are taken from later, logarithm, (n,) each, and if
+    the body moves faster, (m,) as `PACES`."""
 
     seconds: np.ndarray
     log_likelihood: np.ndarray
+    of_paces: np.ndarray
 
     def delay_s(self, limits: GateLimits) -> float:
         """Of the forces after the body, 0 where that is not sure or as small as others find."""
@@ -46,7 +57,7 @@ class Lags:
         before, here, after = self.log_likelihood[best - 1 : best + 2]  # of a parabola
         bend = 2.0 * here - before - after
         aside = 0.5 * (after - before) / bend if bend > 0 else 0.0
-        return float(self.seconds[best] + aside * (self.seconds[1] - self.seconds[0]))
+        return float(self.seconds[best] + aside * (self.seconds[best + 1] - self.seconds[best]))
 
 
 def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
@@ -65,10 +76,44 @@ def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
     total[: len(samples)] = np.sum(wrenches, axis=0)
     if not np.isfinite(body.rate).any():
         return None
-    most = round(_MOST_S * rate_hz / step)
-    balances = [Balance.of(body, _shifted(total, k), limits) for k in range(-most, most + 1)]
-    likely = np.array([balance.log_likelihood(limits) for balance in balances])
-    return Lags(np.arange(-most, most + 1) * step / rate_hz, likely)
+    most, near = (round(seconds * rate_hz / step) for seconds in (_MOST_S, 2 * _NEAR_S))
+    most = min(most, len(frames))
+    rough = {k: _goes(body, total, k, limits) for k in range(-2 * (most // 2), most + 1, 2)}
+    best = max(rough, key=lambda k: rough[k])
+    fine = {*range(-near, near + 1), *range(best - near, best + near + 1)} - rough.keys()
+    found = dict(sorted({**rough, **{k: _goes(body, total, k, limits) for k in fine}}.items()))
+    seconds = np.array(list(found)) * step / rate_hz
+    return Lags(seconds, np.array(list(found.values())), _paces(body, total, limits))
+
+
+def _goes(body: Body, total: np.ndarray, by: int, limits: GateLimits) -> float:
+    return Balance.of(body, _shifted(total, by), limits).log_likelihood(limits)
+
+
+def _paces(body: Body, total: np.ndarray, limits: GateLimits) -> np.ndarray:
+    """How much better forces are as large as each of `PACES` needs them, (m,), than as the first
+    does: where the plates hold all of the body by the one or by the other, whichever is more."""
+    found = [Balance.of(body.faster(times), total, limits) for times in PACES]
+    stated = found[0]
+    return np.array(
+        [
+            one.size_log_likelihood() - one.size_log_likelihood(1 / times)
+            if one.numbers > stated.numbers
+            else stated.size_log_likelihood(times) - stated.size_log_likelihood()
+            for times, one in zip(PACES, found, strict=True)
+        ]
+    )
+
+
+def pace(of_trials: Sequence[np.ndarray], limits: GateLimits) -> float:
+    """How many times as fast as stated trials ran, from what `PACES` are of each; 1 where that is
+    not sure."""
+    logs = np.sum([np.zeros(len(PACES)), *of_trials], axis=0)
+    logs[1:] += OTHER_RATE - np.log(len(PACES) - 1)
+    best = int(np.argmax(logs))
+    same_way = np.sign(np.log(PACES)) == np.sign(np.log(PACES[best]))
+    surely = np.exp(logsumexp(logs[same_way]) - logsumexp(logs))
+    return float(PACES[best]) if surely >= limits.corrected_percent / 100 else 1.0
 
 
 def _wrench(source: PlateSource, samples: np.ndarray, sigma: float) -> np.ndarray:

@@ -74,8 +74,9 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
     delay_s = session.delays_s.get(recording.path.stem, 0.0)
     opened = opened.with_forces_from(delay_s)
     findings = [*findings_about(session), *_about_delay(delay_s), *_about_sides(recording)]
-    if recording.forces_note:
-        return replace(recording, findings=(*recording.findings, *findings))
+    pace = session.paces.get(recording.path.stem, 1.0)
+    if note := recording.forces_note or _other_pace(pace, recording.marker_rate_hz):
+        return replace(recording, findings=(*recording.findings, *findings), forces_note=note)
     plates: list[Plate] = []
     reversed_names, missing = [], []
     by_name = {source.name: source for source in opened.sources}
@@ -167,6 +168,18 @@ def delay_words(delay_s: float) -> str:
     when = "later" if delay_s > 0 else "earlier"
     words = f"the forces come {abs(delay_s):.2f} s {when} than the motion that they drive"
     return words if delay_s else ""
+
+
+def _other_pace(times: float, rate_hz: float) -> str:
+    """Empty if it is 1."""
+    if times == 1.0:
+        return ""
+    how, much = ("fast", times) if times > 1 else ("slowly", 1 / times)
+    return (
+        f"the body moves about {much:.2g} times as {how} as at the stated {rate_hz:g} Hz: forces "
+        f"and accelerations agree at about {times * rate_hz:.3g} Hz; correct the rate of the "
+        "cameras in the file"
+    )
 
 
 def _about_delay(delay_s: float) -> list[Finding]:

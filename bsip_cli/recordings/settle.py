@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bsip_cli.recordings.body_motion import USUAL, GateLimits
-from bsip_cli.recordings.clock import DELAYED
+from bsip_cli.recordings.clock import DELAYED, PACES, pace
 from bsip_cli.recordings.hypothesis import AS_IT_IS, Hypothesis
 from bsip_cli.recordings.plate_fit import PlateFit
 from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange, PlateReading
@@ -66,18 +66,20 @@ class Verdict:
 class SessionReading:
     """How all recordings of a session are to be understood: their axes, and each plate.
 
-    ``delays_s`` : by trial, of the forces after the markers, where there is one.
+    ``delays_s`` : by trial, of the forces after the markers, where there is one. ``paces`` : by
+    trial, how many times as fast as stated it ran, where that is another.
     """
 
     frame: FrameChange = field(default_factory=FrameChange)
     plates: Mapping[str, Verdict] = field(default_factory=dict)
     delays_s: Mapping[str, float] = field(default_factory=dict)
+    paces: Mapping[str, float] = field(default_factory=dict)
     log_posterior: float = field(default=0.0, compare=False)  # but for a constant
 
 
 def settle_session(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -> SessionReading:
     """The axes and the plates' readings that make a person of a session, and the delays of single
-    trials: what either may explain, the likelier does."""
+    trials: what either may explain, the likelier does. And the paces, of all or of single ones."""
     surely = np.log(limits.corrected_percent / (100 - limits.corrected_percent))
     best = _settled(trials, limits)
     for k, trial in enumerate(trials):
@@ -87,7 +89,18 @@ def settle_session(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -
             if other.log_posterior + DELAYED - best.log_posterior > surely:
                 trials, best = others, other
     delays = {trial.name: trial.delay_s for trial in trials if trial.delay_s}
-    return replace(best, delays_s=delays)
+    return replace(best, delays_s=delays, paces=_paces(trials, limits))
+
+
+def _paces(trials: Sequence[TrialSamples], limits: GateLimits) -> dict[str, float]:
+    """Other than 1; one for all, where their movement tells it, or else each its own."""
+    seen = {trial.name: trial.paces for trial in trials if trial.paces is not None}
+    of_all = pace(list(seen.values()), limits)
+    if of_all != 1.0:
+        k = int(np.flatnonzero(PACES == of_all)[0])
+        return {name: of_all for name, logs in seen.items() if logs[k] > 0}
+    own = {name: pace([logs], limits) for name, logs in seen.items()}
+    return {name: times for name, times in own.items() if times != 1.0}
 
 
 def _settled(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReading:

@@ -200,7 +200,8 @@ class _Voice:
             alike = self.told.setdefault((outcome.stage, re.sub(_NAME, "it", sentence)), [])
             if is_finding or not alike:
                 _say(outcome, sentence)
-            alike += [] if is_finding else [outcome.unit]
+            whose = re.search(_NAME, sentence)
+            alike += [] if is_finding else [whose.group() if whose else outcome.unit]
         if self.verbose and outcome.state == "done":
             what = f"{outcome.seconds:.1f} s; read {', '.join(outcome.reads)}"
             _say(outcome, f"{outcome.unit}: {what}")

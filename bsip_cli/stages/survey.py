@@ -35,6 +35,7 @@ def run(unit: Unit) -> None:
     assert unit.participant is not None
     rows: list[dict] = []
     delays_s: dict[str, float] = {}
+    paces: dict[str, float] = {}
     options = unit.config.ingest
     limits = GateLimits(**{one.name: getattr(options, one.name) for one in fields(GateLimits)})
     _say_copies(unit, unit.participant.trials)
@@ -50,10 +51,11 @@ def run(unit: Unit) -> None:
         reading = settle_session(seen, limits)
         rows += rows_of(session or "", reading)
         delays_s |= reading.delays_s
+        paces |= reading.paces
         whose = f"{unit.name}, session {session}" if session else unit.name
         for finding in findings_about(reading):
             unit.warn(f"{whose}: {finding.sentence()}")
-    unit.write("readings", rows, {"delays_s": delays_s})
+    unit.write("readings", rows, {"delays_s": delays_s, "paces": paces})
 
 
 def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:
@@ -174,4 +176,4 @@ def reading_of(table: pd.DataFrame, facts: dict, trial: Trial) -> SessionReading
         corners_only=bool(first["corners_only"]),
     )
     plates = {row["plate"]: _verdict(row) for row in rows if row["plate"]}
-    return SessionReading(frame, plates, facts["delays_s"])
+    return SessionReading(frame, plates, facts["delays_s"], facts["paces"])

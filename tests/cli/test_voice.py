@@ -30,6 +30,14 @@ def test_a_remark_is_made_once_for_the_study(capsys):
     assert "1.2 s" not in text and "bsip run: 4 done, 1 refused" in text
 
 
+def test_of_the_study_it_is_said_whom_a_remark_is_of(capsys):
+    sentences = tuple(f"participants.tsv: height_m 168 of sub-{k} is in cm" for k in (1, 2, 3))
+    study = Outcome("study", "study", "noted", sentences)
+    assert follow("run", [], (one for one in [study]), 1, None) == 0
+    text = capsys.readouterr().err
+    assert "the same of sub-2, sub-3: participants.tsv: height_m 168 of it is in cm" in text
+
+
 def test_quiet_says_findings_and_errors_only(capsys):
     assert said(capsys, quiet=True).splitlines() == [
         "diagnose: sub-1: something is wrong",

@@ -15,6 +15,12 @@ from bsip_cli.recordings.settle import settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from tests.recordings.standing_on_two_plates import RATE_HZ, N, motion, of_c3d, of_table, opened
 
+MOVING = (  # walks, a jump, sitting down: each alone tells that its rate is twice the cameras'
+    "zoo_children/HC031A-straight.c3d",
+    "opencap_subject4/STS1.trc",
+    "opencap_subject4/walking1.trc",
+    "motionanalysis_helenhayes/Sample_Jump2.c3d",
+)
 REAL = {  # one of each: quiet on one leg, squats, gait, golf, jump, sitting down, running
     "biobuddy_ech/right_knee.c3d": True,
     "opencap_subject4/squats1.trc": True,
@@ -33,7 +39,7 @@ def session_of(trial: Opened, *others: Opened):
 
 
 @pytest.mark.parametrize("make", [of_c3d, of_table])
-@pytest.mark.parametrize("delay_s", [-0.65, -0.5, 0.55, 0.8])
+@pytest.mark.parametrize("delay_s", [-0.65, -0.5, 0.55, 0.8, 1.3])
 def test_a_delay_is_found_and_taken_off(make, delay_s):
     sound = opened(make())
     late = sound.with_forces_from(-delay_s)
@@ -101,3 +107,42 @@ def test_real_recordings_have_no_delay_and_a_hidden_one_is_found(real_data, name
         assert list(hidden.values()) == [pytest.approx(0.37, abs=0.04)]
     else:
         assert all(abs(found - 0.37) < 0.04 for found in hidden.values())
+
+
+def at_rate(trial: Opened, times: float) -> Opened:
+    """The same, of a file that states so many times its rate."""
+    one = trial.recording
+    rates = {
+        "marker_rate_hz": times * one.marker_rate_hz,
+        "analog_rate_hz": times * one.analog_rate_hz,
+    }
+    return replace(trial, recording=replace(one, **rates))
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_a_body_that_moves_at_another_pace_than_its_forces_say(real_data, name):
+    sound = open_recording(real_data / name)
+    assert session_of(sound).paces == {}
+    for times in (0.5, 2.0):
+        session = session_of(wrong := at_rate(sound, times))
+        assert list(session.paces.values()) == [pytest.approx(1 / times, rel=0.25)]
+        read = assemble(wrong, session)
+        assert not read.plates and f"{wrong.recording.marker_rate_hz:g} Hz" in read.forces_note
+
+
+def test_all_trials_of_a_session_together_tell_a_pace_that_none_tells_alone(real_data):
+    walks = [
+        at_rate(open_recording(real_data / f"opencap_subject4/{name}.trc"), 0.8)
+        for name in ("walking1", "walking2", "STS1", "squats1", "static1")
+    ]
+    assert not any(session_of(walk).paces for walk in walks)
+    found = session_of(*walks).paces
+    assert len(set(found.values())) == 1 and 1.1 < next(iter(found.values())) < 1.6
+    assert "static1" not in found  # which tells nothing, and which is not wrong
+
+
+def test_no_pace_is_told_of_who_stands_still_or_is_held_by_others():
+    still = np.repeat(motion()[0][:1], N, axis=0)
+    assert session_of(opened(of_c3d(), still)).paces == {}
+    half = [replace(one, usable=one.usable & (k > 0)) for k, one in enumerate(of_c3d())]
+    assert session_of(opened(half)).paces == {}

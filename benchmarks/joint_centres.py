@@ -21,9 +21,9 @@ import pandas as pd
 from benchmarks.measure import RESULTS, machine, markdown, write_csv
 from benchmarks.participant import run_stage
 from bsip_cli.artifacts import read_artifact
-from bsip_cli.body.names import without_side
 from bsip_cli.body.person import Person, rigid_motion
 from bsip_cli.body.skeleton import load_skeleton
+from bsip_cli.segments import without_side
 from bsip_cli.simulate.options import StudyOptions
 from bsip_cli.simulate.study import simulate_study
 from bsip_cli.stages.frames import person_from

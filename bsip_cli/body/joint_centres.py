@@ -15,8 +15,8 @@ import numpy as np
 
 from bsip_cli.body.anthropometry import mean_length_m
 from bsip_cli.body.keypoints import HIP_FRACTIONS, stood_in_for
-from bsip_cli.body.names import in_words
 from bsip_cli.errors import BadDataError
+from bsip_cli.segments import in_words
 from bsip_cli.stated.sex_words import OTHER, with_other
 
 # --- stand-ins for landmarks of trunk and arms that a marker set lacks ----------------------------

@@ -11,7 +11,7 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from bsip_cli.body.names import in_words
+from bsip_cli.segments import in_words
 from bsip_cli.stated.sex_words import with_other
 
 # Hip joint centre in fractions of the distance of the ASIS, from their middle; X anterior, Y up, Z

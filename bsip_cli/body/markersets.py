@@ -11,10 +11,10 @@ from math import inf
 from pathlib import Path
 
 from bsip_cli.body.landmarks import JOINT_CENTRES, LANDMARKS
-from bsip_cli.body.names import SEGMENTS
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
 from bsip_cli.files.regular import read_toml
+from bsip_cli.segments import SEGMENTS
 
 _TABLES = {"description", "also_called", "segments", "weights", "aliases", "optional"}
 

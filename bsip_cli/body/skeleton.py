@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Literal
 
 from bsip_cli.body.landmarks import LANDMARKS
-from bsip_cli.body.names import LINKS, SEGMENTS, joint_of
 from bsip_cli.config import shipped
 from bsip_cli.errors import UsageError
 from bsip_cli.files.regular import read_toml
+from bsip_cli.segments import LINKS, SEGMENTS, joint_of
 
 JointType = Literal["free", "spherical", "revolute"]
 

@@ -12,7 +12,6 @@ import numpy as np
 
 from bsip_cli.body.joint_centres import missing_landmarks
 from bsip_cli.body.markersets import Marker, MarkerSet, load_marker_set
-from bsip_cli.body.names import in_words, without_side
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.config import load_config
 from bsip_cli.errors import UsageError, printable
@@ -27,6 +26,7 @@ from bsip_cli.recordings.marker_guess import (
 )
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.read import read_recording
+from bsip_cli.segments import in_words, without_side
 
 _RIVALS = 3
 

@@ -15,7 +15,6 @@ import numpy as np
 from scipy.special import logit
 from scipy.stats import chi2
 
-from bsip_cli.body.names import in_words
 from bsip_cli.diagnosis.filtering import every
 from bsip_cli.diagnosis.findings import (
     DRAWS,
@@ -33,6 +32,7 @@ from bsip_cli.effects.effect import Effect
 from bsip_cli.effects.markers import LEAST_S, ramp, ramp_of
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH
+from bsip_cli.segments import in_words
 from bsip_cli.statistics.samples import effective_samples
 
 ENOUGH_HZ = 10.0  # for a course of many seconds

@@ -16,11 +16,11 @@ import numpy as np
 from scipy.stats import chi2
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.body.names import in_words
 from bsip_cli.diagnosis.findings import Finding, Number
 from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, Gain
 from bsip_cli.effects.loads import UnmeasuredContact
 from bsip_cli.effects.scene import Scene
+from bsip_cli.segments import in_words
 from bsip_cli.statistics.samples import Z95, effective_samples
 
 HANDS, TRUNK = ("hand_l", "hand_r"), "upper_torso"

@@ -22,12 +22,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.body.names import without_side
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import skew
 from bsip_cli.dynamics.segment_motion import SegmentMotion, segment_motion
+from bsip_cli.segments import without_side
 
 _LIMB = ("flexion", "adduction", "internal_rotation")
 _SPINE = ("extension", "bending_right", "turning_left")

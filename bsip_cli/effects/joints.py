@@ -8,11 +8,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.body.names import the_joint
 from bsip_cli.body.person import Person
 from bsip_cli.dynamics.segment_motion import UP, Point
 from bsip_cli.effects.effect import Effect, Parameter, Reported, along_xyz
 from bsip_cli.effects.scene import Scene
+from bsip_cli.segments import the_joint
 
 
 def displaced(mass_kg: float, centre: Point, shift_m: np.ndarray, rate_hz: float) -> np.ndarray:

@@ -12,10 +12,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.body.inertia import Inertia
-from bsip_cli.body.names import in_words
 from bsip_cli.dynamics.regressor import skew
 from bsip_cli.effects.effect import Effect, Parameter, Reported, along_xyz, parts_xyz
 from bsip_cli.effects.scene import Scene
+from bsip_cli.segments import in_words
 
 WINDOWS_S = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0, 64.0)
 MOST_WINDOWS = 30  # side by side; shorter ones are found in part of a window, and refined

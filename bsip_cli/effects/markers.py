@@ -11,10 +11,10 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import butter, sosfiltfilt
 from scipy.special import ndtr
 
-from bsip_cli.body.names import mirrored
 from bsip_cli.effects.effect import Effect, Parameter, Reported, explained_share, parts_xyz
 from bsip_cli.effects.scene import Scene
 from bsip_cli.motion.marker_events import two_levels
+from bsip_cli.segments import mirrored
 
 RISE_S = 0.04  # standard deviation of the ramp that smoothing leaves of a sudden change
 APART_S = 0.5

@@ -12,10 +12,10 @@ from bsip_cli.body.anthropometry import mean_length_m, stature_m
 from bsip_cli.body.joint_centres import JointCentres, hip_centres, joint_centres, unit
 from bsip_cli.body.keypoints import with_skin
 from bsip_cli.body.markersets import MarkerSet
-from bsip_cli.body.names import in_words
 from bsip_cli.body.person import Person, rigid_motion
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.errors import BadDataError
+from bsip_cli.segments import in_words
 
 Frame = tuple[np.ndarray, np.ndarray]  # origin (3,) and axes (3, 3) with X, Y, Z as columns
 

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from scipy.special import chdtri, fdtrc
 
-from bsip_cli.body.names import in_words
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit, best_source
+from bsip_cli.segments import in_words
 
 # --- one change of level in an autocorrelated signal that also follows known columns --------------
 

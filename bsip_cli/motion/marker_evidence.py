@@ -30,7 +30,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
-from bsip_cli.body.names import mirrored
 from bsip_cli.motion.marker_events import (
     BEYOND,
     LevelChange,
@@ -54,6 +53,7 @@ from bsip_cli.motion.marker_exchange import (
     with_exchanges,
 )
 from bsip_cli.motion.marker_fit import MEDIAN_LENGTH, MarkerFit, best_source
+from bsip_cli.segments import mirrored
 
 # --- both arms or both legs that bear each other's labels throughout ------------------------------
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bsip_cli.body.names import mirrored
 from bsip_cli.motion.marker_events import MarkerEvent, event, pieces
 from bsip_cli.motion.marker_fit import MarkerFit
+from bsip_cli.segments import mirrored
 
 Refit = Callable[[np.ndarray, np.ndarray], MarkerFit]
 

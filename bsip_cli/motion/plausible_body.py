@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bsip_cli.body.anthropometry import mean_length_m, stature_m
-from bsip_cli.body.names import in_words
 from bsip_cli.body.person import Person
+from bsip_cli.segments import in_words
 
 # Segments' lengths at one stature: standard deviations of 4 to 6 % in adults (Dumas 2007, table 1),
 # children's proportions a tenth off, joint centres another 5 %. Beyond these no person is.

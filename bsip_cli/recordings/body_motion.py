@@ -17,8 +17,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.body.names import without_side
 from bsip_cli.recordings.momentum_mass import NEIGHBOUR, shares_of_seen
+from bsip_cli.segments import without_side
 
 SMOOTH_S = 0.04
 """Standard deviation of the bell that forces and markers alike are averaged with: half of the
@@ -33,9 +33,11 @@ _FEWEST_FRAMES = 10
 _ROUNDS = 5  # of weights that follow the residuals
 _FALLS = 0.2  # of gravity: less is flight
 _CLOSEST = 0.97  # correlation: the highest of moments in sound recordings, see above
-_ALIKE = 0.2  # logarithm of force over motion: its scatter over sound recordings, see above
+_ALIKE = 0.15  # logarithm of force over motion: its scatter over sound recordings, see above
 _KINDS = {"force": [0, 1], "level": [3, 4], "vertical": [5]}  # columns of a wrench
-_SIZES = {"force": [0, 1], "lift": [2], "level": [3, 4]}  # those whose sizes are compared
+# Those whose sizes are compared, and the usual one, logarithm: the spin of the segments about their
+# own centres is not in the motion.
+_SIZES = {"force": ([0, 1], 0.0), "lift": ([2], 0.0), "level": ([3, 4], 0.26)}
 # Of the way from a segment's markers, which mark its lower joint or the top of the trunk, to those
 # of the segment that it hangs on: about there is its centre of mass.
 _TO_NEIGHBOUR = dict.fromkeys(("thigh", "shank", "upper_arm", "forearm"), 0.5) | {
@@ -131,7 +133,7 @@ class Balance:
     gaps_m : of each trial, of the centre of mass from over the centre of pressure, movement taken
     off, RMS; without trials in which nothing is known. correlations : of force with motion, by
     kind; numbers : how many independent ones they are of. sizes : of force over motion, logarithm,
-    each with their correlation.
+    above the usual one, each with their correlation.
     """
 
     gaps_m: tuple[float, ...] = ()
@@ -163,8 +165,8 @@ class Balance:
             {kind: correlation(k) for kind, k in _KINDS.items()},
             some.numbers,
             tuple(
-                (0.5 * float(np.log(force2[k].sum() / motion2[k].sum())), correlation(k))
-                for k in _SIZES.values()
+                (0.5 * float(np.log(force2[k].sum() / motion2[k].sum())) - usual, correlation(k))
+                for k, usual in _SIZES.values()
             ),
         )
 

@@ -18,9 +18,9 @@ import numpy as np
 
 from bsip_cli.body.anthropometry import load_table
 from bsip_cli.body.gravity import GRAVITY_M_S2
-from bsip_cli.body.names import SEGMENTS, without_side
 from bsip_cli.recordings.analog import runs
 from bsip_cli.recordings.contacts import low_pass, mean_path
+from bsip_cli.segments import SEGMENTS, without_side
 
 # A segment's share of the body's mass against the table: published regressions err by 10 to 25 %
 # of a segment's mass (configs/default.toml, [prior]), the large segments by less.

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bsip_cli.recordings.body_motion import USUAL, GateLimits
-from bsip_cli.recordings.clock import DELAYED, PACES, pace
+from bsip_cli.recordings.clock import DELAYED, pace
 from bsip_cli.recordings.hypothesis import AS_IT_IS, Hypothesis
 from bsip_cli.recordings.plate_fit import PlateFit
 from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange, PlateReading
@@ -93,12 +93,11 @@ def settle_session(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -
 
 
 def _paces(trials: Sequence[TrialSamples], limits: GateLimits) -> dict[str, float]:
-    """Other than 1; one for all, where their movement tells it, or else each its own."""
+    """Other than 1; one for all, where together they tell it, or else each its own."""
     seen = {trial.name: trial.paces for trial in trials if trial.paces is not None}
     of_all = pace(list(seen.values()), limits)
     if of_all != 1.0:
-        k = int(np.flatnonzero(PACES == of_all)[0])
-        return {name: of_all for name, logs in seen.items() if logs[k] > 0}
+        return {trial.name: of_all for trial in trials}
     own = {name: pace([logs], limits) for name, logs in seen.items()}
     return {name: times for name, times in own.items() if times != 1.0}
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import Protocol
 
-from bsip_cli.body.names import SEGMENTS
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.plates import plates_called
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.report.words import listing, number, segment_label
+from bsip_cli.segments import SEGMENTS
 
 
 class Number(Protocol):

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 
-from bsip_cli.body.names import in_words
+from bsip_cli.segments import in_words
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
 
 MISSING = "–"

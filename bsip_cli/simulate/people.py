@@ -1,6 +1,6 @@
 """Draw a person: sizes, joints, true inertial parameters, marker placements.
 
-Sixteen bodies: the 15 segments of `bsip_cli.body.names`, with the upper torso in two
+Sixteen bodies: the 15 segments of `bsip_cli.segments`, with the upper torso in two
 parts (abdomen below T12/L1, thorax above). Body axes: X anterior, Y up along the segment,
 Z to the right, on both sides of the body. Origins: lower_torso and abdomen at the lumbar
 joint centre (LJC), thorax and head at the cervical (CJC), limbs at their proximal joint.
@@ -15,7 +15,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from bsip_cli.body.names import SEGMENTS
+from bsip_cli.segments import SEGMENTS
 from bsip_cli.simulate.landmarks import (
     Build,
     Marker,

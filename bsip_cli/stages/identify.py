@@ -10,7 +10,6 @@ import pandas as pd
 
 from bsip_cli.artifacts import empty_table
 from bsip_cli.body.inertia import PARAMETERS, UNITS
-from bsip_cli.body.names import in_words as segment_in_words
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.diagnosis.filtering import slow
@@ -33,6 +32,7 @@ from bsip_cli.identification.uncertainty import (
 )
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import column_names, spread_names
+from bsip_cli.segments import in_words as segment_in_words
 from bsip_cli.stages.frames import WRENCH, bsip_table, load_words, loads_record, person_of
 from bsip_cli.stages.identification_problem import (
     duration_s,

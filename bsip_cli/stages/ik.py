@@ -7,7 +7,6 @@ from dataclasses import asdict
 import numpy as np
 import pandas as pd
 
-from bsip_cli.body.names import the_joint
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton
 from bsip_cli.motion.inverse_kinematics import Poses, solve_trial
@@ -16,6 +15,7 @@ from bsip_cli.motion.marker_evidence import Evidence, marker_evidence
 from bsip_cli.motion.marker_fit import MarkerFit, marker_fit
 from bsip_cli.motion.smoothing import Motion, smooth_motion
 from bsip_cli.running.unit import Unit
+from bsip_cli.segments import the_joint
 from bsip_cli.stages.frames import markers_from, ordered_markers, person_of
 
 _MOST_SAID = 5  # of a trial's sentences about single markers

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
-from bsip_cli.body.names import SEGMENTS, TRUNK
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings.c3d_person import against_table
 from bsip_cli.recordings.contacts import (
@@ -30,6 +29,7 @@ from bsip_cli.recordings.resample import FrameWrench, wrench_at_marker_rate
 from bsip_cli.recordings.told_mass import mass_finding, told_mass
 from bsip_cli.recordings.zero import nobody_near, plate_zero, subtract_zero
 from bsip_cli.running.unit import Unit
+from bsip_cli.segments import SEGMENTS, TRUNK
 from bsip_cli.stages.frames import WRENCH
 from bsip_cli.stages.person_mass import VAGUE_PERCENT, StatedMass, compared, stated_mass
 from bsip_cli.stages.survey import opened, prefix_of, reading_of

@@ -11,7 +11,6 @@ from scipy.interpolate import interp1d
 from scipy.spatial.transform import Rotation
 
 from bsip_cli.artifacts import table_of
-from bsip_cli.body.names import in_words
 from bsip_cli.body.person import Person
 from bsip_cli.diagnosis.cause import Cause, method_of
 from bsip_cli.diagnosis.corrected_wrench import corrected_plates, is_of_the_forces
@@ -34,6 +33,7 @@ from bsip_cli.motion.jacobian import coordinate_covariance
 from bsip_cli.recordings.own_plates import SIDES, FootForces, Reading, foot_forces, plate_noise
 from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit
+from bsip_cli.segments import in_words
 from bsip_cli.stages.frames import (
     WRENCH,
     acceleration_noise,

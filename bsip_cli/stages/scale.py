@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.body.markersets import MarkerSet, load_marker_set
-from bsip_cli.body.names import in_words, without_side
 from bsip_cli.body.person import Person
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.errors import BadDataError
@@ -17,6 +16,7 @@ from bsip_cli.motion.calibration import Calibration, calibrate
 from bsip_cli.motion.plausible_body import Doubt, doubts_about, words_of
 from bsip_cli.motion.scaling import Refinement, ScalingOptions, TrialMarkers, refine_over_trials
 from bsip_cli.running.unit import Unit
+from bsip_cli.segments import in_words, without_side
 from bsip_cli.stages.frames import markers_from, ordered_markers
 from bsip_cli.stages.person_mass import person_mass
 from bsip_cli.study.study import Trial

@@ -57,7 +57,7 @@ def _sources(file: Path) -> set[str]:
 
 
 def _module(name: str, known: set[str]) -> str:
-    """``bsip_cli.body.names.SEGMENTS`` becomes ``bsip_cli.body.names``; others their first part."""
+    """``bsip_cli.segments.SEGMENTS`` becomes ``bsip_cli.segments``; others their first part."""
     if not name.startswith("bsip_cli"):
         return name.split(".")[0]
     inner = name.removeprefix("bsip_cli").removeprefix(".")

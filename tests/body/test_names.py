@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bsip_cli.body.names import SEGMENTS, in_words, mirrored, the_joint, without_side
+from bsip_cli.segments import SEGMENTS, in_words, mirrored, the_joint, without_side
 
 
 @pytest.mark.parametrize(

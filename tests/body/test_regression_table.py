@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.body.anthropometry import load_table, mean_length_m, regress, stature_m
-from bsip_cli.body.names import SEGMENTS
+from bsip_cli.segments import SEGMENTS
 from bsip_cli.simulate.people import Inertia, combined, mean_segments
 from tests.body.standing_person import standing
 

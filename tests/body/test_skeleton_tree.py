@@ -1,10 +1,10 @@
 import pytest
 
-from bsip_cli.body.names import SEGMENTS
 from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import shipped
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.errors import UsageError
+from bsip_cli.segments import SEGMENTS
 
 
 def row(name, parent, joint, kind, table="thigh"):

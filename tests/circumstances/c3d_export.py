@@ -59,7 +59,7 @@ def _add_points(
     frames, markers, _ = points.shape
     labels = [export.label(name) for name in session.labels]
     point = content["parameters"]["POINT"]
-    point["RATE"]["value"] = [float(export.marker_hz)]
+    point["RATE"]["value"] = [export.marker_hz * export.stated_rate]
     point["LABELS"]["value"] = labels
     point["DESCRIPTIONS"]["value"] = [""] * markers
     point["UNITS"]["value"] = [export.stated_point_unit]
@@ -77,7 +77,7 @@ def _add_plates(
     channels = np.hstack([plate.channels for plate in plates])
     count = len(plates[0].units)
     analog = content["parameters"]["ANALOG"]
-    analog["RATE"]["value"] = [float(export.marker_hz * export.analog_per_marker)]
+    analog["RATE"]["value"] = [export.marker_hz * export.stated_rate * export.analog_per_marker]
     analog["LABELS"]["value"] = [
         f"P{i + 1}C{k + 1}" for i in range(len(plates)) for k in range(count)
     ]

@@ -54,6 +54,7 @@ class Export:
     limit_share: float | None = None  # of its vertical channel: from quiet stance to the largest
     # time
     marker_hz: float = 100.0
+    stated_rate: float = 1.0  # over the true one
     analog_per_marker: int = 10
     time_unit: str = "s"
     time_decimals: int = 6

@@ -369,6 +369,11 @@ def rates(export: Export, rng: np.random.Generator, plates: int) -> str:
     return f"markers at {export.marker_hz:g} Hz, forces {export.analog_per_marker} times as fast"
 
 
+def other_rate_stated(export: Export, rng: np.random.Generator, plates: int) -> str:
+    export.stated_rate = pick(rng, (0.5, 2.0))
+    return f"the file states {export.stated_rate:g} times the cameras' rate"
+
+
 def few_decimals(export: Export, rng: np.random.Generator, plates: int) -> str:
     export.marker_hz = float(pick(rng, (60, 120, 240)))
     export.time_decimals = 3 if export.marker_hz > 120 else pick(rng, (2, 3))
@@ -547,6 +552,7 @@ THINGS = (
     Thing("samples", "samples", cut_off, C3D),
     Thing("samples", "samples", lost_samples, C3D),
     Thing("time", "time", rates),
+    Thing("time", "time", other_rate_stated, C3D),
     Thing("time", "time", few_decimals, TEXT),
     Thing("time", "time", milliseconds, TEXT),
     Thing("time", "time", frame_numbers, TEXT),

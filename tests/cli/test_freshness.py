@@ -129,7 +129,7 @@ def hashes(code: Path) -> dict[str, str]:
     [
         ("bsip_cli/stages/regress.py", {"regress"}, {"ingest", "identify", "stats"}),
         ("bsip_cli/running/unit.py", {stage.name for stage in STAGES}, set()),
-        ("bsip_cli/body/tables/dumas2007.csv", {"regress", "scale"}, {"stats"}),
+        ("bsip_cli/body/tables/dumas2007.csv", {"regress", "scale"}, {"stats", "tables"}),
         ("configs/markersets/plugin_gait.toml", {"ingest"}, {"stats", "regress"}),
         ("bsip_cli/commands/export.py", set(), {stage.name for stage in STAGES}),
         ("configs/default.toml", set(), {stage.name for stage in STAGES}),

@@ -10,7 +10,7 @@ import pandas as pd
 import pinocchio as pin
 import pytest
 
-from bsip_cli.body.names import LINKS, SEGMENTS
+from bsip_cli.segments import LINKS, SEGMENTS
 
 ESTIMATORS = '["consistent", "hansen2017", "robert2017", "base"]'
 IDENTIFY = f"[identify]\nhold_out_fraction = 0.4\nestimators = {ESTIMATORS}\n"

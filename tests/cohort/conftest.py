@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 
 from bsip_cli.artifacts import read_artifact, write_artifact
-from bsip_cli.body.names import SEGMENTS
 from bsip_cli.config import Config, load_config
 from bsip_cli.pipeline import STAGES
 from bsip_cli.running.runner import Outcome, perform
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names, share_name
+from bsip_cli.segments import SEGMENTS
 from bsip_cli.statistics.hypothesis_tests import fisher_z_difference, williams_t
 from bsip_cli.study.study import Study, Trial, load_study
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from bsip_cli.body.names import SEGMENTS
+from bsip_cli.segments import SEGMENTS
 
 ALPHA = 0.05
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")

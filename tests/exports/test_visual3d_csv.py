@@ -10,7 +10,7 @@ import pytest
 
 from bsip_cli.body.exports.visual3d_csv import VISUAL3D_SEGMENTS, visual3d_csv_text
 from bsip_cli.body.inertia import Inertia
-from bsip_cli.body.names import SEGMENTS
+from bsip_cli.segments import SEGMENTS
 
 # What a row's axes point to, in bsip's axes X anterior, Y up, Z right.
 DIRECTIONS = {

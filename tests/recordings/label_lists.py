@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bsip_cli.body.landmarks import LANDMARKS
-from bsip_cli.body.names import SEGMENTS
+from bsip_cli.segments import SEGMENTS
 
 _FILE = Path(__file__).with_name("label_lists.toml")
 

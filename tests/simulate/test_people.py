@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bsip_cli.body.names import SEGMENTS
+from bsip_cli.segments import SEGMENTS
 from bsip_cli.simulate.options import Richness
 from bsip_cli.simulate.people import (
     HIP_FROM_ASIS,

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from bsip_cli.body.names import in_words
 from bsip_cli.report.blocks import Block, Grid, Paragraph, Picture, Section
 from bsip_cli.report.effect_words import effect_title
 from bsip_cli.report.figures.canvas import middle_of_longest
 from bsip_cli.report.figures.curves import Panel, curves
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.words import count, number, signed
+from bsip_cli.segments import in_words
 from bsip_cli.statistics.methods import OM, RM, is_extended
 from bsip_cli.statistics.samples import Z95
 

@@ -14,9 +14,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from bsip_cli.body.names import SEGMENTS
 from bsip_cli.errors import UsageError
 from bsip_cli.instruments.readings import Instruments
+from bsip_cli.segments import SEGMENTS
 from bsip_cli.simulate.people import Inertia, Person, combined
 from bsip_cli.simulate.plan import Plan
 

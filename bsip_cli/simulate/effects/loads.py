@@ -10,9 +10,9 @@ from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, sosfiltfilt
 
 from bsip_cli.body.markersets import load_marker_set, shipped_names
-from bsip_cli.body.names import SEGMENTS
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.instruments.readings import Instruments
+from bsip_cli.segments import SEGMENTS
 from bsip_cli.simulate.effects.base import Effect, OnSegment, Target, body_of, span, with_body
 from bsip_cli.simulate.numerics import response, rotate, second_derivative, step, window
 from bsip_cli.simulate.people import Inertia, Person

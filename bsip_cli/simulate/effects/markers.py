@@ -9,8 +9,8 @@ from typing import Self
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from bsip_cli.body.names import SEGMENTS
 from bsip_cli.instruments.readings import Instruments
+from bsip_cli.segments import SEGMENTS
 from bsip_cli.simulate.effects.base import JOINTS, Effect, Target, direction, span
 from bsip_cli.simulate.numerics import frame_of, glide, rotate, runs, step
 from bsip_cli.simulate.people import Inertia, Person

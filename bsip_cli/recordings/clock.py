@@ -37,12 +37,10 @@ PACES = np.array([1.0, *_SLOWER, *(1 / times for times in _SLOWER)])
 
 @dataclass(frozen=True, eq=False)
 class Lags:
-    """How well forces go with the body if they are taken from later, logarithm, (n,) each, and if
-    the body moves faster, (m,) as `PACES`."""
+    """How well forces go with the body if they are taken from later, logarithm, (n,) each."""
 
     seconds: np.ndarray
     log_likelihood: np.ndarray
-    of_paces: np.ndarray
 
     def delay_s(self, limits: GateLimits) -> float:
         """Of the forces after the body, 0 where that is not sure or as small as others find."""
@@ -83,16 +81,17 @@ def lags(opened: Opened, limits: GateLimits = USUAL) -> Lags | None:
     fine = {*range(-near, near + 1), *range(best - near, best + near + 1)} - rough.keys()
     found = dict(sorted({**rough, **{k: _goes(body, total, k, limits) for k in fine}}.items()))
     seconds = np.array(list(found)) * step / rate_hz
-    return Lags(seconds, np.array(list(found.values())), _paces(body, total, limits))
+    return Lags(seconds, np.array(list(found.values())))
 
 
 def _goes(body: Body, total: np.ndarray, by: int, limits: GateLimits) -> float:
     return Balance.of(body, _shifted(total, by), limits).log_likelihood(limits)
 
 
-def _paces(body: Body, total: np.ndarray, limits: GateLimits) -> np.ndarray:
-    """How much better forces are as large as each of `PACES` needs them, (m,), than as the first
-    does: where the plates hold all of the body by the one or by the other, whichever is more."""
+def paces(body: Body, total: np.ndarray, limits: GateLimits) -> np.ndarray:
+    """How much better the plates' total wrench (n, 6), smoothed as the body is, is as large as each
+    of `PACES` needs it, logarithm (m,), than as the first does: where the plates hold all of the
+    body by the one or by the other, whichever is more."""
     found = [Balance.of(body.faster(times), total, limits) for times in PACES]
     stated = found[0]
     return np.array(

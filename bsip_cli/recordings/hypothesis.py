@@ -10,6 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from bsip_cli.recordings.body_motion import Balance, Body, GateLimits, turn_of_forces
+from bsip_cli.recordings.clock import pace, paces
 from bsip_cli.recordings.plate_fit import PlateFit, plate_fits
 from bsip_cli.recordings.plate_reading import (
     AS_STATED,
@@ -79,11 +80,26 @@ class Hypothesis:
 
     def _total(self) -> np.ndarray:
         """All plates' wrench at the samples of all trials, (n, 6)."""
+        return np.concatenate(self._totals())
+
+    def _totals(self) -> list[np.ndarray]:
         total = [np.zeros((len(trial.body.trial), 6)) for trial in self.trials]
         for fit in self.fits.values():
             for k, wrench in fit.smooth_wrenches().items():
                 total[k] += wrench
-        return np.concatenate(total)
+        return total
+
+    def paces(self) -> dict[str, float]:
+        """How many times as fast as stated trials ran, other than 1: one for all, where together
+        they tell it, or else each its own."""
+        seen = {
+            trial.name: paces(trial.body, total, self.limits)
+            for trial, total in zip(self.trials, self._totals(), strict=True)
+        }
+        of_all = pace(list(seen.values()), self.limits)
+        own = {name: pace([one], self.limits) for name, one in seen.items()}
+        found = own if of_all == 1.0 else dict.fromkeys(seen, of_all)
+        return {name: times for name, times in found.items() if times != 1.0}
 
     @cached_property
     def log_posterior(self) -> float:

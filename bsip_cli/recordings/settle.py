@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bsip_cli.recordings.body_motion import USUAL, GateLimits
-from bsip_cli.recordings.clock import DELAYED, pace
+from bsip_cli.recordings.clock import DELAYED
 from bsip_cli.recordings.hypothesis import AS_IT_IS, Hypothesis
 from bsip_cli.recordings.plate_fit import PlateFit
 from bsip_cli.recordings.plate_reading import FORCES_MOVED, MIRRORS, FrameChange, PlateReading
@@ -79,7 +79,7 @@ class SessionReading:
 
 def settle_session(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -> SessionReading:
     """The axes and the plates' readings that make a person of a session, and the delays of single
-    trials: what either may explain, the likelier does. And the paces, of all or of single ones."""
+    trials: what either may explain, the likelier does."""
     surely = np.log(limits.corrected_percent / (100 - limits.corrected_percent))
     best = _settled(trials, limits)
     for k, trial in enumerate(trials):
@@ -89,17 +89,7 @@ def settle_session(trials: Sequence[TrialSamples], limits: GateLimits = USUAL) -
             if other.log_posterior + DELAYED - best.log_posterior > surely:
                 trials, best = others, other
     delays = {trial.name: trial.delay_s for trial in trials if trial.delay_s}
-    return replace(best, delays_s=delays, paces=_paces(trials, limits))
-
-
-def _paces(trials: Sequence[TrialSamples], limits: GateLimits) -> dict[str, float]:
-    """Other than 1; one for all, where together they tell it, or else each its own."""
-    seen = {trial.name: trial.paces for trial in trials if trial.paces is not None}
-    of_all = pace(list(seen.values()), limits)
-    if of_all != 1.0:
-        return {trial.name: of_all for trial in trials}
-    own = {name: pace([logs], limits) for name, logs in seen.items()}
-    return {name: times for name, times in own.items() if times != 1.0}
+    return replace(best, delays_s=delays)
 
 
 def _settled(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReading:
@@ -115,8 +105,12 @@ def _settled(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReadi
     chosen = _corrected(hypotheses)
     verdicts = {name: _verdict(hypotheses[0].fits[name], chosen, name) for name in chosen.of.fits}
     repeated = {name: Verdict(repeats=others) for name, others in repeats.items()}
-    known = chosen.of.log_posterior
-    return SessionReading(chosen.of.frame, verdicts | repeated, log_posterior=known)
+    return SessionReading(
+        chosen.of.frame,
+        verdicts | repeated,
+        paces=chosen.of.paces(),
+        log_posterior=chosen.of.log_posterior,
+    )
 
 
 # --- the choice -------------------------------------------------------------------------------

@@ -25,8 +25,7 @@ class TrialSamples:
 
     ``sources`` by their names, none if no plate is loaded, and ``smooth``, averaged over as long as
     the ``body``; for each ``loaded`` (n,) bool; the ``feet``. ``late`` : the same with the forces
-    of ``delay_s`` later, if these go with the motion far better; None else. ``paces`` : how
-    likely others than the stated rate are, logarithm, as `clock.PACES`; None where nothing tells.
+    of ``delay_s`` later, if these go with the motion far better; None else.
     """
 
     name: str
@@ -39,19 +38,16 @@ class TrialSamples:
     body: Body
     delay_s: float = 0.0
     late: TrialSamples | None = None
-    paces: np.ndarray | None = None
 
     @classmethod
     def of(cls, opened: Opened, limits: GateLimits = USUAL) -> TrialSamples:
         stated = cls._of(opened)
         seen = lags(opened, limits) if stated.sources else None
-        if seen is None:
-            return stated
-        stated, delay_s = replace(stated, paces=seen.of_paces), seen.delay_s(limits)
+        delay_s = 0.0 if seen is None else seen.delay_s(limits)
         if not delay_s:
             return stated
         late = cls._of(opened.with_forces_from(delay_s))
-        return replace(stated, late=replace(late, delay_s=delay_s, paces=seen.of_paces))
+        return replace(stated, late=replace(late, delay_s=delay_s))
 
     @classmethod
     def _of(cls, opened: Opened) -> TrialSamples:

@@ -91,28 +91,25 @@ def _goes(body: Body, total: np.ndarray, by: int, limits: GateLimits) -> float:
 def paces(body: Body, total: np.ndarray, limits: GateLimits) -> np.ndarray:
     """How much better the plates' total wrench (n, 6), smoothed as the body is, is as large as each
     of `PACES` needs it, logarithm (m,), than as the first does: where the plates hold all of the
-    body by the one or by the other, whichever is more."""
+    body by the one and by the other, each by its independent numbers."""
     found = [Balance.of(body.faster(times), total, limits) for times in PACES]
-    stated = found[0]
-    return np.array(
-        [
-            one.size_log_likelihood() - one.size_log_likelihood(1 / times)
-            if one.numbers > stated.numbers
-            else stated.size_log_likelihood(times) - stated.size_log_likelihood()
-            for times, one in zip(PACES, found, strict=True)
-        ]
-    )
+    gains, stated = np.zeros(len(PACES)), found[0]
+    for k, (times, one) in enumerate(zip(PACES, found, strict=True)):
+        gain = one.numbers * (one.size_log_likelihood() - one.size_log_likelihood(1 / times))
+        back = stated.size_log_likelihood(times) - stated.size_log_likelihood()
+        gains[k] = (gain + stated.numbers * back) / max(one.numbers + stated.numbers, 1.0)
+    return gains
 
 
-def pace(of_trials: Sequence[np.ndarray], limits: GateLimits) -> float:
-    """How many times as fast as stated trials ran, from what `PACES` are of each; 1 where that is
-    not sure."""
+def pace(of_trials: Sequence[np.ndarray], percent: float) -> float:
+    """How many times as fast as stated trials ran, from what `PACES` are of each; 1 where it is not
+    so likely that they ran faster, or slower."""
     logs = np.sum([np.zeros(len(PACES)), *of_trials], axis=0)
     logs[1:] += OTHER_RATE - np.log(len(PACES) - 1)
     best = int(np.argmax(logs))
     same_way = np.sign(np.log(PACES)) == np.sign(np.log(PACES[best]))
     surely = np.exp(logsumexp(logs[same_way]) - logsumexp(logs))
-    return float(PACES[best]) if surely >= limits.corrected_percent / 100 else 1.0
+    return float(PACES[best]) if surely >= percent / 100 else 1.0
 
 
 def _wrench(source: PlateSource, samples: np.ndarray, sigma: float) -> np.ndarray:

@@ -74,8 +74,12 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
     delay_s = session.delays_s.get(recording.path.stem, 0.0)
     opened = opened.with_forces_from(delay_s)
     findings = [*findings_about(session), *_about_delay(delay_s), *_about_sides(recording)]
-    pace = session.paces.get(recording.path.stem, 1.0)
-    if note := recording.forces_note or _other_pace(pace, recording.marker_rate_hz):
+    paces = (one.get(recording.path.stem, 1.0) for one in (session.paces, session.maybe_paces))
+    surely, maybe = (_other_pace(times, recording.marker_rate_hz) for times in paces)
+    if maybe and not surely:
+        expected, action = "accelerations as large as forces make them", "took the stated rate"
+        findings.append(Finding("rate", "cameras", f"perhaps {maybe}", expected, action, "warning"))
+    if note := recording.forces_note or surely:
         return replace(recording, findings=(*recording.findings, *findings), forces_note=note)
     plates: list[Plate] = []
     reversed_names, missing = [], []

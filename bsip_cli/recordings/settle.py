@@ -67,13 +67,15 @@ class SessionReading:
     """How all recordings of a session are to be understood: their axes, and each plate.
 
     ``delays_s`` : by trial, of the forces after the markers, where there is one. ``paces`` : by
-    trial, how many times as fast as stated it ran, where that is another.
+    trial, how many times as fast as stated it ran, where that is sure, or ``maybe_paces`` where the
+    stated rate is not believed.
     """
 
     frame: FrameChange = field(default_factory=FrameChange)
     plates: Mapping[str, Verdict] = field(default_factory=dict)
     delays_s: Mapping[str, float] = field(default_factory=dict)
     paces: Mapping[str, float] = field(default_factory=dict)
+    maybe_paces: Mapping[str, float] = field(default_factory=dict)
     log_posterior: float = field(default=0.0, compare=False)  # but for a constant
 
 
@@ -108,7 +110,8 @@ def _settled(trials: Sequence[TrialSamples], limits: GateLimits) -> SessionReadi
     return SessionReading(
         chosen.of.frame,
         verdicts | repeated,
-        paces=chosen.of.paces(),
+        paces=chosen.of.paces(limits.corrected_percent),
+        maybe_paces=chosen.of.paces(100 - limits.believed_percent),
         log_posterior=chosen.of.log_posterior,
     )
 

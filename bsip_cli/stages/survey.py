@@ -27,6 +27,7 @@ from bsip_cli.study.study import Trial
 
 _EVIDENCE = tuple(field.name for field in fields(Evidence))
 _CENTRE = ("centre_x_m", "centre_y_m", "centre_z_m")
+_OF_TRIALS = ("delays_s", "paces", "maybe_paces")
 _HALF = ("half_size_x_m", "half_size_y_m")
 
 
@@ -34,8 +35,7 @@ def run(unit: Unit) -> None:
     """Look at every recording of the participant; write readings, decided for each session."""
     assert unit.participant is not None
     rows: list[dict] = []
-    delays_s: dict[str, float] = {}
-    paces: dict[str, float] = {}
+    facts: dict[str, dict[str, float]] = {name: {} for name in _OF_TRIALS}
     options = unit.config.ingest
     limits = GateLimits(**{one.name: getattr(options, one.name) for one in fields(GateLimits)})
     _say_copies(unit, unit.participant.trials)
@@ -50,12 +50,12 @@ def run(unit: Unit) -> None:
             raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
         reading = settle_session(seen, limits)
         rows += rows_of(session or "", reading)
-        delays_s |= reading.delays_s
-        paces |= reading.paces
+        for name, of_trials in facts.items():
+            of_trials |= getattr(reading, name)
         whose = f"{unit.name}, session {session}" if session else unit.name
         for finding in findings_about(reading):
             unit.warn(f"{whose}: {finding.sentence()}")
-    unit.write("readings", rows, {"delays_s": delays_s, "paces": paces})
+    unit.write("readings", rows, facts)
 
 
 def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:
@@ -176,4 +176,4 @@ def reading_of(table: pd.DataFrame, facts: dict, trial: Trial) -> SessionReading
         corners_only=bool(first["corners_only"]),
     )
     plates = {row["plate"]: _verdict(row) for row in rows if row["plate"]}
-    return SessionReading(frame, plates, facts["delays_s"], facts["paces"])
+    return SessionReading(frame, plates, **{name: facts[name] for name in _OF_TRIALS})

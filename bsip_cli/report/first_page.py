@@ -32,7 +32,16 @@ from bsip_cli.report.candidates import (
     looked_at,
 )
 from bsip_cli.report.effect_words import separating_recording
-from bsip_cli.report.gains import use_sentence
+from bsip_cli.report.gains import (
+    COP_LIMIT_M,
+    FORCE_LIMIT_PERCENT,
+    MARKERS,
+    SOURCES,
+    Yardstick,
+    errors_of,
+    use_sentence,
+    yardsticks,
+)
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.verdict import (
     ALL_FAULTS,
@@ -43,15 +52,6 @@ from bsip_cli.report.verdict import (
     unseen,
 )
 from bsip_cli.report.words import capital, count, listing, number
-from bsip_cli.report.yardsticks import (
-    COP_LIMIT_M,
-    FORCE_LIMIT_PERCENT,
-    MARKERS,
-    SOURCES,
-    Yardstick,
-    errors_of,
-    yardsticks,
-)
 
 if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose

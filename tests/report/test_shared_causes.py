@@ -11,9 +11,15 @@ from scipy.stats import norm
 
 from bsip_cli.report.blocks import Bullets, Grid, Light
 from bsip_cli.report.cohort import diagnoses
-from bsip_cli.report.cohort.record import CohortRecord, Member, Ratios
+from bsip_cli.report.cohort.record import (
+    CohortRecord,
+    Member,
+    Ratios,
+    named_people,
+    searched,
+    shared_causes,
+)
 from bsip_cli.report.records import HowMade
-from bsip_cli.report.shared import named_people, searched, shared_causes
 from tests.report.fake_study import diagnosis
 
 TRIAL = "sub-01_task-sequence_run-1"

@@ -5,8 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Light, Paragraph, Section, State
-from bsip_cli.report.cohort.record import CohortRecord, Member
-from bsip_cli.report.shared import SHARED, Cause, Searched, named_people, shared_causes
+from bsip_cli.report.cohort.record import (
+    SHARED,
+    Cause,
+    CohortRecord,
+    Member,
+    Searched,
+    named_people,
+    shared_causes,
+)
 from bsip_cli.report.verdict import probability_of, probability_words
 from bsip_cli.report.words import MISSING, capital, count, labelled, listing
 

@@ -23,8 +23,14 @@ from bsip_cli.report.blocks import (
 )
 from bsip_cli.report.cohort import diagnoses, laboratory
 from bsip_cli.report.cohort.record import CohortRecord, Member, Ratios
-from bsip_cli.report.figures.strips import Strip, gain_dots, strips
-from bsip_cli.report.gains import one_number_alone
+from bsip_cli.report.figures.charts import Strip, gain_dots, strips
+from bsip_cli.report.gains import (
+    COP_LIMIT_M,
+    FORCE_LIMIT_PERCENT,
+    Yardstick,
+    one_number_alone,
+    yardsticks,
+)
 from bsip_cli.report.records import how_made
 from bsip_cli.report.tables.build import BUILDERS, IN_PRINT
 from bsip_cli.report.tables.model import Table
@@ -39,7 +45,6 @@ from bsip_cli.report.words import (
     significant,
     trial_label,
 )
-from bsip_cli.report.yardsticks import COP_LIMIT_M, FORCE_LIMIT_PERCENT, Yardstick, yardsticks
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
 
 SHOWN = {

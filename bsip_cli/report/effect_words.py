@@ -5,25 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Protocol
 
 from bsip_cli.body.names import SEGMENTS
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.plates import plates_called
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.report.words import listing, number, segment_label
-
-
-class Number(Protocol):
-    """A parameter of a fault, as estimated."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def unit(self) -> str: ...
-    @property
-    def value(self) -> float: ...
-
 
 _FORCES = (
     "The measured forces are not the true ones, and everything identified from them inherits the "
@@ -143,8 +130,10 @@ def place_label(effect: str, target: str) -> str:
     """``plate 1, force x into force y`` or ``left hand`` of an effect's target; empty for none."""
     if effect in _ONE_PLACE:
         return ""
-    if effect.startswith("plate_"):
-        return _plate_label(target)
+    if effect.startswith("plate_"):  # 1 fx>fy, 1 fz or 1
+        plate, _, channels = target.partition(" ")
+        words = " into ".join(_CHANNELS.get(one, one) for one in channels.split(">"))
+        return f"{plates_called(plate)}, {words}" if words else plates_called(plate)
     if effect.startswith("marker_"):
         first, _, second = target.partition("+")
         return f"markers {first} and {second}" if second else f"marker {target}"
@@ -153,14 +142,6 @@ def place_label(effect: str, target: str) -> str:
     if effect == "unmeasured_contact":
         return " and ".join(segment_label(name) for name in target.split("+"))
     return _CHANNELS.get(target, target)
-
-
-def _plate_label(target: str) -> str:
-    """Of ``1 fx>fy``, ``1 fz`` or ``1``."""
-    name, _, channels = target.rpartition(" ") if " " in target else (target, "", "")
-    words = " into ".join(_CHANNELS.get(channel, channel) for channel in channels.split(">"))
-    where = plates_called(name)
-    return f"{where}, {words}" if words else where
 
 
 _REGULARITIES = {  # first number of a regularity without a name: what it is
@@ -218,17 +199,12 @@ _PARTS = {  # of a size with several parts: which one the interval is of
     "mass": "mass",
     "amplitude": "mass times amplitude",
 }
-_TOLD = (
-    "added_mass",
-    "plate_gain",
-)  # their sentence has one such number only
+_TOLD = ("added_mass", "plate_gain", "unexplained")  # their sentence leaves nothing open
 
 
 def parameter_label(effect: str, parameter: str) -> str:
     """What an interval is of, where the sentence leaves that open; else empty."""
-    if effect in _TOLD or effect == "unexplained":
-        return ""
-    return _PARTS.get(parameter, "")
+    return "" if effect in _TOLD else _PARTS.get(parameter, "")
 
 
 def size_words(parameter: str, unit: str, size: float) -> str:
@@ -286,61 +262,33 @@ def usual_words(effect: str) -> str:
     return with_unit(f"{factor * usual.least:.3g} to {factor * usual.most:.3g}", unit)
 
 
-def beside_usual(effect: str, size: Number) -> str:
-    """``, a usual size (5 to 20 ms)``; empty where nothing usual is known."""
-    usual = USUAL.get(effect)
-    if usual is None or size.name not in usual.parameters or size.unit != usual.unit:
-        return ""
-    shown = float(f"{abs(size.value):.2g}")  # as it is read
-    how = "smaller than usual" if shown < usual.least else "a usual size"
-    how = "larger than usual" if shown > usual.most else how
-    return f", {how} ({usual_words(effect)})"
-
-
 # --- recordings that separate causes --------------------------------------------------------------
 
 _LOADS = ("added_mass", "released_object", "object_handled", "implement", "wobbling_mass")
-_APART: dict[frozenset[str], str] = {
-    frozenset(pair): words
-    for pairs, words in (
-        (
-            [("plate_gain", "plate_zero"), ("plate_zero", "plate_crosstalk")],
-            "step off the plate for five seconds: an offset stays when nobody stands there",
-        ),
-        (
-            [("plate_zero", "added_mass"), ("plate_zero", "gravity_tilt")],
-            "step off the plate for five seconds: an offset stays when nobody stands there",
-        ),
-        (
-            [("plate_gain", "added_mass")],
-            "weigh the person as recorded on a scale, and lay a known weight on the plate",
-        ),
-        (
-            [("gravity_tilt", "plate_rotation"), ("gravity_tilt", "plate_crosstalk")],
-            "hop three times: a fault of the plate grows with the force on it, a tilted vertical "
-            "does not",
-        ),
-        (
-            [("plate_rotation", "plate_crosstalk")],
-            "stand on the plate and push forwards and sideways, and lay a known weight at several "
-            "places: a tilted plate changes every force, a leaking channel only one",
-        ),
-        (
-            [("gravity_tilt", "unexplained"), ("plate_zero", "unexplained")],
-            "stand still for ten seconds at three places of the plate with nothing attached to the "
-            "person: a tilt or an offset stays, whatever pulls is gone",
-        ),
-        (
-            [("sync_offset", "clock_drift")],
-            "hop three times at the beginning and at the end of a long recording",
-        ),
-        ([("missing_joint", "soft_tissue")], EFFECTS["missing_joint"].remedy),
-        (
-            [("breathing", "unexplained")],
-            "stand still for thirty seconds, the breath held in the last ten",
-        ),
-    )
-    for pair in pairs
+_STEP_OFF = "step off the plate for five seconds: an offset stays when nobody stands there"
+_HOP = (
+    "hop three times: a fault of the plate grows with the force on it, a tilted vertical does not"
+)
+_PULLED = (
+    "stand still for ten seconds at three places of the plate with nothing attached to the "
+    "person: a tilt or an offset stays, whatever pulls is gone"
+)
+_APART = {
+    "plate_gain plate_zero": _STEP_OFF,
+    "plate_zero plate_crosstalk": _STEP_OFF,
+    "plate_zero added_mass": _STEP_OFF,
+    "plate_zero gravity_tilt": _STEP_OFF,
+    "plate_gain added_mass": "weigh the person as recorded on a scale, and lay a known weight on "
+    "the plate",
+    "gravity_tilt plate_rotation": _HOP,
+    "gravity_tilt plate_crosstalk": _HOP,
+    "plate_rotation plate_crosstalk": "stand on the plate and push forwards and sideways, and lay a "
+    "known weight at several places: a tilted plate changes every force, a leaking channel only one",
+    "gravity_tilt unexplained": _PULLED,
+    "plate_zero unexplained": _PULLED,
+    "sync_offset clock_drift": "hop three times at the beginning and at the end of a long recording",
+    "missing_joint soft_tissue": EFFECTS["missing_joint"].remedy,
+    "breathing unexplained": "stand still for thirty seconds, the breath held in the last ten",
 }
 _UNKNOWN = "look at plates, cables and everything that touches the person, and record again"
 
@@ -348,36 +296,25 @@ _UNKNOWN = "look at plates, cables and everything that touches the person, and r
 def separating_recording(rivals: Sequence[tuple[str, str]], most: int | None = None) -> str:
     """What to record, without a final stop, for rivals as (effect, target); at most so many steps."""
     effects = list(dict.fromkeys(effect for effect, _ in rivals))
-    advice = [_places(effect, rivals) for effect in effects if _count(effect, rivals) > 1]
-    for pair in combinations(effects, 2):
-        known = _APART.get(frozenset(pair))
-        advice += [known] if known else [_own(effect) for effect in pair]
-    steps = _without_beginnings(advice)
+    places = {one: {target for effect, target in rivals if effect == one} for one in effects}
+    advice = [_places(effect, rivals) for effect in effects if len(places[effect]) > 1]
+    for one, other in combinations(effects, 2):
+        known = _APART.get(f"{one} {other}") or _APART.get(f"{other} {one}")
+        advice += [known] if known else [_own(one), _own(other)]
+    each = dict.fromkeys(advice)  # once, and none that another says with more words
+    steps = [one for one in each if not any(o != one and o.startswith(one) for o in each)]
     if most is not None:
         steps = [step for step in steps if step != _UNKNOWN][:most]
     return "; ".join(steps) or _UNKNOWN
 
 
-def _without_beginnings(advice: list[str]) -> list[str]:
-    """Each once, and none that another says with more words."""
-    each = list(dict.fromkeys(advice))
-    return [one for one in each if not any(o != one and o.startswith(one) for o in each)]
-
-
-def _count(effect: str, rivals: Sequence[tuple[str, str]]) -> int:
-    return len({target for name, target in rivals if name == effect})
-
-
 def _places(effect: str, rivals: Sequence[tuple[str, str]]) -> str:
     """The same effect at several places: they have to move, or be loaded, one at a time."""
-    where = [place_label(effect, target) for name, target in rivals if name == effect]
+    where = listing([place_label(effect, target) for name, target in rivals if name == effect])
     if effect in _LOADS:
-        return (
-            "look for what is worn or loose there, or keep still but for one at a time: "
-            f"{listing(where)}"
-        )
+        return f"look for what is worn or loose there, or keep still but for one at a time: {where}"
     if effect in ("unmeasured_contact", "external_force"):
-        return f"watch, or film, what touches the person: {listing(where)}"
+        return f"watch, or film, what touches the person: {where}"
     return _own(effect)
 
 

@@ -121,15 +121,6 @@ Message = tuple[str, str, str]
 """Stage, unit, text."""
 
 
-def messages_of(origin: Origin) -> tuple[Message, ...]:
-    return tuple((origin.stage, origin.unit, text) for text in origin.messages)
-
-
-def messages(origins: Iterable[Origin]) -> tuple[Message, ...]:
-    """Each once, in the order of the origins."""
-    return tuple(dict.fromkeys(said for origin in origins for said in messages_of(origin)))
-
-
 def with_all_causes(table: pd.DataFrame) -> pd.DataFrame:
     """Of the methods OM+<effect>... the last, which contains all causes, as `EXTENDED`."""
     names = [name for name in table["method"].unique() if is_extended(name)]
@@ -191,7 +182,9 @@ class HowMade:
             for name, version in {"bsip": origin.bsip_version, **origin.libraries}.items():
                 made.versions.setdefault(name, set()).add(version)
             made.files.update(_files(origin.inputs))
-            made.messages.update(dict.fromkeys(messages_of(origin)))
+            made.messages.update(
+                dict.fromkeys((origin.stage, origin.unit, text) for text in origin.messages)
+            )
         return made
 
     def number(self, option: str, otherwise: float) -> float:

@@ -58,7 +58,9 @@ def gains_of(trial: str, fit: pd.DataFrame) -> tuple[Gain, ...]:
         known = {m: rows[m, component] for m in METHODS if (m, component) in rows}
         if not {RM, OM} <= known.keys():
             continue
-        column, unit = _measure(component, known[OM])
+        column, unit = "rmse", str(known[OM]["unit"])
+        if component == "grf_vertical" and np.isfinite(known[OM]["rmse_percent_bw"]):
+            column, unit = "rmse_percent_bw", "% BW"
         gains.append(
             Gain(
                 component,
@@ -70,12 +72,6 @@ def gains_of(trial: str, fit: pd.DataFrame) -> tuple[Gain, ...]:
             )
         )
     return tuple(gains)
-
-
-def _measure(component: str, row: pd.Series) -> tuple[str, str]:
-    if component == "grf_vertical" and np.isfinite(row["rmse_percent_bw"]):
-        return "rmse_percent_bw", "% BW"
-    return "rmse", str(row["unit"])
 
 
 def pooled_gains(gains: Iterable[Gain]) -> tuple[Errors, ...]:
@@ -197,6 +193,9 @@ class Yardstick:
     good: float
     limit: float
 
+    def in_sentence(self) -> str:
+        return f"{self.title[:1].lower()}{self.title[1:]}"
+
     def words(self, value: float) -> str:
         if not np.isfinite(value):
             return "not known"
@@ -243,7 +242,11 @@ def errors_of(fits: Iterable[pd.DataFrame], method: str) -> dict[str, float]:
     rows = [_error(fit[fit["method"] == method]) for fit in fits]
     known = [row for row in rows if np.isfinite(row[COP]) or np.isfinite(row[FORCE])]
     chosen = [row for row in known if row["held_out"]] or known
-    return {name: _rms([row[name] for row in chosen]) for name in (COP, FORCE)}
+    found = {}
+    for name in (COP, FORCE):
+        sizes = [row[name] for row in chosen if np.isfinite(row[name])]
+        found[name] = float(np.sqrt(np.mean(np.square(sizes)))) if sizes else float("nan")
+    return found
 
 
 def _error(fit: pd.DataFrame) -> Mapping[str, float]:
@@ -253,8 +256,3 @@ def _error(fit: pd.DataFrame) -> Mapping[str, float]:
     percent = rows["rmse_percent_bw"].to_dict().get("grf_vertical", np.nan)
     held_out = bool((fit["data"] == "held_out").any())
     return {COP: float(cop), FORCE: float(percent), "held_out": held_out}
-
-
-def _rms(values: Iterable[float]) -> float:
-    known = [v for v in values if np.isfinite(v)]
-    return float(np.sqrt(np.mean(np.square(known)))) if known else float("nan")

@@ -82,11 +82,7 @@ def endings_kept() -> Iterator[None]:
 def ignore_endings() -> None:
     """From now on nothing is raised, for a process that is about to end."""
     for number in ENDING:  # with SIG_IGN, Python would complain of one that has just come
-        signal.signal(number, _pass_over)
-
-
-def _pass_over(_number: int, _frame: object) -> None:
-    return
+        signal.signal(number, lambda *_: None)
 
 
 def leave(exit_code: int) -> NoReturn:

@@ -142,7 +142,9 @@ def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
     try:
         with held_alone(task.folder):
             if _is_unchanged(task):
-                yield from ((task.name, outcome) for outcome in _all_fresh(task))
+                for stage, trial in _units(task):
+                    name = trial.stem if trial else task.name
+                    yield task.name, Outcome(stage.name, name, "fresh")
                 return
             is_true = True
             for outcome in _run_alone(task):
@@ -189,11 +191,6 @@ def _state(task: _Task) -> str:
     code = [code_hash(stage.module) for stage in stages]
     facts = (files, code, library_versions(), task.config.model_dump_json(), task.participant)
     return hashlib.sha256(repr(facts).encode()).hexdigest() if files else ""
-
-
-def _all_fresh(task: _Task) -> Iterator[Outcome]:
-    for stage, trial in _units(task):
-        yield Outcome(stage.name, trial.stem if trial else task.name, "fresh")
 
 
 def _remember(task: _Task, state: str) -> None:
@@ -312,17 +309,13 @@ def lacking(unit: Unit) -> Outcome | None:
         return Outcome(stage, unit.name, "waiting", (f"{unit.name}: nobody is left for {stage}",))
     if not gone:
         return None
-    if _refused_upstream(unit):
+    folders = [unit.out / participant.id for participant in unit.participants()]
+    if any(any(folder.glob("*_refusal-*.parquet")) for folder in folders):
         why = f"{unit.name}: left out of {stage}, since its input was refused"
         return Outcome(stage, unit.name, "waiting", (why,))
     first = producer(gone[0]).name
     why = f"{unit.name}: {stage} has no {', '.join(gone)} to read"
     return Outcome(stage, unit.name, "waiting", (f"{why}; run `bsip {first}` first",), 2)
-
-
-def _refused_upstream(unit: Unit) -> bool:
-    folders = [unit.out / participant.id for participant in unit.participants()]
-    return any(any(folder.glob("*_refusal-*.parquet")) for folder in folders)
 
 
 def _write_refusal(unit: Unit, kind: str, sentence: str) -> None:
@@ -343,17 +336,11 @@ def _bug(stage: str, name: str, error: Exception) -> Outcome:
 
 def _killed(task: _Task, exit_code: int | None) -> Outcome:
     stage = task.stages[0].name if len({stage.name for stage in task.stages}) == 1 else "run"
-    how = (
-        _SHORT_OF_MEMORY
-        if exit_code == -signal.SIGKILL
-        else f"the process crashed ({_ending(exit_code)})"
-    )
-    return Outcome(stage, task.name, "bug", (f"{task.name}: {how}",), 1)
-
-
-def _ending(exit_code: int | None) -> str:
     code = exit_code or 0
-    return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+    ending = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+    killed = code == -signal.SIGKILL
+    how = _SHORT_OF_MEMORY if killed else f"the process crashed ({ending})"
+    return Outcome(stage, task.name, "bug", (f"{task.name}: {how}",), 1)
 
 
 def refusal_sentence(refusals: list[BadDataError]) -> Iterator[Outcome]:

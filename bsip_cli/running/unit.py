@@ -413,24 +413,24 @@ def _data_of(modules: frozenset[str]) -> set[Path]:
     packages = {module.rpartition(".")[0] for module in modules} - {"", _NAME}
     folders = {_PACKAGE.joinpath(*package.split(".")[1:]) for package in packages}
     inside = {file for folder in folders for file in _below(folder)}
-    return files | {file for file in inside if _package_of(file) in folders}
+    return files | {
+        file
+        for file in inside
+        if next(one for one in file.parents if (one / "__init__.py").is_file()) in folders
+    }
 
 
 def _below(place: Path) -> set[Path]:
     """Files that belong to the package and are no code."""
     files = place.rglob("*") if place.is_dir() else [place]
     return {
-        file for file in files if file.is_file() and not _is_made(file) and file.suffix != ".py"
+        file
+        for file in files
+        if file.is_file()
+        and file.suffix != ".py"
+        # what Python, numba or an editor left there
+        and not (file.parent.name == "__pycache__" or file.name[0] == "." or file.name[-1] == "~")
     }
-
-
-def _is_made(file: Path) -> bool:
-    """What Python, numba or an editor left there."""
-    return file.parent.name == "__pycache__" or file.name.startswith(".") or file.name[-1] == "~"
-
-
-def _package_of(file: Path) -> Path:
-    return next(folder for folder in file.parents if (folder / "__init__.py").is_file())
 
 
 _LIBRARIES = (

@@ -94,15 +94,13 @@ def _nothing_found(people: Sequence[Searched]) -> list[str]:
     of_movements: dict[str, list[str]] = {}
     for one in people:
         if one.was_searched and not one.causes:
-            of_movements.setdefault(_movements(one), []).append(one.id)
+            movements = labelled(listing(list(one.trials)))
+            told = f" (searched: {movements})" if one.trials else ""
+            of_movements.setdefault(told, []).append(one.id)
     return [
         f"No fault was found in {named_people(names)}{movements}."
         for movements, names in of_movements.items()
     ]
-
-
-def _movements(one: Searched) -> str:
-    return f" (searched: {labelled(listing(list(one.trials)))})" if one.trials else ""
 
 
 def _row(person: str, cause: Cause, reports: set[str]) -> tuple[str | Cell, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import pandas as pd
@@ -271,19 +271,23 @@ def _choice(record: ParticipantRecord) -> Iterator[Block]:
     if choice["trials"].iloc[0]:
         yield Grid(
             ("movement", "use", "OM over RM", "RM+mass over RM", "OM over RM+mass", "recordings"),
-            tuple(_choice_row(row) for _, row in choice.iterrows()),
+            tuple(
+                (
+                    row["movement"],
+                    row["use"],
+                    *(_ratio(row, x) for x in _RATIOS),
+                    str(row["trials"]),
+                )
+                for row in choice.to_dict("records")
+            ),
             "Errors as ratios (below 1: smaller), with one standard error to either side.",
             words=2,
         )
 
 
-def _choice_row(row: pd.Series) -> tuple[str, ...]:
-    ratios = (_ratio(row[f"ratio_{name}"], row[f"log_error_{name}"]) for name in _RATIOS)
-    return (str(row["movement"]), str(row["use"]), *ratios, str(row["trials"]))
-
-
-def _ratio(ratio: float, log_error: float) -> str:
-    low, high = Difference.of_ratio(ratio, log_error).interval()
+def _ratio(row: Mapping, name: str) -> str:
+    ratio = row[f"ratio_{name}"]
+    low, high = Difference.of_ratio(ratio, row[f"log_error_{name}"]).interval()
     ends = f" ({number(low, 2)} to {number(high, 2)})" if number(low) != MISSING else ""
     return f"{number(ratio, 2)}{ends}"
 

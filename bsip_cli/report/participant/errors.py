@@ -34,12 +34,6 @@ def section(record: ParticipantRecord) -> Section:
     return Section("errors", "How large are the errors, when, and what makes them?", blocks)
 
 
-def all_gains(record: ParticipantRecord) -> tuple[Gain, ...]:
-    """Of all trials of movement, trial by trial."""
-    fits = [(t.label, t.fit) for t in record.moving_trials() if t.fit is not None]
-    return tuple(gain for label, fit in fits for gain in gains_of(label, fit))
-
-
 # --- over time ----------------------------------------------------------------------------------
 
 
@@ -123,7 +117,8 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
 
 
 def _grid(record: ParticipantRecord) -> Iterator[Block]:
-    gains = all_gains(record)
+    fits = [(t, t.fit) for t in record.moving_trials() if t.fit is not None]
+    gains = [gain for trial, fit in fits for gain in gains_of(trial.label, fit)]
     known = [gain for gain in gains if gain.component in _SHOWN]
     if not known:
         yield Paragraph("No recording could be compared with both methods.", "warning")
@@ -145,7 +140,6 @@ def _grid(record: ParticipantRecord) -> Iterator[Block]:
         for component in _SHOWN:
             cells += [_cell(of.get(component), method) for method in METHODS]
         rows.append(tuple(cells))
-    fits = [t.fit.assign(trial=t.stem) for t in record.moving_trials() if t.fit is not None]
     yield Grid(
         ("recording", *METHODS * len(_SHOWN)),
         tuple(rows),
@@ -153,7 +147,7 @@ def _grid(record: ParticipantRecord) -> Iterator[Block]:
         f"{100 * SAME_WITHIN:.0f} %.",
         groups=(("", 1), ("COP forward [mm]", 3), ("COP sideways [mm]", 3), ("vertical [% BW]", 3)),
         name="errors",
-        data=pd.concat(fits),
+        data=pd.concat(fit.assign(trial=trial.stem) for trial, fit in fits),
     )
 
 
@@ -166,9 +160,9 @@ def _cell(gain: Gain | None, method: str) -> Cell:
     return Cell(number(own, 1), "better" if own < min(others) * (1.0 - SAME_WITHIN) else "")
 
 
-def _one_number(record: ParticipantRecord, gains: tuple[Gain, ...]) -> Iterator[Block]:
+def _one_number(record: ParticipantRecord, gains: list[Gain]) -> Iterator[Block]:
     """What one number for the whole mass is, and does without identification."""
-    held_out = [gain for gain in gains if gain.held_out] or list(gains)
+    held_out = [gain for gain in gains if gain.held_out] or gains
     rows = record.identification[record.identification["method"] == RM_MASS]
     found = [m for m in pooled_gains(held_out) if m.component == "grf_vertical" and RM_MASS in m.of]
     if len(rows) and found:

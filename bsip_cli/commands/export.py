@@ -47,8 +47,7 @@ from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH, coordinates_from, markers_from, person_from, person_of
 from bsip_cli.stages.joints import trial_of
 from bsip_cli.stages.trial_scene import plate_names
-from bsip_cli.study.dataset import describe_dataset
-from bsip_cli.study.study import Participant
+from bsip_cli.study.study import Participant, describe_dataset
 
 # --- tables of each trial -------------------------------------------------------------------------
 
@@ -60,16 +59,7 @@ _BODY = ("skeleton", "marker-positions")
 _EDGE = 5
 
 
-@dataclass(frozen=True)
-class Tables:
-    """What is asked for. model : name of the exported model's file, for OpenSim."""
-
-    what: str
-    to: Path | None
-    model: str = ""
-
-
-def export_trials(opened: OpenedStudy, out: Path, asked: Tables, model: Callable | None) -> int:
+def _export_trials(opened: OpenedStudy, out: Path, asked: Request, model: Callable | None) -> int:
     """Write the tables of all trials; the exit code.
 
     model : of a participant, writes the model and returns its file's name and the outcome.
@@ -78,16 +68,15 @@ def export_trials(opened: OpenedStudy, out: Path, asked: Tables, model: Callable
 
     def running() -> Generator[Outcome, None, None]:
         for participant in study.participants:
-            its = asked
+            name = ""
             if model is not None:
                 name, outcome = model(participant)
                 yield outcome
                 if outcome.state != "done":
                     continue
-                its = replace(asked, model=name)
             for trial in participant.trials:
                 unit = Unit(_READERS[asked.what], study, out, opened.config, participant, trial)
-                yield _export_tables(unit, its)
+                yield _export_tables(unit, asked, name)
 
     if asked.what == "bids" and asked.to is not None:
         asked.to.mkdir(parents=True, exist_ok=True)
@@ -97,7 +86,7 @@ def export_trials(opened: OpenedStudy, out: Path, asked: Tables, model: Callable
     return follow("export", opened.refusals, running(), total, asked.to or out)
 
 
-def _export_tables(unit: Unit, asked: Tables) -> Outcome:
+def _export_tables(unit: Unit, asked: Request, model: str) -> Outcome:
     waiting = lacking(unit)
     if waiting is not None:
         return replace(waiting, exit_code=waiting.exit_code or BadDataError.exit_code)
@@ -105,7 +94,7 @@ def _export_tables(unit: Unit, asked: Tables) -> Outcome:
     folder = folder_of(unit, asked.to)
     try:
         with held_alone(unit.out / unit.participant.id):
-            texts, note = _WRITERS[asked.what](unit, asked)
+            texts, note = _WRITERS[asked.what](unit, model)
             for name, text in texts.items():
                 write_text(folder / name, text)
     except BsipError as error:
@@ -126,13 +115,13 @@ def write_text(path: Path, text: str) -> None:
     write_atomically(path, lambda partial: partial.write_bytes(text.encode()))
 
 
-def _joints(unit: Unit, _: Tables) -> Texts:
+def _joints(unit: Unit, _: str) -> Texts:
     """The artifact, a row per time, method, joint and axis."""
     table = unit.read("joint-moments")
     return {f"{unit.name}_joint-moments.csv": table.to_csv(index=False, float_format="%.9g")}, ""
 
 
-def _bids(unit: Unit, _: Tables) -> Texts:
+def _bids(unit: Unit, _: str) -> Texts:
     assert unit.trial is not None
     trial, skeleton = unit.trial, load_skeleton(unit.config.skeleton)
     kinematics, wrench = unit.read("kinematics"), unit.read("wrench")
@@ -160,15 +149,15 @@ def _bids(unit: Unit, _: Tables) -> Texts:
     }, ""
 
 
-def _opensim(unit: Unit, asked: Tables) -> Texts:
-    """Motion where the markers determine it; loads in the longest time in which the plates tell
-    what acts on each foot, and on nothing else."""
+def _opensim(unit: Unit, model: str) -> Texts:
+    """For the model in that file: motion where the markers determine it; loads in the longest time
+    in which the plates tell what acts on each foot, and on nothing else."""
     person = person_of(unit)
     trial, name = trial_of(unit, person), unit.name
     known = trial.determined
     if known.sum() < 2:
         raise BadDataError("the markers determine no pose", file=name)
-    said = [f"bsip {__version__} export: {name}, for {asked.model}; SI units, Y up"]
+    said = [f"bsip {__version__} export: {name}, for {model}; SI units, Y up"]
     motion = coordinates(person.skeleton, trial.q[known])
     texts = {f"{name}_motion.mot": mot_text(name, trial.times_s[known], motion, said)}
     wrenches = {f"foot_{s}": w for s, w in trial.ground(trial.readings)[0].wrench.items()}
@@ -182,7 +171,7 @@ def _opensim(unit: Unit, asked: Tables) -> Texts:
     times = trial.times_s[frames]
     acting = loads({foot: w[frames] for foot, w in wrenches.items()})
     files = {
-        "model_file": asked.model,
+        "model_file": model,
         "coordinates_file": f"{name}_motion.mot",
         "external_loads_file": f"{name}_loads.xml",
     }
@@ -194,7 +183,7 @@ def _opensim(unit: Unit, asked: Tables) -> Texts:
     return texts, note + "; known loads are not in the model" * bool(unit.loads())
 
 
-_WRITERS: dict[str, Callable[[Unit, Tables], Texts]] = {
+_WRITERS: dict[str, Callable[[Unit, str], Texts]] = {
     "joints": _joints,
     "bids": _bids,
     "opensim": _opensim,
@@ -262,7 +251,7 @@ def export_session(
         assert to is not None
         return export_recordings(opened, out, to)
     if request.what in ("bids", "joints"):
-        return export_trials(opened, out, Tables(request.what, to), None)
+        return _export_trials(opened, out, request, None)
     if request.what == "opensim":
         request = replace(request, formats=("osim",))
     writers = _writers(request, skeleton)
@@ -272,7 +261,7 @@ def export_session(
         return _export(unit, skeleton, request, writers)
 
     if request.what == "opensim":
-        return export_trials(opened, out, Tables("opensim", to), model)
+        return _export_trials(opened, out, request, model)
     running = (model(participant)[1] for participant in study.participants)
     return follow("export", opened.refusals, running, len(study.participants), to or out)
 

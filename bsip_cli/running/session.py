@@ -20,8 +20,7 @@ from bsip_cli.config import Config, Load, load_config, with_estimators
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.pipeline import FINDINGS, Stage, by_level, cost_s, stages_named
 from bsip_cli.running.runner import Manner, Outcome, refusal_sentence, run_stages
-from bsip_cli.study.dataset import describe_dataset, make_out
-from bsip_cli.study.study import Study, load_study
+from bsip_cli.study.study import Study, describe_dataset, load_study, make_out
 from bsip_cli.study.trials import listed
 
 _LOADS = "correct [[loads]] in study.toml"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from array import array
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from itertools import combinations
 from math import isnan, nan
 from typing import Any, Literal, NamedTuple
@@ -438,39 +438,31 @@ class PersonTestCounts:
     """What the participants' tests come to; keeps numbers of them, not the tests."""
 
     def __init__(self) -> None:
-        self._results: dict[tuple[Topic, str, Origin], _Results] = defaultdict(_Results)
+        self._numbers: dict[tuple[Topic, str, Origin], array[float]] = defaultdict(
+            lambda: array("d")  # statistic and p, one participant after the other
+        )
+        self._reasons: dict[tuple[Topic, str, Origin], set[str]] = defaultdict(set)
 
     def add(self, tests: Iterable[PersonTest]) -> None:
         for test in tests:
-            self._results[test.topic, "williams_t", "added"].add(test.williams)
-            self._results[test.topic, "fisher_z", "published"].add(test.fisher)
+            for name, origin, found in (
+                ("williams_t", "added", test.williams),
+                ("fisher_z", "published", test.fisher),
+            ):
+                key: Any = (test.topic, name, origin)
+                self._numbers[key].extend((found.statistic, found.p_value))
+                self._reasons[key] |= {found.reason} if found.reason else set()
 
     def comparisons(self, alpha: float) -> tuple[Comparison, ...]:
         """Median t and p of each topic, and in how many participants OM or RM is better."""
-        results = self._results.items()
-        return tuple(Comparison(*key, OM, RM, **found.numbers(alpha)) for key, found in results)
+        return tuple(Comparison(*key, OM, RM, **self._of(key, alpha)) for key in self._numbers)
 
-
-@dataclass
-class _Results:
-    """Statistic and p of one test in every participant, and why it is missing in some."""
-
-    statistics: array[float] = field(default_factory=lambda: array("d"))
-    p_values: array[float] = field(default_factory=lambda: array("d"))
-    reasons: set[str] = field(default_factory=set)
-
-    def add(self, test: TestResult) -> None:
-        self.statistics.append(test.statistic)
-        self.p_values.append(test.p_value)
-        if test.reason:
-            self.reasons.add(test.reason)
-
-    def numbers(self, alpha: float) -> dict[str, Any]:
-        t, p = np.array(self.statistics), np.array(self.p_values)
-        t, p = t[~np.isnan(p)], p[~np.isnan(p)]
+    def _of(self, key: tuple[Topic, str, Origin], alpha: float) -> dict[str, Any]:
+        numbers, reasons = np.reshape(self._numbers[key], (-1, 2)), self._reasons[key]
+        total = len(numbers)
+        t, p = numbers[~np.isnan(numbers[:, 1])].T
         better, worse = (int(np.sum((sign * t > 0.0) & (p < alpha))) for sign in (1.0, -1.0))
-        total = len(self.p_values)
-        like = ", for instance" if len(self.reasons) > 1 else ""
+        like = ", for instance" if len(reasons) > 1 else ""
         concerned = f"in {total - len(p)} of {total} participants{like}"
         return {
             "n": len(p),
@@ -480,5 +472,5 @@ class _Results:
             "effect_size_name": "share of participants whose correlations differ",
             "count_a": better,
             "count_b": worse,
-            "reason": f"{concerned}: {min(self.reasons)}" if self.reasons else "",
+            "reason": f"{concerned}: {min(reasons)}" if reasons else "",
         }

@@ -45,14 +45,6 @@ def test_two_groups_are_a_t_test():
     assert (pair.ci_low, pair.ci_high) == pytest.approx((interval.low, interval.high))
 
 
-def test_f_follows_from_means_and_sds_as_in_hansen_2017_table_3():
-    """MV: 6.26 (2.70), 6.28 (2.60), 6.52 (1.76) of twelve: printed F = 0.04, p = 0.96."""
-    z = stats.zscore(np.random.default_rng(0).normal(size=12), ddof=1)
-    test, _post_hoc = one_way_anova([6.26 + 2.70 * z, 6.28 + 2.60 * z, 6.52 + 1.76 * z])
-    assert test.statistic == pytest.approx(0.04, abs=0.005)
-    assert test.p_value == pytest.approx(0.96, abs=0.005)
-
-
 @pytest.mark.parametrize(
     ("groups", "words"),
     [
@@ -79,18 +71,6 @@ def test_bushtucker():
     assert stats.f.sf(test.statistic, 3, 21) == pytest.approx(0.026, abs=5e-4)
     assert test.p_value == pytest.approx(0.063, abs=5e-4)
     assert test.effect_size == pytest.approx(83.13 / (83.13 + 153.38), abs=1e-4)
-
-
-def test_against_statsmodels():
-    import pandas as pd
-    from statsmodels.stats.anova import AnovaRM
-
-    n, k = BUSHTUCKER.shape
-    person, column = np.divmod(np.arange(n * k), k)
-    table = pd.DataFrame({"y": BUSHTUCKER.ravel(), "person": person, "column": column})
-    expected = AnovaRM(table, "y", "person", ["column"]).fit().anova_table
-    test, _post_hoc = repeated_measures_anova(BUSHTUCKER)
-    assert test.statistic == pytest.approx(expected["F Value"].iloc[0])
 
 
 def test_epsilon_by_orthonormal_contrasts():

@@ -21,7 +21,6 @@ from bsip_cli.report.blocks import (
     Scales,
     Terms,
 )
-from bsip_cli.report.budget import overall_pieces
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
     Candidate,
@@ -31,13 +30,14 @@ from bsip_cli.report.candidates import (
     looked_at,
 )
 from bsip_cli.report.effect_words import separating_recording
-from bsip_cli.report.gains import (
+from bsip_cli.report.errors import (
     COP_LIMIT_M,
     FORCE_LIMIT_PERCENT,
     MARKERS,
     SOURCES,
     Yardstick,
     errors_of,
+    overall_pieces,
     use_sentence,
     yardsticks,
 )

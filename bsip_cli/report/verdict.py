@@ -11,14 +11,6 @@ import pandas as pd
 
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.report.blocks import Light
-from bsip_cli.report.budget import (
-    PARAMETERS,
-    REST,
-    UNKNOWN,
-    budget_sentences,
-    fault_share,
-    overall_pieces,
-)
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
     UNNAMED,
@@ -36,6 +28,14 @@ from bsip_cli.report.effect_words import (
     WEIGHT,
     effect_title,
     separating_recording,
+)
+from bsip_cli.report.errors import (
+    PARAMETERS,
+    REST,
+    UNKNOWN,
+    budget_sentences,
+    fault_share,
+    overall_pieces,
 )
 from bsip_cli.report.words import (
     capital,

@@ -343,12 +343,6 @@ def _killed(task: _Task, exit_code: int | None) -> Outcome:
     return Outcome(stage, task.name, "bug", (f"{task.name}: {how}",), 1)
 
 
-def refusal_sentence(refusals: list[BadDataError]) -> Iterator[Outcome]:
-    """Outcomes for participants that could not even be listed."""
-    for refusal in refusals:
-        yield Outcome("study", "study", "refused", (str(refusal),), refusal.exit_code)
-
-
 # --- only one program at a time writes into a folder of results -------------------------------
 
 

@@ -19,7 +19,7 @@ from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, Load, load_config, with_estimators
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.pipeline import FINDINGS, Stage, by_level, cost_s, stages_named
-from bsip_cli.running.runner import Manner, Outcome, refusal_sentence, run_stages
+from bsip_cli.running.runner import Manner, Outcome, run_stages
 from bsip_cli.study.study import Study, describe_dataset, load_study, make_out
 from bsip_cli.study.trials import listed
 
@@ -115,7 +115,8 @@ def open_study(
         whole = load_study(root, roles) if chosen else (study, refusals)
         _check_names(config, *whole)
     make_out(out, root)
-    return OpenedStudy(study, config, (*_notes(*study.notes), *refusal_sentence(refusals)))
+    refused = (Outcome("study", "study", "refused", (str(one),), one.exit_code) for one in refusals)
+    return OpenedStudy(study, config, (*_notes(*study.notes), *refused))
 
 
 def _check_names(config: Config, study: Study, refusals: list[BadDataError]) -> None:

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 from bsip_cli.report.blocks import Light, Picture
+from bsip_cli.report.errors import use_sentence
 from bsip_cli.report.first_page import front
-from bsip_cli.report.gains import use_sentence
 from bsip_cli.report.participant import errors
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import ParticipantRecord

@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from bsip_cli.report.blocks import _tied
+from bsip_cli.report.errors import Gain, gains_of, one_number_alone, pooled_gains
 from bsip_cli.report.figures.canvas import middle_of_longest, plain, runs, thinned
-from bsip_cli.report.gains import Gain, gains_of, one_number_alone, pooled_gains
 from bsip_cli.report.words import (
     component_label,
     count,

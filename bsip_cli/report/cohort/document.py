@@ -34,14 +34,14 @@ from bsip_cli.report.cohort.record import (
     named_people,
     shared_causes,
 )
-from bsip_cli.report.figures.charts import Strip, gain_dots, strips
-from bsip_cli.report.gains import (
+from bsip_cli.report.errors import (
     COP_LIMIT_M,
     FORCE_LIMIT_PERCENT,
     Yardstick,
     one_number_alone,
     yardsticks,
 )
+from bsip_cli.report.figures.charts import Strip, gain_dots, strips
 from bsip_cli.report.records import how_made
 from bsip_cli.report.tables.build import BUILDERS, IN_PRINT
 from bsip_cli.report.tables.model import Table

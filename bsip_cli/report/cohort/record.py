@@ -12,7 +12,7 @@ import pandas as pd
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.candidates import Candidate, Number, candidates_of, causes_of
-from bsip_cli.report.gains import COP, FORCE, MARKERS
+from bsip_cli.report.errors import COP, FORCE, MARKERS
 from bsip_cli.report.records import HowMade, Refusal
 from bsip_cli.report.tables.model import Table
 from bsip_cli.report.words import COMPONENTS, capital, listing, number, task_of

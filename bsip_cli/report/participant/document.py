@@ -20,9 +20,9 @@ from bsip_cli.report.blocks import (
     Section,
     Terms,
 )
+from bsip_cli.report.errors import MARKERS, yardsticks
 from bsip_cli.report.figures.charts import SegmentMasses, marker_bars, segment_masses
 from bsip_cli.report.first_page import front
-from bsip_cli.report.gains import MARKERS, yardsticks
 from bsip_cli.report.participant import diagnosis, errors
 from bsip_cli.report.records import (
     HowMade,

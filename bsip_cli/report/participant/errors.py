@@ -10,11 +10,19 @@ import pandas as pd
 
 from bsip_cli.body.names import in_words
 from bsip_cli.report.blocks import Block, Cell, Grid, Paragraph, Picture, Section
-from bsip_cli.report.budget import LEAST_TOLD_SIZE, pieces, size_of
 from bsip_cli.report.effect_words import effect_title
+from bsip_cli.report.errors import (
+    LEAST_TOLD_SIZE,
+    Gain,
+    gains_of,
+    one_number_alone,
+    pieces,
+    pooled_gains,
+    relative_change,
+    size_of,
+)
 from bsip_cli.report.figures.canvas import middle_of_longest
 from bsip_cli.report.figures.charts import Panel, Whole, curves, error_bars
-from bsip_cli.report.gains import Gain, gains_of, one_number_alone, pooled_gains, relative_change
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, clock_of, flags_of, signals_of
 from bsip_cli.report.words import COMPONENTS, component_label, count, number, signed
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN, is_extended

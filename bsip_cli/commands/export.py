@@ -25,12 +25,7 @@ from bsip_cli.body.exports.body_map import (
 from bsip_cli.body.exports.formats import FORMATS
 from bsip_cli.body.exports.identified import IdentifiedPerson
 from bsip_cli.body.exports.opensim_motion import coordinates, loads, loads_xml, mot_text, setup_xml
-from bsip_cli.body.exports.osim_given import (
-    GivenModel,
-    check_fits,
-    read_given_model,
-    with_inertias,
-)
+from bsip_cli.body.exports.osim_given import GivenModel, check_fits, read_given_model, with_inertias
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.commands.export_recording import export_recordings
@@ -236,11 +231,7 @@ Writer = Callable[[IdentifiedPerson], tuple[str, str]]
 
 
 def export_session(
-    root: Path,
-    out: Path,
-    chosen: tuple[str, ...],
-    config_file: Path | None,
-    request: Request,
+    root: Path, out: Path, chosen: tuple[str, ...], config_file: Path | None, request: Request
 ) -> int:
     """Export a study's participants and return the exit code."""
     _check(request)
@@ -434,11 +425,7 @@ def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson
     head = f"bsip {__version__} export: participant {unit.name}, method {method}"
     made_of = (head, *(f"{path.name} sha256 {file_hash(path)}" for path in paths))
     return IdentifiedPerson(
-        person,
-        tuple(from_readable(row) for row in values),
-        unit.name,
-        method,
-        made_of,
+        person, tuple(from_readable(row) for row in values), unit.name, method, made_of
     )
 
 

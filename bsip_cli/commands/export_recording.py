@@ -437,12 +437,7 @@ def _exchanged(events: pd.DataFrame) -> list[tuple[str, str, float, float]]:
 def _stated(reading: PlateReading) -> PlateReading:
     """Without the repairs that other numbers in the channels make needless."""
     return replace(
-        reading,
-        moment_scale=1.0,
-        point_scale=1.0,
-        about="stated",
-        channels="",
-        centre_m=None,
+        reading, moment_scale=1.0, point_scale=1.0, about="stated", channels="", centre_m=None
     )
 
 

@@ -20,13 +20,7 @@ from bsip_cli.report.errors import overall_pieces, use_sentence
 from bsip_cli.report.participant.errors import largest_changes
 from bsip_cli.report.records import with_all_causes
 from bsip_cli.report.tables.build import show as tables_of
-from bsip_cli.report.verdict import (
-    Verdict,
-    cause_line,
-    light_of,
-    put_right_sentence,
-    verdict_of,
-)
+from bsip_cli.report.verdict import Verdict, cause_line, light_of, put_right_sentence, verdict_of
 from bsip_cli.report.words import listing
 from bsip_cli.running.freshness import outdated
 from bsip_cli.schemas import SCHEMAS

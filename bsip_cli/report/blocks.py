@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Literal
 
 import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -24,67 +24,67 @@ Tone = Literal["plain", "good", "warning", "note"]
 State = Literal["fine", "cause", "large", "inconclusive"]
 
 
+class Block:
+    """A piece of a report; each kind has its own part of the template."""
+
+    @property
+    def kind(self) -> str:
+        return type(self).__name__.lower()
+
+
 @dataclass(frozen=True)
-class Paragraph:
-    kind: ClassVar[str] = "paragraph"
+class Paragraph(Block):
     text: str
     tone: Tone = "plain"
 
 
 @dataclass(frozen=True)
-class Heading:
-    kind: ClassVar[str] = "heading"
+class Heading(Block):
     text: str
 
 
 @dataclass(frozen=True)
-class Bullets:
-    kind: ClassVar[str] = "bullets"
+class Bullets(Block):
     items: tuple[str, ...]
     tone: Tone = "plain"
 
 
 @dataclass(frozen=True)
-class Numbered:
+class Numbered(Block):
     """A list whose items other texts refer to by their number."""
 
-    kind: ClassVar[str] = "numbered"
     items: tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Terms:
+class Terms(Block):
     """Names, each with what is to be said of it."""
 
-    kind: ClassVar[str] = "terms"
     pairs: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
-class Links:
+class Links(Block):
     """Words and addresses (relative), one after the other, after a text."""
 
-    kind: ClassVar[str] = "links"
     text: str
     to: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
-class Light:
+class Light(Block):
     """The answer to whether anything is wrong."""
 
-    kind: ClassVar[str] = "light"
     state: State
     title: str
     text: str
 
 
 @dataclass(frozen=True)
-class Bar:
+class Bar(Block):
     """A whole cut into pieces: label and share [%], which add up to 100; a share below zero makes
     the rest larger and has no length."""
 
-    kind: ClassVar[str] = "bar"
     title: str
     pieces: tuple[tuple[str, float], ...]
 
@@ -110,10 +110,9 @@ class Scale:
 
 
 @dataclass(frozen=True)
-class Scales:
+class Scales(Block):
     """Numbers side by side, each on its way to its limit."""
 
-    kind: ClassVar[str] = "scales"
     scales: tuple[Scale, ...]
 
 
@@ -127,7 +126,7 @@ class Cell:
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class Grid(Block):
     """A table.
 
     Attributes
@@ -139,7 +138,6 @@ class Grid:
     name, data : the numbers behind it, written as a CSV file of that name; empty for none.
     """
 
-    kind: ClassVar[str] = "grid"
     head: tuple[str, ...]
     rows: tuple[tuple[str | Cell, ...], ...]
     caption: str = ""
@@ -154,7 +152,7 @@ class Grid:
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class Picture(Block):
     """A figure, and what a reader wants to know of it.
 
     Attributes
@@ -163,7 +161,6 @@ class Picture:
     name : of its files: NAME.svg, and NAME.csv with ``data``, the numbers behind it.
     """
 
-    kind: ClassVar[str] = "picture"
     figure: Figure
     name: str
     shows: str
@@ -188,24 +185,6 @@ class Picture:
 @dataclass(frozen=True, eq=False)
 class Portrait(Picture):
     """A figure that stands at the side of the first page."""
-
-    kind: ClassVar[str] = "portrait"
-
-
-Block = (
-    Paragraph
-    | Heading
-    | Bullets
-    | Numbered
-    | Terms
-    | Links
-    | Light
-    | Bar
-    | Scales
-    | Grid
-    | Picture
-    | Portrait
-)
 
 
 @dataclass(frozen=True)

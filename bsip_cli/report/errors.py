@@ -12,14 +12,7 @@ import pandas as pd
 
 from bsip_cli.report.blocks import Scale
 from bsip_cli.report.effect_words import EFFECT_WORDS
-from bsip_cli.report.words import (
-    COMPONENTS,
-    component_label,
-    count,
-    listing,
-    number,
-    signed,
-)
+from bsip_cli.report.words import COMPONENTS, component_label, count, listing, number, signed
 from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
 from bsip_cli.statistics.published.paper import load_paper

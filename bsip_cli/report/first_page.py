@@ -144,14 +144,13 @@ def portrait(record: ParticipantRecord) -> tuple[Block, ...]:
 
 
 def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
-    from bsip_cli.report.figures.person import Motion, poses_of
+    from bsip_cli.report.figures.person import poses_of
 
     if trial.kinematics is None:
         return ()
     anterior = record.facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
-    weight = record.body_weight()
-    motion = Motion(record.body, trial.kinematics, trial.reconstruction, anterior, weight)
-    return poses_of(motion, _POSES)
+    measured = trial.kinematics, trial.reconstruction
+    return poses_of(record.body, *measured, anterior, record.body_weight(), _POSES)
 
 
 # --- is anything wrong --------------------------------------------------------------------------

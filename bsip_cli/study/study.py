@@ -15,15 +15,7 @@ from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.files.folders import check_path, entries, is_folder, lies_in
 from bsip_cli.files.regular import fault_of
 from bsip_cli.study.participants import NAME, Participant, Row, participant_of, read_people, rows_of
-from bsip_cli.study.trials import (
-    RECORDINGS,
-    Fault,
-    Role,
-    Trial,
-    find_trials,
-    listed,
-    refusals_of,
-)
+from bsip_cli.study.trials import RECORDINGS, Fault, Role, Trial, find_trials, listed, refusals_of
 
 __all__ = ["Participant", "Role", "Study", "Trial", "describe_dataset", "load_study", "make_out"]
 

@@ -98,10 +98,7 @@ def refusals_of(faults: Iterable[Fault]) -> list[BadDataError]:
 def _refusal(first: Fault, *rest: Fault) -> BadDataError:
     likewise = f" (likewise {listed(one.path.name for one in rest)})" if rest else ""
     return BadDataError(
-        f"{first.found}{likewise}",
-        file=first.path,
-        expected=first.expected,
-        remedy=first.remedy,
+        f"{first.found}{likewise}", file=first.path, expected=first.expected, remedy=first.remedy
     )
 
 

@@ -59,10 +59,7 @@ def test_command_line_that_cannot_be_understood(bsip, arguments, said):
         ("run {0}/study --out {0}/file", "{0}/file: is no folder to write to"),
         ("show {0}", "run `bsip run` first, or name the folder"),
         ("show {0}/file", "`bsip info`"),
-        (
-            "run {0}/study --out {0}/out --config {0}/no.toml",
-            "{0}/no.toml: there is no such file",
-        ),
+        ("run {0}/study --out {0}/out --config {0}/no.toml", "{0}/no.toml: there is no such file"),
     ],
 )
 def test_what_is_not_there_is_said_in_a_sentence(bsip, empty_study, tmp_path, command, said):

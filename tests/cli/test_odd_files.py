@@ -8,20 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from bsip_cli.body.exports.body_map import load_body_map
-from bsip_cli.body.markersets import load_marker_set
-from bsip_cli.body.skeleton import load_skeleton
-from bsip_cli.config import load_config
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.files.regular import check_regular, fault_of
 from bsip_cli.recordings.read import read_recording
-
-TOML_READERS = {
-    "options": lambda path: load_config([path]),
-    "marker set": lambda path: load_marker_set(str(path)),
-    "skeleton": lambda path: load_skeleton(str(path)),
-    "map of bodies": lambda path: load_body_map(str(path)),
-}
+from tests.cli.test_odd_configuration import READERS
 
 
 @pytest.fixture
@@ -77,10 +67,10 @@ def test_a_fifo_is_no_recording(fifo, ending):
         read_recording(fifo(f"a.{ending}"))
 
 
-@pytest.mark.parametrize("kind", TOML_READERS)
+@pytest.mark.parametrize("kind", READERS)
 def test_a_fifo_is_no_toml(fifo, kind):
     with pytest.raises(UsageError, match="is a FIFO"):
-        TOML_READERS[kind](fifo("a.toml"))
+        READERS[kind](fifo("a.toml"))
 
 
 def test_commands_refuse_a_fifo(fifo, bsip, tmp_path):

@@ -83,9 +83,7 @@ ONE = ("F", pytest.approx(70.5, abs=0.05), pytest.approx(1.63, abs=0.005))
         # units that nothing else can be
         (
             f"{HEADER}\nsub-01\tF\t70.5\t163\n",
-            [
-                "height_m 163 of sub-01 is taken as cm: 1.63 m, since it cannot be in m",
-            ],
+            ["height_m 163 of sub-01 is taken as cm: 1.63 m, since it cannot be in m"],
         ),
         (
             "id\tsex\tmass\theight\nsub-01\tF\t691.4\t64.2\n",

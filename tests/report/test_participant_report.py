@@ -191,10 +191,7 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
     )
     large = replace(record, diagnosis=nothing, trials=trials)
     (light,) = (block for block in front(large) if isinstance(block, Light))
-    assert (light.state, light.title) == (
-        "large",
-        "Large error also with identified parameters",
-    )
+    assert (light.state, light.title) == ("large", "Large error also with identified parameters")
     assert light.text.startswith("Large with OM: vertical force 5.5 % of body weight. None of the")
     *_, to_do = front(large)
     assert not any("nothing needs to be corrected" in item for item in to_do.items)

@@ -21,14 +21,7 @@ from bsip_cli.report.words import (
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [
-        (1.25, "1.2"),
-        (-0.04, "0.0"),
-        (-3.0, "−3.0"),
-        (math.nan, "–"),
-        (None, "–"),
-        (math.inf, "–"),
-    ],
+    [(1.25, "1.2"), (-0.04, "0.0"), (-3.0, "−3.0"), (math.nan, "–"), (None, "–"), (math.inf, "–")],
 )
 def test_number(value, text):
     assert number(value) == text

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -191,14 +190,6 @@ _SIDES = ("l", "r")
 _LEAST_FRAMES = 10  # of a curve
 
 
-@dataclass(frozen=True)
-class _Shown:
-    """A recording and the joints of which it has moments, the first axis of each (flexion)."""
-
-    trial: TrialRecord
-    joints: tuple[str, ...]
-
-
 def joints_section(record: ParticipantRecord) -> Section:
     return Section("joints", "What does it change at the joints?", tuple(_blocks(record)))
 
@@ -208,8 +199,8 @@ def _blocks(record: ParticipantRecord) -> Iterator[Block]:
     if not trials:
         yield Paragraph("There are no joint moments: run `bsip joints`.", "note")
         return
-    shown = _chosen(trials)
-    if shown is None:
+    trial, joints = _chosen(trials)
+    if not joints:
         yield Paragraph("In no recording are the moments of a hip, knee, ankle, shoulder or elbow "
                         f"determined. {_left_out(trials[0])}", "warning")  # fmt: skip
         return
@@ -217,76 +208,63 @@ def _blocks(record: ParticipantRecord) -> Iterator[Block]:
         "Net moments of all structures across a joint, by the proximal on the distal segment, "
         "from the forces under each foot. Legs are left out while both feet share a plate."
     )
-    yield _picture(record, shown)
-    yield from _changes(trials)
-    yield _peaks_grid(shown, trials)
-    if left := _left_out(shown.trial):
+    yield _picture(trial, joints, record.use())
+    for said in largest_changes(all_peaks(trials)):
+        yield Paragraph(f"{said}.")
+    yield _peaks_grid(trial, joints, trials)
+    if left := _left_out(trial):
         yield Paragraph(left, "note")
 
 
-def _chosen(trials: Sequence[TrialRecord]) -> _Shown | None:
-    """The recording in which most is changed at a leg, where no leg is known at an arm."""
+def _chosen(trials: Sequence[TrialRecord]) -> tuple[TrialRecord, tuple[str, ...]]:
+    """The recording in which most is changed at a leg, where no leg is known at an arm, and its
+    joints; none where no curve can be drawn."""
     for kinds in (_LEGS, _ARMS):
-        found = [(_most_changed(trial, kinds), k) for k, trial in enumerate(trials)]
-        _, k = max(found)
-        frames = _frames(trials[k], kinds)
-        joints = tuple(joint for joint, n in frames.items() if n >= _LEAST_FRAMES)
+        names = [f"{kind}_{side}" for kind in kinds for side in _SIDES]
+        changes = []
+        for trial in trials:
+            peaks = trial.joint_peaks
+            assert peaks is not None
+            asked = peaks["joint"].str.startswith(kinds) & (peaks["frames"] >= _LEAST_FRAMES)
+            changes.append(np.nan_to_num(peaks.loc[asked, "change_Nm"].abs().max(), nan=-1.0))
+        trial = trials[max(range(len(trials)), key=lambda k: (changes[k], k))]
+        peaks = trial.joint_peaks
+        assert peaks is not None
+        frames = peaks[peaks["method"] == RM].groupby("joint")["frames"].max()
+        joints = tuple(one for one in names if frames.get(one, 0) >= _LEAST_FRAMES)
         if joints:
-            return _Shown(trials[k], joints)
-    return None
-
-
-def _most_changed(trial: TrialRecord, kinds: Sequence[str]) -> float:
-    """[N m] by identification or a fault; less than nothing where no curve can be drawn."""
-    peaks = trial.joint_peaks
-    assert peaks is not None
-    asked = peaks["joint"].str.startswith(tuple(kinds)) & (peaks["frames"] >= _LEAST_FRAMES)
-    return float(np.nan_to_num(peaks.loc[asked, "change_Nm"].abs().max(), nan=-1.0))
-
-
-def _frames(trial: TrialRecord, kinds: Sequence[str]) -> dict[str, int]:
-    """By joint, in how many frames its moment is determined; with the parameters of the table."""
-    peaks = trial.joint_peaks
-    assert peaks is not None
-    frames = peaks[peaks["method"] == RM].groupby("joint")["frames"].max()
-    names = [f"{kind}_{side}" for kind in kinds for side in _SIDES]
-    return {name: int(frames[name]) for name in names if name in frames}
+            return trial, joints
+    return trials[0], ()
 
 
 # --- curves -------------------------------------------------------------------------------------
 
 
-def _picture(record: ParticipantRecord, shown: _Shown) -> Picture:
-    moments = shown.trial.joint_moments
+def _picture(trial: TrialRecord, joints: Sequence[str], use: str) -> Picture:
+    moments = trial.joint_moments
     assert moments is not None
-    rows = moments[moments["joint"].isin(shown.joints)]
+    rows = moments[moments["joint"].isin(joints)]
     valid = rows["valid"].astype(bool).groupby(rows["time_s"]).any()
-    time = valid.index.to_numpy()[
-        middle_of_longest(valid.index.to_numpy(), valid.to_numpy(), _WINDOW_S)
-    ]
+    time = valid.index.to_numpy()
+    time = time[middle_of_longest(time, valid.to_numpy(), _WINDOW_S)]
     rows = rows[rows["time_s"].between(time[0], time[-1])]
-    methods = _methods(rows["method"])
-    panels = [_panel(rows, joint, methods) for joint in shown.joints]
-    axes = {joint: _axis(rows, joint) for joint in shown.joints}
+    found = list(dict.fromkeys(rows["method"]))
+    methods = [name for name in (RM, OM) if name in found]
+    methods += [name for name in found if is_extended(name)][-1:]  # with all named causes
+    panels = [_panel(rows, joint, methods) for joint in joints]
+    axes = {joint: _axis(rows, joint) for joint in joints}
     data = rows[rows["method"].isin(methods) & (rows["axis"] == rows["joint"].map(axes))]
     columns = ["time_s", "method", "joint", "axis", "moment_Nm", "moment_sd_Nm"]
     return Picture(
         curves(panels, 2, 32.0),
         "joint_moments",
-        f"{shown.trial.label}: moments with the table's parameters (RM) and identified ones (OM), "
+        f"{trial.label}: moments with the table's parameters (RM) and identified ones (OM), "
         "with 95 % bands of OM.",
         "Curves: joint moments over time.",
         "lines inside one another's band differ by less than can be known.",
-        f"where RM leaves the band, report moments of {record.use()}.",
+        f"where RM leaves the band, report moments of {use}.",
         data[columns],
     )
-
-
-def _methods(column: pd.Series) -> list[str]:
-    """RM, OM, and the model with all named causes."""
-    found = list(dict.fromkeys(column))
-    extended = [name for name in found if is_extended(name)]
-    return [*(name for name in (RM, OM) if name in found), *extended[-1:]]
 
 
 def _axis(rows: pd.DataFrame, joint: str) -> str:
@@ -335,21 +313,16 @@ def largest_changes(peaks: pd.DataFrame, kinds: Sequence[str] = (*_LEGS, *_ARMS)
             )
 
 
-def _changes(trials: Sequence[TrialRecord]) -> Iterator[Block]:
-    for said in largest_changes(all_peaks(trials)):
-        yield Paragraph(f"{said}.")
-
-
-def _peaks_grid(shown: _Shown, trials: Sequence[TrialRecord]) -> Grid:
-    peaks = shown.trial.joint_peaks
+def _peaks_grid(trial: TrialRecord, joints: Sequence[str], trials: Sequence[TrialRecord]) -> Grid:
+    peaks = trial.joint_peaks
     assert peaks is not None
     faults = [name for name in dict.fromkeys(peaks["method"]) if is_extended(name)]
-    rows = [_peak_row(peaks, joint, faults) for joint in shown.joints]
+    rows = [_peak_row(peaks, joint, faults) for joint in joints]
     names = [f"{effect_title(name.rpartition('+')[2])} [N m (%)]" for name in faults]
     return Grid(
         ("joint", "peak, OM [N m]", "[N m/kg]", "at [s]", "OM − RM [N m (%)]", *names),
         tuple(rows),
-        f"Peaks in {shown.trial.label} with 95 % interval; largest change in N m, and in per cent "
+        f"Peaks in {trial.label} with 95 % interval; largest change in N m, and in per cent "
         "of the joint's peak. A change beyond the interval matters.",
         name="joint_peaks",
         data=all_peaks(trials),

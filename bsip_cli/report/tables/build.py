@@ -236,11 +236,7 @@ NAMES = (
     "table5_six_components",
     "table6_centres_of_mass",
 )
-RENDERERS: dict[str, Callable[[Table], str]] = {
-    "csv": to_csv,
-    "md": to_markdown,
-    "tex": to_latex,
-}
+RENDERERS: dict[str, Callable[[Table], str]] = {"csv": to_csv, "md": to_markdown, "tex": to_latex}
 
 
 def build_tables(

@@ -166,11 +166,7 @@ def _paired(
         own, group = row(topic)
         found = results.values(topic, every) | {"reason": results.reasons(topic)} | own
         rows.append(Row(found, topic.unit, group, stars(results, topic, criteria)))
-    said = (
-        model.star_legend(criteria.alpha),
-        *legend,
-        *model.not_possible(results, named),
-    )
+    said = (model.star_legend(criteria.alpha), *legend, *model.not_possible(results, named))
     return Table(name, title, every, tuple(rows), tuple(filter(None, said)))
 
 

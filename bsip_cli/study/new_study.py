@@ -372,13 +372,10 @@ def _task_and_run(parts: Sequence[str]) -> tuple[str, int]:
         return task[1], int(number[1]) if number else 1
     match = re.fullmatch(rf"(.*?)(?<!\d)_?(\d{{1,{_LONGEST_RUN}}})", whole)
     before, run = (match[1], int(match[2])) if match else (whole, 1)
-    letters = plain(_camel(before))[:_LONGEST_TASK]
+    first, *others = _parts(before) or [""]
+    camel = first + "".join(part[:1].upper() + part[1:] for part in others)
+    letters = plain(camel)[:_LONGEST_TASK]
     return (letters if re.search("[A-Za-z]", letters) else f"trial{letters}"), max(run, 1)
-
-
-def _camel(text: str) -> str:
-    first, *others = [part for part in re.split(r"[\W_]+", text) if part] or [""]
-    return first + "".join(part[:1].upper() + part[1:] for part in others)
 
 
 # --- words ----------------------------------------------------------------------------------------

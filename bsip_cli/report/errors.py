@@ -321,7 +321,9 @@ def _overall(budget: pd.DataFrame) -> pd.DataFrame:
 def _cut(rows: pd.DataFrame) -> tuple[Piece, ...]:
     """What was found has its own piece, however small."""
     groups = list(_groups(rows))
-    found = [_together(rows, terms) for terms in groups]
+    labels = (" or ".join(dict.fromkeys(map(term_words, terms))) for terms in groups)
+    shares = (float(rows.loc[list(terms), "share_percent"].sum()) for terms in groups)
+    found = list(map(Piece, labels, shares))
     least = [0.5 if terms[0].startswith(_FAULT) else _WORTH for terms in groups]
     large = [
         one
@@ -345,11 +347,6 @@ def _groups(rows: pd.DataFrame) -> Iterator[tuple[str, ...]]:
             group += [one for one in alike if one in left and one not in group]
         left = [term for term in left if term not in group]
         yield tuple(group)
-
-
-def _together(rows: pd.DataFrame, terms: tuple[str, ...]) -> Piece:
-    label = " or ".join(dict.fromkeys(term_words(term) for term in terms))
-    return Piece(label, float(rows.loc[list(terms), "share_percent"].sum()))
 
 
 def term_words(term: str) -> str:

@@ -181,7 +181,11 @@ class HowMade:
                 made.options.setdefault(name, set()).add(value)
             for name, version in {"bsip": origin.bsip_version, **origin.libraries}.items():
                 made.versions.setdefault(name, set()).add(version)
-            made.files.update(_files(origin.inputs))
+            made.files.update(
+                (name, digest)
+                for name, digest in origin.inputs.items()
+                if "." in name and not name.endswith(".parquet")  # no artifact, no person's all
+            )
             made.messages.update(
                 dict.fromkeys((origin.stage, origin.unit, text) for text in origin.messages)
             )
@@ -227,12 +231,3 @@ def _flat(options: Mapping, before: str = "") -> Iterable[tuple[str, str]]:
             yield from _flat(value, f"{before}{name}.")
         else:
             yield f"{before}{name}", value if isinstance(value, str) else json.dumps(value)
-
-
-def _files(inputs: Mapping[str, str]) -> dict[str, str]:
-    """Inputs that are neither artifacts nor all of a participant's."""
-    return {
-        name: digest
-        for name, digest in inputs.items()
-        if "." in name and not name.endswith(".parquet")
-    }

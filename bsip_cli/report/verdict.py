@@ -239,26 +239,22 @@ def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     if len(cause) == 1:
         return f"{capital(first.told())}{places[0]}. {sure}".rstrip()
     common, own = (places[0], [""] * len(cause)) if len(set(places)) == 1 else ("", places)
-    members = "; ".join(
-        f"({_letter(k)}) {one.told()}{place}{_probability(one)}"
-        for k, (one, place) in enumerate(zip(cause, own, strict=True))
-    )
+    members = []
+    for k, (one, place) in enumerate(zip(cause, own, strict=True)):
+        words = probability_words(one.probability)
+        probability = f", probability {words}" if words else ""
+        members.append(f"({_letter(k)}) {one.told()}{place}{probability}")
     apart = separating_recording([(one.effect, one.target) for one in cause], _MOST_STEPS)
     if first.class_id == OF_THE_WEIGHT:
         apart = f"weigh the person on a scale; {apart}"
     return (
-        f"One of these, which these recordings cannot distinguish{common}: {members}. "
+        f"One of these, which these recordings cannot distinguish{common}: {'; '.join(members)}. "
         f"{sure}{' ' if sure else ''}To distinguish them: {apart}."
     )
 
 
 def _letter(number: int) -> str:
     return chr(ord("a") + number)
-
-
-def _probability(one: Candidate) -> str:
-    words = probability_words(one.probability)
-    return f", probability {words}" if words else ""
 
 
 def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:

@@ -151,7 +151,11 @@ def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
                 is_true &= outcome.state in ("done", "fresh")
                 yield task.name, outcome
             time.sleep(fingerprints.STEP_S)  # for what was written last to have its own time
-            _remember(task, _state(task) if is_true and task.part == "last" else "")
+            state = _state(task) if is_true and task.part == "last" else ""
+            recordings = [task.study.root / task.participant.id] if task.participant else []
+            kept = fingerprints.to_keep([task.folder, *recordings], state).encode()
+            if fingerprints.kept_in(task.folder) != kept:
+                write_bytes(task.folder / fingerprints.NAME, kept)
     except BsipError as error:
         yield task.name, _stopped(task, error)
     except OSError as error:
@@ -191,14 +195,6 @@ def _state(task: _Task) -> str:
     code = [code_hash(stage.module) for stage in stages]
     facts = (files, code, library_versions(), task.config.model_dump_json(), task.participant)
     return hashlib.sha256(repr(facts).encode()).hexdigest() if files else ""
-
-
-def _remember(task: _Task, state: str) -> None:
-    """Keep what is known of the participant's files, or of the group's own."""
-    recordings = [task.study.root / task.participant.id] if task.participant else []
-    kept = fingerprints.to_keep([task.folder, *recordings], state).encode()
-    if fingerprints.kept_in(task.folder) != kept:
-        write_bytes(task.folder / fingerprints.NAME, kept)
 
 
 def _units(task: _Task) -> Iterator[tuple[Stage, Trial | None]]:

@@ -301,7 +301,11 @@ def _gain(record: CohortRecord) -> Iterator[Block]:
             "parameters, and favour OM.",
             "warning",
         )
-    worse = [component_label(name) for name in names if _is_worse(ratios.over_rival(name))]
+    worse = []
+    for name in names:
+        over = ratios.over_rival(name)
+        fewer, more, _ = _counts(over)
+        worse += [component_label(name)] if _typical(over) > 0.0 or more > fewer else []
     yield Paragraph(
         f"RM or RM+mass follows better on the whole, or in more participants, in: {listing(worse)}."
         if worse
@@ -352,11 +356,6 @@ def _counts(ratios: np.ndarray) -> tuple[int, int, int]:
     """In how many participants OM is better, in how many worse, and of how many."""
     better, worse = int((ratios < 1 - SAME_WITHIN).sum()), int((ratios > 1 + SAME_WITHIN).sum())
     return better, worse, int(np.isfinite(ratios).sum())
-
-
-def _is_worse(ratios: np.ndarray) -> bool:
-    better, worse, _ = _counts(ratios)
-    return _typical(ratios) > 0.0 or worse > better
 
 
 def _row(component: str, ratios: Ratios) -> tuple[str, ...]:

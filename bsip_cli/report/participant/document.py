@@ -73,6 +73,8 @@ GLOSSARY = (
 
 
 def participant_document(record: ParticipantRecord) -> Document:
+    made = [Heading("What cannot be known"), Bullets(CANNOT_KNOW)]
+    made += how_made(HowMade.of(record.origins), record.defaults)
     return Document(
         title=f"{record.id}: do motion and measured forces agree?",
         subtitle="Ground forces computed from the motion, against the plates'.",
@@ -83,19 +85,10 @@ def participant_document(record: ParticipantRecord) -> Document:
             errors.joints_section(record),
             parameters_section(record),
             recording_section(record),
-            _made(record),
+            Section("made", "How was it made, and what can it not know?", tuple(made)),
             Section("words", "What do the words mean?", (Terms(GLOSSARY),)),
         ),
     )
-
-
-def _made(record: ParticipantRecord) -> Section:
-    blocks: list[Block] = [
-        Heading("What cannot be known"),
-        Bullets(CANNOT_KNOW),
-        *how_made(HowMade.of(record.origins), record.defaults),
-    ]
-    return Section("made", "How was it made, and what can it not know?", tuple(blocks))
 
 
 # --- what was recorded: trials, what was repaired or left out, markers ----------------------------
@@ -177,24 +170,22 @@ def _findings(record: ParticipantRecord) -> Iterator[Block]:
                     key = (row["level"], row["check"], row["action"])
                     what = f"{row['subject']} {row['found']}".strip()
                     found.setdefault(key, {}).setdefault(trial.label, set()).add(what)
-    order = sorted(found, key=lambda key: _LEVELS.index(key[0]))
-    lines = tuple(_line(key, found[key]) for key in order)
+    lines = []
+    for level, check, action in sorted(found, key=lambda key: _LEVELS.index(key[0])):
+        trials = found[level, check, action]
+        told = set().union(*trials.values())
+        what = told.pop() if len(told) == 1 else count(len(told), "finding")
+        done = f" ({action})" if action else ""
+        place = f"{check.replace('_', ' ')}, {level}, in {listing(list(trials))}"
+        lines.append(f"{place}: {what}{done}")
     if not lines:
         yield Paragraph("Nothing was repaired, excluded or warned of.")
         return
     yield Heading("Repaired, left out, warned of")
-    yield Bullets(lines[:_MOST_FINDINGS])
+    yield Bullets(tuple(lines[:_MOST_FINDINGS]))
     if len(lines) > _MOST_FINDINGS:
         more = count(len(lines) - _MOST_FINDINGS, "more finding")
         yield Paragraph(f"{more} in the recordings' quality artifacts.", "note")
-
-
-def _line(key: tuple[str, str, str], trials: dict[str, set[str]]) -> str:
-    level, check, action = key
-    told = set().union(*trials.values())
-    what = told.pop() if len(told) == 1 else count(len(told), "finding")
-    done = f" ({action})" if action else ""
-    return f"{check.replace('_', ' ')}, {level}, in {listing(list(trials))}: {what}{done}"
 
 
 # --- markers ------------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ from bsip_cli.report.tables.model import (
     p_value,
     unit_label,
 )
-from bsip_cli.report.tables.paired import LEGEND, REASON, SHORT
+from bsip_cli.report.tables.paired import REASON, SHORT
 from bsip_cli.statistics.cohort import Comparison, Criteria, Topic, joined
 from bsip_cli.statistics.methods import MEASURED, OM, RM
 
@@ -97,23 +97,9 @@ def _posturography(results: Results, criteria: Criteria) -> Table:
             marks[heading] = differs + marks.get(heading, "")
         rows.append(Row(results.values(topic, columns) | own, topic.unit, marks=marks))
     tests = [results.find(topic, "one_way_anova", *_ALL) for topic in results.topics]
-    notes = (
-        f"Bonferroni post hoc p < {alpha:g}: * between FP and RM; + between OM and RM; # "
-        "between FP and OM. MV mean velocity, SL sway length, SA area of the 95 % prediction "
-        "ellipse, RMS about the mean.",
-        "As published: one-way ANOVA (F, p), as if FP, OM and RM were three groups of people, "
-        "with its post hoc tests. Added: ANOVA for repeated measures, because they are the "
-        "same people, with Greenhouse and Geisser's correction (epsilon); its post hoc tests "
-        "are in the CSV.",
-        LEGEND,
-        *model.not_possible(results, named),
-    )
-    title = (
-        "Table 3. Sway of the centre of pressure, measured (FP) and simulated (OM, RM, RM+mass), in "
-        f"the identification sequence (task: {paired.tasks_of(results)}): mean (standard deviation) of "
-        f"{model.participants(tests)}."
-    )
-    return Table("table3_posturography", title, columns, tuple(rows), notes)
+    title, legend = model.texts_of(NAMES[2], results, tests, criteria)
+    notes = (*legend, *model.not_possible(results, named))
+    return Table(NAMES[2], title, columns, tuple(rows), notes)
 
 
 # --- table 5: the six components of the ground wrench, movement by movement (Hansen 2014) ---------
@@ -168,25 +154,9 @@ def _six_components(results: Results, criteria: Criteria) -> Table:
         REASON,
     )
     tests_of_error = [results.find(topic, "paired_t") for topic in errors]
-    title = (
-        "Table 5. Six components of the ground wrench about the world origin, simulated against "
-        f"measured: mean (standard deviation) of {model.participants(tests_of_error)}."
-    )
-    notes = (
-        "RMSE in N for forces and N m for moments; r Pearson's correlation; M, P, C errors in "
-        "magnitude and phase and both (Schwer 2007), without unit, 0 for equal signals.",
-        "The test of r is made in each participant, with the effective number of independent "
-        "samples; t, z and p are medians over participants, positive where OM correlates "
-        f"better. '{_DIFFER}' counts those in whom r of OM, or of RM, is significantly higher "
-        f"(p < {criteria.alpha:g}) by Williams' t.",
-        "As published: RMSE, r, M, P, C, and Fisher's z, which takes the two correlations for "
-        "independent. Added: Williams' t, because they share the measured signal; in how many "
-        "participants OM or its rival has the smaller RMSE (paired t tests of the RMSE are in "
-        "the CSV). Several runs of a movement are averaged for each participant first.",
-        LEGEND,
-        *model.not_possible(results, named),
-    )
-    return Table("table5_six_components", title, columns, tuple(rows), notes)
+    title, legend = model.texts_of(NAMES[4], results, tests_of_error, criteria, differ=_DIFFER)
+    notes = (*legend, *model.not_possible(results, named))
+    return Table(NAMES[4], title, columns, tuple(rows), notes)
 
 
 def _errors_of_six() -> Iterator[Column]:

@@ -3,12 +3,14 @@ them; a number that is not there is a dash."""
 
 from __future__ import annotations
 
+import tomllib
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isnan
+from pathlib import Path
 
-from bsip_cli.statistics.cohort import Comparison, Topic, joined
+from bsip_cli.statistics.cohort import Comparison, Criteria, Topic, joined
 from bsip_cli.statistics.methods import OM, RM
 
 Cell = str | float | int
@@ -189,6 +191,26 @@ def participants(rows: Iterable[Comparison]) -> str:
     return f"n = {high} {word}" if low == high else f"n = {low} to {high} {word}"
 
 
+_TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
+
+
+def texts_of(
+    name: str, results: Results, tests: Sequence[Comparison], criteria: Criteria, **more: str
+) -> tuple[str, tuple[str, ...]]:
+    """Title and legend of a table; ``more``: what only this one tells."""
+    words = _TEXTS["shared"] | more
+    words |= {"n": participants(tests), "alpha": f"{criteria.alpha:g}"}
+    words["percent"] = f"{criteria.equivalence_percent:g}"
+    words["tasks"] = ", ".join(dict.fromkeys(topic.task for topic in results.topics)) or "none"
+    words["holm"] = _holm_legend(tests, criteria.alpha)
+    words["normal"] = (
+        f"Where Lilliefors' p is below {_level(criteria.alpha)} the differences are not normal, and "
+        "Wilcoxon's test is the one to read."
+    )
+    notes = (note.format(**words) for note in _TEXTS[name]["notes"])
+    return _TEXTS[name]["title"].format(**words), tuple(filter(None, notes))
+
+
 def star(row: Comparison, alpha: float, sign: str = "*") -> str:
     return sign if row.p_value < alpha else ""
 
@@ -197,14 +219,7 @@ def star_legend(alpha: float) -> str:
     return f"* significant: p < {_level(alpha)}."
 
 
-def normality_legend(alpha: float) -> str:
-    return (
-        f"Where Lilliefors' p is below {_level(alpha)} the differences are not normal, and "
-        "Wilcoxon's test is the one to read."
-    )
-
-
-def holm_legend(tests: Sequence[Comparison], alpha: float) -> str:
+def _holm_legend(tests: Sequence[Comparison], alpha: float) -> str:
     """How many of the stars outlast the correction for their number; nothing for one test."""
     done = [row for row in tests if not isnan(row.p_value)]
     if len(done) < 2:

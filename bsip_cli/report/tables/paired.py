@@ -22,7 +22,7 @@ from bsip_cli.report.tables.model import (
     unit_label,
 )
 from bsip_cli.report.words import segment_label
-from bsip_cli.statistics.cohort import DATA_SHARE, DIFFERENCE, Criteria, Topic
+from bsip_cli.statistics.cohort import DATA_SHARE, DIFFERENCE, Comparison, Criteria, Topic
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 from bsip_cli.statistics.published.paper import load_paper
 
@@ -35,18 +35,6 @@ _PREFIX = {RM: "", RM_MASS: "rm_mass_"}
 _P = {RM: "p", RM_MASS: "p OM, RM+mass"}
 """Headings of the columns that carry the stars."""
 
-LEGEND = (
-    "RM+mass is RM with all masses and tensors times the one number that fits the identification "
-    "trials best: what it does is no gain of identification. Its centre of pressure and its "
-    "correlations are RM's. Tests of OM against RM+mass are added, those that are not printed stand "
-    "in the CSV (rm_mass_...)."
-)
-_TESTS = (
-    "As published: paired t test of OM - RM with its confidence interval; Cohen's d = (RM - OM) / "
-    "pooled SD; Lilliefors' test of the differences. Added: Wilcoxon's signed-rank test; d_z = mean "
-    "/ SD of the differences; "
-)
-_SMALLER = "in how many participants OM or its rival has the smaller error"
 REASON = Column(("reason",))
 _N = column("n", "paired_t.n", "n", count)
 _LIMBS = (("upper_arm", "forearm", "hand"), ("thigh", "shank", "foot"))
@@ -121,10 +109,6 @@ def stars(results: Results, topic: Topic, criteria: Criteria) -> dict[str, str]:
     }
 
 
-def tasks_of(results: Results) -> str:
-    return ", ".join(dict.fromkeys(topic.task for topic in results.topics)) or "none"
-
-
 def task_label(topic: Topic) -> str:
     """The movement; the one that identified OM is named as such."""
     identified = " (identified OM; in the paper: random, 120 s)"
@@ -149,15 +133,15 @@ _COM = "com_"
 
 def _paired(
     name: str,
-    title: str,
+    tests: Sequence[Comparison],
     columns: tuple[Sequence[Column], Sequence[Column]],
     named: Mapping[Topic, str],
     row: Callable[[Topic], tuple[dict[str, Cell], str]],
-    legend: Sequence[str],
     given: tuple[Results, Criteria],
+    **more: str,
 ) -> Table:
-    """``columns``: those before the tests, and after them. ``named``: the label of each topic, a row
-    each. ``row``: its own values, and its group."""
+    """``tests``: whose number is told. ``columns``: those before the tests of OM, and after them.
+    ``named``: the label of each topic, a row each. ``row``: its own values, and its group."""
     results, criteria = given
     before, after = columns
     every = (*before, *_tests(criteria), *against_rm_mass(criteria), *after, REASON)
@@ -166,8 +150,10 @@ def _paired(
         own, group = row(topic)
         found = results.values(topic, every) | {"reason": results.reasons(topic)} | own
         rows.append(Row(found, topic.unit, group, stars(results, topic, criteria)))
-    said = (model.star_legend(criteria.alpha), *legend, *model.not_possible(results, named))
-    return Table(name, title, every, tuple(rows), tuple(filter(None, said)))
+    title, legend = model.texts_of(name, results, tests, criteria, **more)
+    star = model.star_legend(criteria.alpha)
+    notes = (star, *legend, *model.not_possible(results, named))
+    return Table(name, title, every, tuple(rows), notes)
 
 
 def segment_mass(results: Results, criteria: Criteria) -> Table:
@@ -184,9 +170,7 @@ def segment_mass(results: Results, criteria: Criteria) -> Table:
 
     return _paired(
         "table1_segment_mass",
-        "Table 1. Mass of the segments [kg], identified from ground forces (OM), from the "
-        "regression (RM), and from the regression times one number (RM+mass): mean (standard "
-        f"deviation) of {model.participants(tests)}.",
+        tests,
         (
             (
                 Column(("segment",), "Segment", segment_label, text=True),
@@ -203,18 +187,6 @@ def segment_mass(results: Results, criteria: Criteria) -> Table:
         ),
         {topic: segment_label(topic.variable) for topic in segments},
         row,
-        (
-            f"{_TESTS}equivalence by two one-sided t tests, where p < {criteria.alpha:g} says that "
-            f"OM and RM differ by less than {criteria.equivalence_percent:g} % of RM's mean; data "
-            "share.",
-            "Data share: the part of the prior's variance of OM's mass that the data removed, from "
-            "0 (the mass is the regression's) to 1 (the data alone decide), mean over participants. "
-            "Masses behind spherical joints are not decided by the data alone: the ground forces "
-            "hold them only in combinations, and nearness to the regression splits these.",
-            LEGEND,
-            model.normality_legend(criteria.alpha),
-            model.holm_legend(tests, criteria.alpha),
-        ),
         (results, criteria),
     )
 
@@ -226,17 +198,10 @@ def cop_rmse(results: Results, criteria: Criteria) -> Table:
     axis = Column(("axis",), "RMSE", _AXES.__getitem__, text=True)
     return _paired(
         "table2_cop_rmse",
-        "Table 2. RMSE of the simulated centre of pressure against the force plate [mm] in the "
-        f"identification sequence (task: {tasks_of(results)}): mean (standard deviation) of "
-        f"{model.participants(tests)}.",
+        tests,
         ((axis, *[_N] * differ, *means()), tuple(smaller_error())),
         {topic: _AXES[topic.variable] for topic in results.topics},
         lambda topic: ({"axis": topic.variable}, ""),
-        (
-            f"{_TESTS}{_SMALLER}. AP and ML are the person's own axes.",
-            LEGEND,
-            model.normality_legend(criteria.alpha),
-        ),
         (results, criteria),
     )
 
@@ -258,21 +223,10 @@ def cross_validation(results: Results, criteria: Criteria) -> Table:
     place = [Column((name,)) for name in ("quantity", "task", "role")]
     return _paired(
         "table4_cross_validation",
-        "Table 4. Errors of the simulated centre of pressure (COP) and vertical ground force (GRF)"
-        f" by movement: mean (standard deviation) of {model.participants(tests)}.",
+        tests,
         ((*place, label, _N, *means()), tuple(smaller_error())),
         {topic: f"{_QUANTITIES[topic.variable]}, {topic.task}" for topic in topics},
         row,
-        (
-            "COP error: root mean square of the distance in the plane, sqrt(AP² + ML²); several "
-            "runs of a movement are averaged for each participant first.",
-            "As published: means and standard deviations. Added: everything else (paired t test of "
-            "OM - RM, Cohen's d = (RM - OM) / pooled SD, Wilcoxon's test, d_z = mean / SD of the "
-            f"differences, {_SMALLER}). The same count for the six components stands in table 5.",
-            LEGEND,
-            model.normality_legend(criteria.alpha),
-            model.holm_legend(tests, criteria.alpha),
-        ),
         (results, criteria),
     )
 
@@ -305,22 +259,12 @@ def centres_of_mass(results: Results, criteria: Criteria) -> Table:
     label = Column(("label",), "Quantity", text=True)
     return _paired(
         "table6_centres_of_mass",
-        "Table 6. Residual of the ground wrench in the identification sequence, and how far the "
-        "identified centres of mass (OM) lie from the regression's (RM) along the segments: mean "
-        f"(standard deviation) of {model.participants(tests)}.",
+        tests,
         ((Column(("variable",)), label, _N, *means(), column(*apart)), ()),
         named,
         row,
-        (
-            "As published (Robert 2017, table 1): residuals of force and moment, and mean, median "
-            "and largest distance of the centres of mass over a person's segments, along each "
-            "segment's Y axis: its length, of a foot its height. Added: the tests, and each segment. "
-            "Residuals are root mean squares of the error as a vector, the moment about the lab's "
-            "origin, so that it grows with the plate's distance from there.",
-            LEGEND,
-            f"In print, of single people: {'; '.join(_in_print())}.",
-        ),
         (results, criteria),
+        in_print="; ".join(_in_print()),
     )
 
 

@@ -357,18 +357,11 @@ def _export(
                 notes += [note] if note else []
     except BsipError as error:
         errors.append(error)
-    return written[-1] if written else "", _outcome(unit, folder, written, notes, errors)
-
-
-def _outcome(
-    unit: Unit, folder: Path, written: list[str], notes: list[str], errors: list[BsipError]
-) -> Outcome:
-    sentences = [f"{unit.name}: {note}" for note in notes]
-    if written:
-        sentences.append(f"{unit.name}: {folder}: {', '.join(written)}")
-    sentences += dict.fromkeys(map(str, errors))
+    notes += [f"{folder}: {', '.join(written)}"] if written else []
+    said = (*(f"{unit.name}: {note}" for note in notes), *dict.fromkeys(map(str, errors)))
     code = max((error.exit_code for error in errors), default=0)
-    return Outcome("export", unit.name, "refused" if errors else "done", tuple(sentences), code)
+    name = written[-1] if written else ""
+    return name, Outcome("export", unit.name, "refused" if errors else "done", said, code)
 
 
 def _chosen(unit: Unit) -> tuple[str, str]:

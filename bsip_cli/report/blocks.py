@@ -1,4 +1,5 @@
-"""What a report is made of, as data: a first page, and folded sections of texts, grids, pictures."""
+"""What a report is made of, as data (a first page, folded sections of texts, grids and pictures), and
+the page that is made of it."""
 
 from __future__ import annotations
 

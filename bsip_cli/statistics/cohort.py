@@ -1,4 +1,4 @@
-"""The tests of the six tables, from the participants' values."""
+"""Participants' results as tidy values, and the tests of the six tables from these."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def with_holm(comparisons: Sequence[Comparison]) -> tuple[Comparison, ...]:
     return tuple(corrected)
 
 
-# --------------------------------------------------------------------------------------------------
+# --- values, and those that belong to one line of a table -----------------------------------------
 
 
 DIFFERENCE = f"|{OM}-{RM}|"
@@ -162,7 +162,7 @@ def per_participant(values: Iterable[Value], methods: Sequence[str]) -> NDArray[
     return means
 
 
-# --- tests ---
+# --- the tests ------------------------------------------------------------------------------------
 
 Sample = NDArray[np.float64]
 Origin = Literal["published", "added"]
@@ -182,7 +182,7 @@ class Criteria:
     equivalence_percent: float
 
 
-# --- oM against a rival over the participants: the published t test, and what stands beside it ----
+# --- OM against a rival over the participants: the published t test, and what stands beside it ----
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,3 +1,5 @@
+"""Agreement of signals, and sway, against signals whose measures are known."""
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,3 +1,5 @@
+"""Against published examples and SciPy: paired samples, correlations, analysis of variance."""
+
 from dataclasses import asdict
 from itertools import product
 
@@ -325,15 +327,6 @@ def test_bushtucker():
     assert stats.f.sf(test.statistic, 3, 21) == pytest.approx(0.026, abs=5e-4)
     assert test.p_value == pytest.approx(0.063, abs=5e-4)
     assert test.effect_size == pytest.approx(83.13 / (83.13 + 153.38), abs=1e-4)
-
-
-def test_epsilon_by_orthonormal_contrasts():
-    """An independent way: eigenvalues of the covariance of orthonormal contrasts (Box 1954)."""
-    helmert = np.array([[1, -1, 0, 0], [1, 1, -2, 0], [1, 1, 1, -3.0]])
-    helmert /= np.linalg.norm(helmert, axis=1, keepdims=True)
-    eigenvalues = np.linalg.eigvalsh(np.cov(helmert @ BUSHTUCKER.T))
-    expected = eigenvalues.sum() ** 2 / (3 * (eigenvalues**2).sum())
-    assert repeated_measures_anova(BUSHTUCKER)[0].epsilon == pytest.approx(expected)
 
 
 def test_two_columns_are_a_paired_t_test():

@@ -1,3 +1,5 @@
+"""Independent samples, stretches, normality, p values of several tests."""
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter

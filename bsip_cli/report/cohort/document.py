@@ -1,4 +1,4 @@
-"""The report of the cohort: a first page, and folded sections."""
+"""The report of the cohort: a first page, and folded sections; here all but the laboratory's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All that the cohort's report reads."""
+"""All that the cohort's report reads, and the causes that several people share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bars: errors cut into what makes them, residuals of markers, masses of segments."""
+"""Bars, dots per person, and curves over time."""
 
 from __future__ import annotations
 
@@ -28,6 +28,8 @@ from bsip_cli.report.figures.canvas import (
 )
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
 from bsip_cli.statistics.samples import Z95
+
+# --- bars: errors cut into what makes them, residuals of markers, masses of segments ---------------
 
 COLOURS = (BLUE, "#E69F00", "#56B4E9", "#CC79A7", "#F0E442", "#009E73", FAINT, "#8C510A")
 """As those of the first page's bar: Okabe and Ito, told apart by the colour-blind."""

@@ -1,4 +1,5 @@
-"""The report of one participant: a first page, and folded sections in the order of questions."""
+"""The report of one participant: a first page, and folded sections in the order of questions; here
+those of the recordings and of the parameters."""
 
 from __future__ import annotations
 

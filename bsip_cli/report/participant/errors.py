@@ -1,4 +1,5 @@
-"""How large the errors of the forces are, in which recordings, and what makes them."""
+"""Sections of a person's report: how large the errors of the forces are, in which recordings and what
+makes them; and what identification and named faults change at the joints."""
 
 from __future__ import annotations
 

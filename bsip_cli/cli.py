@@ -240,9 +240,9 @@ def published(what, paper):
     the printed means and standard deviations, and lists what cannot be true, with the likely
     reading. PAPER is hansen2014, hansen2017 or robert2017; without it, all.
     """
-    from bsip_cli.commands.published import shown
+    from bsip_cli.commands.info import papers
 
-    for part in shown(what, paper):
+    for part in papers(what, paper):
         click.echo(part)
 
 

@@ -25,12 +25,7 @@ from bsip_cli.body.exports.body_map import (
 from bsip_cli.body.exports.formats import FORMATS
 from bsip_cli.body.exports.identified import IdentifiedPerson
 from bsip_cli.body.exports.opensim_motion import coordinates, loads, loads_xml, mot_text, setup_xml
-from bsip_cli.body.exports.osim_given import (
-    GivenModel,
-    check_fits,
-    read_given_model,
-    with_inertias,
-)
+from bsip_cli.body.exports.osim_given import GivenModel, check_fits, read_given_model, with_inertias
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import Skeleton, load_skeleton
 from bsip_cli.commands.export_recording import export_recordings
@@ -47,8 +42,7 @@ from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH, coordinates_from, markers_from, person_from, person_of
 from bsip_cli.stages.joints import trial_of
 from bsip_cli.stages.trial_scene import plate_names
-from bsip_cli.study.dataset import describe_dataset
-from bsip_cli.study.study import Participant
+from bsip_cli.study.study import Participant, describe_dataset
 
 # --- tables of each trial -------------------------------------------------------------------------
 
@@ -60,16 +54,7 @@ _BODY = ("skeleton", "marker-positions")
 _EDGE = 5
 
 
-@dataclass(frozen=True)
-class Tables:
-    """What is asked for. model : name of the exported model's file, for OpenSim."""
-
-    what: str
-    to: Path | None
-    model: str = ""
-
-
-def export_trials(opened: OpenedStudy, out: Path, asked: Tables, model: Callable | None) -> int:
+def _export_trials(opened: OpenedStudy, out: Path, asked: Request, model: Callable | None) -> int:
     """Write the tables of all trials; the exit code.
 
     model : of a participant, writes the model and returns its file's name and the outcome.
@@ -78,16 +63,15 @@ def export_trials(opened: OpenedStudy, out: Path, asked: Tables, model: Callable
 
     def running() -> Generator[Outcome, None, None]:
         for participant in study.participants:
-            its = asked
+            name = ""
             if model is not None:
                 name, outcome = model(participant)
                 yield outcome
                 if outcome.state != "done":
                     continue
-                its = replace(asked, model=name)
             for trial in participant.trials:
                 unit = Unit(_READERS[asked.what], study, out, opened.config, participant, trial)
-                yield _export_tables(unit, its)
+                yield _export_tables(unit, asked, name)
 
     if asked.what == "bids" and asked.to is not None:
         asked.to.mkdir(parents=True, exist_ok=True)
@@ -97,7 +81,7 @@ def export_trials(opened: OpenedStudy, out: Path, asked: Tables, model: Callable
     return follow("export", opened.refusals, running(), total, asked.to or out)
 
 
-def _export_tables(unit: Unit, asked: Tables) -> Outcome:
+def _export_tables(unit: Unit, asked: Request, model: str) -> Outcome:
     waiting = lacking(unit)
     if waiting is not None:
         return replace(waiting, exit_code=waiting.exit_code or BadDataError.exit_code)
@@ -105,7 +89,7 @@ def _export_tables(unit: Unit, asked: Tables) -> Outcome:
     folder = folder_of(unit, asked.to)
     try:
         with held_alone(unit.out / unit.participant.id):
-            texts, note = _WRITERS[asked.what](unit, asked)
+            texts, note = _WRITERS[asked.what](unit, model)
             for name, text in texts.items():
                 write_text(folder / name, text)
     except BsipError as error:
@@ -126,13 +110,13 @@ def write_text(path: Path, text: str) -> None:
     write_atomically(path, lambda partial: partial.write_bytes(text.encode()))
 
 
-def _joints(unit: Unit, _: Tables) -> Texts:
+def _joints(unit: Unit, _: str) -> Texts:
     """The artifact, a row per time, method, joint and axis."""
     table = unit.read("joint-moments")
     return {f"{unit.name}_joint-moments.csv": table.to_csv(index=False, float_format="%.9g")}, ""
 
 
-def _bids(unit: Unit, _: Tables) -> Texts:
+def _bids(unit: Unit, _: str) -> Texts:
     assert unit.trial is not None
     trial, skeleton = unit.trial, load_skeleton(unit.config.skeleton)
     kinematics, wrench = unit.read("kinematics"), unit.read("wrench")
@@ -160,15 +144,15 @@ def _bids(unit: Unit, _: Tables) -> Texts:
     }, ""
 
 
-def _opensim(unit: Unit, asked: Tables) -> Texts:
-    """Motion where the markers determine it; loads in the longest time in which the plates tell
-    what acts on each foot, and on nothing else."""
+def _opensim(unit: Unit, model: str) -> Texts:
+    """For the model in that file: motion where the markers determine it; loads in the longest time
+    in which the plates tell what acts on each foot, and on nothing else."""
     person = person_of(unit)
     trial, name = trial_of(unit, person), unit.name
     known = trial.determined
     if known.sum() < 2:
         raise BadDataError("the markers determine no pose", file=name)
-    said = [f"bsip {__version__} export: {name}, for {asked.model}; SI units, Y up"]
+    said = [f"bsip {__version__} export: {name}, for {model}; SI units, Y up"]
     motion = coordinates(person.skeleton, trial.q[known])
     texts = {f"{name}_motion.mot": mot_text(name, trial.times_s[known], motion, said)}
     wrenches = {f"foot_{s}": w for s, w in trial.ground(trial.readings)[0].wrench.items()}
@@ -182,7 +166,7 @@ def _opensim(unit: Unit, asked: Tables) -> Texts:
     times = trial.times_s[frames]
     acting = loads({foot: w[frames] for foot, w in wrenches.items()})
     files = {
-        "model_file": asked.model,
+        "model_file": model,
         "coordinates_file": f"{name}_motion.mot",
         "external_loads_file": f"{name}_loads.xml",
     }
@@ -194,7 +178,7 @@ def _opensim(unit: Unit, asked: Tables) -> Texts:
     return texts, note + "; known loads are not in the model" * bool(unit.loads())
 
 
-_WRITERS: dict[str, Callable[[Unit, Tables], Texts]] = {
+_WRITERS: dict[str, Callable[[Unit, str], Texts]] = {
     "joints": _joints,
     "bids": _bids,
     "opensim": _opensim,
@@ -247,11 +231,7 @@ Writer = Callable[[IdentifiedPerson], tuple[str, str]]
 
 
 def export_session(
-    root: Path,
-    out: Path,
-    chosen: tuple[str, ...],
-    config_file: Path | None,
-    request: Request,
+    root: Path, out: Path, chosen: tuple[str, ...], config_file: Path | None, request: Request
 ) -> int:
     """Export a study's participants and return the exit code."""
     _check(request)
@@ -262,7 +242,7 @@ def export_session(
         assert to is not None
         return export_recordings(opened, out, to)
     if request.what in ("bids", "joints"):
-        return export_trials(opened, out, Tables(request.what, to), None)
+        return _export_trials(opened, out, request, None)
     if request.what == "opensim":
         request = replace(request, formats=("osim",))
     writers = _writers(request, skeleton)
@@ -272,7 +252,7 @@ def export_session(
         return _export(unit, skeleton, request, writers)
 
     if request.what == "opensim":
-        return export_trials(opened, out, Tables("opensim", to), model)
+        return _export_trials(opened, out, request, model)
     running = (model(participant)[1] for participant in study.participants)
     return follow("export", opened.refusals, running, len(study.participants), to or out)
 
@@ -377,18 +357,11 @@ def _export(
                 notes += [note] if note else []
     except BsipError as error:
         errors.append(error)
-    return written[-1] if written else "", _outcome(unit, folder, written, notes, errors)
-
-
-def _outcome(
-    unit: Unit, folder: Path, written: list[str], notes: list[str], errors: list[BsipError]
-) -> Outcome:
-    sentences = [f"{unit.name}: {note}" for note in notes]
-    if written:
-        sentences.append(f"{unit.name}: {folder}: {', '.join(written)}")
-    sentences += dict.fromkeys(map(str, errors))
+    notes += [f"{folder}: {', '.join(written)}"] if written else []
+    said = (*(f"{unit.name}: {note}" for note in notes), *dict.fromkeys(map(str, errors)))
     code = max((error.exit_code for error in errors), default=0)
-    return Outcome("export", unit.name, "refused" if errors else "done", tuple(sentences), code)
+    name = written[-1] if written else ""
+    return name, Outcome("export", unit.name, "refused" if errors else "done", said, code)
 
 
 def _chosen(unit: Unit) -> tuple[str, str]:
@@ -445,11 +418,7 @@ def _identified(unit: Unit, skeleton: Skeleton, method: str) -> IdentifiedPerson
     head = f"bsip {__version__} export: participant {unit.name}, method {method}"
     made_of = (head, *(f"{path.name} sha256 {file_hash(path)}" for path in paths))
     return IdentifiedPerson(
-        person,
-        tuple(from_readable(row) for row in values),
-        unit.name,
-        method,
-        made_of,
+        person, tuple(from_readable(row) for row in values), unit.name, method, made_of
     )
 
 

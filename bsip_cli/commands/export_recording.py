@@ -152,7 +152,10 @@ class _Correction:
     def __init__(self, unit: Unit) -> None:
         self.unit, self.left = unit, list[str]()
         self._opened, self._session = _opened(unit)
-        self._swaps = _exchanged(unit.read("marker-events"))
+        events = unit.read("marker-events")
+        exchanged = events[events["put_right"].astype(bool)]  # by the inverse kinematics
+        pairs = exchanged[["marker", "partner", "start_s", "end_s"]]
+        self._swaps = list(pairs.itertuples(index=False, name=None))
         self.causes: dict[Cause, str] = {}  # and what else it may be
         told = unit.read("overall-diagnosis")
         known = set[tuple[str, str]]()
@@ -428,21 +431,10 @@ def _said_of(trial: str, told: pd.DataFrame, effects: Sequence[str]) -> pd.DataF
     return told[here & told["effect"].isin(effects) & (told["verdict"] != "rejected")]
 
 
-def _exchanged(events: pd.DataFrame) -> list[tuple[str, str, float, float]]:
-    """Pairs of labels that the inverse kinematics exchanged, and from when to when."""
-    done = events[events["put_right"].astype(bool)]
-    return list(done[["marker", "partner", "start_s", "end_s"]].itertuples(index=False, name=None))
-
-
 def _stated(reading: PlateReading) -> PlateReading:
     """Without the repairs that other numbers in the channels make needless."""
     return replace(
-        reading,
-        moment_scale=1.0,
-        point_scale=1.0,
-        about="stated",
-        channels="",
-        centre_m=None,
+        reading, moment_scale=1.0, point_scale=1.0, about="stated", channels="", centre_m=None
     )
 
 

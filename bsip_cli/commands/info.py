@@ -1,4 +1,4 @@
-"""``bsip info``: versions, or what an artifact holds and what made it."""
+"""``bsip info`` and ``bsip published``: versions, what an artifact holds, what is in the papers."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from bsip_cli import __version__
 from bsip_cli.artifacts import read_header
 from bsip_cli.errors import printable
 from bsip_cli.files.regular import check_regular
+from bsip_cli.report.tables.formats import to_markdown
+from bsip_cli.report.tables.published import audited, printed
 from bsip_cli.running.unit import library_versions
 from bsip_cli.schemas import SCHEMAS
+from bsip_cli.statistics.published.paper import load_paper, names
 
 
 def versions() -> Iterator[str]:
@@ -70,3 +73,25 @@ def _made(made_by: dict[str, Any], title: str) -> Iterator[str]:
         yield f"  input   {name} sha256 {digest}"
     for name, value in (made_by.get("options") or {}).items():
         yield f"  option  {name} = {json.dumps(value, ensure_ascii=False)}"
+
+
+# --- ``bsip published``: the papers' tables, and what in them cannot be true ----------------------
+
+
+def papers(what: str, paper: str | None) -> Iterator[str]:
+    """The parts of the answer as Markdown: ``what`` is show or audit; of one paper, or of all.
+
+    Raises
+    ------
+    UsageError
+        There is no such paper.
+    """
+    for one in (load_paper(name) for name in ([paper] if paper else names())):
+        if what == "show":
+            yield from (to_markdown(printed(one, table)) for table in one.tables)
+        elif (slips := audited(one)).rows:
+            yield to_markdown(slips)
+        else:
+            is_told = any(table.design != "described" or table.claims for table in one.tables)
+            nothing = "nothing in it can be recomputed from what is printed"
+            yield f"**{one.name}: {'its numbers agree' if is_told else nothing}.**\n"

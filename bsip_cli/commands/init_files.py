@@ -108,23 +108,23 @@ def read_sources(
     """Recordings that can be read, and every other file with the reason why it is not used."""
     unused: list[Unused] = []
     kept: list[Source] = []
-    pairs = _Pairs(files)
     hashes: dict[str, Path] = {}
     for one in progress([file for file in files if file.kind in RECORDINGS]):
         try:
             twin = hashes.setdefault(file_hash(one.path), one.path)
             if twin != one.path:
                 unused.append(Unused(one.path, f"holds the same as {twin.name}"))
-            elif container := pairs.container_of(one):
-                unused.append(Unused(one.path, f"{container.name}, of the same name, is used"))
+            elif one.kind == ".trc" and (containers := _beside(one, files)):
+                why = f"{containers[0].path.name}, of the same name, is used"
+                unused.append(Unused(one.path, why))
             else:
-                kept.append(_source(one, pairs, unused))
+                kept.append(_source(one, files, unused))
         except BadDataError as refusal:
             unused.append(Unused(one.path, _why(refusal), is_fault=True))
     done = {source.forces for source in kept} | {one.path for one in unused}
     c3d = {source.path.stem.casefold() for source in kept if source.forces is None}
     left = (one for one in files if one.path not in done and one.kind not in RECORDINGS)
-    unused += [_unused(one, pairs, c3d) for one in left]
+    unused += [_unused(one, files, c3d) for one in left]
     return kept, unused
 
 
@@ -134,7 +134,7 @@ def _why(refusal: BadDataError) -> str:
     return f"{refusal.found}{expected}{remedy}"
 
 
-def _unused(one: Listed, pairs: _Pairs, used: Collection[str]) -> Unused:
+def _unused(one: Listed, files: Sequence[Listed], used: Collection[str]) -> Unused:
     """Why a file that is no recording is left where it is."""
     inner = Path(one.path.stem.removesuffix(".tar")).suffix.lower()
     if one.kind in PACKED and inner in (*RECORDINGS, *ENDINGS):
@@ -143,44 +143,41 @@ def _unused(one: Listed, pairs: _Pairs, used: Collection[str]) -> Unused:
         return Unused(one.path, NO_RECORDING)
     if one.path.stem.casefold() in used:
         return Unused(one.path, "a C3D of its name has forces of its own")
-    if several := pairs.markers_of(one):
+    if several := _markers_of(one, files):
         names = " and ".join(str(file.path) for file in several)
         why = f"may belong to {names}: which is meant is not guessed"
         return Unused(one.path, why if len(several) > 1 else "no forces that could be used")
     return Unused(one.path, "no TRC of its name is there")
 
 
-class _Pairs:
-    """Which files are of one trial, by their names and places."""
+# --- which files are of one trial, by their names and places --------------------------------------
 
-    def __init__(self, files: Sequence[Listed]) -> None:
-        self.files = files
 
-    def container_of(self, one: Listed) -> Path | None:
-        """The C3D beside a TRC of its name, which holds markers and forces."""
-        if one.kind != ".trc":
-            return None
-        beside = [
-            other.path
-            for other in self.files
-            if other.kind == ".c3d"
-            and other.path.parent == one.path.parent
-            and other.path.stem.casefold() == one.path.stem.casefold()
-        ]
-        return beside[0] if beside else None
+def _beside(trc: Listed, files: Sequence[Listed]) -> list[Listed]:
+    """The C3D of its name in its folder, which holds markers and forces."""
+    own = trc.path.with_suffix("")
+    return [
+        one
+        for one in files
+        if one.kind == ".c3d"
+        and one.path.parent == own.parent
+        and one.path.stem.casefold() == own.name.casefold()
+    ]
 
-    def markers_of(self, table: Listed) -> list[Listed]:
-        """The TRC files of a table's name, from the nearest folder that has one."""
-        return _nearest(table, (file for file in self.files if file.kind == ".trc"))
 
-    def forces_of(self, one: Listed) -> list[Path]:
-        """Tables of a TRC's name, from the nearest folder that has one, which no other TRC has."""
-        tables = _nearest(one, (file for file in self.files if file.kind in ENDINGS))
-        is_alone = sum(file.path.parent == one.path.parent for file in self.files) == 1
-        if not tables and is_alone:  # a file was given, and not the folder
-            beside = (p for p in entries(one.path.parent) if p.suffix.lower() in ENDINGS)
-            return [t.path for t in _nearest(one, (Listed(p, one.folders) for p in beside))]
-        return sorted(table.path for table in tables if self.markers_of(table) == [one])
+def _markers_of(table: Listed, files: Sequence[Listed]) -> list[Listed]:
+    """The TRC files of a table's name, from the nearest folder that has one."""
+    return _nearest(table, (file for file in files if file.kind == ".trc"))
+
+
+def _forces_of(one: Listed, files: Sequence[Listed]) -> list[Path]:
+    """Tables of a TRC's name, from the nearest folder that has one, which no other TRC has."""
+    tables = _nearest(one, (file for file in files if file.kind in ENDINGS))
+    is_alone = sum(file.path.parent == one.path.parent for file in files) == 1
+    if not tables and is_alone:  # a file was given, and not the folder
+        beside = (p for p in entries(one.path.parent) if p.suffix.lower() in ENDINGS)
+        return [t.path for t in _nearest(one, (Listed(p, one.folders) for p in beside))]
+    return sorted(table.path for table in tables if _markers_of(table, files) == [one])
 
 
 def _nearest(one: Listed, others: Iterable[Listed]) -> list[Listed]:
@@ -206,11 +203,11 @@ def trial_words(path: Path) -> tuple[str, ...]:
 # --- reading --------------------------------------------------------------------------------------
 
 
-def _source(one: Listed, pairs: _Pairs, unused: list[Unused]) -> Source:
+def _source(one: Listed, files: Sequence[Listed], unused: list[Unused]) -> Source:
     """Read a recording as it will lie in the study."""
     forces = None
     if one.kind == ".trc":
-        recording, forces = _with_forces(one, _tables(pairs.forces_of(one), unused), unused)
+        recording, forces = _with_forces(one, _tables(_forces_of(one, files), unused), unused)
     else:
         recording = read_recording(one.path)
     bare = [label.rpartition(":")[2].strip() for label in recording.labels]

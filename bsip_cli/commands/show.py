@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from shutil import get_terminal_size
@@ -13,21 +13,14 @@ import pandas as pd
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.report.blocks import Light
-from bsip_cli.report.budget import overall_pieces
 from bsip_cli.report.candidates import candidates_of, causes_of, looked_at
 from bsip_cli.report.cohort.laboratory import named_sentences, unnamed_sentences
-from bsip_cli.report.gains import use_sentence
-from bsip_cli.report.participant.joints import largest_changes
+from bsip_cli.report.cohort.record import SHARED, Searched, searched, shared_causes
+from bsip_cli.report.errors import overall_pieces, use_sentence
+from bsip_cli.report.participant.errors import largest_changes
 from bsip_cli.report.records import with_all_causes
-from bsip_cli.report.shared import SHARED, Searched, searched, shared_causes
 from bsip_cli.report.tables.build import show as tables_of
-from bsip_cli.report.verdict import (
-    Verdict,
-    cause_line,
-    light_of,
-    put_right_sentence,
-    verdict_of,
-)
+from bsip_cli.report.verdict import Verdict, cause_line, light_of, put_right_sentence, verdict_of
 from bsip_cli.report.words import listing
 from bsip_cli.running.freshness import outdated
 from bsip_cli.schemas import SCHEMAS
@@ -56,18 +49,20 @@ def shown(out: Path, full: bool = False) -> Iterator[str]:
         )
     tables = tables_of(out)
     people = sorted(out.glob("sub-*/*_diagnosis.parquet"))
-    notes = [*_mass_notes(out), *(_choices(out) if full else ())]
-    if not tables and not people and not [*notes, *_choices(out)]:
+    choices = list(_notes(out, "choice", "sentence"))
+    masses = list(_notes(out, "person", "mass_note"))
+    if not tables and not people and not masses and not choices:
         raise UsageError(
             "there are no tables and no diagnoses",
             file=out,
             remedy="run `bsip run` first, or name the folder that it was given with --out",
         )
-    yield from ["\n".join(notes)] if notes else []
+    if notes := [*masses, *(choices if full else ())]:
+        yield "\n".join(notes)
+    folders = _folders(out)
     if full and tables and len(list(out.glob("sub-*"))) > 1:  # of one person nothing is tested
         yield "\n".join(map(printable, tables.split("\n")))
     everybody, unread = [], []
-    folders = sorted(path for path in out.glob("sub-*") if path.is_dir())
     for folder in folders:
         try:
             if found := _person(folder, full, len(folders) == 1):
@@ -76,15 +71,18 @@ def shown(out: Path, full: bool = False) -> Iterator[str]:
         except BadDataError as error:
             unread.append(folder.name)
             yield f"\n{error}"
-    yield from _laboratory(out)
-    yield from _no_more_true(out, get_terminal_size().columns)
-    yield from _shared_text(shared_causes(everybody), get_terminal_size().columns)
+    laboratory = out / "group" / "group_laboratory.parquet"
+    if laboratory.exists():
+        table = read_artifact(laboratory, "laboratory")
+        yield from map(_wrapped, (*named_sentences(table), *unnamed_sentences(table)))
+    if old := list(_no_more_true(out)):
+        yield _listed("\n## Not up to date: run `bsip run` again", old)
+    if shared := shared_causes(everybody):
+        yield _listed(f"\n## What several participants share\n{_wrapped(SHARED)}", shared)
     reports = [out / "group" / "report.html"] if len(folders) > 1 else []
     if full or not reports:
         reports += sorted(out.glob("sub-*/report.html"))
-    for report in reports:
-        if report.exists():
-            yield f"report: {printable(str(report))}"
+    yield from (f"report: {printable(str(report))}" for report in reports if report.exists())
     if unread:
         raise BadDataError(
             f"the diagnosis of {listed(unread)} cannot be shown",
@@ -93,39 +91,20 @@ def shown(out: Path, full: bool = False) -> Iterator[str]:
         )
 
 
-def _mass_notes(out: Path) -> Iterator[str]:
-    """Whose mass is not known, or stated grossly otherwise than the plates tell."""
-    for folder in sorted(path for path in out.glob("sub-*") if path.is_dir()):
+def _folders(out: Path) -> list[Path]:
+    return sorted(path for path in out.glob("sub-*") if path.is_dir())
+
+
+def _notes(out: Path, kind: str, column: str) -> Iterator[str]:
+    """What an artifact says of each person, if anything."""
+    for folder in _folders(out):
         try:
-            person = _table(folder, "person")
+            table = _table(folder, kind)
         except BadDataError as error:
             yield str(error)
             continue
-        note = "" if person is None else str(person["mass_note"].iloc[0])
-        if note:
-            yield _wrapped(f"{folder.name}: {note}", _width(get_terminal_size().columns))
-
-
-def _laboratory(out: Path) -> Iterator[str]:
-    """What is wrong with the plates and the clock that all share."""
-    path = out / "group" / "group_laboratory.parquet"
-    if path.exists():
-        table = read_artifact(path, "laboratory")
-        for sentence in (*named_sentences(table), *unnamed_sentences(table)):
-            yield _wrapped(sentence, _width(get_terminal_size().columns))
-
-
-def _choices(out: Path) -> Iterator[str]:
-    """Which parameters to use, a line per person."""
-    for folder in sorted(path for path in out.glob("sub-*") if path.is_dir()):
-        try:
-            choice = _table(folder, "choice")
-        except BadDataError as error:
-            yield str(error)
-            continue
-        if choice is not None:
-            text = f"{folder.name}: {choice['sentence'].iloc[0]}"
-            yield _wrapped(text, _width(get_terminal_size().columns))
+        if table is not None and (said := str(table[column].iloc[0])):
+            yield _wrapped(f"{folder.name}: {said}")
 
 
 def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | None:
@@ -140,13 +119,12 @@ def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | Non
     gains, changes = (_extended(folder, kind) for kind in ("overall-gain", "bsip-change"))
     budget = _table(folder, "overall-error-budget")
     found = verdict_of(diagnosis, detection, gains, changes, budget)
-    right = put_right_sentence(_marker_events(folder))
+    right = put_right_sentence(_of_trials(folder, "marker-events"))
     if light := _light(folder):
         found = replace(found, headline=f"{light.title}. {light.text}")
     changed = tuple(f"{said}." for said in largest_changes(_peaks(folder)))
     found = replace(found, results=(*found.results, *changed))
-    text = verdict_text(folder.name, found, right, get_terminal_size().columns)
-    return searched(folder.name, diagnosis, facts), text
+    return searched(folder.name, diagnosis, facts), verdict_text(folder.name, found, right)
 
 
 def _findings(
@@ -154,28 +132,27 @@ def _findings(
 ) -> Iterator[str]:
     """A line each, the most important first: whether anything is wrong, the causes, what makes the
     error, which parameters to use, what is changed at the joints. Of one among many the first."""
-    width = _width(get_terminal_size().columns)
     budget, choice = (_table(folder, kind) for kind in ("overall-error-budget", "choice"))
     light = _light(folder) or light_of(diagnosis, detection, budget)
     use = "" if alone or choice is None else f" Use {choice['use'].iloc[0]}."
-    yield _wrapped(f"{folder.name}: {light.title}. {light.text}{use}", width)
+    yield _wrapped(f"{folder.name}: {light.title}. {light.text}{use}")
     if not alone:
         return
     causes = causes_of(candidates_of(diagnosis))
     everywhere = looked_at(detection, diagnosis)
     for number, cause in enumerate(causes[:_MOST], start=1):
-        yield _wrapped(cause_line(cause, everywhere), width, f"{number:2d}. ")
+        yield _wrapped(cause_line(cause, everywhere), f"{number:2d}. ")
     if len(causes) > _MOST:
         yield f"  - {len(causes) - _MOST} more findings: --full"
     if budget is not None and (pieces := overall_pieces(budget)):
         parts = listing([f"{one.label} {one.share:.0f} %" for one in pieces])
-        yield _wrapped(f"The error of the table's parameters (RM): {parts}.", width, "  - ")
+        yield _wrapped(f"The error of the table's parameters (RM): {parts}.", "  - ")
     if choice is not None:
         identified = _table(folder, "identification")
         assert identified is not None  # it was chosen among what was identified
-        yield _wrapped(use_sentence(choice, identified, light.state == "large"), width, "  - ")
+        yield _wrapped(use_sentence(choice, identified, light.state == "large"), "  - ")
     for said in largest_changes(_peaks(folder)):
-        yield _wrapped(f"{said}.", width, "  - ")
+        yield _wrapped(f"{said}.", "  - ")
 
 
 def _light(folder: Path) -> Light | None:
@@ -186,63 +163,53 @@ def _light(folder: Path) -> Light | None:
     return Light(**read_header(page, "report-files")["provenance"]["facts"]["light"])
 
 
+def _of_trials(folder: Path, kind: str) -> list[tuple[str, pd.DataFrame]]:
+    """Stems of the trials and their artifacts of a kind."""
+    ending = f"_{SCHEMAS[kind].file_name}.parquet"
+    paths = sorted(folder.glob(f"{folder.name}_*{ending}"))
+    return [(path.name.removesuffix(ending), read_artifact(path, kind)) for path in paths]
+
+
 def _peaks(folder: Path) -> pd.DataFrame:
     """``joint-peaks`` of all trials, with a column ``trial``."""
-    ending = f"_{SCHEMAS['joint-peaks'].file_name}.parquet"
-    files = sorted(folder.glob(f"{folder.name}_*{ending}"))
-    tables = [
-        read_artifact(path, "joint-peaks").assign(trial=path.name.removesuffix(ending))
-        for path in files
-    ]
+    tables = [table.assign(trial=stem) for stem, table in _of_trials(folder, "joint-peaks")]
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
 
-def _no_more_true(out: Path, columns: int) -> Iterator[str]:
+def _no_more_true(out: Path) -> Iterator[str]:
     """Whose report is of other code, or of artifacts that were made anew since."""
-    files = (_path(folder, "report-files") for folder in sorted(out.glob("sub-*")))
-    found = {path.parent.name: _why_outdated(path) for path in files if path.exists()}
-    reasons = [f"{name}: {why}" for name, why in found.items() if why]
-    if reasons:
-        width = _width(columns)
-        bullets = (_wrapped(text, width, "  - ") for text in reasons)
-        yield "\n".join(["\n## Not up to date: run `bsip run` again", *bullets])
+    for folder in sorted(out.glob("sub-*")):
+        if (path := _path(folder, "report-files")).exists():
+            try:
+                why = outdated(path)
+            except BadDataError as error:
+                why = str(error)
+            if why:
+                yield f"{folder.name}: {why}"
 
 
-def _why_outdated(path: Path) -> str:
-    try:
-        return outdated(path)
-    except BadDataError as error:
-        return str(error)
+def _listed(head: str, sentences: Sequence[str]) -> str:
+    return "\n".join([head, *(_wrapped(text, "  - ") for text in sentences)])
 
 
-def _shared_text(sentences: tuple[str, ...], columns: int) -> Iterator[str]:
-    """What several participants have in common, if anything."""
-    if sentences:
-        width = _width(columns)
-        bullets = (_wrapped(text, width, "  - ") for text in sentences)
-        yield "\n".join(["\n## What several participants share", _wrapped(SHARED, width), *bullets])
-
-
-def verdict_text(name: str, found: Verdict, right: tuple[str, ...], columns: int) -> str:
+def verdict_text(
+    name: str, found: Verdict, right: tuple[str, ...], columns: int | None = None
+) -> str:
     """A diagnosis for a terminal of so many columns: causes numbered, lines broken; ``right`` says
     what was corrected before."""
-    width = _width(columns)
-    lines = [f"\n## Is anything wrong: {printable(name)}", _wrapped(found.headline, width)]
+    lines = [f"\n## Is anything wrong: {printable(name)}", _wrapped(found.headline, "", columns)]
     for number, cause in enumerate(found.causes, start=1):
-        lines.append(_wrapped(cause, width, f"{number:2d}. "))
+        lines.append(_wrapped(cause, f"{number:2d}. ", columns))
     rest = (*right, *found.results, *found.advice, found.limits)
-    lines += [_wrapped(text, width, "  - ") for text in rest if text]
+    lines += [_wrapped(text, "  - ", columns) for text in rest if text]
     return "\n".join(lines)
 
 
-def _width(columns: int) -> int:
-    return max(40, min(columns, _WIDEST))
-
-
-def _wrapped(text: str, width: int, first: str = "") -> str:
+def _wrapped(text: str, first: str = "", columns: int | None = None) -> str:
+    """In lines as wide as the terminal, or of so many columns."""
     return fill(
         printable(text),
-        width,
+        max(40, min(columns or get_terminal_size().columns, _WIDEST)),
         initial_indent=first,
         subsequent_indent=" " * len(first),
         break_long_words=False,
@@ -257,13 +224,6 @@ def _table(folder: Path, kind: str) -> pd.DataFrame | None:
 
 def _path(folder: Path, kind: str) -> Path:
     return folder / f"{folder.name}_{SCHEMAS[kind].file_name}.parquet"
-
-
-def _marker_events(folder: Path) -> list[tuple[str, pd.DataFrame]]:
-    """Stems of the trials and what was found of their markers."""
-    ending = f"_{SCHEMAS['marker-events'].file_name}.parquet"
-    paths = sorted(folder.glob(f"{folder.name}_*{ending}"))
-    return [(p.name.removesuffix(ending), read_artifact(p, "marker-events")) for p in paths]
 
 
 def _extended(folder: Path, kind: str) -> pd.DataFrame | None:

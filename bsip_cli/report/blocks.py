@@ -1,13 +1,21 @@
-"""What a report is made of, as data: a first page, and folded sections of texts, grids, pictures."""
+"""What a report is made of, as data (a first page, folded sections of texts, grids and pictures), and
+the page that is made of it."""
 
 from __future__ import annotations
 
+import base64
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 import pandas as pd
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from bsip_cli.errors import printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,67 +25,67 @@ Tone = Literal["plain", "good", "warning", "note"]
 State = Literal["fine", "cause", "large", "inconclusive"]
 
 
+class Block:
+    """A piece of a report; each kind has its own part of the template."""
+
+    @property
+    def kind(self) -> str:
+        return type(self).__name__.lower()
+
+
 @dataclass(frozen=True)
-class Paragraph:
-    kind: ClassVar[str] = "paragraph"
+class Paragraph(Block):
     text: str
     tone: Tone = "plain"
 
 
 @dataclass(frozen=True)
-class Heading:
-    kind: ClassVar[str] = "heading"
+class Heading(Block):
     text: str
 
 
 @dataclass(frozen=True)
-class Bullets:
-    kind: ClassVar[str] = "bullets"
+class Bullets(Block):
     items: tuple[str, ...]
     tone: Tone = "plain"
 
 
 @dataclass(frozen=True)
-class Numbered:
+class Numbered(Block):
     """A list whose items other texts refer to by their number."""
 
-    kind: ClassVar[str] = "numbered"
     items: tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Terms:
+class Terms(Block):
     """Names, each with what is to be said of it."""
 
-    kind: ClassVar[str] = "terms"
     pairs: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
-class Links:
+class Links(Block):
     """Words and addresses (relative), one after the other, after a text."""
 
-    kind: ClassVar[str] = "links"
     text: str
     to: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
-class Light:
+class Light(Block):
     """The answer to whether anything is wrong."""
 
-    kind: ClassVar[str] = "light"
     state: State
     title: str
     text: str
 
 
 @dataclass(frozen=True)
-class Bar:
+class Bar(Block):
     """A whole cut into pieces: label and share [%], which add up to 100; a share below zero makes
     the rest larger and has no length."""
 
-    kind: ClassVar[str] = "bar"
     title: str
     pieces: tuple[tuple[str, float], ...]
 
@@ -103,10 +111,9 @@ class Scale:
 
 
 @dataclass(frozen=True)
-class Scales:
+class Scales(Block):
     """Numbers side by side, each on its way to its limit."""
 
-    kind: ClassVar[str] = "scales"
     scales: tuple[Scale, ...]
 
 
@@ -120,7 +127,7 @@ class Cell:
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class Grid(Block):
     """A table.
 
     Attributes
@@ -132,7 +139,6 @@ class Grid:
     name, data : the numbers behind it, written as a CSV file of that name; empty for none.
     """
 
-    kind: ClassVar[str] = "grid"
     head: tuple[str, ...]
     rows: tuple[tuple[str | Cell, ...], ...]
     caption: str = ""
@@ -147,7 +153,7 @@ class Grid:
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class Picture(Block):
     """A figure, and what a reader wants to know of it.
 
     Attributes
@@ -156,7 +162,6 @@ class Picture:
     name : of its files: NAME.svg, and NAME.csv with ``data``, the numbers behind it.
     """
 
-    kind: ClassVar[str] = "picture"
     figure: Figure
     name: str
     shows: str
@@ -181,24 +186,6 @@ class Picture:
 @dataclass(frozen=True, eq=False)
 class Portrait(Picture):
     """A figure that stands at the side of the first page."""
-
-    kind: ClassVar[str] = "portrait"
-
-
-Block = (
-    Paragraph
-    | Heading
-    | Bullets
-    | Numbered
-    | Terms
-    | Links
-    | Light
-    | Bar
-    | Scales
-    | Grid
-    | Picture
-    | Portrait
-)
 
 
 @dataclass(frozen=True)
@@ -226,3 +213,46 @@ class Document:
 
     def pictures(self) -> Iterator[Picture]:
         yield from (block for block in self.blocks() if isinstance(block, Picture))
+
+
+# --- a document as one self-contained HTML page ---------------------------------------------------
+
+
+FILES = "figures"
+"""Folder beside the page that holds its figures and the numbers behind them."""
+
+_BEFORE_UNIT = re.compile(r"(?<=[\d)]) (?=(?:mm|ms|kg|m|s|N|Hz)\b|%)|(?<=N) (?=m\b)|(?<=%) (?=BW)")
+_TEMPLATES = Path(__file__).parent / "templates"
+
+
+def render(document: Document) -> str:
+    """The page: figures as data, nothing from the network, no script at all; all texts escaped."""
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        finalize=_cleaned,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["svg_source"] = _svg_source
+    environment.filters["tied"] = _tied
+    style = Markup((_TEMPLATES / "report.css").read_text(encoding="utf-8"))
+    return environment.get_template("report.html.j2").render(
+        document=document, style=style, files=FILES
+    )
+
+
+def _cleaned(value: object) -> object:
+    """Names of files and markers may hold control characters; what templates make is clean."""
+    is_foreign = isinstance(value, str) and not isinstance(value, Markup)
+    return printable(str(value)) if is_foreign else value
+
+
+def _tied(text: str) -> str:
+    """Numbers and their units stay on one line."""
+    return re.sub(_BEFORE_UNIT, "\N{NO-BREAK SPACE}", text)
+
+
+def _svg_source(svg: bytes) -> str:
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode('ascii')}"

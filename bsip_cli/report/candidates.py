@@ -15,13 +15,16 @@ import pandas as pd
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.report.effect_words import (
     MAIN_NUMBERS,
+    OBJECTS,
+    USUAL,
     effect_title,
     parameter_label,
     place_label,
     size_words,
     unnamed_label,
+    usual_words,
 )
-from bsip_cli.report.words import number
+from bsip_cli.report.words import capital, number
 
 NOTHING = "none"
 UNNAMED = "unexplained"
@@ -121,6 +124,18 @@ class Candidate:
         sizes = main or [n for n in self.numbers if n.name not in _NO_SIZES]
         return max(sizes or self.numbers, key=Number.certainty, default=None)
 
+    def beside_usual(self) -> str:
+        """``, a usual size (5 to 20 ms)``; empty where nothing usual is known."""
+        size, usual = self.main_number(), USUAL.get(self.effect)
+        if size is None or usual is None or self.effect in OBJECTS:
+            return ""
+        if size.name not in usual.parameters or size.unit != usual.unit:
+            return ""
+        shown = float(f"{abs(size.value):.2g}")  # as it is read
+        how = "smaller than usual" if shown < usual.least else "a usual size"
+        how = "larger than usual" if shown > usual.most else how
+        return f", {how} ({usual_words(self.effect)})"
+
     def removes(self) -> str:
         """``61.1 (-19.6 to 100.0)``, percent of the squared difference in unseen seconds."""
         gain, low, high = self.gain
@@ -165,13 +180,13 @@ def causes_of(candidates: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], .
     for k, one in enumerate(candidates):
         if one.verdict != "rejected":
             groups.setdefault(one.class_id or f"#{k}", []).append(one)
-    return tuple(sorted(map(tuple, groups.values()), key=_importance))
 
+    def importance(cause: tuple[Candidate, ...]) -> tuple[bool, float]:
+        """Of a group, by what is to be expected: each member counts as probable as it is."""
+        expected = [np.nan_to_num(one.probability, nan=1.0) * one.rms_change for one in cause]
+        return not is_large(cause), -float(np.nansum(expected))
 
-def _importance(cause: tuple[Candidate, ...]) -> tuple[bool, float]:
-    """Of a group, by what is to be expected of it: each member counts as probable as it is."""
-    expected = [np.nan_to_num(one.probability, nan=1.0) * one.rms_change for one in cause]
-    return not is_large(cause), -float(np.nansum(expected))
+    return tuple(sorted(map(tuple, groups.values()), key=importance))
 
 
 def is_large(cause: Sequence[Candidate]) -> bool:
@@ -216,14 +231,7 @@ def limits_of(
     most = rows.groupby(["effect", "target", "parameter"])["together"].transform("max")
     rows = rows[rows["together"] == (1 if alone else most)]
     return tuple(
-        Limit(
-            r["effect"],
-            r["target"],
-            r["parameter"],
-            r["unit"],
-            float(r["limit"]),
-            int(r["together"]),
-        )
+        Limit(r["effect"], r["target"], r["parameter"], r["unit"], float(r["limit"]), r["together"])
         for r in rows.to_dict("records")
         if (r["effect"], r["target"]) not in found
     )
@@ -233,25 +241,17 @@ def limits_sentence(limits: Sequence[Limit]) -> str:
     """``A delay ... under 2.5 ms or ... might have gone unseen.``: of plates, axes and recordings
     the worst one; empty without examples."""
     parts = []
+    told = [x for x in limits if x.parameter in ("delay", "x", "y", "gain", "mass")]
     for effect, ends, words in _EXAMPLES:
-        of_it = [
-            x
-            for x in limits
-            if x.effect == effect
-            and x.target.endswith(ends)
-            and x.parameter in ("delay", "x", "y", "gain", "mass")
-        ]
+        of_it = [x for x in told if x.effect == effect and x.target.endswith(ends)]
         if of_it:
             worst = max(of_it, key=lambda x: x.size)
-            parts.append(f"{words} {_under(worst)}")
+            size = f"under {worst.in_words()}" if isfinite(worst.size) else "of any size"
+            parts.append(f"{words} {size}")
     if not parts:
         return ""
     text = " or ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
-    return f"{text[0].upper()}{text[1:]} might have gone unseen."
-
-
-def _under(limit: Limit) -> str:
-    return f"under {limit.in_words()}" if isfinite(limit.size) else "of any size"
+    return f"{capital(text)} might have gone unseen."
 
 
 def looked_at(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[str, ...]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Protocol
+from pathlib import Path
 
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.plates import plates_called
@@ -13,64 +14,12 @@ from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.report.words import listing, number, segment_label
 from bsip_cli.segments import SEGMENTS
 
-
-class Number(Protocol):
-    """A parameter of a fault, as estimated."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def unit(self) -> str: ...
-    @property
-    def value(self) -> float: ...
-
-
-_FORCES = (
-    "The measured forces are not the true ones, and everything identified from them inherits the "
-    "error.",
-    "Correct the forces in the lab, or write corrected files (bsip export), and run again.",
-)
-_CLOCKS = (
-    "Forces and markers are not of the same moments, and everything identified from them inherits "
-    "the error. A filter that only the forces have gone through delays them too.",
-    "Correct the clock in the lab, or write corrected files (bsip export), and run again.",
-)
-_MOTION = (
-    "The motion is not the true one, and the simulated forces with it.",
-    "Correct the markers, and run again.",
-)
-_FRAME = (
-    "Motion and forces do not share their axes, and everything identified from them inherits the "
-    "error.",
-    "Calibrate the cameras again, or turn the markers back, and run again.",
-)
-_SKIN = (
-    "The pose of the trunk, and the simulated forces with it, is only as good as markers on soft "
-    "tissue can be.",
-    "Put markers over bone, and record again.",
-)
-_PERSON = (
-    "The recordings need not be wrong: the model lacks something that this person has, and "
-    "squeezes it into the inertial parameters of some segment.",
-    "Use the forces as they are, and do not read the parameters near that place as this person's.",
-)
-_LOAD = (
-    "A load that is not stated ends up in the masses of the body where its recording identifies "
-    "them, and in the errors of the forces where it judges them.",
-    "Weigh it, state its mass (tutorial: loads) and run again.",
-)
+_FILE = Path(__file__).with_suffix(".toml")
+_WORDS = tomllib.loads(_FILE.read_text(encoding="utf-8"))
 WEIGHT = (
     "Either the stated mass is wrong or what the plates measure. Only if a scale confirms the stated "
     "mass are the plates at fault, or something that is carried.",
     "Weigh the person on a scale first.",
-)
-_CONTACT = (
-    "The plates do not carry all of the ground force.",
-    "Leave out the frames with the contact, or record without anything in reach.",
-)
-_UNNAMED = (
-    "Neither the forces nor the identified parameters should be trusted further than the report says.",
-    "Look at the recordings where the error comes and goes (report, under errors).",
 )
 
 
@@ -89,35 +38,13 @@ class EffectWords:
 
 
 EFFECT_WORDS = {
-    "sync_offset": EffectWords("forces and markers out of step", *_CLOCKS),
-    "clock_drift": EffectWords("clocks of forces and markers run apart", *_CLOCKS),
-    "plate_translation": EffectWords("force plate not where the file says", *_FORCES),
-    "plate_rotation": EffectWords("force plate turned or tilted", *_FORCES),
-    "plate_gain": EffectWords("wrong gain of a plate's channel", *_FORCES),
-    "plate_crosstalk": EffectWords("one channel of a plate leaks into another", *_FORCES),
-    "plate_zero": EffectWords("constant offset of a plate's channel", *_FORCES),
-    "plate_drift": EffectWords("drift of a plate's channel", *_FORCES),
-    "gravity_tilt": EffectWords("the lab's vertical is not vertical", *_FORCES),
-    "added_mass": EffectWords("mass that the model does not know", *_LOAD),
-    "released_object": EffectWords("object held and let go", *_LOAD),
-    "wobbling_mass": EffectWords("soft tissue that swings", *_PERSON),
-    "breathing": EffectWords("breathing", *_PERSON),
-    "unmeasured_contact": EffectWords("contact beside the plates", *_CONTACT),
-    "joint_centre": EffectWords("joint centre in the wrong place", *_PERSON),
-    "missing_joint": EffectWords("trunk bends where the model is stiff", *_PERSON),
-    "soft_tissue": EffectWords("soft tissue that moves with the trunk's posture", *_SKIN),
-    "marker_shift": EffectWords("marker not in its place", *_MOTION),
-    "marker_slide": EffectWords("marker that slides", *_MOTION),
-    "marker_swap": EffectWords("two markers exchanged", *_MOTION),
-    "over_smoothing": EffectWords("markers smoothed too much", *_MOTION),
-    "segment_inertia": EffectWords("other inertial parameters of a segment", *_PERSON),
-    "implement": EffectWords("club, racket or stick in the hand", *_LOAD),
-    "camera_frame": EffectWords("cameras turned against plates and gravity", *_FRAME),
-    "external_force": EffectWords("constant force beside the plates", *_CONTACT),
-    "object_handled": EffectWords("object picked up and put down", *_LOAD),
-    "unexplained": EffectWords("error of unknown cause", *_UNNAMED),
+    name: EffectWords(about["title"], **_WORDS["follows"][about["follows"]])
+    for name, about in _WORDS["causes"].items()
 }
-
+MAIN_NUMBERS = {
+    name: tuple(about["about"]) for name, about in _WORDS["causes"].items() if "about" in about
+}
+"""Numbers that an effect is about. Where none stands here, all are parts of one size."""
 
 OBJECTS = ("released_object", "implement", "object_handled")
 """What a task may be about: found, and nothing wrong with the recordings."""
@@ -128,14 +55,6 @@ def effect_title(effect: str) -> str:
     return words.title if words else effect.replace("_", " ")
 
 
-_CHANNELS = {
-    "fx": "force x",
-    "fy": "force y",
-    "fz": "vertical force",
-    "mx": "moment x",
-    "my": "moment y",
-    "mz": "moment about the vertical",
-}
 _ONE_PLACE = ("breathing", "missing_joint", "soft_tissue")  # where they sit is no news
 
 
@@ -143,8 +62,10 @@ def place_label(effect: str, target: str) -> str:
     """``plate 1, force x into force y`` or ``left hand`` of an effect's target; empty for none."""
     if effect in _ONE_PLACE:
         return ""
-    if effect.startswith("plate_"):
-        return _plate_label(target)
+    if effect.startswith("plate_"):  # 1 fx>fy, 1 fz or 1
+        plate, _, channels = target.partition(" ")
+        words = " into ".join(_WORDS["channels"].get(one, one) for one in channels.split(">"))
+        return f"{plates_called(plate)}, {words}" if words else plates_called(plate)
     if effect.startswith("marker_"):
         first, _, second = target.partition("+")
         return f"markers {first} and {second}" if second else f"marker {target}"
@@ -152,30 +73,12 @@ def place_label(effect: str, target: str) -> str:
         return segment_label(target)
     if effect == "unmeasured_contact":
         return " and ".join(segment_label(name) for name in target.split("+"))
-    return _CHANNELS.get(target, target)
-
-
-def _plate_label(target: str) -> str:
-    """Of ``1 fx>fy``, ``1 fz`` or ``1``."""
-    name, _, channels = target.rpartition(" ") if " " in target else (target, "", "")
-    words = " into ".join(_CHANNELS.get(channel, channel) for channel in channels.split(">"))
-    where = plates_called(name)
-    return f"{where}, {words}" if words else where
-
-
-_REGULARITIES = {  # first number of a regularity without a name: what it is
-    "amplitude": "swing",
-    "curvature": "square of the load",
-    "error": "play or friction",
-    "lacking": "channel at its limit",
-    "nonlinearity": "not in proportion to the load",
-    "stiffness": "pull on the pelvis",
-}
+    return _WORDS["channels"].get(target, target)
 
 
 def unnamed_label(number_name: str, where: str) -> str:
     """``swing, force x``; of a pull, ``y by z`` is the force's axis and the place's."""
-    kind = _REGULARITIES.get(number_name)
+    kind = _WORDS["regularities"].get(number_name)
     if kind is None:
         return where
     force, by, place = where.partition(" by ")
@@ -184,51 +87,12 @@ def unnamed_label(number_name: str, where: str) -> str:
     )
 
 
-# Numbers that an effect is about. Where none stands here, all are parts of one size.
-MAIN_NUMBERS = {
-    "added_mass": ("mass",),
-    "released_object": ("mass",),
-    "implement": ("mass",),
-    "object_handled": ("mass",),
-    "camera_frame": ("angle",),
-    "external_force": ("force",),
-    "wobbling_mass": ("mass",),
-    "breathing": ("amplitude",),
-    "gravity_tilt": ("angle",),
-    "unmeasured_contact": ("force",),
-    "marker_shift": ("shift",),
-    "marker_slide": ("way",),
-    "soft_tissue": ("size",),
-    "unexplained": ("amplitude", "stiffness", "curvature", "error", "nonlinearity", "lacking"),
-}
-_PARTS = {  # of a size with several parts: which one the interval is of
-    "x": "along the lab's X axis",
-    "y": "along the lab's Y axis",
-    "z": "height",
-    "shift_x": "along the segment's x axis",
-    "shift_y": "along the segment's y axis",
-    "shift_z": "along the segment's z axis",
-    "yaw": "about the vertical",
-    "tilt_x": "tilt about the lab's X axis",
-    "tilt_y": "tilt about the lab's Y axis",
-    "flexion": "bending forwards there",
-    "lateral": "bending sideways there",
-    "axial": "turning there",
-    "force": "force",
-    "mass": "mass",
-    "amplitude": "mass times amplitude",
-}
-_TOLD = (
-    "added_mass",
-    "plate_gain",
-)  # their sentence has one such number only
+_TOLD = ("added_mass", "plate_gain", "unexplained")  # their sentence leaves nothing open
 
 
 def parameter_label(effect: str, parameter: str) -> str:
     """What an interval is of, where the sentence leaves that open; else empty."""
-    if effect in _TOLD or effect == "unexplained":
-        return ""
-    return _PARTS.get(parameter, "")
+    return "" if effect in _TOLD else str(_WORDS["parts"].get(parameter, ""))
 
 
 def size_words(parameter: str, unit: str, size: float) -> str:
@@ -251,31 +115,10 @@ class Usual:
     most: float
 
 
-USUAL: dict[str, Usual] = {
-    "sync_offset": Usual(("delay",), "s", 0.005, 0.02),
-    "clock_drift": Usual(("rate_error",), "1", 2e-4, 5e-4),
-    "plate_translation": Usual(("x", "y"), "m", 0.01, 0.03),
-    "plate_rotation": Usual(
-        ("tilt_x", "tilt_y", "yaw"), "rad", 0.017453, 0.069813
-    ),  # 1 to 4 degrees
-    "plate_gain": Usual(("gain",), "1", 0.02, 0.05),
-    "plate_crosstalk": Usual(("coefficient",), "1", 0.01, 0.03),
-    "plate_zero": Usual(("offset",), "N", 8.0, 25.0),
-    "plate_drift": Usual(("drift",), "N/s", 0.3, 2.0),  # 10 to 20 N over 10 to 30 s
-    "gravity_tilt": Usual(("angle_x", "angle_y"), "rad", 0.0087266, 0.034907),
-    "added_mass": Usual(("mass",), "kg", 0.5, 1.5),
-    "released_object": Usual(("mass",), "kg", 0.3, 0.7),
-    "wobbling_mass": Usual(("mass",), "kg", 3.0, 4.5),
-    "breathing": Usual(("cosine", "sine"), "kg m", 0.05, 0.3),
-    "unmeasured_contact": Usual(("force_x", "force_y", "force_z"), "N", 20.0, 40.0),
-    "joint_centre": Usual(("shift_x", "shift_y", "shift_z"), "m", 0.015, 0.04),
-    "missing_joint": Usual(("flexion", "lateral", "axial"), "1", 0.2, 0.6),
-    "marker_shift": Usual(("x", "y", "z", "shift_x", "shift_y", "shift_z"), "m", 0.02, 0.04),
-    "implement": Usual(("moment",), "kg m", 0.08, 0.5),  # from a racket to a bat
-    "camera_frame": Usual(("angle_x", "angle_y"), "rad", 0.0087266, 0.034907),
-    "external_force": Usual(("force_x", "force_y", "force_z"), "N", 20.0, 80.0),
-    "object_handled": Usual(("mass",), "kg", 0.3, 2.0),
-    "marker_slide": Usual(("x", "y", "z"), "m", 0.01, 0.04),
+USUAL = {
+    name: Usual(tuple(usual["of"]), usual["unit"], usual["least"], usual["most"])
+    for name, about in _WORDS["causes"].items()
+    if (usual := about.get("usual"))
 }
 
 
@@ -286,98 +129,36 @@ def usual_words(effect: str) -> str:
     return with_unit(f"{factor * usual.least:.3g} to {factor * usual.most:.3g}", unit)
 
 
-def beside_usual(effect: str, size: Number) -> str:
-    """``, a usual size (5 to 20 ms)``; empty where nothing usual is known."""
-    usual = USUAL.get(effect)
-    if usual is None or size.name not in usual.parameters or size.unit != usual.unit:
-        return ""
-    shown = float(f"{abs(size.value):.2g}")  # as it is read
-    how = "smaller than usual" if shown < usual.least else "a usual size"
-    how = "larger than usual" if shown > usual.most else how
-    return f", {how} ({usual_words(effect)})"
-
-
 # --- recordings that separate causes --------------------------------------------------------------
 
 _LOADS = ("added_mass", "released_object", "object_handled", "implement", "wobbling_mass")
-_APART: dict[frozenset[str], str] = {
-    frozenset(pair): words
-    for pairs, words in (
-        (
-            [("plate_gain", "plate_zero"), ("plate_zero", "plate_crosstalk")],
-            "step off the plate for five seconds: an offset stays when nobody stands there",
-        ),
-        (
-            [("plate_zero", "added_mass"), ("plate_zero", "gravity_tilt")],
-            "step off the plate for five seconds: an offset stays when nobody stands there",
-        ),
-        (
-            [("plate_gain", "added_mass")],
-            "weigh the person as recorded on a scale, and lay a known weight on the plate",
-        ),
-        (
-            [("gravity_tilt", "plate_rotation"), ("gravity_tilt", "plate_crosstalk")],
-            "hop three times: a fault of the plate grows with the force on it, a tilted vertical "
-            "does not",
-        ),
-        (
-            [("plate_rotation", "plate_crosstalk")],
-            "stand on the plate and push forwards and sideways, and lay a known weight at several "
-            "places: a tilted plate changes every force, a leaking channel only one",
-        ),
-        (
-            [("gravity_tilt", "unexplained"), ("plate_zero", "unexplained")],
-            "stand still for ten seconds at three places of the plate with nothing attached to the "
-            "person: a tilt or an offset stays, whatever pulls is gone",
-        ),
-        (
-            [("sync_offset", "clock_drift")],
-            "hop three times at the beginning and at the end of a long recording",
-        ),
-        ([("missing_joint", "soft_tissue")], EFFECTS["missing_joint"].remedy),
-        (
-            [("breathing", "unexplained")],
-            "stand still for thirty seconds, the breath held in the last ten",
-        ),
-    )
-    for pair in pairs
-}
+_APART = {pair: one["record"] for one in _WORDS["apart"] for pair in one["causes"]}
+_APART["missing_joint soft_tissue"] = EFFECTS["missing_joint"].remedy
 _UNKNOWN = "look at plates, cables and everything that touches the person, and record again"
 
 
 def separating_recording(rivals: Sequence[tuple[str, str]], most: int | None = None) -> str:
     """What to record, without a final stop, for rivals as (effect, target); at most so many steps."""
     effects = list(dict.fromkeys(effect for effect, _ in rivals))
-    advice = [_places(effect, rivals) for effect in effects if _count(effect, rivals) > 1]
-    for pair in combinations(effects, 2):
-        known = _APART.get(frozenset(pair))
-        advice += [known] if known else [_own(effect) for effect in pair]
-    steps = _without_beginnings(advice)
+    places = {one: {target for effect, target in rivals if effect == one} for one in effects}
+    advice = [_places(effect, rivals) for effect in effects if len(places[effect]) > 1]
+    for one, other in combinations(effects, 2):
+        known = _APART.get(f"{one} {other}") or _APART.get(f"{other} {one}")
+        advice += [known] if known else [_own(one), _own(other)]
+    each = dict.fromkeys(advice)  # once, and none that another says with more words
+    steps = [one for one in each if not any(o != one and o.startswith(one) for o in each)]
     if most is not None:
         steps = [step for step in steps if step != _UNKNOWN][:most]
     return "; ".join(steps) or _UNKNOWN
 
 
-def _without_beginnings(advice: list[str]) -> list[str]:
-    """Each once, and none that another says with more words."""
-    each = list(dict.fromkeys(advice))
-    return [one for one in each if not any(o != one and o.startswith(one) for o in each)]
-
-
-def _count(effect: str, rivals: Sequence[tuple[str, str]]) -> int:
-    return len({target for name, target in rivals if name == effect})
-
-
 def _places(effect: str, rivals: Sequence[tuple[str, str]]) -> str:
     """The same effect at several places: they have to move, or be loaded, one at a time."""
-    where = [place_label(effect, target) for name, target in rivals if name == effect]
+    where = listing([place_label(effect, target) for name, target in rivals if name == effect])
     if effect in _LOADS:
-        return (
-            "look for what is worn or loose there, or keep still but for one at a time: "
-            f"{listing(where)}"
-        )
+        return f"look for what is worn or loose there, or keep still but for one at a time: {where}"
     if effect in ("unmeasured_contact", "external_force"):
-        return f"watch, or film, what touches the person: {listing(where)}"
+        return f"watch, or film, what touches the person: {where}"
     return _own(effect)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -18,11 +18,9 @@ from bsip_cli.report.blocks import (
     Numbered,
     Paragraph,
     Portrait,
-    Scale,
     Scales,
     Terms,
 )
-from bsip_cli.report.budget import overall_pieces
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
     Candidate,
@@ -32,7 +30,17 @@ from bsip_cli.report.candidates import (
     looked_at,
 )
 from bsip_cli.report.effect_words import separating_recording
-from bsip_cli.report.gains import use_sentence
+from bsip_cli.report.errors import (
+    COP_LIMIT_M,
+    FORCE_LIMIT_PERCENT,
+    MARKERS,
+    SOURCES,
+    Yardstick,
+    errors_of,
+    overall_pieces,
+    use_sentence,
+    yardsticks,
+)
 from bsip_cli.report.records import ParticipantRecord, TrialRecord
 from bsip_cli.report.verdict import (
     ALL_FAULTS,
@@ -43,15 +51,6 @@ from bsip_cli.report.verdict import (
     unseen,
 )
 from bsip_cli.report.words import capital, count, listing, number
-from bsip_cli.report.yardsticks import (
-    COP_LIMIT_M,
-    FORCE_LIMIT_PERCENT,
-    MARKERS,
-    SOURCES,
-    Yardstick,
-    errors_of,
-    yardsticks,
-)
 
 if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
@@ -80,7 +79,7 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         *_causes(record),
         *budget_bar(record),
         Heading("How large are the errors?"),
-        Scales(scales(record)),
+        Scales(tuple(yardstick.scale(value) for yardstick, value in measured_of(record))),
         Paragraph(f"Root mean square (RMS), with {record.use()}. {SOURCES}", "note"),
         *_sure(record, light),
         Heading("Which parameters to use"),
@@ -99,14 +98,10 @@ def light_for(record: ParticipantRecord) -> Light:
 def large_errors(record: ParticipantRecord) -> list[str]:
     """The yardsticks beyond which the errors are."""
     return [
-        f"{_within_sentence(one.title).removesuffix(' error')} {number(value)} {one.unit}"
+        f"{one.in_sentence().removesuffix(' error')} {number(value)} {one.unit}"
         for one, value in measured_of(record)
         if one.words(value) == "large"
     ]
-
-
-def _within_sentence(title: str) -> str:
-    return f"{title[:1].lower()}{title[1:]}"
 
 
 def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
@@ -149,14 +144,13 @@ def portrait(record: ParticipantRecord) -> tuple[Block, ...]:
 
 
 def _poses(record: ParticipantRecord, trial: TrialRecord) -> tuple[Pose, ...]:
-    from bsip_cli.report.figures.person import Motion, poses_of
+    from bsip_cli.report.figures.person import poses_of
 
     if trial.kinematics is None:
         return ()
     anterior = record.facts[["anterior_x", "anterior_y"]].to_numpy(dtype=float)
-    weight = record.body_weight()
-    motion = Motion(record.body, trial.kinematics, trial.reconstruction, anterior, weight)
-    return poses_of(motion, _POSES)
+    measured = trial.kinematics, trial.reconstruction
+    return poses_of(record.body, *measured, anterior, record.body_weight(), _POSES)
 
 
 # --- is anything wrong --------------------------------------------------------------------------
@@ -166,16 +160,12 @@ def _found(record: ParticipantRecord) -> tuple[tuple[Candidate, ...], ...]:
     return () if record.diagnosis is None else causes_of(candidates_of(record.diagnosis))
 
 
-def cause_lines(record: ParticipantRecord) -> tuple[str, ...]:
+def _causes(record: ParticipantRecord) -> Iterator[Block]:
     """A line per cause that was found, the most probable first."""
     if record.diagnosis is None or record.detection is None:
-        return ()
+        return
     everywhere = looked_at(record.detection, record.diagnosis)
-    return tuple(cause_line(cause, everywhere) for cause in _found(record))
-
-
-def _causes(record: ParticipantRecord) -> Iterator[Block]:
-    lines = cause_lines(record)
+    lines = tuple(cause_line(cause, everywhere) for cause in _found(record))
     if lines:
         yield Numbered(lines[:_MOST])
     if len(lines) > _MOST:
@@ -202,18 +192,13 @@ def _sure(record: ParticipantRecord, light: Light) -> Iterator[Block]:
     yield Paragraph(" ".join((*said, unseen(record.detection, record.diagnosis))).rstrip())
 
 
-def budget_bar(record: ParticipantRecord) -> tuple[Block, ...]:
+def budget_bar(record: ParticipantRecord) -> Iterator[Block]:
     """What makes the error of the table's parameters, as one bar."""
-    budget = record.budget
-    pieces = () if budget is None or budget.empty else overall_pieces(budget)
-    if budget is None or not pieces:
-        return ()
-    return (
-        Bar(
+    if record.budget is not None and (pieces := overall_pieces(record.budget)):
+        yield Bar(
             "What makes the squared error of the forces with a table's parameters (RM)",
             tuple((piece.label, piece.share) for piece in pieces if abs(piece.share) >= 0.5),
-        ),
-    )
+        )
 
 
 # --- how large ----------------------------------------------------------------------------------
@@ -227,10 +212,6 @@ def measured_of(record: ParticipantRecord) -> tuple[tuple[Yardstick, float], ...
     return tuple((one, values[one.name]) for one in yardsticks(*limits))
 
 
-def scales(record: ParticipantRecord) -> tuple[Scale, ...]:
-    return tuple(yardstick.scale(value) for yardstick, value in measured_of(record))
-
-
 # --- what to do ---------------------------------------------------------------------------------
 
 
@@ -240,24 +221,22 @@ def to_do(record: ParticipantRecord, light: Light) -> list[str]:
     said = [f"{refusal.unit or record.id}: {refusal.sentence}" for refusal in record.refusals[:1]]
     said = [_USABLE[light.state], *said]
     said += consequences(causes[:_MOST], only_actions=True)
-    said += [
-        f"To learn the cause of finding {k}, {_first_step(cause)}."
-        for k, cause in enumerate(causes[:_MOST], start=1)
-        if len(cause) > 1
-    ][:1]
+    groups = [(k, cause) for k, cause in enumerate(causes[:_MOST], start=1) if len(cause) > 1]
+    for k, cause in groups[:1]:
+        rivals = [(one.effect, one.target) for one in cause]
+        on_scale = cause[0].class_id == OF_THE_WEIGHT
+        step = "weigh the person on a scale" if on_scale else separating_recording(rivals, most=1)
+        said.append(f"To learn the cause of finding {k}, {step}.")
     large = [one for one, value in measured_of(record) if one.words(value) == "large"]
     if light.state == "inconclusive" and not large:
         said.append(
             "Record a movement in which every foot that touches the ground stands on a plate."
         )
     said += [text for one in large[:1] if (text := _where_large(record, one))]
-    return said[: _MOST + 1] if len(said) > 1 else [*said, *advice(record)]
-
-
-def _first_step(cause: Sequence[Candidate]) -> str:
-    if cause[0].class_id == OF_THE_WEIGHT:
-        return "weigh the person on a scale"
-    return separating_recording([(one.effect, one.target) for one in cause], most=1)
+    if len(said) == 1 and len(rows := record.excitation.query("quantity == 'next'")):
+        text = rows["text"].iloc[0]
+        said.append(f"Optional, to know the parameters better, record: {text}.")
+    return said[: _MOST + 1]
 
 
 def _where_large(record: ParticipantRecord, yardstick: Yardstick) -> str:
@@ -273,15 +252,6 @@ def _where_large(record: ParticipantRecord, yardstick: Yardstick) -> str:
         return ""
     worst = max(known, key=known.__getitem__)
     return (
-        f"Look at {worst}, where the {_within_sentence(yardstick.title)} is largest: a foot beside the "
+        f"Look at {worst}, where the {yardstick.in_sentence()} is largest: a foot beside the "
         "plate, a hand on something, plates or markers out of place, forces that start late?"
     )
-
-
-def advice(record: ParticipantRecord) -> list[str]:
-    """The movement that would tell most of the parameters, if any was computed."""
-    table = record.excitation
-    rows = table[table["quantity"] == "next"]
-    if rows.empty:
-        return []
-    return [f"Optional, to know the parameters better, record: {rows['text'].iloc[0]}."]

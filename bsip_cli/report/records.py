@@ -121,15 +121,6 @@ Message = tuple[str, str, str]
 """Stage, unit, text."""
 
 
-def messages_of(origin: Origin) -> tuple[Message, ...]:
-    return tuple((origin.stage, origin.unit, text) for text in origin.messages)
-
-
-def messages(origins: Iterable[Origin]) -> tuple[Message, ...]:
-    """Each once, in the order of the origins."""
-    return tuple(dict.fromkeys(said for origin in origins for said in messages_of(origin)))
-
-
 def with_all_causes(table: pd.DataFrame) -> pd.DataFrame:
     """Of the methods OM+<effect>... the last, which contains all causes, as `EXTENDED`."""
     names = [name for name in table["method"].unique() if is_extended(name)]
@@ -190,8 +181,14 @@ class HowMade:
                 made.options.setdefault(name, set()).add(value)
             for name, version in {"bsip": origin.bsip_version, **origin.libraries}.items():
                 made.versions.setdefault(name, set()).add(version)
-            made.files.update(_files(origin.inputs))
-            made.messages.update(dict.fromkeys(messages_of(origin)))
+            made.files.update(
+                (name, digest)
+                for name, digest in origin.inputs.items()
+                if "." in name and not name.endswith(".parquet")  # no artifact, no person's all
+            )
+            made.messages.update(
+                dict.fromkeys((origin.stage, origin.unit, text) for text in origin.messages)
+            )
         return made
 
     def number(self, option: str, otherwise: float) -> float:
@@ -234,12 +231,3 @@ def _flat(options: Mapping, before: str = "") -> Iterable[tuple[str, str]]:
             yield from _flat(value, f"{before}{name}.")
         else:
             yield f"{before}{name}", value if isinstance(value, str) else json.dumps(value)
-
-
-def _files(inputs: Mapping[str, str]) -> dict[str, str]:
-    """Inputs that are neither artifacts nor all of a participant's."""
-    return {
-        name: digest
-        for name, digest in inputs.items()
-        if "." in name and not name.endswith(".parquet")
-    }

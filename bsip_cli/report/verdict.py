@@ -11,14 +11,6 @@ import pandas as pd
 
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.report.blocks import Light
-from bsip_cli.report.budget import (
-    PARAMETERS,
-    REST,
-    UNKNOWN,
-    budget_sentences,
-    fault_share,
-    overall_pieces,
-)
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
     UNNAMED,
@@ -34,9 +26,16 @@ from bsip_cli.report.effect_words import (
     EFFECT_WORDS,
     OBJECTS,
     WEIGHT,
-    beside_usual,
     effect_title,
     separating_recording,
+)
+from bsip_cli.report.errors import (
+    PARAMETERS,
+    REST,
+    UNKNOWN,
+    budget_sentences,
+    fault_share,
+    overall_pieces,
 )
 from bsip_cli.report.words import (
     capital,
@@ -109,6 +108,7 @@ def verdict_of(
     causes = causes_of(candidates_of(diagnosis))
     everywhere = looked_at(detection, diagnosis)
     light = light_of(diagnosis, detection, budget)
+    names = [trial_label(stem) for stem in everywhere]
     return Verdict(
         f"{light.title}. {light.text}".rstrip(),
         bool(causes),
@@ -116,7 +116,7 @@ def verdict_of(
         (
             *(budget_sentences(budget) if budget is not None else ()),
             *(_results(causes, gains, changes) if causes else ()),
-            *_seen_in(everywhere),
+            *([f"Recordings looked at: {listing(names)}."] if names else ()),
         ),
         (*filter(None, [_named_twice(causes)]), *consequences(causes)),
         unseen(detection, diagnosis),
@@ -196,8 +196,6 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     if len(cause) > 1:
         return _group_line(cause, sure)
     (one,) = cause
-    main = one.main_number()
-    usual = beside_usual(one.effect, main) if main and one.effect not in OBJECTS else ""
     some = _MOST_NAMED < len(one.trials) < len(everywhere)
     where = where_seen(one.trials, everywhere)
     where = f"in {len(one.trials)} of {len(everywhere)} recordings" if some else where
@@ -205,7 +203,7 @@ def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
         error, *good = one.what().removeprefix(_UNEXPLAINED).split("; ")
         return f"{capital('; '.join([f'{error}, {where}', *good[:1]]))}."
     sure = f"; probability {sure}" if sure else ""
-    return f"{capital(one.told(remarks=one.is_of_all))}, {where}{usual}{sure}."
+    return f"{capital(one.told(remarks=one.is_of_all))}, {where}{one.beside_usual()}{sure}."
 
 
 def _group_line(cause: Sequence[Candidate], sure: str) -> str:
@@ -231,41 +229,32 @@ def _group_line(cause: Sequence[Candidate], sure: str) -> str:
     )
 
 
-def _seen_in(everywhere: Sequence[str]) -> tuple[str, ...]:
-    names = [trial_label(stem) for stem in everywhere]
-    return (f"Recordings looked at: {listing(names)}.",) if names else ()
-
-
 # --- a cause ----------------------------------------------------------------------------------
 
 
 def cause_text(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:
     """A cause, or a group of which one is there: what, how large, where and how probable."""
     first = cause[0]
-    places, sure = [f", {where_seen(one.trials, everywhere)}" for one in cause], how_sure(cause)
+    places, sure = [f", {where_seen(one.trials, everywhere)}" for one in cause], _how_sure(cause)
     if len(cause) == 1:
         return f"{capital(first.told())}{places[0]}. {sure}".rstrip()
     common, own = (places[0], [""] * len(cause)) if len(set(places)) == 1 else ("", places)
-    members = "; ".join(
-        f"({_letter(k)}) {one.told()}{place}{_probability(one)}"
-        for k, (one, place) in enumerate(zip(cause, own, strict=True))
-    )
+    members = []
+    for k, (one, place) in enumerate(zip(cause, own, strict=True)):
+        words = probability_words(one.probability)
+        probability = f", probability {words}" if words else ""
+        members.append(f"({_letter(k)}) {one.told()}{place}{probability}")
     apart = separating_recording([(one.effect, one.target) for one in cause], _MOST_STEPS)
     if first.class_id == OF_THE_WEIGHT:
         apart = f"weigh the person on a scale; {apart}"
     return (
-        f"One of these, which these recordings cannot distinguish{common}: {members}. "
+        f"One of these, which these recordings cannot distinguish{common}: {'; '.join(members)}. "
         f"{sure}{' ' if sure else ''}To distinguish them: {apart}."
     )
 
 
 def _letter(number: int) -> str:
     return chr(ord("a") + number)
-
-
-def _probability(one: Candidate) -> str:
-    words = probability_words(one.probability)
-    return f", probability {words}" if words else ""
 
 
 def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
@@ -278,21 +267,15 @@ def where_seen(trials: Sequence[str], everywhere: Sequence[str]) -> str:
     return f"{'only ' if set(trials) < set(everywhere) else ''}in {listing(names)}"
 
 
-def how_sure(cause: Sequence[Candidate]) -> str:
+def _how_sure(cause: Sequence[Candidate]) -> str:
     """How probable it is, and what it explains of data that were not used to size it."""
-    said = [_probable(cause), *(_explained(one, k, cause) for k, one in enumerate(cause))]
+    words = probability_words(probability_of(cause))
+    if words:
+        rest = ", else the stated mass is wrong" if cause[0].class_id == OF_THE_WEIGHT else ""
+        words = f"probability {words}" if len(cause) == 1 else f"together {words}{rest}"
+    said = [words, *(_explained(one, k, cause) for k, one in enumerate(cause))]
     text = "; ".join(filter(None, said))
     return f"{capital(text)}." if text else ""
-
-
-def _probable(cause: Sequence[Candidate]) -> str:
-    words = probability_words(probability_of(cause))
-    if not words:
-        return ""
-    if len(cause) == 1:
-        return f"probability {words}"
-    rest = ", else the stated mass is wrong" if cause[0].class_id == OF_THE_WEIGHT else ""
-    return f"together {words}{rest}"
 
 
 def _explained(one: Candidate, position: int, cause: Sequence[Candidate]) -> str:
@@ -368,7 +351,8 @@ def change_sentence(changes: pd.DataFrame) -> str:
     """What the causes do to the person's parameters; ``changes`` is a ``bsip-change`` table."""
     if changes.empty:
         return ""
-    worth = worth_telling(changes)
+    large = changes["mass_change_kg"].abs() >= _WORTH_KG
+    worth = changes[large | (1000.0 * changes["com_change_m"] >= _WORTH_MM)]
     if worth.empty:
         return (
             "What it does to the body's parameters: next to nothing; no segment changes by "
@@ -386,12 +370,6 @@ def change_sentence(changes: pd.DataFrame) -> str:
         "What it does to the body's parameters: with what was found in the model, most of all "
         f"{'; '.join(parts)}."
     )
-
-
-def worth_telling(changes: pd.DataFrame) -> pd.DataFrame:
-    """Rows of ``bsip-change`` that are large enough to matter."""
-    millimetres = 1000.0 * changes["com_change_m"]
-    return changes[(changes["mass_change_kg"].abs() >= _WORTH_KG) | (millimetres >= _WORTH_MM)]
 
 
 def put_right_sentence(events: Sequence[tuple[str, pd.DataFrame]]) -> tuple[str, ...]:

@@ -28,8 +28,10 @@ def why_stale(unit: Unit) -> str:
     if unit.refusal_path().exists():
         return "it was refused before"
     for kind in unit.stage.writes:
-        if why := _why_not(unit, kind, "made_by") or _listed_changed(unit, kind):
+        if why := _why_not(unit, kind, "made_by"):
             return why
+        if names := _changed_files(unit, kind):  # beside the artifact: pages, figures, tables
+            return f"{names[0]} has changed since bsip wrote it"
     amended = (_why_not(unit, kind, "amended_by") for kind in unit.stage.amends)
     return next(filter(None, amended), "")
 
@@ -128,22 +130,15 @@ def _names(one: Mapping, other: Mapping) -> list[str]:
     return sorted(key for key in one.keys() | other.keys() if one.get(key) != other.get(key))
 
 
-def _listed_changed(unit: Unit, kind: str) -> str:
-    """Files beside the artifact (pages, figures, tables) are no more those it lists."""
-    names = _changed_files(unit, kind)
-    return f"{names[0]} has changed since bsip wrote it" if names else ""
-
-
 def _changed_files(unit: Unit, kind: str) -> list[str]:
     if SCHEMAS[kind].column("sha256") is None:
         return []
     listed = read_artifact(unit.path(kind), kind)
-    files = zip(listed["file"], listed["sha256"], strict=True)
-    return [name for name, known in files if not _is(unit.out / name, known)]
-
-
-def _is(path: Path, sha256: str) -> bool:
-    return path.is_file() and file_hash(path) == sha256
+    return [
+        name
+        for name, known in zip(listed["file"], listed["sha256"], strict=True)
+        if not (path := unit.out / name).is_file() or file_hash(path) != known
+    ]
 
 
 def _changed(unit: Unit, kind: str) -> list[str]:
@@ -172,9 +167,10 @@ def outdated(path: Path) -> str:
     waiting, seen = [path], set()
     while waiting:
         one = waiting.pop()
-        provenance = read_header(one)["provenance"]
-        made_by = provenance["made_by"]
-        if made_by.get("code") != _code_of(one):
+        header = read_header(one)
+        made_by = header["provenance"]["made_by"]
+        makers = [stage for stage in STAGES if header["kind"] in stage.writes]
+        if made_by.get("code") != (code_hash(makers[0].module) if makers else ""):
             return f"{one.name} was made by other code"
         for name, known in made_by["inputs"].items():
             source = one.with_name(name)
@@ -185,9 +181,3 @@ def outdated(path: Path) -> str:
             seen.add(source.name)
             waiting.append(source)
     return ""
-
-
-def _code_of(path: Path) -> str:
-    kind = read_header(path)["kind"]
-    makers = [stage for stage in STAGES if kind in stage.writes]
-    return code_hash(makers[0].module) if makers else ""

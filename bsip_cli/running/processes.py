@@ -82,11 +82,7 @@ def endings_kept() -> Iterator[None]:
 def ignore_endings() -> None:
     """From now on nothing is raised, for a process that is about to end."""
     for number in ENDING:  # with SIG_IGN, Python would complain of one that has just come
-        signal.signal(number, _pass_over)
-
-
-def _pass_over(_number: int, _frame: object) -> None:
-    return
+        signal.signal(number, lambda *_: None)
 
 
 def leave(exit_code: int) -> NoReturn:
@@ -166,7 +162,9 @@ def work_on(
                 workers.append(_start())
             for worker in workers:
                 if worker.task is None and pending:
-                    _hand(worker, work, pending.popleft())
+                    worker.task = pending.popleft()
+                    with suppress(OSError):  # it has died: then its end of the pipe says so
+                        worker.pipe.send((work, worker.task))
             by_pipe = {worker.pipe: worker for worker in workers}
             for pipe in wait(list(by_pipe)):
                 end_if_asked()
@@ -192,12 +190,6 @@ def _start() -> _Worker:
         process.start()
     theirs.close()
     return _Worker(process, ours)
-
-
-def _hand(worker: _Worker[Task], work: Callable, task: Task) -> None:
-    worker.task = task
-    with suppress(OSError):  # it has died: then its end of the pipe says so
-        worker.pipe.send((work, task))
 
 
 def _died(worker: _Worker[Task], tidy: Callable[[Task], None]) -> Iterator[Died[Task]]:

@@ -142,14 +142,20 @@ def _run(task: _Task) -> Iterator[tuple[str, Outcome]]:
     try:
         with held_alone(task.folder):
             if _is_unchanged(task):
-                yield from ((task.name, outcome) for outcome in _all_fresh(task))
+                for stage, trial in _units(task):
+                    name = trial.stem if trial else task.name
+                    yield task.name, Outcome(stage.name, name, "fresh")
                 return
             is_true = True
             for outcome in _run_alone(task):
                 is_true &= outcome.state in ("done", "fresh")
                 yield task.name, outcome
             time.sleep(fingerprints.STEP_S)  # for what was written last to have its own time
-            _remember(task, _state(task) if is_true and task.part == "last" else "")
+            state = _state(task) if is_true and task.part == "last" else ""
+            recordings = [task.study.root / task.participant.id] if task.participant else []
+            kept = fingerprints.to_keep([task.folder, *recordings], state).encode()
+            if fingerprints.kept_in(task.folder) != kept:
+                write_bytes(task.folder / fingerprints.NAME, kept)
     except BsipError as error:
         yield task.name, _stopped(task, error)
     except OSError as error:
@@ -189,19 +195,6 @@ def _state(task: _Task) -> str:
     code = [code_hash(stage.module) for stage in stages]
     facts = (files, code, library_versions(), task.config.model_dump_json(), task.participant)
     return hashlib.sha256(repr(facts).encode()).hexdigest() if files else ""
-
-
-def _all_fresh(task: _Task) -> Iterator[Outcome]:
-    for stage, trial in _units(task):
-        yield Outcome(stage.name, trial.stem if trial else task.name, "fresh")
-
-
-def _remember(task: _Task, state: str) -> None:
-    """Keep what is known of the participant's files, or of the group's own."""
-    recordings = [task.study.root / task.participant.id] if task.participant else []
-    kept = fingerprints.to_keep([task.folder, *recordings], state).encode()
-    if fingerprints.kept_in(task.folder) != kept:
-        write_bytes(task.folder / fingerprints.NAME, kept)
 
 
 def _units(task: _Task) -> Iterator[tuple[Stage, Trial | None]]:
@@ -312,17 +305,13 @@ def lacking(unit: Unit) -> Outcome | None:
         return Outcome(stage, unit.name, "waiting", (f"{unit.name}: nobody is left for {stage}",))
     if not gone:
         return None
-    if _refused_upstream(unit):
+    folders = [unit.out / participant.id for participant in unit.participants()]
+    if any(any(folder.glob("*_refusal-*.parquet")) for folder in folders):
         why = f"{unit.name}: left out of {stage}, since its input was refused"
         return Outcome(stage, unit.name, "waiting", (why,))
     first = producer(gone[0]).name
     why = f"{unit.name}: {stage} has no {', '.join(gone)} to read"
     return Outcome(stage, unit.name, "waiting", (f"{why}; run `bsip {first}` first",), 2)
-
-
-def _refused_upstream(unit: Unit) -> bool:
-    folders = [unit.out / participant.id for participant in unit.participants()]
-    return any(any(folder.glob("*_refusal-*.parquet")) for folder in folders)
 
 
 def _write_refusal(unit: Unit, kind: str, sentence: str) -> None:
@@ -343,23 +332,11 @@ def _bug(stage: str, name: str, error: Exception) -> Outcome:
 
 def _killed(task: _Task, exit_code: int | None) -> Outcome:
     stage = task.stages[0].name if len({stage.name for stage in task.stages}) == 1 else "run"
-    how = (
-        _SHORT_OF_MEMORY
-        if exit_code == -signal.SIGKILL
-        else f"the process crashed ({_ending(exit_code)})"
-    )
-    return Outcome(stage, task.name, "bug", (f"{task.name}: {how}",), 1)
-
-
-def _ending(exit_code: int | None) -> str:
     code = exit_code or 0
-    return signal.Signals(-code).name if code < 0 else f"exit code {code}"
-
-
-def refusal_sentence(refusals: list[BadDataError]) -> Iterator[Outcome]:
-    """Outcomes for participants that could not even be listed."""
-    for refusal in refusals:
-        yield Outcome("study", "study", "refused", (str(refusal),), refusal.exit_code)
+    ending = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+    killed = code == -signal.SIGKILL
+    how = _SHORT_OF_MEMORY if killed else f"the process crashed ({ending})"
+    return Outcome(stage, task.name, "bug", (f"{task.name}: {how}",), 1)
 
 
 # --- only one program at a time writes into a folder of results -------------------------------

@@ -19,9 +19,8 @@ from bsip_cli.body.skeleton import load_skeleton
 from bsip_cli.config import Config, Load, load_config, with_estimators
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.pipeline import FINDINGS, Stage, by_level, cost_s, stages_named
-from bsip_cli.running.runner import Manner, Outcome, refusal_sentence, run_stages
-from bsip_cli.study.dataset import describe_dataset, make_out
-from bsip_cli.study.study import Study, load_study
+from bsip_cli.running.runner import Manner, Outcome, run_stages
+from bsip_cli.study.study import Study, describe_dataset, load_study, make_out
 from bsip_cli.study.trials import listed
 
 _LOADS = "correct [[loads]] in study.toml"
@@ -116,7 +115,8 @@ def open_study(
         whole = load_study(root, roles) if chosen else (study, refusals)
         _check_names(config, *whole)
     make_out(out, root)
-    return OpenedStudy(study, config, (*_notes(*study.notes), *refusal_sentence(refusals)))
+    refused = (Outcome("study", "study", "refused", (str(one),), one.exit_code) for one in refusals)
+    return OpenedStudy(study, config, (*_notes(*study.notes), *refused))
 
 
 def _check_names(config: Config, study: Study, refusals: list[BadDataError]) -> None:
@@ -177,7 +177,7 @@ def follow(
     voice.tell_of_the_others()
     if not quiet:
         _summary(command, outcomes, out)
-    return _exit_code(outcomes)
+    return max((outcome.exit_code for outcome in outcomes), key=_SEVERITY.index, default=0)
 
 
 def _cost_s(outcome: Outcome) -> float:
@@ -226,21 +226,16 @@ def _config(root: Path, config_file: Path | None) -> Config:
     if config_file is not None and not config_file.is_file():
         raise UsageError("there is no such file", file=config_file, remedy="check --config")
     config = load_config([root / "study.toml", *([config_file] if config_file else [])])
-    config = config.model_copy(
-        update={name: _own_file(root, getattr(config, name)) for name in ("marker_set", "skeleton")}
-    )
+    for option in ("marker_set", "skeleton"):  # a user's own file lies in the study, or here
+        in_study = root / (name := getattr(config, option))
+        if name.endswith(".toml") and in_study.is_file():
+            config = config.model_copy(update={option: str(in_study)})
     if config.marker_set != "auto":
         load_marker_set(config.marker_set)
     with_mass = load_skeleton(config.skeleton).body_names
     for k, load in enumerate(config.loads):
         _check_known(f"loads.{k}.segment", [load.segment], with_mass)
     return config
-
-
-def _own_file(root: Path, name: str) -> str:
-    """A user's own TOML file lies in the study, or where the command was given."""
-    in_study = root / name
-    return str(in_study) if name.endswith(".toml") and in_study.is_file() else name
 
 
 def _summary(command: str, outcomes: Iterable[Outcome], out: Path | None) -> None:
@@ -256,10 +251,6 @@ def _summary(command: str, outcomes: Iterable[Outcome], out: Path | None) -> Non
     said = ", ".join(f"{states[state]} {word}" for state, word in words.items() if states[state])
     where = f"; results in {printable(str(out))}" if out else ""
     click.echo(f"bsip {command}: {said or 'nothing to do'}{where}", err=True)
-
-
-def _exit_code(outcomes: Iterable[Outcome]) -> int:
-    return max((outcome.exit_code for outcome in outcomes), key=_SEVERITY.index, default=0)
 
 
 # --- whether loads and prefixes of study.toml fit the study: nothing named that is not there ------

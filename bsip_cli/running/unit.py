@@ -50,9 +50,6 @@ class Folder:
         except FileNotFoundError:
             return cls(path, frozenset())
 
-    def holds(self, path: Path) -> bool:
-        return path.name in self.names
-
     def refusals(self, owners: Collection[str], stages: Iterable[Stage]) -> list[Path]:
         """The refusals of these owners (ids of participants, stems of trials) by these stages."""
         if not any("_refusal-" in name for name in self.names):
@@ -113,11 +110,10 @@ class Unit:
         stem = owner.stem if owner else participant.id
         return self.out / participant.id / f"{stem}_{name}.parquet"
 
-    def refusal_path(self, stage: str | None = None, trial: Trial | None = None) -> Path:
-        """Where a refusal of this unit (or of another stage or trial) is written down."""
+    def refusal_path(self) -> Path:
+        """Where a refusal of this unit is written down."""
         folder = self.participant.id if self.participant else "group"
-        stem = trial.stem if trial else self.name
-        return self.out / folder / f"{stem}_refusal-{stage or self.stage.name}.parquet"
+        return self.out / folder / f"{self.name}_refusal-{self.stage.name}.parquet"
 
     def loads(self, trial: Trial | None = None) -> tuple[Load, ...]:
         """Known loads of a trial (by default the unit's own; without one, of the participant)."""
@@ -163,7 +159,7 @@ class Unit:
         before = STAGES[: STAGES.index(producer(kind)) + 1]
         of_trials = [stage for stage in before if stage.level == "trial"]
         return (
-            folder.holds(self.path(kind, trial, participant))
+            self.path(kind, trial, participant).name in folder.names
             and not folder.refusals(_owners_of_refusals(participant), before)
             and not (trial and folder.refusals([trial.stem], of_trials))
         )
@@ -254,7 +250,14 @@ class Unit:
                 "mass_kg": self.participant.mass_kg,
                 "height_m": self.participant.height_m,
             }
-        return describe(self.stage, self._hashes(), options)
+        return {
+            "stage": self.stage.name,
+            "bsip_version": __version__,
+            "code": code_hash(self.stage.module),
+            "libraries": library_versions(),
+            "inputs": dict(sorted(self._hashes().items())),
+            "options": json.loads(json.dumps(options, sort_keys=True)),
+        }
 
     def _hashes(self) -> dict[str, str]:
         """Of every input; in the group, of everything of a participant together."""
@@ -262,7 +265,10 @@ class Unit:
             files = self.inputs()
             hashes = {name: file_hash(path) for name, path in files.items() if path.exists()}
             of_all = [k for k in self.stage.inputs if SCHEMAS[k].level == "cohort" and self._has(k)]
-            return hashes | {f"{k} of the group": _digest(self.facts(k)["answer"]) for k in of_all}
+            for kind in of_all:  # what a result of the group tells its participants
+                answer = json.dumps(self.facts(kind)["answer"], sort_keys=True)
+                hashes[f"{kind} of the group"] = hashlib.sha256(answer.encode()).hexdigest()
+            return hashes
         everybody = ((person.id, self._files_of(person)) for person in self.study.participants)
         people = {name: hash_of_files(files) for name, files in everybody if files}
         files = self._files_of(None) | self._files_of_options()
@@ -322,11 +328,6 @@ class Unit:
         notes |= {"amended_by": self.made_by, "rows_made": len(made)}
         whole = pd.concat([made, rows], ignore_index=True) if len(rows) else made
         write_artifact(path, kind, whole, notes)
-
-
-def _digest(answer: object) -> str:
-    """Of what a result of the group tells its participants."""
-    return hashlib.sha256(json.dumps(answer, sort_keys=True).encode()).hexdigest()
 
 
 def _owners_of_refusals(participant: Participant | None, *trials: Trial | None) -> list[str]:
@@ -413,39 +414,28 @@ def _data_of(modules: frozenset[str]) -> set[Path]:
     packages = {module.rpartition(".")[0] for module in modules} - {"", _NAME}
     folders = {_PACKAGE.joinpath(*package.split(".")[1:]) for package in packages}
     inside = {file for folder in folders for file in _below(folder)}
-    return files | {file for file in inside if _package_of(file) in folders}
+    return files | {
+        file
+        for file in inside
+        if next(one for one in file.parents if (one / "__init__.py").is_file()) in folders
+    }
 
 
 def _below(place: Path) -> set[Path]:
     """Files that belong to the package and are no code."""
     files = place.rglob("*") if place.is_dir() else [place]
     return {
-        file for file in files if file.is_file() and not _is_made(file) and file.suffix != ".py"
+        file
+        for file in files
+        if file.is_file()
+        and file.suffix != ".py"
+        # what Python, numba or an editor left there
+        and not (file.parent.name == "__pycache__" or file.name[0] == "." or file.name[-1] == "~")
     }
 
 
-def _is_made(file: Path) -> bool:
-    """What Python, numba or an editor left there."""
-    return file.parent.name == "__pycache__" or file.name.startswith(".") or file.name[-1] == "~"
-
-
-def _package_of(file: Path) -> Path:
-    return next(folder for folder in file.parents if (folder / "__init__.py").is_file())
-
-
 _LIBRARIES = (
-    "clarabel",
-    "ezc3d",
-    "jinja2",
-    "matplotlib",
-    "numba",
-    "numpy",
-    "pandas",
-    "pin",
-    "pyarrow",
-    "pydantic",
-    "scipy",
-    "statsmodels",
+    "clarabel ezc3d jinja2 matplotlib numba numpy pandas pin pyarrow pydantic scipy statsmodels"
 )
 
 
@@ -458,16 +448,4 @@ def hash_of_files(files: Mapping[str, Path]) -> str:
 @lru_cache(maxsize=1)
 def library_versions() -> dict[str, str]:
     """Versions of the libraries that numbers and figures depend on."""
-    return {name: version(name) for name in _LIBRARIES}
-
-
-def describe(stage: Stage, inputs: Mapping[str, str], options: Mapping) -> dict:
-    """The provenance of what ``stage`` makes from ``inputs`` (name: hash) with ``options``."""
-    return {
-        "stage": stage.name,
-        "bsip_version": __version__,
-        "code": code_hash(stage.module),
-        "libraries": library_versions(),
-        "inputs": dict(sorted(inputs.items())),
-        "options": json.loads(json.dumps(options, sort_keys=True)),
-    }
+    return {name: version(name) for name in _LIBRARIES.split()}

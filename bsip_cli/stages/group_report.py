@@ -16,9 +16,15 @@ import pandas as pd
 from bsip_cli.artifacts import file_rows
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.cohort.document import SHOWN, cohort_document
-from bsip_cli.report.cohort.record import CohortRecord, Member, ratios_of, yardsticks_of
+from bsip_cli.report.cohort.record import (
+    CohortRecord,
+    Member,
+    Searched,
+    ratios_of,
+    searched,
+    yardsticks_of,
+)
 from bsip_cli.report.records import HowMade, Origin
-from bsip_cli.report.shared import Searched, searched
 from bsip_cli.report.tables.build import build_tables
 from bsip_cli.report.words import listing
 from bsip_cli.running.unit import Unit

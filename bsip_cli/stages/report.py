@@ -15,9 +15,8 @@ from pathlib import Path
 import pandas as pd
 
 from bsip_cli.artifacts import file_rows, is_made_from, read_artifact, read_header, write_bytes
-from bsip_cli.report.blocks import Document, Grid, Picture
+from bsip_cli.report.blocks import FILES, Document, Grid, Picture, render
 from bsip_cli.report.first_page import light_for
-from bsip_cli.report.page import FILES, render
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import Origin, ParticipantRecord, Refusal, TrialRecord, with_all_causes
 from bsip_cli.report.words import ROLES, trial_label

@@ -19,19 +19,17 @@ from bsip_cli.pipeline import STAGES, producer
 from bsip_cli.running.unit import Unit
 from bsip_cli.statistics.cohort import (
     DATA_SHARE,
+    DIFFERENCE,
     PAIR,
+    Comparison,
     CorrelationRun,
     Criteria,
     PersonTestCounts,
-    person_tests,
-    tests_of,
-)
-from bsip_cli.statistics.cohort_values import (
-    DIFFERENCE,
-    Comparison,
     Topic,
     Value,
     line_of,
+    person_tests,
+    tests_of,
     with_holm,
 )
 from bsip_cli.statistics.methods import MEASURED, METHODS, OM, RM

@@ -1,27 +1,18 @@
-"""The tests of the six tables, from the participants' values."""
+"""Participants' results as tidy values, and the tests of the six tables from these."""
 
 from __future__ import annotations
 
 from array import array
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from itertools import combinations
 from math import isnan, nan
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bsip_cli.statistics.cohort_values import (
-    DIFFERENCE,
-    Comparison,
-    Topic,
-    Value,
-    joined,
-    per_participant,
-    topics,
-)
 from bsip_cli.statistics.hypothesis_tests import (
     PostHoc,
     cohens_d_pooled,
@@ -39,12 +30,139 @@ from bsip_cli.statistics.hypothesis_tests import (
 from bsip_cli.statistics.methods import MEASURED, OM, RIVALS, RM
 from bsip_cli.statistics.samples import (
     TestResult,
+    adjusted_p_values,
     finite_pairs,
     finite_values,
     lilliefors_test,
     mean_of,
     standard_deviation,
 )
+
+# --- one line of the cohort's results: a test, or a description, with all its numbers -------------
+
+
+@dataclass(frozen=True)
+class Comparison(TestResult):
+    """A test of method_a against method_b.
+
+    `p_holm` corrects for all rows of the same test with the same method_b in the same table.
+    """
+
+    topic: Topic
+    test: str
+    origin: Literal["published", "added"]
+    method_a: str
+    method_b: str = ""
+    p_holm: float = nan
+    lilliefors_p: float = nan
+
+    def as_row(self) -> dict[str, str | float]:
+        """The fields by name, the topic's among them."""
+        everything = asdict(self)
+        return everything.pop("topic") | everything
+
+    @classmethod
+    def from_row(cls, row: Mapping) -> Comparison:
+        """The comparison that `as_row` wrote down."""
+        of_topic = {field.name for field in fields(Topic)}
+        topic = Topic(**{name: row[name] for name in of_topic})
+        return cls(topic, **{name: row[name] for name in row if name not in of_topic})
+
+
+def joined(*reasons: str) -> str:
+    """Every reason once, in order."""
+    return " ".join(dict.fromkeys(filter(None, reasons)))
+
+
+HOLM_FAMILIES = ("paired_t", "wilcoxon")
+
+
+def with_holm(comparisons: Sequence[Comparison]) -> tuple[Comparison, ...]:
+    """The same comparisons, p_holm filled in where a table asks one question many times."""
+    families: dict[tuple[str, str, str], list[int]] = defaultdict(list)
+    for place, row in enumerate(comparisons):
+        if row.test in HOLM_FAMILIES and not isnan(row.p_value):
+            families[row.topic.table, row.test, row.method_b].append(place)
+    corrected = list(comparisons)
+    for places in families.values():
+        adjusted = adjusted_p_values([comparisons[place].p_value for place in places], "holm")
+        for place, p in zip(places, adjusted, strict=True):
+            corrected[place] = replace(comparisons[place], p_holm=p)
+    return tuple(corrected)
+
+
+# --- values, and those that belong to one line of a table -----------------------------------------
+
+
+DIFFERENCE = f"|{OM}-{RM}|"
+"""The method of a value that is how far both are apart."""
+
+OVER_TASKS = ("table2", "table3", "table6")
+"""Tables of the identification sequence, under whatever task names it was recorded."""
+
+
+class Value(NamedTuple):
+    """One number of one participant, trial and method; `trial` is empty where there is none.
+
+    `role` is sequence or validation, `data` what the trial was to OM: identification or held_out.
+    """
+
+    participant: str
+    trial: str
+    task: str
+    role: str
+    data: str
+    table: str
+    variable: str
+    method: str
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Topic:
+    """What one line of a table is about: a variable in a task, in one unit."""
+
+    table: str
+    variable: str
+    task: str
+    role: str
+    unit: str
+
+
+def topics(values: Iterable[Value]) -> dict[Topic, list[Value]]:
+    """The values of each topic, in the order in which the topics first appear."""
+    groups: dict[Topic, list[Value]] = defaultdict(list)
+    for value in values:
+        groups[line_of(value)].append(value)
+    names = {topic: sorted({value.task for value in group}) for topic, group in groups.items()}
+    return {replace(topic, task=", ".join(names[topic])): groups[topic] for topic in groups}
+
+
+def line_of(one: Value | Topic) -> Topic:
+    """The topic of a value, or a topic itself, without the names of tasks that do not matter."""
+    task = "" if one.table in OVER_TASKS else one.task
+    return Topic(one.table, one.variable, task, one.role, one.unit)
+
+
+def per_participant(values: Iterable[Value], methods: Sequence[str]) -> NDArray[np.float64]:
+    """Shape (participants, methods): the mean over each one's runs; nan where there is none.
+
+    Only runs with all the methods count, so that the methods are compared over the same runs.
+    """
+    found: dict[str, dict[str, dict[str, float]]] = defaultdict(lambda: defaultdict(dict))
+    for value in values:
+        found[value.participant][value.trial][value.method] = value.value
+    means = np.full((len(found), len(methods)), np.nan)
+    for row, trials in enumerate(found.values()):
+        runs = np.array([[run.get(m, np.nan) for m in methods] for run in trials.values()])
+        complete = runs[np.isfinite(runs).all(axis=1)]
+        if len(complete):
+            means[row] = complete.mean(axis=0)
+    return means
+
+
+# --- the tests ------------------------------------------------------------------------------------
 
 Sample = NDArray[np.float64]
 Origin = Literal["published", "added"]
@@ -64,7 +182,7 @@ class Criteria:
     equivalence_percent: float
 
 
-# --- oM against a rival over the participants: the published t test, and what stands beside it ----
+# --- OM against a rival over the participants: the published t test, and what stands beside it ----
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,39 +438,31 @@ class PersonTestCounts:
     """What the participants' tests come to; keeps numbers of them, not the tests."""
 
     def __init__(self) -> None:
-        self._results: dict[tuple[Topic, str, Origin], _Results] = defaultdict(_Results)
+        self._numbers: dict[tuple[Topic, str, Origin], array[float]] = defaultdict(
+            lambda: array("d")  # statistic and p, one participant after the other
+        )
+        self._reasons: dict[tuple[Topic, str, Origin], set[str]] = defaultdict(set)
 
     def add(self, tests: Iterable[PersonTest]) -> None:
         for test in tests:
-            self._results[test.topic, "williams_t", "added"].add(test.williams)
-            self._results[test.topic, "fisher_z", "published"].add(test.fisher)
+            for name, origin, found in (
+                ("williams_t", "added", test.williams),
+                ("fisher_z", "published", test.fisher),
+            ):
+                key: Any = (test.topic, name, origin)
+                self._numbers[key].extend((found.statistic, found.p_value))
+                self._reasons[key] |= {found.reason} if found.reason else set()
 
     def comparisons(self, alpha: float) -> tuple[Comparison, ...]:
         """Median t and p of each topic, and in how many participants OM or RM is better."""
-        results = self._results.items()
-        return tuple(Comparison(*key, OM, RM, **found.numbers(alpha)) for key, found in results)
+        return tuple(Comparison(*key, OM, RM, **self._of(key, alpha)) for key in self._numbers)
 
-
-@dataclass
-class _Results:
-    """Statistic and p of one test in every participant, and why it is missing in some."""
-
-    statistics: array[float] = field(default_factory=lambda: array("d"))
-    p_values: array[float] = field(default_factory=lambda: array("d"))
-    reasons: set[str] = field(default_factory=set)
-
-    def add(self, test: TestResult) -> None:
-        self.statistics.append(test.statistic)
-        self.p_values.append(test.p_value)
-        if test.reason:
-            self.reasons.add(test.reason)
-
-    def numbers(self, alpha: float) -> dict[str, Any]:
-        t, p = np.array(self.statistics), np.array(self.p_values)
-        t, p = t[~np.isnan(p)], p[~np.isnan(p)]
+    def _of(self, key: tuple[Topic, str, Origin], alpha: float) -> dict[str, Any]:
+        numbers, reasons = np.reshape(self._numbers[key], (-1, 2)), self._reasons[key]
+        total = len(numbers)
+        t, p = numbers[~np.isnan(numbers[:, 1])].T
         better, worse = (int(np.sum((sign * t > 0.0) & (p < alpha))) for sign in (1.0, -1.0))
-        total = len(self.p_values)
-        like = ", for instance" if len(self.reasons) > 1 else ""
+        like = ", for instance" if len(reasons) > 1 else ""
         concerned = f"in {total - len(p)} of {total} participants{like}"
         return {
             "n": len(p),
@@ -362,5 +472,5 @@ class _Results:
             "effect_size_name": "share of participants whose correlations differ",
             "count_a": better,
             "count_b": worse,
-            "reason": f"{concerned}: {min(self.reasons)}" if self.reasons else "",
+            "reason": f"{concerned}: {min(reasons)}" if reasons else "",
         }

@@ -121,12 +121,16 @@ def wilcoxon(x: ArrayLike, y: ArrayLike) -> TestResult:
         )
         return TestResult(n=n, difference=estimate, reason=reason)
     ranks = stats.rankdata(np.abs(nonzero))
+    has_ties = len(np.unique(ranks)) < m
+    method: Any = stats.PermutationMethod(n_resamples=2**m) if has_ties else "exact"
+    if m > (EXACT_WITH_TIES_UP_TO if has_ties else EXACT_WILCOXON_UP_TO):
+        method = "asymptotic"
     positive, negative = float(ranks[nonzero > 0].sum()), float(ranks[nonzero < 0].sum())
     return TestResult(
         n=n,
         difference=estimate,
         statistic=min(positive, negative),
-        p_value=_signed_rank_p(nonzero, ranks),
+        p_value=float(stats.wilcoxon(nonzero, method=method).pvalue),
         effect_size=(positive - negative) / (positive + negative),
     )
 
@@ -219,13 +223,6 @@ def _pair_sum(ordered: NDArray[np.int64], number: int) -> int:
 
     sums = range(2 * int(ordered[0]), 2 * int(ordered[-1]) + 1)
     return sums[bisect_left(sums, number, key=pairs_up_to)]
-
-
-def _signed_rank_p(nonzero: NDArray[np.float64], ranks: NDArray[np.float64]) -> float:
-    n, has_ties = len(nonzero), len(np.unique(ranks)) < len(nonzero)
-    exact = stats.PermutationMethod(n_resamples=2**n) if has_ties else "exact"
-    is_exact = n <= (EXACT_WITH_TIES_UP_TO if has_ties else EXACT_WILCOXON_UP_TO)
-    return float(stats.wilcoxon(nonzero, method=exact if is_exact else "asymptotic").pvalue)
 
 
 # --- more than two methods: one-way analysis of variance, and the one for repeated measures -------

@@ -120,7 +120,9 @@ def name_all(
 
 def _people(recordings: Sequence[Found], notes: list[str]) -> dict[str, list[Found]]:
     """Recordings by participant."""
-    groups = _by(recordings, [_bids_person(one) for one in recordings])
+    places = ((one.stem, "/".join(one.folders)) for one in recordings)
+    found = (_BIDS_PERSON.search(stem) or _BIDS_PERSON.search(path) for stem, path in places)
+    groups = _by(recordings, [match[1] if match else "" for match in found])
     named = {key: own for key, own in groups.items() if key}
     for folder, inside in _by(groups.get("", []), _person_folders(groups.get("", []))).items():
         for key, own in _in_one_folder(inside, notes).items():
@@ -135,11 +137,6 @@ def _by(recordings: Iterable[Found], keys: Iterable[str]) -> dict[str, list[Foun
     for one, key in zip(recordings, keys, strict=True):
         groups[key].append(one)
     return groups
-
-
-def _bids_person(one: Found) -> str:
-    match = _BIDS_PERSON.search(one.stem) or _BIDS_PERSON.search("/".join(one.folders))
-    return match[1] if match else ""
 
 
 def _person_folders(recordings: Sequence[Found]) -> list[str]:
@@ -227,7 +224,9 @@ def _of_one_marker_set(recordings: Sequence[Found], notes: list[str]) -> list[li
     parts: list[list[Found]] = []
     for one in sorted(recordings, key=lambda one: -len(one.labels)):
         for part in parts:
-            if any(_share(one.labels, other.labels) >= _ENOUGH_LABELS for other in part):
+            least = (max(1, min(len(one.labels), len(other.labels))) for other in part)
+            shared = (len(one.labels & other.labels) for other in part)
+            if any(n >= _ENOUGH_LABELS * of for n, of in zip(shared, least, strict=True)):
                 part.append(one)
                 break
         else:
@@ -238,11 +237,6 @@ def _of_one_marker_set(recordings: Sequence[Found], notes: list[str]) -> list[li
             f"for those of {len(parts)} people; --participant says that they are one's"
         )
     return [sorted(part, key=lambda one: one.path) for part in parts]
-
-
-def _share(one: frozenset[str], other: frozenset[str]) -> float:
-    least = min(len(one), len(other))
-    return len(one & other) / least if least else 0.0
 
 
 def _free(wished: str, taken: Mapping[str, object], own: Sequence[Found]) -> str:
@@ -372,13 +366,10 @@ def _task_and_run(parts: Sequence[str]) -> tuple[str, int]:
         return task[1], int(number[1]) if number else 1
     match = re.fullmatch(rf"(.*?)(?<!\d)_?(\d{{1,{_LONGEST_RUN}}})", whole)
     before, run = (match[1], int(match[2])) if match else (whole, 1)
-    letters = plain(_camel(before))[:_LONGEST_TASK]
+    first, *others = _parts(before) or [""]
+    camel = first + "".join(part[:1].upper() + part[1:] for part in others)
+    letters = plain(camel)[:_LONGEST_TASK]
     return (letters if re.search("[A-Za-z]", letters) else f"trial{letters}"), max(run, 1)
-
-
-def _camel(text: str) -> str:
-    first, *others = [part for part in re.split(r"[\W_]+", text) if part] or [""]
-    return first + "".join(part[:1].upper() + part[1:] for part in others)
 
 
 # --- words ----------------------------------------------------------------------------------------

@@ -83,9 +83,8 @@ def columns_of(header: Sequence[str]) -> Columns:
         own = [column for column in found if column.name == name]
         exact = [column for column in own if column.title == name]
         if len(own) > 1 and len(exact) != 1:
-            faults.append(
-                f"has {len(own)} columns of one meaning, {_listed(own)}, and none is {name}"
-            )
+            titles = ", ".join(repr(column.title) for column in own)
+            faults.append(f"has {len(own)} columns of one meaning, {titles}, and none is {name}")
         elif own:
             known[name] = (exact or own)[0]
             if "?" in known[name].unit:
@@ -116,10 +115,6 @@ def _column(index: int, title: str) -> Column | None:
     elif name is None or (name not in _QUANTITIES and "".join(words) not in _COLUMN_OF):
         return None
     return Column(index, name, title.strip(), unit, legend if name == "sex" else {})
-
-
-def _listed(columns: Sequence[Column]) -> str:
-    return ", ".join(repr(column.title) for column in columns)
 
 
 def _misspelt(titles: Sequence[str], lacking: Sequence[str]) -> list[tuple[str, str]]:

@@ -17,11 +17,7 @@ MOST_COLUMNS = 1000  # a table of people has tens; a million take minutes and gi
 
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars"}
 _BLANKS = {"two or more blanks": 2, "blanks": 1}
-_BOMS = {
-    codecs.BOM_UTF8: "utf-8-sig",
-    codecs.BOM_UTF16_LE: "utf-16",
-    codecs.BOM_UTF16_BE: "utf-16",
-}
+_BOMS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 _SEPARATOR_LINE = re.compile(r"\s*\"?sep=.\"?\s*", re.IGNORECASE)  # which Excel writes and reads
 _MOSTLY_ZERO = 0.4  # of the bytes, every other one: UTF-16 without a mark
@@ -63,7 +59,8 @@ def read_text_table(file: Path, known: Callable[[Sequence[str]], int]) -> TextTa
         rows = [tuple(map(str.strip, cells)) for cells in _cells("".join(lines), separator)]
     except csv.Error as error:
         raise _no_text(file, str(error)) from None
-    kept = (_cut(cells, len(header)) for cells in rows[1:] if any(cells))
+    width = len(header)  # behind it a spreadsheet leaves empty cells
+    kept = (cells if any(cells[width:]) else cells[:width] for cells in rows[1:] if any(cells))
     return TextTable(header, tuple(kept), separator, encoding)
 
 
@@ -120,11 +117,6 @@ def _cells(text: str, separator: str) -> Iterator[list[str]]:
         separator = "tabs"
     sign = next(sign for sign, word in _SEPARATORS.items() if word == separator)
     yield from csv.reader(io.StringIO(text, newline=""), delimiter=sign)
-
-
-def _cut(cells: tuple[str, ...], width: int) -> tuple[str, ...]:
-    """Without the empty cells that a spreadsheet leaves to the right of a table."""
-    return cells if any(cells[width:]) else cells[:width]
 
 
 def _unreadable(file: Path, found: str) -> BadDataError:

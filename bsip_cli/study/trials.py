@@ -92,17 +92,14 @@ def refusals_of(faults: Iterable[Fault]) -> list[BadDataError]:
     alike: dict[tuple, list[Fault]] = {}
     for one in faults:
         alike.setdefault((one.path.parent, one.alike or one.found, one.remedy), []).append(one)
-    return [_refusal(*group) for group in alike.values()]
-
-
-def _refusal(first: Fault, *rest: Fault) -> BadDataError:
-    likewise = f" (likewise {listed(one.path.name for one in rest)})" if rest else ""
-    return BadDataError(
-        f"{first.found}{likewise}",
-        file=first.path,
-        expected=first.expected,
-        remedy=first.remedy,
-    )
+    refusals = []
+    for one, *rest in alike.values():
+        likewise = f" (likewise {listed(other.path.name for other in rest)})" if rest else ""
+        found = f"{one.found}{likewise}"
+        refusals.append(
+            BadDataError(found, file=one.path, expected=one.expected, remedy=one.remedy)
+        )
+    return refusals
 
 
 def listed(names: Iterable[str]) -> str:
@@ -233,7 +230,10 @@ def find_trials(folder: Path, participant: str, roles: Mapping[str, tuple[str, .
     found.look_through(folder)
     found.refusals[:0] = refusals_of(found.faults)
     found.trials.sort(key=lambda trial: trial.stem)
-    if double := _of_one_name(found.trials):
+    names: dict[str, list[str]] = {}  # of files of results, also where capitals do not count
+    for trial in found.trials:
+        names.setdefault(trial.stem.casefold(), []).append(trial.path.name)
+    if double := [name for alike in names.values() if len(alike) > 1 for name in alike]:
         found.refusals.append(
             BadDataError(
                 f"recordings of one name, but for capitals and the ending: {listed(double)}",
@@ -246,14 +246,6 @@ def find_trials(folder: Path, participant: str, roles: Mapping[str, tuple[str, .
     if not found.trials:
         found.refusals.append(_nothing_in(found))
     return found
-
-
-def _of_one_name(trials: Iterable[Trial]) -> list[str]:
-    """Recordings whose results would lie in the same files, also where capitals do not count."""
-    names: dict[str, list[str]] = {}
-    for trial in trials:
-        names.setdefault(trial.stem.casefold(), []).append(trial.path.name)
-    return [name for alike in names.values() if len(alike) > 1 for name in alike]
 
 
 def _nothing_in(folder: Folder) -> BadDataError:

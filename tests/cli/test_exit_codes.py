@@ -43,49 +43,31 @@ def test_command_line_that_cannot_be_understood(bsip, arguments, said):
     assert answer.err.splitlines()[-1].startswith("Error: ")
 
 
-def test_no_study_at_this_place(bsip, tmp_path):
-    answer = bsip("run", tmp_path / "nowhere", "--out", tmp_path / "out")
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("run {0}/nowhere --out {0}/out", "{0}/nowhere: there is no such folder. To mend it: "),
+        (
+            "run {0}/study --out {0}/out --participant sub-07 --participant sub-01 "
+            "--participant sub-9",
+            "no participant sub-07, sub-9; expected one of sub-01, sub-02",
+        ),
+        (
+            "run {0}/study --out {0}/out --participant sub-01 --group",
+            "--group is about all participants",
+        ),
+        ("run {0}/study --out {0}/file", "{0}/file: is no folder to write to"),
+        ("show {0}", "run `bsip run` first, or name the folder"),
+        ("show {0}/file", "`bsip info`"),
+        ("run {0}/study --out {0}/out --config {0}/no.toml", "{0}/no.toml: there is no such file"),
+    ],
+)
+def test_what_is_not_there_is_said_in_a_sentence(bsip, empty_study, tmp_path, command, said):
+    (tmp_path / "file").write_text("mine")
+    answer = bsip(*command.format(tmp_path).split())
     assert_usage_error(answer)
-    sentence = one_sentence(answer)
-    assert f"{tmp_path / 'nowhere'}: there is no such folder" in sentence
-    assert "To mend it: " in sentence
-    assert not (tmp_path / "out").exists()
-
-
-def test_unknown_participants_are_named_with_the_known_ones(bsip, empty_study, tmp_path):
-    chosen = ["--participant", "sub-07", "--participant", "sub-01", "--participant", "sub-9"]
-    answer = bsip("run", empty_study, "--out", tmp_path / "out", *chosen)
-    assert_usage_error(answer)
-    sentence = one_sentence(answer)
-    assert "no participant sub-07, sub-9; expected one of sub-01, sub-02" in sentence
-
-
-def test_the_group_needs_everybody(bsip, empty_study, tmp_path):
-    chosen = ["--participant", "sub-01", "--group"]
-    answer = bsip("run", empty_study, "--out", tmp_path / "out", *chosen)
-    assert_usage_error(answer)
-    assert "--group is about all participants" in one_sentence(answer)
-
-
-def test_out_that_is_a_file(bsip, empty_study, tmp_path):
-    (tmp_path / "out").write_text("mine")
-    answer = bsip("run", empty_study, "--out", tmp_path / "out")
-    assert_usage_error(answer)
-    assert f"{tmp_path / 'out'}: is no folder to write to" in one_sentence(answer)
-    assert (tmp_path / "out").read_text() == "mine"
-
-
-def test_show_without_tables(bsip, tmp_path):
-    answer = bsip("show", tmp_path)
-    assert_usage_error(answer)
-    assert "run `bsip run` first, or name the folder" in one_sentence(answer)
-
-
-def test_show_of_one_artifact(bsip, tmp_path):
-    (tmp_path / "sub-01_diagnosis.parquet").write_bytes(b"PAR1")
-    answer = bsip("show", tmp_path / "sub-01_diagnosis.parquet")
-    assert_usage_error(answer)
-    assert "`bsip info`" in one_sentence(answer)
+    assert said.format(tmp_path) in one_sentence(answer)
+    assert not (tmp_path / "out").exists() and (tmp_path / "file").read_text() == "mine"
 
 
 # --- configuration ------------------------------------------------------------------------------
@@ -139,12 +121,6 @@ def test_own_marker_set_with_faults(bsip, empty_study, tmp_path):
     (empty_study / "study.toml").write_text(f'marker_set = "{own}"\n')
     answer = bsip("run", empty_study, "--out", tmp_path / "out")
     assert_usage_error(answer, "unknown segment hed (did you mean head?)", "TOP stands twice")
-
-
-def test_config_file_that_is_not_there(bsip, empty_study, tmp_path):
-    answer = bsip("run", empty_study, "--out", tmp_path / "out", "--config", tmp_path / "no.toml")
-    assert_usage_error(answer)
-    assert f"{tmp_path / 'no.toml'}: there is no such file" in one_sentence(answer)
 
 
 def test_stage_before_its_turn_names_the_one_to_run_first(bsip, empty_study, tmp_path):

@@ -17,28 +17,11 @@ from tests.recordings.recording_writers import standing_markers, write_trc
 
 LINE_M = 1.5
 HANSEN = [marker.label for marker in load_marker_set("hansen2017").markers]
-OWN = [
-    "c7",
-    "IJ",
-    "LAcromion",
-    "RAcromion",
-    "LAsis",
-    "RAsis",
-    "Sacrum",
-    "LElbowLat",
-    "RElbowLat",
-    "LWrist",
-    "RWrist",
-    "LKneeLat",
-    "RKneeLat",
-    "LAnkleLat",
-    "RAnkleLat",
-    "LHeel",
-    "RHeel",
-    "LMT5",
-    "RMT5",
-    "Ball#1",
-]
+_OWN = (
+    "c7 IJ LAcromion RAcromion LAsis RAsis Sacrum LElbowLat RElbowLat LWrist RWrist LKneeLat "
+    "RKneeLat LAnkleLat RAnkleLat LHeel RHeel LMT5 RMT5 Ball#1"
+)
+OWN = _OWN.split()
 
 
 @pytest.fixture(autouse=True)
@@ -206,18 +189,8 @@ def test_ingest_makes_a_set_of_words_and_hands_it_on(bsip, here):
 
 
 def test_ingest_refuses_labels_without_feet_and_leads_to_the_starter(bsip, here):
-    labels = [
-        "EIASG",
-        "EIASD",
-        "SACRUM",
-        "GENOUG",
-        "GENOUD",
-        "CHEVILLEG",
-        "CHEVILLED",
-        "C7",
-        "EPAULEG",
-        "EPAULED",
-    ]
+    pelvis, legs = "EIASG EIASD SACRUM", "GENOUG GENOUD CHEVILLEG CHEVILLED"
+    labels = f"{pelvis} {legs} C7 EPAULEG EPAULED".split()
     answer = bsip("ingest", study_of(here, {"static": labels}), "--out", here / "out")
     assert answer.code == 3 and "none on the left foot (the heel and a metatarsal)" in answer.err
     command = answer.err.split("`bsip markers ")[1].split("`")[0]

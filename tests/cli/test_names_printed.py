@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.errors import BadDataError, printable
-from bsip_cli.report.blocks import Document, Paragraph, Section
-from bsip_cli.report.page import render
+from bsip_cli.report.blocks import Document, Paragraph, Section, render
 from tests.recordings.recording_writers import standing_markers, write_trc
 
 FORGED = "bsip run: 30 done"

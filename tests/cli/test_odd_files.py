@@ -1,7 +1,6 @@
-"""What is no regular file is named and never opened: who opens a FIFO waits for ever."""
+"""What is no regular file is never opened; configuration that nobody means is refused soon."""
 
-from __future__ import annotations
-
+import errno
 import os
 import socket
 from pathlib import Path
@@ -15,13 +14,126 @@ from bsip_cli.config import load_config
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.files.regular import check_regular, fault_of
 from bsip_cli.recordings.read import read_recording
+from bsip_cli.study.participants import read_people
 
-TOML_READERS = {
+READERS = {
     "options": lambda path: load_config([path]),
     "marker set": lambda path: load_marker_set(str(path)),
     "skeleton": lambda path: load_skeleton(str(path)),
     "map of bodies": lambda path: load_body_map(str(path)),
 }
+NO_TOML = {
+    "brackets": b"a = " + b"[" * 100_000,
+    "brackets in lines": b"a = [\n" + b"[\n" * 50_000,
+    "deep": b"a = " + b"[" * 50 + b"]" * 50,
+    "deep by dots": b"a." * 30 + b"a = 1",
+    "long by dots": b"a." * 50_000 + b"a = 1",
+    "digits": b"a = " + b"9" * 9_000,
+    "hexadecimal": b"a = 0x" + b"f" * 9_000,
+    "65 bits": b"a = 9223372036854775808",
+    "NUL": b'a = "\0"',
+    "UTF-16": "a = 1".encode("utf-16"),
+    "Latin-1": 'a = "é"'.encode("latin-1"),
+    "large": b"#\n" * 600_000,
+}
+WRONG = {
+    "max_gap_s = inf": "finite number",
+    "max_gap_s = 1e400": "finite number",
+    "max_gap_s = -nan": "finite number",
+    "max_gap_s = true": "valid number",
+    "max_gap_s = '0.1'": "valid number",
+    "max_gap_s = 1979-05-27": "valid number",
+    "max_gap_s = {a = {b = 1}}": "valid number",
+    "plates = [1.5]": "valid integer",
+    "plates = 1": "valid array",
+    "prefixes = [1]": "prefixes = ",
+    "prefixes = {a = 1}": "valid string",
+}
+
+
+def refused(read, path: Path) -> str:
+    with pytest.raises(UsageError) as refusal:
+        read(path)
+    sentence = str(refusal.value)
+    assert str(path) in sentence and len(sentence) < 500
+    return sentence
+
+
+@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize("case", NO_TOML)
+def test_what_is_no_toml(tmp_path, reader, case):
+    path = tmp_path / "a.toml"
+    path.write_bytes(NO_TOML[case])
+    refused(READERS[reader], path)
+
+
+@pytest.mark.parametrize("line", WRONG)
+def test_options_of_another_type(tmp_path, line):
+    path = tmp_path / "study.toml"
+    path.write_text(f"[ingest]\n{line}\n")
+    sentence = refused(READERS["options"], path)
+    assert WRONG[line] in sentence and f"ingest.{line.split()[0]}" in sentence
+
+
+@pytest.mark.parametrize("line", ["[scale]\nframes", "[ik]\niterations"])
+def test_counts_without_end(tmp_path, line):
+    path = tmp_path / "study.toml"
+    path.write_text(f"{line} = 1000000000000\n")
+    assert "less than or equal to 10000" in refused(READERS["options"], path)
+
+
+def test_many_faults_are_counted(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text("".join(f"a{k} = 1\n" for k in range(5_000)))
+    with pytest.raises(UsageError, match=r"unknown option a19.*; and 4980 more"):
+        load_config([path])
+
+
+@pytest.mark.parametrize(
+    ("reader", "text", "found"),
+    [
+        ("marker set", '[segments]\nhead = {A = ""}\n[weights]\nA = inf\n', "weight of 0 or more"),
+        ("skeleton", "segments = 3", "not a skeleton"),
+        ("skeleton", "[[segments]]\nname = 1\nparent = ''\njoint = ''\n", "not a skeleton"),
+        (
+            "skeleton",
+            "[[segments]]\nname = 'a'\nparent = ''\njoint = 'b'\ntype = ['free']\ntable = ''\n",
+            "values that are no text",
+        ),
+        ("map of bodies", "groups = 3", "not a map"),
+        ("map of bodies", "[[groups]]\nbodies = 'pelvis'\nsegments = [1]\njoints = []", "no list"),
+    ],
+)
+def test_other_shapes(tmp_path, reader, text, found):
+    path = tmp_path / "a.toml"
+    path.write_text(text)
+    assert found in refused(READERS[reader], path)
+
+
+def test_the_command(bsip, empty_study):
+    (empty_study / "study.toml").write_bytes(NO_TOML["brackets"])
+    said = bsip("ingest", empty_study, "--out", empty_study.with_name("out"))
+    assert said.code == 2 and len(said.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["a.c3d", "a.trc", "a.toml", "participants.tsv"])
+def test_a_disk_that_fails(tmp_path, monkeypatch, name):
+    path = tmp_path / name
+    path.write_text("a = 1\n")
+    read = {".toml": READERS["marker set"], ".tsv": read_people}.get(path.suffix, read_recording)
+    opened = Path.open
+
+    def failing(self, *arguments, **options):
+        if self == path:
+            raise OSError(errno.EIO, "Input/output error")
+        return opened(self, *arguments, **options)
+
+    monkeypatch.setattr(Path, "open", failing)
+    with pytest.raises((BadDataError, UsageError), match="Input/output error"):
+        read(path)
+
+
+# --- what is no regular file is named and never opened: who opens a FIFO waits for ever -----------
 
 
 @pytest.fixture
@@ -77,10 +189,10 @@ def test_a_fifo_is_no_recording(fifo, ending):
         read_recording(fifo(f"a.{ending}"))
 
 
-@pytest.mark.parametrize("kind", TOML_READERS)
+@pytest.mark.parametrize("kind", READERS)
 def test_a_fifo_is_no_toml(fifo, kind):
     with pytest.raises(UsageError, match="is a FIFO"):
-        TOML_READERS[kind](fifo("a.toml"))
+        READERS[kind](fifo("a.toml"))
 
 
 def test_commands_refuse_a_fifo(fifo, bsip, tmp_path):

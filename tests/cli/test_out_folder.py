@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from bsip_cli.errors import UsageError
-from bsip_cli.study.dataset import NAME, describe_dataset, make_out
+from bsip_cli.study.study import DESCRIPTION, describe_dataset, make_out
 
 OWN = {"Name": "old", "GeneratedBy": [{"Name": "bsip", "Version": "0.0.1"}]}
 
@@ -89,14 +89,14 @@ def test_the_command_says_where_results_may_lie(bsip, study):
 
 
 def test_the_description_is_kept_up_to_date(study, tmp_path):
-    (tmp_path / NAME).write_text(json.dumps(OWN))
+    (tmp_path / DESCRIPTION).write_text(json.dumps(OWN))
     assert describe_dataset(tmp_path, study) == ""
-    description = json.loads((tmp_path / NAME).read_text())
+    description = json.loads((tmp_path / DESCRIPTION).read_text())
     assert description["Name"] == "bsip results of study"
     assert description["GeneratedBy"][0]["Name"] == "bsip"
-    written = (tmp_path / NAME).stat().st_mtime_ns
+    written = (tmp_path / DESCRIPTION).stat().st_mtime_ns
     assert describe_dataset(tmp_path, study) == ""
-    assert (tmp_path / NAME).stat().st_mtime_ns == written
+    assert (tmp_path / DESCRIPTION).stat().st_mtime_ns == written
 
 
 @pytest.mark.parametrize(
@@ -114,7 +114,7 @@ def test_the_description_is_kept_up_to_date(study, tmp_path):
     ],
 )
 def test_a_foreign_description_stays(study, tmp_path, content):
-    file = tmp_path / NAME
+    file = tmp_path / DESCRIPTION
     file.write_bytes(content.encode(errors="surrogateescape"))
     before = file.read_bytes()
     assert describe_dataset(tmp_path, study) == f"{file}: is not of bsip, and stays as it is"
@@ -128,23 +128,23 @@ def test_what_is_no_file_of_its_own_stays(study, tmp_path):
     for k, made in enumerate((lambda p: p.symlink_to(other), lambda p: p.symlink_to("nowhere"))):
         out = tmp_path / f"link{k}"
         out.mkdir()
-        made(out / NAME)
+        made(out / DESCRIPTION)
         assert describe_dataset(out, study).endswith("stays as it is")
-        assert (out / NAME).is_symlink()
+        assert (out / DESCRIPTION).is_symlink()
     for k, made in enumerate((os.mkfifo, Path.mkdir)):
         out = tmp_path / f"none{k}"
         out.mkdir()
-        made(out / NAME)
+        made(out / DESCRIPTION)
         assert describe_dataset(out, study).endswith("stays as it is")
     assert json.loads(other.read_text()) == OWN
 
 
 def test_the_study_s_own_description_is_not_touched(bsip, study):
-    (study / NAME).write_text(json.dumps({"Name": "raw", "BIDSVersion": "1.10.0"}))
+    (study / DESCRIPTION).write_text(json.dumps({"Name": "raw", "BIDSVersion": "1.10.0"}))
     out = study / "derivatives" / "bsip"
     out.mkdir()
-    (out / NAME).write_text("mine")
+    (out / DESCRIPTION).write_text("mine")
     answer = bsip("scale", study, "--out", out)
     assert answer.err.count("stays as it is") == 1
-    assert json.loads((study / NAME).read_text())["Name"] == "raw"
-    assert (out / NAME).read_text() == "mine"
+    assert json.loads((study / DESCRIPTION).read_text())["Name"] == "raw"
+    assert (out / DESCRIPTION).read_text() == "mine"

@@ -1,7 +1,6 @@
 """Participants and recordings as they lie in a study folder."""
 
-from __future__ import annotations
-
+import json
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,10 +10,12 @@ from bsip_cli.config import load_config
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.pipeline import STAGES
 from bsip_cli.running.unit import Unit
+from bsip_cli.study.participants import named_in
 from bsip_cli.study.study import load_study
 
 ROLES = {"static": ("static",), "sequence": ("sequence", "dance")}
-HEADER = "participant_id\tsex\tmass_kg\theight_m\n"
+COLUMNS = "participant_id\tsex\tmass_kg\theight_m"
+HEADER = f"{COLUMNS}\n"
 
 
 def write_table(root: Path, *lines: str) -> None:
@@ -177,3 +178,243 @@ def test_trials_keep_one_order(empty_study):
         (empty_study / "sub-01" / f"sub-01_task-walk_run-{run}.c3d").write_bytes(b"")
     stems = [trial.stem for trial in load(empty_study)[0].participants[0].trials]
     assert all(a < b for a, b in pairwise(stems))
+
+
+# --- participants.tsv as laboratories write it: what is read, what is said, what is refused -------
+
+
+CASES = Path(__file__).parents[3] / "shared" / "cases"
+
+
+def people(root: Path, table: str | bytes) -> tuple[list[tuple], list[str], list[str]]:
+    """Sex, mass and height of each; what is noted; what is refused."""
+    raw = table.encode() if isinstance(table, str) else table
+    (root / "participants.tsv").write_bytes(raw)
+    study, refusals = load(root)
+    found = [(p.sex, p.mass_kg, p.height_m) for p in study.participants]
+    notes = [note.partition("participants.tsv: ")[2] for note in study.notes]
+    return found, [note for note in notes if note], refusals
+
+
+ONE = ("F", pytest.approx(70.5, abs=0.05), pytest.approx(1.63, abs=0.005))
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        # cells
+        (f"{COLUMNS}\nsub-01\tF\t70,5\t1,63\n", []),
+        (f"{COLUMNS}\n\nsub-01\tF\t70.5\t1.63\n\t\t\t\n   \n\t\t\t\n", []),
+        (f"{COLUMNS}\t\t\nsub-01\tF\t70.5\t1.63\t\t\n", []),
+        (f'{COLUMNS}\n"sub-01"\t"F"\t"70,5"\t"1,63"\n', []),
+        (f"{COLUMNS}\nsub-01 \tF\t 70.5\t1.63 \n", []),
+        ("\n\t\nid\tage\tSEX\tmass_kg\theight_m\nsub-01\t30\tF\t70.5\t1.63\n", []),
+        (f"{COLUMNS}\n01\tF\t70.5\t1.63\n", []),
+        (f"{COLUMNS}\n1\tF\t70.5\t1.63\n", ["1 is sub-01, by their folders"]),
+        (f"{COLUMNS}\nsub-01\tF\t70.5 kg\t163 cm\n", []),
+        (f"{COLUMNS}\nsub-01\tF\t155.4 lb\t5' 4\"\n", []),
+        (f"{COLUMNS}\nsub-01\tF\t11 st 1.4 lb\t5 ft 4.2 in\n", []),
+        # separators
+        (
+            "participant_id;sex;mass_kg;height_m\nsub-01;F;70,5;1,63\n;;;\n",
+            ["its cells are separated by semicolons"],
+        ),
+        (
+            'participant_id,sex,mass_kg,height_m\nsub-01,F,"70,5",1.63\n',
+            ["its cells are separated by commas"],
+        ),
+        ("sep=;\nid;sex;mass;height\n01;F;70,5;1,63\n", ["its cells are separated by semicolons"]),
+        (
+            "participant_id sex  mass_kg height_m\nsub-01   F  70.5 1.63\n",
+            ["its cells are separated by blanks"],
+        ),
+        (
+            "subject  sex  Mass [kg]  Height [m]\nsub-01   F    70.5       1.63\n",
+            ["its cells are separated by two or more blanks"],
+        ),
+        # letters
+        (f"\ufeff{COLUMNS}\r\nsub-01\tF\t70.5\t1.63\r\n", []),
+        (f"{COLUMNS}\nsub-01\tF\t70.5\t1.63\n".encode("utf-16"), []),
+        (f"{COLUMNS}\nsub-01\tF\t70.5\t1.63\n".encode("utf-16-be"), []),
+        (f"{COLUMNS}\nsub-01\tF\t70.5\t1.63\n".encode("utf-16-le"), []),
+        (
+            "id\tGeschlecht\tKörpergewicht (kg)\tGröße (cm)\nsub-01\tw\t70,5\t163\n".encode(
+                "cp1252"
+            ),
+            ["it is no UTF-8 and was read as Windows-1252 (Latin-1)"],
+        ),
+        # columns
+        ("Subject\tGender\tweight\tHeight (cm)\nsub-01\tfemale\t70.5\t163\n", []),
+        ("Participant ID\tSex\tweight_kg\tstature mm\nsub-01\tF\t70.5\t1630\n", []),
+        ("ID\tsex\tMass [kg]\tHeight [m]\nsub-01\tF\t70.5\t1.63\n", []),
+        ("ID\tsex\tBody mass (lbs)\tHeight (in)\nsub-01\tF\t155.4\t64.2\n", []),
+        ("ID\tsexe\tPoids (g)\tTaille (cm)\nsub-01\tfemme\t70500\t163\n", []),
+        ("ID\tsexo\tweight [N]\taltura\nsub-01\tmujer\t691.4\t1,63\n", []),
+        # units that nothing else can be
+        (
+            f"{COLUMNS}\nsub-01\tF\t70.5\t163\n",
+            ["height_m 163 of sub-01 is taken as cm: 1.63 m, since it cannot be in m"],
+        ),
+        (
+            "id\tsex\tmass\theight\nsub-01\tF\t691.4\t64.2\n",
+            [
+                "mass 691.4 of sub-01 is taken as N: 70.5 kg, since it cannot be in kg",
+                "height 64.2 of sub-01 is taken as in: 1.631 m, since it cannot be in m",
+            ],
+        ),
+        (
+            "id\tsex\tmass [g]\theight (cm)\nsub-01\tF\t70.5\t1.63\n",
+            [
+                "mass [g] 70.5 of sub-01 is taken as kg: 70.5 kg, since it cannot be in g",
+                "height (cm) 1.63 of sub-01 is taken as m: 1.63 m, since it cannot be in cm",
+            ],
+        ),
+    ],
+)
+def test_dialects(empty_study, table, said):
+    found, notes, refusals = people(empty_study, table)
+    assert (found, refusals) == ([ONE], [])
+    assert notes == said
+
+
+@pytest.mark.parametrize(
+    ("sexes", "legend", "read"),
+    [
+        ("female male woman man", "", "FMFM"),
+        ("weiblich männlich Frau Mann", "", "FMFM"),
+        ("femme homme F H", "", "FMFM"),
+        ("mujer hombre femenino masculino", "", "FMFM"),
+        ("donna uomo femmina maschio", "", "FMFM"),
+        ("other O n/a", "", ["other"] * 3),
+        ("0 1 n/a", " (0=F, 1=M)", ["F", "M", "other"]),
+        ("1 2", " [1: male; 2: female]", "MF"),
+        ("2 1", " female = 2, male = 1", "FM"),
+        ("1.0 2.0", " (1=F; 2=M)", "FM"),
+        ("M F", " (M/F)", "MF"),
+        ("a b", " (a = weiblich / b = männlich)", "FM"),
+    ],
+)
+def test_sexes(empty_study, sexes, legend, read):
+    assert sexes_of(empty_study, sexes, legend) == ([*read], [])
+
+
+def sexes_of(root: Path, sexes: str, legend: str = "") -> tuple[list[str], list[str]]:
+    rows = [f"sub-{k:02d}\t{sex}\t70\t1.7\n" for k, sex in enumerate(sexes.split(), 1)]
+    for k in range(1, len(rows) + 1):
+        (root / f"sub-{k:02d}").mkdir(exist_ok=True)
+        (root / f"sub-{k:02d}" / f"sub-{k:02d}_task-static.c3d").write_bytes(b"")
+    table = f"participant_id\tsex{legend}\tmass_kg\theight_m\n" + "".join(rows)
+    found, _, refusals = people(root, table)
+    return [sex for sex, *_ in found], refusals
+
+
+@pytest.mark.parametrize(
+    ("sexes", "remedy"),
+    [
+        ("0", "say what the numbers mean"),
+        ("1 2", "say what the numbers mean"),
+        ("H M", "mujer or man"),
+        ("V", "write one of them"),  # vrouw, varón
+        ("D", "write one of them"),  # donna, divers
+    ],
+)
+def test_sexes_that_may_be_either_are_refused(empty_study, sexes, remedy):
+    _, refusals = sexes_of(empty_study, sexes)
+    assert remedy in refusals[-1]
+
+
+@pytest.mark.parametrize(
+    "levels",
+    [
+        {"0": "female", "1": "male"},
+        {"0": {"Description": "Assigned female at birth"}, "1": {"Description": "male"}},
+        {"F": "0", "M": "1"},
+    ],
+)
+def test_levels_of_bids(empty_study, levels):
+    (empty_study / "participants.json").write_text(json.dumps({"sex": {"Levels": levels}}))
+    assert sexes_of(empty_study, "0 1") == (["F", "M"], [])
+
+
+def test_units_of_bids(empty_study):
+    sidecar = {"height": {"Units": "cm"}, "weight": {"Units": "lb"}}
+    (empty_study / "participants.json").write_text(json.dumps(sidecar))
+    table = "participant_id\tsex\tweight\theight\nsub-01\tF\t155.4\t163\n"
+    assert people(empty_study, table)[0] == [ONE]
+    with pytest.raises(BadDataError, match=r"do not agree: the unit of 'weight \(kg\)' is 'lb'"):
+        sidecar |= {"weight (kg)": sidecar["weight"]}
+        (empty_study / "participants.json").write_text(json.dumps(sidecar))
+        people(empty_study, table.replace("weight", "weight (kg)"))
+
+
+def test_a_sidecar_that_cannot_be_read_is_said(empty_study):
+    (empty_study / "participants.json").write_text("{")
+    study, _ = load(empty_study)
+    assert "participants.json: is not used: " in study.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("mass", "height", "said"),
+    [
+        ("163", "1.63", "index of 61.3 kg/m2, people have 12 to 60; in lb the mass would be 73.9"),
+        ("165", "1.63", "in lb the mass would be 74.8 kg and the index 28.2"),
+        ("11", "1.63", "in st the mass would be 69.9 kg and the index 26.3"),
+        ("26", "1.9", "index of 7.2 kg/m2, people have 12 to 60: used as it stands"),
+    ],
+)
+def test_masses_and_heights_of_nobody_are_said_and_kept(empty_study, mass, height, said):
+    found, notes, refusals = people(empty_study, f"{COLUMNS}\nsub-01\tF\t{mass}\t{height}\n")
+    assert (found, refusals) == ([("F", float(mass), float(height))], [])
+    assert said in notes[0]
+
+
+@pytest.mark.parametrize(
+    ("mass", "height"),
+    [("20", "1.15"), ("27.7", "1.33"), ("56.8", "1.74"), ("115", "1.70"), ("110.9", "1.63")],
+)
+def test_ordinary_people_are_not_commented(empty_study, mass, height):
+    assert not [
+        note
+        for note in people(empty_study, f"{COLUMNS}\nsub-01\tF\t{mass}\t{height}\n")[1]
+        if "index" in note
+    ]
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "said"),
+    [
+        ("mass\theight", "500\tn/a", "it may be 226.8 kg (lb) or 50.99 kg (N)"),
+        ("mass_kg\theight_m", "500\t1.7", "mass_kg '500' of sub-01"),  # a stated unit is no guess
+        ("mass_kg\theight_m", "70.000,5\t1.7", "mass_kg '70.000,5' of sub-01"),
+        ("mass_kg\theight_m", "60-70\t1.7", "mass_kg '60-70' of sub-01"),
+        ("Mass [lb]\theight_m", "1550\t1.7", "a number between 22.05 and 881.8 lb"),
+    ],
+)
+def test_numbers_that_may_be_anything_are_refused(empty_study, header, row, said):
+    _, _, (refusal,) = people(empty_study, f"participant_id\tsex\t{header}\nsub-01\tF\t{row}\n")
+    assert said in refusal
+
+
+def test_decimal_commas_between_commas_are_refused_with_the_reason(empty_study):
+    table = "participant_id,sex,mass_kg,height_m\nsub-01,F,70,5,1.63\nsub-02,M,80.1,1.8\n"
+    found, _, (refusal,) = people(empty_study, table)
+    assert found == [("M", 80.1, 1.8)] and "write points for decimal commas" in refusal
+
+
+def test_names_for_scripts_are_those_of_the_folders(empty_study):
+    (empty_study / "participants.tsv").write_text("id;sex;mass\n1;F;70\nsub-02;M;80\n")
+    assert named_in(empty_study / "participants.tsv") == ["sub-01", "sub-02"]
+    study, _ = load_study(empty_study, ROLES, ["sub-01"])
+    assert [person.mass_kg for person in study.participants] == [70.0]
+
+
+@pytest.mark.parametrize(
+    ("case", "sex"), [("15g-mass-lb", "M"), ("15i-sex-female", "F"), ("15l-trailing-empty", "M")]
+)
+def test_shared_cases(case, sex):
+    found = [*CASES.glob(f"{case}*/study")]
+    if not found:
+        pytest.skip("shared/cases is not there")
+    study, refusals = load(found[0])
+    assert ([person.sex for person in study.participants], refusals) == ([sex], [])
+    assert not any("index" in note for note in study.notes)  # 15g: what heavy people have, too

@@ -18,17 +18,8 @@ from bsip_cli.study.study import Study, Trial, load_study
 
 NOTES = {"made_by": {}, "messages": [], "facts": {}}
 FILES = ("static", "sequence", "walking", "throwing_run-1", "throwing_run-2")
-UNITS = {
-    "fx": "N",
-    "fy": "N",
-    "fz": "N",
-    "grf_vertical": "N",
-    "mx": "N m",
-    "my": "N m",
-    "mz": "N m",
-    "cop_ap": "mm",
-    "cop_ml": "mm",
-}
+UNITS = dict.fromkeys(("fx", "fy", "fz", "grf_vertical"), "N")
+UNITS |= dict.fromkeys(("mx", "my", "mz"), "N m") | dict.fromkeys(("cop_ap", "cop_ml"), "mm")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 
 

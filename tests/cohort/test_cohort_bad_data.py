@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from bsip_cli.artifacts import read_header, write_artifact
-from bsip_cli.report.tables.build import BESIDE, NAMES, RENDERERS, show
+from bsip_cli.report.tables.build import IN_PRINT, NAMES, RENDERERS, show
+from bsip_cli.report.tables.published import name_beside
 from bsip_cli.running.runner import perform
 from bsip_cli.stages import stats as stats_stage
 
@@ -200,7 +201,9 @@ def test_freshness_and_files(make_cohort):
     cohort.run()
     assert [cohort.perform(name).state for name in ("stats", "tables")] == ["fresh", "fresh"]
     files = sorted(path.name for path in (cohort.out / "group" / "tables").iterdir())
-    assert files == sorted(f"{name}.{ending}" for name in (*NAMES, *BESIDE) for ending in RENDERERS)
+    assert files == sorted(
+        f"{name}.{ending}" for name in (*NAMES, *map(name_beside, IN_PRINT)) for ending in RENDERERS
+    )
     listed = cohort.group("tables-files")
     assert sorted(listed["file"]) == [f"group/tables/{file}" for file in files]
     before = {file: (cohort.out / file).read_bytes() for file in listed["file"]}

@@ -8,15 +8,16 @@ from math import nan
 import pytest
 
 from bsip_cli.artifacts import read_header
-from bsip_cli.report.tables.build import BESIDE, NAMES, render_markdown, show
+from bsip_cli.report.tables.build import IN_PRINT, NAMES, build_tables, show
 from bsip_cli.report.tables.formats import escape_latex as latex
 from bsip_cli.report.tables.formats import escape_markdown as markdown
 from bsip_cli.report.tables.formats import to_csv, to_latex, to_markdown
-from bsip_cli.report.tables.labels import interval, mean_sd, number, p_value
-from bsip_cli.report.tables.model import Column, Row, Table
+from bsip_cli.report.tables.model import Column, Row, Table, interval, mean_sd, number, p_value
+from bsip_cli.report.tables.published import name_beside
 from bsip_cli.report.words import segment_label
 from bsip_cli.statistics.cohort import Criteria
 
+BESIDE = tuple(map(name_beside, IN_PRINT))
 NASTY = r"50% of A&B_1 #2 {x} ~y ^z $5 \end{table} a|b <b>*bold*</b> `c`"
 
 
@@ -207,6 +208,7 @@ def test_no_absent_number_is_printed_as_nan(cohort):
 
 def test_render_and_show_give_the_written_texts(cohort):
     facts = read_header(cohort.out / "group" / "group_values.parquet")["provenance"]["facts"]
-    texts = render_markdown(cohort.group("comparisons"), Criteria(0.05, 10.0), facts["fitted_on"])
+    tables = build_tables(cohort.group("comparisons"), Criteria(0.05, 10.0), facts["fitted_on"])
+    texts = {table.name: to_markdown(table) for table in tables}
     assert texts == {name: cohort.text(name) for name in (*NAMES, *BESIDE)}
     assert show(cohort.out) == "\n\n".join(texts[name] for name in NAMES)

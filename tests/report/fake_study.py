@@ -34,34 +34,20 @@ _JOINTS = {  # joint centre in the parent, right side; origin of the parent wher
     "shank": (0, -0.42, 0),
     "foot": (0, -0.41, 0),
 }
-_LENGTHS = {
-    "lower_torso": 0.1,
-    "upper_torso": 0.48,
-    "head": 0.25,
-    "upper_arm": 0.29,
-    "forearm": 0.25,
-    "hand": 0.08,
-    "thigh": 0.42,
-    "shank": 0.41,
-    "foot": 0.17,
-}
-_SHARES = {
-    "lower_torso": 0.142,
-    "upper_torso": 0.333,
-    "head": 0.067,
-    "upper_arm": 0.024,
-    "forearm": 0.017,
-    "hand": 0.006,
-    "thigh": 0.123,
-    "shank": 0.048,
-    "foot": 0.011,
-}
+_LENGTHS = dict(zip(_JOINTS, (0.1, 0.48, 0.25, 0.29, 0.25, 0.08, 0.42, 0.41, 0.17), strict=True))
+_PARTS = (0.142, 0.333, 0.067, 0.024, 0.017, 0.006, 0.123, 0.048, 0.011)
+_SHARES = dict(zip(_JOINTS, _PARTS, strict=True))
 _TIPS = {
     "foot": ((-0.05, -0.06, 0.0), (0.13, -0.06, 0.0)),
     "hand": ((0.0, -0.08, 0.0),),
     "head": ((0.1, 0.15, 0.0), (0.0, 0.15, 0.07), (0.0, 0.15, -0.07)),
 }
 _KINDS = ["fx", "fy", "fz", "mx", "my", "mz"]
+
+
+def frame(columns: str, *rows: tuple) -> pd.DataFrame:
+    """A table with columns of these names."""
+    return pd.DataFrame(list(rows), columns=columns.split())
 
 
 def part(segment: str) -> str:
@@ -146,74 +132,39 @@ class Artifacts:
     # --- participant ------------------------------------------------------------------------
 
     def facts(self) -> pd.DataFrame:
-        return pd.DataFrame(
-            [
-                {
-                    "sex": "M",
-                    "mass_kg": MASS_KG,
-                    "mass_source": "participants.tsv",
-                    "plate_mass_kg": 63.1,
-                    "mass_note": "",
-                    "height_m": 1.63,
-                    "anterior_x": 1.0,
-                    "anterior_y": 0.0,
-                    "calibration_trial": self.person.trials[0].stem,
-                    "marker_rms_m": 0.0067,
-                }
-            ]
+        stem = self.person.trials[0].stem
+        return frame(
+            "sex mass_kg mass_source plate_mass_kg mass_note height_m anterior_x anterior_y "
+            "calibration_trial marker_rms_m",
+            ("M", MASS_KG, "participants.tsv", 63.1, "", 1.63, 1.0, 0.0, stem, 0.0067),
         )
 
     def skeleton_rows(self) -> pd.DataFrame:
         rows = []
-        for i, name in enumerate(self.skeleton.segments):
-            x, y, z = _JOINTS[part(name)]
-            side = -1.0 if self.skeleton.side(name) == "l" else 1.0
-            parent = self.skeleton.parents[i]
+        known = self.skeleton
+        for i, name in enumerate(known.segments):
+            x, y, z = map(float, _JOINTS[part(name)])
+            side = -1.0 if known.side(name) == "l" else 1.0
+            parent = known.segments[known.parents[i]] if i else ""
             origin = 0.48 if name == "upper_torso" else 0.0
             length = _LENGTHS[part(name)] * (1.01 if side < 0 else 1.0)
-            rows.append(
-                {
-                    "segment": name,
-                    "parent": self.skeleton.segments[parent] if i else "",
-                    "joint": self.skeleton.joints[i],
-                    "joint_type": self.skeleton.joint_types[i],
-                    "joint_x_m": float(x),
-                    "joint_y_m": float(y),
-                    "joint_z_m": side * z,
-                    "parent_tilt_rad": 0.0,
-                    "child_tilt_rad": 0.0,
-                    "origin_x_m": 0.0,
-                    "origin_y_m": origin,
-                    "origin_z_m": 0.0,
-                    "length_m": length,
-                    "first_guess_m": 0.97 * length,
-                    "length_sd_m": 0.004,
-                    "joint_shift_m": 0.006,
-                    "held": False,
-                }
-            )
-        return pd.DataFrame(rows)
+            joint = (name, parent, known.joints[i], known.joint_types[i], x, y, side * z)
+            sizes = (0.0, origin, 0.0, length, 0.97 * length, 0.004, 0.006, False)
+            rows.append((*joint, 0.0, 0.0, *sizes))
+        return frame(
+            "segment parent joint joint_type joint_x_m joint_y_m joint_z_m parent_tilt_rad "
+            "child_tilt_rad origin_x_m origin_y_m origin_z_m length_m first_guess_m length_sd_m "
+            "joint_shift_m held",
+            *rows,
+        )
 
     def markers(self) -> pd.DataFrame:
         rows = []
         for name in self.skeleton.segments:
-            tips = _TIPS.get(part(name), ((0.05, -0.1, 0.03),))
-            for k, tip in enumerate(tips):
-                rows.append(
-                    {
-                        "marker": EVIL
-                        if name == "forearm_r"
-                        else f"{name[:6].upper()}{name[-1]}{k}",
-                        "segment": name,
-                        "x_m": tip[0],
-                        "y_m": tip[1],
-                        "z_m": tip[2],
-                        "weight": 1.0,
-                        "shift_m": 0.004,
-                        "residual_m": 0.005,
-                    }
-                )
-        return pd.DataFrame(rows)
+            for k, tip in enumerate(_TIPS.get(part(name), ((0.05, -0.1, 0.03),))):
+                label = EVIL if name == "forearm_r" else f"{name[:6].upper()}{name[-1]}{k}"
+                rows.append((label, name, *tip, 1.0, 0.004, 0.005))
+        return frame("marker segment x_m y_m z_m weight shift_m residual_m", *rows)
 
     def bsip(self) -> pd.DataFrame:
         rows = []
@@ -315,13 +266,8 @@ class Artifacts:
         size = np.linspace(0.003, 0.012, len(names))
         values = size * (1 + 0.3 * self.random.normal(size=(len(t), len(names))))
         values[3, 4] = np.nan
-        return pd.DataFrame(
-            {
-                "time_s": np.repeat(t, len(names)),
-                "marker": list(names) * len(t),
-                "residual_m": np.abs(values).ravel(),
-            }
-        )
+        rows = {"time_s": np.repeat(t, len(names)), "marker": list(names) * len(t)}
+        return pd.DataFrame(rows | {"residual_m": np.abs(values).ravel()})
 
     def reconstruction(self, trial: Trial) -> pd.DataFrame:
         t, valid = self.times(trial), self.valid(trial)
@@ -342,17 +288,8 @@ class Artifacts:
                 name: v * (1 + 0.08 * size) + 0.02 * size * np.ptp(v) * fast
                 for name, v in signals.items()
             }
-            parts.append(
-                pd.DataFrame(
-                    {
-                        "time_s": t,
-                        "method": method,
-                        **part_,
-                        "valid": valid,
-                        "used": valid & (trial.role == "sequence"),
-                    }
-                )
-            )
+            flags = {"valid": valid, "used": valid & (trial.role == "sequence")}
+            parts.append(pd.DataFrame({"time_s": t, "method": method, **part_, **flags}))
         return pd.concat(parts, ignore_index=True)
 
     def joint_moments(self, trial: Trial) -> pd.DataFrame:
@@ -385,23 +322,16 @@ class Artifacts:
                 worse = 1.7 if (method, c, trial.role) == (OM, "mz", "validation") else size
                 unit = "mm" if c.startswith("cop") else "N m" if c.startswith("m") else "N"
                 force = c.startswith("f") or c == "grf_vertical"
-                rows.append(
-                    {
-                        "method": method,
-                        "component": c,
-                        "rmse": (4.0 + k) * worse,
-                        "unit": unit,
-                        "rmse_percent_bw": 0.7 * (1 + k / 10) * worse if force else np.nan,
-                        "pearson_r": 1 - 0.03 * worse,
-                        "schwer_m": 0.05 * worse,
-                        "schwer_p": 0.04 * worse,
-                        "schwer_c": 0.064 * worse,
-                        "n": 500,
-                        "n_effective": 41.5,
-                        "data": "identification" if trial.role == "sequence" else "held_out",
-                    }
-                )
-        return pd.DataFrame(rows)
+                percent = 0.7 * (1 + k / 10) * worse if force else np.nan
+                data = "identification" if trial.role == "sequence" else "held_out"
+                schwer = (0.05 * worse, 0.04 * worse, 0.064 * worse)
+                errors = (method, c, (4.0 + k) * worse, unit, percent, 1 - 0.03 * worse)
+                rows.append((*errors, *schwer, 500, 41.5, data))
+        return frame(
+            "method component rmse unit rmse_percent_bw pearson_r schwer_m schwer_p schwer_c n "
+            "n_effective data",
+            *rows,
+        )
 
 
 def choice() -> pd.DataFrame:
@@ -418,33 +348,11 @@ def choice() -> pd.DataFrame:
 
 
 def quality() -> pd.DataFrame:
-    return pd.DataFrame(
-        [
-            {
-                "check": "plate sign",
-                "subject": "plate 1",
-                "found": "pushes up",
-                "expected": "down",
-                "action": "sign turned",
-                "level": "corrected",
-            },
-            {
-                "check": "label",
-                "subject": EVIL,
-                "found": "unknown",
-                "expected": "",
-                "action": "cut",
-                "level": "excluded",
-            },
-            {
-                "check": "rate",
-                "subject": "",
-                "found": "50 Hz",
-                "expected": "",
-                "action": "",
-                "level": "info",
-            },
-        ]
+    return frame(
+        "check subject found expected action level",
+        ("plate sign", "plate 1", "pushes up", "down", "sign turned", "corrected"),
+        ("label", EVIL, "unknown", "", "cut", "excluded"),
+        ("rate", "", "50 Hz", "", "", "info"),
     )
 
 
@@ -465,39 +373,23 @@ def excitation(skeleton: Skeleton) -> pd.DataFrame:
         ("movement_forces", "head_nods", 7.0, "%", "", "nod"),
         ("movement_forces", "kicks_l", 43.0, "%", "", "swing the left shank"),
     ]
-    return pd.DataFrame(rows, columns=["quantity", "name", "value", "unit", "segment", "text"])
+    return frame("quantity name value unit segment text", *rows)
 
 
 def marker_events() -> pd.DataFrame:
-    return pd.DataFrame(
-        [
-            {
-                "kind": "slip",
-                "marker": "RKNEL",
-                "partner": "",
-                "start_s": 1.0,
-                "end_s": 2.0,
-                "size_m": 0.015,
-                "statistic": 9.0,
-                "sentence": f"RKNEL slips 15 mm on {EVIL}",
-                "put_right": False,
-            }
-        ]
+    return frame(
+        "kind marker partner start_s end_s size_m statistic sentence put_right",
+        ("slip", "RKNEL", "", 1.0, 2.0, 0.015, 9.0, f"RKNEL slips 15 mm on {EVIL}", False),
     )
 
 
 def posturography() -> pd.DataFrame:
-    row = {
-        "rms_ap_mm": 31.4,
-        "rms_ml_mm": 15.9,
-        "rms_ap_origin_m": 0.05,
-        "rms_ml_origin_m": 0.01,
-        "mean_velocity_mm_s": 88.8,
-        "sway_length_mm": 1234.5,
-        "ellipse_area_mm2": 4321.0,
-        "duration_s": 13.1,
-    }
-    return pd.DataFrame([{"method": m, **row} for m in (MEASURED, *METHODS)])
+    numbers = (31.4, 15.9, 0.05, 0.01, 88.8, 1234.5, 4321.0, 13.1)
+    return frame(
+        "method rms_ap_mm rms_ml_mm rms_ap_origin_m rms_ml_origin_m mean_velocity_mm_s "
+        "sway_length_mm ellipse_area_mm2 duration_s",
+        *((method, *numbers) for method in (MEASURED, *METHODS)),
+    )
 
 
 def diagnosis(trials: list[str]) -> pd.DataFrame:
@@ -505,55 +397,38 @@ def diagnosis(trials: list[str]) -> pd.DataFrame:
     everywhere, last = ", ".join(trials), trials[-1]
     turned = "plate 1 is turned by +2.0 degrees (yaw: 95 % interval 1.75 to 2.26°)"
     alike = "; other causes look alike here: to tell them apart, pray"
-    return pd.DataFrame(
-        [
-            _cause(1, "plate_rotation", "1", "yaw", 0.035, "rad", "named", "", turned, everywhere),
-            _cause(1, "plate_rotation", "1", "tilt", 0.0, "rad", "named", "", turned, everywhere),
-            _cause(
-                2, "plate_zero", "1 fz", "offset", 9.8, "N", "ambiguous", "B",
-                f"channel fz has an offset of +9.8 N (offset: 95 % interval 9 to 10){alike}", last,
-            ),
-            _cause(
-                3, "added_mass", "hand_l", "mass", 1.0, "kg", "ambiguous", "B",
-                f"1.00 kg more move with the left hand (mass: 95 % interval 0.9 to 1 kg){alike}",
-                last,
-            ),
-            _cause(
-                4, "wobbling_mass", "thigh_l", "mass", 0.3, "kg", "rejected", "",
-                f"not so: 0.3 kg swing on {EVIL} (probability 0.04 given what is found)", last,
-            ),
-        ]
+    return frame(
+        "rank effect target parameter estimate unit ci_low ci_high p_value gain_percent "
+        "gain_ci_low gain_ci_high verdict class_id sentence trials probability scope rms_change",
+        _cause(1, "plate_rotation", "1", "yaw", 0.035, "rad", "named", "", turned, everywhere),
+        _cause(1, "plate_rotation", "1", "tilt", 0.0, "rad", "named", "", turned, everywhere),
+        _cause(
+            2, "plate_zero", "1 fz", "offset", 9.8, "N", "ambiguous", "B",
+            f"channel fz has an offset of +9.8 N (offset: 95 % interval 9 to 10){alike}", last,
+        ),
+        _cause(
+            3, "added_mass", "hand_l", "mass", 1.0, "kg", "ambiguous", "B",
+            f"1.00 kg more move with the left hand (mass: 95 % interval 0.9 to 1 kg){alike}",
+            last,
+        ),
+        _cause(
+            4, "wobbling_mass", "thigh_l", "mass", 0.3, "kg", "rejected", "",
+            f"not so: 0.3 kg swing on {EVIL} (probability 0.04 given what is found)", last,
+        ),
     )  # fmt: skip
 
 
 def _cause(
     rank, effect, target, parameter, estimate, unit, verdict, class_id, sentence, trials
-) -> dict:
-    rejected = verdict == "rejected"
+) -> tuple:
     probability = {1: 0.995, 2: 0.58, 3: 0.38, 4: 0.04}[rank]
-    return {
-        "rank": rank,
-        "effect": effect,
-        "target": target,
-        "parameter": parameter,
-        "estimate": estimate,
-        "unit": unit,
-        "ci_low": np.nan if rejected else 0.9 * estimate - 0.001,
-        "ci_high": np.nan if rejected else 1.1 * estimate + 0.001,
-        "p_value": 1 - probability,
-        "gain_percent": np.nan if rank > 2 else 8.0 / rank,
-        "gain_ci_low": np.nan if rank > 2 else 4.0 / rank,
-        "gain_ci_high": np.nan if rank > 2 else 12.0 / rank,
-        "verdict": verdict,
-        "class_id": class_id,
-        "sentence": sentence,
-        "trials": trials,
-        "probability": probability,
-        "scope": {"plate": "laboratory", "added": "person", "wobbling": "person"}[
-            effect.split("_")[0]
-        ],
-        "rms_change": 12.0 / rank,
-    }
+    ends = (0.9 * estimate - 0.001, 1.1 * estimate + 0.001)
+    low, high = ends if verdict != "rejected" else (np.nan, np.nan)
+    gain = 8.0 / rank if rank < 3 else np.nan
+    scope = {"plate": "laboratory", "added": "person", "wobbling": "person"}
+    what = (rank, effect, target, parameter, estimate, unit, low, high, 1 - probability)
+    said = (gain, gain / 2, 1.5 * gain, verdict, class_id, sentence, trials)
+    return (*what, *said, probability, scope[effect.split("_")[0]], 12.0 / rank)
 
 
 def error_budget(trials: list[str]) -> pd.DataFrame:
@@ -566,30 +441,19 @@ def error_budget(trials: list[str]) -> pd.DataFrame:
         "noise": (3.0, ""),
         "total": (100.0, ""),
     }
-    return pd.DataFrame(
-        [
-            {
-                "term": term,
-                "target": "",
-                "component": component,
-                "rms": 20.0 * abs(share) / 100,
-                "unit": unit,
-                "share_percent": share,
-                "share_low": share - 5.0,
-                "share_high": share + 5.0,
-                "gain_percent": 40.0 if term == "total" else np.nan,
-                "gain_low": 30.0 if term == "total" else np.nan,
-                "gain_high": 50.0 if term == "total" else np.nan,
-                "data": "each trial from the others" if term == "total" else "",
-                "trial": trial,
-                "scale": 1.0,
-                "alike": alike,
-            }
-            for trial in ("", *trials)
-            for component, unit in (("fz", "N"), ("cop_ap", "mm"), ("cop_ml", "mm"))
-            for term, (share, alike) in shares.items()
-        ]
+    columns = (
+        "term target component rms unit share_percent share_low share_high gain_percent gain_low "
+        "gain_high data trial scale alike"
     )
+    rows = []
+    for trial in ("", *trials):
+        for component, unit in (("fz", "N"), ("cop_ap", "mm"), ("cop_ml", "mm")):
+            for term, (share, alike) in shares.items():
+                size = (20.0 * abs(share) / 100, unit, share, share - 5.0, share + 5.0)
+                gain: tuple = (np.nan, np.nan, np.nan, "")
+                gain = (40.0, 30.0, 50.0, "each trial from the others") if term == "total" else gain
+                rows.append((term, "", component, *size, *gain, trial, 1.0, alike))
+    return frame(columns, *rows)
 
 
 def detection(trials: list[str]) -> pd.DataFrame:
@@ -603,34 +467,28 @@ def detection(trials: list[str]) -> pd.DataFrame:
         ("added_mass", "hand_r", "mass", "kg", 0.93),
         ("added_mass", "hand_l", "mass", "kg", 0.95),
     ]
-    columns = ["effect", "target", "parameter", "unit", "limit"]
-    alone = pd.DataFrame(rows, columns=columns).assign(trials=trials[-1])
+    table = frame("effect target parameter unit limit", *rows)
+    alone = table.assign(trials=trials[-1])
     together = alone.assign(trials=", ".join(trials))
     return pd.concat([alone.assign(limit=9 * alone["limit"]), together], ignore_index=True)
 
 
 def gains() -> pd.DataFrame:
     """As ``extend`` writes them."""
-    rows = [("cop_ap", "mm", 12.0, 6.0, 50.0, 40.0, 60.0), ("fz", "N", 9.0, 9.9, -10.0, -20.0, 0.0)]
-    columns = [
-        "component",
-        "unit",
-        "rmse_before",
-        "rmse_after",
-        "gain_percent",
-        "ci_low",
-        "ci_high",
-    ]
-    frame = pd.DataFrame(rows, columns=columns)
-    return frame.assign(method="OM+plate_rotation", data="held_out: sub-01_task-basketball_run-1")
+    table = frame(
+        "component unit rmse_before rmse_after gain_percent ci_low ci_high",
+        ("cop_ap", "mm", 12.0, 6.0, 50.0, 40.0, 60.0),
+        ("fz", "N", 9.0, 9.9, -10.0, -20.0, 0.0),
+    )
+    return table.assign(method="OM+plate_rotation", data="held_out: sub-01_task-basketball_run-1")
 
 
 def changes() -> pd.DataFrame:
     """What a cause does to the parameters: much to a thigh, little to a foot."""
-    rows = [("thigh_l", 1.2, 0.015), ("foot_r", 0.001, 0.0002)]
-    frame = pd.DataFrame(rows, columns=["segment", "mass_change_kg", "com_change_m"])
+    columns = "segment mass_change_kg com_change_m"
+    table = frame(columns, ("thigh_l", 1.2, 0.015), ("foot_r", 0.001, 0.0002))
     shift = {f"com_{axis}_change_m": 0.0 for axis in "xyz"}
-    return frame.assign(method="OM+plate_rotation", **shift, largest="", sentence="")
+    return table.assign(method="OM+plate_rotation", **shift, largest="", sentence="")
 
 
 def empty(kind: str) -> pd.DataFrame:

@@ -7,7 +7,6 @@ import pytest
 from bsip_cli.diagnosis.marker_proof import SOFT_TISSUE
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.report.blocks import Paragraph
-from bsip_cli.report.budget import budget_sentences, fault_share, overall_pieces, pieces
 from bsip_cli.report.candidates import UNNAMED, candidates_of, causes_of, limits_of, limits_sentence
 from bsip_cli.report.effect_words import (
     EFFECT_WORDS,
@@ -16,6 +15,7 @@ from bsip_cli.report.effect_words import (
     separating_recording,
     size_words,
 )
+from bsip_cli.report.errors import budget_sentences, fault_share, overall_pieces, pieces
 from bsip_cli.report.participant.diagnosis import limit_blocks, nearest
 from bsip_cli.report.verdict import (
     cause_line,

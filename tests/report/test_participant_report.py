@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 
 from bsip_cli.report.blocks import Light, Picture
+from bsip_cli.report.errors import use_sentence
 from bsip_cli.report.first_page import front
-from bsip_cli.report.gains import use_sentence
-from bsip_cli.report.participant import joints
+from bsip_cli.report.participant import errors
 from bsip_cli.report.participant.document import participant_document
 from bsip_cli.report.records import ParticipantRecord
 from bsip_cli.report.verdict import light_of
@@ -191,10 +191,7 @@ def test_no_fault_and_a_large_error_is_not_fine(record):
     )
     large = replace(record, diagnosis=nothing, trials=trials)
     (light,) = (block for block in front(large) if isinstance(block, Light))
-    assert (light.state, light.title) == (
-        "large",
-        "Large error also with identified parameters",
-    )
+    assert (light.state, light.title) == ("large", "Large error also with identified parameters")
     assert light.text.startswith("Large with OM: vertical force 5.5 % of body weight. None of the")
     *_, to_do = front(large)
     assert not any("nothing needs to be corrected" in item for item in to_do.items)
@@ -255,12 +252,12 @@ def test_arms_are_shown_where_no_leg_is_known(record):
         replace(t, joint_moments=armed(t.joint_moments), joint_peaks=armed(t.joint_peaks))
         for t in record.trials[1:]
     )
-    section = joints.section(replace(record, trials=trials))
+    section = errors.joints_section(replace(record, trials=trials))
     (picture,) = [block for block in section.blocks if isinstance(block, Picture)]
     assert set(picture.data["joint"]) == {"elbow_r"}
     assert set(picture.data["method"]) == {"RM", "OM", "OM+plate_rotation"}
     bare = tuple(replace(t, joint_moments=None, joint_peaks=None) for t in record.trials)
-    (said,) = joints.section(replace(record, trials=bare)).blocks
+    (said,) = errors.joints_section(replace(record, trials=bare)).blocks
     assert "bsip joints" in said.text
 
 

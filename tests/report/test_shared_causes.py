@@ -10,10 +10,16 @@ import pytest
 from scipy.stats import norm
 
 from bsip_cli.report.blocks import Bullets, Grid, Light
-from bsip_cli.report.cohort import diagnoses
-from bsip_cli.report.cohort.record import CohortRecord, Member, Ratios
+from bsip_cli.report.cohort.document import diagnoses_section, light_of_all
+from bsip_cli.report.cohort.record import (
+    CohortRecord,
+    Member,
+    Ratios,
+    named_people,
+    searched,
+    shared_causes,
+)
 from bsip_cli.report.records import HowMade
-from bsip_cli.report.shared import named_people, searched, shared_causes
 from tests.report.fake_study import diagnosis
 
 TRIAL = "sub-01_task-sequence_run-1"
@@ -126,7 +132,7 @@ def cohort(**tables: pd.DataFrame | None) -> CohortRecord:
 
 
 def text_of(record: CohortRecord) -> str:
-    return " ".join(getattr(b, "text", "") for b in diagnoses.section(record).blocks)
+    return " ".join(getattr(b, "text", "") for b in diagnoses_section(record).blocks)
 
 
 def test_the_section_lists_causes_and_names_those_without():
@@ -135,7 +141,7 @@ def test_the_section_lists_causes_and_names_those_without():
     assert "No fault was found in bob (searched: sequence (run 1))." in text
     assert "Not searched for errors: eve." in text
     assert "No recording has motion with every contact on a plate: tom." in text
-    (grid,) = (b for b in diagnoses.section(record).blocks if isinstance(b, Grid))
+    (grid,) = (b for b in diagnoses_section(record).blocks if isinstance(b, Grid))
     first, group = grid.cells()
     assert (first[0].text, first[0].link) == ("ann", "../ann/report.html")
     assert first[1].text.startswith("Plate 1 is turned by +2.0 degrees")
@@ -145,7 +151,7 @@ def test_the_section_lists_causes_and_names_those_without():
 
 
 def test_what_is_shared_stands_in_the_section():
-    blocks = diagnoses.section(cohort(ann=TURNED, eve=TURNED)).blocks
+    blocks = diagnoses_section(cohort(ann=TURNED, eve=TURNED)).blocks
     (said,) = (b for b in blocks if isinstance(b, Bullets))
     assert len(said.items) == 1
 
@@ -173,12 +179,12 @@ def test_the_light_of_all_is_that_of_their_own(states, said):
     lights = [state and Light(state, "", "") for state in states]
     pairs = zip(record.members, lights, strict=True)
     members = tuple(replace(member, light=one) for member, one in pairs)
-    light = diagnoses.light(replace(record, members=members))
+    light = light_of_all(replace(record, members=members))
     assert f"{light.state}: {light.title}. {light.text}".startswith(said)
 
 
 def test_the_light_of_all_where_nobody_was_searched():
-    assert "run `bsip diagnose`" in diagnoses.light(cohort(bob=None)).text
+    assert "run `bsip diagnose`" in light_of_all(cohort(bob=None)).text
 
 
 def test_what_a_probability_means_is_said_where_something_was_found():
@@ -189,7 +195,7 @@ def test_what_a_probability_means_is_said_where_something_was_found():
 def test_a_person_without_report_has_no_link():
     record = cohort(ann=TURNED)
     record = replace(record, members=(replace(record.members[0], has_report=False),))
-    (grid,) = (b for b in diagnoses.section(record).blocks if isinstance(b, Grid))
+    (grid,) = (b for b in diagnoses_section(record).blocks if isinstance(b, Grid))
     assert not grid.cells()[0][0].link
 
 

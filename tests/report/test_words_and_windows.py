@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bsip_cli.report.blocks import _tied
+from bsip_cli.report.errors import Gain, gains_of, one_number_alone, pooled_gains
 from bsip_cli.report.figures.canvas import middle_of_longest, plain, runs, thinned
-from bsip_cli.report.gains import Gain, gains_of, one_number_alone, pooled_gains
-from bsip_cli.report.page import _tied
 from bsip_cli.report.words import (
     component_label,
     count,
@@ -21,14 +21,7 @@ from bsip_cli.report.words import (
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [
-        (1.25, "1.2"),
-        (-0.04, "0.0"),
-        (-3.0, "−3.0"),
-        (math.nan, "–"),
-        (None, "–"),
-        (math.inf, "–"),
-    ],
+    [(1.25, "1.2"), (-0.04, "0.0"), (-3.0, "−3.0"), (math.nan, "–"), (None, "–"), (math.inf, "–")],
 )
 def test_number(value, text):
     assert number(value) == text

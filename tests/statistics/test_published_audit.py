@@ -218,8 +218,7 @@ def test_an_interval_of_other_cells_is_told_by_its_difference():
 
 
 @pytest.mark.parametrize(
-    ("test", "text", "what"),
-    [("t", "-1.11", "t"), ("p", ".444", "p"), ("d", "3.33", "Cohen's d")],
+    ("test", "text", "what"), [("t", "-1.11", "t"), ("p", ".444", "p"), ("d", "3.33", "Cohen's d")]
 )
 def test_a_wrong_statistic_is_found_in_its_row(test, text, what):
     sound = drawn_table(1)

@@ -91,7 +91,7 @@ def unnamed_sentences(table: pd.DataFrame) -> Iterator[str]:
         yield f"Nothing can be said of the laboratory: {sentence}."
     for number, rows in _of_several(table).groupby("laboratory"):
         if not rows["verdict"].isin(SAID).any():
-            limits = listing([x for x in map(_limit_words, _best(rows)) if x])
+            limits = listing(list(_limits(rows)))
             yield (
                 f"Laboratory {number}: no fault of plates, clock or vertical was named; these "
                 f"recordings would have shown {limits}."
@@ -112,19 +112,13 @@ _TOLD = {
 }
 
 
-def _best(rows: pd.DataFrame) -> Iterator[Mapping[Any, Any]]:
+def _limits(rows: pd.DataFrame) -> Iterator[str]:
     """The smallest limit of each fault that is told in the sentence."""
-    for effect, parameter in _TOLD:
+    for (effect, parameter), words in _TOLD.items():
         mine = rows[(rows["effect"] == effect) & (rows["parameter"] == parameter)]
-        if len(mine):
-            yield mine.sort_values("limit").iloc[0].to_dict()
-
-
-def _limit_words(row: Mapping[Any, Any]) -> str:
-    if not isfinite(row["limit"]):
-        return ""
-    size = size_words(row["parameter"], row["unit"], row["limit"])
-    return f"{_TOLD[row['effect'], row['parameter']]} {size}"
+        for best in mine.sort_values("limit").head(1).to_dict("records"):
+            if isfinite(best["limit"]):
+                yield f"{words} {size_words(parameter, best['unit'], best['limit'])}"
 
 
 def _row(row: Mapping[Any, Any]) -> tuple[str | Cell, ...]:

@@ -92,29 +92,6 @@ _ON_GROUND_PERCENTILE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Skeleton:
-    """Bones as pairs of points, each a segment with a position (in joint axes of that segment)."""
-
-    starts: np.ndarray
-    start_m: np.ndarray
-    ends: np.ndarray
-    end_m: np.ndarray
-    sides: tuple[str, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """A trial's motion as the model makes it; anterior (2,) is the person's forward direction in
-    the world."""
-
-    body: Person
-    kinematics: pd.DataFrame
-    reconstruction: pd.DataFrame | None
-    anterior: np.ndarray
-    body_weight_N: float
-
-
-@dataclass(frozen=True, eq=False)
 class Pose:
     """Positions and force in the person's axes (anterior, right, up).
 
@@ -151,47 +128,58 @@ class Pose:
         return bool(self.force_N[2] > 0.5 * self.body_weight_N)
 
 
-def poses_of(motion: Motion, instants: int) -> tuple[Pose, ...]:
-    """Poses at evenly spread instants; none where no frame is determined."""
-    rows = _compared(motion)
+def poses_of(
+    body: Person,
+    kinematics: pd.DataFrame,
+    reconstruction: pd.DataFrame | None,
+    anterior: np.ndarray,
+    body_weight_N: float,
+    instants: int,
+) -> tuple[Pose, ...]:
+    """Poses of a trial, as the model makes them, at evenly spread instants; none where no frame is
+    determined. anterior : (2,) the person's forward direction in the world."""
+    rows = _compared(kinematics, reconstruction)
     if rows.empty:
         return ()
     rows = rows.iloc[np.unique(np.linspace(0, len(rows) - 1, instants).astype(int))]
-    body = motion.body
     q = rows[[f"q_{name}" for name in body.skeleton.q_names]].to_numpy()
     R, p = tree_of(body).forward(q)
-    axes = _person_axes(motion.anterior)
-    lines = _bones(body)
-    start = _points(R, p, lines.starts, lines.start_m) @ axes.T
-    end = _points(R, p, lines.ends, lines.end_m) @ axes.T
+    x, y = anterior / np.linalg.norm(anterior)
+    axes = np.array([[x, y, 0.0], [y, -x, 0.0], [0.0, 0.0, 1.0]])  # forward, to the right, up
+    bones = _bones(body)
+    segments = np.array([i for i, _, _ in bones])
+    start, end = (
+        _points(R, p, segments, np.array([bone[k] for bone in bones])) @ axes.T for k in (1, 2)
+    )
+    sides = tuple(_side(body, i, tip) for i, _, tip in bones)
     head = body.skeleton.index("head") if "head" in body.skeleton.segments else 0
-    centre = _centre_of_markers(body, head, np.array([0.0, 0.15, 0.0]))
+    own = body.markers_in_joint_m()[body.marker_segments == head]
+    centre = own.mean(axis=0) if len(own) else np.array([0.0, 0.15, 0.0])
     heads = (p[:, head] + R[:, head] @ centre) @ axes.T
     markers = _points(R, p, body.marker_segments, body.markers_in_joint_m()) @ axes.T
     low = np.minimum(start[..., 2], end[..., 2]).min(axis=1)
     times = rows["time_s"].to_numpy()
     ground = float(np.percentile(low, _ON_GROUND_PERCENTILE))
-    force, point = _forces(motion.reconstruction, times, axes, ground)
+    force, point = _forces(reconstruction, times, axes, ground)
     return tuple(
         Pose(
             float(times[k]),
             np.stack([start[k], end[k]], axis=1),
-            lines.sides,
+            sides,
             heads[k],
             _HEAD_RADIUS_M,
             markers[k],
             point[k],
             force[k],
             ground,
-            motion.body_weight_N,
+            body_weight_N,
         )
         for k in range(len(times))
     )
 
 
-def _compared(motion: Motion) -> pd.DataFrame:
+def _compared(kinematics: pd.DataFrame, reconstruction: pd.DataFrame | None) -> pd.DataFrame:
     """Rows of determined frames, within the compared span if there is one."""
-    kinematics, reconstruction = motion.kinematics, motion.reconstruction
     rows = kinematics[kinematics["determined"].astype(bool)]
     if reconstruction is not None:
         compared = clock_of(reconstruction)[flags_of(reconstruction, "valid")]
@@ -201,19 +189,14 @@ def _compared(motion: Motion) -> pd.DataFrame:
     return rows
 
 
-def _person_axes(anterior: np.ndarray) -> np.ndarray:
-    """(3, 3) rows: forward, to the right, up."""
-    x, y = anterior / np.linalg.norm(anterior)
-    return np.array([[x, y, 0.0], [y, -x, 0.0], [0.0, 0.0, 1.0]])
-
-
 def _points(R: np.ndarray, p: np.ndarray, segments: np.ndarray, local: np.ndarray) -> np.ndarray:
     """(n, b, 3) world positions of points fixed to segments."""
     return p[:, segments] + np.einsum("nbij,bj->nbi", R[:, segments], local)
 
 
-def _bones(body: Person) -> _Skeleton:
-    """From each joint to the next one; the last segments of a limb end at their markers."""
+def _bones(body: Person) -> list[tuple[int, np.ndarray, np.ndarray]]:
+    """Segment and end points, in the axes of its joint: from each joint to the next one; the last
+    segments of a limb end at their markers."""
     skeleton, joints = body.skeleton, body.joint_positions_m()
     bones: list[tuple[int, np.ndarray, np.ndarray]] = []
     for i, name in enumerate(skeleton.segments):
@@ -223,14 +206,7 @@ def _bones(body: Person) -> _Skeleton:
         bones += [(i, origin, joints[k]) for k in children if not np.allclose(joints[k], origin)]
         if not children and name != "head":
             bones += [(i, np.zeros(3), tip) for tip in _tips(body, i)]
-    segments = np.array([i for i, _, _ in bones])
-    return _Skeleton(
-        segments,
-        np.array([a for _, a, _ in bones]),
-        segments,
-        np.array([b for _, _, b in bones]),
-        tuple(_side(body, i, tip) for i, _, tip in bones),
-    )
+    return bones
 
 
 def _side(body: Person, segment: int, tip: np.ndarray) -> str:
@@ -249,11 +225,6 @@ def _tips(body: Person, segment: int) -> list[np.ndarray]:
     if body.skeleton.segments[segment].startswith("foot"):
         tips = [own[np.argmax(own[:, 0])], own[np.argmin(own[:, 0])]]
     return tips
-
-
-def _centre_of_markers(body: Person, segment: int, otherwise: np.ndarray) -> np.ndarray:
-    own = body.markers_in_joint_m()[body.marker_segments == segment]
-    return own.mean(axis=0) if len(own) else otherwise
 
 
 def _forces(

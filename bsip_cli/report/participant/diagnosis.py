@@ -7,7 +7,7 @@ from math import inf, isfinite
 
 import pandas as pd
 
-from bsip_cli.report.blocks import Block, Cell, Grid, Heading, Numbered, Paragraph, Section
+from bsip_cli.report.blocks import Block, Grid, Heading, Numbered, Paragraph, Section
 from bsip_cli.report.candidates import Candidate, Limit, candidates_of, limits_of
 from bsip_cli.report.effect_words import (
     USUAL,
@@ -66,18 +66,21 @@ def nearest(candidates: Sequence[Candidate]) -> tuple[Block, ...]:
     rejected = [one for one in candidates if one.verdict == "rejected"][:_NEAREST]
     if not rejected:
         return (Paragraph("No other fault of the catalogue came near."),)
-    rows = tuple(_row(one) for one in rejected)
+    rows = tuple(
+        (
+            one.label,
+            probability_words(one.probability) or MISSING,
+            number(one.rms_change, 1),
+            one.removes(),
+        )
+        for one in rejected
+    )
     head = ("not found, but near", "probability", "changes [N or N m]", "explains [%]")
     caption = (
         "Changes: root mean square in the force or moment that changes most. Explains: of the "
         "squared difference in seconds that did not size it, with 95 % interval."
     )
     return (Grid(head, rows, caption),)
-
-
-def _row(one: Candidate) -> tuple[str | Cell, ...]:
-    probability = probability_words(one.probability) or MISSING
-    return (one.label, probability, number(one.rms_change, 1), one.removes())
 
 
 # --- limits -------------------------------------------------------------------------------------
@@ -113,17 +116,12 @@ def _never_seen(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> list[Block]
         if len(hidden) == len(sizes):
             never.append(effect_title(effect))
         elif hidden and effect in _TOLD_BY_PART:
-            words = "; ".join(_part(effect, *part) for part in hidden)
+            places = ((place_label(effect, at), parameter_label(effect, one)) for at, one in hidden)
+            words = "; ".join(", ".join(filter(None, part)) for part in places)
             never.append(f"{effect_title(effect)} ({words})")
     if not never:
         return []
     return [Paragraph(f"Not to be found here at any size that can be true: {', '.join(never)}.")]
-
-
-def _part(effect: str, target: str, parameter: str) -> str:
-    """``plate 1, height``."""
-    places = [place_label(effect, target), parameter_label(effect, parameter)]
-    return ", ".join(filter(None, places))
 
 
 def _limit_rows(

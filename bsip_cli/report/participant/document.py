@@ -1,11 +1,52 @@
-"""The report of one participant: a first page, and folded sections in the order of questions."""
+"""The report of one participant: a first page, and folded sections in the order of questions; here
+those of the recordings and of the parameters."""
 
 from __future__ import annotations
 
-from bsip_cli.report.blocks import Block, Bullets, Document, Heading, Section, Terms
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.report.blocks import (
+    Block,
+    Bullets,
+    Cell,
+    Document,
+    Grid,
+    Heading,
+    Numbered,
+    Paragraph,
+    Picture,
+    Section,
+    Terms,
+)
+from bsip_cli.report.errors import MARKERS, yardsticks
+from bsip_cli.report.figures.charts import SegmentMasses, marker_bars, segment_masses
 from bsip_cli.report.first_page import front
-from bsip_cli.report.participant import diagnosis, errors, joints, parameters, recording
-from bsip_cli.report.records import HowMade, ParticipantRecord, how_made
+from bsip_cli.report.participant import diagnosis, errors
+from bsip_cli.report.records import (
+    HowMade,
+    ParticipantRecord,
+    TrialRecord,
+    clock_of,
+    flags_of,
+    how_made,
+)
+from bsip_cli.report.words import (
+    MISSING,
+    ROLES,
+    capital,
+    count,
+    listing,
+    number,
+    percent,
+    segment_label,
+    signed,
+    with_spread,
+)
+from bsip_cli.statistics.choice import Difference
+from bsip_cli.statistics.methods import OM, RM, RM_MASS
 
 CANNOT_KNOW = (
     "A mass behind a spherical joint enters the ground force only together with its neighbour's "
@@ -33,6 +74,8 @@ GLOSSARY = (
 
 
 def participant_document(record: ParticipantRecord) -> Document:
+    made = [Heading("What cannot be known"), Bullets(CANNOT_KNOW)]
+    made += how_made(HowMade.of(record.origins), record.defaults)
     return Document(
         title=f"{record.id}: do motion and measured forces agree?",
         subtitle="Ground forces computed from the motion, against the plates'.",
@@ -40,19 +83,279 @@ def participant_document(record: ParticipantRecord) -> Document:
         sections=(
             diagnosis.section(record),
             errors.section(record),
-            joints.section(record),
-            parameters.section(record),
-            recording.section(record),
-            _made(record),
+            errors.joints_section(record),
+            parameters_section(record),
+            recording_section(record),
+            Section("made", "How was it made, and what can it not know?", tuple(made)),
             Section("words", "What do the words mean?", (Terms(GLOSSARY),)),
         ),
     )
 
 
-def _made(record: ParticipantRecord) -> Section:
-    blocks: list[Block] = [
-        Heading("What cannot be known"),
-        Bullets(CANNOT_KNOW),
-        *how_made(HowMade.of(record.origins), record.defaults),
+# --- what was recorded: trials, what was repaired or left out, markers ----------------------------
+
+
+_MOST_FINDINGS = 10
+_MOST_EVENTS = 6
+_LEVELS = ("excluded", "warning", "corrected")
+_MM = 1000.0
+
+
+def recording_section(record: ParticipantRecord) -> Section:
+    refused = tuple(f"{r.unit or record.id}, {r.stage}: {r.sentence}" for r in record.refusals)
+    blocks: list[Block] = [_trials(record)]
+    if refused:
+        blocks += [Heading("Refused"), Bullets(refused, "warning")]
+    blocks += [*_loads(record), *_findings(record), *_markers(record), *_events(record)]
+    return Section("recording", "What was recorded?", tuple(blocks))
+
+
+def _trials(record: ParticipantRecord) -> Grid:
+    head = (
+        "recording",
+        "role",
+        "duration [s]",
+        "forces compared [%]",
+        "pose known [%]",
+        "markers [mm]",
+    )
+    return Grid(
+        head,
+        tuple(_trial_row(trial) for trial in record.trials),
+        "Forces are compared while every foot on the ground stands on a plate. Markers: root mean "
+        "square distance from the model.",
+        words=2,
+    )
+
+
+def _trial_row(trial: TrialRecord) -> tuple[str | Cell, ...]:
+    role = ROLES[trial.role]
+    frame = trial.kinematics
+    if frame is None or frame.empty:
+        return (trial.label, role, MISSING, MISSING, MISSING, MISSING)
+    compared = np.nan
+    if trial.reconstruction is not None and len(clock_of(trial.reconstruction)):
+        compared = float(flags_of(trial.reconstruction, "valid").mean())
+    rms = frame["marker_rms_m"].to_numpy(dtype=float)
+    rms = rms[np.isfinite(rms)]
+    return (
+        trial.label,
+        role,
+        number(float(frame["time_s"].iloc[-1] - frame["time_s"].iloc[0])),
+        percent(compared),
+        percent(float(frame["determined"].astype(float).mean())),
+        number(_MM * float(np.sqrt(np.mean(rms**2)))) if len(rms) else MISSING,
+    )
+
+
+def _loads(record: ParticipantRecord) -> Iterator[Block]:
+    """What the person carried as the study says, and what was made of it."""
+    trials_of: dict[str, list[str]] = {}
+    for trial, words in record.loads:
+        trials_of.setdefault(words, []).append(trial)
+    if trials_of:
+        carried = "; ".join(f"{words} in {listing(trials)}" for words, trials in trials_of.items())
+        yield Paragraph(
+            f"Known loads, as study.toml states them: {carried}. They are no part of the masses: "
+            "their share of the ground forces was computed as of point masses."
+        )
+
+
+def _findings(record: ParticipantRecord) -> Iterator[Block]:
+    """What ingest repaired, warned of or left out: one line per check, with its recordings."""
+    found: dict[tuple[str, str, str], dict[str, set[str]]] = {}
+    for trial in record.trials:
+        if trial.quality is not None:
+            for row in trial.quality.to_dict("records"):
+                if row["level"] in _LEVELS:
+                    key = (row["level"], row["check"], row["action"])
+                    what = f"{row['subject']} {row['found']}".strip()
+                    found.setdefault(key, {}).setdefault(trial.label, set()).add(what)
+    lines = []
+    for level, check, action in sorted(found, key=lambda key: _LEVELS.index(key[0])):
+        trials = found[level, check, action]
+        told = set().union(*trials.values())
+        what = told.pop() if len(told) == 1 else count(len(told), "finding")
+        done = f" ({action})" if action else ""
+        place = f"{check.replace('_', ' ')}, {level}, in {listing(list(trials))}"
+        lines.append(f"{place}: {what}{done}")
+    if not lines:
+        yield Paragraph("Nothing was repaired, excluded or warned of.")
+        return
+    yield Heading("Repaired, left out, warned of")
+    yield Bullets(tuple(lines[:_MOST_FINDINGS]))
+    if len(lines) > _MOST_FINDINGS:
+        more = count(len(lines) - _MOST_FINDINGS, "more finding")
+        yield Paragraph(f"{more} in the recordings' quality artifacts.", "note")
+
+
+# --- markers ------------------------------------------------------------------------------------
+
+
+def _markers(record: ParticipantRecord) -> Iterator[Block]:
+    frames = [t.residuals for t in record.trials if t.residuals is not None]
+    rows = pd.concat(frames) if frames else pd.DataFrame({"marker": [], "residual_m": []})
+    squares = rows["residual_m"].astype(float) ** 2
+    rms = _MM * squares.groupby(rows["marker"]).mean().dropna().pow(0.5)
+    if rms.empty:
+        yield Paragraph("No marker residuals are known.", "warning")
+        return
+    limit = next(y.limit for y in yardsticks(np.nan, np.nan) if y.name == MARKERS)
+    far = [f"{name} ({number(rms[name], 0)} mm)" for name in rms.index[rms > limit]]
+    yield Heading("Markers")
+    yield Picture(
+        marker_bars([str(name) for name in rms.index], rms.to_numpy(), limit),
+        "marker_residuals",
+        "Root mean square distance of each marker from its model, all recordings; the line is the "
+        f"limit of {number(limit, 0)} mm.",
+        "Bars: distance per marker.",
+        "low and even is good. One far above the others has slipped, is exchanged with another, or "
+        "sits where the model does not expect it.",
+        f"look at {listing(far)}." if far else "nothing: none is beyond the limit.",
+        rms.rename("rms_mm").reset_index(),
+    )
+
+
+def _events(record: ParticipantRecord) -> Iterator[Block]:
+    """What the inverse kinematics says of single markers; nothing where it was not asked."""
+    known = [(trial.label, t) for trial in record.trials if (t := trial.marker_events) is not None]
+    lines = [
+        f"{label}: {sentence} ({number(_MM * float(size), 0)} mm)"
+        for label, table in known
+        for sentence, size in zip(table["sentence"], table["size_m"], strict=True)
     ]
-    return Section("made", "How was it made, and what can it not know?", tuple(blocks))
+    if known and not lines:
+        yield Paragraph("No marker jumps, slips, bears another's label or sits wrong.")
+    elif lines:
+        yield Bullets(tuple(lines[:_MOST_EVENTS]))
+        if len(lines) > _MOST_EVENTS:
+            yield Paragraph(
+                f"{len(lines) - _MOST_EVENTS} more in the trials' marker-events.", "note"
+            )
+
+
+# --- which segment parameters come out, how sure they are, and in which movements to use them -----
+
+
+_FROM_TABLE = 0.2  # less of the variance than this removed: the number is the table's
+_COM = ["com_x_m", "com_y_m", "com_z_m"]
+_RATIOS = ("om", "rm_mass", "om_rm_mass")
+_MOST_STEPS = 3
+
+
+def parameters_section(record: ParticipantRecord) -> Section:
+    blocks = (*_choice(record), *_masses(record), *_next(record))
+    return Section("parameters", "Which segment parameters come out?", blocks)
+
+
+def _choice(record: ParticipantRecord) -> Iterator[Block]:
+    """Nothing where ``choose`` has not run."""
+    choice = record.choice
+    if choice is None or choice.empty:
+        return
+    yield Paragraph(str(choice["sentence"].iloc[0]))
+    for row in record.identification[record.identification["rare"].astype(bool)].itertuples():
+        yield Paragraph(
+            f"Do not use {row.method}: a body like this is rarer than 1 in 100 people, most by "
+            f"{row.farthest}.",
+            "warning",
+        )
+    if choice["trials"].iloc[0]:
+        yield Grid(
+            ("movement", "use", "OM over RM", "RM+mass over RM", "OM over RM+mass", "recordings"),
+            tuple(
+                (
+                    row["movement"],
+                    row["use"],
+                    *(_ratio(row, x) for x in _RATIOS),
+                    str(row["trials"]),
+                )
+                for row in choice.to_dict("records")
+            ),
+            "Errors as ratios (below 1: smaller), with one standard error to either side.",
+            words=2,
+        )
+
+
+def _ratio(row: Mapping, name: str) -> str:
+    ratio = row[f"ratio_{name}"]
+    low, high = Difference.of_ratio(ratio, row[f"log_error_{name}"]).interval()
+    ends = f" ({number(low, 2)} to {number(high, 2)})" if number(low) != MISSING else ""
+    return f"{number(ratio, 2)}{ends}"
+
+
+# --- parameters ---------------------------------------------------------------------------------
+
+
+def _masses(record: ParticipantRecord) -> Iterator[Block]:
+    rm, om = record.method(RM), record.method(OM)
+    if om.empty or rm.empty:
+        gone = OM if om.empty else RM
+        yield Paragraph(
+            f"There are no parameters of {gone}, so nothing can be compared.", "warning"
+        )
+        return
+    om = om.reindex(rm.index)
+    rm_mass_kg = record.method(RM_MASS)["mass_kg"].reindex(rm.index).to_numpy(dtype=float)
+    labels = tuple(segment_label(name) for name in rm.index)
+    table, own = rm["mass_kg"].to_numpy(dtype=float), om["mass_kg"].to_numpy(dtype=float)
+    sd, share = (om[c].to_numpy(dtype=float) for c in ("mass_kg_sd", "mass_data_share"))
+    yield Picture(
+        segment_masses(SegmentMasses(labels, table, rm_mass_kg, own, sd, share)),
+        "masses",
+        "Segment masses by table (RM), by the table times one number (RM+mass) and identified (OM), "
+        "their difference, and how much of each the data decide.",
+        "Points: segment masses; bars: how much the data decide.",
+        "long bars to the right are good: the number is this person's. Short ones: it is the table's.",
+        "do not read a difference into a mass that the data hardly decide.",
+    )
+    shift_mm = 1e3 * np.linalg.norm(om[_COM].to_numpy() - rm[_COM].to_numpy(), axis=1)
+    rows = [
+        (
+            label,
+            number(table[k], 2),
+            with_spread(own[k], sd[k], 2),
+            signed(100.0 * (own[k] / table[k] - 1.0)),
+            number(shift_mm[k], 0),
+            Cell(percent(share[k]), "warning" if share[k] < _FROM_TABLE else ""),
+        )
+        for k, label in enumerate(labels)
+    ]
+    total = ("whole body", number(table.sum(), 2), number(own.sum(), 2))
+    change = signed(100.0 * (own.sum() / table.sum() - 1.0))
+    yield Grid(
+        (
+            "segment",
+            "RM [kg]",
+            "OM [kg] ± sd",
+            "change [%]",
+            "centre of mass moves [mm]",
+            "data decide [%]",
+        ),
+        (*rows, (*total, change, "", "")),
+        "Centres of mass and tensors of inertia with their errors are in the CSV.",
+        name="segment_parameters",
+        data=record.bsip,
+    )
+
+
+def _next(record: ParticipantRecord) -> Iterator[Block]:
+    """What to record to know more."""
+    table = record.excitation
+    if table.empty:
+        yield Paragraph("How well the movement excites the parameters was not computed.", "note")
+        return
+    combinations = table[table["quantity"] == "combinations"]
+    silent = [segment_label(n) for n in combinations.loc[combinations["value"] == 0, "name"]]
+    if silent:
+        yield Paragraph(f"The movement tells nothing of {listing(silent)} that the table does not.")
+    steps = table[table["quantity"] == "next"].head(_MOST_STEPS)
+    if len(steps):
+        yield Heading("What to record next time")
+        yield Numbered(
+            tuple(
+                f"{capital(row['text'])}: {number(row['value'])} per cent points more decided by the "
+                f"data, most of all for the {segment_label(row['segment'])}."
+                for row in steps.to_dict("records")
+            )
+        )

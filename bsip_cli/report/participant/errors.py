@@ -1,21 +1,32 @@
-"""How large the errors of the forces are, in which recordings, and what makes them."""
+"""Sections of a person's report: how large the errors of the forces are, in which recordings and what
+makes them; and what identification and named faults change at the joints."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pandas as pd
 
 from bsip_cli.report.blocks import Block, Cell, Grid, Paragraph, Picture, Section
-from bsip_cli.report.budget import LEAST_TOLD_SIZE, pieces, size_of
-from bsip_cli.report.figures.bars import Whole, error_bars
+from bsip_cli.report.effect_words import effect_title
+from bsip_cli.report.errors import (
+    LEAST_TOLD_SIZE,
+    Gain,
+    gains_of,
+    one_number_alone,
+    pieces,
+    pooled_gains,
+    relative_change,
+    size_of,
+)
 from bsip_cli.report.figures.canvas import middle_of_longest
-from bsip_cli.report.figures.curves import Panel, curves
-from bsip_cli.report.gains import Gain, gains_of, one_number_alone, pooled_gains, relative_change
+from bsip_cli.report.figures.charts import Panel, Whole, curves, error_bars
 from bsip_cli.report.records import ParticipantRecord, TrialRecord, clock_of, flags_of, signals_of
-from bsip_cli.report.words import COMPONENTS, component_label, number
-from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
+from bsip_cli.report.words import COMPONENTS, component_label, count, number, signed
+from bsip_cli.segments import in_words
+from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN, is_extended
+from bsip_cli.statistics.samples import Z95
 
 _WINDOW_S = 10.0
 _PANELS = (  # column, title, to millimetres
@@ -29,12 +40,6 @@ _SHOWN = ("cop_ap", "cop_ml", "grf_vertical")
 def section(record: ParticipantRecord) -> Section:
     blocks = (*_over_time(record), *_budget(record), *_grid(record))
     return Section("errors", "How large are the errors, when, and what makes them?", blocks)
-
-
-def all_gains(record: ParticipantRecord) -> tuple[Gain, ...]:
-    """Of all trials of movement, trial by trial."""
-    fits = [(t.label, t.fit) for t in record.moving_trials() if t.fit is not None]
-    return tuple(gain for label, fit in fits for gain in gains_of(label, fit))
 
 
 # --- over time ----------------------------------------------------------------------------------
@@ -120,7 +125,8 @@ def _budget(record: ParticipantRecord) -> Iterator[Block]:
 
 
 def _grid(record: ParticipantRecord) -> Iterator[Block]:
-    gains = all_gains(record)
+    fits = [(t, t.fit) for t in record.moving_trials() if t.fit is not None]
+    gains = [gain for trial, fit in fits for gain in gains_of(trial.label, fit)]
     known = [gain for gain in gains if gain.component in _SHOWN]
     if not known:
         yield Paragraph("No recording could be compared with both methods.", "warning")
@@ -142,7 +148,6 @@ def _grid(record: ParticipantRecord) -> Iterator[Block]:
         for component in _SHOWN:
             cells += [_cell(of.get(component), method) for method in METHODS]
         rows.append(tuple(cells))
-    fits = [t.fit.assign(trial=t.stem) for t in record.moving_trials() if t.fit is not None]
     yield Grid(
         ("recording", *METHODS * len(_SHOWN)),
         tuple(rows),
@@ -150,7 +155,7 @@ def _grid(record: ParticipantRecord) -> Iterator[Block]:
         f"{100 * SAME_WITHIN:.0f} %.",
         groups=(("", 1), ("COP forward [mm]", 3), ("COP sideways [mm]", 3), ("vertical [% BW]", 3)),
         name="errors",
-        data=pd.concat(fits),
+        data=pd.concat(fit.assign(trial=trial.stem) for trial, fit in fits),
     )
 
 
@@ -163,9 +168,9 @@ def _cell(gain: Gain | None, method: str) -> Cell:
     return Cell(number(own, 1), "better" if own < min(others) * (1.0 - SAME_WITHIN) else "")
 
 
-def _one_number(record: ParticipantRecord, gains: tuple[Gain, ...]) -> Iterator[Block]:
+def _one_number(record: ParticipantRecord, gains: list[Gain]) -> Iterator[Block]:
     """What one number for the whole mass is, and does without identification."""
-    held_out = [gain for gain in gains if gain.held_out] or list(gains)
+    held_out = [gain for gain in gains if gain.held_out] or gains
     rows = record.identification[record.identification["method"] == RM_MASS]
     found = [m for m in pooled_gains(held_out) if m.component == "grf_vertical" and RM_MASS in m.of]
     if len(rows) and found:
@@ -175,3 +180,179 @@ def _one_number(record: ParticipantRecord, gains: tuple[Gain, ...]) -> Iterator[
             component_label(mean.component), mean.change(RM_MASS), mean.change(), over
         )
         yield Paragraph(f"{said} RM+mass is {RM} times {number(rows['mass_factor'].iloc[0], 3)}.")
+
+
+# --- what identification and named faults change at the joints: curves and peaks of the moments ---
+
+
+_LEGS = ("hip", "knee", "ankle")
+_ARMS = ("shoulder", "elbow")
+_SIDES = ("l", "r")
+_LEAST_FRAMES = 10  # of a curve
+
+
+def joints_section(record: ParticipantRecord) -> Section:
+    return Section("joints", "What does it change at the joints?", tuple(_blocks(record)))
+
+
+def _blocks(record: ParticipantRecord) -> Iterator[Block]:
+    trials = [t for t in record.moving_trials() if t.joint_peaks is not None]
+    if not trials:
+        yield Paragraph("There are no joint moments: run `bsip joints`.", "note")
+        return
+    trial, joints = _chosen(trials)
+    if not joints:
+        yield Paragraph("In no recording are the moments of a hip, knee, ankle, shoulder or elbow "
+                        f"determined. {_left_out(trials[0])}", "warning")  # fmt: skip
+        return
+    yield Paragraph(
+        "Net moments of all structures across a joint, by the proximal on the distal segment, "
+        "from the forces under each foot. Legs are left out while both feet share a plate."
+    )
+    yield _picture(trial, joints, record.use())
+    for said in largest_changes(all_peaks(trials)):
+        yield Paragraph(f"{said}.")
+    yield _peaks_grid(trial, joints, trials)
+    if left := _left_out(trial):
+        yield Paragraph(left, "note")
+
+
+def _chosen(trials: Sequence[TrialRecord]) -> tuple[TrialRecord, tuple[str, ...]]:
+    """The recording in which most is changed at a leg, where no leg is known at an arm, and its
+    joints; none where no curve can be drawn."""
+    for kinds in (_LEGS, _ARMS):
+        names = [f"{kind}_{side}" for kind in kinds for side in _SIDES]
+        changes = []
+        for trial in trials:
+            peaks = trial.joint_peaks
+            assert peaks is not None
+            asked = peaks["joint"].str.startswith(kinds) & (peaks["frames"] >= _LEAST_FRAMES)
+            changes.append(np.nan_to_num(peaks.loc[asked, "change_Nm"].abs().max(), nan=-1.0))
+        trial = trials[max(range(len(trials)), key=lambda k: (changes[k], k))]
+        peaks = trial.joint_peaks
+        assert peaks is not None
+        frames = peaks[peaks["method"] == RM].groupby("joint")["frames"].max()
+        joints = tuple(one for one in names if frames.get(one, 0) >= _LEAST_FRAMES)
+        if joints:
+            return trial, joints
+    return trials[0], ()
+
+
+# --- curves -------------------------------------------------------------------------------------
+
+
+def _picture(trial: TrialRecord, joints: Sequence[str], use: str) -> Picture:
+    moments = trial.joint_moments
+    assert moments is not None
+    rows = moments[moments["joint"].isin(joints)]
+    valid = rows["valid"].astype(bool).groupby(rows["time_s"]).any()
+    time = valid.index.to_numpy()
+    time = time[middle_of_longest(time, valid.to_numpy(), _WINDOW_S)]
+    rows = rows[rows["time_s"].between(time[0], time[-1])]
+    found = list(dict.fromkeys(rows["method"]))
+    methods = [name for name in (RM, OM) if name in found]
+    methods += [name for name in found if is_extended(name)][-1:]  # with all named causes
+    panels = [_panel(rows, joint, methods) for joint in joints]
+    axes = {joint: _axis(rows, joint) for joint in joints}
+    data = rows[rows["method"].isin(methods) & (rows["axis"] == rows["joint"].map(axes))]
+    columns = ["time_s", "method", "joint", "axis", "moment_Nm", "moment_sd_Nm"]
+    return Picture(
+        curves(panels, 2, 32.0),
+        "joint_moments",
+        f"{trial.label}: moments with the table's parameters (RM) and identified ones (OM), "
+        "with 95 % bands of OM.",
+        "Curves: joint moments over time.",
+        "lines inside one another's band differ by less than can be known.",
+        f"where RM leaves the band, report moments of {use}.",
+        data[columns],
+    )
+
+
+def _axis(rows: pd.DataFrame, joint: str) -> str:
+    """The first: flexion or extension."""
+    return str(rows.loc[rows["joint"] == joint, "axis"].iloc[0])
+
+
+def _panel(rows: pd.DataFrame, joint: str, methods: Sequence[str]) -> Panel:
+    axis = _axis(rows, joint)
+    mine = rows[(rows["joint"] == joint) & (rows["axis"] == axis)]
+    of = {method: mine[mine["method"] == method] for method in methods}
+    time = of[methods[0]]["time_s"].to_numpy()
+    return Panel(
+        f"{in_words(joint)}, {axis.replace('_', ' ')} [N m]",
+        time,
+        {method: own["moment_Nm"].to_numpy() for method, own in of.items()},
+        {m: own["moment_sd_Nm"].to_numpy() for m, own in of.items() if m == OM},
+    )
+
+
+# --- peaks --------------------------------------------------------------------------------------
+
+
+def all_peaks(trials: Sequence[TrialRecord]) -> pd.DataFrame:
+    """Of all recordings, with a column ``trial``."""
+    tables = [t.joint_peaks.assign(trial=t.stem) for t in trials if t.joint_peaks is not None]
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+
+
+def largest_changes(peaks: pd.DataFrame, kinds: Sequence[str] = (*_LEGS, *_ARMS)) -> Iterator[str]:
+    """What identification, and each named fault, changes most: a sentence each."""
+    if peaks.empty:
+        return
+    asked = peaks["joint"].str.rpartition("_")[0].isin(kinds)
+    known = peaks[asked & peaks["change_Nm"].notna() & peaks["compared_with"].ne("")]
+    for method, rows in known.groupby("method", sort=False):
+        if method == OM or is_extended(str(method)):
+            most = rows.iloc[int(rows["change_Nm"].abs().argmax())]
+            what = "Identification (OM against RM)"
+            if method != OM:
+                what = f"The {effect_title(str(method).rpartition('+')[2])}"
+            yield (
+                f"{what} changes {in_words(most['joint'])} {most['axis'].replace('_', ' ')} most, "
+                f"by {signed(most['change_Nm'], 1)} N m, {number(most['change_percent'], 0)} % of "
+                "that joint's peak"
+            )
+
+
+def _peaks_grid(trial: TrialRecord, joints: Sequence[str], trials: Sequence[TrialRecord]) -> Grid:
+    peaks = trial.joint_peaks
+    assert peaks is not None
+    faults = [name for name in dict.fromkeys(peaks["method"]) if is_extended(name)]
+    rows = [_peak_row(peaks, joint, faults) for joint in joints]
+    names = [f"{effect_title(name.rpartition('+')[2])} [N m (%)]" for name in faults]
+    return Grid(
+        ("joint", "peak, OM [N m]", "[N m/kg]", "at [s]", "OM − RM [N m (%)]", *names),
+        tuple(rows),
+        f"Peaks in {trial.label} with 95 % interval; largest change in N m, and in per cent "
+        "of the joint's peak. A change beyond the interval matters.",
+        name="joint_peaks",
+        data=all_peaks(trials),
+    )
+
+
+def _peak_row(peaks: pd.DataFrame, joint: str, faults: Sequence[str]) -> tuple[str, ...]:
+    axis = _axis(peaks, joint)
+    rows = peaks[(peaks["joint"] == joint) & (peaks["axis"] == axis)].to_dict("records")
+    mine = {row["method"]: row for row in rows}
+    own = mine.get(OM) or mine[RM]
+    changes = (mine[name] for name in (OM, *faults) if name in mine)
+    return (
+        f"{in_words(joint)} {axis.replace('_', ' ')}",
+        f"{number(own['peak_Nm'], 1)} ± {number(Z95 * own['peak_sd_Nm'], 1)}",
+        number(own["peak_Nm_kg"], 2),
+        number(own["peak_at_s"], 2),
+        *(f"{signed(c['change_Nm'], 1)} ({number(c['change_percent'], 0)})" for c in changes),
+    )
+
+
+def _left_out(trial: TrialRecord) -> str:
+    """Why moments of the trial are missing, in words; empty where none are."""
+    assert trial.joint_peaks is not None
+    legs = trial.joint_peaks["joint"].str.startswith(_LEGS)
+    reasons = trial.joint_peaks.loc[legs, "left_out"]
+    said = dict.fromkeys(text for text in reasons if text)
+    if not said:
+        return ""
+    first, *more = said
+    others = f" ({count(len(more), 'other pattern')} in the CSV)" if more else ""
+    return f"Left out of {trial.label}: {first}{others}."

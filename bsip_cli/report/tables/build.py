@@ -1,25 +1,200 @@
-"""The papers' six tables, from the cohort's results to text."""
+"""The papers' six tables, from the cohort's results to text; here those of sway and components."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
-from bsip_cli.report.tables import notes, paired, posturography, published, six_components
+from bsip_cli.report.tables import model, paired, published
 from bsip_cli.report.tables.formats import to_csv, to_latex, to_markdown
-from bsip_cli.report.tables.model import Results, Table
-from bsip_cli.statistics.cohort import Criteria
-from bsip_cli.statistics.cohort_values import Comparison
+from bsip_cli.report.tables.model import (
+    Cell,
+    Column,
+    Results,
+    Row,
+    Table,
+    column,
+    count,
+    counts_of,
+    mean_sd,
+    number,
+    p_value,
+    unit_label,
+)
+from bsip_cli.report.tables.paired import REASON, SHORT
+from bsip_cli.statistics.cohort import Comparison, Criteria, Topic, joined
+from bsip_cli.statistics.methods import MEASURED, OM, RM
+
+# --- table 3: sway of the measured and the simulated centre of pressure ---------------------------
+
+_SWAY = {
+    "mean_velocity": "MV",
+    "sway_length": "SL",
+    "ellipse_area": "SA",
+    "rms_ap": "RMS AP",
+    "rms_ml": "RMS ML",
+    "rms_ap_origin": "RMS AP (origin)",
+    "rms_ml_origin": "RMS ML (origin)",
+}
+_MARKS = {
+    (MEASURED, OM): ("OM M(SD)", "#"),
+    (MEASURED, RM): ("RM M(SD)", "*"),
+    (OM, RM): ("RM M(SD)", "+"),
+}
+"""Where the sign of a post hoc difference stands, and which it is, after the print."""
+
+_ALL = " / ".join((MEASURED, OM, RM)), ""
+_anova = partial(column, pair=_ALL)
+_ANOVA = (
+    _anova("f", "one_way_anova.statistic", "F", number(2)),
+    _anova("df1", "one_way_anova.df1"),
+    _anova("df2", "one_way_anova.df2"),
+    _anova("p", "one_way_anova.p_value", "p", p_value),
+    _anova("eta_squared", "one_way_anova.effect_size"),
+    _anova("lilliefors_p_smallest", "one_way_anova.lilliefors_p"),
+    _anova("repeated_f", "repeated_measures_anova.statistic", "F repeated", number(2)),
+    _anova("repeated_df1", "repeated_measures_anova.df1"),
+    _anova("repeated_df2", "repeated_measures_anova.df2"),
+    _anova("repeated_p", "repeated_measures_anova.p_value", "p repeated", p_value),
+    _anova("repeated_epsilon", "repeated_measures_anova.epsilon", "epsilon", number(2)),
+    _anova("repeated_partial_eta_squared", "repeated_measures_anova.effect_size"),
+)
+
+
+def _posturography(results: Results, criteria: Criteria) -> Table:
+    alpha, short = criteria.alpha, {MEASURED: "fp"} | SHORT
+    measured = "bonferroni_t.mean_a bonferroni_t.sd_a"
+    post_hoc = [
+        column(f"{kind}_{short[a]}_{short[b]}", f"{test}.p_value", pair=(a, b))
+        for kind, test in (
+            ("bonferroni_p", "bonferroni_t"),
+            ("repeated_bonferroni_p", "bonferroni_paired_t"),
+        )
+        for a, b in _MARKS
+    ]
+    columns = (
+        Column(("variable",)),
+        Column(("label",), "Variable", text=True),
+        column("n", "one_way_anova.n", pair=_ALL),
+        column("fp_mean fp_sd", measured, "FP M(SD)", mean_sd(2), (MEASURED, RM), True),
+        *paired.means("bonferroni_t"),
+        *_ANOVA,
+        *post_hoc,
+        *paired.against_rm_mass(criteria),
+        REASON,
+    )
+    named = {t: f"{_SWAY[t.variable]} [{unit_label(t.unit)}]" for t in results.topics}
+    rows = []
+    for topic, label in named.items():
+        own = {"variable": topic.variable, "label": label, "reason": results.reasons(topic)}
+        marks = paired.stars(results, topic, criteria)
+        for pair, (heading, sign) in _MARKS.items():
+            differs = model.star(results.find(topic, "bonferroni_t", *pair), alpha, sign)
+            marks[heading] = differs + marks.get(heading, "")
+        rows.append(Row(results.values(topic, columns) | own, topic.unit, marks=marks))
+    tests = [results.find(topic, "one_way_anova", *_ALL) for topic in results.topics]
+    title, legend = model.texts_of(NAMES[2], results, tests, criteria)
+    notes = (*legend, *model.not_possible(results, named))
+    return Table(NAMES[2], title, columns, tuple(rows), notes)
+
+
+# --- table 5: the six components of the ground wrench, movement by movement (Hansen 2014) ---------
+
+_COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
+_MEASURES = {"rmse": "rmse", "pearson_r": "r", "schwer_m": "m", "schwer_p": "p", "schwer_c": "c"}
+"""Measure of the data: its name in the CSV."""
+
+_DIFFER = "r differs OM : RM"
+_BETTER = "williams_t.count_a williams_t.count_b williams_t.n"
+_OF_R = (
+    ("williams_t_median", "williams_t.statistic", "Williams t", number(2)),
+    ("williams_p_median", "williams_t.p_value", "p", p_value),
+    ("williams_om_better williams_rm_better williams_n", _BETTER, _DIFFER, counts_of),
+    ("fisher_z_median", "fisher_z.statistic", "Fisher z", number(2)),
+    ("fisher_p_median", "fisher_z.p_value", "p (z)", p_value),
+    ("fisher_om_better", "fisher_z.count_a"),
+    ("fisher_rm_better", "fisher_z.count_b"),
+)
+
+
+def _six_components(results: Results, criteria: Criteria) -> Table:
+    errors = [topic for topic in results.topics if topic.variable.endswith("_rmse")]
+    errors.sort(key=lambda t: (t.role == "sequence", t.task, _COMPONENTS.index(t.variable[:2])))
+    of_error = list(_errors_of_six())
+    of_r = [column(*one) for one in _OF_R]
+    named: dict[Topic, str] = {}
+    rows = []
+    for topic in errors:
+        component, r = topic.variable[:2], _sibling(topic, "r")
+        name = component.capitalize()
+        named |= dict.fromkeys((topic, r), f"{name}, {topic.task}")
+        of_topic: dict[str, Cell] = {"task": topic.task, "role": topic.role, "component": component}
+        of_topic["n"] = results.find(topic, "paired_t").n
+        tests = results.values(topic, of_error) | results.values(r, of_r)
+        tests["label"] = f"{name} [{unit_label(topic.unit)}]"
+        tests["reason"] = joined(results.reasons(topic), results.reasons(r))
+        for method in SHORT:  # tests stand in OM's row; those of its rivals leave them empty
+            own = tests if method == OM else dict.fromkeys(tests, "")
+            of_method = _means_of_six(results, topic, method)
+            values = {**of_topic, "method": method, **own, **of_method}
+            rows.append(Row(values, topic.unit, paired.task_label(topic)))
+    columns = (
+        *(Column((name,)) for name in ("task", "role", "component")),
+        Column(("label",), "Component", text=True),
+        Column(("method",), "Method", text=True),
+        Column(("n",), "n", count),
+        Column(("rmse_mean", "rmse_sd"), "RMSE", mean_sd(2), in_row_unit=True),
+        *(Column((f"{x.lower()}_mean", f"{x.lower()}_sd"), x, mean_sd(3)) for x in "rMPC"),
+        *of_error,
+        *of_r,
+        REASON,
+    )
+    tests_of_error = [results.find(topic, "paired_t") for topic in errors]
+    title, legend = model.texts_of(NAMES[4], results, tests_of_error, criteria, differ=_DIFFER)
+    notes = (*legend, *model.not_possible(results, named))
+    return Table(NAMES[4], title, columns, tuple(rows), notes)
+
+
+def _errors_of_six() -> Iterator[Column]:
+    """Tests of the RMSE, of OM against each rival."""
+    for one in paired.smaller_error("n_paired", "sign.n"):
+        yield one
+        name, pair = one.fields[0], one.of[0][2:]
+        if name.endswith("sign_test_p"):
+            before = name.removesuffix("sign_test_p")
+            yield column(f"{before}rmse_t", "paired_t.statistic", pair=pair)
+            yield column(f"{before}rmse_t_p", "paired_t.p_value", pair=pair)
+
+
+def _means_of_six(results: Results, topic: Topic, method: str) -> dict[str, Cell]:
+    found: dict[str, Cell] = {}
+    for measure, short in _MEASURES.items():
+        place = (topic, "paired_t")
+        if measure != "rmse":
+            place = _sibling(topic, measure), "description"
+        pair = results.find(*place, OM, RM if method == OM else method)
+        mean, sd = (pair.mean_a, pair.sd_a) if method == OM else (pair.mean_b, pair.sd_b)
+        found |= {f"{short}_mean": mean, f"{short}_sd": sd}
+    return found
+
+
+def _sibling(topic: Topic, measure: str) -> Topic:
+    """The same component and task, another measure."""
+    return Topic(topic.table, topic.variable[:3] + measure, topic.task, topic.role, "1")
+
+
+# --- all of them ----------------------------------------------------------------------------------
 
 BUILDERS: dict[str, Callable[[Results, Criteria], Table]] = {
     "table1": paired.segment_mass,
     "table2": paired.cop_rmse,
-    "table3": posturography.build,
+    "table3": _posturography,
     "table4": paired.cross_validation,
-    "table5": six_components.build,
+    "table5": _six_components,
     "table6": paired.centres_of_mass,
 }
 IN_PRINT = ("table1", "table2", "table3", "table4")
@@ -31,12 +206,7 @@ NAMES = (
     "table5_six_components",
     "table6_centres_of_mass",
 )
-BESIDE = tuple(published.name_beside(tag) for tag in IN_PRINT)
-RENDERERS: dict[str, Callable[[Table], str]] = {
-    "csv": to_csv,
-    "md": to_markdown,
-    "tex": to_latex,
-}
+RENDERERS: dict[str, Callable[[Table], str]] = {"csv": to_csv, "md": to_markdown, "tex": to_latex}
 
 
 def build_tables(
@@ -57,33 +227,17 @@ def build_tables(
     missing : who is not in which tables: ``sentence`` and ``tables`` (as in `BUILDERS`).
     """
     rows = [Comparison.from_row(row) for row in comparisons.to_dict("records")]
+    of_table = {tag: Results(row for row in rows if row.topic.table == tag) for tag in BUILDERS}
     tables = []
     for tag, build in BUILDERS.items():
-        table = build(Results(row for row in rows if row.topic.table == tag), criteria)
+        table = build(of_table[tag], criteria)
         absent = [str(gone["sentence"]) for gone in missing if tag in gone["tables"]]
         more = (
-            *notes.fitted_on(counts for counts in fitted_on if counts["table"] == tag),
-            notes.missing(absent),
+            *model.fitted_on(counts for counts in fitted_on if counts["table"] == tag),
+            model.missing(absent),
         )
         tables.append(replace(table, notes=(*table.notes, *filter(None, more))))
-    return (*tables, *_beside_print(rows))
-
-
-def _beside_print(rows: Sequence[Comparison]) -> Iterator[Table]:
-    """Tables 1 to 4 with the published values."""
-    for tag in IN_PRINT:
-        yield published.beside(tag, Results(row for row in rows if row.topic.table == tag))
-
-
-def render_markdown(
-    comparisons: pd.DataFrame,
-    criteria: Criteria,
-    fitted_on: Sequence[Mapping] = (),
-    missing: Sequence[Mapping] = (),
-) -> dict[str, str]:
-    """All tables as Markdown, by the stem of their file; parameters as `build_tables`."""
-    tables = build_tables(comparisons, criteria, fitted_on, missing)
-    return {table.name: to_markdown(table) for table in tables}
+    return (*tables, *(published.beside(tag, of_table[tag]) for tag in IN_PRINT))
 
 
 def folder(out: Path) -> Path:
@@ -94,5 +248,4 @@ def folder(out: Path) -> Path:
 def show(out: Path) -> str:
     """The written Markdown tables of an output folder, one after the other; empty without any."""
     paths = [folder(out) / f"{name}.md" for name in NAMES]
-    texts = [path.read_text(encoding="utf-8") for path in paths if path.exists()]
-    return "\n\n".join(texts)
+    return "\n\n".join(path.read_text(encoding="utf-8") for path in paths if path.exists())

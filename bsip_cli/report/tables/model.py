@@ -1,14 +1,21 @@
-"""A table as data, and the comparisons of one table, found by what they are about."""
+"""A table as data, the tests of one table by what they are about, and numbers as the papers print
+them; a number that is not there is a dash."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import tomllib
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import isnan
+from pathlib import Path
 
-from bsip_cli.statistics.cohort_values import Comparison, Topic, joined
+from bsip_cli.statistics.cohort import Comparison, Criteria, Topic, joined
 from bsip_cli.statistics.methods import OM, RM
 
 Cell = str | float | int
+Number = tuple[str, str, str, str]
+"""A number of a test: the test, the number's name, and the two methods."""
 
 
 @dataclass(frozen=True)
@@ -20,6 +27,7 @@ class Column:
     form : the values of the fields as printed text.
     in_row_unit : the CSV names get the unit of the row, so that each holds one unit only.
     text : aligned to the left.
+    of : the numbers of the fields; empty for what a row brings itself.
     """
 
     fields: tuple[str, ...]
@@ -27,6 +35,20 @@ class Column:
     form: Callable[..., str] = str
     in_row_unit: bool = False
     text: bool = False
+    of: tuple[Number, ...] = ()
+
+
+def column(
+    fields: str,
+    of: str,
+    heading: str = "",
+    form: Callable[..., str] = str,
+    pair: tuple[str, str] = (OM, RM),
+    in_row_unit: bool = False,
+) -> Column:
+    """A column of numbers: ``of`` as ``test.name``, as many as there are names of ``fields``."""
+    numbers = ((*one.split("."), *pair) for one in of.split())
+    return Column(tuple(fields.split()), heading, form, in_row_unit, of=tuple(numbers))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -71,11 +93,11 @@ class Results:
     """`topics` in the order in which they were computed."""
 
     def __init__(self, comparisons: Iterable[Comparison]) -> None:
-        rows = tuple(comparisons)
-        self.topics = tuple(dict.fromkeys(row.topic for row in rows))
-        self._by_topic = {
-            topic: tuple(row for row in rows if row.topic == topic) for topic in self.topics
-        }
+        self._about: dict[Topic, list[Comparison]] = defaultdict(list)
+        for row in comparisons:
+            self._about[row.topic].append(row)
+        self.topics = tuple(self._about)
+        rows = (row for rows in self._about.values() for row in rows)
         self._rows = {(row.topic, row.test, row.method_a, row.method_b): row for row in rows}
 
     def find(self, topic: Topic, test: str, first: str = OM, second: str = RM) -> Comparison:
@@ -83,10 +105,179 @@ class Results:
         nothing = Comparison(topic, test, "added", first, second, reason="There are no such data.")
         return self._rows.get((topic, test, first, second), nothing)
 
-    def about(self, topic: Topic) -> tuple[Comparison, ...]:
+    def values(self, topic: Topic, columns: Iterable[Column]) -> dict[str, Cell]:
+        """The numbers of those columns that are made of tests."""
+        return {
+            name: getattr(self.find(topic, test, *pair), number)
+            for one in columns
+            for name, (test, number, *pair) in zip(one.fields, one.of, strict=False)
+        }
+
+    def about(self, topic: Topic) -> Sequence[Comparison]:
         """Every row on the topic."""
-        return self._by_topic.get(topic, ())
+        return self._about.get(topic, ())
 
     def reasons(self, topic: Topic) -> str:
         """Why tests on the topic are not possible, each reason once."""
         return joined(*(row.reason for row in self.about(topic)))
+
+
+# --- numbers as text ------------------------------------------------------------------------------
+
+ABSENT = "-"
+
+
+def unit_label(unit: str) -> str:
+    return {"mm2": "mm²", "% body weight": "% BW"}.get(unit, unit)
+
+
+def number(decimals: int) -> Callable[[float], str]:
+    return lambda value: ABSENT if isnan(value) else _rounded(value, decimals)
+
+
+def mean_sd(decimals: int) -> Callable[[float, float], str]:
+    """M(SD), in whole numbers from a thousand on; one participant has no SD."""
+
+    def form(mean: float, sd: float) -> str:
+        if isnan(mean):
+            return ABSENT
+        places = number(0 if abs(mean) >= 1000.0 else decimals)
+        return f"{places(mean)}({places(sd)})"
+
+    return form
+
+
+def interval(decimals: int) -> Callable[[float, float], str]:
+    def form(low: float, high: float) -> str:
+        if isnan(low) or isnan(high):
+            return ABSENT
+        return f"[{_rounded(low, decimals)}, {_rounded(high, decimals)}]"
+
+    return form
+
+
+def p_value(p: float) -> str:
+    """Three decimals without the leading zero."""
+    if isnan(p):
+        return ABSENT
+    return "<.001" if p < 0.0005 else f"{p:.3f}".removeprefix("0")
+
+
+def count(value: float) -> str:
+    return ABSENT if isnan(value) else f"{value:.0f}"
+
+
+def counts_of(a: float, b: float, n: float) -> str:
+    """How many for the one, how many for the other, of how many."""
+    return ABSENT if isnan(a) or n == 0 else f"{a:.0f} : {b:.0f} of {n:.0f}"
+
+
+def _rounded(value: float, decimals: int) -> str:
+    text = f"{value:.{decimals}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+# --- sentences below a table: who is in it, what the stars mean, what could not be tested ---------
+
+NAMED_AT_MOST = 6
+"""Missing participants and rows that are named one by one."""
+
+
+def participants(rows: Iterable[Comparison]) -> str:
+    """n = 8 participants, or the range over the rows."""
+    numbers = [row.n for row in rows] or [0]
+    low, high = min(numbers), max(numbers)
+    word = "participant" if high == 1 else "participants"
+    return f"n = {high} {word}" if low == high else f"n = {low} to {high} {word}"
+
+
+_TEXTS = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
+
+
+def texts_of(
+    name: str, results: Results, tests: Sequence[Comparison], criteria: Criteria, **more: str
+) -> tuple[str, tuple[str, ...]]:
+    """Title and legend of a table; ``more``: what only this one tells."""
+    words = _TEXTS["shared"] | more
+    words |= {"n": participants(tests), "alpha": f"{criteria.alpha:g}"}
+    words["percent"] = f"{criteria.equivalence_percent:g}"
+    words["tasks"] = ", ".join(dict.fromkeys(topic.task for topic in results.topics)) or "none"
+    words["holm"] = _holm_legend(tests, criteria.alpha)
+    words["normal"] = (
+        f"Where Lilliefors' p is below {_level(criteria.alpha)} the differences are not normal, and "
+        "Wilcoxon's test is the one to read."
+    )
+    notes = (note.format(**words) for note in _TEXTS[name]["notes"])
+    return _TEXTS[name]["title"].format(**words), tuple(filter(None, notes))
+
+
+def star(row: Comparison, alpha: float, sign: str = "*") -> str:
+    return sign if row.p_value < alpha else ""
+
+
+def star_legend(alpha: float) -> str:
+    return f"* significant: p < {_level(alpha)}."
+
+
+def _holm_legend(tests: Sequence[Comparison], alpha: float) -> str:
+    """How many of the stars outlast the correction for their number; nothing for one test."""
+    done = [row for row in tests if not isnan(row.p_value)]
+    if len(done) < 2:
+        return ""
+    before, after = (
+        sum(p < alpha for p in ps)
+        for ps in zip(*((r.p_value, r.p_holm) for r in done), strict=True)
+    )
+    return (
+        f"The {len(done)} t tests ask one question many times: {before} have p < {_level(alpha)}, "
+        f"{after} after Holm's correction (added; p_holm in the CSV)."
+    )
+
+
+def not_possible(results: Results, labels: Mapping[Topic, str]) -> tuple[str, ...]:
+    """A sentence for each reason why a test is missing, with the labels of its rows."""
+    concerned: dict[str, dict[str, None]] = defaultdict(dict)
+    for topic, label in labels.items():
+        for row in results.about(topic):
+            if row.reason:
+                concerned[row.reason][label] = None
+    everyone = set(labels.values())
+    return tuple(
+        f"Not possible ({'all rows' if len(names) == len(everyone) > 1 else _named([*names])}): "
+        f"{reason}"
+        for reason, names in concerned.items()
+    )
+
+
+def missing(sentences: Sequence[str]) -> str:
+    """Who is not in the table, and why."""
+    return f"Missing: {_named(sentences, '; ')}." if sentences else ""
+
+
+def fitted_on(counts: Iterable[Mapping]) -> tuple[str, ...]:
+    """For each task what its data were to OM: those it was fitted to, or data it never saw.
+
+    counts : task, role, and of how many participants (``everyone``) OM was fitted to its data
+        (``identification``).
+    """
+    sentences = []
+    for counted in counts:
+        task, fitted = counted["task"], counted["identification"]
+        if fitted:
+            sentences.append(
+                f"{task}: OM was fitted to these very data in {fitted} of {counted['everyone']} "
+                "participants; there its error is that of a fit, not of a prediction."
+            )
+        elif counted["role"] == "sequence":
+            sentences.append(f"{task}: only stretches that OM was not fitted to.")
+    return tuple(sentences)
+
+
+def _named(names: Sequence[str], comma: str = ", ") -> str:
+    shown = comma.join(names[:NAMED_AT_MOST])
+    more = len(names) - NAMED_AT_MOST
+    return f"{shown}{comma}and {more} more" if more > 0 else shown
+
+
+def _level(alpha: float) -> str:
+    return p_value(alpha) if alpha < 0.01 else f"{alpha:g}".removeprefix("0")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import product
-from math import copysign, inf, pi, sqrt
+from math import copysign, inf, nan, pi, sqrt
 
 import numpy as np
 from scipy import stats
@@ -41,14 +41,49 @@ def _unlike(
 # --- the ways in which papers compute Cohen's d of two methods in the same people -----------------
 
 
+_PAIRED = "SD of the differences"
+_POOLED = "pooled SD of the two columns"
+_HEDGES = f"{_POOLED}, corrected after Hedges"
+_BELOW: dict[str, Callable[[float, float], float]] = {
+    _POOLED: lambda a, b: sqrt((a**2 + b**2) / 2),
+    _PAIRED: lambda a, b: nan,  # from t
+    "mean of the two SDs": lambda a, b: (a + b) / 2,
+    "SD of {a}": lambda a, _: a,
+    "SD of {b}": lambda _, b: b,
+    _HEDGES: lambda a, b: sqrt((a**2 + b**2) / 2),
+}
+_ABOVE: dict[str, Callable[[Interval], Interval]] = {
+    "({b} - {a})": lambda d: d,
+    "({a} - {b})": Interval.negative,
+    "|{b} - {a}|": Interval.size,
+}
+
+
 @dataclass(frozen=True)
 class Definition:
-    """formula : with {a} and {b} for the first and the second method. is_paired : of the
-    differences, as the paired test is."""
+    """A difference of means, over a standard deviation of which only that of the differences is
+    paired as the test is; both with {a} and {b} for the first and the second method."""
 
-    formula: str
-    of: Callable[[PrintedTable, Row, Paper], Interval]
-    is_paired: bool = False
+    above: str
+    below: str
+
+    def of(self, table: PrintedTable, row: Row, paper: Paper) -> Interval:
+        def effect(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float:
+            below, above = _BELOW[self.below](sd_a, sd_b), mean_b - mean_a
+            return above / below if below > 0.0 else copysign(inf, above) if above else 0.0
+
+        if self.below == _PAIRED:
+            found = image(lambda t: -t / sqrt(paper.participants), row.printed("t"))
+        else:
+            a, b = (row.cells[method] for method in table.methods)
+            found = image(effect, a.mean, a.spread(), b.mean, b.spread())
+        if self.below == _HEDGES:
+            factor = 1 - 3 / (8 * paper.participants - 9)
+            found = image(lambda d: factor * d, found)
+        return _ABOVE[self.above](found)
+
+
+DEFINITIONS = tuple(Definition(above, below) for below in _BELOW for above in _ABOVE)
 
 
 def definition_of(paper: Paper, table: PrintedTable) -> tuple[Definition, int]:
@@ -59,53 +94,6 @@ def definition_of(paper: Paper, table: PrintedTable) -> tuple[Definition, int]:
 
     best = max(DEFINITIONS, key=followers)
     return best, followers(best)
-
-
-def _over(denominator: Callable[[float, float], float]) -> Callable[..., Interval]:
-    """(second - first) / a function of both standard deviations."""
-
-    def effect(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float:
-        below = denominator(sd_a, sd_b)
-        above = mean_b - mean_a
-        return above / below if below > 0.0 else copysign(inf, above) if above else 0.0
-
-    def of(table: PrintedTable, row: Row, _: Paper) -> Interval:
-        a, b = (row.cells[method] for method in table.methods)
-        return image(effect, a.mean, a.spread(), b.mean, b.spread())
-
-    return of
-
-
-def _of_differences(_: PrintedTable, row: Row, paper: Paper) -> Interval:
-    return image(lambda t: -t / sqrt(paper.participants), row.printed("t"))
-
-
-def _hedges(table: PrintedTable, row: Row, paper: Paper) -> Interval:
-    factor = 1 - 3 / (8 * paper.participants - 9)
-    return image(lambda d: factor * d, _pooled(table, row, paper))
-
-
-_pooled = _over(lambda a, b: sqrt((a**2 + b**2) / 2))
-_DENOMINATORS: tuple[tuple[str, Callable[[PrintedTable, Row, Paper], Interval], bool], ...] = (
-    ("pooled SD of the two columns", _pooled, False),
-    ("SD of the differences", _of_differences, True),
-    ("mean of the two SDs", _over(lambda a, b: (a + b) / 2), False),
-    ("SD of {a}", _over(lambda a, _: a), False),
-    ("SD of {b}", _over(lambda _, b: b), False),
-    ("pooled SD of the two columns, corrected after Hedges", _hedges, False),
-)
-
-
-_FORMS: dict[str, Callable[[Interval], Interval]] = {
-    "({b} - {a})": lambda d: d,
-    "({a} - {b})": Interval.negative,
-    "|{b} - {a}|": Interval.size,
-}
-DEFINITIONS = tuple(
-    Definition(f"{above} / {below}", lambda *row, of=of, form=form: form(of(*row)), is_paired)
-    for below, of, is_paired in _DENOMINATORS
-    for above, form in _FORMS.items()
-)
 
 
 # --- tables that compare methods as if they were groups of people: F and p from M(SD) and n -------
@@ -249,9 +237,10 @@ def _effect_sizes(paper: Paper, table: PrintedTable, meant: PrintedTable) -> Ite
             right = range_words(definition.of(table, true, paper))
             found = f"computed from the means as printed; {right} from those that were meant"
             yield table.slip(row.name, what, row.tests["d"], found)
-    if not definition.is_paired:
+    if definition.below != _PAIRED:
         a, b = table.methods
-        printed = f"{definition.formula.format(a=a, b=b)} in {count} of {len(table.rows)} rows"
+        formula = f"{definition.above} / {definition.below}".format(a=a, b=b)
+        printed = f"{formula} in {count} of {len(table.rows)} rows"
         found = "not the d of the differences, t / sqrt(n), though the test is paired"
         what = "definition of Cohen's d"
         yield table.slip("all rows", what, printed, found, is_remark=True)

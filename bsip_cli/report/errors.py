@@ -1,0 +1,398 @@
+"""Errors of the methods: what identification gains over the table's parameters, and over these times
+one number; how large they are beside yardsticks; what makes them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pandas as pd
+
+from bsip_cli.report.blocks import Scale
+from bsip_cli.report.effect_words import EFFECT_WORDS
+from bsip_cli.report.words import COMPONENTS, component_label, count, listing, number, signed
+from bsip_cli.statistics.choice import Difference
+from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
+from bsip_cli.statistics.published.paper import load_paper
+
+_IN_WORDS = {
+    OM: "OM (segment parameters identified from this person)",
+    RM_MASS: "RM+mass (segment parameters of a table, masses times one number)",
+    RM: "RM (segment parameters of an anthropometric table)",
+}
+_PAIRS = ("om", "rm_mass", "om_rm_mass")  # of whose ratios the choice is made
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors (RMSE) of the methods in one component: of OM, RM, and RM+mass if there."""
+
+    component: str
+    unit: str
+    of: Mapping[str, float]
+
+    def change(self, method: str = OM) -> float:
+        """Relative change of RM's error: -0.4 is 40 % less."""
+        return relative_change(self.of[RM], self.of.get(method, np.nan))
+
+
+@dataclass(frozen=True)
+class Gain(Errors):
+    """Those of one trial. frames : that they rest on. held_out : OM had not seen the data."""
+
+    trial: str
+    frames: int
+    held_out: bool
+
+
+def relative_change(before: float, after: float) -> float:
+    return after / before - 1.0 if before > 0.0 else float("nan")
+
+
+def gains_of(trial: str, fit: pd.DataFrame) -> tuple[Gain, ...]:
+    """The gains of one trial, in the order of the components; the vertical force in % BW."""
+    rows = {(row["method"], row["component"]): row for _, row in fit.iterrows()}
+    gains = []
+    for component in COMPONENTS:
+        known = {m: rows[m, component] for m in METHODS if (m, component) in rows}
+        if not {RM, OM} <= known.keys():
+            continue
+        column, unit = "rmse", str(known[OM]["unit"])
+        if component == "grf_vertical" and np.isfinite(known[OM]["rmse_percent_bw"]):
+            column, unit = "rmse_percent_bw", "% BW"
+        gains.append(
+            Gain(
+                component,
+                unit,
+                {method: float(row[column]) for method, row in known.items()},
+                trial,
+                min(int(row["n"]) for row in known.values()),
+                known[OM]["data"] == "held_out",
+            )
+        )
+    return tuple(gains)
+
+
+def pooled_gains(gains: Iterable[Gain]) -> tuple[Errors, ...]:
+    """Over all frames of the trials, component by component, so that a stride of 0.2 s counts for
+    no more than it is; trials without numbers are left out."""
+    known = [gain for gain in gains if np.isfinite(list(gain.of.values())).all()]
+    of_each = ([gain for gain in known if gain.component == name] for name in COMPONENTS)
+    return tuple(Errors(of[0].component, of[0].unit, _pooled(of)) for of in of_each if of)
+
+
+def _pooled(gains: Sequence[Gain]) -> dict[str, float]:
+    """Root mean square over all frames, of those of stretches of so many frames."""
+    frames = [gain.frames for gain in gains]
+    methods = [m for m in METHODS if all(m in gain.of for gain in gains)]
+    return {
+        method: float(np.sqrt(np.average([g.of[method] ** 2 for g in gains], weights=frames)))
+        for method in methods
+    }
+
+
+def one_number_alone(quantity: str, rm_mass: float, om: float, over_rm_mass: float) -> str:
+    """What one number for the whole mass does without identification, in a sentence.
+
+    rm_mass, om : relative change of RM's error by these methods; over_rm_mass : of RM+mass's by OM.
+    """
+    if min(rm_mass, om) >= -SAME_WITHIN:
+        gained = "neither is better than the table"
+    elif over_rm_mass < -SAME_WITHIN:
+        gained = f"OM errs by {number(-100.0 * over_rm_mass, 0)} % less than {RM_MASS}"
+    else:
+        gained = "identification gains nothing over that number"
+    return (
+        f"One number for the whole mass alone ({RM_MASS}) changes RM's error in the {quantity} by "
+        f"{signed(100.0 * rm_mass)} %, OM by {signed(100.0 * om)} %: {gained}."
+    )
+
+
+# --- which parameters ---------------------------------------------------------------------------
+
+
+def use_sentence(
+    choice: pd.DataFrame | None, identification: pd.DataFrame, is_wrong: bool = False
+) -> str:
+    """Which method, by how much it is better than the others, and in which movements another; from
+    the artifacts of these names."""
+    use = "Once the large error is understood, use" if is_wrong else "Use"
+    if choice is None or choice.empty:
+        return f"{use} {_IN_WORDS[RM]}: nothing was compared."
+    first = choice.iloc[0]
+    said = f"{use} {_IN_WORDS[str(first['use'])]}{_compared(first)}."
+    others = [
+        f"{method} for {listing(list(rows['movement']))}"
+        for method, rows in choice.iloc[1:].groupby("use")
+        if method != first["use"]
+    ]
+    rare = identification[identification["rare"].astype(bool)]
+    warned = [
+        f"Never use {m}: fewer than 1 in 100 people have such a body." for m in rare["method"]
+    ]
+    return " ".join([said, *([f"But {listing(others)}."] if others else []), *warned])
+
+
+def _compared(first: pd.Series) -> str:
+    """What the choice rests on, to go on with after the method's name."""
+    if not np.isfinite([first[f"ratio_{name}"] for name in _PAIRS]).all():
+        return ": no recording is left to judge OM by"
+    om, scaled, over_scaled = (
+        _change(first[f"ratio_{name}"], first[f"log_error_{name}"]) for name in _PAIRS
+    )
+    n = int(first["trials"])
+    where = {
+        "whole_trials": f"in {count(n, 'other recording')} ",
+        "held_out": f"in seconds of {count(n, 'recording')} that were kept apart ",
+    }.get(str(first["data"]), "")
+    if first["use"] == RM_MASS:
+        return f": {where}it errs {scaled} than RM, and OM (identified) {over_scaled} than it"
+    table, times = "RM (table)", "RM+mass (table, masses times one number)"
+    said = f"{om} than {table} and {times}"
+    if om != over_scaled:
+        said = f"{om} than {table}, {over_scaled} than {times}"
+    if first["use"] == OM:
+        return f": {where}it errs {said}"
+    return f": {where}OM (identified) errs {said}, which is no sure gain"
+
+
+def _change(ratio: float, log_error: float) -> str:
+    """``31 to 45 % less`` or ``5 % less to 16 % more``: one standard error to either side."""
+    ends = [100 * (end - 1) for end in Difference.of_ratio(ratio, log_error).interval()]
+    if not np.isfinite(ends).all():
+        ends = [100 * (ratio - 1)] * 2
+    words = ["less" if end < 0 else "more" for end in ends]
+    if words[0] != words[1]:
+        return f"{number(-ends[0], 0)} % less to {number(ends[1], 0)} % more"
+    sizes = [number(size, 0) for size in sorted(map(abs, ends))]
+    return f"{' to '.join(dict.fromkeys(sizes))} % {words[0]}"
+
+
+# --- three numbers of a recording beside what good laboratories and the literature have -----------
+
+
+COP, FORCE, MARKERS = "cop_mm", "vertical_force_percent_bw", "markers_mm"
+COP_LIMIT_M, FORCE_LIMIT_PERCENT = "large_cop_error_m", "large_force_error_percent"
+"""Options of the diagnosis: errors that are called large."""
+
+SOURCES = "Sources: Hansen 2017, table 4 (good), Hicks 2015 (large), OpenSim (markers)."
+_MARKER_GOOD_MM, _MARKER_LIMIT_MM = 10.0, 20.0
+"""RMS of a fitted static pose, and of a movement, in OpenSim's checklist (Simulation with OpenSim,
+Best Practices)."""
+
+
+@dataclass(frozen=True)
+class Yardstick:
+    """``good`` and ``limit`` in ``unit``: up to the one it is as good as published, beyond the
+    other it is large."""
+
+    name: str
+    title: str
+    unit: str
+    good: float
+    limit: float
+
+    def in_sentence(self) -> str:
+        return f"{self.title[:1].lower()}{self.title[1:]}"
+
+    def words(self, value: float) -> str:
+        if not np.isfinite(value):
+            return "not known"
+        if value > self.limit:
+            return "large"
+        return "good" if value <= self.good else "ordinary"
+
+    def scale(self, value: float) -> Scale:
+        """The number on its way from nothing to a quarter beyond the limit, or beyond itself."""
+        end = max(1.25 * self.limit, 1.1 * value) if np.isfinite(value) else 1.25 * self.limit
+        return Scale(
+            self.title,
+            f"{number(value)} {self.unit}",
+            self.words(value),
+            value / end if np.isfinite(value) else 0.0,
+            self.good / end,
+            self.limit / end,
+            f"good to {self.good:.2g} {self.unit.partition(' ')[0]}",
+            f"large from {number(self.limit, 0)} {self.unit.partition(' ')[0]}",
+        )
+
+
+def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstick, ...]:
+    """Of the centre of pressure, the vertical force and the markers."""
+    cop = _published("cop_error"), 1e3 * cop_limit_m
+    force = _published("grf_vertical"), force_limit_percent
+    return (
+        Yardstick(COP, "Centre of pressure (COP) error", "mm", *cop),
+        Yardstick(FORCE, "Vertical force error", "% of body weight", *force),
+        Yardstick(MARKERS, "Markers from model", "mm", _MARKER_GOOD_MM, _MARKER_LIMIT_MM),
+    )
+
+
+@cache
+def _published(variable: str) -> float:
+    """Median over the movements of the mean errors with identified parameters."""
+    rows = [r for r in load_paper("hansen2017").table(4).rows if r.compare.startswith(variable)]
+    return float(np.median([row.cells[OM].mean.middle for row in rows if OM in row.cells]))
+
+
+def errors_of(fits: Iterable[pd.DataFrame], method: str) -> dict[str, float]:
+    """Errors of a method over trials, from tables ``fit``: the root mean square of those with
+    held-out data, or of all where there are none; NaN where nothing is known."""
+    rows = [_error(fit[fit["method"] == method]) for fit in fits]
+    known = [row for row in rows if np.isfinite(row[COP]) or np.isfinite(row[FORCE])]
+    chosen = [row for row in known if row["held_out"]] or known
+    found = {}
+    for name in (COP, FORCE):
+        sizes = [row[name] for row in chosen if np.isfinite(row[name])]
+        found[name] = float(np.sqrt(np.mean(np.square(sizes)))) if sizes else float("nan")
+    return found
+
+
+def _error(fit: pd.DataFrame) -> Mapping[str, float]:
+    rows = fit.set_index("component")
+    of = rows["rmse"].to_dict()
+    cop = np.hypot(of.get("cop_ap", np.nan), of.get("cop_ml", np.nan))
+    percent = rows["rmse_percent_bw"].to_dict().get("grf_vertical", np.nan)
+    held_out = bool((fit["data"] == "held_out").any())
+    return {COP: float(cop), FORCE: float(percent), "held_out": held_out}
+
+
+# --- the error budget as people read it: what makes RM's error, in a few words and as bars --------
+
+
+FIRST = ("fz", "cop_ap", "cop_ml")  # components that a reader asks for first
+REST = "all others"
+UNKNOWN = "unknown"
+PARAMETERS = "the table's segment parameters"
+_FAULT = "fault:"
+_LAST = ("noise", UNKNOWN)
+_WORDS = {
+    "inertial_parameters": PARAMETERS,
+    "joint_centres": "joint centres",
+    "marker_places": "places of the markers",
+    "soft_tissue": "soft tissue",
+    "trunk_and_shoulders": "trunk and shoulders that bend",
+    "smoothing": "smoothing of the motion",
+    "noise": "noise",
+    "unknown": UNKNOWN,
+}
+_WORTH = 5.0  # percent of the squared error: less is in the rest
+LEAST_TOLD_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What some terms, told together where they look alike, make of an error [%]."""
+
+    label: str
+    share: float
+
+
+def pieces(budget: pd.DataFrame, trial: str, component: str) -> tuple[Piece, ...]:
+    """The largest first; what is small together, then unknown and noise. Their sum is 100."""
+    whole = (budget["trial"] == trial) & (budget["target"] == "")
+    return _cut(budget[whole & (budget["component"] == component)].set_index("term"))
+
+
+def overall_pieces(budget: pd.DataFrame) -> tuple[Piece, ...]:
+    """Of all trials, the mean over the vertical force and both directions of the centre of pressure,
+    as far as their errors are of interest; terms that look alike in one count together in all."""
+    shares = _overall(budget)
+    return () if shares.empty else _cut(shares)
+
+
+def fault_share(budget: pd.DataFrame) -> float:
+    """Of the same error, what faults make [%]; NaN where no error is of interest."""
+    shares = _overall(budget)
+    faults = shares.index.astype(str).str.startswith(_FAULT)
+    return float(shares.loc[faults, "share_percent"].sum()) if len(shares) else np.nan
+
+
+def _overall(budget: pd.DataFrame) -> pd.DataFrame:
+    told = [one for one in FIRST if size_of(budget, "", one)[0] >= LEAST_TOLD_SIZE]
+    mine = budget[(budget["trial"] == "") & (budget["target"] == "")]
+    by_term = mine[mine["component"].isin(told)].groupby("term", sort=False)
+    alike = by_term["alike"].agg(lambda texts: ", ".join(filter(None, map(str, texts))))
+    return pd.DataFrame({"share_percent": by_term["share_percent"].mean(), "alike": alike})
+
+
+def _cut(rows: pd.DataFrame) -> tuple[Piece, ...]:
+    """What was found has its own piece, however small."""
+    groups = list(_groups(rows))
+    labels = (" or ".join(dict.fromkeys(map(term_words, terms))) for terms in groups)
+    shares = (float(rows.loc[list(terms), "share_percent"].sum()) for terms in groups)
+    found = list(map(Piece, labels, shares))
+    least = [0.5 if terms[0].startswith(_FAULT) else _WORTH for terms in groups]
+    large = [
+        one
+        for one, size in zip(found, least, strict=True)
+        if (one.share >= size or one.share <= -_WORTH) and one.label not in _LAST
+    ]
+    large.sort(key=lambda one: -one.share)
+    last = [one for one in found if one.label in _LAST]
+    others = 100.0 - sum(one.share for one in (*large, *last))
+    rest = [Piece(REST, others)] if abs(others) >= 0.5 else []
+    return (*large, *rest, *last)
+
+
+def _groups(rows: pd.DataFrame) -> Iterator[tuple[str, ...]]:
+    """Terms that stand in for each other are one group."""
+    left = [term for term in rows.index if term != "total"]
+    while left:
+        group = [left[0]]
+        for term in group:
+            alike = str(rows.loc[term, "alike"]).split(", ")
+            group += [one for one in alike if one in left and one not in group]
+        left = [term for term in left if term not in group]
+        yield tuple(group)
+
+
+def term_words(term: str) -> str:
+    """A term of the budget in words."""
+    if term.startswith(_FAULT):
+        return EFFECT_WORDS[term.removeprefix(_FAULT)].title
+    return _WORDS[term]
+
+
+def size_of(budget: pd.DataFrame, trial: str, component: str) -> tuple[float, str]:
+    """RM's error of a component, and its unit."""
+    row = _total(budget, trial, component)
+    return (np.nan, "") if row is None else (float(row["rms"]), str(row["unit"]))
+
+
+def _total(budget: pd.DataFrame, trial: str, component: str) -> pd.Series | None:
+    mine = (budget["trial"] == trial) & (budget["component"] == component)
+    rows = budget[mine & (budget["term"] == "total")]
+    return None if rows.empty else rows.iloc[0]
+
+
+def budget_sentences(budget: pd.DataFrame) -> tuple[str, ...]:
+    """What makes RM's error in all trials together, one component each, and what that is worth on
+    data held out."""
+    if budget.empty:
+        return ()
+    return tuple(filter(None, (_sentence(budget, component) for component in FIRST)))
+
+
+def _sentence(budget: pd.DataFrame, component: str) -> str:
+    size, unit = size_of(budget, "", component)
+    if not size >= LEAST_TOLD_SIZE:
+        return ""
+    parts = [f"{one.label} {number(one.share, 0)} %" for one in pieces(budget, "", component)]
+    total = _total(budget, "", component)
+    assert total is not None
+    worth = ""
+    if np.isfinite(total["gain_percent"]):
+        change, low, high = (
+            signed(-total[name], 0) for name in ("gain_percent", "gain_high", "gain_low")
+        )
+        worth = (
+            " Put into the model with their sizes in other data, all of them change the error by "
+            f"{change} % ({low} to {high} %)."
+        )
+    return (
+        f"What makes RM's error of {number(size, 1)} {unit} in {component_label(component)}: "
+        f"{listing(parts)}.{worth}"
+    )

@@ -1,0 +1,303 @@
+"""Bars, dots per person, and curves over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, NullLocator
+
+from bsip_cli.report.figures.canvas import (
+    BLUE,
+    FAINT,
+    INK,
+    MANY_PEOPLE,
+    ORANGE,
+    SOFT,
+    house_style,
+    legend_above,
+    line_of,
+    new_figure,
+    plain,
+    thinned,
+    tidy,
+)
+from bsip_cli.statistics.methods import OM, RM, RM_MASS
+from bsip_cli.statistics.samples import Z95
+
+# --- bars: errors cut into what makes them, residuals of markers, masses of segments ---------------
+
+COLOURS = (BLUE, "#E69F00", "#56B4E9", "#CC79A7", "#F0E442", "#009E73", FAINT, "#8C510A")
+"""As those of the first page's bar: Okabe and Ito, told apart by the colour-blind."""
+_TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
+_FIXED = {"noise": ("#ffffff", ""), "unknown": ("#ffffff", "////")}
+
+
+@dataclass(frozen=True)
+class Whole:
+    """An error in words, and shares [%] that add up to 100, each with its label."""
+
+    label: str
+    shares: tuple[tuple[str, float], ...]
+
+
+@house_style()
+def error_bars(bars: Sequence[Whole]) -> Figure:
+    """One bar each; what makes the error smaller stands left of zero. Hatched: unknown."""
+    figure = new_figure(24.0 + 6.0 * len(bars))
+    axes = figure.add_subplot()
+    labels = list(dict.fromkeys(label for bar in bars for label, _ in bar.shares))
+    ordinary = [label for label in labels if label not in _FIXED]
+    order = (*ordinary, *(one for one in _FIXED if one in labels))
+    ends = np.zeros((len(bars), 2))  # left of zero, right of it
+    for label in order:
+        colour, hatch = _FIXED.get(label) or (COLOURS[ordinary.index(label) % len(COLOURS)], "")
+        shares = np.array([dict(bar.shares).get(label, 0.0) for bar in bars])
+        side = (shares > 0).astype(int)
+        start = ends[range(len(bars)), side]
+        style: dict[str, Any] = {"color": colour, "hatch": hatch, "edgecolor": INK, "lw": 0.5}
+        axes.barh(range(len(bars)), shares, left=start, height=0.7, label=label, **style)
+        ends[range(len(bars)), side] += shares
+    axes.axvline(0.0, color=INK, lw=0.9)
+    axes.set_yticks(range(len(bars)), [bar.label for bar in bars])
+    axes.set_ylim(len(bars) - 0.5, -0.5)
+    axes.set_xlabel("share of the squared error [%]")
+    tidy(axes, grid="x")
+    handles, names = axes.get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside upper center", ncols=2, frameon=False, fontsize=7.5)
+    return figure
+
+
+@house_style()
+def marker_bars(markers: Sequence[str], rms_mm: np.ndarray, limit_mm: float) -> Figure:
+    """A bar per marker; the line is the limit."""
+    figure = new_figure(52)
+    axes = figure.add_subplot()
+    axes.bar(range(len(markers)), rms_mm, color=np.where(rms_mm > limit_mm, ORANGE, BLUE))
+    axes.axhline(limit_mm, color=INK, lw=0.9, ls="--")
+    axes.set_xticks(range(len(markers)), [plain(name) for name in markers], rotation=90)
+    axes.set_xlim(-0.6, len(markers) - 0.4)
+    axes.set_ylabel("distance [mm]")
+    tidy(axes)
+    axes.tick_params(axis="x", labelsize=6.5)
+    return figure
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentMasses:
+    """All (s,) over the segments; masses and standard deviations [kg], in 0..1 how much the data
+    decide."""
+
+    segments: tuple[str, ...]
+    rm_kg: np.ndarray
+    rm_mass_kg: np.ndarray
+    om_kg: np.ndarray
+    om_sd_kg: np.ndarray
+    data_share: np.ndarray
+
+
+def _ticks(axes: Axes, low: float, high: float) -> None:
+    """Of a logarithmic axis."""
+    axes.set_xlim(low, high)
+    ticks = [t for t in _TICKS if low <= t <= high]
+    axes.xaxis.set_major_locator(FixedLocator(ticks))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
+
+
+@house_style()
+def segment_masses(data: SegmentMasses) -> Figure:
+    """Three panels over the segments: masses, OM - RM with 95 % intervals, what the data decide."""
+    rows = np.arange(len(data.segments))
+    figure = new_figure(22.0 + 4.8 * len(rows))
+    masses, differences, shares = figure.subplots(1, 3, sharey=True, width_ratios=(3, 3, 1.5))
+    positive = np.where(data.om_kg > 0.0, data.om_kg, np.nan)
+    own = ((RM, data.rm_kg, 24), (RM_MASS, data.rm_mass_kg, 9), (OM, positive, 16))
+    for method, kg, size in own:
+        line = line_of(method)
+        style = {"facecolor": "white" if method == RM else line.colour, "edgecolor": line.colour}
+        masses.scatter(kg, rows, marker=line.marker, s=size, label=method, **style)
+    masses.set_xscale("log")
+    both = np.concatenate([data.rm_kg, positive])
+    _ticks(masses, np.nanmin(both) / 1.35, np.nanmax(both) * 1.35)
+    masses.set_xlabel("mass [kg] (log scale)")
+    legend_above(masses)
+    differences.axvline(0.0, color=ORANGE, lw=1.2, ls="--")
+    spread = np.nan_to_num(Z95 * data.om_sd_kg)
+    dots: dict[str, Any] = {
+        "fmt": "o",
+        "ms": 4,
+        "color": BLUE,
+        "ecolor": SOFT,
+        "elinewidth": 1.1,
+        "capsize": 2,
+    }
+    differences.errorbar(data.om_kg - data.rm_kg, rows, xerr=spread, **dots)
+    differences.set_xlabel("OM − RM [kg], 95 % interval")
+    shares.barh(rows, 100.0, height=0.55, color=FAINT)
+    shares.barh(rows, np.nan_to_num(100.0 * data.data_share), height=0.55, color=BLUE)
+    shares.set_xlim(0.0, 100.0)
+    shares.set_xlabel("data decide [%]")
+    for axes in (masses, differences, shares):
+        tidy(axes, grid="both")
+    masses.set_yticks(rows, data.segments)
+    masses.set_ylim(len(rows) - 0.4, -0.6)
+    return figure
+
+
+# --- a dot per person: errors beside their yardsticks, and what identification gains --------------
+
+
+_SPREAD = 0.28
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """One quantity of all persons: ``values`` (p,), NaN where not known; ``far`` (p,) those that are
+    named beside their dot."""
+
+    title: str
+    values: np.ndarray
+    names: tuple[str, ...]
+    far: np.ndarray
+    good: float
+    limit: float
+
+
+@house_style()
+def strips(data: Sequence[Strip]) -> Figure:
+    """Side by side; light blue is as good as published, above the red line is large."""
+    figure = new_figure(70.0)
+    panels = figure.subplots(1, len(data), squeeze=False)[0]
+    for axes, strip in zip(panels, data, strict=True):
+        _draw_strip(axes, strip)
+    return figure
+
+
+def _draw_strip(axes: Axes, strip: Strip) -> None:
+    known = np.flatnonzero(np.isfinite(strip.values))
+    offsets = np.linspace(-_SPREAD, _SPREAD, len(known)) if len(known) > 1 else np.zeros(len(known))
+    axes.axhspan(0.0, strip.good, color="#cfe3f2", lw=0)
+    axes.axhline(strip.limit, color="#b30000", lw=1.2)
+    colours = np.where(strip.far[known], ORANGE, BLUE)
+    many = len(known) > MANY_PEOPLE
+    axes.scatter(offsets, strip.values[known], s=8 if many else 22, c=colours, rasterized=many)
+    for x, k in zip(offsets, known, strict=True):
+        if strip.far[k]:
+            place = (x, float(strip.values[k]))
+            axes.annotate(plain(strip.names[k]), place, (5, 3), textcoords="offset points", size=7)
+    if len(known):
+        axes.hlines(np.median(strip.values[known]), -0.42, 0.42, color=INK, lw=1.4)
+    axes.set_xlim(-0.6, 0.9)
+    top = max([1.15 * strip.limit, *(1.1 * strip.values[known])])
+    axes.set_ylim(0.0, top)
+    axes.set_xticks([])
+    axes.set_title(strip.title, fontsize=8, loc="left")
+    tidy(axes)
+
+
+@house_style()
+def gain_dots(components: Sequence[str], ratios: Mapping[str, np.ndarray]) -> Figure:
+    """A row per component; of each method (c, p) its error over RM's, a dot per person, a line at
+    the geometric mean."""
+    rows = len(components)
+    figure = new_figure(24.0 + 8.0 * rows)
+    axes = figure.add_subplot()
+    for method, table in ratios.items():
+        for row, of_row in enumerate(table):
+            _draw_gains(axes, method, row, of_row)
+    axes.axvline(1.0, color=SOFT, lw=1.0)
+    everything = np.concatenate(list(ratios.values()))
+    low = min(0.5, float(np.nanmin(everything))) / 1.15
+    high = max(2.0, float(np.nanmax(everything))) * 1.15
+    axes.set_xscale("log")
+    _ticks(axes, low, high)
+    legend_above(axes)
+    axes.set_yticks(range(rows), components)
+    axes.set_ylim(rows - 0.5, -0.5)
+    axes.set_xlabel("error over that of RM (left of 1: follows better)")
+    tidy(axes, grid="x")
+    transform = axes.get_yaxis_transform()
+    axes.hlines(np.arange(1, rows) - 0.5, 0, 1, transform=transform, color=FAINT, lw=0.6)
+    return figure
+
+
+def _draw_gains(axes: Axes, method: str, row: int, ratios: np.ndarray) -> None:
+    line, people = line_of(method), len(ratios)
+    many = people > MANY_PEOPLE
+    offsets = np.linspace(-_SPREAD, _SPREAD, people) if people > 1 else np.zeros(1)
+    axes.scatter(
+        ratios,
+        row + offsets,
+        s=6 if many else 24,
+        lw=0.0 if many else 0.5,
+        rasterized=many,
+        edgecolor="white",
+        marker=line.marker,
+        color=line.colour,
+        label=method,
+        zorder=2,
+    )
+    if np.isfinite(ratios).any():
+        mean = float(np.exp(np.nanmean(np.log(ratios))))
+        axes.plot([mean, mean], [row - 0.38, row + 0.38], color=line.colour, lw=1.8, zorder=3)
+
+
+# --- signals over time, measured and by method, with bands where their errors are known -----------
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Signals of one quantity.
+
+    Attributes
+    ----------
+    title : what it is, with its unit.
+    time_s : (n,).
+    signals : label of the method -> (n,), NaN where there are none.
+    spreads : label of the method -> (n,) standard deviation, for those drawn with a band.
+    """
+
+    title: str
+    time_s: np.ndarray
+    signals: Mapping[str, np.ndarray]
+    spreads: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+
+@house_style()
+def curves(panels: Sequence[Panel], columns: int, height_mm: float = 38.0) -> Figure:
+    """Panels in rows of ``columns``, one legend above; bands are 95 % intervals."""
+    rows = -(-len(panels) // columns)
+    figure = new_figure(12.0 + height_mm * rows)
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=True)
+    for axes, panel in zip(grid.flat, panels, strict=False):
+        _draw(axes, panel)
+    for axes in grid.flat[len(panels) :]:
+        axes.set_axis_off()
+    for axes in grid[-1]:
+        axes.set_xlabel("time [s]")
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=5, frameon=False, fontsize=8)
+    return figure
+
+
+def _draw(axes: Axes, panel: Panel) -> None:
+    keep = thinned(len(panel.time_s))
+    time = panel.time_s[keep]
+    for method, values in panel.signals.items():
+        line = line_of(method)
+        axes.plot(time, values[keep], color=line.colour, ls=line.style, lw=line.width, label=method)
+        if method in panel.spreads:
+            half = Z95 * panel.spreads[method][keep]
+            low, high = values[keep] - half, values[keep] + half
+            axes.fill_between(time, low, high, color=line.colour, alpha=0.2, lw=0)
+    if panel.spreads:
+        axes.axhline(0.0, color=SOFT, lw=0.5, zorder=0)
+    axes.set_title(panel.title, fontsize=8, loc="left", pad=3)
+    axes.set_xlim(panel.time_s[0], panel.time_s[-1])
+    tidy(axes)
+    axes.tick_params(labelsize=7)

@@ -1,0 +1,141 @@
+"""Independent samples, stretches, normality, p values of several tests."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from bsip_cli.statistics.samples import (
+    adjusted_p_values,
+    effective_samples,
+    effective_samples_of_pair,
+    finite_stretches,
+    joined,
+    lilliefors_test,
+    stretches_of,
+)
+
+N = 12_000
+
+
+def autoregressive(coefficients, n, runs, seed):
+    noise = np.random.default_rng(seed).normal(size=(runs, n + 500))
+    return lfilter([1.0], coefficients, noise, axis=1)[:, 500:]
+
+
+@pytest.mark.parametrize("a", [0.0, 0.5, 0.9, 0.97])
+def test_mean_of_ar1(a):
+    counted = [effective_samples(x) for x in autoregressive([1.0, -a], N, 20, seed=1)]
+    assert np.mean(counted) == pytest.approx(N * (1 - a) / (1 + a), rel=0.12)
+
+
+@pytest.mark.parametrize("a", [-0.5, 0.0, 0.5, 0.9])
+def test_correlation_of_two_ar1(a):
+    x, y = np.split(autoregressive([1.0, -a], N, 20, seed=2), 2)
+    counted = [effective_samples_of_pair(u, v) for u, v in zip(x, y, strict=True)]
+    assert np.mean(counted) == pytest.approx(N * (1 - a**2) / (1 + a**2), rel=0.08)
+
+
+def test_correlation_of_oscillations_scatters_as_the_effective_samples_say():
+    damped = [1.0, -2 * 0.98 * np.cos(2 * np.pi * 0.01), 0.98**2]
+    x, y = np.split(autoregressive(damped, 3000, 600, seed=3), 2)
+    scatter = np.std([np.corrcoef(u, v)[0, 1] for u, v in zip(x, y, strict=True)])
+    counted = np.mean([effective_samples_of_pair(u, v) for u, v in zip(x, y, strict=True)])
+    assert 1 / scatter**2 == pytest.approx(counted, rel=0.25)
+
+
+def test_two_nearly_equal_oscillations_do_not_end_the_sum_at_their_zero_crossings():
+    damped = [1.0, -2 * 0.98 * np.cos(2 * np.pi * 0.01), 0.98**2]
+    x, y = autoregressive(damped, 3000, 2, seed=4)
+    assert effective_samples_of_pair(x, x + 0.05 * y) < 150
+
+
+def test_alternating_series_is_worth_no_more_than_its_length():
+    (x,) = autoregressive([1.0, 0.8], N, 1, seed=5)
+    assert effective_samples(x) == N
+
+
+def test_gaps_count_as_time():
+    series = autoregressive([1.0, -0.9], N, 20, seed=6)
+    windows = [(i, i + 300) for i in range(0, N, 400)]
+    counted = np.mean([effective_samples(x, windows) for x in series])
+    assert counted == pytest.approx(0.75 * N * 0.1 / 1.9, rel=0.12)
+
+
+def test_nan_is_a_gap():
+    (x,) = autoregressive([1.0, -0.9], N, 1, seed=7)
+    holed = x.copy()
+    holed[300:400] = np.nan
+    assert effective_samples(holed) == effective_samples(x, [(0, 300), (400, N)])
+
+
+@pytest.mark.parametrize("x", [[], [1.0, 2.0, 3.0], np.full(100, 0.1), np.full(9, np.nan)])
+def test_no_answer(x):
+    assert np.isnan(effective_samples(x))
+    assert np.isnan(effective_samples_of_pair(x, x))
+    assert np.isnan(effective_samples(np.arange(10.0), []))
+
+
+# --- stretches ------------------------------------------------------------------------------------
+
+
+def test_runs_of_true():
+    assert stretches_of([0, 1, 1, 0, 1]) == [(1, 3), (4, 5)]
+    assert stretches_of([]) == []
+    assert stretches_of([True, True]) == [(0, 2)]
+
+
+def test_split_at_what_is_not_finite_and_keep_given_breaks():
+    x = np.array([0.0, 1.0, np.nan, 3.0, 4.0, 5.0])
+    y = np.array([0.0, 1.0, 2.0, 3.0, np.inf, 5.0])
+    assert finite_stretches(None, x) == [(0, 2), (3, 6)]
+    assert finite_stretches([(3, 6), (0, 3)], x, y) == [(0, 2), (3, 4), (5, 6)]
+    assert finite_stretches([(0, 1), (1, 2)], x) == [(0, 1), (1, 2)]
+    assert finite_stretches([], x) == []
+    assert joined(x, [(0, 2), (5, 6)]).tolist() == [0.0, 1.0, 5.0]
+
+
+@pytest.mark.parametrize("stretches", [[(0, 7)], [(-1, 2)], [(3, 2)], [(0, 3), (2, 4)]])
+def test_stretches_that_do_not_fit(stretches):
+    with pytest.raises(ValueError, match="stretch"):
+        finite_stretches(stretches, np.zeros(6))
+
+
+def test_signals_of_different_length():
+    with pytest.raises(ValueError, match="shape"):
+        finite_stretches(None, np.zeros(6), np.zeros(5))
+
+
+# --- normality and p values -----------------------------------------------------------------------
+
+
+def test_nan_is_dropped():
+    x = np.random.default_rng(3).normal(size=12)
+    assert lilliefors_test([*x, np.nan]) == lilliefors_test(x)
+
+
+@pytest.mark.parametrize(
+    ("x", "n", "words"),
+    [([], 0, "needs 4"), ([1, 2, 3, np.nan], 3, "there are 3"), ([0.1] * 12, 12, "equal")],
+)
+def test_lilliefors_not_possible(x, n, words):
+    test = lilliefors_test(x)
+    assert test.n == n
+    assert np.isnan([test.statistic, test.p_value]).all()
+    assert words in test.reason
+
+
+def test_holm_and_bonferroni():
+    """R: p.adjust(c(0.01, 0.04, 0.03, 0.005), "holm")."""
+    p = [0.01, 0.04, 0.03, 0.005]
+    assert adjusted_p_values(p) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert adjusted_p_values(p, "bonferroni") == pytest.approx([0.04, 0.16, 0.12, 0.02])
+
+
+def test_impossible_tests_do_not_count():
+    adjusted = adjusted_p_values([0.01, np.nan, 0.04])
+    assert adjusted[::2] == pytest.approx([0.02, 0.04])
+    assert np.isnan(adjusted[1])
+    assert adjusted_p_values([]) == ()
+    assert np.isnan(adjusted_p_values([np.nan])).all()
+    with pytest.raises(ValueError, match="outside"):
+        adjusted_p_values([1.2])

@@ -1,15 +1,16 @@
 """Laboratories of many persons, drawn from a pool of fully simulated ones.
 
-    python -m benchmarks.laboratory POOL [POOL ...] [--labs 100] [--count 8] [--kind 0] [--write]
+    python -m benchmarks.laboratory POOL [POOL ...] [--table drawn] [--count 4 8] [--write]
 
 POOL: results of `bsip laboratory` for simulated persons of one sound laboratory, whose forces come
 by the simulator's own route. Persons are drawn from them with replacement, and one fault is added
 to what they tell: J theta to the pull; to what they tell in motion alone, where trials of who
 stands still are clean. In another kind persons only know as much as those of the pool, and what
-they tell is drawn as the model has it, deviations and all. Printed are the errors beside the
-Cramer-Rao bound (the persons' deviations and every other number known to be as usual), how often 95
-% intervals hold, names that are false in laboratories without a fault, and time and memory of many
-persons.
+they tell is drawn as the model has it, deviations and all. Tables: ``drawn``, the errors beside the
+Cramer-Rao bound (the persons' deviations and every other number known to be as usual) and how often
+95 % intervals hold; ``nulls``, names that are false in laboratories without a fault; ``alike``, how
+far all persons of the pool err alike in each direction; ``cost``, time and memory of the files of
+many persons.
 """
 
 from __future__ import annotations
@@ -17,8 +18,11 @@ from __future__ import annotations
 import argparse
 import resource
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +32,14 @@ from benchmarks.measure import machine
 from bsip_cli.artifacts import read_artifact, read_header
 from bsip_cli.config import load_config
 from bsip_cli.diagnosis.fault_model import SIZES
-from bsip_cli.diagnosis.laboratory import Alike, persons_of, sums_of
+from bsip_cli.diagnosis.laboratory import (
+    Persons,
+    alike_in,
+    persons_of,
+    posterior_of,
+    scales_of,
+    sums_of,
+)
 from bsip_cli.diagnosis.laboratory_deviations import deviations_of
 from bsip_cli.diagnosis.laboratory_search import Laboratory, causes_of, laboratory_of, verdicts_of
 from bsip_cli.diagnosis.shared_faults import STATED_MASS, Coordinate, Information
@@ -50,7 +61,8 @@ UNITS = {
 SIMULATED, MODEL = "of the simulator", "as the model has them"
 CLEAN = "of the simulator, who stands still without the fault"
 MANNERS = (SIMULATED, MODEL, CLEAN)
-MANY = (10, 100, 1000)
+COUNTS = (4, 8, 16, 64)
+MANY = (100, 300, 1000)
 SEED = 20261127
 PLACE = Path("docs/results")
 
@@ -58,8 +70,7 @@ PLACE = Path("docs/results")
 class Pool:
     """What the pool's persons tell, and laboratories drawn from it."""
 
-    def __init__(self, outs: Sequence[Path]) -> None:
-        paths = [path for out in outs for path in sorted(out.glob(f"sub-*/*_{KIND}.parquet"))]
+    def __init__(self, paths: Sequence[Path]) -> None:
         facts = [read_header(path, KIND)["provenance"]["facts"] for path in paths]
         self.told = [information_in(read_artifact(path, KIND)) for path in paths]
         self.mass_sd = [one["mass_sd"] for one in facts]
@@ -67,7 +78,7 @@ class Pool:
         self.centres_m = {plate: np.mean(x, axis=0) for plate, x in corners.items()}
         self.options = load_config([])
         mean_s, sd_s = np.mean([one["sessions"][""]["moments_s"] for one in facts], axis=0).tolist()
-        self.alike = Alike(self.options.laboratory.alike, (mean_s, sd_s))
+        self.moments_s = (mean_s, sd_s)
 
     def laboratory(
         self,
@@ -78,24 +89,38 @@ class Pool:
     ) -> Laboratory:
         """Of persons drawn with replacement, with faults of so many typical sizes."""
         drawn = rng.integers(len(self.told), size=count)
+        return self.of(drawn.tolist(), rng, sizes, manner)
+
+    def of(
+        self,
+        drawn: Sequence[int],
+        rng: np.random.Generator,
+        sizes: Mapping[Coordinate, float] | None = None,
+        manner: str = SIMULATED,
+    ) -> Laboratory:
+        """Of these persons."""
         told = [self.told[k] for k in drawn]
         if manner == MODEL:
             common = self._of_all(rng)
             told = [self._as_modelled(one, common, rng) for one in told]
         told = [with_faults(one, sizes or {}, manner == CLEAN) for one in told]
         masses = [self.mass_sd[k] for k in drawn]
-        persons = persons_of(told, masses, self.options.laboratory.between_persons, self.alike)
+        persons = self.persons(told, masses)
         causes = causes_of(persons, self.centres_m)
         return laboratory_of(persons, causes, self.options.diagnosis.fault_prior_odds)
 
+    def persons(self, told: Sequence[Information], mass_sd: Sequence[float]) -> Persons:
+        options = self.options.laboratory
+        between, alike = options.between_persons, options.alike
+        return persons_of(told, mass_sd, between, alike, self.moments_s)
+
     def _of_all(self, rng: np.random.Generator) -> dict[Coordinate, float]:
         """What every laboratory has of a fault, and what the model lacks of all alike [typical]."""
-        first = persons_of(
-            self.told, self.mass_sd, self.options.laboratory.between_persons, self.alike
-        )
+        first = self.persons(self.told, self.mass_sd)
         number = first.ordinary * rng.standard_normal(len(first.ordinary))
         differences = first.differences(np.ones(first.count))
-        alike = first.alike @ rng.standard_normal(first.alike.shape[1])
+        root = alike_in(first)
+        alike = root @ rng.standard_normal(root.shape[1])
         sizes = first.both @ number + alike
         sizes += differences @ rng.standard_normal(differences.shape[1])
         return dict(zip(first.coordinates, sizes.tolist(), strict=True))
@@ -184,13 +209,15 @@ def judged(
     return one.value / typical - size, float(np.sqrt(covariance[number, number])), inside
 
 
-def false_names(pool: Pool, labs: int, manners: Sequence[str]) -> Iterator[dict[str, object]]:
+def false_names(
+    pool: Pool, count: int, labs: int, manners: Sequence[str]
+) -> Iterator[dict[str, object]]:
     """Names of faults, and of sessions that deviate, in laboratories without a fault."""
     for manner in manners:
         faults, sessions = [], []
         for seed in range(labs):
-            rng = np.random.default_rng([SEED, seed, 4711])
-            lab = pool.laboratory(8, rng, manner=manner)
+            rng = np.random.default_rng([SEED, seed, count, len(FAULTS)])
+            lab = pool.laboratory(count, rng, manner=manner)
             odds, named_from = pool.options.diagnosis.fault_prior_odds, pool.named_from
             said = verdicts_of(lab, named_from, rng)
             faults += [f"{x.cause.effect} {x.cause.target}" for x in said if x.said == "named"]
@@ -198,58 +225,101 @@ def false_names(pool: Pool, labs: int, manners: Sequence[str]) -> Iterator[dict[
             sessions += [f"{x.cause.effect} {x.cause.target}" for x in deviating]
         yield {
             "persons": manner,
-            "laboratories of 8": labs,
+            "count": count,
+            "laboratories": labs,
             "faults named": len(faults),
             "sessions named": len(sessions),
-            "which": "; ".join(faults + sessions),
+            "which": "; ".join(f"{n} {name}" for name, n in Counter(faults + sessions).items()),
         }
 
 
-def cost(pool: Pool, count: int) -> dict[str, object]:
-    """CPU-seconds, milliseconds per person, memory that the fit takes beyond what was there."""
+def errors_alike(pool: Pool) -> Iterator[dict[str, object]]:
+    """Of each direction of the numbers in motion, the best known first: what all persons of a sound
+    laboratory err by, every fault being free, and what part it is of what one person errs by."""
+    persons = pool.persons(pool.told, pool.mass_sd)
+    scale = scales_of(persons)
+    one = (alike_in(persons) / np.sqrt(persons.alike))[:, :-1]  # the last is a lag that grows
+    sizes = np.linalg.norm(one, axis=0)
+    ordinary, free = persons.both * persons.ordinary, 10 * one
+    root = np.hstack([ordinary, persons.differences(scale), free])
+    mean = posterior_of(sums_of(persons, scale), root).mean
+    for k in np.argsort(sizes):
+        most = persons.coordinates[int(np.argmax(np.abs(one[:, k])))]
+        error = float(one[:, k] @ mean / sizes[k])
+        yield {
+            "mostly": f"{most.effect} {most.target} {most.parameter}".replace("  ", " "),
+            "one person [typical]": round(float(sizes[k]), 3),
+            "all persons [typical]": round(error, 3),
+            "part": round(error / sizes[k], 2),
+        }
+
+
+def cost(paths: Sequence[Path], count: int) -> dict[str, object]:
+    """CPU-seconds of reading and summing so many persons' files and of all verdicts, and memory
+    beyond that of three persons; in a process of its own."""
+    rng = np.random.default_rng(1)
+    drawn = [paths[k] for k in rng.integers(len(paths), size=count)]
+    _judged_from(drawn[:3], rng)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    start, rng = time.process_time(), np.random.default_rng(1)
-    lab = pool.laboratory(count, rng)
-    verdicts_of(lab, pool.named_from, rng)
-    deviations_of(lab, pool.options.diagnosis.fault_prior_odds, pool.named_from, [], rng)
+    start = time.process_time()
+    _judged_from(drawn, rng)
     took = time.process_time() - start
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return {
         "persons": count,
         "CPU s": round(took, 1),
-        "ms per person": round(1000 * took / count),
-        "MB more": round(peak - before),
+        "ms per person": round(1000 * took / count, 1),
+        "MB more": round(peak - before, 1),
+        "MB more per person": round((peak - before) / count, 3),
     }
+
+
+def _judged_from(paths: Sequence[Path], rng: np.random.Generator) -> None:
+    pool = Pool(paths)
+    lab = pool.of(range(len(paths)), rng)
+    verdicts_of(lab, pool.named_from, rng)
+    odds, order = pool.options.diagnosis.fault_prior_odds, range(len(paths))
+    deviations_of(lab, odds, pool.named_from, order, rng)
+
+
+def costs(paths: Sequence[Path]) -> Iterator[dict[str, object]]:
+    for count in MANY:
+        context = get_context("spawn")
+        with ProcessPoolExecutor(max_workers=1, mp_context=context) as alone:
+            yield alone.submit(cost, paths, count).result()
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("pool", type=Path, nargs="+")
-    parser.add_argument("--labs", type=int, default=100, help="per fault and kind")
-    parser.add_argument("--count", type=int, help="persons in each; without it cost and nulls")
-    parser.add_argument(
-        "--kind", type=int, choices=range(len(MANNERS)), help="of MANNERS; else all"
-    )
+    parser.add_argument("--table", choices=("drawn", "nulls", "alike", "cost"), default="drawn")
+    parser.add_argument("--labs", type=int, default=25, help="per fault and number of persons")
+    parser.add_argument("--count", type=int, nargs="+", default=COUNTS, help="persons in each")
+    kinds = range(len(MANNERS))
+    parser.add_argument("--kind", type=int, nargs="+", choices=kinds, default=(0, 1))
     parser.add_argument("--write", action="store_true", help="into docs/results")
     asked = parser.parse_args()
-    pool = Pool(asked.pool)
-    print(f"{machine()}; {len(pool.told)} persons in the pool", flush=True)
-    manners = MANNERS if asked.kind is None else (MANNERS[asked.kind],)
-    tables: dict[str, Iterable[dict[str, object]]] = (
-        {f"laboratory_of_{asked.count}": errors(pool, asked.count, asked.labs, manners)}
-        if asked.count
-        else {
-            "laboratory_nulls": false_names(pool, 40, manners),
-            "laboratory_cost": (cost(pool, count) for count in MANY),
-        }
-    )
-    for name, rows in tables.items():
-        found = []
-        for row in rows:
-            found.append(row)
-            print(*row.values(), sep=", ", flush=True)
-        if asked.write:
-            pd.DataFrame(found).to_csv(PLACE / f"{name}.csv", index=False)
+    paths = [path for out in asked.pool for path in sorted(out.glob(f"sub-*/*_{KIND}.parquet"))]
+    print(f"{machine()}; {len(paths)} persons in the pool", flush=True)
+    found = []
+    for row in rows_of(asked, paths):
+        found.append(row)
+        print(*row.values(), sep=", ", flush=True)
+    if asked.write:
+        pd.DataFrame(found).to_csv(PLACE / f"laboratory_{asked.table}.csv", index=False)
+
+
+def rows_of(asked: argparse.Namespace, paths: Sequence[Path]) -> Iterator[dict[str, object]]:
+    manners = [MANNERS[k] for k in asked.kind]
+    if asked.table == "cost":
+        yield from costs(paths)
+    elif asked.table == "alike":
+        yield from errors_alike(Pool(paths))
+    else:
+        made = errors if asked.table == "drawn" else false_names
+        pool = Pool(paths)
+        for count in asked.count:
+            yield from made(pool, count, asked.labs, manners)
 
 
 if __name__ == "__main__":

@@ -154,7 +154,7 @@ class Diagnosis(Section):
 
 class Laboratory(Section):
     between_persons: float = Field(gt=0)
-    alike: float = Field(ge=0)
+    alike: float = Field(ge=0, lt=1)
     recorded_on: dict[str, str]
 
 

@@ -9,12 +9,17 @@ own, E d what a person deviates in both. With J and h a person's precision and p
 variance of d, the person adds J - J E V E' J and h - J E V E' h to what is known of the
 coordinates, V = (E' J E + T^-2)^-1. These are E theta, and for who stands still a difference more
 in all persons alike, whose size follows from the data too: plates may be moved before they walk.
+
+What a body's model gets wrong in motion it may get wrong in every body. No scatter of persons shows
+it: a share of the variance of what one person tells counts as the same in all (an intraclass
+correlation: Kish 1965, Survey Sampling, 5.4), in every direction of the coordinates.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 from scipy.stats import norm
@@ -28,6 +33,8 @@ from bsip_cli.effects.effect import Parameter
 
 _STEPS = 100  # of expectation and maximisation, at most
 _STEADY = 0.01  # change of every scale
+_BLOCK = 32  # persons
+_UNTOLD = 1e-10  # of the precision of what is told best
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +46,9 @@ class Persons:
     numbers (C,) : which number a coordinate is; the first K are those in motion.
     usual (M, K) : standard deviation of the deviations before the data. groups (K,) : whose
     deviations have one scale; behind them as many groups of differences of who stands still.
-    ordinary (K,) : what every laboratory has of a fault.
-    alike (C, L) : root of the covariance of what persons' bodies do alike.
+    ordinary (K,) : what every laboratory has of a fault. alike : share of the variance of what one
+    tells in motion that is the same in all. moments_s : mean and standard deviation of those that
+    tell of the clock, from the start of a recording.
     """
 
     coordinates: tuple[Coordinate, ...]
@@ -51,7 +59,8 @@ class Persons:
     usual: np.ndarray
     groups: np.ndarray
     ordinary: np.ndarray
-    alike: np.ndarray
+    alike: float
+    moments_s: tuple[float, float]
 
     @property
     def both(self) -> np.ndarray:
@@ -73,15 +82,13 @@ class Persons:
         """(S,) scale of each difference of who stands still."""
         return self.count // 2 + self.groups[self.numbers[self.standing]]
 
-    def told(self) -> np.ndarray:
-        """(M, K) True where a person tells something of a number."""
-        return (np.diagonal(self.precision, axis1=1, axis2=2) > 0) @ self.both > 0
-
-    def only(self, numbers: Sequence[int]) -> Persons:
-        """Some of them."""
-        mine = list(numbers)
-        precision, pull, usual = self.precision[mine], self.pull[mine], self.usual[mine]
-        return replace(self, precision=precision, pull=pull, usual=usual)
+    def blocks(self, who: Iterable[int] | None = None) -> Iterator[tuple[np.ndarray, ...]]:
+        """precision, pull and usual of all or some, a few at a time: beside what is kept of each
+        person, no memory grows with their number."""
+        mine = np.arange(len(self.pull)) if who is None else np.array([*who])
+        for k in range(0, len(mine), _BLOCK):
+            some = mine[k : k + _BLOCK]
+            yield self.precision[some], self.pull[some], self.usual[some]
 
     def differences(self, scale: np.ndarray) -> np.ndarray:
         """(C, S) root of the covariance of the differences of who stands still: usually as large as
@@ -91,48 +98,17 @@ class Persons:
         return np.eye(len(self.coordinates))[:, mine] * sizes
 
 
-@dataclass(frozen=True)
-class Alike:
-    """What the model of a body lacks of all persons alike passes for faults of the laboratory: of a
-    plate, and, since soft tissue lags other early than late in a stance, of a clock's delay and
-    rate.
-
-    size : standard deviation [typical]. moments_s : mean and standard deviation of the moments that
-    tell of the clock, from the start of a recording.
-    """
-
-    size: float
-    moments_s: tuple[float, float]
-
-    def root(
-        self, coordinates: Sequence[Coordinate], known: Mapping[Coordinate, Parameter]
-    ) -> np.ndarray:
-        """(C, C) of the covariance [typical]. Nothing of it is in who stands still."""
-        mean_s, sd_s = self.moments_s
-        moving = [one.effect != STATED_MASS.name and not one.standing for one in coordinates]
-        root = self.size * np.diag(np.array(moving, float))
-        names = {one.effect: k for k, one in enumerate(coordinates) if moving[k]}
-        if {SyncOffset.name, ClockDrift.name} <= names.keys():
-            delay, rate = names[SyncOffset.name], names[ClockDrift.name]
-            later = self.size * known[coordinates[delay]].typical / sd_s
-            root[rate, rate] = later / known[coordinates[rate]].typical
-            root[delay, rate] = -self.size * mean_s / sd_s
-        return root
-
-
-NOTHING_ALIKE = Alike(0.0, (0.0, 1.0))
-
-
 def persons_of(
     informations: Sequence[Information],
     mass_sd: Sequence[float],
     deviation: float,
-    alike: Alike = NOTHING_ALIKE,
+    alike: float,
+    moments_s: tuple[float, float],
 ) -> Persons:
     """Lay out what was kept of each.
 
     mass_sd : (M,) standard deviation of each stated mass, part of it. deviation : usual standard
-    deviation from person to person [typical].
+    deviation from person to person [typical]. alike, moments_s : as in ``Persons``.
     """
     known = {
         x: p for one in informations for x, p in zip(one.coordinates, one.parameters, strict=True)
@@ -152,7 +128,8 @@ def persons_of(
         np.where(is_mass, masses[:, None], deviation),
         np.array([groups[kind] for kind in kinds]),
         np.where(is_mass, np.median(masses), SHARE),  # one scale weighs all: it may err too
-        alike.root(coordinates, known),
+        alike,
+        moments_s,
     )
 
 
@@ -189,10 +166,9 @@ class Sums:
 
 def sums_of(persons: Persons, scale: np.ndarray, who: Iterable[int] | None = None) -> Sums:
     """Of all persons or some; scale (G,) times what is usual: of their deviations."""
-    mine = slice(None) if who is None else list(who)
-    precision, pull = persons.precision[mine], persons.pull[mine]
-    spread = persons.usual[mine] * scale[persons.groups]
-    return _sums(precision, pull, spread, persons.both)
+    spread, both = scale[persons.groups], persons.both
+    blocks = persons.blocks(who)
+    return reduce(Sums.with_, (_sums(j, h, usual * spread, both) for j, h, usual in blocks))
 
 
 def _sums(precision: np.ndarray, pull: np.ndarray, spread: np.ndarray, both: np.ndarray) -> Sums:
@@ -289,36 +265,72 @@ def anything(persons: Persons, scale: np.ndarray) -> np.ndarray:
     return np.hstack([persons.both * sizes, persons.differences(scale)])
 
 
-def scales_of(*parts: Persons) -> np.ndarray:
+def scales_of(
+    persons: Persons, *parts: Iterable[int], start: np.ndarray | None = None
+) -> np.ndarray:
     """(G,) of the deviations and of who stands still, of the largest evidence beside any faults of
-    the laboratory; of other sizes in each part of its persons."""
-    first = parts[0]
-    counts, scale = np.zeros(first.count), np.ones(first.count)
-    np.add.at(counts, first.groups, sum(one.told().sum(axis=0) for one in parts))
-    np.add.at(counts, first.of_differences, len(parts))
+    the laboratory; of other sizes in each part of its persons. start (G,) : near to it."""
+    everybody = [list(one) for one in parts] or [list(range(len(persons.pull)))]
+    scale = np.ones(persons.count) if start is None else start
     for _ in range(_STEPS):
-        before, sums = scale, np.zeros(len(scale))
-        for one in parts:
-            squares, differences = squares_of(one, scale)
-            np.add.at(sums, first.groups, (squares * one.told()).sum(axis=0))
-            np.add.at(sums, first.of_differences, differences)
-        scale = np.sqrt((WEIGHT_OF_FAULTS + sums) / (WEIGHT_OF_FAULTS + counts))
+        found = [_squares(persons, scale, one) for one in everybody]
+        squares, counts = np.sum(found, axis=0)
+        before, scale = scale, np.sqrt((WEIGHT_OF_FAULTS + squares) / (WEIGHT_OF_FAULTS + counts))
         if np.abs(scale / before - 1).max() < _STEADY:
             break
     return scale
 
 
-def squares_of(persons: Persons, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(M, K) and (S,) expected squares of the deviations and of the differences of who stands
-    still, times what is usual."""
-    found, both = posterior_of(sums_of(persons, scale), anything(persons, scale)), persons.both
-    variance, _ = _deviations(persons.precision, persons.usual * scale[persons.groups], both)
-    taken = variance @ both.T @ persons.precision
-    mean = np.einsum("mij,mj->mi", variance, persons.pull @ both) - taken @ found.mean
-    square = mean**2 + np.diagonal(variance, axis1=1, axis2=2)
-    square += np.einsum("mij,jk,mik->mi", taken, found.covariance, taken, optimize=True)
-    differences = scale[persons.of_differences] ** 2 * found.squares[len(persons.groups) :]
-    return square / persons.usual**2, differences
+def _squares(persons: Persons, scale: np.ndarray, who: Sequence[int]) -> np.ndarray:
+    """(2, G) expected squares, times what is usual, of the deviations and of the differences of who
+    stands still, and how many these are."""
+    found, both = posterior_of(sums_of(persons, scale, who), anything(persons, scale)), persons.both
+    total, groups = np.zeros((2, persons.count)), persons.groups
+    for precision, pull, usual in persons.blocks(who):
+        variance, _ = _deviations(precision, usual * scale[groups], both)
+        taken = variance @ both.T @ precision
+        mean = np.einsum("mij,mj->mi", variance, pull @ both) - taken @ found.mean
+        square = mean**2 + np.diagonal(variance, axis1=1, axis2=2)
+        square += (taken @ found.covariance * taken).sum(axis=2)
+        told = (np.diagonal(precision, axis1=1, axis2=2) > 0) @ both > 0
+        np.add.at(total[0], groups, (square / usual**2 * told).sum(axis=0))
+        np.add.at(total[1], groups, told.sum(axis=0))
+    differences = scale[persons.of_differences] ** 2 * found.squares[len(groups) :]
+    np.add.at(total[0], persons.of_differences, differences)
+    np.add.at(total[1], persons.of_differences, 1)
+    return total
+
+
+def alike_in(persons: Persons) -> np.ndarray:
+    """(C, L) root of the covariance of what is the same in all persons in motion: a share of what
+    one of them has, whose deviation is as usual. Their scatter tells nothing of it."""
+    tell = (np.diagonal(persons.precision, axis1=1, axis2=2) > 0).sum(axis=0)
+    moving = [
+        k
+        for k, one in enumerate(persons.coordinates)
+        if tell[k] and not one.standing and one.effect != STATED_MASS.name
+    ]
+    one_of = np.sqrt(np.outer(tell, tell))[np.ix_(moving, moving)]
+    everybody = sums_of(persons, np.ones(persons.count)).precision[np.ix_(moving, moving)]
+    values, vectors = np.linalg.eigh(everybody / one_of)
+    told = values > _UNTOLD * values.max(initial=0.0)
+    root = np.zeros((len(persons.coordinates), int(told.sum())))
+    root[moving] = vectors[:, told] / np.sqrt(values[told])
+    return np.sqrt(persons.alike) * np.column_stack([root, _growing_lag(persons)])
+
+
+def _growing_lag(persons: Persons) -> np.ndarray:
+    """(C,) a delay that is no delay in the mean, but early and late in a recording as different as
+    persons are: soft tissue lags, and clocks whose rates differ do as much."""
+    lag = np.zeros(len(persons.coordinates))
+    at = {one.effect: k for k, one in enumerate(persons.coordinates[: len(persons.groups)])}
+    if {SyncOffset.name, ClockDrift.name} <= at.keys():
+        delay, rate = at[SyncOffset.name], at[ClockDrift.name]
+        mean_s, sd_s = persons.moments_s
+        size = float(np.median(persons.usual[:, delay]))
+        typical_s, typical = (persons.parameters[k].typical for k in (delay, rate))
+        lag[rate], lag[delay] = size * typical_s / sd_s / typical, -size * mean_s / sd_s
+    return lag
 
 
 def log_prior_of_scales(scale: np.ndarray) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,11 +59,11 @@ def deviations_of(
     causes = (*lab.causes, *_stated_mass(lab))
     log_prior = log_prior_of(causes, prior_odds) - np.log(count + max(0, len(order) - 2))
     found: list[Deviation] = []
-    alone = [(k,) for k in range(count)] if count > 1 else []
-    since = [tuple(order[k:]) for k in range(1, len(order) - 1)]
-    likeliest = (*_likeliest(lab, causes, alone), *_likeliest(lab, causes, since))
-    judged = [(sessions, *_by_the_others(lab, sessions)) for sessions in likeliest]
-    for sessions, total, own in judged:
+    alone = _likeliest(lab, causes, _each(lab) if count > 1 else ())
+    since = _likeliest(lab, causes, _from_each_on(lab, order))
+    likeliest = [(k,) for k in alone] + [tuple(order[k:]) for k in since]
+    for sessions in likeliest:
+        total, own = _by_the_others(lab, sessions)
         posterior = lab.posterior(sums=total)
         offsets = [posterior.offset(own, one.directions) for one in causes]
         logs = _log_odds(offsets, causes) + log_prior
@@ -87,27 +87,43 @@ def _stated_mass(lab: Laboratory) -> Iterator[Cause]:
     yield Cause(STATED_MASS.name, "", (STATED_MASS.parameter,), directions)
 
 
+def _each(lab: Laboratory) -> Iterator[tuple[int, Sums]]:
+    for k in range(len(lab.persons.pull)):
+        yield k, sums_of(lab.persons, lab.scale, (k,))
+
+
+def _from_each_on(lab: Laboratory, order: Sequence[int]) -> Iterator[tuple[int, Sums]]:
+    """Place in the order, and what all from there on tell: at least two, and not everybody."""
+    together = None
+    for k in range(len(order) - 1, 0, -1):
+        own = sums_of(lab.persons, lab.scale, (order[k],))
+        together = own if together is None else together.with_(own)
+        if k < len(order) - 1:
+            yield k, together
+
+
 def _likeliest(
-    lab: Laboratory, causes: Sequence[Cause], asked: Sequence[tuple[int, ...]]
-) -> list[tuple[int, ...]]:
+    lab: Laboratory, causes: Sequence[Cause], asked: Iterable[tuple[int, Sums]]
+) -> list[int]:
     """The sets of sessions that deviate most, with the scales of all: only of these the scales
     beside their deviation are fitted, which among many sessions are the same."""
-    posterior, odds = lab.posterior(), []
-    for sessions in asked:
-        own = sums_of(lab.persons, lab.scale, sessions)
+    posterior = lab.posterior()
+    odds = {}
+    for k, own in asked:
         offsets = [posterior.offset(own, one.directions) for one in causes]
-        odds.append(_log_odds(offsets, causes).max())
-    return [asked[k] for k in sorted(np.argsort(odds)[-_JUDGED:].tolist())]
+        odds[k] = _log_odds(offsets, causes).max()
+    return sorted(sorted(odds, key=lambda k: odds[k])[-_JUDGED:])
 
 
 def _by_the_others(lab: Laboratory, sessions: tuple[int, ...]) -> tuple[Sums, Sums]:
     """What all tell and what some sessions tell, with the scales of deviations from the others'
     laboratory and from their own."""
-    others = lab.persons.only([k for k in range(len(lab.persons.pull)) if k not in sessions])
-    mine = lab.persons.only(sessions)
-    scale = scales_of(others, mine) if len(sessions) > 1 else scales_of(others)
-    own = sums_of(mine, scale)
-    return sums_of(others, scale).with_(own), own
+    persons = lab.persons
+    others = np.setdiff1d(np.arange(len(persons.pull)), sessions)
+    parts = (others, sessions) if len(sessions) > 1 else (others,)
+    scale = scales_of(persons, *parts, start=lab.scale)
+    own = sums_of(persons, scale, sessions)
+    return sums_of(persons, scale, others).with_(own), own
 
 
 def _log_odds(offsets: Sequence[Offset], causes: Sequence[Cause]) -> np.ndarray:

@@ -21,6 +21,7 @@ from bsip_cli.diagnosis.laboratory import (
     Pooled,
     Posterior,
     Sums,
+    alike_in,
     anything,
     log_prior_of_scales,
     posterior_of,
@@ -141,7 +142,8 @@ def log_prior_of(causes: Sequence[Cause], prior_odds: float) -> np.ndarray:
 class Laboratory:
     """The faults that are there, of sizes before the data [typical], by all persons together.
 
-    scale (G,) : of the persons' deviations. log_prior (K,) : of ``causes``.
+    scale (G,) : of the persons' deviations. log_prior (K,) : of ``causes``. alike (C, L) : root of
+    the covariance of what is the same in all persons.
     """
 
     persons: Persons
@@ -149,6 +151,7 @@ class Laboratory:
     log_prior: np.ndarray
     scale: np.ndarray
     sums: Sums
+    alike: np.ndarray
     found: Mapping[int, float]
 
     def posterior(self, but: int | None = None, sums: Sums | None = None) -> Posterior:
@@ -159,7 +162,7 @@ class Laboratory:
         there = [s * self.causes[k].directions for k, s in self.found.items() if k != but]
         ordinary = self.persons.both * self.persons.ordinary
         differences = self.persons.differences(self.scale)
-        return np.column_stack([ordinary, differences, self.persons.alike, *there])
+        return np.column_stack([ordinary, differences, self.alike, *there])
 
     def sizes(self, k: int, named_from: float, rng: np.random.Generator) -> tuple[Size, ...]:
         """Of a cause, if it is there."""
@@ -196,7 +199,8 @@ def laboratory_of(persons: Persons, causes: tuple[Cause, ...], prior_odds: float
     """Fit the deviations beside any fault, and then look for what is there."""
     scale = scales_of(persons)
     log_prior = log_prior_of(causes, prior_odds)
-    lab = Laboratory(persons, causes, log_prior, scale, sums_of(persons, scale), {})
+    sums = sums_of(persons, scale)
+    lab = Laboratory(persons, causes, log_prior, scale, sums, alike_in(persons), {})
     while len(lab.found) < _MOST:
         odds = _log_odds(lab)
         best = max(odds, key=lambda k: odds[k][0], default=None)

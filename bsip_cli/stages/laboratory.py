@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.diagnosis.findings import Number, interval_words
-from bsip_cli.diagnosis.laboratory import Alike, persons_of
+from bsip_cli.diagnosis.laboratory import persons_of
 from bsip_cli.diagnosis.laboratory_deviations import Deviation, deviations_of
 from bsip_cli.diagnosis.laboratory_search import (
     Cause,
@@ -170,7 +170,8 @@ def _fitted(unit: Unit, sessions: Sequence[_Session]) -> Laboratory:
         [one.told for one in sessions],
         [one.mass_sd for one in sessions],
         mine.between_persons,
-        Alike(mine.alike, (mean_s, sd_s)),
+        mine.alike,
+        (mean_s, sd_s),
     )
     centres = {name: x.mean(axis=0) for one in sessions for name, x in one.plates.items()}
     causes = causes_of(persons, centres)

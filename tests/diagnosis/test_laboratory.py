@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +11,8 @@ import pytest
 from bsip_cli.diagnosis.fault_model import FaultTrial
 from bsip_cli.diagnosis.filtering import slow
 from bsip_cli.diagnosis.laboratory import (
-    NOTHING_ALIKE,
-    Alike,
+    Persons,
+    alike_in,
     persons_of,
     posterior_of,
     scales_of,
@@ -38,8 +39,11 @@ from tests.effects.moving_scene import moving
 CENTRES_M = {"1": np.array([0.2, 0.3, 0.0]), "2": np.array([0.2, -0.3, 0.0])}
 ODDS, NAMED = 0.1, 0.95
 BETWEEN = 0.2  # deviations from person to person [typical]
+MOMENTS_S = (1.0, 0.3)  # mean and standard deviation
+ALIKE = 0.25  # share of one person's variance
 DELAY = Coordinate("sync_offset", "", "delay")
 VERTICAL = Coordinate("plate_gain", "1 fz", "gain")
+VERTICAL_TYPICAL = 0.04
 MASS = Coordinate(STATED_MASS.name, "", "share")
 
 
@@ -78,8 +82,12 @@ def drawn(
     return found
 
 
-def fitted(told: list[Information]) -> Laboratory:
-    persons = persons_of(told, [0.008] * len(told), BETWEEN)
+def together(told: list[Information], alike: float = 0.0) -> Persons:
+    return persons_of(told, [0.008] * len(told), BETWEEN, alike, MOMENTS_S)
+
+
+def fitted(told: list[Information], alike: float = 0.0) -> Laboratory:
+    persons = together(told, alike)
     return laboratory_of(persons, causes_of(persons, CENTRES_M), ODDS)
 
 
@@ -134,17 +142,18 @@ def test_a_fault_in_motion_alone_is_found_beside_those_who_stand_still_without()
 
 
 def test_deviations_follow_from_the_persons():
-    few = scales_of(persons_of(drawn(np.random.default_rng(3), {}, 12, 0.05), [0.008] * 12, 0.2))
-    many = scales_of(persons_of(drawn(np.random.default_rng(3), {}, 12, 0.8), [0.008] * 12, 0.2))
+    few, many = (
+        scales_of(together(drawn(np.random.default_rng(3), {}, 12, between)))
+        for between in (0.05, 0.8)
+    )
     assert np.median((many / few)[: len(many) // 2]) > 2
 
 
 def test_persons_are_a_sum():
-    told = drawn(np.random.default_rng(4), {DELAY: 1.0}, 6)
-    persons = persons_of(told, [0.008] * 6, BETWEEN)
+    persons = together(drawn(np.random.default_rng(4), {DELAY: 1.0}, 70))
     scale = np.ones(persons.count)
     whole = sums_of(persons, scale)
-    parts = sums_of(persons, scale, range(2)).with_(sums_of(persons, scale, range(2, 6)))
+    parts = sums_of(persons, scale, range(2)).with_(sums_of(persons, scale, range(2, 70)))
     assert np.allclose(whole.precision, parts.precision)
     assert np.allclose(whole.pull, parts.pull)
     assert whole.log_factor == pytest.approx(parts.log_factor)
@@ -174,20 +183,93 @@ def test_what_is_known_of_the_clock_is_no_residual_any_more():
     assert not any(x.term == "fault:sync_offset" for x in known.errors.terms)
 
 
+def test_no_memory_but_what_is_kept_grows_with_the_persons():
+    peaks = []
+    for count in (100, 500):
+        persons = together(drawn(np.random.default_rng(13), {}, 1) * count)
+        scale = np.ones(persons.count)
+        tracemalloc.start()
+        scales_of(persons)
+        sums_of(persons, scale)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.1 * peaks[0]
+
+
 @pytest.mark.parametrize("number", [DELAY, VERTICAL])
 def test_what_all_persons_have_alike_is_no_fault_of_the_laboratory(number):
     """Two milliseconds or 0.8 % in everybody, of however many persons; else it would be named."""
     told = drawn(np.random.default_rng(10), {number: 0.2}, 40, 0.02)
-    for alike, expected in ((NOTHING_ALIKE, True), (Alike(0.15, (1.0, 0.3)), False)):
-        persons = persons_of(told, [0.008] * len(told), BETWEEN, alike)
-        lab = laboratory_of(persons, causes_of(persons, CENTRES_M), ODDS)
+    for alike, expected in ((0.0, True), (ALIKE, False)):
+        lab = fitted(told, alike)
         assert any(lab.causes[k].effect == number.effect for k in lab.found) == expected
+
+
+def test_what_is_alike_is_a_share_of_what_one_person_has():
+    """However many there are, and whoever tells nothing of a plate."""
+    (one,) = drawn(np.random.default_rng(14), {}, 1)
+    second = np.array([x.target.startswith("2") for x in one.coordinates])
+    apart = replace(one, precision=one.precision * (second == second[:, None]))
+    of_first = replace(apart, precision=apart.precision * ~second)
+    persons = together([apart])
+    moving = [k for k, x in enumerate(persons.coordinates) if x != MASS]
+    known = sums_of(persons, np.ones(persons.count)).precision
+    expected = ALIKE * np.linalg.inv(known[np.ix_(moving, moving)])
+    lag = np.array([x.effect in ("sync_offset", "clock_drift") for x in persons.coordinates])
+    for told in ([apart], [apart] * 50, [apart] * 4 + [of_first] * 9):
+        root = alike_in(together(told, ALIKE))
+        covariance = (root @ root.T)[np.ix_(moving, moving)]
+        plates = ~lag[moving]
+        assert np.allclose(covariance[plates][:, plates], expected[plates][:, plates])
+        assert (np.diag(covariance)[~plates] > np.diag(expected)[~plates]).all()
+        assert np.allclose(root[~np.isin(np.arange(len(root)), moving)], 0.0)
+
+
+def test_what_is_told_by_who_stands_still_alone_is_told():
+    known = {replace(x, standing=x == VERTICAL): p for x, p in numbers().items()}
+    standing = replace(VERTICAL, standing=True)
+    lab = fitted(drawn(np.random.default_rng(17), {standing: 1.5}, 12, known=known), ALIKE)
+    assert np.isfinite(lab.alike).all()
+    (size,) = verdict(lab, "plate_gain", "1 fz").sizes
+    assert size.low < 1.5 * VERTICAL_TYPICAL < size.high
+
+
+def test_early_and_late_a_body_may_lag_otherwise_as_persons_do():
+    """And no clock's rate is made of it, by however many persons."""
+    rate = Coordinate("clock_drift", "", "rate_error")
+    persons = together(drawn(np.random.default_rng(15), {}, 1), ALIKE)
+    at = [persons.coordinates.index(x) for x in (DELAY, rate)]
+    typical = np.array([persons.parameters[k].typical for k in at])
+    column = alike_in(persons)[at, -1] * typical
+    late_s = [column @ [1.0, MOMENTS_S[0] + n * MOMENTS_S[1]] for n in (-1, 0, 1)]
+    usual_s = np.sqrt(ALIKE) * BETWEEN * typical[0]
+    assert np.allclose(late_s, [-usual_s, 0.0, usual_s])
+
+
+def test_intervals_hold_what_all_persons_have_alike():
+    """In whatever direction; without the share they miss it in most laboratories of many."""
+    inside = {0.0: 0, ALIKE: 0}
+    for seed in range(10):
+        rng = np.random.default_rng(300 + seed)
+        told = drawn(rng, {DELAY: 1.0, VERTICAL: 1.0}, 24)
+        persons = together(told, ALIKE)
+        root = alike_in(persons)
+        same = root @ rng.standard_normal(root.shape[1])
+        at = [persons.coordinates.index(x) for x in told[0].coordinates]
+        told = [replace(x, pull=x.pull + x.precision @ same[at]) for x in told]
+        for alike in inside:
+            lab = fitted(told, alike)
+            k = [(x.effect, x.target) for x in lab.causes].index((VERTICAL.effect, VERTICAL.target))
+            (size,) = lab.sizes(k, NAMED, rng)
+            inside[alike] += size.low < VERTICAL_TYPICAL < size.high
+    assert inside[ALIKE] >= 9
+    assert inside[0.0] <= 7
 
 
 def test_the_sums_are_those_of_all_deviations_at_once():
     """With every person's deviation a coefficient of its own, the posterior is the same."""
     told = drawn(np.random.default_rng(5), {DELAY: 1.0}, 3)
-    persons = persons_of(told, [0.008] * 3, BETWEEN)
+    persons = together(told)
     root = np.diag(persons.ordinary + 1.0)
     short = posterior_of(sums_of(persons, np.ones(persons.count)), root)
     count = len(persons.ordinary)
@@ -243,7 +325,7 @@ def test_all_plates_turned_are_each_turned_and_shifted():
     empty = np.zeros((len(known), len(known)))
     told = Information(coordinates, parameters, np.ones(len(known)), empty, empty[0])
     centres = {plate.name: plate.centre_m() for plate in scene.plates}
-    persons = persons_of([told], [0.008], BETWEEN)
+    persons = together([told])
     causes = causes_of(persons, centres)
     cause = next(c for c in causes if (c.effect, c.target) == (PlateRotation.name, "all"))
     effects = {effect.name: effect for effect in OF_A_LABORATORY}

@@ -56,7 +56,7 @@ def shown(out: Path, full: bool = False) -> Iterator[str]:
         )
     tables = tables_of(out)
     people = sorted(out.glob("sub-*/*_diagnosis.parquet"))
-    notes = [*_mass_notes(out), *(_choices(out) if full else ())]
+    notes = [*_notes(out), *(_choices(out) if full else ())]
     if not tables and not people and not [*notes, *_choices(out)]:
         raise UsageError(
             "there are no tables and no diagnoses",
@@ -93,16 +93,17 @@ def shown(out: Path, full: bool = False) -> Iterator[str]:
         )
 
 
-def _mass_notes(out: Path) -> Iterator[str]:
-    """Whose mass is not known, or stated grossly otherwise than the plates tell."""
+def _notes(out: Path) -> Iterator[str]:
+    """Whose mass is not known, or stated grossly otherwise than the plates tell, or whose height is
+    stated otherwise than the markers tell."""
     for folder in sorted(path for path in out.glob("sub-*") if path.is_dir()):
         try:
             person = _table(folder, "person")
         except BadDataError as error:
             yield str(error)
             continue
-        note = "" if person is None else str(person["mass_note"].iloc[0])
-        if note:
+        notes = () if person is None else person[["mass_note", "height_note"]].iloc[0]
+        for note in filter(None, notes):
             yield _wrapped(f"{folder.name}: {note}", _width(get_terminal_size().columns))
 
 

@@ -127,8 +127,9 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     yield "Identified from", used
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
     yield "Software", f"bsip {', '.join(versions)}"
-    if record.facts["mass_note"]:
-        yield "Mass", f"{capital(str(record.facts['mass_note']))}."
+    for name in ("mass", "height"):
+        if note := str(record.facts[f"{name}_note"]):
+            yield capital(name), f"{capital(note)}."
 
 
 # --- the person ---------------------------------------------------------------------------------

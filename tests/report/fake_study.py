@@ -155,6 +155,7 @@ class Artifacts:
                     "plate_mass_kg": 63.1,
                     "mass_note": "",
                     "height_m": 1.63,
+                    "height_note": "",
                     "anterior_x": 1.0,
                     "anterior_y": 0.0,
                     "calibration_trial": self.person.trials[0].stem,

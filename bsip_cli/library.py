@@ -34,7 +34,7 @@ from bsip_cli.errors import BadDataError, BsipError, UsageError
 from bsip_cli.pipeline import STAGES, Stage, producer
 from bsip_cli.recordings.model import Recording
 from bsip_cli.recordings.plate_source import C3dPlate, Opened
-from bsip_cli.recordings.plates import LocalWrench, PlateDescription
+from bsip_cli.recordings.plates import PlateDescription
 from bsip_cli.recordings.read import open_recording
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
@@ -142,8 +142,8 @@ def _source(name: str, plate: Plate, count: int) -> C3dPlate:
     axes = described.rotation_lab_plate()
     at_centre = moment - np.cross(described.centre_m(), force)
     usable = np.isfinite(force).all(axis=1) & np.isfinite(moment).all(axis=1)
-    wrench = LocalWrench(np.nan_to_num(force) @ axes, np.nan_to_num(at_centre) @ axes)
-    return C3dPlate(described, wrench, usable, np.eye(3))
+    channels = np.hstack([np.nan_to_num(force) @ axes, np.nan_to_num(at_centre) @ axes])
+    return C3dPlate(described, channels, usable, np.eye(3))
 
 
 class Person:

@@ -50,14 +50,14 @@ def shown(out: Path, full: bool = False) -> Iterator[str]:
     tables = tables_of(out)
     people = sorted(out.glob("sub-*/*_diagnosis.parquet"))
     choices = list(_notes(out, "choice", "sentence"))
-    masses = list(_notes(out, "person", "mass_note"))
-    if not tables and not people and not masses and not choices:
+    stated = list(_notes(out, "person", "mass_note", "height_note"))
+    if not tables and not people and not stated and not choices:
         raise UsageError(
             "there are no tables and no diagnoses",
             file=out,
             remedy="run `bsip run` first, or name the folder that it was given with --out",
         )
-    if notes := [*masses, *(choices if full else ())]:
+    if notes := [*stated, *(choices if full else ())]:
         yield "\n".join(notes)
     folders = _folders(out)
     if full and tables and len(list(out.glob("sub-*"))) > 1:  # of one person nothing is tested
@@ -95,7 +95,7 @@ def _folders(out: Path) -> list[Path]:
     return sorted(path for path in out.glob("sub-*") if path.is_dir())
 
 
-def _notes(out: Path, kind: str, column: str) -> Iterator[str]:
+def _notes(out: Path, kind: str, *columns: str) -> Iterator[str]:
     """What an artifact says of each person, if anything."""
     for folder in _folders(out):
         try:
@@ -103,8 +103,8 @@ def _notes(out: Path, kind: str, column: str) -> Iterator[str]:
         except BadDataError as error:
             yield str(error)
             continue
-        if table is not None and (said := str(table[column].iloc[0])):
-            yield _wrapped(f"{folder.name}: {said}")
+        said = () if table is None else table[list(columns)].iloc[0]
+        yield from (_wrapped(f"{folder.name}: {one}") for one in said if one)
 
 
 def _person(folder: Path, full: bool, alone: bool) -> tuple[Searched, str] | None:

@@ -10,16 +10,17 @@ from bsip_cli.recordings.analog import check_samples, sample_findings
 from bsip_cli.recordings.c3d_content import Content
 from bsip_cli.recordings.c3d_format import Group, number, numbers, texts, whole_numbers
 from bsip_cli.recordings.model import Finding
+from bsip_cli.recordings.plate_reading import AS_STATED
 from bsip_cli.recordings.plate_source import C3dPlate
 from bsip_cli.recordings.plates import (
-    N_CHANNELS,
+    CHANNELS_OF,
     PlateDescription,
     corners_are_plausible,
-    local_wrench,
+    measured,
     side_lengths,
 )
 from bsip_cli.recordings.units import force_in_N, length_in_m, moment_in_Nm
-from bsip_cli.recordings.zero import without_baseline
+from bsip_cli.recordings.zero import lost_baseline
 
 _MOST_PLATES = 64
 _PLATE_UNITS = ("mm", "cm", "in", "m")
@@ -100,14 +101,21 @@ def _read_plate(
     polynomials = polynomial.reshape(2, 6) if corrects else None
     stated = PlateDescription(name, kind, written * plate_unit_m, origin, polynomials)
     stated, about_origin = _without_place(stated)
-    wrench, counts = local_wrench(channels, stated), raw / np.where(scales == 0, 1.0, scales)
+    source = C3dPlate(stated, measured(channels, kind), np.ones(len(raw), bool), rotation_world_lab)
+    lift, counts = (
+        source.measured @ source.local(AS_STATED)[2],
+        raw / np.where(scales == 0, 1.0, scales),
+    )
     rate_hz = content.rate_hz * content.samples_per_frame
-    samples = check_samples(channels, counts, wrench.force_N[:, 2], rate_hz)
+    samples = check_samples(channels, counts, lift, rate_hz)
+    source = replace(source, usable=samples.usable())
+    baseline = _baseline(group, content.samples_per_frame, len(raw))
     down = float(np.sign((rotation_world_lab @ stated.rotation_lab_plate()[:, 2])[2]))
-    baseline, usable = _baseline(group, content.samples_per_frame, len(raw)), samples.usable()
-    wrench, subtracted = without_baseline(wrench, name, down, usable, baseline)
-    source = C3dPlate(stated, wrench, usable, rotation_world_lab)
-    about_samples = [*sample_findings(name, samples, rate_hz), *subtracted]
+    subtracted = lost_baseline(down * lift, name, source.usable, baseline)
+    if subtracted is not None:
+        mean = source.measured[baseline].mean(axis=0)
+        source = replace(source, measured=source.measured - mean)
+    about_samples = [*sample_findings(name, samples, rate_hz), *filter(None, [subtracted])]
     return source, [*about_size, *about_origin, *about_units], about_samples
 
 
@@ -115,7 +123,7 @@ def _kind(group: Group, index: int) -> int:
     kinds = np.ravel(whole_numbers(group, "TYPE"))
     if index >= len(kinds):
         raise _UnusablePlateError("no FORCE_PLATFORM:TYPE", "a type for each plate")
-    if kinds[index] not in N_CHANNELS:
+    if kinds[index] not in CHANNELS_OF:
         raise _UnusablePlateError(f"force platform type {kinds[index]}", "types 1 to 4")
     return int(kinds[index])
 
@@ -174,7 +182,7 @@ def _sides(corners_m: np.ndarray) -> str:
 
 
 def _channel_rows(group: Group, kind: int, index: int, n_analog: int) -> np.ndarray:
-    table, wanted = np.atleast_1d(whole_numbers(group, "CHANNEL")), N_CHANNELS[kind]
+    table, wanted = np.atleast_1d(whole_numbers(group, "CHANNEL")), len(CHANNELS_OF[kind])
     table = table[:, None] if table.ndim == 1 else table
     if table.ndim != 2 or table.shape[0] < wanted or table.shape[1] <= index:
         found = f"{table.shape[0]} channels listed for it"

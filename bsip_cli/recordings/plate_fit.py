@@ -63,7 +63,8 @@ class PlateFit:
     """A reading, with its sign and its fixed point, and how well it makes forces under feet.
 
     For each of n trials that have the plate: from the parts to the wrench, ``matrices`` (6, k), and
-    what it shows, ``found`` (n, 8), with its logarithmic likelihood, of all trials together.
+    what it shows, ``found`` (n, 8), with its logarithmic likelihood, of all trials together; that
+    of its sensors is ``of_sensors``.
     """
 
     reading: PlateReading
@@ -71,10 +72,11 @@ class PlateFit:
     matrices: Sequence[np.ndarray]
     found: np.ndarray
     log_likelihood: float
+    of_sensors: float
 
-    def lever_log_likelihood(self) -> float:
-        """The part that moments about no lever have."""
-        return float(lever_log_likelihood(self.found).sum())
+    def log_likelihood_of_nobody(self) -> float:
+        """The part that tells readings from one another, and no person from nobody."""
+        return float(lever_log_likelihood(self.found).sum()) + self.of_sensors
 
     def evidence(self) -> Evidence:
         """Mean over the trials."""
@@ -106,7 +108,8 @@ def plate_fits(
         pull = pull + (-wrench[..., 2]).clip(min=0).sum(axis=1)
         matrices.append(every)
         found.append(_evidence(one, readings, wrench))
-    likely = log_likelihood(np.array(found)).sum(axis=0)
+    of_sensors = [sum(one.source.sensors_log_likelihood(r) for one in seen) for r in readings]
+    likely = log_likelihood(np.array(found)).sum(axis=0) + of_sensors
     signs = np.where(pull > _PULLS * push, -1, 1)  # mirrored corners turn a plate's axis over
     return [
         PlateFit(
@@ -115,6 +118,7 @@ def plate_fits(
             [sign * every[k] for every in matrices],
             np.array([rows[k] for rows in found]),
             float(likely[k]),
+            of_sensors[k],
         )
         for k, (reading, sign) in enumerate(zip(readings, signs, strict=True))
     ]

@@ -3,12 +3,16 @@ laboratory's axes against those of the person."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
+from scipy.linalg import block_diag
 
-CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+from bsip_cli.recordings.plates import CHANNELS, CHANNELS_OF
+
 Reference = Literal["stated", "reversed", "centred", "origin", "fixed"]
 Moved = Literal["", "all", "markers", "forces"]
 
@@ -19,6 +23,7 @@ Moved = Literal["", "all", "markers", "forces"]
 _SCALED, _OTHER_POINT, TURNED, MIRRORED = -3.4, -4.6, -4.6, -6.2
 # Without the forces, or these without the moments, or one channel; two that are exchanged.
 _MOMENTS_REVERSED = -6.2
+_TWO_OF_SENSORS = -float(np.log(28))  # which of eight, nothing says beforehand
 REVERSED = -2.3  # the action on the plate: one in ten
 EXCHANGED = -5.3  # two plates
 ONE_ALONE = -0.7  # one plate of several: what goes wrong, goes wrong for all more often
@@ -41,8 +46,8 @@ class PlateReading:
     mirrored : the corners are taken in the other direction round.
     sign : -1 where the numbers are the action on the plate.
     place_of : the plate whose place (C3D), or points (MOT), belong to this one's force and moment.
-    channels : what is wrong with single channels, as written: "reversed" and one of CHANNELS,
-        "exchanged" and two forces or two moments; "" if nothing.
+    channels : what is wrong with single channels, as written: "reversed" and one name, "exchanged"
+        and two; "" if nothing. Names are CHANNELS, or a plate's own where these are others.
     half_size_m : half the outline's sides where the stated outline is too small.
     """
 
@@ -63,24 +68,27 @@ class PlateReading:
         return (
             _SCALED * scaled
             + _MOMENTS_REVERSED * ((self.moment_scale < 0) + bool(self.channels))
+            + _TWO_OF_SENSORS * any(n in CHANNELS_OF[3] for n in self.channels.split())
             + _OTHER_POINT * (self.about != "stated")
             + TURNED * (self.turn != 0 and not self.mirrored)
             + MIRRORED * self.mirrored
         )
 
-    def force_matrix(self) -> np.ndarray:
-        """To Fx, Fy, Fz from what is written as such, (3, 3)."""
-        return self._matrix()[:3, :3]
-
-    def moment_matrix(self) -> np.ndarray:
-        """To Mx, My, Mz from what is written as such, (3, 3)."""
-        return self._matrix()[3:, 3:]
-
-    def _matrix(self) -> np.ndarray:
-        right = np.eye(len(CHANNELS))
-        named = [k for k, name in enumerate(CHANNELS) if name in self.channels]
+    def channel_matrix(self, names: Sequence[str] = CHANNELS) -> np.ndarray:
+        """To what the channels of these names are from what is written as such, (k, k)."""
+        right = np.eye(len(names))
+        named = [k for k, name in enumerate(names) if name in self.channels.split()]
         right[named] = -right[named] if len(named) == 1 else right[named[::-1]]
         return right
+
+    def measured_matrix(self, kind: int) -> np.ndarray:
+        """The same of what a plate of a C3D has measured (`plates.measured`), (k, k), where its own
+        channels are no forces and moments of the whole plate."""
+        if kind == 1:
+            points = self.channel_matrix(POINT)
+            return np.asarray(block_diag(np.eye(3), np.kron(points, np.eye(3)), 1.0))
+        own = CHANNELS_OF[kind]
+        return np.eye(len(own)) if own == CHANNELS else self.channel_matrix(own)
 
     def words(self) -> str:
         """What was done about units, reference and axes, as one clause; empty if nothing."""
@@ -101,14 +109,20 @@ class PlateReading:
 
 
 AS_STATED = PlateReading()
+POINT = ("Px", "Py")
+ALIKE = dict.fromkeys((2, 4), (CHANNELS[:3], CHANNELS[3:])) | {
+    1: (CHANNELS[:3], CHANNELS[3:], POINT),
+    3: (CHANNELS[:2], CHANNELS[3:5], CHANNELS_OF[3]),
+}
 
 
-def faults_of_channels(*level: int) -> list[str]:
-    """Each reversed; the two level forces or moments, by default x and y, exchanged."""
-    one, other = level or (0, 1)
-    pairs = ((CHANNELS[one + k], CHANNELS[other + k]) for k in (0, 3))
-    reversed_ = [f"reversed {name}" for name in CHANNELS]
-    return reversed_ + [f"exchanged {a} and {b}" for a, b in pairs]
+def faults_of_channels(alike: Sequence[Sequence[str]]) -> list[str]:
+    """One of CHANNELS reversed; any two that are alike exchanged."""
+    pairs = (pair for names in alike for pair in combinations(names, 2))
+    return [
+        *(f"reversed {name}" for name in CHANNELS),
+        *(f"exchanged {one} and {other}" for one, other in pairs),
+    ]
 
 
 _MOMENT_SCALES = {

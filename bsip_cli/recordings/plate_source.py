@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from bsip_cli.recordings.model import Finding, Plate, Recording
 from bsip_cli.recordings.plate_reading import (
+    ALIKE,
     AS_STATED,
     FrameChange,
     PlateReading,
@@ -19,16 +20,22 @@ from bsip_cli.recordings.plate_reading import (
     faults_of_channels,
 )
 from bsip_cli.recordings.plates import (
+    CHANNELS,
     LOADED_N,
     LocalWrench,
     PlateDescription,
     cop_shift_m,
     crossing,
+    wrench_matrix,
 )
+from bsip_cli.recordings.under_the_feet import falling
 
 _THICK_M = 0.3  # no plate's sensors lie so deep under its surface
 _Z = np.array([1.0, 1.0, -1.0])
 _LEVEL = 0.5  # sine of an axis' slope
+_CORNERS = np.array([[1, 1, 1], [-1, 1, -1], [-1, -1, 1], [1, -1, -1]])  # of x, of y, of both
+_DIAGONAL = 0.1  # of the load, where the likelihood begins to fall
+_MIRRORED = np.array([1.0, 1.0, -1.0, -1.0, -1.0, 1.0])  # a wrench seen in a level mirror
 _HARDLY = 0.05  # of a bell: less of it has points
 # Of the force: what makers state for a plate's linearity and cross talk. A copy or a sum is the
 # same reading and differs by rounding; the loads of two feet differ by tens of per cent mostly.
@@ -73,6 +80,9 @@ class PlateSource(Protocol):
     def lever_m(self, reading: PlateReading) -> np.ndarray | None:
         """How far from the sensor, or from the origin of its points, the force is, (n,); None where
         there is neither."""
+
+    def sensors_log_likelihood(self, reading: PlateReading) -> float:
+        """How likely a plate's single sensors share its load so, logarithm; 0 without any."""
 
     def in_place_of(self, other: PlateSource) -> PlateSource:
         """This force where the other one is."""
@@ -133,34 +143,42 @@ class Opened:
 
 @dataclass(frozen=True, eq=False)
 class C3dPlate:
-    """A plate of a C3D file: its wrench at the sensor's origin, plate frame."""
+    """A plate of a C3D file, and what its channels have `measured`; mirrored: what they hold is."""
 
     description: PlateDescription
-    wrench: LocalWrench
+    measured: np.ndarray  # (n, k)
     usable: np.ndarray  # (n,) bool
     rotation_world_lab: np.ndarray  # (3, 3)
+    is_mirrored: bool = False
 
     @property
     def name(self) -> str:
         return self.description.name
 
     def parts(self) -> np.ndarray:
-        return np.hstack([self.wrench.force_N, self.wrench.moment_Nm])
+        return self.measured
+
+    def local(self, reading: PlateReading) -> np.ndarray:
+        """From the parts to the wrench at the sensor's origin, plate frame, (6, k); before the sign
+        and the scale of a reading."""
+        kind = self.description.kind
+        matrix = wrench_matrix(self.description) @ reading.measured_matrix(kind)
+        mirror = np.diag(_MIRRORED) if self.is_mirrored else np.eye(6)
+        return np.asarray(reading.channel_matrix() @ mirror @ matrix)
 
     def matrix(self, reading: PlateReading) -> np.ndarray:
         """Without the maker's correction of the centre of pressure, which is no linear one."""
         description = self.read_description(reading)
         axes = self.rotation_world_lab @ description.rotation_lab_plate()
-        force = reading.sign * axes @ reading.force_matrix()
+        force, moment = np.split(self.local(reading), 2)
+        force = reading.sign * axes @ force
         to_surface = axes @ crossing(self._surface_m(reading)) @ axes.T
         at_centre = crossing(self.rotation_world_lab @ description.centre_m()) - to_surface
         scale = reading.sign * reading.moment_scale
-        moment = np.hstack([at_centre @ force, scale * axes @ reading.moment_matrix()])
-        return np.vstack([np.hstack([force, np.zeros((3, 3))]), moment])
+        return np.vstack([force, at_centre @ force + scale * axes @ moment])
 
     def at(self, samples: np.ndarray) -> C3dPlate:
-        part = LocalWrench(self.wrench.force_N[samples], self.wrench.moment_Nm[samples])
-        return replace(self, wrench=part, usable=self.usable[samples])
+        return replace(self, measured=self.measured[samples], usable=self.usable[samples])
 
     def later(self, by: int) -> C3dPlate:
         samples, there = later_samples(len(self.usable), by)
@@ -168,10 +186,7 @@ class C3dPlate:
         return replace(part, usable=part.usable & there)
 
     def smoothed(self, sigma: float) -> C3dPlate:
-        parts = (
-            _smooth(x, self.usable, sigma) for x in (self.wrench.force_N, self.wrench.moment_Nm)
-        )
-        return replace(self, wrench=LocalWrench(*parts))
+        return replace(self, measured=_smooth(self.measured, self.usable, sigma))
 
     def plate(self, reading: PlateReading) -> Plate:
         description = self.read_description(reading)
@@ -189,11 +204,26 @@ class C3dPlate:
         return None
 
     def lever_m(self, reading: PlateReading) -> np.ndarray:
-        return np.hypot(*self.wrench.cop().T) * abs(reading.moment_scale)
+        return np.hypot(*self._wrench(reading).cop().T)
+
+    def sensors_log_likelihood(self, reading: PlateReading) -> float:
+        """The load at a point of a bending plate goes to the four corners as that point's distances
+        from the sides, so that the share of one diagonal less that of the other is the product of
+        the point's coordinates. In 13 sound plates of five public laboratories this misses by 0.09
+        of the load in the median, by 0.4 at most; of two exchanged neighbours by 0.3."""
+        if self.description.kind != 3 or not len(self.measured):
+            return 0.0
+        corners = (self.measured @ reading.measured_matrix(3).T)[:, 4:]
+        along, across, diagonal = (corners @ _CORNERS).T / corners.sum(axis=1)
+        missed = np.sqrt(np.mean((diagonal - along * across) ** 2))
+        return float(falling(missed, _DIAGONAL))
 
     def in_place_of(self, other: PlateSource) -> C3dPlate:
         assert isinstance(other, C3dPlate)
-        return replace(self, description=replace(other.description, name=self.name))
+        stated = other.description
+        if stated.kind != self.description.kind:
+            stated = replace(self.description, corners_m=stated.corners_m)
+        return replace(self, description=replace(stated, name=self.name))
 
     def floor_m(self, reading: PlateReading = AS_STATED) -> float:
         return float((self.description.corners_m @ self.rotation_world_lab.T)[:, 2].mean())
@@ -202,10 +232,8 @@ class C3dPlate:
         """A mirrored plate's z points out of the floor."""
         corners = self.description.corners_m @ _in_lab(change, self.rotation_world_lab).T
         description = replace(self.description, corners_m=corners)
-        if np.linalg.det(change) > 0 or corners_only:
-            return replace(self, description=description)
-        wrench = LocalWrench(self.wrench.force_N * _Z, -self.wrench.moment_Nm * _Z)
-        return replace(self, description=description, wrench=wrench)
+        is_mirrored = self.is_mirrored != (np.linalg.det(change) < 0 and not corners_only)
+        return replace(self, description=description, is_mirrored=is_mirrored)
 
     def alternatives(self) -> Iterable[PlateReading]:
         """Type 3 has no moments of its own, type 1 no point that they are about."""
@@ -216,7 +244,7 @@ class C3dPlate:
             abouts += ("reversed", "centred")
         for scale, about, turn, mirrored in product(scales, abouts, range(4), (False, True)):
             yield PlateReading(moment_scale=scale, about=about, turn=turn, mirrored=mirrored)
-        for fault in faults_of_channels():
+        for fault in faults_of_channels(ALIKE[kind]):
             yield PlateReading(channels=fault)
 
     def findings(self, reading: PlateReading) -> list[Finding]:
@@ -258,13 +286,13 @@ class C3dPlate:
             return None
         return cop_shift_m(self._at_surface(reading), description)
 
+    def _wrench(self, reading: PlateReading) -> LocalWrench:
+        """At the sensor's origin, before the sign of a reading."""
+        force, moment = np.split(self.measured @ self.local(reading).T, 2, axis=1)
+        return LocalWrench(force, moment * reading.moment_scale)
+
     def _at_surface(self, reading: PlateReading) -> LocalWrench:
-        """Before the sign of a reading."""
-        wrench = LocalWrench(
-            self.wrench.force_N @ reading.force_matrix().T,
-            self.wrench.moment_Nm @ reading.moment_matrix().T * reading.moment_scale,
-        )
-        return wrench.at_surface(self._surface_m(reading))
+        return self._wrench(reading).at_surface(self._surface_m(reading))
 
 
 @dataclass(frozen=True, eq=False)
@@ -346,6 +374,9 @@ class ForceOnPoint:
             return None
         return np.linalg.norm(self.points, axis=1) * reading.point_scale
 
+    def sensors_log_likelihood(self, reading: PlateReading) -> float:
+        return 0.0
+
     def in_place_of(self, other: PlateSource) -> ForceOnPoint:
         assert isinstance(other, ForceOnPoint)
         return replace(other, name=self.name, force_N=self.force_N, moment=self.moment)
@@ -371,7 +402,8 @@ class ForceOnPoint:
         for point, moment, about in product(points, (1.0, 1e-3, -1.0, -1e-3), abouts):
             yield PlateReading(moment_scale=moment, point_scale=point, about=about)
         level = np.flatnonzero(np.abs(self.rotation_world_lab[2]) < _LEVEL)
-        for fault, about in product(faults_of_channels(*level), abouts):
+        alike = [[CHANNELS[k + first] for k in level] for first in (0, 3)]
+        for fault, about in product(faults_of_channels(alike), abouts):
             yield PlateReading(channels=fault, about=about)
 
     def findings(self, reading: PlateReading) -> list[Finding]:
@@ -406,15 +438,15 @@ class ForceOnPoint:
     # From the parts, lab frame, (3, 15) each.
 
     def _force(self, reading: PlateReading) -> np.ndarray:
-        return np.hstack([reading.force_matrix(), np.zeros((3, 12))])
+        return np.hstack([reading.channel_matrix()[:3, :3], np.zeros((3, 12))])
 
     def _scaled_moment(self, reading: PlateReading) -> np.ndarray:
-        scaled = reading.moment_scale * reading.moment_matrix()
+        scaled = reading.moment_scale * reading.channel_matrix()[3:, 3:]
         return np.hstack([np.zeros((3, 3)), scaled, np.zeros((3, 9))])
 
     def _at_origin(self, reading: PlateReading) -> np.ndarray:
         """Moment of the force at its point about the lab's origin."""
-        cross = _CROSS_PRODUCT @ reading.force_matrix()
+        cross = _CROSS_PRODUCT @ reading.channel_matrix()[:3, :3]
         return np.hstack([np.zeros((3, 6)), reading.point_scale * cross.reshape(3, 9)])
 
     def _left(self, reading: PlateReading) -> np.ndarray:

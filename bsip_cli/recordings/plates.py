@@ -13,7 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-N_CHANNELS = {1: 6, 2: 6, 3: 8, 4: 6}
+CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+CHANNELS_OF = {
+    1: ("Fx", "Fy", "Fz", "Px", "Py", "Tz"),
+    2: CHANNELS,
+    3: ("Fx12", "Fx34", "Fy14", "Fy23", "Fz1", "Fz2", "Fz3", "Fz4"),
+    4: CHANNELS,
+}
 LOADED_N = 100.0  # a foot stands on the plate
 _LEAST_FORCE_N = 1e-6
 _MM = 1e3
@@ -102,27 +108,39 @@ def cop_at_height(
     return np.stack([x, y], axis=-1)
 
 
-def local_wrench(channels: np.ndarray, plate: PlateDescription) -> LocalWrench:
-    """Channels (n, 6 or 8) in N, N m (type 1: m) to the wrench at the sensor's origin."""
-    if plate.kind == 1:  # Fx, Fy, Fz, COP x, COP y, free moment
-        force, n = channels[:, :3], len(channels)
-        point = np.column_stack([channels[:, 3:5], np.zeros(n)])
-        free = np.column_stack([np.zeros((n, 2)), channels[:, 5]])
-        return LocalWrench(force, np.cross(point, force) + free)
+def measured(channels: np.ndarray, kind: int) -> np.ndarray:
+    """What a wrench is linear in, (n, k), of channels (n, 6 or 8) in N, N m (type 1: m).
+
+    Of type 1 these are force, each of its products with Px and with Py, and Tz; else the channels.
+    """
+    if kind != 1:
+        return channels
+    force, point, torque = np.split(channels, [3, 5], axis=1)
+    products = point[:, :, None] * force[:, None]
+    return np.hstack([force, products.reshape(len(force), 6), torque])
+
+
+def wrench_matrix(plate: PlateDescription) -> np.ndarray:
+    """From what is `measured` to the wrench at the sensor's origin, plate frame, (6, k)."""
+    if plate.kind == 1:
+        matrix = np.zeros((6, 10))
+        matrix[[0, 1, 2, 3, 4, 5, 5, 5], [0, 1, 2, 8, 5, 4, 6, 9]] = [1, 1, 1, 1, -1, 1, -1, 1]
+        return matrix
     if plate.kind != 3:
-        return LocalWrench(channels[:, :3], channels[:, 3:6])
-    # Kistler: Fx12, Fx34, Fy14, Fy23, Fz1 to Fz4 at the distances a, b from the centre.
+        return np.eye(6)
+    # Kistler: sensors at the distances a, b from the centre.
     a, b = np.abs(plate.origin_m[:2])
-    fx12, fx34, fy14, fy23, fz1, fz2, fz3, fz4 = channels[:, :8].T
-    force = np.column_stack([fx12 + fx34, fy14 + fy23, fz1 + fz2 + fz3 + fz4])
-    moment = np.column_stack(
+    return np.array(
         [
-            b * (fz1 + fz2 - fz3 - fz4),
-            a * (-fz1 + fz2 + fz3 - fz4),
-            b * (fx34 - fx12) + a * (fy14 - fy23),
-        ]
+            [1, 1, 0, 0, 0, 0, 0, 0],
+            [0, 0, 1, 1, 0, 0, 0, 0],
+            [0, 0, 0, 0, 1, 1, 1, 1],
+            [0, 0, 0, 0, b, b, -b, -b],
+            [0, 0, 0, 0, -a, a, a, -a],
+            [-b, b, a, -a, 0, 0, 0, 0],
+        ],
+        dtype=float,
     )
-    return LocalWrench(force, moment)
 
 
 def cop_shift_m(wrench: LocalWrench, plate: PlateDescription) -> np.ndarray:

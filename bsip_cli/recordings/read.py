@@ -18,7 +18,7 @@ from bsip_cli.recordings.plate_reading import AS_STATED, FrameChange
 from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N
 from bsip_cli.recordings.plates import LOADED_N
 from bsip_cli.recordings.scene import handedness
-from bsip_cli.recordings.settle import SessionReading, Verdict, settle_session
+from bsip_cli.recordings.settle import AGAINST, SessionReading, Verdict, settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
 
@@ -30,6 +30,16 @@ _QUIET_SHARE = 0.05  # of the mean load: more is movement, in which both feet pr
 _LEAST_CHANGE_N = 1.0
 _TOGETHER = 0.8  # correlation
 _UNLOADED = Verdict()
+_TRIED = (
+    "other units, other points that moments are about, corners in another order, reversed and "
+    "exchanged channels, other axes and another plate's place were tried, and none explains it"
+)
+_LOOK_AT = {
+    False: "Look first whether the plate stands where its corners say: in the markers' frame, "
+    "calibrated in the same session, not moved since",
+    True: "Look first whether these are the forces of this trial and of this person alone, on one "
+    "clock with the markers, and whether the labels are those of the markers",
+}
 _WITHOUT_PLACE = (
     "this recording lacks the plate with which it was exchanged in the others",
     "left the plate out",
@@ -203,11 +213,11 @@ def _about_plate(name: str, verdict: Verdict) -> list[Finding]:
         expected = "plates that measure different feet"
         return [Finding("plate_repeated", name, found, expected, action, "corrected")]
     if verdict.refusal:
-        action = "left the plate out: no other unit, point or order of corners explains it"
+        action = f"left the plate out: {_TRIED}. {_LOOK_AT[verdict.refusal == AGAINST]}"
         if verdict.rivals:
             action = (
                 f"left the plate out: {' or '.join(verdict.rivals)}: these trials cannot tell; one "
-                "with more movement might"
+                f"with more movement might. {_LOOK_AT[False]}"
             )
         return [_about(name, verdict.refusal, action, "excluded")]
     reading, findings = verdict.reading, []

@@ -39,7 +39,7 @@ Doubted = Literal["", "vertical moment", "force and centre of pressure"]
 
 _ALL: Doubted = "force and centre of pressure"
 _UNTOLD = "its numbers are no force under a foot as they stand, and several corrections make one"
-_AGAINST = "its force is not one that carries and drives the body that the markers show"
+AGAINST = "its force is not one that carries and drives the body that the markers show"
 
 
 @dataclass(frozen=True)
@@ -161,8 +161,8 @@ def _surest(tried: Sequence[Hypothesis]) -> _Choice:
     seen = leans + sum(1 + len(trial.sources) for trial in now.trials)
     best = tried[int(np.argmax(logs))]
     # A fault that no reading mends; that the file's moments have no lever is none.
-    lever = sum(fit.lever_log_likelihood() for fit in now.fits.values())
-    unknown = _UNKNOWN + _UNKNOWN_EACH * seen + lever
+    nobody = sum(fit.log_likelihood_of_nobody() for fit in now.fits.values())
+    unknown = _UNKNOWN + _UNKNOWN_EACH * seen + nobody
     # Forces that go with the motion may still lie beside the feet.
     goes = max(best.balance.drive_log_likelihood(), 0.0)
     if unknown + goes - logsumexp([*logs, unknown + goes]) > np.log(_SURELY_NOBODY):
@@ -193,7 +193,7 @@ def _verdict(stated: PlateFit, chosen: _Choice, name: str) -> Verdict:
     before, after = stated.evidence(), fit.evidence()
     fault = _fault(after)
     if not fault and not chosen.doubted:
-        fault = _UNTOLD if rivals else _AGAINST if chosen.is_no_person else ""
+        fault = _UNTOLD if rivals else AGAINST if chosen.is_no_person else ""
     if fault:
         return Verdict(fit.reading, before, after, refusal=fault, rivals=rivals)
     is_loaded = np.isfinite([after.distance_m, after.outside_m]).any()

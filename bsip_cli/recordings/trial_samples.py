@@ -13,7 +13,7 @@ from bsip_cli.recordings.label_words import meanings
 from bsip_cli.recordings.plate_reading import FrameChange
 from bsip_cli.recordings.plate_source import Opened, PlateSource, lift_N
 from bsip_cli.recordings.plates import LOADED_N
-from bsip_cli.recordings.scene import Handedness, by_segment, handedness, height_m
+from bsip_cli.recordings.scene import Handedness, Stature, by_segment, handedness, height_m, stature
 from bsip_cli.recordings.under_the_feet import Feet
 
 _FEW = 100  # samples that each plate of a trial is seen by
@@ -31,6 +31,8 @@ class TrialSamples:
     name: str
     hands: Handedness
     height_m: float | None
+    stature: Stature | None
+    stated_height_m: float | None
     sources: dict[str, PlateSource]
     smooth: dict[str, PlateSource]
     loaded: dict[str, np.ndarray]
@@ -69,6 +71,8 @@ class TrialSamples:
             name=recording.path.stem,
             hands=handedness(recording.labels, markers),
             height_m=height_m(segments),
+            stature=stature(recording.labels, markers),
+            stated_height_m=recording.stated.height_m,
             sources={s.name: s.at(samples) for s in sources},
             smooth={s.name: s.smoothed(SMOOTH_S * rate_hz).at(samples) for s in sources},
             loaded={s.name: heavy[s.name][samples] for s in sources},

@@ -33,7 +33,7 @@ _LEAST = 1e-9
 _RARE = -4.6  # an outline is stated wrongly, vertical moments are left out, in one file of 100
 _INDEPENDENT = 3.0  # numbers of a trial that must agree by chance
 _LEAST_SHARE, _HAIR_M = 1e-3, 1e-5  # how nearly they can
-_FURTHEST_M = 1e4
+_FURTHEST_M, _NO_LOAD_N = 1e4, 1e-6
 _LOW_M = 0.17  # ankles and below
 _LIFT_M = 0.035  # over a marker's own lowest height: the foot is in the air
 _RIM_M = 0.05
@@ -142,9 +142,10 @@ def evidence(
     read and as written; None without such points. body_m : the centre of mass (n, 3).
     """
     force, moment = wrench[..., :3], wrench[..., 3:]
-    load = np.abs(force[..., 2])
-    cop = np.clip(cop_at_height(force, moment, floor_m[:, None]), -_FURTHEST_M, _FURTHEST_M)
-    known = np.isfinite(cop).all(axis=(0, 2))
+    load = np.maximum(np.abs(force[..., 2]), _NO_LOAD_N)
+    cop = cop_at_height(force, moment, floor_m[:, None])
+    cop = np.nan_to_num(np.clip(cop, -_FURTHEST_M, _FURTHEST_M), nan=_FURTHEST_M)  # without load
+    known = np.isfinite(wrench).all(axis=(0, 2))
     if not known.any():
         return np.full((len(wrench), len(FIELDS)), np.nan)
     force, moment, load, cop = (x[:, known] for x in (force, moment, load, cop))
@@ -169,13 +170,13 @@ def log_likelihood(found: np.ndarray) -> np.ndarray:
     """Up to a constant: how likely a person's foot makes such numbers (..., 8), logarithm."""
     distance, outside, _, _, torque, level, share, astray = np.moveaxis(found, -1, 0)
     terms = [
-        _falling(distance, _DISTANCE_M),
-        np.clip(_falling(outside, _DISTANCE_M), _RARE, 0.0),
+        falling(distance, _DISTANCE_M),
+        np.clip(falling(outside, _DISTANCE_M), _RARE, 0.0),
         lever_log_likelihood(found),
-        _falling(torque, _TORQUE_M),
-        np.maximum(_falling(_LITTLE_TORQUE_M, torque), _RARE),
-        _falling(level, _LEVEL_M),
-        _falling(astray, _ASTRAY),
+        falling(torque, _TORQUE_M),
+        np.maximum(falling(_LITTLE_TORQUE_M, torque), _RARE),
+        falling(level, _LEVEL_M),
+        falling(astray, _ASTRAY),
         -_INDEPENDENT * np.log(np.maximum(share, _LEAST_SHARE)),
     ]
     return np.nansum(terms, axis=0)
@@ -192,7 +193,8 @@ def mean_evidence(found: np.ndarray) -> Evidence:
     return Evidence(*_mean(found.T).tolist())
 
 
-def _falling(size: float | np.ndarray, scale: float | np.ndarray) -> np.ndarray:
+def falling(size: float | np.ndarray, scale: float | np.ndarray) -> np.ndarray:
+    """Logarithm of a likelihood of sizes (...) that most often are below ``scale``: Student's t."""
     return -2.0 * np.log1p((size / scale) ** 2)
 
 
@@ -228,7 +230,8 @@ def _astray(
     height = body_m[some, 2] - floor_m[:, None]
     level = np.array([1.0, 1j])
     slope = (body_m[some, :2] - cop_m[:, some]) @ level / height
-    lean = force[:, some, :2] @ level / force[:, some, 2]
+    lift = force[:, some, 2]
+    lean = force[:, some, :2] @ level / np.copysign(np.maximum(np.abs(lift), _NO_LOAD_N), lift)
     beyond = ((lean - _LEAN * slope) * slope.conj()).sum(axis=1)
     return np.abs(beyond) / (np.abs(slope) ** 2 + (_PLACE_M / height) ** 2).sum(axis=1)
 

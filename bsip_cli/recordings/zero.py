@@ -9,7 +9,7 @@ from scipy.ndimage import uniform_filter1d
 
 from bsip_cli.recordings.analog import long_runs, runs
 from bsip_cli.recordings.model import Finding, Plate, Recording
-from bsip_cli.recordings.plates import LOADED_N, LocalWrench
+from bsip_cli.recordings.plates import LOADED_N
 
 _WINDOW_S = 0.2
 _LEAST_S = 0.4
@@ -72,31 +72,25 @@ def subtract_zero(plate: Plate, zero: PlateZero) -> tuple[Plate, Finding]:
     return plate, Finding("plate_zero", plate.name, found, "(0, 0, 0) N", action, level)
 
 
-def without_baseline(
-    wrench: LocalWrench,
-    plate: str,
-    down_sign: float,
-    good: np.ndarray,
-    baseline: slice | None,
-) -> tuple[LocalWrench, list[Finding]]:
-    """Subtract the mean of the ZERO samples if it is a pull, which no person can do.
+def lost_baseline(
+    lift_N: np.ndarray, plate: str, good: np.ndarray, baseline: slice | None
+) -> Finding | None:
+    """Said, and to be subtracted, if the mean of the ZERO samples is a pull, which no person makes.
 
     Where the plate never pushes, and pulls no more than a person weighs, somebody stood on it from
     the first and its sign is the other one.
     """
     if baseline is None or not good[baseline].all():
-        return wrench, []
-    force, moment = (x[baseline].mean(axis=0) for x in (wrench.force_N, wrench.moment_Nm))
-    level = down_sign * force[2]
-    rest = (down_sign * wrench.force_N[:, 2] - level)[good]
+        return None
+    level = lift_N[baseline].mean()
+    rest = (lift_N - level)[good]
     is_loaded_above = np.percentile(rest, 95) > LOADED_N and np.percentile(rest, 2) > _PULL_N
     is_reversed = level > -_HEAVIEST_N and level + np.percentile(rest, 98) < -_PULL_N
     if level > _PULL_N or not is_loaded_above or is_reversed:
-        return wrench, []
+        return None
     found = f"{level:.0f} N in the samples of FORCE_PLATFORM:ZERO, a pull"
     expected, action = "0 N without load", "subtracted that baseline from all channels"
-    finding = Finding("plate_zero", plate, found, expected, action, "corrected")
-    return LocalWrench(wrench.force_N - force, wrench.moment_Nm - moment), [finding]
+    return Finding("plate_zero", plate, found, expected, action, "corrected")
 
 
 def nobody_near(recording: Recording, plate: Plate) -> np.ndarray:

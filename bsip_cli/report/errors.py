@@ -118,7 +118,7 @@ def use_sentence(
 ) -> str:
     """Which method, by how much it is better than the others, and in which movements another; from
     the artifacts of these names."""
-    use = "Once the large error is understood, use" if is_wrong else "Use"
+    use = "Once the large error is gone, use" if is_wrong else "Use"
     if choice is None or choice.empty:
         return f"{use} {_IN_WORDS[RM]}: nothing was compared."
     first = choice.iloc[0]
@@ -155,7 +155,7 @@ def _compared(first: pd.Series) -> str:
         said = f"{om} than {table}, {over_scaled} than {times}"
     if first["use"] == OM:
         return f": {where}it errs {said}"
-    return f": {where}OM (identified) errs {said}, which is no sure gain"
+    return f": OM (identified) is no sure gain; {where}it errs {said}"
 
 
 def _change(ratio: float, log_error: float) -> str:

@@ -62,7 +62,7 @@ _SIGNS = "✓ fine; ▲ something found; ■ large error; ? inconclusive."
 _USABLE = {
     "fine": "The data may be used: nothing needs to be corrected.",
     "cause": "The data may be used once what was found is corrected or stated.",
-    "large": "Use no results before the large error is understood.",
+    "large": "Use no results while the error is so large.",
     "inconclusive": "Whether the data may be used cannot be said.",
 }
 
@@ -122,8 +122,9 @@ def who(record: ParticipantRecord) -> Iterator[tuple[str, str]]:
     yield "Identified from", used
     versions = dict.fromkeys(origin.bsip_version for origin in record.origins)
     yield "Software", f"bsip {', '.join(versions)}"
-    if record.facts["mass_note"]:
-        yield "Mass", f"{capital(str(record.facts['mass_note']))}."
+    for name in ("mass", "height"):
+        if note := str(record.facts[f"{name}_note"]):
+            yield capital(name), f"{capital(note)}."
 
 
 # --- the person ---------------------------------------------------------------------------------
@@ -185,7 +186,7 @@ def _sure(record: ParticipantRecord, light: Light) -> Iterator[Block]:
         )
         said.append(f"That the error is large is certain; {cause}.")
     if any(not is_large(cause) for cause in _found(record)):
-        said.append("Each finding states its own probability.")
+        said.append("Each cause found states its own probability.")
     elif light.state != "large":
         said.append("No fault is more probable than not.")
     yield Heading("How sure is this?")

@@ -179,15 +179,16 @@ def _how_many(causes: Sequence[Sequence[Candidate]]) -> str:
 
 
 def mostly(budget: pd.DataFrame | None, use: str = RM) -> str:
-    """Of a large error, what makes the largest part of it: ``, mostly soft tissue (56 %)``. Errors
-    with identified parameters are not the table's."""
+    """Of a large error, what makes the largest part of it: ``, most of it soft tissue (56 %)``.
+    Errors with identified parameters are not the table's."""
     parts = () if budget is None or budget.empty else overall_pieces(budget)
     most = max(parts, key=lambda one: one.share, default=None)
     if most is None or most.label in (UNKNOWN, REST):
         return f", {CAUSE_UNKNOWN}"
     if use == OM and PARAMETERS in most.label:
         return " also with identified parameters"
-    return f", mostly {most.label} ({number(most.share, 0)} %)"
+    how = "most" if most.share > 50.0 else "the largest part"
+    return f", {how} of it {most.label} ({number(most.share, 0)} %)"
 
 
 def cause_line(cause: Sequence[Candidate], everywhere: Sequence[str]) -> str:

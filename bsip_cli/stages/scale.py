@@ -15,6 +15,7 @@ from bsip_cli.errors import BadDataError
 from bsip_cli.motion.calibration import Calibration, calibrate
 from bsip_cli.motion.plausible_body import Doubt, doubts_about, words_of
 from bsip_cli.motion.scaling import Refinement, ScalingOptions, TrialMarkers, refine_over_trials
+from bsip_cli.recordings.scene import Stature, stature
 from bsip_cli.running.unit import Unit
 from bsip_cli.segments import in_words, without_side
 from bsip_cli.stages.frames import markers_from, ordered_markers
@@ -66,6 +67,7 @@ def run(unit: Unit) -> None:
     ahead = calibration.anterior
     row = {"sex": sex, "mass_kg": kg, "mass_source": mass.source, "plate_mass_kg": mass.plate_kg}
     row |= {"mass_note": mass.note, "height_m": calibration.stature_m}
+    row |= {"height_note": _height_note(recorded, height_m)}
     row |= {"anterior_x": ahead[0], "anterior_y": ahead[1]}
     row |= {"calibration_trial": still.trial.stem, "marker_rms_m": fit.poses.rms_m()}
     facts = {"marker_set": marker_set.name, "rms_before_m": fit.rms_before_m}
@@ -82,6 +84,13 @@ def _height_m(unit: Unit, recorded: list[_Recorded]) -> float | None:
             unit.warn(f"{unit.name}: height {height_m:.2f} m, as {one.trial.stem} states it")
             return float(height_m)
     return None
+
+
+def _height_note(recorded: list[_Recorded], stated_m: float | None) -> str:
+    """Empty, or how the markers' height differs from the stated one, which ingest has said."""
+    told = Stature.of_all([stature(one.labels, one.positions) for one in recorded])
+    fault = told.against(stated_m) if told is not None and stated_m is not None else None
+    return "; ".join((fault[0], fault[2])) if fault else ""
 
 
 def _doubt(unit: Unit, doubts: list[Doubt]) -> None:

@@ -15,10 +15,11 @@ from bsip_cli.files.fingerprints import file_hash
 from bsip_cli.recordings.body_motion import GateLimits
 from bsip_cli.recordings.label_words import bones
 from bsip_cli.recordings.labels import person_of
+from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
 from bsip_cli.recordings.plate_source import Opened
 from bsip_cli.recordings.read import findings_about, open_recording
-from bsip_cli.recordings.scene import no_person
+from bsip_cli.recordings.scene import Stature, no_person
 from bsip_cli.recordings.settle import SessionReading, Verdict, settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import Evidence
@@ -48,6 +49,7 @@ def run(unit: Unit) -> None:
         if heights and (fault := no_person(max(heights), unit.participant.height_m)):
             found, expected, remedy = fault
             raise BadDataError(found, file=unit.name, expected=expected, remedy=remedy)
+        _say_height(unit, seen)
         reading = settle_session(seen, limits)
         rows += rows_of(session or "", reading)
         for name, of_trials in facts.items():
@@ -56,6 +58,17 @@ def run(unit: Unit) -> None:
         for finding in findings_about(reading):
             unit.warn(f"{whose}: {finding.sentence()}")
     unit.write("readings", rows, facts)
+
+
+def _say_height(unit: Unit, seen: Sequence[TrialSamples]) -> None:
+    """Where the height that participants.tsv states, or else a recording, is not the markers'."""
+    assert unit.participant is not None
+    in_files = (one.stated_height_m for one in seen if one.stated_height_m is not None)
+    stated_m = unit.participant.height_m or next(in_files, None)
+    usual = Stature.of_all([one.stature for one in seen])
+    if stated_m is not None and usual is not None and (fault := usual.against(stated_m)):
+        about = Finding("stated_person", "", *fault, "warning")
+        unit.warn(f"{unit.name}: {about.sentence()}")
 
 
 def _say_copies(unit: Unit, trials: Sequence[Trial]) -> None:

@@ -67,5 +67,5 @@ def _module(name: str, known: set[str]) -> str:
 
 
 def package(module: str) -> str:
-    """``body`` of ``body.names``, ``cli`` of ``cli``."""
+    """``body`` of ``body.person``, ``cli`` of ``cli``."""
     return module.split(".")[0]

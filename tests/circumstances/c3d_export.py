@@ -182,6 +182,8 @@ def _describe(plate: Plate, six: np.ndarray, export: Export, number: int) -> _St
         channels, units = _with_point(six, export), ["N"] * 3 + [export.corner_unit] * 2 + [unit]
     elif export.plate_type == 3:
         channels, units, origin = _kistler(six, plate.depth_m)
+        for one, other in filter(None, [export.sensors_exchanged.get(number)]):
+            channels[:, [one, other]] = channels[:, [other, one]]
     else:
         channels = six / np.array([1.0] * 3 + [moment_size] * 3)
         units = ["N"] * 3 + [unit] * 3
@@ -217,6 +219,9 @@ def _kistler(six: np.ndarray, depth_m: float) -> tuple[np.ndarray, list[str], np
     fx, fy, fz, mx, my, mz = six.T
     fx12, fy14 = fx / 2 - mz / (2 * b), fy / 2
     over, across = mx / (4 * b), my / (4 * a)
-    verticals = [fz / 4 + s * over + t * across for s, t in ((1, -1), (1, 1), (-1, 1), (-1, -1))]
+    # A bending plate: the load at a place goes to the corners as its distances from them have it.
+    both = 4 * over * across / np.where(np.abs(fz) > 1.0, fz, np.inf)
+    signs = ((1, -1), (1, 1), (-1, 1), (-1, -1))
+    verticals = [fz / 4 + s * over + t * across + s * t * both for s, t in signs]
     channels = np.column_stack([fx12, fx - fx12, fy14, fy - fy14, *verticals])
     return channels, ["N"] * 8, np.array([a, b, -depth_m])

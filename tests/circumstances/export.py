@@ -20,7 +20,8 @@ class Export:
         one of them only, after it.
     point_unit, corner_unit, moment_unit : in which the numbers are; stated_* : what the file says.
     channel_signs : (6,) of forces and moments; plate_signs by plate: (6,), after it; exchanged by
-        plate: whether the level forces, and the level moments, stand in each other's place.
+        plate: whether the level forces, and the level moments, stand in each other's place;
+        sensors_exchanged by plate of type 3: which two of eight.
     plate_order : which plate's readings stand where; corner_roll, corner_wound, doubled,
         summed : see c3d_export. reference : of the moments: sensor (C3D), surface; in MOT point,
         plate_centre, lab_origin.
@@ -41,6 +42,7 @@ class Export:
     channel_signs: np.ndarray = field(default_factory=lambda: np.ones(6))
     plate_signs: dict[int, np.ndarray] = field(default_factory=dict)
     exchanged: dict[int, tuple[bool, bool]] = field(default_factory=dict)
+    sensors_exchanged: dict[int, tuple[int, int]] = field(default_factory=dict)
     plate_order: list[int] | None = None
     corner_roll: dict[int, int] = field(default_factory=dict)
     corner_wound: bool = False

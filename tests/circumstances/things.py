@@ -272,6 +272,17 @@ def level_exchanged(export: Export, rng: np.random.Generator, plates: int) -> st
     return f"the level {'forces' if forces else 'moments'} of plate {named} exchanged"
 
 
+def sensors_exchanged(export: Export, rng: np.random.Generator, plates: int) -> str:
+    plate, names = (
+        _one_of(rng, plates),
+        ("Fx12", "Fx34", "Fy14", "Fy23", "Fz1", "Fz2", "Fz3", "Fz4"),
+    )
+    first = 4 if rng.random() < 0.7 else 0
+    one, other = (int(k) for k in first + rng.choice(4, 2, replace=False))
+    export.plate_type, export.sensors_exchanged = 3, {plate: (one, other)}
+    return f"{names[one]} and {names[other]} of plate {plate + 1}, of type 3, exchanged"
+
+
 # Plates
 
 
@@ -548,6 +559,7 @@ THINGS = (
     Thing("plates", "plates", plate_sum),
     Thing("plate type", "type", plate_type, C3D),
     Thing("plate type", "moment", calibration_in_Nm, C3D),
+    Thing("plate type", "type", sensors_exchanged, C3D),
     Thing("samples", "samples", spikes, C3D),
     Thing("samples", "samples", cut_off, C3D),
     Thing("samples", "samples", lost_samples, C3D),

@@ -119,12 +119,12 @@ def of_c3d(
         moment = free_moment(force) + np.cross(point - CENTRES_M[k], force)
         local = LocalWrench(sign * force @ axes, sign * moment @ axes)
         at_sensor = local.at_surface(-np.array(origin_m))
-        at_sensor = LocalWrench(at_sensor.force_N, at_sensor.moment_Nm * moment_scale)
+        channels = np.hstack([at_sensor.force_N, at_sensor.moment_Nm * moment_scale])
         stated = PlateDescription(
             true.name,
             2,
             np.roll(corners(k), turn, axis=0),
             np.array(origin_m if stated_origin_m is None else stated_origin_m) + 0.0,
         )
-        sources.append(C3dPlate(stated, at_sensor, np.ones(N, bool), np.eye(3)))
+        sources.append(C3dPlate(stated, channels, np.ones(N, bool), np.eye(3)))
     return sources

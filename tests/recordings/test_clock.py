@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from bsip_cli.recordings.clock import lags
-from bsip_cli.recordings.plate_source import C3dPlate, Opened
-from bsip_cli.recordings.plates import LocalWrench
+from bsip_cli.recordings.plate_source import Opened
 from bsip_cli.recordings.read import assemble, open_recording
 from bsip_cli.recordings.settle import settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
@@ -73,16 +72,8 @@ def test_quiet_stance_tells_no_delay():
 
 def test_side_forces_of_the_other_sign_are_no_delay():
     """Half a period later they would go with the motion; a repair explains them better."""
-    signs = np.array([-1.0, -1.0, 1.0])
-    wrong = [
-        C3dPlate(
-            one.description,
-            LocalWrench(one.wrench.force_N * signs, one.wrench.moment_Nm * signs),
-            one.usable,
-            one.rotation_world_lab,
-        )
-        for one in of_c3d()
-    ]
+    signs = np.array([-1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
+    wrong = [replace(one, measured=one.measured * signs) for one in of_c3d()]
     assert session_of(opened(wrong)).delays_s == {}
 
 

@@ -11,7 +11,7 @@ from bsip_cli.recordings.analog import check_samples, spike_samples
 from bsip_cli.recordings.model import Plate, Recording
 from bsip_cli.recordings.plate_reading import AS_STATED
 from bsip_cli.recordings.plate_source import C3dPlate
-from bsip_cli.recordings.plates import LocalWrench, PlateDescription
+from bsip_cli.recordings.plates import PlateDescription, wrench_matrix
 from bsip_cli.recordings.read import read_recording, sign_doubts
 from bsip_cli.recordings.zero import nobody_near, plate_zero
 from tests.circumstances.sound import sound_session
@@ -209,8 +209,8 @@ def test_kistlers_polynomial_moves_the_centre_of_pressure():
     force = np.array([[5.0, 3.0, -500.0]])
     x, y = 0.05, 0.10
     moment = np.array([[y * -500.0, -x * -500.0, 2.0]])
-    wrench = LocalWrench(force, moment)
-    source = C3dPlate(stated, wrench, np.ones(1, bool), np.eye(3))
+    channels = np.hstack([force, moment]) @ np.linalg.pinv(wrench_matrix(stated)).T
+    source = C3dPlate(stated, channels, np.ones(1, bool), np.eye(3))
     bare = replace(source, description=replace(stated, cop_polynomial=None))
     (finding,) = source.findings(AS_STATED)
     corrected, as_written = source.plate(AS_STATED), bare.plate(AS_STATED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -11,9 +12,11 @@ import pytest
 
 from bsip_cli.errors import BadDataError
 from bsip_cli.recordings import c3d_content
+from bsip_cli.recordings.c3d import open_c3d
 from bsip_cli.recordings.c3d_content import read_content
 from bsip_cli.recordings.c3d_format import numbers, texts
 from bsip_cli.recordings.model import Recording
+from bsip_cli.recordings.plates import CHANNELS_OF
 from bsip_cli.recordings.read import findings_about, open_recording, read_recording
 from bsip_cli.recordings.resample import wrench_at_marker_rate
 from bsip_cli.recordings.settle import settle_session
@@ -258,3 +261,27 @@ def test_vertical_moments_go_with_the_turning_body(real_data, names, words):
     found = findings_about(settle_session(trials))
     assert bool(words) == bool(found)
     assert all(words in finding.action for finding in found)
+
+
+@pytest.mark.parametrize(
+    ("plate", "one", "other"),
+    [(0, "Fz2", "Fz3"), (0, "Fz2", "Fz4"), (1, "Fz1", "Fz4"), (1, "Fz2", "Fz4"), (0, "", "")],
+)
+def test_exchanged_corners_of_a_plate_with_eight_sensors(real_data, plate, one, other):
+    folder = real_data / "type3_qualisys_c3dorg26"
+    trials = [open_c3d(folder / f"Walking_Hybrid_1_{k}.c3d") for k in (1, 2)]
+    name = trials[0].sources[plate].name
+    order = list(CHANNELS_OF[3])
+    if one:
+        i, j = order.index(one), order.index(other)
+        order[i], order[j] = order[j], order[i]
+    columns = [CHANNELS_OF[3].index(sensor) for sensor in order]
+    changed = []
+    for trial in trials:
+        sources = list(trial.sources)
+        sources[plate] = replace(sources[plate], measured=sources[plate].measured[:, columns])
+        changed.append(replace(trial, sources=tuple(sources)))
+    session = settle_session([TrialSamples.of(trial) for trial in changed])
+    done = {n: v.reading.channels for n, v in session.plates.items() if v.reading.channels}
+    assert done == ({name: f"exchanged {one} and {other}"} if one else {})
+    assert not any(v.refusal or v.doubted for v in session.plates.values())

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, astuple, replace
+from dataclasses import asdict, replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from bsip_cli.config import load_config
 from bsip_cli.recordings.body_motion import USUAL
 from bsip_cli.recordings.plate_reading import FrameChange, PlateReading
 from bsip_cli.recordings.plate_source import C3dPlate, ForceOnPoint
-from bsip_cli.recordings.plates import LOADED_N, LocalWrench
+from bsip_cli.recordings.plates import CHANNELS_OF, LOADED_N, measured, wrench_matrix
 from bsip_cli.recordings.read import assemble, findings_about
 from bsip_cli.recordings.scene import handedness
 from bsip_cli.recordings.settle import SessionReading, Verdict, settle_session
@@ -36,24 +37,48 @@ def of_table_with_mx_reversed(**faults) -> list[ForceOnPoint]:
 
 def of_c3d_with_x_for_y(**faults) -> list[C3dPlate]:
     """Fx and Fy, Mx and My exchanged, above sensors that lie under the surface."""
-    return [
-        replace(one, wrench=LocalWrench(*(part[:, [1, 0, 2]] for part in astuple(one.wrench))))
-        for one in of_c3d(**faults)
-    ]
+    return [replace(one, measured=one.measured[:, [1, 0, 2, 4, 3, 5]]) for one in of_c3d(**faults)]
 
 
 def of_c3d_with_fx_for_fy(**faults) -> list[C3dPlate]:
-    return [
-        replace(one, wrench=replace(one.wrench, force_N=one.wrench.force_N[:, [1, 0, 2]]))
-        for one in of_c3d(**faults)
-    ]
+    return [replace(one, measured=one.measured[:, [1, 0, 2, 3, 4, 5]]) for one in of_c3d(**faults)]
 
 
 def of_c3d_with_mx_for_my(**faults) -> list[C3dPlate]:
-    return [
-        replace(one, wrench=replace(one.wrench, moment_Nm=one.wrench.moment_Nm[:, [1, 0, 2]]))
-        for one in of_c3d(**faults)
-    ]
+    return [replace(one, measured=one.measured[:, [0, 1, 2, 4, 3, 5]]) for one in of_c3d(**faults)]
+
+
+def of_sensors(one: str = "", other: str = "") -> list[C3dPlate]:
+    """Of type 3, with two sensors exchanged; a load goes to the corners as its place has it."""
+    sources = []
+    for plate in of_c3d(origin_m=(0.0, 0.0, -0.04)):
+        stated = replace(plate.description, kind=3, origin_m=np.array([0.12, 0.2, -0.04]))
+        channels = plate.measured @ np.linalg.pinv(wrench_matrix(stated)).T
+        load, mx, my = plate.measured[:, 2:5].T
+        with np.errstate(invalid="ignore", divide="ignore"):
+            diagonal = np.nan_to_num(-mx * my / load / (0.12 * 0.2)) / 4
+        channels[:, 4:] += np.outer(diagonal, [1, -1, 1, -1])
+        order = list(CHANNELS_OF[3])
+        if one:
+            i, j = order.index(one), order.index(other)
+            channels[:, [i, j]] = channels[:, [j, i]]
+        sources.append(replace(plate, description=stated, measured=channels))
+    return sources
+
+
+def of_points(exchanged: bool = False) -> list[C3dPlate]:
+    """Of type 1, with the coordinates of the point exchanged."""
+    sources = []
+    for plate in of_c3d(origin_m=(0.0, 0.0, 0.0)):
+        force, moment = np.split(plate.measured, 2, axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            x, y = (np.nan_to_num(m / force[:, 2]) for m in (-moment[:, 1], moment[:, 0]))
+        torque = moment[:, 2] - x * force[:, 1] + y * force[:, 0]
+        point = [y, x] if exchanged else [x, y]
+        stated = replace(plate.description, kind=1)
+        channels = measured(np.column_stack([force, *point, torque]), 1)
+        sources.append(replace(plate, description=stated, measured=channels))
+    return sources
 
 
 def of_table_with_x_for_y(**faults) -> list[ForceOnPoint]:
@@ -102,6 +127,16 @@ FAULTS = {
     "Mx and My exchanged": (of_c3d_with_mx_for_my, {}, "exchanged Mx and My"),
     "Fx and Fy of a table exchanged": (of_table_with_x_for_y, {}, "exchanged Fx and Fy"),
     "the action on the plate": (of_c3d, {"sign": -1}, ""),
+    "eight sensors, sound": (of_sensors, {}, ""),
+    "a point and a torque, sound": (of_points, {}, ""),
+    "Px and Py exchanged": (of_points, {"exchanged": True}, "exchanged Px and Py"),
+} | {
+    f"{one} and {other} exchanged": (
+        of_sensors,
+        {"one": one, "other": other},
+        f"exchanged {one} and {other}",
+    )
+    for one, other in combinations(CHANNELS_OF[3][4:], 2)
 }
 
 
@@ -127,7 +162,7 @@ def test_the_forces_of_the_person_come_back(name):
 
 def test_exchanged_plates():
     one, two = of_c3d()
-    trial = opened([replace(one, wrench=two.wrench), replace(two, wrench=one.wrench)])
+    trial = opened([replace(one, measured=two.measured), replace(two, measured=one.measured)])
     session = settle_session([TrialSamples.of(trial)])
     assert [v.reading.place_of for v in session.plates.values()] == ["2", "1"]
     sound = assemble(opened([one, two]), session_of())
@@ -156,14 +191,14 @@ def test_copies_and_sums_count_once(make):
 
 
 def _force(source) -> np.ndarray:
-    return source.force_N if hasattr(source, "force_N") else source.wrench.force_N
+    return source.force_N if hasattr(source, "force_N") else source.measured[:, :3]
 
 
 def _renamed(source, name: str, force: np.ndarray) -> dict:
     if hasattr(source, "force_N"):
         return {"name": name, "force_N": force}
     description = replace(source.description, name=name)
-    return {"description": description, "wrench": replace(source.wrench, force_N=force)}
+    return {"description": description, "measured": np.hstack([force, source.measured[:, 3:]])}
 
 
 def test_forces_that_no_reading_brings_under_the_feet_are_refused():
@@ -317,7 +352,7 @@ def test_feet_on_the_plate_count_before_all_others():
 
 def test_a_trial_without_the_exchanged_plate_leaves_its_own_out():
     one, two = of_c3d()
-    trial = opened([replace(one, wrench=two.wrench), replace(two, wrench=one.wrench)])
+    trial = opened([replace(one, measured=two.measured), replace(two, measured=one.measured)])
     session = settle_session([TrialSamples.of(trial)])
     alone = assemble(opened([one]), session)
     assert alone.plates == ()

@@ -134,9 +134,9 @@ class Artifacts:
     def facts(self) -> pd.DataFrame:
         stem = self.person.trials[0].stem
         return frame(
-            "sex mass_kg mass_source plate_mass_kg mass_note height_m anterior_x anterior_y "
-            "calibration_trial marker_rms_m",
-            ("M", MASS_KG, "participants.tsv", 63.1, "", 1.63, 1.0, 0.0, stem, 0.0067),
+            "sex mass_kg mass_source plate_mass_kg mass_note height_m height_note anterior_x "
+            "anterior_y calibration_trial marker_rms_m",
+            ("M", MASS_KG, "participants.tsv", 63.1, "", 1.63, "", 1.0, 0.0, stem, 0.0067),
         )
 
     def skeleton_rows(self) -> pd.DataFrame:

@@ -169,7 +169,7 @@ def test_the_light_has_four_states(record):
     assert light(record, large).state == "large"
     beside = pd.concat([large, found[found["rank"] > 1]])
     assert light(record, beside).title == (
-        "Large error, mostly the table's segment parameters (70 %); 1 fault found"
+        "Large error, most of it the table's segment parameters (70 %); 1 fault found"
     )
     assert light_of(beside, record.detection).title == "Large error, cause unknown; 1 fault found"
     small = large.assign(target="1 fz", parameter="amplitude")

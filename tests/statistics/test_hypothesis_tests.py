@@ -318,6 +318,14 @@ def test_one_way_not_possible(groups, words):
     assert post_hoc == {}
 
 
+def test_f_follows_from_means_and_sds_as_in_hansen_2017_table_3():
+    """MV: 6.26 (2.70), 6.28 (2.60), 6.52 (1.76) of twelve: printed F = 0.04, p = 0.96."""
+    z = stats.zscore(np.random.default_rng(0).normal(size=12), ddof=1)
+    test, _post_hoc = one_way_anova([6.26 + 2.70 * z, 6.28 + 2.60 * z, 6.52 + 1.76 * z])
+    assert test.statistic == pytest.approx(0.04, abs=0.005)
+    assert test.p_value == pytest.approx(0.96, abs=0.005)
+
+
 def test_bushtucker():
     """Field, SPSS output 13.2 to 13.4: F(3, 21) = 3.79, epsilon 0.533, p 0.026 and 0.063."""
     test, _post_hoc = repeated_measures_anova(BUSHTUCKER)

@@ -75,6 +75,7 @@ def run_with(bench: Bench, library: Path, out: Path, call: Call) -> tuple[Ended,
 def calls_of(bench: Bench, library: Path, out: Path, chance: random.Random) -> list[Call]:
     """The calls of an undisturbed run in their order, each with a failure that it may meet; of
     several that follow each other on one file the first and the last."""
+    bench.run(bench.fresh_out(out), {})  # the first run of new code makes calls that no other does
     done, lines = run_with(bench, library, bench.fresh_out(out), NONE)
     assert done.code == 0 and all(len(line) == _RECORD - 1 for line in lines), done.said
     calls = [Call(n, *line.split(maxsplit=1)) for n, line in enumerate(lines, 1)]

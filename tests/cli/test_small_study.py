@@ -620,9 +620,10 @@ def test_corrupt_recording_and_its_return(run, bsip, first_run):
     assert ". To mend it: " in sentence
     assert " 1 refused, 5 without input;" in answer.summary
     rewritten = run.rewritten(times)
-    assert not any(
-        "sub-02" in name or "squat" in name for name in rewritten if "refusal" not in name
-    )
+    # What sub-01 tells of the laboratory is less: the diagnosis of sub-02 may change.
+    for stage in ("ingest", "scale", "ik", "regress", "identify"):
+        written = (name for name in rewritten if "refusal" not in name)
+        assert not any("sub-02" in owner or "squat" in owner for owner in owners_of(written, stage))
     assert owners_of(rewritten, "identify") == {"sub-01"}
     assert "sub-01_task-squat_run-1" not in set(
         read_artifact(run.path("values", "group"), "values")["trial"]

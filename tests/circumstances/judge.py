@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tests.circumstances.comparison import Comparison, compare
 from tests.circumstances.generator import Circumstance
@@ -27,7 +27,7 @@ _MOMENT = rf"centre of pressure|moments? (of|in|about|are|with)\b|torque|ORIGIN|
 # Words that name a matter, as narrow as leaves the wording free: a sentence on something else has
 # none of them.
 NAMES = {
-    "rate": r"\d ?Hz\b|\brates?\b|time.?stamps?|\btimes\b|clock|\bin ms\b|frame numbers?",
+    "rate": r"\d ?Hz\b|\b(late|early|delay)\b|\brates?\b|time.?stamps?|\btimes\b|clock|\bin ms\b|frame numbers?",
     "labels": r"labels?\b|marker.?set|no marker|markers? .*(missing|twice|double)|unknown marker",
     "scale": r"POINT:UNITS|units? of (the )?(points|lengths?|markers)|unit.points|lengths? in|"
     r"statur|\btall\b|\bheight\b|inch",
@@ -56,6 +56,7 @@ OF_KIND = {
     "plates": ("force", "cop"),
     "plate type": ("moment",),
     "samples": ("samples",),
+    "forces": ("force", "rate", "samples"),
     "time": ("rate",),
     "labels": ("labels",),
     "missing": ("markers",),
@@ -104,9 +105,11 @@ def judge(circumstance: Circumstance, taken: Taken) -> Judgement:
     short = {n for n in trials if n not in comparisons or not comparisons[n].is_whole}
     is_whole = not short
     # What must be named: what is wrong in the artifacts, and what these cannot show.
-    # A stated mass shows beside forces only.
+    # A stated mass, and the pace of the frames, show beside forces only.
     has_forces = any(comparison.has_forces for comparison in comparisons.values())
     hidden_matters = [t.name for t in circumstance.things if t.name]
+    if not has_forces and circumstance.export.stated_rate != 1.0:
+        wrong = {which: found for which, found in wrong.items() if which[1] != "rate"}
     asked = [*wrong, *(("", name) for name in hidden_matters if name != "mass" or has_forces)]
     telling = [w for w in news if not _CONTACT.search(w.text)]
     named = {which: word for which in asked if (word := _naming(*which, telling))}
@@ -140,6 +143,16 @@ def judge(circumstance: Circumstance, taken: Taken) -> Judgement:
         named={" ".join(which): word for which, word in named.items()},
         said=tuple(dict.fromkeys(f"{w.level}: {w.text}" for w in news)),
     )
+
+
+def judge_by_conclusion(judgement: Judgement, conclusion: str) -> Judgement:
+    """What is wrong without a word when it is read may be found when the forces are explained."""
+    unnamed = [which for which in judgement.wrong if which not in judgement.named]
+    found = [re.search(NAMES[which.split()[-1]], conclusion, re.I) for which in unnamed]
+    if not ("Large error" in conclusion or (found and all(found))):
+        return judgement
+    named = judgement.named | dict.fromkeys(unnamed, conclusion)
+    return replace(judgement, outcome=SAID, named=named, said=(*judgement.said, conclusion))
 
 
 def _comparisons(circumstance: Circumstance, taken: Taken) -> dict[str, Comparison]:

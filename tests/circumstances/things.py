@@ -361,6 +361,22 @@ def lost_samples(export: Export, rng: np.random.Generator, plates: int) -> str:
     return _damaged(export, rng, plates, hit, f"all zero {count} times for {length_s:.3f} s")
 
 
+def tared(export: Export, rng: np.random.Generator, plates: int) -> str:
+    export.tared = True
+    return "plates zeroed as each trial begins, whoever stands on them"
+
+
+def one_plate_gain(export: Export, rng: np.random.Generator, plates: int) -> str:
+    plate, gain = _one_of(rng, plates), pick(rng, (0.5, 0.8, 1.25, 2.0))
+    export.plate_gains, export.stated_mass = {plate: gain}, True
+    return f"plate {plate + 1} reads {gain:g} times the load; the mass is stated"
+
+
+def force_unit(export: Export, rng: np.random.Generator, plates: int) -> str:
+    unit, export.mot_force_N = pick(rng, (("kN", 1000.0), ("lbf", 4.448222), ("kgf", 9.80665)))
+    return f"forces and moments in {unit} for N"
+
+
 def _damaged(export: Export, rng: np.random.Generator, plates: int, hit: Damage, words: str) -> str:
     export.damage, export.damaged_plate = hit, _one_of(rng, plates)
     return f"plate {export.damaged_plate + 1}: {words}"
@@ -383,6 +399,16 @@ def rates(export: Export, rng: np.random.Generator, plates: int) -> str:
 def other_rate_stated(export: Export, rng: np.random.Generator, plates: int) -> str:
     export.stated_rate = pick(rng, (0.5, 2.0))
     return f"the file states {export.stated_rate:g} times the cameras' rate"
+
+
+def forces_late(export: Export, rng: np.random.Generator, plates: int) -> str:
+    export.late_s = float(rng.choice([-1, 1]) * np.exp(rng.uniform(np.log(0.05), np.log(1.0))))
+    return f"forces {export.late_s:.2f} s late"
+
+
+def forces_of_another(export: Export, rng: np.random.Generator, plates: int) -> str:
+    export.of_another = True
+    return "the force tables of the two trials exchanged"
 
 
 def few_decimals(export: Export, rng: np.random.Generator, plates: int) -> str:
@@ -563,8 +589,13 @@ THINGS = (
     Thing("samples", "samples", spikes, C3D),
     Thing("samples", "samples", cut_off, C3D),
     Thing("samples", "samples", lost_samples, C3D),
+    Thing("forces", "samples", tared),
+    Thing("forces", "gain", one_plate_gain),
+    Thing("forces", "force_unit", force_unit, TEXT),
     Thing("time", "time", rates),
-    Thing("time", "time", other_rate_stated, C3D),
+    Thing("time", "time", other_rate_stated),
+    Thing("forces", "time", forces_late),
+    Thing("forces", "time", forces_of_another, TEXT),
     Thing("time", "time", few_decimals, TEXT),
     Thing("time", "time", milliseconds, TEXT),
     Thing("time", "time", frame_numbers, TEXT),

@@ -49,7 +49,7 @@ def stick_figure(pose: Pose, trial: str) -> Figure:
     markers = projected(pose.markers_m, centre)
     axes.plot(*markers.T, "o", ms=2.6, mfc="white", mec=BLUE, mew=0.8, label="markers")
     points = [bones.reshape(-1, 2), ground.reshape(-1, 2), markers, head[None] + pose.head_radius_m]
-    if np.isfinite(pose.force_N).all():
+    if np.isfinite([pose.force_N, pose.force_at_m]).all():
         foot, tip = projected(pose.force_at_m, centre), projected(pose.tip_m(), centre)
         arrow = {"color": GREEN, "lw": 2.2, "arrowstyle": "-|>", "mutation_scale": 12}
         axes.annotate("", tuple(tip), tuple(foot), arrowprops=arrow)

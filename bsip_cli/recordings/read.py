@@ -272,8 +272,8 @@ def why_no_forces(plates: Sequence[Plate], had_some: bool = True) -> str:
         if not total.any():
             return found
         return (
-            f"{found}; if these are kN, kgf or parts of the weight, export them in N; if the plates "
-            "were set to zero under the person, record again"
+            f"{found}; if these are kN, kgf or parts of the weight, export them in N; if the "
+            "plates were set to zero under the person, record again"
         )
     return ""
 

@@ -27,7 +27,8 @@ _MOMENT = rf"centre of pressure|moments? (of|in|about|are|with)\b|torque|ORIGIN|
 # Words that name a matter, as narrow as leaves the wording free: a sentence on something else has
 # none of them.
 NAMES = {
-    "rate": r"\d ?Hz\b|\b(late|early|delay)\b|\brates?\b|time.?stamps?|\btimes\b|clock|\bin ms\b|frame numbers?",
+    "rate": r"\d ?Hz\b|\b(late|early|delay)\b|\brates?\b|time.?stamps?|\btimes\b|clock|"
+    r"\bin ms\b|frame numbers?",
     "labels": r"labels?\b|marker.?set|no marker|markers? .*(missing|twice|double)|unknown marker",
     "scale": r"POINT:UNITS|units? of (the )?(points|lengths?|markers)|unit.points|lengths? in|"
     r"statur|\btall\b|\bheight\b|inch",

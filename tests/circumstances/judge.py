@@ -23,6 +23,8 @@ _PLATES = (
     r"frame.*(plate|force)|(plate|force)s?\b.*\bframe\b|another frame|"
     r"plates? .*(turned|cop(y|ies)\b|\bsum\b|twice|same|virtual|exchange|combined|that of plate)"
 )
+# What is told first of forces of a wrong size.
+_SIZE = r"stated mass and the plates do not agree"
 _MOMENT = rf"centre of pressure|moments? (of|in|about|are|with)\b|torque|ORIGIN|corners?|{_PLATES}"
 # Words that name a matter, as narrow as leaves the wording free: a sentence on something else has
 # none of them.
@@ -37,9 +39,9 @@ NAMES = {
     "markers": r"(marker|point|traject)\w*\b.*(missing|invalid|held|slip|jump|repeat|frozen|gap)|"
     r"(missing|invalid|held|repeated|frozen|gaps?)\b.*(marker|point|traject)|residual",
     "force": r"\bsigns?\b|vertical force|forces?\b.*(unit|axes|reverse|do not follow)|mirror|"
-    rf"never loaded|do not carry|{_PLATES}",
+    rf"never loaded|do not carry|{_PLATES}|{_SIZE}",
     "samples": r"\bsamples?\b",
-    "cop": rf"{_MOMENT}|points? of (pressure|force)|for the point|no points?|mirror",
+    "cop": rf"{_MOMENT}|{_SIZE}|points? of (pressure|force)|for the point|no points?|mirror",
     "moment": rf"{_MOMENT}|\bsigns?\b|mirror|none for the moment",
     "mass": r"stated.*\b(kg|mass)|\bmass\b.*(stated|participants)|pound|\blbs?\b",
     "table": r"\bcolumns?\b|force (table|file)|no (ground )?force",
@@ -183,7 +185,9 @@ def _of_wrong(wrong: Wrong, telling: list[Word], all_named: bool, is_told: bool)
     left = {
         w for w in wrong if not _naming(*w, [x for x in telling if _IS_LEFT_OUT.search(x.text)])
     }
-    if any(_naming(*w, of_labels if w[1] == "labels" else corrected) for w in left):
+    warned = [w for w in telling if w.level == "warning"]
+    repaired = {w for w in left if _naming(*w, of_labels if w[1] == "labels" else corrected)}
+    if any(not _naming(*w, warned) for w in repaired):
         return WRONGLY_REPAIRED
     if not all_named:
         return WRONG

@@ -177,6 +177,8 @@ UNIT = "ANALOG:UNITS says N mm; read the moments in N m"
         (beside, [word("warning", "force plates were switched on")], WRONG),
         (beside, [word("warning", "plate 1: its frame may be wrong")], SAID),
         (beside, [word("corrected", UNIT)], WRONGLY_REPAIRED),
+        (beside, [word("corrected", UNIT), word("printed", UNIT)], WRONGLY_REPAIRED),
+        (beside, [word("corrected", UNIT), word("warning", "moments of plate 1 doubted")], SAID),
         (nothing_valid, [word("excluded", UNIT)], REFUSED),
         (mostly_lost, [], MISNAMED),
         (nothing_valid, [word("excluded", "the left hand holds something")], MISNAMED),

@@ -59,7 +59,7 @@ OF_KIND = {
     "plates": ("force", "cop"),
     "plate type": ("moment",),
     "samples": ("samples",),
-    "forces": ("force", "rate", "samples"),
+    "wrong forces": ("force", "rate", "samples", "mass"),
     "time": ("rate",),
     "labels": ("labels",),
     "missing": ("markers",),

@@ -34,7 +34,7 @@ from tests.circumstances.judge import (
 )
 from tests.circumstances.sound import LABORATORIES, PEOPLE, sound_session
 from tests.circumstances.taken import Taken, concluded, ingest
-from tests.circumstances.things import KINDS
+from tests.circumstances.things import KINDS, NO_EXPORT
 
 BATCH = 20
 WORST = (CRASHED, DISTURBED, WRONGLY_REPAIRED, WRONG, MISNAMED)
@@ -105,6 +105,11 @@ def share(judgements: list[Judgement], *outcomes: str) -> float:
     return sum(j.outcome in outcomes for j in judgements) / max(len(judgements), 1)
 
 
+def can_be_mended(judgements: list[Judgement]) -> list[Judgement]:
+    """Those that were changed in nothing but how right forces are written."""
+    return [j for j in judgements if not {"sound", NO_EXPORT} & set(j.kinds)]
+
+
 def table(judgements: list[Judgement]) -> str:
     """Outcomes by kind, and the ids of the worst."""
     changed = [j for j in judgements if "sound" not in j.kinds]
@@ -122,8 +127,9 @@ def table(judgements: list[Judgement]) -> str:
         lines.append(outcome.ljust(width) + str(count).rjust(6) + "  " + "  ".join(cells))
     counts = "  ".join(str(len(some)).rjust(len(name)) for name, some in rows)
     lines.append("n".ljust(width) + str(len(judgements)).rjust(6) + "  " + counts)
-    good = share(changed, RIGHT, REPAIRED)
-    lines.append(f"right or repaired: {good:.1%} of {len(changed)} that were changed")
+    mendable = can_be_mended(judgements)
+    good = share(mendable, RIGHT, REPAIRED)
+    lines.append(f"right or repaired: {good:.1%} of {len(mendable)} that can be")
     for outcome in WORST:
         of_it = [j for j in judgements if j.outcome == outcome]
         things = Counter(thing for j in of_it for thing in j.things)

@@ -543,6 +543,8 @@ def table_format(export: Export, rng: np.random.Generator, plates: int) -> str:
 
 
 C3D, TEXT = ("c3d",), ("trc",)
+NO_EXPORT = "wrong forces"
+"""What no other understanding of the numbers puts right: it is to be refused or said."""
 THINGS = (
     Thing("length unit", "length", points_unit_stated),
     Thing("length unit", "length", points_unit_wrong),
@@ -589,13 +591,13 @@ THINGS = (
     Thing("samples", "samples", spikes, C3D),
     Thing("samples", "samples", cut_off, C3D),
     Thing("samples", "samples", lost_samples, C3D),
-    Thing("forces", "samples", tared),
-    Thing("forces", "gain", one_plate_gain),
-    Thing("forces", "force_unit", force_unit, TEXT),
+    Thing(NO_EXPORT, "samples", tared),
+    Thing(NO_EXPORT, "gain", one_plate_gain),
+    Thing(NO_EXPORT, "force_unit", force_unit, TEXT),
     Thing("time", "time", rates),
     Thing("time", "time", other_rate_stated),
-    Thing("forces", "time", forces_late),
-    Thing("forces", "time", forces_of_another, TEXT),
+    Thing("time", "time", forces_late),
+    Thing(NO_EXPORT, "time", forces_of_another, TEXT),
     Thing("time", "time", few_decimals, TEXT),
     Thing("time", "time", milliseconds, TEXT),
     Thing("time", "time", frame_numbers, TEXT),

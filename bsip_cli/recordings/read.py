@@ -23,6 +23,7 @@ from bsip_cli.recordings.scene import by_segment, handedness
 from bsip_cli.recordings.settle import AGAINST, SessionReading, Verdict, settle_session
 from bsip_cli.recordings.trial_samples import TrialSamples
 from bsip_cli.recordings.under_the_feet import BESIDE_M, Evidence
+from bsip_cli.recordings.zero import steady_pull
 from bsip_cli.segments import TRUNK
 
 _ABSURD_N = 15_000.0
@@ -113,7 +114,7 @@ def assemble(opened: Opened, session: SessionReading) -> Recording:
                 continue
             source = source.in_place_of(by_name[other])
         plate = source.plate(verdict.reading)
-        if fault := _no_person(plate):
+        if fault := _no_person(plate, recording.analog_rate_hz):
             findings.append(fault)
             missing.append(source)
             continue
@@ -278,9 +279,10 @@ def why_no_forces(plates: Sequence[Plate], had_some: bool = True) -> str:
     return ""
 
 
-def _no_person(plate: Plate) -> Finding | None:
-    """Why a plate's forces in this trial are no person's."""
-    lift = plate.force_N[plate.usable, 2]
+def _no_person(plate: Plate, rate_hz: float) -> Finding | None:
+    """Why a plate's forces in this trial are no person's, even from another zero."""
+    pulled = steady_pull(plate, rate_hz)
+    lift = plate.force_N[plate.usable, 2] - (plate.force_N[pulled, 2].mean() if pulled.any() else 0)
     if not len(lift):
         return None
     largest = np.percentile(np.abs(lift), 99.5)

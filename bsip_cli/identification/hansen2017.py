@@ -41,23 +41,13 @@ def estimate(problem: Problem) -> Estimate:
     target = (shown.T @ gradient) / strength[known]
     z = shown @ target
     note = f"{int(known.sum())} of {problem.basis.rank} combinations decided by the data"
-    if np.any(_masses(problem, z) < 0):
-        z = _with_positive_masses(problem, shown, target)
+    if np.any((prior.phi + prior.root @ z)[::10] < 0):
+        room = prior.phi[::10] * (1 - _SMALLEST_MASS)
+        z = smallest(shown.T, target, -prior.root[::10], room)
         note += "; masses kept positive"
     variance = np.where(known, 1.0 / np.where(known, strength, 1.0), 1.0)
     spread = prior.root @ directions
     return Estimate(prior.phi + prior.root @ z, (spread * variance) @ spread.T, note)
-
-
-def _masses(problem: Problem, z: np.ndarray) -> np.ndarray:
-    return (problem.prior.phi + problem.prior.root @ z)[::10]
-
-
-def _with_positive_masses(problem: Problem, shown: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Smallest z with ``shown^T z = target`` and every mass above a part of the table's."""
-    prior = problem.prior
-    slack = prior.phi[::10] * (1 - _SMALLEST_MASS)
-    return smallest(shown.T, target, -prior.root[::10], slack)
 
 
 # --- the quadratic programme of estimators that keep masses positive ------------------------------

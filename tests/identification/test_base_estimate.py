@@ -7,9 +7,8 @@ from scipy import stats
 from bsip_cli.dynamics.lowpass import lowpass_operator
 from bsip_cli.dynamics.regressor import predicted_wrench, wrench_regressor
 from bsip_cli.identification.base import base_parameters, estimate
-from bsip_cli.identification.equations import ResidualSeries, accumulate
+from bsip_cli.identification.equations import ResidualSeries, accumulate, even_noise, noise_of
 from bsip_cli.identification.estimator import Problem
-from bsip_cli.identification.noise import even_noise, noise_of
 from bsip_cli.identification.uncertainty import readable
 from tests.identification.synthetic_identification import (
     equations_of,

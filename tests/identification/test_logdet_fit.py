@@ -6,8 +6,16 @@ import pytest
 from scipy import sparse
 
 from bsip_cli.errors import NumericalError
-from bsip_cli.identification.consistent import Objective, Weights, minimise, objective_of, terms_of
-from bsip_cli.identification.pseudo_inertia import BASIS, are_physical, pseudo_inertias
+from bsip_cli.identification.consistent import (
+    BASIS,
+    Objective,
+    Weights,
+    are_physical,
+    minimise,
+    objective_of,
+    pseudo_inertias,
+    terms_of,
+)
 from tests.identification.synthetic_identification import problem_of, regressor, world
 
 

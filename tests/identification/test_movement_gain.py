@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from bsip_cli.dynamics.regressor import wrench_regressor
+from bsip_cli.identification.equations import even_noise
 from bsip_cli.identification.estimator import Problem
 from bsip_cli.identification.movement_gain import DURATION_S, advice, load_movements, motion_of
-from bsip_cli.identification.noise import even_noise
 from bsip_cli.identification.uncertainty import beforehand, excitation
 from tests.identification.synthetic_identification import equations_of, regressor, world
 

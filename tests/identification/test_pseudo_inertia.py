@@ -1,7 +1,7 @@
 import numpy as np
 
 from bsip_cli.body.inertia import Inertia, from_phi
-from bsip_cli.identification import pseudo_inertia
+from bsip_cli.identification import consistent as pseudo_inertia
 from tests.identification.synthetic_identification import world
 
 STEP = 1e-6

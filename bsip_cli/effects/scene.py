@@ -71,8 +71,6 @@ _OF_THE_MOTION = {
 class Scene:
     """One trial: what was measured of the motion and the ground, and a body to simulate.
 
-    Attributes
-    ----------
     times_s : (N,).
     q, v, a : (N, nq), (N, nv), (N, nv) in Pinocchio's conventions.
     phi : (10 n,) inertial parameters of the segments with mass, about their joint centres.

@@ -137,10 +137,7 @@ class Optimum:
 def minimise(objective: Objective, start: np.ndarray | None = None) -> Optimum:
     """Damped Newton; the Cholesky factor of every J keeps the steps among possible bodies.
 
-    Raises
-    ------
-    NumericalError
-        The equations hold values that are not finite.
+    NumericalError: the equations hold values that are not finite.
     """
     x = np.zeros_like(objective.linear) if start is None else start
     value = objective.value(x)

@@ -26,10 +26,7 @@ def estimate(problem: Problem) -> Estimate:
     In coordinates z with phi = phi_RM + S z, where z is N(0, 1) among people, the data give each
     eigendirection of their information a variance; those below 1 are taken from the data.
 
-    Raises
-    ------
-    NumericalError
-        No parameters with positive masses satisfy the data.
+    NumericalError: no parameters with positive masses satisfy the data.
     """
     prior = problem.prior
     information, right = problem.trusted_equations()
@@ -64,10 +61,7 @@ def smallest(
 ) -> np.ndarray:
     """(k,) vector x of the smallest square with ``equal x = targets`` and ``below x <= limits``.
 
-    Raises
-    ------
-    NumericalError
-        There is none.
+    NumericalError: there is none.
     """
     settings = clarabel.DefaultSettings()
     settings.verbose = False

@@ -25,8 +25,6 @@ _FORWARDS, _TILT = 1, 7  # of the readable parameters: com x, ixy
 class Spread:
     """How people stray from the table: one number, or one per segment with mass.
 
-    Attributes
-    ----------
     mass_sd_percent, inertia_sd_percent : scalars or (n,): of the mass; of the moments of a segment
         of known mass.
     com_sd_percent : scalar or (n, 3), segment axes: of the length of the rod that has the
@@ -48,8 +46,6 @@ class Spread:
 class Prior:
     """Mean and covariance of the inertial parameters before the data.
 
-    Attributes
-    ----------
     inertias : of the n segments with mass, in the segment frame.
     origin_in_joint_m : (n, 3) segment origin seen from the joint; parallel frames.
     phi : (10 n,) mean, about the joint centres (Pinocchio's order).

@@ -16,8 +16,14 @@ from bsip_cli.simulate.effects.loads import WobblingMass
 from bsip_cli.simulate.movements import MOVEMENTS
 from bsip_cli.simulate.options import ALL_TASKS, MORE_TASKS, StudyOptions
 from bsip_cli.simulate.people import Inertia, Person, draw_person
-from bsip_cli.simulate.recording import SIMULATION_HZ, Measurement, measure_trial, write_trial
-from bsip_cli.simulate.trial import Trial, simulate_trial
+from bsip_cli.simulate.recording import (
+    SIMULATION_HZ,
+    Measurement,
+    Trial,
+    measure_trial,
+    simulate_trial,
+    write_trial,
+)
 
 HEADING_SPREAD_RAD = np.deg2rad(2.0)
 SCALE_SPREAD_KG = 0.1

@@ -54,21 +54,3 @@ def test_divergence_does_not_depend_on_the_frame():
     np.testing.assert_allclose(
         pseudo_inertia.divergences(*moved), pseudo_inertia.divergences(*pair), rtol=1e-8
     )
-
-
-def test_derivatives_against_finite_differences():
-    rng = np.random.default_rng(2)
-    scale = np.linalg.norm(world().prior.root, axis=1)
-    for _ in range(5):
-        phi = table() + 0.3 * (world().phi_true - table()) * rng.uniform(0, 1)
-        step = STEP * scale * rng.normal(size=150)
-        ahead, behind = phi + step, phi - step
-        slope = pseudo_inertia.gradient(phi, table())
-        rise = sum(
-            sign * pseudo_inertia.divergences(x, table()).sum()
-            for sign, x in ((1, ahead), (-1, behind))
-        )
-        assert abs(rise - 2 * slope @ step) < 1e-5 * np.abs(slope * step).sum()
-        change = pseudo_inertia.gradient(ahead, table()) - pseudo_inertia.gradient(behind, table())
-        expected = 2 * pseudo_inertia.hessian(phi) @ step
-        assert np.abs((change - expected) * scale).max() < 1e-5 * np.abs(expected * scale).max()

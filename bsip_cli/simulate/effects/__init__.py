@@ -23,10 +23,7 @@ def pair_up(
     """Match names, sizes and targets in the order they are given.
 
     simulated : whether the effects are for simulated recordings or for measured ones.
-
-    Raises
-    ------
-    UsageError : unknown effect; not one size for each; targets for some effects only; a size
+    UsageError: unknown effect; not one size for each; targets for some effects only; a size
         out of bounds or a target that the effect cannot have.
     """
     for name in names:

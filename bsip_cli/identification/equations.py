@@ -130,16 +130,6 @@ class NormalEquations:
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
-    """Filtered and decimated equations of some frames: regressor (n, 6, P) and measured wrench
-    (n, 6) about the reference, and the accelerations' noise level (n,)."""
-
-    regressor: np.ndarray
-    measured: np.ndarray
-    noise_level: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class ResidualSeries:
     """What a parameter vector leaves of one recording: residual (n, 6), noise level (n,)."""
 
@@ -164,11 +154,12 @@ def accumulate(
     information, right = np.zeros((6, size, size)), np.zeros((6, size))
     squares, samples, duration = np.zeros(6), 0, 0.0
     for recording in recordings:
-        for block in _filtered_blocks(model, recording, cutoff_hz, reference_m, beside):
-            root = np.sqrt(weights_at(block.noise_level))
-            measured = root * block.measured
+        blocks = _filtered_blocks(model, recording, cutoff_hz, reference_m, beside)
+        for regressor, wrench, noise_level in blocks:
+            root = np.sqrt(weights_at(noise_level))
+            measured = root * wrench
             for c in range(6):
-                rows = root[:, c, None] * block.regressor[:, c]
+                rows = root[:, c, None] * regressor[:, c]
                 information[c] += rows.T @ rows
                 right[c] += rows.T @ measured[:, c]
             squares += (measured**2).sum(axis=0)
@@ -188,7 +179,7 @@ def residual_series(
     series = []
     for recording in recordings:
         blocks = _filtered_blocks(model, recording, cutoff_hz, reference_m)
-        left = [(one.measured - one.regressor @ phi, one.noise_level) for one in blocks]
+        left = [(measured - regressor @ phi, level) for regressor, measured, level in blocks]
         if left:
             series.append(ResidualSeries(*map(np.concatenate, zip(*left, strict=True))))
     return series
@@ -200,7 +191,9 @@ def _filtered_blocks(
     cutoff_hz: float,
     reference_m: np.ndarray,
     beside: Instruments | None = None,
-) -> Iterator[Samples]:
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Filtered and decimated equations of some frames: regressor (n, 6, P) and measured wrench
+    (n, 6) about the reference, and the accelerations' noise level (n,)."""
     stride = stride_to(recording.rate_hz, _OVERSAMPLING * cutoff_hz)
     operator, frames = lowpass_operator(recording.use, recording.rate_hz, cutoff_hz, stride)
     measured = operator @ np.where(
@@ -218,11 +211,9 @@ def _filtered_blocks(
             columns = beside.columns(regressor, recording.rate_hz)
             regressor = np.concatenate([regressor, columns], axis=2)
         filtered = rows[:, part] @ regressor.reshape(last - first, -1)
-        yield Samples(
-            filtered.reshape(rows.shape[0], 6, -1),
-            measured[start : start + _ROWS],
-            recording.noise_level[frames[start : start + _ROWS]],
-        )
+        mine = slice(start, start + _ROWS)
+        level = recording.noise_level[frames[mine]]
+        yield filtered.reshape(rows.shape[0], 6, -1), measured[mine], level
 
 
 # --- how much each component of the wrench may be trusted: residual size, its course, its memory --

@@ -184,11 +184,5 @@ def _readable_sd(inertia: Inertia, mass: float, com: np.ndarray, part: float) ->
     (3,) and of the moments."""
     moments = np.diag(inertia.tensor_kgm2)
     products = np.sqrt([moments[0] * moments[1], moments[0] * moments[2], moments[1] * moments[2]])
-    return np.array(
-        [
-            mass * inertia.mass_kg,
-            *(com * rod_length_m(inertia)),
-            *(part * moments),
-            *(0.5 * part * products),
-        ]
-    )
+    centre = com * rod_length_m(inertia)
+    return np.r_[mass * inertia.mass_kg, centre, part * moments, 0.5 * part * products]

@@ -178,10 +178,8 @@ MOVED_BY_THE_ARM = {"RAC": "upper_arm_r", "LAC": "upper_arm_l", "RSCAP": "upper_
 
 def rigid_paths(person: Person, poses: Poses) -> dict[str, np.ndarray]:
     """(T, 3) path of every marker if it were fixed to its bone."""
-    return {
-        label: poses.point(marker.body, marker.position_m)
-        for label, marker in person.markers.items()
-    }
+    markers = person.markers.items()
+    return {label: poses.point(marker.body, marker.position_m) for label, marker in markers}
 
 
 def marker_paths(

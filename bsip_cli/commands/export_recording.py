@@ -16,9 +16,10 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli import __version__
 from bsip_cli.artifacts import empty_table, is_made_from
-from bsip_cli.diagnosis.cause import Cause, delay_by
-from bsip_cli.diagnosis.corrected_wrench import (
+from bsip_cli.diagnosis.cause import (
+    Cause,
     corrected_plates,
+    delay_by,
     is_fault_of_forces,
     is_of_the_forces,
 )

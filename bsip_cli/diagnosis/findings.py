@@ -10,10 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from bsip_cli.diagnosis.evenness import plain
 from bsip_cli.diagnosis.fault_model import Fitted
 from bsip_cli.diagnosis.fault_search import Found, Verdict
-from bsip_cli.diagnosis.held_out import HeldOut
+from bsip_cli.diagnosis.held_out import HeldOut, plain
 from bsip_cli.diagnosis.hypothesis import Hypothesis
 from bsip_cli.effects.effect import Effect, Reported
 from bsip_cli.effects.readable import digits_of, readable_unit, with_unit

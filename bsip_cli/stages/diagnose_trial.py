@@ -6,11 +6,10 @@ import numpy as np
 import pandas as pd
 
 from bsip_cli.artifacts import empty_table, table_of
-from bsip_cli.diagnosis.evenness import plain
 from bsip_cli.diagnosis.fault_scores import Library, limits_of
 from bsip_cli.diagnosis.fault_search import Found, Verdict
 from bsip_cli.diagnosis.findings import Finding, Number
-from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, HeldOut, first_blocks, start_s
+from bsip_cli.diagnosis.held_out import BLOCK_S, FOLDS, HeldOut, first_blocks, plain, start_s
 from bsip_cli.running.unit import Unit
 
 

@@ -19,14 +19,16 @@ from bsip_cli.diagnosis.fault_model import FaultTrial
 from bsip_cli.diagnosis.filtering import Filter, at_full_rate, filter_of, slow
 from bsip_cli.diagnosis.findings import Finding
 from bsip_cli.diagnosis.marker_proof import Proof, Slip, alone_and_shaken, slips_of
-from bsip_cli.diagnosis.stated_mass import (
+from bsip_cli.diagnosis.support import (
+    HANDS,
+    LIGHTER,
+    Support,
     agreed_share,
     is_noticed,
     loaded_plate,
     stated_mass_findings,
     weight_share,
 )
-from bsip_cli.diagnosis.support import HANDS, LIGHTER, Support
 from bsip_cli.effects.catalogue import EFFECTS
 from bsip_cli.effects.markers import BEFORE_S
 from bsip_cli.effects.scene import Scene

@@ -6,10 +6,10 @@ from zlib import crc32
 
 import numpy as np
 
-from bsip_cli.diagnosis.error_gain import BlockErrors, pooled
 from bsip_cli.report.verdict import gain_sentence
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.reconstruct import gain_rows
+from bsip_cli.statistics.choice import BlockErrors, pooled
 
 
 def run(unit: Unit) -> None:

@@ -10,9 +10,14 @@ import pandas as pd
 
 from bsip_cli.artifacts import empty_table
 from bsip_cli.body.person import Person
-from bsip_cli.diagnosis.cause import Blocks, Cause, method_of, unseen_change_by
-from bsip_cli.diagnosis.corrected_wrench import corrected_wrench, is_of_the_forces
-from bsip_cli.diagnosis.error_gain import BlockErrors, block_errors
+from bsip_cli.diagnosis.cause import (
+    Blocks,
+    Cause,
+    corrected_wrench,
+    is_of_the_forces,
+    method_of,
+    unseen_change_by,
+)
 from bsip_cli.effects.scene import Scene
 from bsip_cli.running.unit import Unit
 from bsip_cli.stages.frames import WRENCH, load_phi, person_of
@@ -29,6 +34,7 @@ from bsip_cli.stages.reconstruct import (
     scale_of,
 )
 from bsip_cli.stages.trial_scene import blocks_of, body_beside, causes_of, scene_of
+from bsip_cli.statistics.choice import BlockErrors, block_errors
 from bsip_cli.statistics.methods import MEASURED, OM, RM, is_extended
 
 

@@ -14,9 +14,15 @@ from bsip_cli.dynamics.base_parameters import find_basis
 from bsip_cli.dynamics.lowpass import stretches
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
 from bsip_cli.dynamics.regressor import predicted_wrench
-from bsip_cli.identification.equations import Instruments, Recording, accumulate, residual_series
+from bsip_cli.identification.equations import (
+    Instruments,
+    Recording,
+    accumulate,
+    even_noise,
+    noise_of,
+    residual_series,
+)
 from bsip_cli.identification.estimator import Estimate, Problem
-from bsip_cli.identification.noise import even_noise, noise_of
 from bsip_cli.identification.prior import Prior, Spread, likeliest, prior_of
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names, spread_names

@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.artifacts import table_of
 from bsip_cli.body.person import Person
-from bsip_cli.diagnosis.cause import Cause, method_of
-from bsip_cli.diagnosis.corrected_wrench import corrected_plates, is_of_the_forces
+from bsip_cli.diagnosis.cause import Cause, corrected_plates, is_of_the_forces, method_of
 from bsip_cli.dynamics.joint_moments import (
     Ground,
     JointLoads,

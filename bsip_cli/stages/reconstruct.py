@@ -16,7 +16,6 @@ from bsip_cli.artifacts import table_of
 from bsip_cli.body.gravity import GRAVITY_M_S2
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.person import Person
-from bsip_cli.diagnosis.error_gain import BlockErrors, error_gain
 from bsip_cli.dynamics.cop import anterior_and_right, centre_of_pressure
 from bsip_cli.dynamics.lowpass import lowpass_operator, stretches
 from bsip_cli.dynamics.pinocchio_model import pinocchio_model
@@ -24,6 +23,7 @@ from bsip_cli.dynamics.regressor import predicted_wrench
 from bsip_cli.running.unit import Unit
 from bsip_cli.schemas import bsip_names
 from bsip_cli.stages.frames import WRENCH, coordinates_from, load_phi, loads_record, person_of
+from bsip_cli.statistics.choice import BlockErrors, error_gain
 from bsip_cli.statistics.fit_measures import correlation, fit_measures, posturography
 from bsip_cli.statistics.hypothesis_tests import fisher_z_difference, williams_t
 from bsip_cli.statistics.methods import MEASURED, METHODS

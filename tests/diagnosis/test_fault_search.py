@@ -9,11 +9,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bsip_cli.diagnosis.evenness import plain, unevenness
 from bsip_cli.diagnosis.fault_scores import library_of, limits_of
 from bsip_cli.diagnosis.fault_search import Found, search
 from bsip_cli.diagnosis.findings import Finding, findings_of
-from bsip_cli.diagnosis.held_out import held_out
+from bsip_cli.diagnosis.held_out import held_out, plain, unevenness
 from bsip_cli.diagnosis.patterns import PATTERNS
 from bsip_cli.effects.catalogue import CATALOGUE, EFFECTS
 from bsip_cli.effects.scene import Scene

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bsip_cli.diagnosis.stated_mass import (
+from bsip_cli.diagnosis.support import (
     CLASS,
     agreed_share,
     loaded_plate,

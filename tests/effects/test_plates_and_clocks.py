@@ -25,7 +25,7 @@ from bsip_cli.effects.plates import (
 )
 from bsip_cli.effects.scene import Plate, Scene
 from tests.body.standing_person import Swing, standing
-from tests.effects.moving_scene import RATE_HZ, moving, phi, rms, scene_of, standing_still
+from tests.effects.moving_scene import MASS_KG, RATE_HZ, moving, phi, rms, scene_of, standing_still
 
 # A plate as files have it: turned by 30 degrees, x from the second corner to the first, y from the
 # fourth to the first, z into the floor, moments about a sensor below the surface.
@@ -102,6 +102,35 @@ def test_readings_are_put_right_whatever_the_simulation_is(k):
         np.testing.assert_allclose(error, too_much, atol=1e-8, err_msg=effect.name)
 
 
+@pytest.mark.parametrize(("source", "sink"), [("fz", "fx"), ("fx", "fy"), ("fy", "fz")])
+def test_crosstalk(source, sink):
+    names = ("fx", "fy", "fz")
+
+    def spoil(reading):
+        spoilt = reading.copy()
+        spoilt[:, names.index(sink)] += 0.03 * reading[:, names.index(source)]
+        return spoilt
+
+    scene, too_much = scene_with(spoil)
+    change = PlateCrosstalk().change(scene, f"1 {source}>{sink}", np.array([0.03]))
+    np.testing.assert_allclose(change, too_much, atol=1e-8)
+
+
+def test_crosstalk_of_all_plates_is_that_of_each():
+    effect, size, scene = PlateCrosstalk(), np.array([0.02]), moving()
+    assert "all fz>fx" in effect.targets(scene)
+    each = [effect.change(scene, f"{plate} fz>fx", size) for plate in (1, 2)]
+    np.testing.assert_allclose(effect.change(scene, "all fz>fx", size), sum(each))
+    assert "of all plates leaks" in effect.sentence(scene, "all fz>fx", size)
+
+
+def test_an_offset_in_fz_makes_everybody_heavier():
+    scene = scene_with(lambda r: r)[0]
+    change = PlateZero().change(scene, "1 fz", np.array([9.80665]))
+    np.testing.assert_allclose(change[:, 2], 9.80665)
+    assert "+9.8 N" in PlateZero().sentence(scene, "1 fz", np.array([9.80665]))
+
+
 def test_a_shifted_plate_shows_the_pressure_short_of_the_shift():
     scene = standing_still()
     shift = np.array([0.03, -0.02, 0.0])
@@ -149,19 +178,13 @@ def test_two_plates_err_together_as_one_plate_under_both_feet(effect, values):
     assert "all" in effect.targets(scene) and "all" not in effect.targets(alone)
 
 
-@pytest.mark.parametrize(
-    ("effect", "channel", "words"),
-    [
-        (PlateGain(), "fz", "all plates read the vertical force 3.0 % too large"),
-        (PlateCrosstalk(), "fz>fx", "of all plates leaks"),
-    ],
-)
-def test_a_fault_of_all_plates_is_that_of_each(effect, channel, words):
-    scene, size = moving(), np.array([0.03])
-    assert f"all {channel}" in effect.targets(scene)
-    each = [effect.change(scene, f"{plate.name} {channel}", size) for plate in scene.plates]
-    np.testing.assert_allclose(effect.change(scene, f"all {channel}", size), sum(each), atol=1e-8)
-    assert words in effect.sentence(scene, f"all {channel}", size)
+def test_a_gain_of_all_plates_is_that_of_each():
+    scene, effect, gain = moving(), PlateGain(), np.array([0.03])
+    each = [effect.change(scene, f"{plate.name} fz", gain) for plate in scene.plates]
+    np.testing.assert_allclose(effect.change(scene, "all fz", gain), sum(each), atol=1e-8)
+    assert effect.sentence(scene, "all fz", gain) == (
+        "all plates read the vertical force 3.0 % too large"
+    )
 
 
 @pytest.mark.parametrize("tilt", [[0.02, 0.0], [-0.05, 0.1]])
@@ -214,6 +237,12 @@ def test_words_for_the_order_of_clocks():
     assert delay.sentence(scene, "", np.array([0.01])).endswith("10.0 ms after the markers")
     assert delay.sentence(scene, "", np.array([-0.01])).endswith("10.0 ms before the markers")
     assert "1000 ppm slower" in ClockDrift().sentence(scene, "", np.array([1e-3]))
+
+
+def test_a_standing_person_weighs_what_the_scene_says():
+    scene = standing_still()
+    np.testing.assert_allclose(scene.predicted[5, 2], MASS_KG * 9.80665, rtol=1e-9)
+    np.testing.assert_allclose(scene.measured, scene.predicted, atol=1e-9)
 
 
 # --- several at once ----------------------------------------------------------------------------

@@ -62,6 +62,18 @@ def test_blocks_sum_to_the_dense_equations(recordings):
     assert found.duration_s == pytest.approx(used / RATE_HZ)
 
 
+def test_weights_per_component(recordings):
+    equations = accumulate(world().model, recordings[:1], CUTOFF_HZ, REFERENCE)
+    rows, measured = dense(recordings[0])
+    weights = np.array([1.0, 0.5, 0.25, 2.0, 3.0, 0.0])
+    information, right = equations.weighted(weights)
+    weighted = (rows * np.sqrt(weights)[:, None]).reshape(-1, 150)
+    expected = weighted.T @ weighted
+    np.testing.assert_allclose(information, expected, atol=1e-12 * np.abs(expected).max())
+    expected = weighted.T @ (measured * np.sqrt(weights)).ravel()
+    np.testing.assert_allclose(right, expected, atol=1e-12 * np.abs(expected).max())
+
+
 def test_weights_per_frame(recordings):
     """A frame's weight multiplies its share of every sum."""
     one = replace(recordings[0], noise_level=np.linspace(1.0, 4.0, len(recordings[0].use)))

@@ -25,7 +25,7 @@ from bsip_cli.simulate.options import Asked, Laboratory, Rates, StudyOptions
 from bsip_cli.simulate.plan import GRAVITY, Poses
 from bsip_cli.simulate.recording import MM, Measurement, Trial, measure_trial, simulate_trial
 from bsip_cli.simulate.study import simulate_study
-from tests.blind.outside_effects import OUTSIDE
+from tests.blind.outside_effects import OUTSIDE, play
 from tests.simulate.conftest import NOTHING_RICH, is_physical, person_of
 
 G = 9.81
@@ -150,6 +150,11 @@ def test_what_cannot_be_hidden_is_refused_in_a_sentence(names, sizes, targets, w
         pair_up(names, sizes, targets)
 
 
+def test_sizes_and_targets_follow_the_order_of_the_effects():
+    pairs = pair_up(["added_mass", "sync_offset"], [1.0, 0.1], ["hand_r", "-"])
+    assert pairs == (Asked("added_mass", 1.0, "hand_r"), Asked("sync_offset", 0.1, "-"))
+
+
 def test_effects_are_drawn_from_the_seed_and_labs_are_shared():
     asked = (Asked("added_mass", 1.0), Asked("plate_translation", 0.01))
     options = StudyOptions(seed=4, effects=asked)
@@ -249,6 +254,17 @@ def test_a_delayed_force_is_the_force_of_earlier(delay):
         late.points_m, measured_with("squat").points_m[start // 10 :][: len(late.points_m)]
     )
     assert len(null) - len(got) == 10 * np.ceil(abs(shift) / 10)
+
+
+def test_cross_correlation_finds_the_delay():
+    late = measured_with("squat", ("sync_offset", 0.0125, ""))
+    start = round(1000 * late.start_s)
+    here = readings(late)[:, 2] - readings(late)[:, 2].mean()
+    null = readings(measured_with("squat"))[start : start + len(here), 2]
+    null = null - null.mean()
+    lags = np.arange(-30, 31)
+    scores = [here[50:-50] @ np.roll(null, lag)[50:-50] for lag in lags]
+    assert lags[np.argmax(scores)] in (12, 13)
 
 
 def test_a_drifting_clock_loses_its_rate_times_the_time():
@@ -512,6 +528,16 @@ def test_breath_moves_as_much_mass_as_a_real_mass_would():
     assert np.abs(moment)[inner].max() > 0.1
 
 
+def test_a_tether_pulls_the_more_the_farther():
+    trial = trial_with("squat", ("outside_elastic_tether", 200.0, ""))
+    (band,) = trial.plan.loads
+    pull = -band.wrench(trial.poses, 0.001)[0]
+    length = np.linalg.norm(trial.poses.origin_m["lower_torso"] - band.fastened_m, axis=1)
+    slope = np.polyfit(length, np.linalg.norm(pull, axis=1), 1)[0]
+    assert slope == pytest.approx(200.0, rel=1e-6)
+    assert trial.force_n[:, 0].mean() == pytest.approx(-pull[:, 0].mean(), abs=1.0)
+
+
 # --- the person -------------------------------------------------------------------------------
 
 
@@ -595,3 +621,51 @@ def test_smoothing_halves_the_power_at_its_cut_off():
     assert ratio == pytest.approx(np.sqrt(0.5), rel=0.02)
     assert np.abs(got[300:1200, 0, 1] - points[300:1200, 0, 1]).max() < 1e-3
     assert np.array_equal(np.isnan(got), np.isnan(points))
+
+
+# --- outside the catalogue --------------------------------------------------------------------
+
+
+def test_a_backlash_follows_at_half_its_width():
+    t = np.linspace(0.0, 4.0 * np.pi, 2000)
+    shown = play(10.0 * np.sin(t), 4.0)
+    assert shown[500:].max() == pytest.approx(8.0, abs=1e-3)
+    assert np.abs(shown - 10.0 * np.sin(t)).max() <= 2.0 + 1e-9
+
+
+def test_repeated_frames_have_the_asked_share():
+    stalled = measured_with("squat", ("outside_repeated_frames", 0.25, ""))
+    still = np.all(np.diff(stalled.points_m, axis=0) == 0.0, axis=(1, 2))
+    assert 0.2 < still.mean() < 0.35
+
+
+def channel_of(name: str, size: float, column: int, target: str = "") -> tuple[np.ndarray, ...]:
+    """A channel (N,) without and with an effect, and the times of its samples."""
+    plain, other = measured_with("squat"), measured_with("squat", (name, size, target))
+    rest = [c for c in range(6) if c != column]
+    if name != "outside_clock_jump":
+        np.testing.assert_allclose(plain.channels[:, rest], other.channels[:, rest], atol=1e-6)
+    times = np.arange(len(plain.channels)) / plain.rates.analog_hz
+    return plain.channels[:, column], other.channels[:, column], times
+
+
+def test_a_late_channel_is_the_channel_of_a_moment_ago():
+    plain, late, times = channel_of("outside_late_channel", 0.02, 0, "fx")
+    lag = round(0.02 / (times[1] - times[0]))
+    np.testing.assert_allclose(late[lag:], plain[:-lag], atol=1e-6)
+
+
+def test_a_loose_connector_changes_the_gain_of_the_vertical_channel():
+    plain, other, _ = channel_of("outside_loose_connector", 0.03, 2)
+    gain = other / plain - 1.0
+    assert 0.005 < gain.std() < 0.06
+    assert np.abs(np.diff(gain)).max() < 1e-3
+
+
+def test_a_clock_that_jumps_is_right_before_and_late_after():
+    plain, other, times = channel_of("outside_clock_jump", 0.05, 2)
+    before, after = times < 0.3 * times[-1], times > 0.7 * times[-1]
+    np.testing.assert_allclose(other[before], plain[before], atol=1e-6)
+    lag = round(0.05 / (times[1] - times[0]))
+    shifted = np.roll(plain, lag)
+    np.testing.assert_allclose(other[after], shifted[after], atol=1e-6)

@@ -103,6 +103,16 @@ def test_a_delay_comes_through_the_file(request, tmp_path, kind):
     assert np.abs(after.plates[0].force_N - late).max() < 0.01
 
 
+def test_a_shifted_plate_moves_the_cop_and_nothing_else(tmp_path, recorded):
+    effect = effect_of("plate_translation", 0.02, "x,plate=1")
+    before, after = injected(recorded, tmp_path, effect)
+    force, moment = before.plates[0].force_N, after.plates[0].moment_Nm
+    assert np.abs(after.plates[0].force_N - force).max() < 1e-3
+    expected = before.plates[0].moment_Nm - np.cross([0.02, 0.0, 0.0], force)
+    assert np.abs(moment - expected).max() < 1e-3
+    assert np.abs(after.plates[1].moment_Nm - before.plates[1].moment_Nm).max() < 1e-3
+
+
 def test_all_else_in_a_c3d_file_stays(tmp_path, recorded):
     injected(recorded, tmp_path, effect_of("plate_gain", 0.05, "fz,plate=1"))
     old, new = (ezc3d.c3d(str(path)) for path in (recorded, tmp_path / recorded.name))
@@ -132,6 +142,18 @@ def test_marker_effects_leave_the_forces_alone(tmp_path, recorded, trc):
         assert np.abs(travel[106:, knee][seen] - 0.03).max() < 1e-5
         assert np.nanmax(np.delete(travel, knee, axis=1)) < 1e-5
         assert np.abs(after.plates[0].force_N - before.plates[0].force_N).max() < 1e-3
+
+
+def test_a_tilted_lab_turns_markers_and_forces_together(tmp_path, recorded):
+    before, after = injected(recorded, tmp_path, effect_of("gravity_tilt", 0.03, "x"))
+    lean = after.plates[0].force_N.mean(axis=0)
+    upright = before.plates[0].force_N.mean(axis=0)
+    angle = np.arctan2(lean[1], lean[2]) - np.arctan2(upright[1], upright[2])
+    assert angle == pytest.approx(-0.03, abs=1e-4)
+    top, ankle = (before.labels.index(name) for name in ("FHEAD", "RMALL"))
+    up = [np.nanmean(r.markers_m[:, top] - r.markers_m[:, ankle], axis=0) for r in (before, after)]
+    turned = [np.arctan2(v[1], v[2]) for v in up]
+    assert turned[1] - turned[0] == pytest.approx(-0.03, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", ["unmeasured_contact", "missing_joint", "segment_inertia"])

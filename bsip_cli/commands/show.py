@@ -13,7 +13,7 @@ import pandas as pd
 from bsip_cli.artifacts import is_made_from, read_artifact, read_header
 from bsip_cli.errors import BadDataError, UsageError, printable
 from bsip_cli.report.blocks import Light
-from bsip_cli.report.candidates import candidates_of, causes_of, looked_at
+from bsip_cli.report.candidates import candidates_of, causes_of, effects_in, looked_at
 from bsip_cli.report.cohort.laboratory import named_sentences, unnamed_sentences
 from bsip_cli.report.cohort.record import SHARED, Searched, searched, shared_causes
 from bsip_cli.report.errors import overall_pieces, use_sentence
@@ -144,7 +144,7 @@ def _findings(
         yield _wrapped(cause_line(cause, everywhere), f"{number:2d}. ")
     if len(causes) > _MOST:
         yield f"  - {len(causes) - _MOST} more findings: --full"
-    if budget is not None and (pieces := overall_pieces(budget)):
+    if budget is not None and (pieces := overall_pieces(budget, effects_in(causes))):
         parts = listing([f"{one.label} {one.share:.0f} %" for one in pieces])
         yield _wrapped(f"The error of the table's parameters (RM): {parts}.", "  - ")
     if choice is not None:

@@ -5,7 +5,7 @@ might have been and still been seen.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -187,6 +187,11 @@ def causes_of(candidates: Sequence[Candidate]) -> tuple[tuple[Candidate, ...], .
         return not is_large(cause), -float(np.nansum(expected))
 
     return tuple(sorted(map(tuple, groups.values()), key=importance))
+
+
+def effects_in(causes: Iterable[Sequence[Candidate]]) -> frozenset[str]:
+    """Names of all effects that were found."""
+    return frozenset(one.effect for cause in causes for one in cause)
 
 
 def is_large(cause: Sequence[Candidate]) -> bool:

@@ -26,6 +26,7 @@ from bsip_cli.report.candidates import (
     Candidate,
     candidates_of,
     causes_of,
+    effects_in,
     is_large,
     looked_at,
 )
@@ -50,7 +51,7 @@ from bsip_cli.report.verdict import (
     light_of,
     unseen,
 )
-from bsip_cli.report.words import capital, count, listing, number
+from bsip_cli.report.words import METHODS, capital, count, listing, number
 
 if TYPE_CHECKING:
     from bsip_cli.report.figures.person import Pose
@@ -80,7 +81,7 @@ def front(record: ParticipantRecord) -> tuple[Block, ...]:
         *budget_bar(record),
         Heading("How large are the errors?"),
         Scales(tuple(yardstick.scale(value) for yardstick, value in measured_of(record))),
-        Paragraph(f"Root mean square (RMS), with {record.use()}. {SOURCES}", "note"),
+        Paragraph(f"Root mean square (RMS), with {METHODS[record.use()]}. {SOURCES}", "note"),
         *_sure(record, light),
         Heading("Which parameters to use"),
         Paragraph(use_sentence(record.choice, record.identification, light.state == "large")),
@@ -195,7 +196,9 @@ def _sure(record: ParticipantRecord, light: Light) -> Iterator[Block]:
 
 def budget_bar(record: ParticipantRecord) -> Iterator[Block]:
     """What makes the error of the table's parameters, as one bar."""
-    if record.budget is not None and (pieces := overall_pieces(record.budget)):
+    if record.budget is None:
+        return
+    if pieces := overall_pieces(record.budget, effects_in(_found(record))):
         yield Bar(
             "What makes the squared error of the forces with a table's parameters (RM)",
             tuple((piece.label, piece.share) for piece in pieces if abs(piece.share) >= 0.5),

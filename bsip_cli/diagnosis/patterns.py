@@ -163,8 +163,8 @@ class Bend(Curve):
     def goes_along_with(self, target: str, values: np.ndarray) -> str:
         return (
             f"an error of {OF_THE_LAB[target]} that is not in proportion to the load "
-            f"({self._error(values):+.1f} {unit_of(target)} under {self.MUCH:g} times the body "
-            "weight, none under the body weight alone)"
+            f"({self._error(values):+.1f} {unit_of(target)} at {self.MUCH:g} times body weight, "
+            f"0 {unit_of(target)} at body weight)"
         )
 
     def reported(self, scene: Scene, target: str, values: np.ndarray) -> Reported:

@@ -5,9 +5,12 @@ might have been and still been seen.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from math import isfinite
+from operator import itemgetter
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -146,15 +149,16 @@ class Candidate:
 
 def candidates_of(diagnosis: pd.DataFrame) -> tuple[Candidate, ...]:
     """The candidates of a ``diagnosis`` table in their order; the row ``none`` is none."""
-    rows = diagnosis[diagnosis["effect"] != NOTHING]
-    return tuple(_candidate(group) for _, group in rows.groupby("rank", sort=True))
+    rows = diagnosis[diagnosis["effect"] != NOTHING].sort_values("rank", kind="stable")
+    by_rank = groupby(rows.to_dict("records"), itemgetter("rank"))
+    return tuple(_candidate(list(group)) for _, group in by_rank)
 
 
-def _candidate(rows: pd.DataFrame) -> Candidate:
-    first = rows.iloc[0]
+def _candidate(rows: Sequence[Mapping[Any, Any]]) -> Candidate:
+    first = rows[0]
     numbers = tuple(
         Number(r["parameter"], r["unit"], r["estimate"], r["ci_low"], r["ci_high"])
-        for r in rows.to_dict("records")
+        for r in rows
         if r["parameter"]
     )
     gain, low, high = (float(first[f"gain_{name}"]) for name in ("percent", "ci_low", "ci_high"))

@@ -22,7 +22,7 @@ _CAPTION = (
     "What was found, and of each other fault the likeliest place. Estimate: if the fault is there. "
     "Seen from: this size would be named in 95 of 100 laboratories with these recordings"
 )
-_ALONE = "Of one person what is wrong with the laboratory stands in the person's report."
+_ALONE = "Of one person what is wrong with the laboratory is in the person's report."
 _WHAT_TO_DO = (
     "Check what is named on the spot, as its sentence says, before any number is corrected. What is "
     "wrong in the same way with the model of every person here can look like a plate elsewhere."

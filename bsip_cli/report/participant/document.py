@@ -308,6 +308,16 @@ def _masses(record: ParticipantRecord) -> Iterator[Block]:
         "Points: segment masses; bars: how much the data decide.",
         "long bars to the right are good: the number is this person's. Short ones: it is the table's.",
         "do not read a difference into a mass that the data hardly decide.",
+        pd.DataFrame(
+            {
+                "segment": rm.index,
+                "rm_kg": table,
+                "rm_mass_kg": rm_mass_kg,
+                "om_kg": own,
+                "om_sd_kg": sd,
+                "data_share": share,
+            }
+        ),
     )
     shift_mm = 1e3 * np.linalg.norm(om[_COM].to_numpy() - rm[_COM].to_numpy(), axis=1)
     rows = [

@@ -145,7 +145,10 @@ def _strips(record: CohortRecord) -> Iterator[Block]:
         drawn.append(Strip(title, values, names, far, one.good, one.limit))
         rows[one.name] = list(values)
         far_out += [
-            (f"{member.id} ({one.title.partition(' (')[0].lower()} {number(v)} {one.unit})", member)
+            (
+                f"{member.id} ({one.in_sentence().replace(' (COP)', '')} {number(v)} {one.unit})",
+                member,
+            )
             for member, v, is_out in zip(members, values, far, strict=True)
             if is_out
         ]

@@ -27,16 +27,15 @@ from bsip_cli.report.effect_words import (
     unnamed_label,
     usual_words,
 )
-from bsip_cli.report.words import capital, number
+from bsip_cli.report.words import capital, number, true_minus
 
 NOTHING = "none"
 UNNAMED = "unexplained"
 _INTERVAL = re.compile(r" \([^()]*: 95 % interval .*$")  # what follows it the report says itself
-_ADVICE = re.compile(r"; ([^;]* look alike here: )?to tell them apart, .*$")
+_ADVICE = re.compile(r"; ([^;]* look alike here: )?to distinguish them, .*$")
 _REMARK = re.compile(r"; this is [^;]*")  # what markers prove by themselves
 _OF_ALL = "; this is known from the laboratory"
 _REASON = re.compile(r" \([^()]*\)$")  # how improbable a rejected candidate is
-_MINUS = re.compile(r"(?<![\w.)])-(?=\d)")
 _SIGNED = re.compile(r"[+−]\d")
 _NO_SIZES = ("start", "end", "from_time", "release_time", "frequency", "damping_ratio")
 
@@ -106,7 +105,7 @@ class Candidate:
         text = re.sub(_ADVICE, "", re.sub(_INTERVAL, "", self.sentence))
         text = text.removeprefix("not so: ").removeprefix("not sure: ")
         text = re.sub(_REASON, "", text) if self.verdict == "rejected" else text
-        return re.sub(_MINUS, "−", text)
+        return true_minus(text)
 
     def told(self, remarks: bool = True) -> str:
         """Its sentence with the interval of its main number, and what the markers alone say."""
@@ -263,7 +262,7 @@ def limits_sentence(limits: Sequence[Limit]) -> str:
     return f"{capital(text)} might have gone unseen."
 
 
-def looked_at(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[str, ...]:
+def analysed(detection: pd.DataFrame, diagnosis: pd.DataFrame) -> tuple[str, ...]:
     """Stems of the recordings that were diagnosed, those of which something was told before the
     search too."""
     told = diagnosis.loc[diagnosis["class_id"] != OF_THE_WEIGHT, "trials"]

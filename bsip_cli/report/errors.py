@@ -279,6 +279,7 @@ _WORDS = {
     "unknown": UNKNOWN,
 }
 _WORTH = 5.0  # percent of the squared error: less is in the rest
+_LEAST = 0.5  # less is nothing
 LEAST_TOLD_SIZE = 2.0  # errors, in N or mm: what makes them is of no interest
 
 
@@ -299,9 +300,11 @@ def pieces(budget: pd.DataFrame, component: str, found: Collection[str]) -> tupl
 
 def overall_pieces(budget: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
     """The same of the mean over the vertical force and both directions of the centre of pressure,
-    as far as their errors are of interest; terms that look alike in one count together in all."""
+    as far as their errors are of interest; terms that look alike in one count together in all, and
+    what rounds to nothing is left out."""
     shares = _overall(budget)
-    return () if shares.empty else _cut(shares, found)
+    whole = () if shares.empty else _cut(shares, found)
+    return tuple(one for one in whole if abs(one.share) >= _LEAST)
 
 
 def found_share(budget: pd.DataFrame, found: Collection[str]) -> float:
@@ -325,14 +328,14 @@ def _cut(rows: pd.DataFrame, found: Collection[str]) -> tuple[Piece, ...]:
     for terms in _groups(rows):
         label = " or ".join(dict.fromkeys(_label(term, found) for term in terms))
         piece = Piece(label, float(rows.loc[list(terms), "share_percent"].sum()))
-        least = 0.5 if any(term.removeprefix(_FAULT) in found for term in terms) else _WORTH
+        least = _LEAST if any(term.removeprefix(_FAULT) in found for term in terms) else _WORTH
         if label in _LAST:
             last.append(piece)
         elif piece.share >= least or piece.share <= -_WORTH:
             large.append(piece)
     large.sort(key=lambda one: -one.share)
     others = 100.0 - sum(one.share for one in (*large, *last))
-    rest = [Piece(REST, others)] if abs(others) >= 0.5 else []
+    rest = [Piece(REST, others)] if abs(others) >= _LEAST else []
     return (*large, *rest, *last)
 
 

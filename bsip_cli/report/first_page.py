@@ -23,9 +23,9 @@ from bsip_cli.report.blocks import (
 )
 from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
+    analysed,
     effects_in,
     is_large,
-    looked_at,
 )
 from bsip_cli.report.effect_words import separating_recording
 from bsip_cli.report.errors import (
@@ -159,7 +159,7 @@ def _causes(record: ParticipantRecord) -> Iterator[Block]:
     """A line per cause that was found, the most probable first."""
     if record.diagnosis is None or record.detection is None:
         return
-    everywhere = looked_at(record.detection, record.diagnosis)
+    everywhere = analysed(record.detection, record.diagnosis)
     lines = tuple(cause_line(cause, everywhere) for cause in record.causes)
     if lines:
         yield Numbered(lines[:_MOST])
@@ -192,7 +192,7 @@ def budget_bar(record: ParticipantRecord) -> Iterator[Block]:
     if pieces := overall_pieces(record.budget, effects_in(record.causes)):
         yield Bar(
             "What makes the squared error of the forces with a table's parameters (RM)",
-            tuple((piece.label, piece.share) for piece in pieces if abs(piece.share) >= 0.5),
+            tuple((piece.label, piece.share) for piece in pieces),
         )
 
 

@@ -15,13 +15,13 @@ from bsip_cli.report.candidates import (
     OF_THE_WEIGHT,
     UNNAMED,
     Candidate,
+    analysed,
     candidates_of,
     causes_of,
     effects_in,
     is_large,
     limits_of,
     limits_sentence,
-    looked_at,
 )
 from bsip_cli.report.effect_words import (
     EFFECT_WORDS,
@@ -108,7 +108,7 @@ def verdict_of(
     ``gain`` and ``bsip-change``, with one method each. ``budget``: ``overall-error-budget``, where
     it is known."""
     causes = causes_of(candidates_of(diagnosis))
-    everywhere = looked_at(detection, diagnosis)
+    everywhere = analysed(detection, diagnosis)
     light = light_of(diagnosis, detection, budget)
     names = [trial_label(stem) for stem in everywhere]
     return Verdict(
@@ -118,7 +118,7 @@ def verdict_of(
         (
             *(budget_sentences(budget, effects_in(causes)) if budget is not None else ()),
             *(_results(causes, gains, changes) if causes else ()),
-            *([f"Recordings looked at: {listing(names)}."] if names else ()),
+            *([f"Recordings analysed: {listing(names)}."] if names else ()),
         ),
         (*filter(None, [_named_twice(causes)]), *consequences(causes)),
         unseen(detection, diagnosis),
@@ -150,7 +150,7 @@ def light_of(
     unsure = [c[0] for c in causes if c[0].effect == "inconclusive"]
     if unsure:
         return Light("inconclusive", "Inconclusive", f"{capital(unsure[0].what())}.")
-    looked = count(len(looked_at(detection, diagnosis)), "recording")
+    looked = count(len(analysed(detection, diagnosis)), "recording")
     nothing = f"None of the {len(EFFECTS)} faults that bsip knows was found in {looked}."
     found = _how_many(causes)
     if large or any(is_large(cause) for cause in causes):
@@ -377,7 +377,7 @@ def change_sentence(changes: pd.DataFrame) -> str:
     )
 
 
-def put_right_sentence(events: Sequence[tuple[str, pd.DataFrame]]) -> tuple[str, ...]:
+def corrected_sentence(events: Sequence[tuple[str, pd.DataFrame]]) -> tuple[str, ...]:
     """What ``ik`` has corrected, from (stem, ``marker-events``); nothing where there was nothing."""
     said = [
         f"in {trial_label(stem)} {text.removesuffix('; corrected')}"

@@ -74,7 +74,7 @@ def test_what_only_the_markers_prove_says_so(found):
 def test_a_trial_of_which_something_was_told_before_is_looked_at_too(found):
     leaning = found[found["rank"] == 1].assign(trials="sub-01_task-stairs", rank=9)
     text = text_of(pd.concat([found, leaning]), detection(TRIALS))
-    assert "Recordings looked at: basketball (run 1), sequence (run 1) and stairs." in text
+    assert "Recordings analysed: basketball (run 1), sequence (run 1) and stairs." in text
     assert "only in sequence (run 1) and basketball (run 1)" in text
     standing = leaning.assign(class_id="W")
     assert "stairs" not in text_of(pd.concat([found, standing]), detection(TRIALS))[-400:]
@@ -120,7 +120,7 @@ def test_members_of_a_group_may_be_of_different_recordings(found):
 
 def test_what_quiet_standing_tells_gives_its_advice_once(found):
     """The static recording is none of those that were searched."""
-    told = "the plates read 60.0 kg, 2.6 kg less than stated: a gain; to tell them apart, weigh it"
+    told = "the plates read 60.0 kg, 2.6 kg less than stated: a gain; to distinguish them, weigh it"
     rows = found[found["class_id"] != ""].assign(
         class_id="W", trials="sub-01_task-static", sentence=told, probability=1 / 3
     )
@@ -170,7 +170,7 @@ def test_nothing_wrong(found):
     said = verdict_of(pd.concat([first, none]), detection(TRIALS))
     assert not said.found
     assert said.headline.startswith("No fault found. None of the")
-    assert said.paragraphs()[1] == "Recordings looked at: basketball (run 1) and sequence (run 1)."
+    assert said.paragraphs()[1] == "Recordings analysed: basketball (run 1) and sequence (run 1)."
     assert said.paragraphs()[2].endswith("might have gone unseen.")
 
 
@@ -273,7 +273,7 @@ def test_what_changes_the_forces_most_comes_first(found):
 def test_soft_tissue_or_a_bend_of_the_trunk(found):
     """As ``marker_proof`` says it: no forces tell, and the markers do not tell which."""
     remedy = EFFECTS["missing_joint"].remedy
-    advice = f"; a second bend and soft tissue look alike here: to tell them apart, {remedy}"
+    advice = f"; a second bend and soft tissue look alike here: to distinguish them, {remedy}"
     bend = "the trunk bends twice (flexion: 95 % interval 0.3 to 0.4); this is 40 % of all"
     group = found[found["class_id"] == "B"].assign(
         effect=["missing_joint", SOFT_TISSUE],
@@ -381,7 +381,7 @@ def test_gains_lead_with_what_improves():
 
 
 def test_the_verdict_tells_gains_where_they_are(found):
-    looked = "Recordings looked at: basketball (run 1) and sequence (run 1)."
+    looked = "Recordings analysed: basketball (run 1) and sequence (run 1)."
     told = verdict_of(found, detection(TRIALS), gains()).results
     assert told == (gain_sentence(gains()), looked)
     advice, where = verdict_of(found, detection(TRIALS)).results

@@ -13,7 +13,7 @@ from bsip_cli.report.blocks import Block, Bullets, Cell, Grid, Paragraph, Sectio
 from bsip_cli.report.cohort.record import CohortRecord
 from bsip_cli.report.effect_words import effect_title, parameter_label, place_label, size_words
 from bsip_cli.report.verdict import probability_words
-from bsip_cli.report.words import MISSING, capital, listing
+from bsip_cli.report.words import MISSING, capital, listing, true_minus
 
 SAID = ("named", "ambiguous")
 _NOT_RUN = "Nobody asked for the faults of the laboratory: run `bsip laboratory`."
@@ -76,7 +76,7 @@ def named_sentences(table: pd.DataFrame) -> Iterator[str]:
         text = f"Laboratory {laboratory}: {likeliest['sentence']}."
         if others:
             text += f" It may also be: {listing([_named(one) for one in others])}."
-        yield text
+        yield true_minus(text)
 
 
 def _named(row: Mapping[Any, Any]) -> str:

@@ -96,7 +96,7 @@ def _members(
         one = replace(fit.faults[number], effect=tried.fault.effect)
         sentence = one.alike(fit.session)[0].sentence(fit.session) + interval_words(numbers)
         if class_id:
-            sentence += f"; other causes look alike here: to tell them apart, {mine.effect.remedy}"
+            sentence += f"; other causes look alike here: to distinguish them, {mine.effect.remedy}"
             more |= {"verdict": "ambiguous", "class_id": class_id}
         else:
             probability = verdict.probability

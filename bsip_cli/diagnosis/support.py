@@ -251,7 +251,7 @@ def stated_mass_findings(
             target,
             trials,
             (Number(name, unit, x, x - Z95 * sd, x + Z95 * sd),),
-            f"{told}: {why}, or the stated mass is wrong; to tell them apart, {REMEDY}",
+            f"{told}: {why}, or the stated mass is wrong; to distinguish them, {REMEDY}",
             p_value,
             (1 - p_value) / (len(causes) + 1),
             "ambiguous",

@@ -62,10 +62,16 @@ def run_session(
     participants = opened.study.participants
     manner = Manner(force=force, verify=verify, jobs=jobs)
     running = run_stages(stages, opened.study, out, opened.config, manner)
-    persons, trials = len(participants), sum(len(p.trials) for p in participants)
-    units = {"cohort": 1, "participant": persons, "trial": trials}
-    total = sum(cost_s(s.name, s.level) * units[s.level] for s in stages)
-    return follow(command, refusals, running, total, out, _cost_s, verbose=verbose, quiet=quiet)
+    trials = {p.id: len(p.trials) for p in participants}
+    units = {"cohort": [1], "participant": trials.values(), "trial": [1] * sum(trials.values())}
+    total = sum(cost_s(s.name, s.level, n) for s in stages for n in units[s.level])
+
+    def cost(outcome: Outcome) -> float:
+        level = "cohort" if outcome.unit == "group" else "participant"
+        level = "trial" if "_task-" in outcome.unit else level
+        return cost_s(outcome.stage, level, trials.get(outcome.unit, 1))
+
+    return follow(command, refusals, running, total, out, cost, verbose=verbose, quiet=quiet)
 
 
 def _stages(
@@ -178,11 +184,6 @@ def follow(
     if not quiet:
         _summary(command, outcomes, out)
     return max((outcome.exit_code for outcome in outcomes), key=_SEVERITY.index, default=0)
-
-
-def _cost_s(outcome: Outcome) -> float:
-    level = "cohort" if outcome.unit == "group" else "participant"
-    return cost_s(outcome.stage, "trial" if "_task-" in outcome.unit else level)
 
 
 @dataclass

@@ -105,7 +105,7 @@ def weighed(unit: Unit, person: Person) -> Weighed:
     sd = stated_sd(unit)
     standing = [(t, s) for t, s in scenes if t.role == STATIC][:1]
     if standing:
-        share, manner = weight_share(standing[0][1]), "in quiet standing"
+        share, manner = weight_share(standing[0][1]), "in quiet stance"
     else:
         standing, manner = list(scenes), "in motion"
         share = agreed_share([s for _, s in scenes], sd) or 0.0

@@ -99,7 +99,7 @@ def test_what_looks_alike_is_a_group_that_holds_the_truth():
     assert {one.verdict for one in findings} == {"ambiguous"}
     assert (findings[0].effect, findings[0].target) == ("added_mass", "forearm_r")
     assert sum(one.probability for one in findings) >= NAMED_FROM
-    assert all("to tell them apart" in one.sentence for one in findings)
+    assert all("to distinguish them" in one.sentence for one in findings)
 
 
 def half_late(seed: int) -> Scene:

@@ -13,19 +13,18 @@ Tables are those of the artifacts: docs/artifacts.md lists their columns, units 
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, cast
 
 import numpy as np
 import pandas as pd
 
 from bsip_cli import __version__
-from bsip_cli.artifacts import Rows, as_read
-from bsip_cli.body.exports.formats import FORMATS
+from bsip_cli.body.exports import FORMATS
 from bsip_cli.body.exports.identified import IdentifiedPerson
 from bsip_cli.body.inertia import from_readable
 from bsip_cli.body.skeleton import load_skeleton
@@ -45,7 +44,6 @@ from bsip_cli.study.trials import Trial, trial_named
 
 _NOWHERE = Path("memory")
 _ID = "sub-01"
-Key = tuple[str, str]  # kind of table; trial, or nothing where it is of the person
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +181,7 @@ class Person:
         self.messages: list[str] = []
         self.refused: dict[tuple[str, str], BsipError] = {}
         self._done: set[str] = set()
-        self._kept: dict[Key, _Kept] = {}
+        self._folder = TemporaryDirectory(prefix="bsip-")  # the tables, as long as the object lives
         roles = self.config.roles.model_dump()
         named = {name: trial_named(_ID, name, _NOWHERE, roles) for name in trials}
         self._recordings = {named[name].stem: opened for name, opened in trials.items()}
@@ -250,19 +248,23 @@ class Person:
         KeyError
             It has not been made.
         """
-        stems = {name: stem for stem, name in self._names.items()}
-        return self._kept[kind, stems[trial] if trial else ""].frame.copy()
+        trials = {self._names[one.stem]: one for one in self._participant.trials}
+        for stage in (one for one in STAGES if kind in one.writes):
+            unit = self._unit(stage, trials[trial] if trial else None)
+            if unit.path(kind).exists():
+                return unit.read(kind)
+        raise KeyError(kind, trial)
 
     # --- running them -------------------------------------------------------------------------
 
     def _whole(self, stage: str, kind: str) -> pd.DataFrame:
         self._run(stage)
-        return self._kept[kind, ""].frame.copy()
+        return self.table(kind)
 
     def _by_trial(self, stage: str, kind: str) -> dict[str, pd.DataFrame]:
         self._run(stage)
-        found = ((name, self._kept.get((kind, stem))) for stem, name in self._names.items())
-        return {name: kept.frame.copy() for name, kept in found if kept is not None}
+        made = self._unit(producer(kind)).trials(kind)
+        return {self._names[one.stem]: self.table(kind, self._names[one.stem]) for one in made}
 
     def _run(self, last: str) -> None:
         """What a stage needs, and itself, once; a trial that is refused does not stop the others.
@@ -281,9 +283,13 @@ class Person:
             self._done.add(stage.label)
 
     def _do(self, unit: Unit) -> None:
-        if unit.missing():
+        if gone := unit.missing():
             if unit.trial is None:
-                raise self._why_not(unit)
+                raise next(iter(self.refused.values()), None) or BadDataError(
+                    f"{unit.stage.name} has no {', '.join(gone)} to read",
+                    file=unit.name,
+                    remedy="give the recordings that it needs",
+                )
             return
         try:
             import_module(unit.stage.module).run(unit)
@@ -296,105 +302,18 @@ class Person:
         finally:
             self.messages += unit.messages
 
-    def _why_not(self, unit: Unit) -> BsipError:
-        first = next(iter(self.refused.values()), None)
-        return first or BadDataError(
-            f"{unit.stage.name} has no {', '.join(unit.missing())} to read",
-            file=unit.name,
-            remedy="give the recordings that it needs",
-        )
-
-    def _unit(self, stage: Stage, trial: Trial | None) -> Unit:
-        return _InMemory(
-            stage,
-            self._study,
-            _NOWHERE,
-            self.config,
-            self._participant,
-            trial,
-            recordings=self._recordings,
-            kept=self._kept,
-        )
-
-
-def _stages_of(name: str) -> list[Stage]:
-    return [stage for stage in STAGES if stage.name == name and stage.level != "cohort"]
+    def _unit(self, stage: Stage, trial: Trial | None = None) -> Unit:
+        whole = self._study, Path(self._folder.name), self.config, self._participant
+        return Unit(stage, *whole, trial, recordings=self._recordings)
 
 
 def _needed(last: str) -> list[Stage]:
     """A stage and all that it reads from, in order."""
     needed: set[str] = set()
-    open_ = _stages_of(last)
+    open_ = [stage for stage in STAGES if stage.name == last and stage.level != "cohort"]
     while open_:
         stage = open_.pop()
         if stage.label not in needed:
             needed.add(stage.label)
             open_ += [producer(kind) for kind in (*stage.reads, *stage.amends)]
     return [stage for stage in STAGES if stage.label in needed]
-
-
-@dataclass(frozen=True, eq=False)
-class _Kept:
-    """A table, what its stage said of it, and how many rows were its stage's own."""
-
-    frame: pd.DataFrame
-    facts: dict
-    rows_made: int
-
-
-@dataclass
-class _InMemory(Unit):
-    """A unit whose tables stay in memory."""
-
-    kept: dict[Key, _Kept] = field(default_factory=dict)
-
-    def _key(self, kind: str, trial: Trial | None = None) -> Key:
-        of_trial = producer(kind).level == "trial"
-        owner = trial or self.trial
-        return kind, owner.stem if of_trial and owner else ""
-
-    def trials(self, *kinds: str) -> tuple[Trial, ...]:
-        assert self.participant is not None
-        every = self.participant.trials
-        return tuple(t for t in every if all(self._key(k, t) in self.kept for k in kinds))
-
-    def stands(self, kind: str, trial: Trial | None, participant: Participant) -> bool:
-        return self._key(kind, trial) in self.kept
-
-    def _has(self, kind: str) -> bool:
-        if producer(kind).level == "trial" and self.trial is None:
-            return bool(self.trials(kind))
-        return self._key(kind) in self.kept
-
-    def read(
-        self,
-        kind: str,
-        trial: Trial | None = None,
-        participant: Participant | None = None,
-        **wanted: Iterable[str],
-    ) -> pd.DataFrame:
-        frame = self.kept[self._key(kind, trial)].frame
-        for column, values in wanted.items():
-            frame = frame[frame[column].isin(list(values))]
-        return frame.reset_index(drop=True)
-
-    def facts(
-        self, kind: str, trial: Trial | None = None, participant: Participant | None = None
-    ) -> dict:
-        return self.kept[self._key(kind, trial)].facts
-
-    def write(self, kind: str, frame: Rows, facts: dict | None = None) -> None:
-        plain = json.loads(json.dumps(facts or {}))  # as it would come back from a file
-        self.kept[self._key(kind)] = _Kept(as_read(kind, frame), plain, len(frame))
-
-    def write_in_parts(
-        self, kind: str, parts: Iterable[pd.DataFrame], facts: Callable[[], dict]
-    ) -> None:
-        frame = pd.concat(list(parts), ignore_index=True)
-        self.write(kind, frame, facts())
-
-    def amend(self, kind: str, rows: pd.DataFrame) -> None:
-        before = self.kept[self._key(kind)]
-        made = before.frame.iloc[: before.rows_made]
-        whole = pd.concat([made, rows], ignore_index=True) if len(rows) else made
-        self.kept[self._key(kind)] = replace(before, frame=as_read(kind, whole))

@@ -15,8 +15,7 @@ from bsip_cli.running.unit import Unit
 
 def run(unit: Unit) -> None:
     """Read the person's diagnosis and error budget; write this trial's part of them."""
-    assert unit.trial is not None
-    stem, overall = unit.trial.stem, unit.read("overall-diagnosis")
+    stem, overall = unit.own_trial.stem, unit.read("overall-diagnosis")
     budget = unit.read("overall-error-budget")
     unit.write("error-budget", budget[budget["trial"] == stem])
     if stem not in unit.facts("overall-diagnosis").get("trials", []):

@@ -40,9 +40,8 @@ from bsip_cli.statistics.methods import MEASURED, OM, RM, is_extended
 
 def run(unit: Unit) -> None:
     """Read the causes, motion, wrench and parameters; write the gain, amend the comparison."""
-    assert unit.trial is not None
     causes, extended = causes_of(unit), unit.read("extended-bsip")
-    own = [k for k, cause in enumerate(causes) if unit.trial.stem in cause.trials]
+    own = [k for k, cause in enumerate(causes) if unit.own_trial.stem in cause.trials]
     if not own or extended.empty:
         for kind in ("gain", "corrected-wrench"):
             unit.write(kind, ())
@@ -52,7 +51,7 @@ def run(unit: Unit) -> None:
     person = person_of(unit)
     measured = unit.read("wrench")
     judgement = judgement_of(unit, unit.read("kinematics"), measured)
-    blocks = blocks_of(unit, unit.trial.stem)
+    blocks = blocks_of(unit, unit.own_trial.stem)
     scene, parameters = _scene(unit, person, extended)
     fold = blocks.fold_of(judgement.times_s)
     raw: Wrenches = {MEASURED: measured[WRENCH].to_numpy(), OM: scene.wrench_of(parameters[OM])}

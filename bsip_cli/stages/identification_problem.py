@@ -82,9 +82,7 @@ def recordings_of(
         rate = 1.0 / float(np.median(np.diff(times)))
         use = usable_frames(unit, trial) & ~_held_out(unit, times)
         if not use.any():
-            unit.warn(
-                f"{unit.name}: {trial.stem} has no frame with all contacts on plates; left out"
-            )
+            unit.say(f"{trial.stem} has no frame with all contacts on plates; left out")
             continue
         for start, stop in stretches(use):
             blocks.append({"trial": trial.stem, "start_s": times[start], "end_s": times[stop - 1]})

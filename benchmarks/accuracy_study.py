@@ -74,7 +74,7 @@ def one_arm_plan(person: Person, rng: np.random.Generator) -> Plan:
     sketch.angles["shoulder_r"] += RAISED_RAD * swing[:, None]
     sketch.angles["elbow_r"] += BENT_RAD * swing
     add_breath_of_motion(sketch, rng, np.deg2rad(0.2))
-    add_sway(sketch, rng)
+    add_sway(sketch, rng, 1.0)
     return sketch.plan(plate_centre_m=plate_under(sketch, rng))
 
 

@@ -397,7 +397,7 @@ def rates(export: Export, rng: np.random.Generator, plates: int) -> str:
 
 
 def other_rate_stated(export: Export, rng: np.random.Generator, plates: int) -> str:
-    export.stated_rate = pick(rng, (0.5, 2.0))
+    export.stated_rate = pick(rng, (0.5, 0.8, 1.2, 2.0))
     return f"the file states {export.stated_rate:g} times the cameras' rate"
 
 

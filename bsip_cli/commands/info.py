@@ -18,7 +18,7 @@ from bsip_cli.report.tables.formats import to_markdown
 from bsip_cli.report.tables.published import audited, printed
 from bsip_cli.running.unit import library_versions
 from bsip_cli.schemas import SCHEMAS
-from bsip_cli.statistics.published.paper import load_paper, names
+from bsip_cli.statistics.published import load_paper, names
 
 
 def versions() -> Iterator[str]:
@@ -92,6 +92,5 @@ def papers(what: str, paper: str | None) -> Iterator[str]:
         elif (slips := audited(one)).rows:
             yield to_markdown(slips)
         else:
-            is_told = any(table.design != "described" or table.claims for table in one.tables)
             nothing = "nothing in it can be recomputed from what is printed"
-            yield f"**{one.name}: {'its numbers agree' if is_told else nothing}.**\n"
+            yield f"**{one.name}: {'its numbers agree' if one.is_audited else nothing}.**\n"

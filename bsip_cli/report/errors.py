@@ -15,7 +15,7 @@ from bsip_cli.report.effect_words import EFFECT_WORDS
 from bsip_cli.report.words import COMPONENTS, component_label, count, listing, number, signed
 from bsip_cli.statistics.choice import Difference
 from bsip_cli.statistics.methods import METHODS, OM, RM, RM_MASS, SAME_WITHIN
-from bsip_cli.statistics.published.paper import load_paper
+from bsip_cli.statistics.published import load_paper
 
 _IN_WORDS = {
     OM: "OM (segment parameters identified from this person)",
@@ -234,7 +234,7 @@ def yardsticks(cop_limit_m: float, force_limit_percent: float) -> tuple[Yardstic
 def _published(variable: str) -> float:
     """Median over the movements of the mean errors with identified parameters."""
     rows = [r for r in load_paper("hansen2017").table(4).rows if r.compare.startswith(variable)]
-    return float(np.median([row.cells[OM].mean.middle for row in rows if OM in row.cells]))
+    return float(np.median([row.cells[OM].mean for row in rows if OM in row.cells]))
 
 
 def errors_of(fits: Iterable[pd.DataFrame], method: str) -> dict[str, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from bsip_cli.statistics.published.paper import Cell, Claim, Paper, PrintedTable, Row
+from benchmarks.printed_paper import Cell, Claim, Paper, PrintedTable, Row
 
 N = 12
 

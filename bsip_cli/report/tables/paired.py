@@ -24,7 +24,7 @@ from bsip_cli.report.tables.model import (
 from bsip_cli.report.words import segment_label
 from bsip_cli.statistics.cohort import DATA_SHARE, DIFFERENCE, Comparison, Criteria, Topic
 from bsip_cli.statistics.methods import OM, RM, RM_MASS
-from bsip_cli.statistics.published.paper import load_paper
+from bsip_cli.statistics.published import load_paper
 
 SHORT = {OM: "om", RM: "rm", RM_MASS: "rm_mass"}
 """Methods in the names of CSV columns."""

@@ -8,9 +8,8 @@ from math import nan
 from bsip_cli.report.tables.model import Cell, Column, Results, Row, Table, count, mean_sd
 from bsip_cli.statistics.cohort import Topic
 from bsip_cli.statistics.methods import MEASURED, OM, RM, RM_MASS
-from bsip_cli.statistics.published.audit import audit, unit_of_length
-from bsip_cli.statistics.published.paper import Paper, PrintedTable, as_meant, load_paper
-from bsip_cli.statistics.published.paper import Row as PrintedRow
+from bsip_cli.statistics.published import Paper, PrintedTable, load_paper
+from bsip_cli.statistics.published import Row as PrintedRow
 
 COMPARED = "hansen2017"
 """The paper whose tables this study's tables 1 to 4 repeat."""
@@ -18,7 +17,6 @@ COMPARED = "hansen2017"
 _PAIRED = ("table1", "table2", "table4")
 _METHODS = {"FP": MEASURED, "OM": OM, "RM": RM}  # in print
 _MOVED = "†"
-_DIGITS = 9  # more than print has, fewer than the arithmetic of its rounding
 
 
 def printed(paper: Paper, table: PrintedTable) -> Table:
@@ -50,13 +48,7 @@ def audited(paper: Paper) -> Table:
         "reading": "Likely reading",
     }
     columns = tuple(Column((name,), heading, text=True) for name, heading in headings.items())
-    rows = tuple(
-        Row(
-            vars(one) | {"what": f"{one.what} (remark)" if one.is_remark else one.what},
-            group=f"Table {one.table}",
-        )
-        for one in audit(paper)
-    )
+    rows = tuple(Row(slip, group=f"Table {slip['table']}") for slip in paper.slips)
     title = f"{paper.name}: what cannot be as printed."
     return Table(f"{paper.key}_audit", title, columns, rows, (paper.citation,))
 
@@ -70,7 +62,7 @@ def beside(tag: str, results: Results) -> Table:
     """This study's means beside the printed ones; ``tag`` is table1 to table4."""
     paper = load_paper(COMPARED)
     table = paper.table(int(tag.removeprefix("table")))
-    meant = as_meant(table)
+    meant = table.as_meant()
     columns = [Column(("row",), "Row", text=True), Column(("n",), "n here", count)]
     for method in table.methods:
         if method in _METHODS:
@@ -86,10 +78,9 @@ def beside(tag: str, results: Results) -> Table:
         values: dict[str, Cell] = {"row": row.name, "unit": "", "n": nan, "printed_unit": row.unit}
         for method in (RM_MASS, *table.methods):
             cell = true.cells.get(method)
-            ends = (cell.mean, cell.sd) if cell is not None else (None, None)
-            middles = (nan if one is None else round(one.middle, _DIGITS) for one in ends)
+            numbers = (cell.mean, cell.sd) if cell is not None else (nan, nan)
             values |= dict.fromkeys(_here(method), nan)
-            values |= dict(zip(_here(method, "_printed"), middles, strict=True))
+            values |= dict(zip(_here(method, "_printed"), numbers, strict=True))
         moved = [m for m in table.methods if true.cells.get(m) != row.cells.get(m)]
         marks = {f"{method} in print": _MOVED for method in moved}
         rows.append(Row(values | _found_here(tag, results, row), marks=marks))
@@ -140,7 +131,6 @@ def _notes(paper: Paper, as_printed: PrintedTable, meant: PrintedTable) -> Itera
     yield f"Printed values: {paper.citation} ({paper.url})."
     if meant != as_printed:
         yield f"{_MOVED} In print these cells stand in each other's place (bsip published audit)."
-    unit = unit_of_length(paper, as_printed)
-    if unit:
+    if unit := as_printed.fits_unit:
         rows = " and ".join(row.name for row in as_printed.rows if row.error_of)
         yield f"The printed {rows} fit {unit}, whatever the text says (bsip published audit)."

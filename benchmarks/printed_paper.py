@@ -1,4 +1,4 @@
-"""The papers' tables as data, one file per paper beside this one, and what was likely meant."""
+"""The papers' tables for the audit: every number stands for all that are printed so."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import combinations, product
-from pathlib import Path
 from typing import Any, Literal
 
-from bsip_cli.errors import UsageError
+from bsip_cli.statistics.published import FOLDER
 
 # --- numbers as print gives them: every one stands for all that round to it -----------------------
 
@@ -175,7 +174,7 @@ class Row:
 class PrintedTable:
     """star : what a star behind p means, `p < alpha` or `p > alpha`. marks : of cells, between
     which methods they say a difference. values : behind each mean of a summary. errors_in : number
-    of the table with the errors of these paths.
+    of the table with the errors of these paths. exchanged, fits_unit : as the shipped file says.
     """
 
     paper: str
@@ -190,6 +189,8 @@ class PrintedTable:
     claims: tuple[Claim, ...] = ()
     values: int = 0
     errors_in: int = 0
+    exchanged: tuple[tuple[str, str], ...] = ()
+    fits_unit: str = ""
 
     def row(self, name: str) -> Row:
         return next(row for row in self.rows if row.name == name)
@@ -215,17 +216,10 @@ class Paper:
         return next(table for table in self.tables if table.number == number)
 
 
-def names() -> tuple[str, ...]:
-    """The papers that are there."""
-    return tuple(sorted(path.stem for path in Path(__file__).parent.glob("*.toml")))
-
-
 @cache
 def load_paper(name: str) -> Paper:
-    """A paper by its key; UsageError if there is none."""
-    if name not in names():
-        raise UsageError(f"there is no paper {name!r}", expected=", ".join(names()))
-    data = tomllib.loads((Path(__file__).parent / f"{name}.toml").read_text(encoding="utf-8"))
+    """A shipped paper by its key."""
+    data = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
     data["tables"] = tuple(_table(data["key"], **one) for one in data["tables"])
     for key, read in (("body_mass_kg", Cell.of), ("sequence_s", rounded_from)):
         data |= {key: read(data[key])} if key in data else {}
@@ -237,6 +231,7 @@ def _table(
 ) -> PrintedTable:
     """A table of the file; ``plain``: what stands in it as it is."""
     plain["rows"] = tuple(_row(methods, {"unit": unit} | one) for one in rows)
+    plain["exchanged"] = tuple(map(tuple, plain.get("exchanged", ())))
     plain["marks"] = {sign: tuple(pair) for sign, pair in plain.get("marks", {}).items()}
     claims = (one | {"but": tuple(one.get("but", ()))} for one in plain.get("claims", ()))
     plain["claims"] = tuple(Claim(**one) for one in claims)

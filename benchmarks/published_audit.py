@@ -1,7 +1,12 @@
-"""Everything in a paper that its own numbers contradict."""
+"""Everything in a paper that its own numbers contradict; writes what ``bsip published`` lists.
+
+The papers are the files in `bsip_cli/statistics/published`, where `audit.csv` is written.
+"""
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Callable, Iterator
 from itertools import product
 from math import copysign, inf, nan, pi, sqrt
@@ -10,7 +15,7 @@ import numpy as np
 from scipy import stats
 from scipy.optimize import minimize_scalar
 
-from bsip_cli.statistics.published.paper import (
+from benchmarks.printed_paper import (
     Cell,
     Claim,
     Interval,
@@ -21,9 +26,11 @@ from bsip_cli.statistics.published.paper import (
     as_meant,
     exchanged_cells,
     image,
+    load_paper,
     place_words,
     places,
 )
+from bsip_cli.statistics.published import FOLDER, names
 
 
 def _unlike(
@@ -415,3 +422,23 @@ def _is_false(paper: Paper, table: PrintedTable, row: Row, claim: Claim) -> bool
     is_different = row.printed("p").is_below(paper.alpha)
     should = (claim.says == "different") != (row.name in claim.but)
     return is_different is not None and is_different != should
+
+
+# --- what ships -----------------------------------------------------------------------------------
+
+COLUMNS = ("paper", "table", "row", "what", "printed", "recomputed", "reading")
+
+
+def audit_csv() -> str:
+    """The slips of all papers."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for slip in (slip for name in names() for slip in audit(load_paper(name))):
+        what = f"{slip.what} (remark)" if slip.is_remark else slip.what
+        writer.writerow([what if name == "what" else getattr(slip, name) for name in COLUMNS])
+    return text.getvalue()
+
+
+if __name__ == "__main__":
+    (FOLDER / "audit.csv").write_text(audit_csv(), encoding="utf-8")

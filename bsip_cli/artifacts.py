@@ -55,8 +55,6 @@ def as_read(kind: str, frame: Rows) -> pd.DataFrame:
 def write_artifact(path: Path, kind: str, frame: Rows, provenance: Mapping) -> None:
     """Write a table under its final name only when it is whole.
 
-    Parameters
-    ----------
     frame : columns as the kind's schema says; a missing or an unknown one is a bug. Or rows, of
         which these columns are written.
     provenance : what made it; stored as JSON in the file's metadata.
@@ -76,8 +74,6 @@ def write_artifact_in_parts(
 ) -> None:
     """Write a table that is longer than the memory; a row group for each part.
 
-    Parameters
-    ----------
     provenance : asked for when the last part is written.
     """
     layout = SCHEMAS[kind]
@@ -112,10 +108,7 @@ def _row_groups(file: pq.ParquetFile) -> Iterator[pa.Table]:
 def write_atomically(path: Path, write) -> None:
     """Call ``write`` with a temporary path beside ``path``, then rename it into place.
 
-    Raises
-    ------
-    NotWritableError
-        The disk is full, or the place cannot be written to; what was there stays.
+    NotWritableError: the disk is full, or the place cannot be written to; what was there stays.
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}{_UNFINISHED}")
     try:
@@ -153,10 +146,7 @@ def remove_unfinished(folder: Path) -> None:
 def remove(path: Path) -> None:
     """Take a file away, if it is there.
 
-    Raises
-    ------
-    NotWritableError
-        The place is closed.
+    NotWritableError: the place is closed.
     """
     try:
         path.unlink(missing_ok=True)
@@ -168,16 +158,11 @@ def remove(path: Path) -> None:
 def read_artifact(path: Path, kind: str, **wanted: Collection[str]) -> pd.DataFrame:
     """Read a table of a known kind and version.
 
-    Parameters
-    ----------
     wanted : by the name of a text column, the values of which rows are read; the others never
         come into memory all at once.
 
-    Raises
-    ------
-    BadDataError
-        The file is not an artifact of this kind, has changed since it was written, or is of a
-        version this bsip does not know.
+    BadDataError: the file is not an artifact of this kind, has changed since it was written, or is
+        of a version this bsip does not know.
     """
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
@@ -195,11 +180,8 @@ def read_artifact(path: Path, kind: str, **wanted: Collection[str]) -> pd.DataFr
 def read_header(path: Path, kind: str | None = None) -> dict[str, Any]:
     """Kind, schema version and provenance of an artifact, without its data.
 
-    Raises
-    ------
-    BadDataError
-        The file is missing, is not an artifact or has changed since it was written; with ``kind``,
-        it is of another kind or version.
+    BadDataError: the file is missing, is not an artifact or has changed since it was written; with
+        ``kind``, it is of another kind or version.
     """
     try:
         found = _header_in(pq.read_schema(path))
@@ -214,10 +196,7 @@ def read_header(path: Path, kind: str | None = None) -> dict[str, Any]:
 def is_made_from(path: Path, source: Path) -> bool:
     """Whether an artifact was made from an input as it stands now.
 
-    Raises
-    ------
-    BadDataError
-        ``path`` is missing or is not an artifact.
+    BadDataError: ``path`` is missing or is not an artifact.
     """
     known = read_header(path)["provenance"]["made_by"]["inputs"]
     return source.exists() and known.get(source.name) == file_hash(source)

@@ -34,8 +34,6 @@ Metre = Annotated[float, Field(ge=-2, le=2)]
 class Load(Section):
     """A mass that is worn or carried, a point in the frame of its segment.
 
-    Attributes
-    ----------
     position_m : in the segment's frame (X anterior, Y up, Z right), from the segment's origin.
     participants, tasks, runs : which trials carry it; empty means all.
     """
@@ -196,10 +194,8 @@ class Config(Section):
 def load_config(files: Iterable[Path], estimators: Sequence[str] = ()) -> Config:
     """Defaults, then each file that is there in turn; other estimators, in order, where given.
 
-    Raises
-    ------
-    UsageError
-        A file is not TOML, or holds unknown options or values out of range: all named at once.
+    UsageError: a file is not TOML, or holds unknown options or values out of range: all named at
+        once.
     """
     there = [file for file in files if os.path.lexists(file)]
     other = {"identify": {"estimators": list(dict.fromkeys(estimators))}} if estimators else {}
@@ -210,10 +206,7 @@ def load_config(files: Iterable[Path], estimators: Sequence[str] = ()) -> Config
 def config_of(*given: Mapping, file: str = "the options") -> Config:
     """Defaults, then each of these in turn.
 
-    Raises
-    ------
-    UsageError
-        Unknown options, or values out of range: all named at once, as those of ``file``.
+    UsageError: unknown options, or values out of range: all named at once, as those of ``file``.
     """
     merged = read_toml(shipped("default.toml"))
     for options in given:

@@ -19,8 +19,6 @@ def printable(text: str) -> str:
 class BsipError(Exception):
     """Base of all errors that are not bugs.
 
-    Parameters
-    ----------
     found : what was found, as a clause without a full stop.
     expected : what should have been there.
     remedy : what the user can do about it.

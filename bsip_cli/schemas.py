@@ -55,10 +55,7 @@ class Schema:
 def _columns(text: str, groups: dict[str, str]) -> tuple[Column, ...]:
     """Of lines as the file explains them.
 
-    Raises
-    ------
-    ValueError
-        A line is none of these.
+    ValueError: a line is none of these.
     """
     found: list[Column] = []
     for line in text.strip().splitlines():

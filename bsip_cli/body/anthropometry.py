@@ -148,8 +148,6 @@ _ALONG = {"foot": 0}  # axis of a segment's length; Y, 1, of all others
 class Strays:
     """Standard deviations of a person's segments about the table, in %.
 
-    Attributes
-    ----------
     mass : (n,) of the segment's mass.
     com : (n, 3) of the length of a rod with the segment's mass and mean moment of inertia, segment
         axes; NaN where no source was found.

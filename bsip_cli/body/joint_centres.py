@@ -208,10 +208,7 @@ class JointCentres:
 def joint_centres(landmarks: Mapping[str, np.ndarray], sex: str, stature_m: float) -> JointCentres:
     """Joint centres of the whole body; trunk and arms may lack landmarks, pelvis and legs not.
 
-    Raises
-    ------
-    BadDataError
-        Landmarks without which there is no skeleton are missing: all are named.
+    BadDataError: landmarks without which there is no skeleton are missing: all are named.
     """
     if missing := missing_landmarks(landmarks.keys()):
         raise BadDataError(

@@ -74,10 +74,8 @@ class MarkerSet:
 def load_marker_set(name: str) -> MarkerSet:
     """Read a marker set: the name of a shipped one, now or formerly, or a path to a TOML file.
 
-    Raises
-    ------
-    UsageError
-        There is no such file, or it names unknown segments or landmarks: all faults at once.
+    UsageError: there is no such file, or it names unknown segments or landmarks: all faults at
+        once.
     """
     file = Path(name) if name.endswith(".toml") else shipped("markersets", f"{name}.toml")
     if not (name.endswith(".toml") or file.exists()):

@@ -40,8 +40,6 @@ class Person:
     All segment axes are parallel in the neutral pose but for the hinges' tilts. A hinge turns
     about ``Rx(parent_tilt) z`` in the parent and about ``Rx(child_tilt) z`` in the segment.
 
-    Attributes
-    ----------
     joint_in_parent_m : (n, 3) joint centre in the parent's segment frame (zeros for the base).
     parent_tilt_rad, child_tilt_rad : (n,) tilt of hinges about X; zero for other joints.
     origin_in_joint_m : (n, 3) from the joint centre to the segment's origin, segment axes; only

@@ -36,8 +36,6 @@ _V_PARTS = {
 class Skeleton:
     """A tree of segments in depth-first order; all tuples run over the segments.
 
-    Attributes
-    ----------
     parents : index of the parent segment, -1 for the floating base, which comes first.
     joints : name of the joint to the parent.
     table_rows : row of the anthropometric table that gives the segment's inertia; empty for links
@@ -133,10 +131,7 @@ class Skeleton:
 def named_file(folder: str, name: str, what: str) -> Path:
     """The shipped file of this name in a folder of configs, or the one at a path.
 
-    Raises
-    ------
-    UsageError
-        There is no such file: the shipped names are told.
+    UsageError: there is no such file: the shipped names are told.
     """
     file = Path(name) if name.endswith(".toml") else shipped(folder, f"{name}.toml")
     if not os.path.lexists(file):
@@ -148,10 +143,7 @@ def named_file(folder: str, name: str, what: str) -> Path:
 def load_skeleton(name: str) -> Skeleton:
     """Read a skeleton file: the name of a shipped one, or a path.
 
-    Raises
-    ------
-    UsageError
-        There is no such file, or its tree is not one: the first fault is named.
+    UsageError: there is no such file, or its tree is not one: the first fault is named.
     """
     file = named_file("skeletons", name, "skeleton")
     data = read_toml(file)

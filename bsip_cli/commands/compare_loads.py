@@ -95,11 +95,8 @@ def _compare(units: list[Unit], names: tuple[str, str]) -> Generator[Outcome, No
 def _sets(unit: Unit, names: tuple[str, str]) -> tuple[list[Trial], list[Trial]]:
     """The recordings with and without: those named, or of the others that move, by what they carry.
 
-    Raises
-    ------
-    UsageError
-        No load is declared that tells them apart, a name fits no recording or both sets, or the
-        recordings of one set carry different loads.
+    UsageError: no load is declared that tells them apart, a name fits no recording or both sets, or
+        the recordings of one set carry different loads.
     """
     ready = unit.trials("kinematics", "wrench")
     moving = [trial for trial in ready if trial.role != "static"]

@@ -32,10 +32,7 @@ def versions() -> Iterator[str]:
 def artifact_info(path: Path) -> Iterator[str]:
     """The lines of what an artifact holds and what made it.
 
-    Raises
-    ------
-    BadDataError
-        It is not there, or no artifact.
+    BadDataError: it is not there, or no artifact.
     """
     check_regular(path)
     yield from map(printable, _lines(path))
@@ -81,10 +78,7 @@ def _made(made_by: dict[str, Any], title: str) -> Iterator[str]:
 def papers(what: str, paper: str | None) -> Iterator[str]:
     """The parts of the answer as Markdown: ``what`` is show or audit; of one paper, or of all.
 
-    Raises
-    ------
-    UsageError
-        There is no such paper.
+    UsageError: there is no such paper.
     """
     for one in (load_paper(name) for name in ([paper] if paper else names())):
         if what == "show":

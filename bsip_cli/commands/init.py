@@ -164,13 +164,9 @@ def init_command(given: tuple[Path, ...], out: Path, participant: str, link: boo
 
     Returns 0, or 3 where a recording cannot be used.
 
-    Raises
-    ------
-    UsageError
-        Something that is given is not there, the study's folder is not empty or cannot be written,
-        or the participant's name cannot be one.
-    BadDataError
-        No recording can be used.
+    UsageError: something that is given is not there, the study's folder is not empty or cannot be
+        written, or the participant's name cannot be one.
+    BadDataError: no recording can be used.
     """
     wished = participant
     if participant and not NAME.fullmatch(participant):

@@ -65,10 +65,7 @@ class Source(Found):
 def list_files(given: Sequence[Path], out: Path) -> list[Listed]:
     """All files that are given or lie below given folders, but hidden ones and those in ``out``.
 
-    Raises
-    ------
-    UsageError
-        One is not there, or may not be read.
+    UsageError: one is not there, or may not be read.
     """
     folders = [path for path in given if is_folder(path)]
     listed: dict[Path, Listed] = {}

@@ -161,10 +161,7 @@ def _segment_rows(
 def _write_starter(file: Path, guess: Guess, write: Path | None) -> None:
     """Write the labels of the file as a marker set; never over a file that is there.
 
-    Raises
-    ------
-    UsageError
-        The file that was asked for is there, or cannot be written.
+    UsageError: the file that was asked for is there, or cannot be written.
     """
     target = write or Path(f"{file.stem.replace(' ', '_')}_markers.toml")
     text = starter_toml(

@@ -38,12 +38,8 @@ _NO_FAULT = ("none", "unexplained", "inconclusive")
 def methods_text(out: Path) -> str:
     """The paragraph with its references, of the results in a folder, as they were made.
 
-    Raises
-    ------
-    UsageError
-        There are no identified parameters in it.
-    BadDataError
-        An artifact cannot be read.
+    UsageError: there are no identified parameters in it.
+    BadDataError: an artifact cannot be read.
     """
     study = _Results(out)
     if not study.people:

@@ -52,10 +52,7 @@ _known: dict[str, _Known] = {}
 def fingerprint(path: Path) -> Fingerprint:
     """Of a regular file, from memory if size, times and inode are what they were.
 
-    Raises
-    ------
-    BadDataError
-        It is missing, is no regular file, or cannot be read.
+    BadDataError: it is missing, is no regular file, or cannot be read.
     """
     name = str(path.absolute())
     try:

@@ -18,10 +18,7 @@ def is_folder(path: Path) -> bool:
 def check_path(path: Path) -> None:
     """Refuse a path that the libraries for C3D and Parquet cannot open.
 
-    Raises
-    ------
-    UsageError
-        It holds bytes that are no UTF-8.
+    UsageError: it holds bytes that are no UTF-8.
     """
     try:
         str(path).encode()
@@ -34,10 +31,7 @@ def check_path(path: Path) -> None:
 def entries(folder: Path) -> list[Path]:
     """Everything in a folder that is not hidden, sorted.
 
-    Raises
-    ------
-    BadDataError
-        The folder cannot be listed.
+    BadDataError: the folder cannot be listed.
     """
     try:
         paths = (path for path in folder.iterdir() if not path.name.startswith("."))

@@ -20,10 +20,7 @@ def trial_stem(forces: Path) -> str:
 def forces_beside(trc: Path) -> Path | None:
     """The file of ground forces beside a TRC, in small letters or capitals; None without one.
 
-    Raises
-    ------
-    BadDataError
-        There are several, and which one is meant cannot be known.
+    BadDataError: there are several, and which one is meant cannot be known.
     """
     own = trc.stem.casefold()
     found = [

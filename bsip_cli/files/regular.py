@@ -41,10 +41,7 @@ def fault_of(path: Path) -> str:
 def check_regular(path: Path, error: type[BsipError] = BadDataError) -> None:
     """Refuse what is no regular file that can be read, without opening it.
 
-    Raises
-    ------
-    BadDataError
-        Or ``error``, where another one is asked for.
+    BadDataError: or ``error``, where another one is asked for.
     """
     if fault := fault_of(path):
         raise error(
@@ -58,10 +55,7 @@ def check_regular(path: Path, error: type[BsipError] = BadDataError) -> None:
 def read_toml(file: Path) -> dict:
     """The content of a TOML file.
 
-    Raises
-    ------
-    UsageError
-        It cannot be read, or is not TOML.
+    UsageError: it cannot be read, or is not TOML.
     """
     check_regular(file, UsageError)
     try:

@@ -40,18 +40,13 @@ def calibrate(
 ) -> Calibration:
     """Build the skeleton from marker positions in one standing pose.
 
-    Parameters
-    ----------
     positions : label to (3,) world position [m], Z up; only markers that are visible.
     sex : M, F or other, for the joint-centre regressions.
     height_m : stature, or None to estimate it from the long segments.
     trials : of each trial, label to (N, 3) positions [m]: knees and ankles without markers are
         found from their movement there.
 
-    Raises
-    ------
-    BadDataError
-        Landmarks are missing (all are named).
+    BadDataError: landmarks are missing (all are named).
     """
     gathered: dict[str, list[np.ndarray]] = {}
     for marker in marker_set.markers:
@@ -256,8 +251,6 @@ _LEAST_FRAMES = 20
 class FunctionalJoint:
     """The point and the line that stay where they are in both segments, in the reference pose.
 
-    Attributes
-    ----------
     point : (3,) on the axis, nearest to the markers' middle [m].
     axis : (3,) unit vector of the direction in which the point is known worst.
     turned_rad : largest turn of one segment against the other from the reference pose.
@@ -292,8 +285,6 @@ def functional_joint(
 ) -> FunctionalJoint | None:
     """The joint between two clusters of markers; None without enough frames.
 
-    Parameters
-    ----------
     proximal, distal : (N, k, 3) world positions of each cluster [m], k of at least 3, NaN where
         missing; frames in which one is missing are left out.
     reference_proximal, reference_distal : (k, 3) world positions in the pose that counts.
@@ -337,8 +328,6 @@ def functional_landmarks(
     """Epicondyles and malleoli (3,) [m] in the reference pose of the sides that have neither, where
     movement shows the joints, and how they were found, in words.
 
-    Parameters
-    ----------
     landmarks : those that have markers, in the reference pose; without pelvis and feet nothing is
         found.
     reference : label to (3,) position in the reference pose.

@@ -20,8 +20,6 @@ _KINDS = {"free": kernel.FREE, "spherical": kernel.SPHERICAL, "revolute": kernel
 class Poses:
     """Least-squares poses of N frames.
 
-    Attributes
-    ----------
     q : (N, nq) configurations in Pinocchio's order (quaternions x, y, z, w).
     residual_m : (N, m) distance of each marker from its model, NaN where missing.
     coordinate_sd : (N, nv) standard deviation of each coordinate [m or rad], given those nearer
@@ -112,17 +110,12 @@ def solve_poses(
 ) -> Poses:
     """Weighted least squares on all markers, robust beyond a limit, each frame from the last.
 
-    Parameters
-    ----------
     markers_m : (N, m, 3) world positions in the order of ``person.markers``, NaN where missing.
     q_first : (nq,) where the first frame starts.
     marker_sd_m, robust_limit_m, posture_sd_rad, iterations : as in configs/default.toml, [ik];
         ``posture_sd_rad`` may differ between coordinates (nv,).
 
-    Raises
-    ------
-    BadDataError
-        There is no frame, or no marker in any frame and that is not allowed.
+    BadDataError: there is no frame, or no marker in any frame and that is not allowed.
     """
     if not may_show_nothing and not np.isfinite(markers_m).any():
         raise BadDataError("no marker is visible in any frame", expected="tracked markers")

@@ -64,8 +64,6 @@ _PRIOR_M = 1e-3  # against the markers' metres: what no marker shows stays where
 class PoseResponse:
     """The least-squares step of the inverse kinematics at poses q (N, nq).
 
-    Attributes
-    ----------
     weights : (N, m) of the markers; 0 where one is missing.
     inverse : (N, nv, nv) of the weighted normal matrix, with a weak prior on all coordinates.
     """

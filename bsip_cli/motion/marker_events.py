@@ -25,8 +25,6 @@ _LEAST_ERROR = 1e-6  # keeps columns that stand still from making the equations 
 class LevelChange:
     """The most likely change of level of a signal.
 
-    Attributes
-    ----------
     at : index of the first sample at the new level.
     step : (d,) new level less old one, in the signal's unit.
     step_sd : standard deviation of the step, each direction.
@@ -49,8 +47,6 @@ class _Problem:
     sqrt(1 - r^2) z[0]; so every product of whitened signals follows from these sums, and no
     correlation that is tried needs the samples again.
 
-    Attributes
-    ----------
     z : (n, 1 + k + d); ``of_x`` = 1 + k.
     squares, neighbours, ends : sums of z z', of z[t] z[t - 1]' and its transpose, and of the
         first and the last sample's z z'.
@@ -111,16 +107,12 @@ def find_level_change(
     model, or a step would look like correlation. A step that the columns could make as well gets
     a large standard deviation and no significance.
 
-    Parameters
-    ----------
     coefficient_sd : prior spread of the columns' coefficients: columns that show a small step of
         their own cannot explain a large one of the signal.
     least : samples at least on each side of the step.
     at : where the step is, or None to look for the place with the largest gain.
 
-    Returns
-    -------
-    None where there are too few samples, or no place for a step.
+    Returns None where there are too few samples, or no place for a step.
     """
     n = len(y)
     places = np.arange(least, n - least + 1) if at is None else np.array([at])
@@ -262,8 +254,6 @@ _DONE = {True: "corrected", False: "not clear enough to correct, left as recorde
 class MarkerEvent:
     """One marker that is not where the model may expect it.
 
-    Attributes
-    ----------
     partner : the other marker of a swap, else empty.
     start_s, end_s : a slip lasts until the trial's end, an offset fills the trial.
     size_m : length of the jump, the slip or the offset on the segment; of a swap the distance

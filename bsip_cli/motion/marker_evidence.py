@@ -393,8 +393,6 @@ def block_means(x: np.ndarray, frames: int) -> np.ndarray:
 class Evidence:
     """What is wrong with the markers of one trial.
 
-    Attributes
-    ----------
     events : in the order of time.
     markers_m : (N, m, 3) the markers with exchanged labels corrected.
     """
@@ -410,8 +408,6 @@ class Evidence:
 def marker_evidence(fit: MarkerFit, refit: Refit, filled: np.ndarray | None = None) -> Evidence:
     """All events of one trial, and the markers without its swaps.
 
-    Parameters
-    ----------
     refit : poses fitted to other markers (n, m, 3) at times (n,); called only where labels may be
         exchanged.
     filled : (N, m) positions that were estimated over a gap: they may jump, but are no evidence

@@ -33,8 +33,6 @@ class Exchange:
 class Labelling:
     """A fit and the labels it rests on.
 
-    Attributes
-    ----------
     fit : poses and markers with the labels corrected.
     order : (N, m) under each label, the recorded label of the marker that bears it now.
     events : the exchanges that were found, corrected or not.
@@ -74,8 +72,6 @@ def put_right(
     the others are left as labelled and the poses fitted again without them, until that holds of
     all that remain. All markers together must fit better than before, or none is exchanged.
 
-    Parameters
-    ----------
     again : the fit with all suspected labels exchanged (:func:`refitted`).
     """
     fit, kept = labelling.fit, list(suspected)

@@ -23,8 +23,6 @@ _USUAL_M = 0.03  # how far a displaced marker moves, before the data speak
 class MarkerFit:
     """Markers of N frames and the poses fitted to them.
 
-    Attributes
-    ----------
     labels, segments : (m,) names of the markers and of the segments they sit on.
     times_s : (N,).
     measured_m, model_m : (N, m, 3) world; NaN where a marker is missing.
@@ -156,16 +154,12 @@ def best_source(
 ) -> tuple[int, np.ndarray]:
     """Which one marker's displacement explains a field of residuals best.
 
-    Parameters
-    ----------
     response : as of :class:`MarkerFit`.
     field : (m, 3) residuals or changes of them, NaN where unknown; ``sd`` (m,).
     candidates : markers to choose from.
 
-    Returns
-    -------
-    The marker and its displacement (3,) [m] on the segment, drawn to zero where the pose would
-    follow it anyway.
+    Returns the marker and its displacement (3,) [m] on the segment, drawn to zero where the pose
+    would follow it anyway.
     """
     known = np.flatnonzero(np.isfinite(sd) & np.isfinite(field[:, 0]))
     weight = np.repeat(1.0 / sd[known], 3)

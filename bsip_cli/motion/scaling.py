@@ -72,8 +72,6 @@ def refine(
 ) -> Refinement:
     """Fit the person's geometry to N frames chosen from all trials.
 
-    Parameters
-    ----------
     markers_m : (N, m, 3) world positions, NaN where missing.
     q : (N, nq) poses to start from.
     ik : keyword options of :func:`solve_poses`.
@@ -353,8 +351,6 @@ def refine_over_trials(
     A marker that sits elsewhere throughout fewer than half of the trials has no say there, since it
     would drag its place in the model towards the middle: the fit is made again without it.
 
-    Parameters
-    ----------
     standing : the one frame that the calibration is like, of the trial with this number.
     ik : keyword options of :func:`solve_poses`.
     """

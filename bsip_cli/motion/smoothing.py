@@ -39,8 +39,6 @@ def skin_corner_hz(
 
     0 where there are too few markers to leave residuals.
 
-    Parameters
-    ----------
     q : (N, nq) poses.
     markers : (N, m, 3) where they were seen [m]; NaN where not.
     white_m : the markers' white noise, each direction.
@@ -114,8 +112,6 @@ def smooth_motion(
     Quaternions are smoothed as curves in four dimensions and brought back to the unit sphere, so
     no orientation is singular; velocities follow from the curve's own derivatives.
 
-    Parameters
-    ----------
     q : (N, nq) poses.
     determined : (N,), or (N, joints): which are to be believed; the others are bridged.
     markers : (N, m, 3) where they were seen [m]; NaN where not.
@@ -123,10 +119,7 @@ def smooth_motion(
     method, butterworth_cutoff_hz, pace_window_s, skin_factor, skin_from_hz, edge_s : as in
         configs/default.toml, [smoothing].
 
-    Raises
-    ------
-    BadDataError
-        Too few frames are determined.
+    BadDataError: too few frames are determined.
     """
     skeleton = person.skeleton
     known = determined.reshape(len(q), -1) & np.ones(len(skeleton.joints), dtype=bool)

@@ -85,17 +85,12 @@ def smooth(
 ) -> SmoothSignal:
     """Smooth all channels by one stiffness that changes over time.
 
-    Parameters
-    ----------
     samples : (N, channels); NaN where missing, which is bridged, each channel on its own.
     window_s : time over which the pace of the motion is judged.
     noise_sd : (channels,) white noise of the samples, estimated from them where not given.
     skin : coloured noise beside it; none where not given.
 
-    Raises
-    ------
-    ValueError
-        There are fewer than 12 samples, or a channel has none.
+    ValueError: there are fewer than 12 samples, or a channel has none.
     """
     count = len(samples)
     if count < _FEWEST or not np.isfinite(samples).any(axis=0).all():

@@ -20,10 +20,7 @@ _MOVED = "what all persons together tell has moved"
 def why_stale(unit: Unit) -> str:
     """Why a unit has work to do, as a clause; empty if all that it writes is there and true.
 
-    Raises
-    ------
-    BadDataError
-        A file that it reads cannot be read.
+    BadDataError: a file that it reads cannot be read.
     """
     if unit.refusal_path().exists():
         return "it was refused before"
@@ -155,10 +152,7 @@ def outdated(path: Path) -> str:
 
     Its code has changed, or an artifact that it was made from, or one that that was made from.
 
-    Raises
-    ------
-    BadDataError
-        It is missing, is no artifact or has changed since it was written.
+    BadDataError: it is missing, is no artifact or has changed since it was written.
     """
     waiting, seen = [path], set()
     while waiting:

@@ -137,15 +137,11 @@ def work_on(
 ) -> Iterator[Result | Died[Task]]:
     """The results of ``work`` on each task as they come, from so many processes at once.
 
-    Parameters
-    ----------
     work : a function of a module, since it is found by its name in another process.
     tidy : what is to be done for a task whose worker was killed in its middle.
 
-    Raises
-    ------
-    EndedError
-        This process, or one of the workers, was asked to end. All workers have ended by then.
+    EndedError: this process, or one of the workers, was asked to end. All workers have ended by
+        then.
     """
     pending, workers = deque(tasks), list[_Worker[Task]]()
     jobs = min(jobs, len(pending))

@@ -105,10 +105,7 @@ def run_stages(
 ) -> Generator[Outcome, None, None]:
     """Run ``stages`` participant by participant and those of the cohort in turn; yield what became.
 
-    Raises
-    ------
-    EndedError
-        A signal asked this process or one of its workers to end.
+    EndedError: a signal asked this process or one of its workers to end.
     """
     personal, _ = by_level(stages)
     whole = all(stage in personal for stage in by_level(STAGES)[0])
@@ -337,10 +334,7 @@ def held_alone(folder: Path) -> Iterator[None]:
 
     What killed processes left half written there is taken away.
 
-    Raises
-    ------
-    UsageError
-        Another process holds it, or the folder cannot be written to.
+    UsageError: another process holds it, or the folder cannot be written to.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -106,12 +106,8 @@ def open_study(
 ) -> OpenedStudy:
     """Read configuration and study, and make sure that there is a folder for the results.
 
-    Raises
-    ------
-    UsageError
-        An option, the study, a participant or the folder is not what it should be.
-    BadDataError
-        participants.tsv cannot be used.
+    UsageError: an option, the study, a participant or the folder is not what it should be.
+    BadDataError: participants.tsv cannot be used.
     """
     config = _config(root, config_file, estimators)
     roles = config.roles.model_dump()

@@ -76,8 +76,6 @@ def _wrenches(
 class Judgement:
     """By what a trial's wrenches are compared.
 
-    Attributes
-    ----------
     times_s : (N,). valid : (N,) frames with every contact on a plate and a determined pose.
     used : (N,) frames that helped to identify. judged : (N,) frames that count.
     data : held_out, or identification where no other data are left.

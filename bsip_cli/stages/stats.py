@@ -76,10 +76,7 @@ class _Cohort:
     def parts(self) -> Iterator[pd.DataFrame]:
         """The rows of ``values``, some thousands at a time.
 
-        Raises
-        ------
-        BadDataError
-            Nobody has any.
+        BadDataError: nobody has any.
         """
         for name, why in self._unit.left_out.items():
             self._lacks(f"{name} is left out, since {why}", 1, 2, 3, 4, 5, 6, is_told=True)

@@ -245,10 +245,8 @@ def rows_of(chosen: Sequence[str], table: PeopleTable) -> list[Row]:
 def read_people(file: Path) -> PeopleTable:
     """The table's rows and columns; of the cells only who is meant is looked at.
 
-    Raises
-    ------
-    BadDataError
-        It cannot be read, is no such table or lacks a column: all faults of its header at once.
+    BadDataError: it cannot be read, is no such table or lacks a column: all faults of its header at
+        once.
     """
     table = read_text_table(file, lambda names: len({c.name for c in columns_in(names)}))
     if not table.rows:
@@ -299,10 +297,7 @@ def _id_of(written: str, root: Path) -> str:
 def participant_of(row: Row, table: PeopleTable) -> Participant:
     """A row as a participant, still without trials.
 
-    Raises
-    ------
-    BadDataError
-        Cells cannot be used, or are missing: all of the row are named.
+    BadDataError: cells cannot be used, or are missing: all of the row are named.
     """
     if not NAME.fullmatch(row.id):
         raise BadDataError(

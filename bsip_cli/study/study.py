@@ -38,24 +38,16 @@ def load_study(
 ) -> tuple[Study, list[BadDataError]]:
     """Read participants.tsv and list the recordings.
 
-    Parameters
-    ----------
     root : the study's folder.
     roles : task names of the roles ``static`` and ``sequence``.
     chosen : only these participants, in this order; nothing of the others is looked at.
 
-    Returns
-    -------
-    The study, and what had to be refused: a participant whose row or folder cannot be used does
-    not stop the others, nor does a recording.
+    Returns the study, and what had to be refused: a participant whose row or folder cannot be used
+        does not stop the others, nor does a recording.
 
-    Raises
-    ------
-    UsageError
-        There is no study at ``root``, its path cannot be opened by all who read it, or
+    UsageError: there is no study at ``root``, its path cannot be opened by all who read it, or
         participants.tsv does not name who is chosen.
-    BadDataError
-        participants.tsv cannot be read or lacks a column.
+    BadDataError: participants.tsv cannot be read or lacks a column.
     """
     if not is_folder(root):
         raise UsageError(
@@ -178,10 +170,7 @@ BIDS_VERSION = "1.10.0"
 def make_out(out: Path, study: Path) -> None:
     """Make sure that there is a folder for results, apart from the recordings.
 
-    Raises
-    ------
-    UsageError
-        It is the study, lies above it or in a participant's folder, or cannot be made.
+    UsageError: it is the study, lies above it or in a participant's folder, or cannot be made.
     """
     check_path(out)
     if found := _in_the_way(out, study):
@@ -222,10 +211,7 @@ def _is_same(one: Path, other: Path) -> bool:
 def describe_dataset(out: Path, study: Path) -> str:
     """Write the description unless the same one is there; what to say of one of other origin.
 
-    Raises
-    ------
-    UsageError
-        It cannot be written.
+    UsageError: it cannot be written.
     """
     what = "body segment inertial parameters from motion and ground forces"
     description = {

@@ -38,10 +38,7 @@ def read_text_table(file: Path, known: Callable[[Sequence[str]], int]) -> TextTa
 
     known : how many of some names are columns of such a table.
 
-    Raises
-    ------
-    BadDataError
-        It cannot be read, is no text, or has too many columns.
+    BadDataError: it cannot be read, is no text, or has too many columns.
     """
     text, encoding = _text(file)
     lines = text.splitlines(keepends=True)

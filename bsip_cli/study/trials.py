@@ -70,10 +70,7 @@ def trial_named(
 ) -> Trial:
     """A trial by what its file's name says after task-: ``walking`` or ``walking_run-2``.
 
-    Raises
-    ------
-    UsageError
-        The name is none of a trial.
+    UsageError: the name is none of a trial.
     """
     stem = f"{participant}_task-{name}"
     match = _TRIAL.fullmatch(stem)
@@ -127,10 +124,7 @@ class Folder:
     def look_through(self, folder: Path, session: str | None = None) -> None:
         """Say of every entry what it is.
 
-        Raises
-        ------
-        BadDataError
-            The folder cannot be listed.
+        BadDataError: the folder cannot be listed.
         """
         paths = entries(folder)
         names = {path.name.casefold() for path in paths}
@@ -218,10 +212,7 @@ class Folder:
 def find_trials(folder: Path, participant: str, roles: Mapping[str, tuple[str, ...]]) -> Folder:
     """The recordings of a participant, sorted by name, and all else in the folder.
 
-    Raises
-    ------
-    BadDataError
-        The folder cannot be listed.
+    BadDataError: the folder cannot be listed.
     """
     found = Folder(folder, participant, roles)
     found.look_through(folder)

@@ -13,7 +13,7 @@ import numpy as np
 from bsip_cli.body.inertia import Inertia, from_phi, nearest_physical_tensor
 from bsip_cli.body.person import Person
 from bsip_cli.files.regular import read_toml
-from bsip_cli.stated.sex_words import OTHER
+from bsip_cli.stated import OTHER
 
 _MEAN_STATURE_M = {"M": 1.77, "F": 1.61, OTHER: (1.77 + 1.61) / 2}
 

@@ -16,7 +16,7 @@ import numpy as np
 from bsip_cli.body.anthropometry import mean_length_m
 from bsip_cli.errors import BadDataError
 from bsip_cli.segments import in_words
-from bsip_cli.stated.sex_words import OTHER, with_other
+from bsip_cli.stated import OTHER, with_other
 
 # --- skin landmarks in place of joint centres, which markerless systems give ----------------------
 

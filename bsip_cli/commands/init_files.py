@@ -13,8 +13,7 @@ import numpy as np
 
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.files.fingerprints import file_hash
-from bsip_cli.files.folders import entries, is_folder, lies_in
-from bsip_cli.files.force_files import ENDINGS
+from bsip_cli.files.folders import ENDINGS, entries, is_folder, lies_in
 from bsip_cli.files.regular import fault_of
 from bsip_cli.recordings.labels import is_unlabelled
 from bsip_cli.recordings.model import Recording, StatedPerson

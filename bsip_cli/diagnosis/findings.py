@@ -14,8 +14,7 @@ from bsip_cli.diagnosis.fault_model import Fitted
 from bsip_cli.diagnosis.fault_search import Found, Verdict
 from bsip_cli.diagnosis.held_out import HeldOut, plain
 from bsip_cli.diagnosis.hypothesis import Hypothesis
-from bsip_cli.effects.effect import Effect, Reported
-from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
+from bsip_cli.effects.effect import Effect, Reported, digits_of, readable_unit, with_unit
 
 DRAWS = 200
 SCALE_ERROR = 0.03  # of every size: the simulated motion is neither free of noise nor unsmoothed

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from bsip_cli.errors import BadDataError
-from bsip_cli.files.force_files import forces_beside
+from bsip_cli.files.folders import forces_beside
 from bsip_cli.files.regular import check_regular
 from bsip_cli.instruments.readings import Instruments, SensingPlate
 

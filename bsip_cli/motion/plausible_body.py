@@ -17,7 +17,7 @@ _DOUBTED, _IMPOSSIBLE = 1.35, 2.0
 _UNEQUAL = 0.15  # of the mean: left and right differ by 2 % at most in 95 % of people
 _STATURE, _NO_STATURE = 1.12, 1.4  # from the long segments over the stated height
 _LONG = ("torso", "thigh", "shank")
-_BMI = (12.0, 60.0)  # kg/m2: as where masses and heights are read (stated/quantities.py)
+_BMI = (12.0, 60.0)  # kg/m2: as where masses and heights are read (stated.py)
 # Rotation from the neutral pose that no healthy joint goes beyond [degrees]. Shoulders may turn
 # over, and wrists, which turn with the forearm here.
 _REACH = {"waist": 110.0, "neck": 120.0, "hip": 160.0, "ankle": 110.0}

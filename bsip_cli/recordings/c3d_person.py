@@ -8,8 +8,16 @@ import numpy as np
 
 from bsip_cli.recordings.c3d_format import Group, Parameters, texts
 from bsip_cli.recordings.model import Finding, StatedPerson
-from bsip_cli.stated.quantities import HEIGHT, MASS, Quantity, Reading, is_usual_pair, readings_of
-from bsip_cli.stated.sex_words import COLUMN_NAMES, sex_of
+from bsip_cli.stated import (
+    COLUMN_NAMES,
+    HEIGHT,
+    MASS,
+    Quantity,
+    Reading,
+    is_usual_pair,
+    readings_of,
+    sex_of,
+)
 
 _GROUPS = ("PROCESSING", "PATIENT", "PARTICIPANT", "ANTHROPOMETRY", "SUBJECT")
 _SAME = 0.005  # relative: programs round

@@ -13,7 +13,7 @@ from scipy.stats import chi2, norm
 
 from bsip_cli.recordings.model import Finding
 from bsip_cli.recordings.momentum_mass import COMES_AND_GOES, Stretch
-from bsip_cli.stated.quantities import BMI_KG_M2
+from bsip_cli.stated import BMI_KG_M2
 
 # Gain of a plate and local gravity: 0.5 % of the range for a plate's linearity and hysteresis
 # (makers' data sheets), 0.27 % between equator and poles for gravity.

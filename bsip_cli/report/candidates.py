@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
+from bsip_cli.effects.effect import digits_of, readable_unit, with_unit
 from bsip_cli.report.effect_words import (
     MAIN_NUMBERS,
     OBJECTS,

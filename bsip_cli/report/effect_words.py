@@ -9,8 +9,8 @@ from itertools import combinations
 from pathlib import Path
 
 from bsip_cli.effects.catalogue import EFFECTS
+from bsip_cli.effects.effect import digits_of, readable_unit, with_unit
 from bsip_cli.effects.plates import plates_called
-from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.report.words import listing, number, segment_label
 from bsip_cli.segments import SEGMENTS
 

@@ -28,9 +28,8 @@ from bsip_cli.diagnosis.laboratory_search import (
 )
 from bsip_cli.diagnosis.shared_faults import STATED_MASS, Information
 from bsip_cli.effects.catalogue import EFFECTS
-from bsip_cli.effects.effect import Effect
+from bsip_cli.effects.effect import Effect, digits_of, readable_unit, with_unit
 from bsip_cli.effects.plates import ALL
-from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
 from bsip_cli.effects.scene import Scene
 from bsip_cli.report.cohort.laboratory import named_sentences
 from bsip_cli.running.unit import Unit

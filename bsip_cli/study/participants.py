@@ -13,18 +13,21 @@ from pathlib import Path
 
 from bsip_cli.errors import BadDataError, UsageError
 from bsip_cli.files.folders import is_folder
-from bsip_cli.files.regular import fault_of
-from bsip_cli.stated.quantities import (
+from bsip_cli.files.regular import fault_of, read_text_table
+from bsip_cli.stated import (
+    COLUMN_NAMES,
     HEIGHT,
     MASS,
     Quantity,
     Reading,
+    Sex,
     is_usual_pair,
+    legend_in,
+    legend_of,
     odd_pair,
     readings_of,
+    sex_of,
 )
-from bsip_cli.stated.sex_words import COLUMN_NAMES, Sex, legend_in, legend_of, sex_of
-from bsip_cli.study.text_table import read_text_table
 from bsip_cli.study.trials import MANY, Trial
 
 # --- which column of participants.tsv is which, and what header and participants.json say of it ---

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from bsip_cli.errors import BadDataError, UsageError, printable
-from bsip_cli.files.folders import entries, is_folder
-from bsip_cli.files.force_files import ENDINGS, forces_beside, trial_stem
+from bsip_cli.files.folders import ENDINGS, entries, forces_beside, is_folder, trial_stem
 from bsip_cli.files.regular import fault_of
 from bsip_cli.schemas import SCHEMAS
 

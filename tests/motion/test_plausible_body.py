@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from bsip_cli.motion.inverse_kinematics import neutral
 from bsip_cli.motion.plausible_body import doubts_about
-from bsip_cli.stated.quantities import BMI_KG_M2, odd_pair
+from bsip_cli.stated import BMI_KG_M2, odd_pair
 from tests.body.standing_person import standing
 
 

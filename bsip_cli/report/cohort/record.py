@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bsip_cli.effects.readable import digits_of, readable_unit, with_unit
+from bsip_cli.effects.effect import digits_of, readable_unit, with_unit
 from bsip_cli.report.blocks import Light
 from bsip_cli.report.candidates import Candidate, Number, candidates_of, causes_of
 from bsip_cli.report.errors import COP, FORCE, MARKERS

@@ -1,1 +1,0 @@
-"""What is stated of a person, in the words and units that people use."""

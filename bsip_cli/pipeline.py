@@ -7,8 +7,12 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
+from bsip_cli.files.regular import read_toml, shipped
+
 if TYPE_CHECKING:  # artifacts needs pandas, and `bsip --help` must not wait for it
     from bsip_cli.schemas import Level
+
+_SHORT_S = 0.1  # of a unit that takes next to no time
 
 
 @dataclass(frozen=True)
@@ -22,6 +26,7 @@ class Stage:
     entries: only they enter the provenance. ``module`` holds a function ``run(unit)``. ``amends``
     are kinds of its own level that earlier stages write and to which it adds rows. ``part`` tells
     apart two steps of one name and level. ``reads_recordings``: these themselves are input.
+    ``costs_s``: of a unit beside others.
     """
 
     name: str
@@ -35,6 +40,7 @@ class Stage:
     amends: tuple[str, ...] = ()
     part: str = ""
     reads_recordings: bool = False
+    costs_s: float = _SHORT_S
 
     @property
     def label(self) -> str:
@@ -46,195 +52,40 @@ class Stage:
         return (*self.reads, *self.reads_if_there)
 
 
-_SUMMARIES = {
-    "ingest": "Read recordings: markers and ground wrench in SI units, gaps filled, "
-    "contacts found.",
-    "scale": "Build the person's skeleton: lengths, joint centres, markers on their segments.",
-    "ik": "Joint coordinates, velocities and accelerations from the markers.",
-    "regress": "Inertial parameters from an anthropometric table (RM).",
-    "identify": "Inertial parameters that explain the measured ground forces (OM).",
-    "reconstruct": "Ground wrench and centre of pressure from the motion, "
-    "beside the measured ones.",
-    "laboratory": "The faults of plates, clock and vertical, "
-    "by all persons recorded there together.",
-    "diagnose": "What the simulation gets wrong: its cause, how large, how sure.",
-    "extend": "The model extended by what the diagnosis named, and what that gains.",
-    "joints": "Net forces, moments and powers at the joints, with standard deviations.",
-    "choose": "Which parameters to use, by the errors in movements that OM never saw.",
-    "stats": "Tests and summaries over all participants.",
-    "tables": "The papers' tables as CSV, Markdown and LaTeX.",
-    "report": "An HTML report per participant and one for the cohort.",
-}
-_SCENE = "markers kinematics marker-events wrench plates skeleton marker-positions"
+def _read() -> tuple[Stage, ...]:
+    """The stages of ``configs/stages.toml``, which says what its entries mean."""
+    data = read_toml(shipped("stages.toml"))
+    return tuple(_stage(data["summaries"], data["scene"], **row) for row in data["stages"])
 
 
-def _stage(place: str, reads_recordings: bool = False, **names: str) -> Stage:
-    """A stage by ``name level module part``; names of kinds and options by spaces."""
-    name, level, module, part = (*place.split(), "")[:4]
-    lists: Any = {key: tuple(text.split()) for key, text in names.items()}
-    made: Any = {"level": level, "part": part, "reads_recordings": reads_recordings} | lists
-    return Stage(name, summary=_SUMMARIES[name], module="bsip_cli.stages." + module, **made)
+def _stage(
+    summaries: dict[str, str],
+    scene: str,
+    *,
+    step: str,
+    module: str,
+    reads_recordings: bool = False,
+    costs_s: float = _SHORT_S,
+    **kinds: str,
+) -> Stage:
+    """``kinds``: names of kinds and options, by spaces."""
+    name, level, part = (*step.split(), "")[:3]
+    lists: Any = {key: tuple(x.replace("@scene", scene).split()) for key, x in kinds.items()}
+    lists |= {"part": part, "reads_recordings": reads_recordings, "costs_s": costs_s}
+    return Stage(name, level, summaries[name], module="bsip_cli.stages." + module, **lists)  # type: ignore[arg-type]
 
 
-STAGES = (
-    _stage(
-        "ingest participant survey session",
-        writes="readings",
-        options="ingest",
-        reads_recordings=True,
-    ),
-    _stage(
-        "ingest trial ingest",
-        reads="readings",
-        writes="markers wrench plates contacts quality",
-        options="marker_set loads ingest",
-        reads_recordings=True,
-    ),
-    _stage(
-        "scale participant scale",
-        reads="markers wrench",
-        writes="skeleton marker-positions person",
-        options="marker_set skeleton loads roles ingest scale ik",
-    ),
-    _stage(
-        "ik trial ik",
-        reads="markers skeleton marker-positions",
-        writes="kinematics marker-residuals marker-events",
-        options="skeleton ik smoothing",
-    ),
-    _stage(
-        "regress participant regress",
-        reads="skeleton marker-positions person",
-        writes="regression",
-        options="skeleton scale regress prior",
-    ),
-    _stage(
-        "identify participant identify",
-        reads="kinematics wrench skeleton marker-positions regression",
-        writes="bsip covariance base-parameters excitation identification used-blocks",
-        options="skeleton loads roles prior identify",
-    ),
-    _stage(
-        "reconstruct trial reconstruct",
-        reads="kinematics wrench plates skeleton marker-positions person bsip used-blocks",
-        writes="reconstruction fit correlation-difference posturography",
-        options="skeleton loads reconstruct",
-    ),
-    _stage(
-        "laboratory participant laboratory_information",
-        reads=f"{_SCENE} person regression identification",
-        writes="laboratory-information",
-        options="skeleton loads roles ik prior diagnosis reconstruct",
-    ),
-    _stage(
-        "laboratory cohort laboratory",
-        reads="laboratory-information",
-        writes="laboratory laboratory-sums",
-        options="diagnosis laboratory",
-    ),
-    _stage(
-        "diagnose participant diagnose",
-        reads=f"{_SCENE} person regression identification",
-        reads_if_there="laboratory-information laboratory-sums laboratory",
-        writes="overall-diagnosis overall-error-budget detection",
-        options="skeleton loads roles ik prior diagnosis reconstruct",
-    ),
-    _stage(
-        "diagnose trial diagnose_trial",
-        reads="overall-diagnosis overall-error-budget",
-        writes="diagnosis error-budget",
-    ),
-    _stage(
-        "extend participant extend",
-        reads=f"overall-diagnosis {_SCENE} regression bsip identification used-blocks",
-        writes="extended-bsip bsip-change extended-skeleton",
-        options="skeleton loads ik prior identify",
-    ),
-    _stage(
-        "extend trial extend_trial",
-        reads=f"overall-diagnosis {_SCENE} person bsip used-blocks extended-bsip",
-        writes="gain corrected-wrench",
-        amends="reconstruction fit",
-        options="skeleton loads ik reconstruct",
-    ),
-    _stage(
-        "extend participant extend_gain gain",
-        reads="gain",
-        writes="overall-gain",
-    ),
-    _stage(
-        "joints trial joints",
-        reads="markers kinematics marker-events wrench plates contacts skeleton marker-positions "
-        "person bsip covariance identification overall-diagnosis extended-bsip",
-        writes="joint-moments joint-peaks",
-        options="skeleton loads ik joints",
-    ),
-    _stage(
-        "choose participant choose",
-        reads="identification used-blocks fit reconstruction",
-        writes="choice",
-        options="roles",
-    ),
-    _stage(
-        "stats cohort stats",
-        reads="bsip fit posturography correlation-difference",
-        writes="values comparisons",
-        options="roles stats",
-    ),
-    _stage(
-        "tables cohort tables",
-        reads="values comparisons",
-        writes="tables-files",
-        options="stats",
-    ),
-    _stage(
-        "report participant report",
-        reads="quality skeleton marker-positions person kinematics marker-residuals marker-events "
-        "bsip excitation identification reconstruction fit",
-        reads_if_there="overall-diagnosis overall-error-budget detection overall-gain bsip-change "
-        "choice joint-moments joint-peaks",
-        writes="report-files",
-        options="skeleton loads roles",
-    ),
-    _stage(
-        "report cohort group_report",
-        reads="values comparisons person identification tables-files",
-        reads_if_there="overall-diagnosis choice laboratory report-files",
-        writes="group-report-files",
-        options="stats",
-    ),
-)
-
+STAGES = _read()
 
 FINDINGS = ("choose", "diagnose", "laboratory", "extend", "report")
 """Stages whose sentences are results; those of the others are remarks on the way."""
 
 
-_SHORT_S = 0.1
-_COSTS_S = {
-    "ingest participant": 5.0,
-    "ingest trial": 0.3,
-    "scale participant": 5.0,
-    "ik trial": 0.3,
-    "identify participant": 1.7,
-    "reconstruct trial": 0.2,
-    "laboratory participant": 5.0,
-    "laboratory cohort": 3.2,
-    "diagnose participant": 6.0,  # per trial
-    "joints trial": 0.4,
-    "stats cohort": 2.3,
-    "report participant": 5.0,
-    "report cohort": 3.5,
-}
-"""About the geometric means of CPU seconds of fresh runs of a person of the sample, a child (gait),
-squats and jumps (OpenCap) and golf swings, which weigh the units in the bar of a run: the time left
-is right within a factor of two in each. All other units take next to no time."""
-
-
 def cost_s(stage: str, level: str, trials: int) -> float:
     """About how long a unit, of a person with so many trials, takes beside others [s]."""
     unit = f"{stage} {level}"
-    return _COSTS_S.get(unit, _SHORT_S) * (trials if unit == "diagnose participant" else 1)
+    costs = (s.costs_s for s in STAGES if (s.name, s.level) == (stage, level))
+    return max(costs, default=_SHORT_S) * (trials if unit == "diagnose participant" else 1)
 
 
 def stages_named(name: str) -> tuple[Stage, ...]:

@@ -19,7 +19,7 @@ ALLOWED = {
     "config": "errors files",
     "schemas": "files",
     "artifacts": "errors files schemas",
-    "pipeline": "schemas",
+    "pipeline": "files schemas",
     "stated": "",
     "study": "__init__ artifacts body config errors files schemas stated",
     "running": "__init__ artifacts body config errors files pipeline schemas study",

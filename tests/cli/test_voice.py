@@ -4,7 +4,6 @@ import re
 import time
 from io import StringIO
 
-from bsip_cli.pipeline import _COSTS_S, STAGES
 from bsip_cli.running.runner import Outcome
 from bsip_cli.running.session import follow
 
@@ -69,7 +68,3 @@ def test_the_bar_counts_what_a_unit_costs_and_not_what_need_not_be_done(monkeypa
     assert drawn[0] == 0
     assert 10 in drawn  # 2 of 20
     assert drawn[-1] == 25  # 2 of 8
-
-
-def test_every_cost_is_of_a_unit_that_there_is():
-    assert set(_COSTS_S) <= {f"{stage.name} {stage.level}" for stage in STAGES}

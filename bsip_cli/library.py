@@ -16,7 +16,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
 
@@ -291,7 +290,7 @@ class Person:
                 )
             return
         try:
-            import_module(unit.stage.module).run(unit)
+            unit.stage.run(unit)
         except BsipError as error:
             self.refused[unit.stage.name, self._names[unit.trial.stem] if unit.trial else ""] = (
                 error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
@@ -23,10 +24,10 @@ class Stage:
     artifact gets its own participant's; a participant stage that reads a trial's gets those of
     all trials; a cohort stage reads everybody's. What is in ``reads_if_there`` counts as an input
     where it exists, and is not missed where it does not. ``options`` are names of configuration
-    entries: only they enter the provenance. ``module`` holds a function ``run(unit)``. ``amends``
-    are kinds of its own level that earlier stages write and to which it adds rows. ``part`` tells
-    apart two steps of one name and level. ``reads_recordings``: these themselves are input.
-    ``costs_s``: of a unit beside others.
+    entries: only they enter the provenance. ``module`` holds the ``function`` of a unit that does
+    it. ``amends`` are kinds of its own level that earlier stages write and to which it adds rows.
+    ``part`` tells apart two steps of one name and level. ``reads_recordings``: these themselves are
+    input. ``costs_s``: of a unit beside others.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Stage:
     part: str = ""
     reads_recordings: bool = False
     costs_s: float = _SHORT_S
+    function: str = "run"
 
     @property
     def label(self) -> str:
@@ -50,6 +52,10 @@ class Stage:
     def inputs(self) -> tuple[str, ...]:
         """Every kind that it may read."""
         return (*self.reads, *self.reads_if_there)
+
+    def run(self, unit: Any) -> None:
+        """Do it for one unit; only now its imports come."""
+        getattr(import_module(self.module), self.function)(unit)
 
 
 def _read() -> tuple[Stage, ...]:
@@ -63,16 +69,18 @@ def _stage(
     scene: str,
     *,
     step: str,
-    module: str,
+    does: str,
     reads_recordings: bool = False,
     costs_s: float = _SHORT_S,
     **kinds: str,
 ) -> Stage:
     """``kinds``: names of kinds and options, by spaces."""
     name, level, part = (*step.split(), "")[:3]
+    module, function = does.split()
     lists: Any = {key: tuple(x.replace("@scene", scene).split()) for key, x in kinds.items()}
     lists |= {"part": part, "reads_recordings": reads_recordings, "costs_s": costs_s}
-    return Stage(name, level, summaries[name], module="bsip_cli.stages." + module, **lists)  # type: ignore[arg-type]
+    lists |= {"module": "bsip_cli.stages." + module, "function": function}
+    return Stage(name, level, summaries[name], **lists)  # type: ignore[arg-type]
 
 
 STAGES = _read()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
-import importlib
 import signal
 import time
 import traceback
@@ -262,7 +261,7 @@ def perform(unit: Unit, force: bool = False) -> Outcome:
         if not why and not force:
             return Outcome(stage.name, unit.name, "fresh")
         said = [f"{changed}: made again" for changed in was_changed(unit)]
-        importlib.import_module(stage.module).run(unit)
+        stage.run(unit)
         remove(unit.refusal_path())
     except BsipError as error:
         return _refused(unit, error)

@@ -1,8 +1,5 @@
-"""Cohort: every participant's numbers in one tidy table, and the tests between the methods.
-
-Reads bsip, fit, posturography, correlation-difference of all who have them, one participant after
-the other. Writes values, comparisons.
-"""
+"""Cohort: every participant's numbers in one tidy table, the tests between the methods, and of both
+the papers' six tables with the published values beside them, as CSV, Markdown and LaTeX."""
 
 from __future__ import annotations
 
@@ -16,8 +13,10 @@ from typing import Any
 
 import pandas as pd
 
+from bsip_cli.artifacts import file_rows, write_bytes
 from bsip_cli.errors import BadDataError
 from bsip_cli.pipeline import STAGES, producer
+from bsip_cli.report.tables.build import RENDERERS, build_tables, folder
 from bsip_cli.running.unit import Unit
 from bsip_cli.statistics.cohort import (
     DATA_SHARE,
@@ -50,7 +49,7 @@ SWAY |= {"rms_ap": "mm", "rms_ml": "mm", "rms_ap_origin": "m", "rms_ml_origin": 
 """Units of what of ``posturography`` is in table 3."""
 
 
-def run(unit: Unit) -> None:
+def run_tests(unit: Unit) -> None:
     cohort = _Cohort(unit)
     unit.write_in_parts("values", cohort.parts(), cohort.facts)
     unit.write("comparisons", cohort.comparisons(), cohort.facts())
@@ -275,3 +274,17 @@ def _correlations(recording: Recording) -> Iterator[CorrelationRun]:
         om, rm = ("r_a", "r_b") if row["method_a"] == OM else ("r_b", "r_a")
         place = (trial.participant_id, trial.stem, trial.task, recording.role, row["component"])
         yield CorrelationRun(*place, row[om], row[rm], row["r_ab"], row["n_effective"])
+
+
+# --- the papers' tables ---------------------------------------------------------------------------
+
+
+def run_tables(unit: Unit) -> None:
+    options, facts = unit.config.stats, unit.facts("values")
+    criteria, told = Criteria(options.alpha, options.equivalence_percent), unit.read("comparisons")
+    files = [
+        write_bytes(folder(unit.out) / f"{table.name}.{ending}", render(table).encode())
+        for table in build_tables(told, criteria, facts["fitted_on"], facts["missing"])
+        for ending, render in RENDERERS.items()
+    ]
+    unit.write("tables-files", file_rows(unit.out, files))

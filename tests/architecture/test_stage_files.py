@@ -16,7 +16,16 @@ LABELS = [stage.label for stage in STAGES]
 
 
 def tree_of(stage) -> ast.Module:
-    return ast.parse(inspect.getsource(importlib.import_module(stage.module)))
+    """The stage's function, with all of its module that this uses."""
+    whole = ast.parse(inspect.getsource(importlib.import_module(stage.module)))
+    parts = {n.name: n for n in whole.body if isinstance(n, ast.FunctionDef | ast.ClassDef)}
+    used, waiting = {}, [stage.function]
+    while waiting:
+        name = waiting.pop()
+        if name in parts and name not in used:
+            used[name] = parts[name]
+            waiting += [n.id for n in ast.walk(parts[name]) if isinstance(n, ast.Name)]
+    return ast.Module(list(used.values()), [])
 
 
 def options_used(tree: ast.Module) -> set[str]:
